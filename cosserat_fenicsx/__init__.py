@@ -1,0 +1,56 @@
+"""Geometrically exact rods on FEniCSx: equilibrium paths of special Cosserat rods under large displacements.
+
+Names load when they are first used, so that `import cosserat_fenicsx` and the command line's --help stay instant.
+"""
+
+import importlib
+from pathlib import Path as _FilePath
+
+__version__ = "0.1.0"
+
+_checkout = _FilePath(__file__).resolve().parent.parent
+if (_checkout / "forms" / "spatial.py").is_file() and (_checkout / "pyproject.toml").is_file():
+    # A plain checkout: forms/ lies beside the package, where an installation has it inside.
+    __path__.append(str(_checkout))
+
+_HOME = {
+    "analytic": None,
+    "Circle": "sections",
+    "Clamp": "supports",
+    "CosseratError": "errors",
+    "EccentricForce": "loads",
+    "Force": "loads",
+    "InstallationError": "errors",
+    "Interrupted": "errors",
+    "Line": "curves",
+    "Material": "materials",
+    "Moment": "loads",
+    "NotConverged": "errors",
+    "Path": "results",
+    "Rectangle": "sections",
+    "Rod": "rod",
+    "Scene": "scene",
+    "SceneError": "errors",
+    "StepControl": "continuation",
+    "Stiffness": "sections",
+    "Tube": "sections",
+    "Weight": "loads",
+    "euler_load": "rod",
+    "read_scene": "scenefile",
+    "solve": "statics",
+}
+__all__ = sorted(_HOME)
+
+
+def __getattr__(name):
+    if name not in _HOME:
+        raise AttributeError(f"module 'cosserat_fenicsx' has no attribute '{name}'")
+    if _HOME[name] is None:
+        return importlib.import_module(f"cosserat_fenicsx.{name}")
+    value = getattr(importlib.import_module(f"cosserat_fenicsx.{_HOME[name]}"), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__():
+    return sorted({*globals(), *__all__})

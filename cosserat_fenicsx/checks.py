@@ -1,0 +1,56 @@
+"""Checks of what a user hands in; every refusal names the field, its value and what was expected."""
+
+import math
+import numbers
+
+import numpy as np
+
+from cosserat_fenicsx.errors import SceneError
+
+
+def refuse(owner, field, value, expected):
+    """Raise a SceneError in the house's one wording."""
+    where = owner if isinstance(owner, str) else type(owner).__name__
+    raise SceneError(f"{where}.{field} = {value!r}: expected {expected}")
+
+
+def number(owner, field, value, expected, accept):
+    """`value` as a float where it is a number that `accept` accepts; refused otherwise."""
+    if isinstance(value, bool) or not isinstance(value, numbers.Real) or math.isnan(value) or not accept(value):
+        refuse(owner, field, value, expected)
+    return float(value)
+
+
+def positive(owner, field, value, unit):
+    """A finite number above zero."""
+    return number(owner, field, value, f"a positive number ({unit})", lambda x: 0 < x < math.inf)
+
+
+def stiffness(owner, field, value, unit):
+    """A number above zero; infinity is allowed."""
+    return number(owner, field, value, f"a positive number or infinity ({unit})", lambda x: x > 0)
+
+
+def vector(owner, field, value, unit, size=3):
+    """A tuple of `size` finite numbers."""
+    expected = f"{size} finite numbers ({unit})"
+    try:
+        array = np.asarray(value)
+    except ValueError:
+        refuse(owner, field, value, expected)
+    if array.shape != (size,) or array.dtype.kind not in "iuf" or not np.isfinite(array).all():
+        refuse(owner, field, value, expected)
+    return tuple(array.astype(float).tolist())
+
+
+def instance(owner, field, value, kinds, expected):
+    """`value`, refused where it is not one of `kinds`."""
+    if not isinstance(value, kinds):
+        refuse(owner, field, value, expected)
+    return value
+
+
+def store(obj, **fields):
+    """Set checked fields on a frozen dataclass from its __post_init__."""
+    for name, value in fields.items():
+        object.__setattr__(obj, name, value)

@@ -1,0 +1,153 @@
+"""The one place that knows which release of dolfinx is installed.
+
+Supported: 0.5.2 (Debian 12), 0.9.0 (Debian 13) and, by the same interface, 0.10 and later.
+Everything else in the package calls the functions below and never asks for a version.
+"""
+
+import logging
+
+from cosserat_fenicsx.errors import InstallationError
+
+_HOW_TO_INSTALL = (
+    "Install it with the system's packages (Debian and Ubuntu: 'apt install python3-dolfinx', then run the "
+    "interpreter that sees them, /usr/bin/python3 or a virtual environment made with --system-site-packages) "
+    "or with conda ('conda install -c conda-forge fenics-dolfinx'). In a checkout, 'make setup' does it all."
+)
+
+try:
+    import dolfinx
+    import ufl
+    from dolfinx import fem
+    from dolfinx import mesh as dolfinx_mesh
+    from petsc4py import PETSc
+except ImportError as missing:
+    raise InstallationError(f"dolfinx cannot be imported ({missing}). {_HOW_TO_INSTALL}") from missing
+
+_VERSION = tuple(int(part) for part in dolfinx.__version__.split(".")[:2])
+if _VERSION < (0, 5):
+    raise InstallationError(f"dolfinx {dolfinx.__version__} is too old: 0.5 or later is needed. {_HOW_TO_INSTALL}")
+
+
+def require_real_scalars(scalar_type=PETSc.ScalarType):
+    """Refuse a PETSc built for complex numbers: a rod's equilibrium is a real problem.
+
+    Raises:
+        InstallationError: PETSc's scalar is complex.
+    """
+    if "complex" in scalar_type.__name__:
+        raise InstallationError(
+            f"PETSc was built for complex numbers ({scalar_type.__name__}); cosserat_fenicsx needs the real build. "
+            "On Debian: 'apt install python3-dolfinx-real' and unset PETSC_DIR and PETSC_ARCH."
+        )
+
+
+require_real_scalars()
+
+if _VERSION < (0, 6):
+    # 0.5's just-in-time compiler reports every cache look-up at INFO on the root logger.
+    logging.getLogger().setLevel(max(logging.WARNING, logging.getLogger().level))
+    logging.getLogger("UFL").setLevel(logging.WARNING)
+    logging.getLogger("FFCx").setLevel(logging.WARNING)
+
+if _VERSION < (0, 8):
+
+    def lagrange(mesh, degree, size, *, discontinuous=False):
+        """A Lagrange element with `size` components: nodes at the Gauss-Lobatto points, numbered node by node."""
+        family = "Discontinuous Lagrange" if discontinuous else "Lagrange"
+        return ufl.VectorElement(family, mesh.ufl_cell(), degree, dim=size)
+
+    def at_quadrature_points(mesh, quadrature_degree, size):
+        """An element whose `size`-component values live at the Gauss points of `quadrature_degree`."""
+        return ufl.VectorElement(
+            "Quadrature", mesh.ufl_cell(), quadrature_degree, dim=size, quad_scheme="default"
+        )
+
+    def mixed(*elements):
+        """The product of several elements."""
+        return ufl.MixedElement(*elements)
+
+    def function_space(mesh, element):
+        """The finite element space of `element` on `mesh`."""
+        return fem.FunctionSpace(mesh, element)
+
+    def create_interval_mesh(comm, cells, x):
+        """A mesh of straight intervals in space from `cells (n, 2)` and `x (m, 3)`, given on rank 0 alone."""
+        cell = ufl.Cell("interval", geometric_dimension=3)
+        return dolfinx_mesh.create_mesh(comm, cells, x, ufl.Mesh(ufl.VectorElement("Lagrange", cell, 1)))
+
+    def evaluate(expression, mesh, cells):
+        """Values of a compiled expression in `cells`, shape (cells, points * components)."""
+        return expression.eval(cells)
+
+    def geometry_dofs(mesh):
+        """Indices into `mesh.geometry.x` of the two ends of every local cell, shape (cells, 2)."""
+        return mesh.geometry.dofmap.array.reshape(-1, 2)
+
+else:
+    import basix.ufl
+
+    def lagrange(mesh, degree, size, *, discontinuous=False):
+        """A Lagrange element with `size` components: nodes at the Gauss-Lobatto points, numbered node by node."""
+        return basix.ufl.element(
+            "Lagrange", mesh.basix_cell(), degree, shape=(size,), discontinuous=discontinuous or degree == 0
+        )
+
+    def at_quadrature_points(mesh, quadrature_degree, size):
+        """An element whose `size`-component values live at the Gauss points of `quadrature_degree`."""
+        return basix.ufl.quadrature_element(mesh.basix_cell(), value_shape=(size,), degree=quadrature_degree)
+
+    def mixed(*elements):
+        """The product of several elements."""
+        return basix.ufl.mixed_element(list(elements))
+
+    def function_space(mesh, element):
+        """The finite element space of `element` on `mesh`."""
+        return fem.functionspace(mesh, element)
+
+    def create_interval_mesh(comm, cells, x):
+        """A mesh of straight intervals in space from `cells (n, 2)` and `x (m, 3)`, given on rank 0 alone."""
+        coordinates = basix.ufl.element("Lagrange", "interval", 1, shape=(3,))
+        if _VERSION < (0, 10):
+            return dolfinx_mesh.create_mesh(comm, cells, x, coordinates)
+        return dolfinx_mesh.create_mesh(comm, cells, coordinates, x)
+
+    def evaluate(expression, mesh, cells):
+        """Values of a compiled expression in `cells`, shape (cells, points * components)."""
+        return expression.eval(mesh, cells).reshape(len(cells), -1)
+
+    def geometry_dofs(mesh):
+        """Indices into `mesh.geometry.x` of the two ends of every local cell, shape (cells, 2)."""
+        return mesh.geometry.dofmap
+
+
+def alias(function):
+    """A second UFL coefficient over the very same numbers as `function`.
+
+    FFCx keeps the value of a coefficient under a one-point rule as constant over the cell and then takes it for every
+    other rule of the same form too. A term with a rule of its own must therefore name its coefficient differently.
+    """
+    return fem.Function(function.function_space, function.x)
+
+
+def element_nodes(space):
+    """Reference coordinates in [0, 1] of the nodes of a blocked Lagrange space, in the order of its cell dofs."""
+    points = space.element.interpolation_points
+    return (points() if callable(points) else points)[:, 0].copy()
+
+
+def cell_nodes(space):
+    """Local node (block) indices of every local cell of a space, shape (cells, nodes per cell)."""
+    cells = space.dofmap.list
+    if not hasattr(cells, "array"):
+        return cells
+    return cells.array.reshape(cells.num_nodes, -1)
+
+
+def petsc_vector(function):
+    """The PETSc vector over a function's numbers."""
+    return function.vector if _VERSION < (0, 8) else function.x.petsc_vec
+
+
+def version():
+    """Release of dolfinx and of PETSc, for reports."""
+    return f"dolfinx {dolfinx.__version__}, PETSc {'.'.join(map(str, PETSc.Sys.getVersion()))}"

@@ -1,0 +1,47 @@
+"""What can go wrong, in words a user can act on."""
+
+import difflib
+
+
+class CosseratError(Exception):
+    """Anything this package refuses to do."""
+
+
+class InstallationError(CosseratError, ImportError):
+    """dolfinx is missing, too old, or built for complex numbers."""
+
+
+class SceneError(CosseratError, ValueError):
+    """A scene that cannot be solved as it is described: says what, where, and what was expected."""
+
+
+class NotConverged(CosseratError, RuntimeError):
+    """A solver could not go on.
+
+    Attributes:
+        path: everything up to the last converged point (a `Path`, possibly empty), or None where nothing was solved.
+    """
+
+    def __init__(self, message, path=None):
+        super().__init__(message)
+        self.path = path
+
+
+class Interrupted(KeyboardInterrupt):
+    """Ctrl-C during a solve.
+
+    Attributes:
+        path: everything up to the last converged point.
+    """
+
+    def __init__(self, path):
+        super().__init__("interrupted; the points already computed are kept in .path")
+        self.path = path
+
+
+def nearest(word, known):
+    """', did you mean ...?' for the known word nearest to `word`, or the list of known words."""
+    match = difflib.get_close_matches(str(word), list(known), n=1, cutoff=0.5)
+    if match:
+        return f"did you mean '{match[0]}'?"
+    return "known: " + ", ".join(sorted(known))

@@ -1,0 +1,136 @@
+"""What acts on a rod. All loads are multiplied by the load factor.
+
+A load says where it acts (`station` or the whole rod), which function of `forms.loads` is its virtual work, and the
+vectors that function takes, each with its unit. Nothing else in the package knows a load by name.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from cosserat_fenicsx.checks import instance, refuse, store, vector
+from cosserat_fenicsx.rod import Station
+
+
+@dataclass(frozen=True)
+class Force:
+    """A dead point force.
+
+    Args:
+        station: where it acts.
+        force: N, inertial; it keeps its direction.
+
+    Raises:
+        SceneError: not a station, or not three finite numbers.
+    """
+
+    station: Station
+    force: tuple
+
+    work = "force"
+
+    def __post_init__(self):
+        _check_station(self)
+        store(self, force=vector(self, "force", self.force, "N"))
+
+    def vectors(self, rod):
+        """The vectors of the virtual work, with their units."""
+        return ((self.force, "force"),)
+
+
+@dataclass(frozen=True)
+class Moment:
+    """A dead point moment.
+
+    Args:
+        station: where it acts.
+        moment: N m, inertial; it keeps its direction.
+
+    Raises:
+        SceneError: not a station, or not three finite numbers.
+    """
+
+    station: Station
+    moment: tuple
+
+    work = "moment"
+
+    def __post_init__(self):
+        _check_station(self)
+        store(self, moment=vector(self, "moment", self.moment, "N m"))
+
+    def vectors(self, rod):
+        """The vectors of the virtual work, with their units."""
+        return ((self.moment, "moment"),)
+
+
+@dataclass(frozen=True)
+class EccentricForce:
+    """A dead point force at the end of a rigid arm that turns with the section.
+
+    Args:
+        station: where the arm sits.
+        force: N, inertial.
+        offset: (a1, a2), the arm along d_1 and d_2, m.
+
+    Raises:
+        SceneError: not a station, or numbers that are not finite.
+    """
+
+    station: Station
+    force: tuple
+    offset: tuple
+
+    work = "eccentric_force"
+
+    def __post_init__(self):
+        _check_station(self)
+        store(self, force=vector(self, "force", self.force, "N"))
+        store(self, offset=vector(self, "offset", self.offset, "m", size=2))
+
+    def vectors(self, rod):
+        """The vectors of the virtual work, with their units."""
+        arm = rod.curve.frame(self.station.s) @ np.array([*self.offset, 0.0])
+        return ((self.force, "force"), (arm, "length"))
+
+
+@dataclass(frozen=True)
+class Weight:
+    """The weight of every rod of the scene, rho A g per unit of reference length.
+
+    Args:
+        gravity: m/s^2, inertial.
+
+    Raises:
+        SceneError: not three finite numbers; a rod without mass (raised by `Scene`).
+    """
+
+    gravity: tuple = (0.0, 0.0, -9.81)
+
+    work = "line_force"
+    station = None
+
+    def __post_init__(self):
+        store(self, gravity=vector(self, "gravity", self.gravity, "m/s^2"))
+
+    def check_rod(self, rod):
+        """Refuse a rod without mass."""
+        if rod.stiffness.mass is None:
+            field = "Stiffness.mass" if rod.material is None else "Material.density"
+            refuse(f"Rod '{rod.name}': {field.split('.')[0]}", field.split(".")[1], None, "a value, which Weight needs")
+
+    def vectors(self, rod):
+        """The vectors of the virtual work, with their units."""
+        return ((self.density(rod), "force per length"),)
+
+    def density(self, rod):
+        """Force per unit of reference length of a rod, N/m, inertial."""
+        return rod.stiffness.mass * np.asarray(self.gravity)
+
+
+def _check_station(load):
+    instance(load, "station", load.station, Station, "a station such as rod.end")
+
+
+#: Loads by the words of the scene file.
+LOADS = (Force, Moment, EccentricForce, Weight)

@@ -1,0 +1,128 @@
+"""The mesh of a scene's rods and the bookkeeping from dolfinx's numbering to arc length and back.
+
+Rods are numbered in the order of the scene, the elements and nodes of each from its start to its end; dolfinx numbers
+them as it likes, turns elements round and spreads them over the ranks. `slot` is the scene's own number of a node.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from cosserat_fenicsx import compat
+
+
+@dataclass(frozen=True)
+class Layout:
+    """How many elements each rod has and where their ends lie.
+
+    Attributes:
+        breaks: for every rod the arc lengths of its element ends over its length, from 0 to 1.
+    """
+
+    breaks: tuple
+
+    @classmethod
+    def of(cls, scene, elements):
+        """`elements` per rod, more only where supports and loads ask for an element end of their own."""
+        breaks = []
+        for rod in scene.rods:
+            stations = {x.station.s / rod.length for x in (*scene.supports, *scene.loads)
+                        if x.station is not None and x.station.rod is rod}  # fmt: skip
+            ends = sorted({0.0, 1.0} | {round(x, 12) for x in stations})
+            pieces = [
+                np.linspace(a, b, max(1, round(elements * (b - a))) + 1)[:-1]
+                for a, b in zip(ends[:-1], ends[1:], strict=True)
+            ]
+            breaks.append(np.append(np.concatenate(pieces), 1.0))
+        return cls(tuple(breaks))
+
+    @property
+    def counts(self):
+        """Elements of each rod."""
+        return tuple(len(b) - 1 for b in self.breaks)
+
+    @property
+    def first_cells(self):
+        """Number of the first element of each rod, and the number of all."""
+        return np.concatenate([[0], np.cumsum(self.counts)])
+
+    def vertex(self, scene, station):
+        """(rod index, element end) of a station that the layout was made for."""
+        rod = scene.rods.index(station.rod)
+        return rod, int(np.argmin(np.abs(self.breaks[rod] - station.s / station.rod.length)))
+
+    def node_s(self, nodes):
+        """Arc length over rod length of every node of each rod, for reference nodes sorted in [0, 1]."""
+        return [
+            np.append((b[:-1, None] + np.diff(b)[:, None] * nodes[None, :-1]).ravel(), 1.0) for b in self.breaks
+        ]
+
+
+class RodMesh:
+    """A dolfinx mesh of intervals in space, one chain per rod.
+
+    Args:
+        comm: MPI communicator.
+        counts: elements of each rod.
+    """
+
+    def __init__(self, comm, counts):
+        self.counts = counts
+        first_cell = np.concatenate([[0], np.cumsum(counts)])
+        first_vertex = first_cell[:-1] + np.arange(len(counts))
+        rods = np.repeat(np.arange(len(counts)), counts)
+        inner = np.arange(first_cell[-1]) - first_cell[rods]
+        v0 = first_vertex[rods] + inner
+        if comm.rank == 0:
+            cells = np.column_stack([v0, v0 + 1]).astype(np.int64)
+            x = np.zeros((first_cell[-1] + len(counts), 3))
+            x[:, 2] = np.arange(len(x))  # placed later, by `place`
+        else:
+            cells, x = np.empty((0, 2), dtype=np.int64), np.empty((0, 3))
+        self.mesh = compat.create_interval_mesh(comm, cells, x)
+        #: the scene's number of every local element, ghosts too
+        self.cells = np.asarray(self.mesh.topology.original_cell_index)
+        self.cell_rod, self.cell_inner = rods[self.cells], inner[self.cells]
+        ends = compat.geometry_dofs(self.mesh)[: len(self.cells)]
+        vertices = np.asarray(self.mesh.geometry.input_global_indices)
+        #: True where dolfinx runs an element from its end to its start
+        self.reversed = vertices[ends[:, 0]] != v0[self.cells]
+        self._vertex_rod = np.searchsorted(first_vertex, vertices, side="right") - 1
+        self._vertex_inner = vertices - first_vertex[self._vertex_rod]
+
+    def place(self, points):
+        """Move the element ends to `points`, one (n + 1, 3) array a rod (dimensionless)."""
+        offsets = np.concatenate([[0], np.cumsum([len(p) for p in points])])[:-1]
+        self.mesh.geometry.x[:] = np.concatenate(points)[offsets[self._vertex_rod] + self._vertex_inner]
+
+    def slots(self, space, degree):
+        """The scene's number of every local node of a degree-`degree` space, and its local number, both (nodes,)."""
+        order = np.argsort(np.argsort(compat.element_nodes(space)))
+        along = np.where(self.reversed[:, None], degree - order[None, :], order[None, :])
+        first_node = np.concatenate([[0], np.cumsum(np.asarray(self.counts) * degree + 1)])
+        slots = first_node[self.cell_rod][:, None] + self.cell_inner[:, None] * degree + along
+        node = compat.cell_nodes(space)[: len(self.cells)]
+        of_node = np.empty(node.max() + 1, dtype=np.int64)
+        of_node[node] = slots
+        return of_node
+
+
+class Gather:
+    """Collects values of owned entities from all ranks on every rank, in the scene's order."""
+
+    def __init__(self, comm, slots, total):
+        self._comm, self._total = comm, total
+        self._slots = np.concatenate(comm.allgather(slots)) if comm.size > 1 else slots
+        self._counts = np.array(comm.allgather(len(slots)))
+
+    def __call__(self, values):
+        """`values (owned, k)` -> (total, k)."""
+        values = np.ascontiguousarray(values)
+        result = np.empty((self._total, values.shape[1]))
+        if self._comm.size > 1:
+            everything = np.empty((self._counts.sum(), values.shape[1]))
+            sizes = self._counts * values.shape[1]
+            self._comm.Allgatherv(values, (everything, sizes))
+            values = everything
+        result[self._slots] = values
+        return result

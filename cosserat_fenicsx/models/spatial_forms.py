@@ -1,0 +1,164 @@
+"""The forms of `forms/spatial.py` on a model's mesh, compiled.
+
+All UFL is built before the first compilation: on dolfinx 0.5 the names of the code cache depend on what was compiled
+in between, and a cache that misses costs a second.
+"""
+
+from dataclasses import dataclass
+
+import basix
+import numpy as np
+import ufl
+from dolfinx import fem
+
+from cosserat_fenicsx import compat
+from cosserat_fenicsx.forms import spatial as eq
+
+
+@dataclass(frozen=True)
+class CompiledForms:
+    """What a solver assembles and evaluates.
+
+    Attributes:
+        residual, tangent: of the unknowns, live loads included.
+        dead: virtual work of the loads that do not depend on the motion, per unit of load factor; or None.
+        second_variation: symmetric form in (r, theta) whose negative squares tell stability.
+        fields: (n, m, r') at the Gauss points.
+        advance: the next carried n at the Gauss points; or None.
+        gauss, weights: points in [0, 1] of one element, and their weights.
+    """
+
+    residual: object
+    tangent: object
+    dead: object
+    second_variation: object
+    fields: object
+    advance: object
+    gauss: np.ndarray
+    weights: np.ndarray
+
+
+def compile_forms(model, rotations, carried_n):
+    """The `CompiledForms` of a `SpatialModel`.
+
+    Args:
+        model: supplies mesh, spaces, data and the load terms.
+        rotations: space of (r, theta) for the second variation.
+        carried_n: the Function n_k of the condensed variant, else None.
+    """
+    variant, points = model.shape.variant, model.shape.points
+    U, before, step = model.state, model.before, model.step
+    U_node = compat.alias(U)
+    data = model.data
+    gauss, at_nodes, at_ends = _measures(model)
+
+    def ds(a):
+        return a * data.stretch[0] * gauss
+
+    def ds_node(a):
+        return a * data.stretch[0] * at_nodes
+
+    def at_points(a):
+        return a * at_ends
+
+    def along(w):
+        return ufl.dot(ufl.grad(w), data.tangent)
+
+    R_R = ufl.as_matrix([[data.R_R[3 * i + j] for j in range(3)] for i in range(3)])
+    section = eq.Section(data.K, data.K_inv, data.J, R_R)
+    state = eq.state_of(U, along(U), U_node)
+    phi, trial = ufl.TestFunction(model.space), ufl.TrialFunction(model.space)
+    test = load_test = eq.tests_of(phi, along(phi))
+
+    def derivative(a):
+        names = a.coefficients() if isinstance(a, ufl.Form) else ufl.algorithms.extract_coefficients(a)
+        return sum(ufl.derivative(a, u, trial) for u in (U, U_node) if u in names)
+
+    n, m = eq.contact_force(state, section), eq.contact_moment(state, section)
+    advance = None
+    if variant == "field":
+        n = ufl.as_vector([U[i] for i in (7, 8, 9)])
+        phi_n = ufl.as_vector([phi[i] for i in (7, 8, 9)])
+        internal = eq.mixed(n, state, section, test, phi_n, ds, ds_node)
+    elif variant == "multiplier":
+        load_test = eq.variation_tests_of(phi, state.q_node)
+        lam = data.K[2] * U[7]  # lambda has the size of EA
+        internal = eq.multiplier(lam, phi[7], state, section, ds, lambda a: ufl.derivative(a, U, phi))
+    else:
+        internal = eq.displacement(state, section, test, ds, ds_node)
+    if variant == "condensed":
+        n = carried_n
+        tangent = eq.carried_force_tangent(n, state, section, test, ds, ds_node, derivative)
+        state_before = eq.state_of(before, along(before), before)
+        advance = eq.carried_force_update(n, state_before, section, lambda a: ufl.derivative(a, before, step))
+    else:
+        tangent = derivative(internal)
+
+    # Dead loads are a vector assembled once; live ones depend on q and enter residual and tangent.
+    dead, live = [], []
+    for work, place, vectors in model.terms:
+        integral = at_points if place == "point" else ds
+        term = integral(work(*vectors, load_test, state.q_node))
+        (live if {U, U_node} & set(term.coefficients()) else dead).append((term, (work, vectors, integral)))
+    residual = internal
+    for term, _ in live:
+        residual -= model.load_factor * term
+        tangent -= model.load_factor * derivative(term)
+
+    # The second variation in (r, theta) never leaves |q| = 1.
+    psi, w = ufl.TestFunction(rotations), ufl.TrialFunction(rotations)
+    rigid = eq.rotation_tests_of(psi, along(psi))
+    direction = [*eq.stability_direction(w, ufl.as_vector([w[3], w[4], w[5]]), state.q)]
+    direction = ufl.as_vector(direction + [0] * (U.ufl_shape[0] - 7))
+
+    def variation(a):
+        tangent = derivative(a)
+        if tangent == 0:  # no motion in it, such as a dead moment tested by a rotation
+            return 0
+        expanded = ufl.algorithms.expand_derivatives(tangent)
+        return ufl.algorithms.expand_derivatives(ufl.replace(expanded, {trial: direction}))
+
+    if variant in ("condensed", "field"):
+        stiff = section._replace(K=data.K_stiff)
+        second = eq.carried_force_tangent(n, state, stiff, rigid, ds, ds_node, variation)
+    else:
+        second = variation(ds(eq.balance(n, m, state, rigid)))
+    for _, (work, vectors, integral) in live:
+        second -= model.load_factor * variation(integral(work(*vectors, rigid, state.q_node)))
+    second = 0.5 * (second + ufl.adjoint(second))
+
+    fields = ufl.as_vector([*n, *m, *state.r_s])
+    points_2d, weights = basix.make_quadrature(basix.CellType.interval, 2 * points - 1)
+    dead = sum(term for term, _ in dead) if dead else None
+    return CompiledForms(
+        fem.form(residual),
+        fem.form(tangent),
+        fem.form(dead) if dead is not None else None,
+        fem.form(second),
+        fem.Expression(fields, points_2d),
+        fem.Expression(advance, points_2d) if advance is not None else None,
+        points_2d[:, 0],
+        weights,
+    )
+
+
+def _measures(model):
+    """Integrals by Gauss's points, at the nodes of P_p, and at the two ends of every element."""
+    nodes = model.nodes
+    weights = np.linalg.solve(np.vander(nodes, increasing=True).T, 1 / np.arange(1, len(nodes) + 1))
+    gauss = ufl.dx(domain=model.mesh, metadata={"quadrature_degree": 2 * model.shape.points - 1})
+    return gauss, _rule(model.mesh, nodes, weights), _rule(model.mesh, np.array([0.0, 1.0]), np.array([0.5, 0.5]))
+
+
+def _rule(mesh, points, weights):
+    # Tuples, and from 1 down to 0: UFL complains of arrays, and FFCx names a rule by three hexadecimal digits of a
+    # hash of its points, in which the Gauss and the Lobatto points of P4 collide.
+    return ufl.dx(
+        domain=mesh,
+        metadata={
+            "quadrature_rule": "custom",
+            "quadrature_degree": max(1, 2 * len(points) - 3),
+            "quadrature_points": tuple((float(x),) for x in points[::-1]),
+            "quadrature_weights": tuple(float(w) for w in weights[::-1]),
+        },
+    )

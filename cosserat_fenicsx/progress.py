@@ -1,0 +1,63 @@
+"""Progress of long runs: a bar on rank 0 of a terminal, plain lines elsewhere, nothing for what is over at once."""
+
+import sys
+import time
+
+_PATIENCE = 2.0  # s before a bar appears
+_LINE_EVERY = 10.0  # s between plain lines
+
+
+class Progress:
+    """Context manager that follows a path towards its last load factor.
+
+    Args:
+        targets: the requested load factors.
+        wanted: True, False, or None for where a person is likely to wait.
+        comm: MPI communicator; only rank 0 shows anything.
+    """
+
+    def __init__(self, targets, wanted, comm):
+        self._show = comm.rank == 0 and wanted is not False
+        self._now = wanted is True
+        self._terminal = sys.stderr.isatty()
+        way = [0.0, *targets]
+        self._way = sum(abs(b - a) for a, b in zip(way[:-1], way[1:], strict=True)) or 1.0
+        self._bar = None
+
+    def __enter__(self):
+        self._began = self._last = time.monotonic()
+        return self
+
+    def start(self, what):
+        """A new run over the whole way."""
+        self._what, self._done, self._eta = what, 0.0, 0.0
+        if self._bar is not None:
+            self._bar.reset(self._task, description=what)
+
+    def at(self, point):
+        """The run has come to a point."""
+        self._done += abs(point.load_factor - self._eta)
+        self._eta = point.load_factor
+        now = time.monotonic()
+        if not self._show or (now - self._began < _PATIENCE and not self._now):
+            return
+        if self._terminal:
+            self._draw()
+        elif now - self._last >= _LINE_EVERY or (self._now and self._last == self._began):
+            self._last = now
+            print(f"{self._what}: load factor {self._eta:.6g}, {100 * self._done / self._way:.0f} %", file=sys.stderr)
+
+    def _draw(self):
+        if self._bar is None:
+            from rich.console import Console
+            from rich.progress import Progress as Bar
+
+            self._bar = Bar(console=Console(stderr=True), transient=True)
+            self._bar.start()
+            self._task = self._bar.add_task(self._what, total=1.0)
+        self._bar.update(self._task, completed=min(self._done / self._way, 1.0),
+                         description=f"{self._what}, load factor {self._eta:.4g}")  # fmt: skip
+
+    def __exit__(self, *exception):
+        if self._bar is not None:
+            self._bar.stop()

@@ -1,0 +1,126 @@
+"""PETSc SNES on a `Problem`: full Newton steps, stopped on the increment and the residual together.
+
+Residual norms alone converge falsely (slender rods have a round-off floor in |F| that grows with EA L^2/EI), and
+PETSc's default line search cripples eq. (1); so the line search is `basic` and the test is this file's own.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from petsc4py import PETSc
+
+#: Newton stops when the error that remains after a step, by its contraction, is below this (root mean square, units L, 1).
+INCREMENT = 1e-11
+_HUGE = 1e3
+
+
+@dataclass(frozen=True)
+class Solved:
+    """Outcome of one Newton solve: whether it converged, its iterations, and why it stopped, in words."""
+
+    converged: bool
+    iterations: int
+    reason: str
+
+
+class Newton:
+    """Newton's method for one problem.
+
+    Args:
+        problem: a `Problem`.
+    """
+
+    def __init__(self, problem):
+        self.problem = problem
+        comm = problem.model.comm
+        self.snes = snes = PETSc.SNES().create(comm)
+        prefix = f"cosserat_{id(self):x}_"
+        snes.setOptionsPrefix(prefix)
+        options = PETSc.Options()
+        options[f"{prefix}snes_linesearch_type"] = "basic"
+        snes.setType("newtonls")
+        snes.setFunction(problem.function, problem.b)
+        snes.setJacobian(problem.jacobian, problem.A)
+        snes.setUpdate(self._carry)
+        snes.setConvergenceTest(self._test)
+        snes.getKSP().setType("preonly")
+        pc = snes.getKSP().getPC()
+        pc.setType("lu")
+        if comm.size == 1:
+            pc.setFactorSolverType("klu")  # pivots; PETSc's own LU does not, and q_a may be zero
+        else:
+            pc.setFactorSolverType("mumps")
+            options[f"{prefix}mat_mumps_icntl_14"] = 200  # room for fill; too little fails without a word
+        snes.setFromOptions()
+        for option in (f"{prefix}snes_linesearch_type", f"{prefix}mat_mumps_icntl_14"):
+            if options.hasName(option):
+                options.delValue(option)
+
+    def allow(self, iterations):
+        """Give up beyond this number of iterations."""
+        self.max_iterations = iterations
+        self.snes.setTolerances(max_it=iterations + 1)  # the test below is the one that stops
+
+    def solve(self):
+        """Newton from the problem's x (and carried fields) at the model's load factor; x and the state follow.
+
+        Returns:
+            Solved. Where it has not converged, x is no equilibrium.
+        """
+        problem, model = self.problem, self.problem.model
+        self._steps = []
+        x = problem.x
+        problem.set_state(x)
+        model.before.x.array[:] = model.state.x.array
+        self.snes.solve(None, x)
+        reason = self.snes.getConvergedReason()
+        problem.set_state(x)
+        if reason > 0:
+            self._advance()
+        return Solved(reason > 0, len(self._steps), _WORDS.get(reason, f"PETSc's reason {reason}"))
+
+    def _carry(self, snes, iteration):
+        if iteration > 0:
+            self._advance()
+
+    def _advance(self):
+        """Carry n over the step from `before` to the state."""
+        model = self.problem.model
+        if not model.carried:
+            return
+        now, before = model.state.x.array, model.before.x.array
+        np.subtract(now, before, out=model.step.x.array)
+        model.advance()
+        before[:] = now
+
+    def _test(self, snes, iteration, norms):
+        _, step, residual = norms
+        Reason = PETSc.SNES.ConvergedReason
+        if not np.isfinite(residual):
+            return Reason.DIVERGED_FNORM_NAN
+        if iteration == 0:
+            return Reason.CONVERGED_ITERATING
+        problem = self.problem
+        step /= np.sqrt(problem.model.unknowns)
+        self._steps.append(step)
+        if not step < _HUGE:
+            return Reason.DIVERGED_DTOL
+        contraction = step / self._steps[-2] if iteration > 1 else 1.0
+        remaining = step * contraction / (1 - contraction) if contraction < 0.9 else step
+        eta = abs(float(problem.model.load_factor.value))
+        floor = 1e3 * np.finfo(float).eps * problem.model.stiffest
+        balanced = residual <= 1e-6 * (1 + eta * problem.load_norm) + floor
+        if balanced and (remaining <= INCREMENT or step <= INCREMENT):
+            return Reason.CONVERGED_SNORM_RELATIVE
+        if iteration >= self.max_iterations:
+            return Reason.DIVERGED_MAX_IT
+        return Reason.CONVERGED_ITERATING
+
+
+_WORDS = {
+    PETSc.SNES.ConvergedReason.CONVERGED_SNORM_RELATIVE: "converged",
+    PETSc.SNES.ConvergedReason.DIVERGED_MAX_IT: "Newton's iterations ran out",
+    PETSc.SNES.ConvergedReason.DIVERGED_DTOL: "Newton's steps grew without bound",
+    PETSc.SNES.ConvergedReason.DIVERGED_FNORM_NAN: "the residual is not a number",
+    PETSc.SNES.ConvergedReason.DIVERGED_LINEAR_SOLVE: "the tangent is singular",
+}

@@ -1,0 +1,177 @@
+"""`solve`: from a scene to its equilibrium path, on a mesh that is fine enough for the accuracy asked for."""
+
+import functools
+import math
+import numbers
+
+import numpy as np
+from mpi4py import MPI
+
+from cosserat_fenicsx.continuation import Continuation, StepControl
+from cosserat_fenicsx.errors import Interrupted, NotConverged, SceneError, nearest
+from cosserat_fenicsx.models.rodmesh import Layout
+from cosserat_fenicsx.models.spatial import Shape, SpatialModel
+from cosserat_fenicsx.problem import Problem
+from cosserat_fenicsx.progress import Progress
+from cosserat_fenicsx.results import Path, Record
+from cosserat_fenicsx.scene import Scene
+from cosserat_fenicsx.snes import Newton
+from cosserat_fenicsx.stability import NegativeModes
+
+MODELS = ("auto", "spatial")
+_MOST_ELEMENTS = 1024
+
+
+def solve(
+    scene,
+    load_factors,
+    *,
+    model="auto",
+    formulation=None,
+    tol=1e-6,
+    elements=None,
+    degree=None,
+    steps=None,
+    progress=None,
+    comm=None,
+):
+    """Equilibrium path of a scene from its unloaded reference over the load factors.
+
+    Args:
+        scene: a `Scene`.
+        load_factors: a list or array, landed on exactly in its order; or a pair (a, b), a tuple, between which the
+            solver chooses its steps; or one number.
+        model: "auto" or "spatial".
+        formulation: "mixed" (default), "displacement" or "multiplier"; see the README.
+        tol: largest estimated error of the positions along the rods, relative to the largest displacement of the
+            scene at that load factor. Elements are refined until it is met, unless `elements` is given.
+        elements: elements per rod; fixes the mesh, and `Path.error` is then not estimated (NaN).
+        degree: 1 to 4, of r and q; default 4 (2 for the other formulations).
+        steps: a `StepControl`.
+        progress: True, False, or None for a bar on long runs in a terminal.
+        comm: MPI communicator; default all ranks. Every rank calls, every rank gets the same Path.
+
+    Returns:
+        Path.
+
+    Raises:
+        SceneError: an argument outside its range.
+        NotConverged: the path cannot be continued, or the accuracy not be met; `.path` holds what was reached.
+        Interrupted: Ctrl-C; `.path` holds what was reached.
+    """
+    comm = comm or MPI.COMM_WORLD
+    targets, free = _targets(load_factors)
+    formulation = formulation or "mixed"
+    degree = degree or (4 if formulation == "mixed" else 2)
+    _check(scene, model, tol, elements)
+    steps = steps or StepControl()
+    run = functools.partial(_run, scene, formulation=formulation, degree=degree, steps=steps, comm=comm)
+    with Progress(targets, progress, comm) as bar:
+        if elements is not None:
+            return run(targets, free, elements, bar=bar)
+        return _refine(run, targets, free, tol, degree, bar)
+
+
+def _refine(run, targets, free, tol, degree, bar):
+    """Solve on finer and finer meshes until two of them agree to `tol`."""
+    elements, coarse, failed = 4, None, None
+    while elements <= _MOST_ELEMENTS:
+        try:
+            fine = run(targets, free, elements, bar=bar)
+        except NotConverged as failure:
+            if failed is not None:
+                raise
+            failed, coarse = failure, None
+            elements *= 2
+            continue
+        failed = None
+        if free:  # the steps that one mesh chose are landed on by the finer ones
+            targets, free = fine.load_factors.tolist(), False
+        if coarse is not None:
+            fine.estimate_error(coarse)
+            if fine.error.max() <= tol:
+                return fine
+        coarse = fine
+        elements *= 2
+    raise NotConverged(
+        f"the accuracy tol = {tol:g} was not reached with {_MOST_ELEMENTS} elements of degree {degree} per rod: "
+        f"the estimated error is {coarse.error.max():.2g}. Ask for a larger tol or a higher degree.",
+        coarse,
+    )
+
+
+@functools.lru_cache(maxsize=16)
+def _solvers(comm_handle, shape):
+    """Problem, Newton solver and stability count of a shape: compiled once, used for every scene of that shape."""
+    model = SpatialModel(MPI.Comm.f2py(comm_handle), shape)
+    problem = Problem(model)
+    return problem, Newton(problem), NegativeModes(model)
+
+
+def _run(scene, targets, free, elements, *, formulation, degree, steps, comm, bar):
+    """One path on one mesh."""
+    layout = Layout.of(scene, elements)
+    shape = Shape.of(scene, layout, formulation=formulation, degree=degree)
+    problem, newton, stability = _solvers(comm.py2f(), shape)
+    problem.load(scene, layout)
+    stability.load()
+    continuation = Continuation(problem, newton, stability, steps)
+    path = Path.of(problem.model, formulation)
+    bar.start(f"{path.model}, {problem.model.unknowns} unknowns")
+    way = max(abs(eta) for eta in targets) or 1.0
+    counted = 0
+
+    def record(point):
+        nonlocal counted
+        path.append(Record(point.load_factor, *problem.model.snapshot(), point.negative_modes,
+                           continuation.iterations - counted))  # fmt: skip
+        counted = continuation.iterations
+
+    try:
+        for k, target in enumerate(targets):
+            between = free and k == 1
+            on_step = (lambda point: (record(point), bar.at(point))) if between else bar.at
+            if not continuation.to(target, way, on_step=on_step):
+                here = continuation.here.load_factor
+                raise NotConverged(
+                    f"no equilibrium was found beyond the load factor {here:.6g} on the way to {target:g}: "
+                    f"{continuation.failure}. {_advice(steps)}",
+                    path,
+                )
+            if not between:
+                record(continuation.here)
+    except KeyboardInterrupt:
+        raise Interrupted(path) from None
+    return path
+
+
+def _advice(steps):
+    if not steps.adaptive:
+        return "Let the steps adapt (StepControl(adaptive=True)) or ask for load factors in between."
+    return (
+        "The rod may have a limit point there, which load control cannot pass; otherwise try a smaller "
+        "StepControl.first, more elements, or formulation='mixed'. The points before are in .path."
+    )
+
+
+def _targets(load_factors):
+    """([load factors], whether the solver may choose the steps between the two)."""
+    free = isinstance(load_factors, tuple) and len(load_factors) == 2
+    values = [load_factors] if isinstance(load_factors, numbers.Real) else list(load_factors)
+    if not values:
+        raise SceneError("load_factors is empty: expected at least one number")
+    for value in values:
+        if isinstance(value, bool) or not isinstance(value, numbers.Real) or not math.isfinite(value):
+            raise SceneError(f"load_factors holds {value!r}: expected finite numbers")
+    return [float(value) for value in values], free
+
+
+def _check(scene, model, tol, elements):
+    if not isinstance(scene, Scene):
+        raise SceneError(f"scene = {scene!r}: expected a Scene")
+    if model not in MODELS:
+        raise SceneError(f"model = {model!r}: {nearest(model, MODELS)}")
+    if isinstance(tol, bool) or not isinstance(tol, numbers.Real) or not 1e-12 <= tol < 1:
+        raise SceneError(f"tol = {tol!r}: expected a number from 1e-12 to below 1")
+    if elements is not None and (isinstance(elements, bool) or not isinstance(elements, numbers.Integral) or elements < 1):
+        raise SceneError(f"elements = {elements!r}: expected a whole number above zero")
