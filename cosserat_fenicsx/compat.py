@@ -4,6 +4,7 @@ Supported: 0.5.2 (Debian 12), 0.9.0 (Debian 13) and, by the same interface, 0.10
 Everything else in the package calls the functions below and never asks for a version.
 """
 
+import contextlib
 import logging
 
 from cosserat_fenicsx.errors import InstallationError
@@ -43,11 +44,16 @@ def require_real_scalars(scalar_type=PETSc.ScalarType):
 
 require_real_scalars()
 
-if _VERSION < (0, 6):
-    # 0.5's just-in-time compiler reports every cache look-up at INFO on the root logger.
-    logging.getLogger().setLevel(max(logging.WARNING, logging.getLogger().level))
-    logging.getLogger("UFL").setLevel(logging.WARNING)
-    logging.getLogger("FFCx").setLevel(logging.WARNING)
+@contextlib.contextmanager
+def quiet_compiler():
+    """Silence the just-in-time compiler's log: 0.5 reports every build and cache look-up at INFO on the root logger."""
+    before = logging.root.manager.disable
+    logging.disable(max(before, logging.INFO))
+    try:
+        yield
+    finally:
+        logging.disable(before)
+
 
 if _VERSION < (0, 8):
 

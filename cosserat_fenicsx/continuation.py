@@ -6,6 +6,7 @@ converged, if the prediction was near the result, and if no new negative mode ap
 smallest step, the path itself has lost its stability, and its points say so.
 """
 
+import math
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -127,10 +128,10 @@ class Continuation:
 
     def _attempt(self, eta, *, guard, on_step):
         """One step: predict, correct, judge. Accepts it (True) or restores the last point (False)."""
-        model, here = self.model, self.here
+        here = self.here
         predicted = self._predict(eta) if self.control.adaptive else here.numbers
         self._put(predicted)
-        model.load_factor.value = eta
+        self.problem.set_load_factor(eta)
         solved = self.newton.solve()
         self.iterations += solved.iterations
         self._shrink = 0.5
@@ -165,17 +166,16 @@ class Continuation:
 
     def _predict(self, eta):
         """Numbers at eta by the polynomial through the last points (constant, secant, quadratic)."""
-        known = self._history[-3:]
-        if len(known) == 3 and len({p.load_factor for p in known}) < 3:
-            known = known[-1:]
+        known = self._history
         etas = [p.load_factor for p in known]
-        weights = [
-            np.prod([(eta - b) / (a - b) for b in etas if b != a]) for a in etas
-        ]  # Lagrange's
-        return [
-            sum(w * numbers for w, numbers in zip(weights, arrays, strict=True))
-            for arrays in zip(*(p.numbers for p in known), strict=True)
-        ]
+        if len(set(etas)) < len(etas):  # the path turned back on itself
+            known, etas = known[-1:], etas[-1:]
+        weights = [math.prod((eta - b) / (a - b) for b in etas if b != a) for a in etas]  # Lagrange's
+        predicted = [weights[-1] * numbers for numbers in known[-1].numbers]
+        for weight, point in zip(weights[:-1], known[:-1], strict=True):
+            for total, numbers in zip(predicted, point.numbers, strict=True):
+                total += weight * numbers
+        return predicted
 
     def _distance(self, a, b):
         """Largest difference of r (lengths) and of the rotation (rad, about twice that of q), over all ranks."""
@@ -192,5 +192,5 @@ class Continuation:
 
     def _restore(self):
         self._put(self.here.numbers)
-        self.model.load_factor.value = self.here.load_factor
+        self.problem.set_load_factor(self.here.load_factor)
         return False

@@ -22,37 +22,38 @@ class Problem:
     def __init__(self, model):
         self.model = model
         self.A = fem_petsc.create_matrix(model.forms.tangent)
-        self.b = self.A.createVecLeft()
+        self._functions = [fem.Function(model.space) for _ in range(2)]  # own the numbers of b and of the dead loads
+        self.b, self._dead = (compat.petsc_vector(function) for function in self._functions)
         self.x = self.A.createVecRight()
-        self._dead = self.A.createVecLeft()
         self._state = compat.petsc_vector(model.state)
-        self._assembled = fem.Function(model.space)
-        self._assembled_vector = compat.petsc_vector(self._assembled)
         self._parallel = model.comm.size > 1
-        self.load_norm = 0.0
+        self.load_factor = self.load_norm = 0.0
 
     def load(self, scene, layout):
         """Take the numbers of a scene; the state becomes its reference configuration."""
         model = self.model
         model.load(scene, layout)
-        held = fem.Function(model.space)
-        self._supports = [clamp(held, model.fixed)]
+        self._supports = [clamp(fem.Function(model.space), model.fixed)]
         self._fixed_owned = model.fixed[model.fixed < model.owned]
         self._dead.set(0.0)
         if model.forms.dead is not None:
             self._assemble(model.forms.dead, self._dead)
         self._dead.array_w[self._fixed_owned] = 0.0
         self.load_norm = self._dead.norm()
+        self.set_load_factor(0.0)
         self.x.array_w[:] = model.state.x.array[: model.owned]
 
+    def set_load_factor(self, eta):
+        """Multiply all loads by eta from now on."""
+        self.load_factor = eta
+        self.model.load_factor.value = eta
+
     def _assemble(self, form, vector):
-        local = self._assembled_vector
-        with local.localForm() as numbers:
+        with vector.localForm() as numbers:
             numbers.set(0.0)
-        fem_petsc.assemble_vector(local, form)
+        fem_petsc.assemble_vector(vector, form)
         if self._parallel:
-            local.ghostUpdate(PETSc.InsertMode.ADD, PETSc.ScatterMode.REVERSE)
-        local.copy(vector)
+            vector.ghostUpdate(PETSc.InsertMode.ADD, PETSc.ScatterMode.REVERSE)
 
     def set_state(self, x):
         """Put a PETSc vector into the model's state, ghosts too."""
@@ -64,7 +65,7 @@ class Problem:
         """Residual at x for SNES; the supports' rows are zero because every guess satisfies them."""
         self.set_state(x)
         self._assemble(self.model.forms.residual, b)
-        b.axpy(-float(self.model.load_factor.value), self._dead)
+        b.axpy(-self.load_factor, self._dead)
         b.array_w[self._fixed_owned] = 0.0
 
     def jacobian(self, snes, x, A, P):

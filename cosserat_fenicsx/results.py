@@ -107,7 +107,7 @@ class Path:
         return q / np.linalg.norm(q, axis=1, keepdims=True)
 
     def rotation_angle(self, station):
-        """(n,) rad: total angle of `rotation`, 0 .. 2 pi and beyond where it grew continuously along the path."""
+        """(n,) rad: angle of `rotation`, in [0, 2 pi]; not folded back at pi, because q is continuous along the path."""
         q = self.rotation(station)
         half = np.arctan2(np.linalg.norm(q[:, 1:], axis=1), q[:, 0])
         return 2 * half

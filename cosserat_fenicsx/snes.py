@@ -4,14 +4,19 @@ Residual norms alone converge falsely (slender rods have a round-off floor in |F
 PETSc's default line search cripples eq. (1); so the line search is `basic` and the test is this file's own.
 """
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 from petsc4py import PETSc
 
+from cosserat_fenicsx import linear
+
 #: Newton stops when the error that remains after a step, by its contraction, is below this (root mean square, units L, 1).
 INCREMENT = 1e-11
 _HUGE = 1e3
+_EPS = float(np.finfo(float).eps)
+_Reason = PETSc.SNES.ConvergedReason
 
 
 @dataclass(frozen=True)
@@ -32,29 +37,23 @@ class Newton:
 
     def __init__(self, problem):
         self.problem = problem
+        self._root = math.sqrt(problem.model.unknowns)
         comm = problem.model.comm
         self.snes = snes = PETSc.SNES().create(comm)
-        prefix = f"cosserat_{id(self):x}_"
-        snes.setOptionsPrefix(prefix)
-        options = PETSc.Options()
-        options[f"{prefix}snes_linesearch_type"] = "basic"
         snes.setType("newtonls")
         snes.setFunction(problem.function, problem.b)
         snes.setJacobian(problem.jacobian, problem.A)
         snes.setUpdate(self._carry)
         snes.setConvergenceTest(self._test)
-        snes.getKSP().setType("preonly")
-        pc = snes.getKSP().getPC()
-        pc.setType("lu")
-        if comm.size == 1:
-            pc.setFactorSolverType("klu")  # pivots; PETSc's own LU does not, and q_a may be zero
-        else:
-            pc.setFactorSolverType("mumps")
-            options[f"{prefix}mat_mumps_icntl_14"] = 200  # room for fill; too little fails without a word
+        ksp = snes.getKSP()
+        ksp.setType("preonly")
+        linear.factor_tangent(ksp.getPC(), problem.A)
+        # petsc4py 3.18 cannot reach the line search but by an option.
+        option, options = f"cosserat_{id(self):x}_snes_linesearch_type", PETSc.Options()
+        snes.setOptionsPrefix(option.removesuffix("snes_linesearch_type"))
+        options[option] = "basic"
         snes.setFromOptions()
-        for option in (f"{prefix}snes_linesearch_type", f"{prefix}mat_mumps_icntl_14"):
-            if options.hasName(option):
-                options.delValue(option)
+        options.delValue(option)
 
     def allow(self, iterations):
         """Give up beyond this number of iterations."""
@@ -95,32 +94,30 @@ class Newton:
 
     def _test(self, snes, iteration, norms):
         _, step, residual = norms
-        Reason = PETSc.SNES.ConvergedReason
-        if not np.isfinite(residual):
-            return Reason.DIVERGED_FNORM_NAN
+        if not math.isfinite(residual):
+            return _Reason.DIVERGED_FNORM_NAN
         if iteration == 0:
-            return Reason.CONVERGED_ITERATING
+            return _Reason.CONVERGED_ITERATING
         problem = self.problem
-        step /= np.sqrt(problem.model.unknowns)
+        step /= self._root
         self._steps.append(step)
         if not step < _HUGE:
-            return Reason.DIVERGED_DTOL
+            return _Reason.DIVERGED_DTOL
         contraction = step / self._steps[-2] if iteration > 1 else 1.0
         remaining = step * contraction / (1 - contraction) if contraction < 0.9 else step
-        eta = abs(float(problem.model.load_factor.value))
-        floor = 1e3 * np.finfo(float).eps * problem.model.stiffest
-        balanced = residual <= 1e-6 * (1 + eta * problem.load_norm) + floor
+        floor = 1e3 * _EPS * problem.model.stiffest
+        balanced = residual <= 1e-6 * (1 + abs(problem.load_factor) * problem.load_norm) + floor
         if balanced and (remaining <= INCREMENT or step <= INCREMENT):
-            return Reason.CONVERGED_SNORM_RELATIVE
+            return _Reason.CONVERGED_SNORM_RELATIVE
         if iteration >= self.max_iterations:
-            return Reason.DIVERGED_MAX_IT
-        return Reason.CONVERGED_ITERATING
+            return _Reason.DIVERGED_MAX_IT
+        return _Reason.CONVERGED_ITERATING
 
 
 _WORDS = {
-    PETSc.SNES.ConvergedReason.CONVERGED_SNORM_RELATIVE: "converged",
-    PETSc.SNES.ConvergedReason.DIVERGED_MAX_IT: "Newton's iterations ran out",
-    PETSc.SNES.ConvergedReason.DIVERGED_DTOL: "Newton's steps grew without bound",
-    PETSc.SNES.ConvergedReason.DIVERGED_FNORM_NAN: "the residual is not a number",
-    PETSc.SNES.ConvergedReason.DIVERGED_LINEAR_SOLVE: "the tangent is singular",
+    _Reason.CONVERGED_SNORM_RELATIVE: "converged",
+    _Reason.DIVERGED_MAX_IT: "Newton's iterations ran out",
+    _Reason.DIVERGED_DTOL: "Newton's steps grew without bound",
+    _Reason.DIVERGED_FNORM_NAN: "the residual is not a number",
+    _Reason.DIVERGED_LINEAR_SOLVE: "the tangent is singular",
 }

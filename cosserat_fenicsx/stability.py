@@ -8,6 +8,7 @@ from dolfinx import fem
 from dolfinx.fem import petsc as fem_petsc
 from petsc4py import PETSc
 
+from cosserat_fenicsx import linear
 from cosserat_fenicsx.problem import clamp
 
 
@@ -23,11 +24,7 @@ class NegativeModes:
         self.K = fem_petsc.create_matrix(model.forms.second_variation)
         self.K.setOption(PETSc.Mat.Option.SYMMETRIC, True)
         self.pc = PETSc.PC().create(model.comm)
-        self.pc.setType("cholesky")
-        if model.comm.size == 1:
-            self.pc.setFactorOrdering("nd")
-        else:
-            self.pc.setFactorSolverType("mumps")
+        linear.factor_second_variation(self.pc, self.K)
 
     def load(self):
         """Take the supports of the scene the model was loaded with."""

@@ -19,6 +19,8 @@ from cosserat_fenicsx.snes import Newton
 from cosserat_fenicsx.stability import NegativeModes
 
 MODELS = ("auto", "spatial")
+#: Elements per rod of the first mesh, where the mesh is not given.
+FIRST_ELEMENTS = 4
 _MOST_ELEMENTS = 1024
 
 
@@ -31,6 +33,7 @@ def solve(
     tol=1e-6,
     elements=None,
     degree=None,
+    gauss_points=None,
     steps=None,
     progress=None,
     comm=None,
@@ -47,6 +50,7 @@ def solve(
             scene at that load factor. Elements are refined until it is met, unless `elements` is given.
         elements: elements per rod; fixes the mesh, and `Path.error` is then not estimated (NaN).
         degree: 1 to 4, of r and q; default 4 (2 for the other formulations).
+        gauss_points: of an element; default `degree`, which does not lock. More of them lock (README, Formulations).
         steps: a `StepControl`.
         progress: True, False, or None for a bar on long runs in a terminal.
         comm: MPI communicator; default all ranks. Every rank calls, every rank gets the same Path.
@@ -62,10 +66,12 @@ def solve(
     comm = comm or MPI.COMM_WORLD
     targets, free = _targets(load_factors)
     formulation = formulation or "mixed"
-    degree = degree or (4 if formulation == "mixed" else 2)
-    _check(scene, model, tol, elements)
+    degree = degree or default_degree(formulation)
+    check_arguments(scene, model, tol, elements)
     steps = steps or StepControl()
-    run = functools.partial(_run, scene, formulation=formulation, degree=degree, steps=steps, comm=comm)
+    run = functools.partial(
+        _run, scene, formulation=formulation, degree=degree, points=gauss_points, steps=steps, comm=comm
+    )
     with Progress(targets, progress, comm) as bar:
         if elements is not None:
             return run(targets, free, elements, bar=bar)
@@ -74,7 +80,7 @@ def solve(
 
 def _refine(run, targets, free, tol, degree, bar):
     """Solve on finer and finer meshes until two of them agree to `tol`."""
-    elements, coarse, failed = 4, None, None
+    elements, coarse, failed = FIRST_ELEMENTS, None, None
     while elements <= _MOST_ELEMENTS:
         try:
             fine = run(targets, free, elements, bar=bar)
@@ -108,13 +114,21 @@ def _solvers(comm_handle, shape):
     return problem, Newton(problem), NegativeModes(model)
 
 
-def _run(scene, targets, free, elements, *, formulation, degree, steps, comm, bar):
-    """One path on one mesh."""
+def solvers_of(scene, *, elements, formulation="mixed", degree=4, points=None, comm=None):
+    """The loaded problem, Newton solver and stability count for a scene on a given mesh, as `solve` uses them."""
     layout = Layout.of(scene, elements)
-    shape = Shape.of(scene, layout, formulation=formulation, degree=degree)
-    problem, newton, stability = _solvers(comm.py2f(), shape)
+    shape = Shape.of(scene, layout, formulation=formulation, degree=degree, points=points)
+    problem, newton, stability = _solvers((comm or MPI.COMM_WORLD).py2f(), shape)
     problem.load(scene, layout)
     stability.load()
+    return problem, newton, stability
+
+
+def _run(scene, targets, free, elements, *, formulation, degree, points, steps, comm, bar):
+    """One path on one mesh."""
+    problem, newton, stability = solvers_of(
+        scene, elements=elements, formulation=formulation, degree=degree, points=points, comm=comm
+    )
     continuation = Continuation(problem, newton, stability, steps)
     path = Path.of(problem.model, formulation)
     bar.start(f"{path.model}, {problem.model.unknowns} unknowns")
@@ -166,7 +180,17 @@ def _targets(load_factors):
     return [float(value) for value in values], free
 
 
-def _check(scene, model, tol, elements):
+def default_degree(formulation):
+    """Degree of r and q where none is asked for."""
+    return 4 if formulation == "mixed" else 2
+
+
+def check_arguments(scene, model, tol, elements):
+    """Refuse arguments of `solve` outside their range.
+
+    Raises:
+        SceneError: naming the argument, its value and what was expected.
+    """
     if not isinstance(scene, Scene):
         raise SceneError(f"scene = {scene!r}: expected a Scene")
     if model not in MODELS:

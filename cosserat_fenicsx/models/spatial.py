@@ -51,6 +51,8 @@ class Shape:
             raise SceneError(f"formulation = {formulation!r}: {nearest(formulation, FORMULATIONS)}")
         if degree not in (1, 2, 3, 4):
             raise SceneError(f"degree = {degree!r}: expected 1, 2, 3 or 4")
+        if points is not None and (not isinstance(points, int) or not 1 <= points <= 12):
+            raise SceneError(f"gauss_points = {points!r}: expected a whole number from 1 to 12")
         infinite = any(np.isinf([*rod.stiffness.shear, rod.stiffness.axial]).any() for rod in scene.rods)
         if infinite and formulation != "mixed":
             raise SceneError(
@@ -104,6 +106,11 @@ class SpatialModel:
 
     def __init__(self, comm, shape):
         self.comm, self.shape = comm, shape
+        with compat.quiet_compiler():
+            self._build()
+
+    def _build(self):
+        comm, shape = self.comm, self.shape
         self.rods = RodMesh(comm, shape.counts)
         self.mesh = self.rods.mesh
         p = shape.degree
@@ -238,7 +245,6 @@ class SpatialModel:
         x[self._rq[:, 3]] = 1
         for function in self.carried:
             function.x.array[:] = 0
-        self.load_factor.value = 0.0
 
     def _fix(self):
         p = self.shape.degree
@@ -261,8 +267,8 @@ class SpatialModel:
 
     def largest(self, change):
         """Largest move (rod lengths) or turn (rad) in a change of the unknowns, over all ranks."""
-        rq = np.abs(change[self._rq])
-        local = max(rq[:, :3].max(initial=0), 2 * rq[:, 3:].max(initial=0))
+        rq = change[self._rq] ** 2
+        local = max(rq[:, :3].sum(axis=1).max(initial=0), 4 * rq[:, 3:].sum(axis=1).max(initial=0)) ** 0.5
         return self.comm.allreduce(local, op=MPI.MAX) if self.comm.size > 1 else local
 
     def snapshot(self):

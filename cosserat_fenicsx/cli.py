@@ -1,0 +1,167 @@
+"""The command line: run a scene file, explain what would be solved.
+
+Only the standard library is imported until a command has to work, so that --help is instant.
+"""
+
+import argparse
+import sys
+from pathlib import Path
+
+from cosserat_fenicsx import __version__
+from cosserat_fenicsx.errors import CosseratError, Interrupted, NotConverged, SceneError
+
+#: Exit codes.
+DONE, NOT_CONVERGED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
+
+
+def main(arguments=None):
+    """Entry point of `cosserat`.
+
+    Returns:
+        0 done, 1 not converged (the partial path is written), 2 bad input, 130 interrupted (likewise written).
+    """
+    parser = _parser()
+    options = parser.parse_args(arguments)
+    if options.command is None:
+        parser.print_help()
+        return BAD_INPUT
+    try:
+        return options.do(options)
+    except CosseratError as problem:
+        _say(f"cosserat: {problem}")
+        return BAD_INPUT
+    except OSError as problem:
+        where = f"{problem.filename}: " if problem.filename else ""
+        _say(f"cosserat: {where}{problem.strerror or problem}")
+        return BAD_INPUT
+
+
+def _parser():
+    parser = argparse.ArgumentParser(
+        prog="cosserat",
+        description="Geometrically exact rods on FEniCSx: equilibrium paths of a scene described in a TOML file.",
+        epilog="Exit codes: 0 done, 1 not converged (what was reached is written), 2 bad input. "
+        "In parallel: mpirun -n 2 cosserat run scene.toml",
+    )
+    parser.add_argument("--version", action="version", version=f"cosserat_fenicsx {__version__}")
+    commands = parser.add_subparsers(dest="command", title="commands")
+
+    run = commands.add_parser("run", help="solve a scene; print a table, write files")
+    _common(run)
+    run.add_argument("-o", "--output", metavar="DIR", help="write path.xdmf, path.csv and rods.png there")
+    run.add_argument("--no-picture", action="store_true", help="write no rods.png")
+    run.set_defaults(do=_run)
+
+    explain = commands.add_parser("explain", help="say which model would be solved and how large it is")
+    _common(explain)
+    explain.set_defaults(do=_explain)
+    return parser
+
+
+def _common(parser):
+    parser.add_argument("scene", help="scene file (TOML)")
+    parser.add_argument("--load-factors", metavar="A:B | A,B,...",
+                        help="0:1.5 lets the solver choose its steps, 0.5,0.9,1 lands on each")  # fmt: skip
+    parser.add_argument("--tol", type=float, help="estimated error of positions over the largest displacement [1e-6]")
+    parser.add_argument("--elements", type=int, help="elements per rod; fixes the mesh, no error estimate")
+    parser.add_argument("--degree", type=int, help="polynomial degree of r and q, 1 to 4 [4]")
+    parser.add_argument("--formulation", help="mixed, displacement or multiplier [mixed]")
+    parser.add_argument("--model", help="auto or spatial [auto]")
+
+
+def _settings(options):
+    """The scene and the arguments of `solve`: those of the file, those of the command line over them."""
+    from cosserat_fenicsx.scenefile import read_scene
+
+    scene, settings = read_scene(options.scene)
+    for name in ("tol", "elements", "degree", "formulation", "model"):
+        if getattr(options, name) is not None:
+            settings[name] = getattr(options, name)
+    if options.load_factors is not None:
+        settings["load_factors"] = options.load_factors
+    load_factors = settings.pop("load_factors", "0:1")
+    if isinstance(load_factors, str):
+        load_factors = _load_factors(load_factors)
+    return scene, load_factors, settings
+
+
+def _load_factors(text):
+    separator = ":" if ":" in text else ","
+    try:
+        values = [float(part) for part in text.split(separator)]
+    except ValueError:
+        values = []
+    if not values or (separator == ":" and len(values) != 2):
+        raise SceneError(f"load factors '{text}': expected A:B (the solver chooses its steps) or A,B,... (landed on)")
+    return tuple(values) if separator == ":" else values
+
+
+def _run(options):
+    scene, load_factors, settings = _settings(options)
+    out = None
+    if options.output:
+        out = Path(options.output)
+        out.mkdir(parents=True, exist_ok=True)  # before the work, not after it
+    from cosserat_fenicsx.statics import solve
+
+    code, trouble = DONE, None
+    try:
+        path = solve(scene, load_factors, **settings)
+    except NotConverged as failure:
+        path, trouble, code = failure.path, failure, NOT_CONVERGED
+    except Interrupted as stop:
+        path, trouble, code = stop.path, stop, INTERRUPTED
+    if path is not None and len(path):
+        _report(path)
+        if out is not None:
+            _write(path, out, picture=not options.no_picture)
+    if trouble is not None:
+        _say(f"cosserat: {trouble}")
+    return code
+
+
+def _report(path):
+    from cosserat_fenicsx.tables import path_table
+
+    text = path_table(path)
+    if _first_rank():
+        print(text)
+
+
+def _write(path, out, *, picture):
+    from cosserat_fenicsx.tables import write_csv
+
+    path.write(out / "path.xdmf")
+    if _first_rank():
+        write_csv(path, out / "path.csv")
+    written = ["path.xdmf", "path.h5", "path.csv"]
+    if picture:
+        path.plot(out / "rods.png")
+        written.append("rods.png")
+    _say(f"written to {out}/: {', '.join(written)}", file=sys.stdout)
+
+
+def _explain(options):
+    scene, load_factors, settings = _settings(options)
+    from cosserat_fenicsx.explain import explain
+
+    _say(explain(scene, load_factors, settings), file=sys.stdout)
+    return DONE
+
+
+def _first_rank():
+    """True on rank 0, and where MPI was never loaded."""
+    if "mpi4py" not in sys.modules:
+        return True
+    from mpi4py import MPI
+
+    return MPI.COMM_WORLD.rank == 0
+
+
+def _say(text, file=None):
+    if _first_rank():
+        print(text, file=file or sys.stderr, flush=True)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,78 @@
+"""What would be solved, in plain sentences, without solving it."""
+
+import numpy as np
+
+from cosserat_fenicsx.models.rodmesh import Layout
+from cosserat_fenicsx.models.spatial import Shape
+from cosserat_fenicsx.statics import FIRST_ELEMENTS, check_arguments, default_degree
+
+_PER_NODE = 7
+
+
+def explain(scene, load_factors, settings):
+    """Text on the model of a scene and its size.
+
+    Args:
+        scene: a `Scene`.
+        load_factors, settings: the arguments of `solve`.
+
+    Raises:
+        SceneError: arguments that `solve` would refuse.
+    """
+    formulation = settings.get("formulation") or "mixed"
+    elements, tol = settings.get("elements"), settings.get("tol", 1e-6)
+    degree = settings.get("degree") or default_degree(formulation)
+    check_arguments(scene, settings.get("model", "auto"), tol, elements)
+    first = elements or FIRST_ELEMENTS
+    layout = Layout.of(scene, first)
+    shape = Shape.of(scene, layout, formulation=formulation, degree=degree)
+    lines = [scene.title] if scene.title else []
+    for rod in scene.rods:
+        s = rod.stiffness
+        slender = rod.length * np.sqrt(s.axial / max(s.bending)) if np.isfinite(s.axial) else np.inf
+        lines.append(
+            f"Rod '{rod.name}': {type(rod.curve).__name__}, length {rod.length:g} m, {type(rod.section).__name__}; "
+            f"EI = {s.bending[0]:.4g}, {s.bending[1]:.4g} N m^2, GJ = {s.torsion:.4g} N m^2, EA = {s.axial:.4g} N, "
+            f"GA = {s.shear[0]:.4g}, {s.shear[1]:.4g} N; L sqrt(EA/EI) = {slender:.4g}."
+        )
+    lines.append(
+        f"{len(scene.supports)} support(s): {', '.join(_item(x) for x in scene.supports)}. "
+        f"{len(scene.loads)} load(s): {', '.join(_item(x) for x in scene.loads) or 'none'}."
+    )
+    lines.append("Model: spatial (centreline r and quaternion q in space), which takes any scene.")
+    lines.append(
+        {
+            "condensed": "Formulation: mixed, the contact force carried at the Gauss points; unknowns r and q alone.",
+            "field": "Formulation: mixed, the contact force as an unknown, because a stiffness is infinite.",
+        }.get(shape.variant, f"Formulation: {formulation}, as asked.")
+    )
+    unknowns = _unknowns(shape)
+    if elements:
+        lines.append(f"Mesh: {elements} element(s) of degree {degree} per rod, as asked: {unknowns} unknowns, no error estimate.")
+    else:
+        lines.append(
+            f"Mesh: elements of degree {degree}, from {first} per rod ({unknowns} unknowns) doubled until two meshes agree "
+            f"to tol = {tol:g}."
+        )
+    if isinstance(load_factors, tuple):
+        lines.append(f"Path: load factor {load_factors[0]:g} to {load_factors[1]:g} in steps the solver chooses.")
+    else:
+        listed = ", ".join(f"{x:g}" for x in np.atleast_1d(load_factors))
+        lines.append(f"Path: load factors {listed}, landed on exactly, with steps between where needed.")
+    return "\n".join(lines)
+
+
+def _item(x):
+    where = f" at {x.station}" if x.station is not None else ""
+    return f"{type(x).__name__}{where}"
+
+
+def _unknowns(shape):
+    """Number of unknowns of a shape, without making its mesh."""
+    cells = sum(shape.counts)
+    total = _PER_NODE * (cells * shape.degree + len(shape.counts))
+    if shape.variant == "field":
+        total += 3 * shape.degree * cells
+    elif shape.variant == "multiplier":
+        total += cells + len(shape.counts)
+    return total

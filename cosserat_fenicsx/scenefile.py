@@ -1,0 +1,183 @@
+"""Scene files in TOML: the words are the package's own class and argument names.
+
+    [[rods]]
+    name = "column"
+    curve = { type = "Line", start = [0, 0, 0], end = [0, 0, 20] }
+    section = { type = "Circle", diameter = 0.2 }
+    material = { E = 210e9, nu = 0.3 }
+
+    [[supports]]
+    type = "Clamp"
+    station = "column.start"          # or "column.end", or "column@5.0" for s = 5 m
+
+    [[loads]]
+    type = "Force"
+    station = "column.end"
+    force = [0, 0, -1e5]
+
+    [solve]                           # optional: defaults of the command line
+    load_factors = [0.5, 1.0]
+"""
+
+import dataclasses
+import inspect
+import tomllib
+from pathlib import Path
+
+from cosserat_fenicsx.curves import CURVES
+from cosserat_fenicsx.errors import SceneError, nearest
+from cosserat_fenicsx.loads import LOADS
+from cosserat_fenicsx.materials import Material
+from cosserat_fenicsx.rod import Rod
+from cosserat_fenicsx.scene import Scene
+from cosserat_fenicsx.sections import SECTIONS
+from cosserat_fenicsx.supports import SUPPORTS
+
+#: What [solve] may hold: the arguments of `solve` that are plain values, with their TOML types.
+SOLVE_KEYS = {
+    "load_factors": (list, str, int, float),
+    "model": (str,),
+    "formulation": (str,),
+    "tol": (int, float),
+    "elements": (int,),
+    "degree": (int,),
+}
+
+
+def read_scene(file):
+    """A scene and its solver settings from a TOML file.
+
+    Args:
+        file: path of the file.
+
+    Returns:
+        (Scene, dict of the [solve] table).
+
+    Raises:
+        SceneError: the file is missing or no TOML, a key or a type is unknown (named, with the nearest known one), or a
+            value is not what its field expects.
+    """
+    file = Path(file)
+    try:
+        with file.open("rb") as stream:
+            tables = tomllib.load(stream)
+    except OSError as problem:
+        raise SceneError(f"{file}: cannot be read ({problem.strerror}): expected a scene file in TOML") from None
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as problem:
+        raise SceneError(f"{file}: not valid TOML: {problem}") from None
+    try:
+        return _scene(tables)
+    except SceneError as problem:
+        raise SceneError(f"{file}: {problem}") from None
+
+
+def _scene(tables):
+    _known_keys("the file", tables, {"title", "materials", "rods", "supports", "loads", "solve"})
+    materials = {
+        name: _build(f"materials.{name}", table, (Material,), {})
+        for name, table in _table("materials", tables.get("materials", {})).items()
+    }
+    rods = [_rod(f"rods[{i}]", entry, materials) for i, entry in _entries("rods", tables)]
+    stations = {rod.name: rod for rod in rods}
+    supports = [_build(f"supports[{i}]", entry, SUPPORTS, stations) for i, entry in _entries("supports", tables)]
+    loads = [_build(f"loads[{i}]", entry, LOADS, stations) for i, entry in _entries("loads", tables)]
+    title = tables.get("title", "")
+    if not isinstance(title, str):
+        raise SceneError(f"title = {title!r}: expected a string")
+    settings = _table("solve", tables.get("solve", {}))
+    _known_keys("[solve]", settings, SOLVE_KEYS)
+    for key, value in settings.items():
+        if not isinstance(value, SOLVE_KEYS[key]) or isinstance(value, bool):
+            names = " or ".join(kind.__name__ for kind in SOLVE_KEYS[key])
+            raise SceneError(f"[solve].{key} = {value!r}: expected {names}")
+    return Scene(rods, supports, loads, title=title), settings
+
+
+def _rod(where, entry, materials):
+    _known_keys(where, entry, {"name", "curve", "section", "material"})
+    for key in ("curve", "section"):
+        if key not in entry:
+            raise SceneError(f"{where}: '{key}' is missing: expected a table with a type")
+    material = entry.get("material")
+    if isinstance(material, str):
+        if material not in materials:
+            raise SceneError(f"{where}.material = '{material}': {nearest(material, materials) or 'no [materials] given'}")
+        material = materials[material]
+    elif material is not None:
+        material = _build(f"{where}.material", material, (Material,), {})
+    curve = _build(f"{where}.curve", entry["curve"], CURVES, {})
+    section = _build(f"{where}.section", entry["section"], SECTIONS, {})
+    try:
+        return Rod(curve, section, material, **({"name": entry["name"]} if "name" in entry else {}))
+    except SceneError as problem:
+        raise SceneError(f"{where}: {problem}") from None
+
+
+def _build(where, entry, classes, rods):
+    """An object from a table whose keys are the class's arguments."""
+    entry = dict(_table(where, entry))
+    if len(classes) == 1:
+        kind = classes[0]
+        if entry.pop("type", kind.__name__) != kind.__name__:
+            raise SceneError(f"{where}.type: expected '{kind.__name__}'")
+    else:
+        names = {cls.__name__: cls for cls in classes}
+        if "type" not in entry:
+            raise SceneError(f"{where}: 'type' is missing; known: {', '.join(names)}")
+        name = entry.pop("type")
+        if name not in names:
+            raise SceneError(f"{where}.type = {name!r}: {nearest(name, names)}")
+        kind = names[name]
+    arguments = {f.name: f for f in dataclasses.fields(kind) if f.init}
+    _known_keys(f"{where} ({kind.__name__})", entry, arguments)
+    required = [name for name, parameter in inspect.signature(kind).parameters.items()
+                if parameter.default is inspect.Parameter.empty]  # fmt: skip
+    for name in required:
+        if name not in entry:
+            raise SceneError(f"{where} ({kind.__name__}): '{name}' is missing")
+    if "station" in entry:
+        entry["station"] = _station(f"{where}.station", entry["station"], rods)
+    try:
+        return kind(**entry)
+    except SceneError as problem:
+        raise SceneError(f"{where}: {problem}") from None
+
+
+def _station(where, text, rods):
+    """'name.start', 'name.end' or 'name@s'."""
+    expected = "expected 'rod.start', 'rod.end' or 'rod@s' with s in m"
+    if not isinstance(text, str):
+        raise SceneError(f"{where} = {text!r}: {expected}")
+    if "@" in text:
+        name, _, s = text.partition("@")
+        try:
+            place = float(s)
+        except ValueError:
+            raise SceneError(f"{where} = '{text}': {expected}") from None
+    else:
+        name, _, place = text.rpartition(".")
+        if place not in ("start", "end"):
+            raise SceneError(f"{where} = '{text}': {expected}")
+    if name not in rods:
+        raise SceneError(f"{where} = '{text}': no rod is named '{name}', {nearest(name, rods)}")
+    return getattr(rods[name], place) if isinstance(place, str) else rods[name].at(place)
+
+
+def _entries(key, tables):
+    """The tables of an array of tables, numbered."""
+    entries = tables.get(key, [])
+    if not isinstance(entries, list):
+        raise SceneError(f"{key} = {entries!r}: expected an array of tables, [[{key}]]")
+    return [(i, _table(f"{key}[{i}]", entry)) for i, entry in enumerate(entries)]
+
+
+def _table(where, value):
+    if not isinstance(value, dict):
+        raise SceneError(f"{where} = {value!r}: expected a table")
+    return value
+
+
+def _known_keys(where, table, known):
+    for key in table:
+        if key not in known:
+            raise SceneError(f"{where}: unknown key '{key}', {nearest(key, known)}")

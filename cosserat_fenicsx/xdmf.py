@@ -1,0 +1,134 @@
+"""Files: a path as XDMF and HDF5 for ParaView, one of its points in whatever meshio writes.
+
+Written from the results with the system's h5py and with meshio, so that the files are the same for every release of
+dolfinx; every element becomes as many straight lines as its degree. (meshio's own time series refuses arrays of four
+components and dolfinx's XDMF crashes or misleads some readers: README, Files.)
+"""
+
+from pathlib import Path
+from xml.etree import ElementTree as xml
+
+import numpy as np
+from mpi4py import MPI
+
+from cosserat_fenicsx.errors import SceneError
+
+#: Names in the files, as in eq. (1), and the fields of `Path.fields` behind them.
+FIELDS = {
+    "displacement": "displacement",
+    "quaternion": "quaternion",
+    "d1": "d1",
+    "d2": "d2",
+    "d3": "d3",
+    "n": "force",
+    "m": "moment",
+    "strain": "strain",
+    "curvature": "curvature",
+    "bending_moment": "bending_moment",
+}
+
+
+def write(path, file, k=-1):
+    """Write a path: all points to .xdmf with the load factor as time axis, point k to any other format.
+
+    Args:
+        path: a `Path` with at least one point.
+        file: the file's name.
+        k: the point, for other formats than .xdmf.
+
+    Raises:
+        SceneError: an empty path, or an ending that meshio does not know.
+        OSError: the file cannot be written.
+    """
+    if len(path) == 0:
+        raise SceneError(f"{file}: the path has no point to write")
+    comm = MPI.COMM_WORLD
+    trouble = None
+    if comm.rank == 0:
+        try:
+            _write(path, Path(file), k)
+        except (OSError, SceneError) as problem:
+            trouble = problem
+    trouble = comm.bcast(trouble)
+    if trouble is not None:
+        raise trouble
+
+
+def _write(path, file, k):
+    import meshio
+
+    file.parent.mkdir(parents=True, exist_ok=True)
+    if file.suffix != ".xdmf":
+        if file.suffix not in meshio.extension_to_filetypes:
+            known = ".xdmf, .vtu, .vtk, .ply and what else meshio writes"
+            raise SceneError(f"{file}: the ending '{file.suffix}' is not known: expected {known}")
+        with open(file, "wb"):
+            pass  # an unwritable place is said here, plainly, whatever meshio makes of it
+        points, cells, data = mesh_of(path, k)
+        meshio.write(file, meshio.Mesh(points, cells, point_data=data))
+        return
+    _write_series(path, file)
+
+
+def _write_series(path, file):
+    """Numbers into the .h5 first, the .xdmf that points to them last: what exists can be opened."""
+    try:
+        import h5py
+    except ImportError:
+        raise SceneError(f"{file}: writing .xdmf needs h5py: install the system's, 'apt install python3-h5py'") from None
+    numbers = file.with_suffix(".h5")
+    root = xml.Element("Xdmf", Version="3.0")
+    series = xml.SubElement(
+        xml.SubElement(root, "Domain"), "Grid", Name="path", GridType="Collection", CollectionType="Temporal"
+    )
+    with h5py.File(numbers, "w") as store:
+
+        def item(parent, name, array):
+            array = np.ascontiguousarray(array)
+            if name not in store:
+                store[name] = array
+            xml.SubElement(
+                parent,
+                "DataItem",
+                Dimensions=" ".join(map(str, array.shape)),
+                NumberType="Int" if array.dtype.kind == "i" else "Float",
+                Precision="8",
+                Format="HDF",
+            ).text = f"{numbers.name}:/{name}"
+
+        for k, eta in enumerate(path.load_factors):
+            points, cells, data = mesh_of(path, k)
+            grid = xml.SubElement(series, "Grid", Name=f"point {k}", GridType="Uniform")
+            xml.SubElement(grid, "Time", Value=repr(float(eta)))
+            geometry = xml.SubElement(grid, "Geometry", GeometryType="XYZ")
+            item(geometry, "reference", points - data["displacement"])
+            lines = cells[0][1]
+            topology = xml.SubElement(
+                grid, "Topology", TopologyType="Polyline", NodesPerElement="2", NumberOfElements=str(len(lines))
+            )
+            item(topology, "lines", lines)
+            for name, array in {"position": points, **data}.items():
+                kind = {1: "Scalar", 2: "Vector"}[array.ndim]
+                attribute = xml.SubElement(grid, "Attribute", Name=name, AttributeType=kind, Center="Node")
+                item(attribute, f"{name}_{k}", array)
+    xml.indent(root)
+    xml.ElementTree(root).write(file, encoding="utf-8", xml_declaration=True)
+
+
+def mesh_of(path, k):
+    """Nodes, lines and fields of all rods at point k.
+
+    Returns:
+        points (n, 3) m; cells as meshio takes them; dict of arrays (n, ...).
+    """
+    points, lines, data, first = [], [], {name: [] for name in FIELDS}, 0
+    for rod in path.scene.rods:
+        fields = path.fields(k, rod)
+        n = len(fields["s"])
+        points.append(fields["position"])
+        lines.append(first + np.column_stack([np.arange(n - 1), np.arange(1, n)]))
+        for name, field in FIELDS.items():
+            data[name].append(fields[field])
+        first += n
+    joined = {name: np.concatenate(values) for name, values in data.items()}
+    return np.concatenate(points), [("line", np.concatenate(lines))], joined

@@ -1,0 +1,138 @@
+"""What the public face costs above the bare dolfinx and PETSc calls it makes: a sweep of 31 points, eta = 0.05 .. 1.5.
+
+    python demos/overhead.py            medians of 15 alternating runs, processor time
+    python demos/overhead.py --quick    one run each, to see that both give the same digits
+
+The bare loop takes the same predicted starts and Newton iterations: residual and tangent assembled, KLU, the update of
+the carried contact force. The stability count (one more assembly and a factorisation a point) is what the package adds
+on purpose; the loop is timed without it and with it.
+"""
+
+import argparse
+import sys
+import time
+
+import numpy as np
+from dolfinx import fem
+from dolfinx.fem import petsc as fem_petsc
+from eccentric_cantilever import column
+from petsc4py import PETSc
+
+import cosserat_fenicsx as cf
+from cosserat_fenicsx import compat, statics
+from cosserat_fenicsx.problem import clamp
+
+ETAS = np.linspace(0.05, 1.5, 31)
+MESHES = ((2, 8), (3, 8), (3, 4))  # degree, elements
+
+
+class BareLoop:
+    """The calls themselves, on the model that `solve` has compiled, with a matrix and vectors of its own."""
+
+    def __init__(self, model, path):
+        self.model, self.iterations = model, path.iterations
+        forms = model.forms
+        self.A, self.K = fem_petsc.create_matrix(forms.tangent), fem_petsc.create_matrix(forms.second_variation)
+        self.K.setOption(PETSc.Mat.Option.SYMMETRIC, True)
+        self.b, self.x = fem_petsc.create_vector(forms.residual), self.A.createVecRight()
+        self.dead = fem_petsc.assemble_vector(forms.dead)
+        self.dead.array_w[model.fixed] = 0
+        self.held = [clamp(fem.Function(model.space), model.fixed)]
+        self.held_rotations = [clamp(fem.Function(model.rotations), model.fixed_rotations)]
+        self.ksp = PETSc.KSP().create()
+        self.ksp.setType("preonly")
+        self.ksp.getPC().setType("lu")
+        self.ksp.getPC().setFactorSolverType("klu")
+        self.ksp.setOperators(self.A)
+        self.pc = PETSc.PC().create()
+        self.pc.setType("cholesky")
+        self.pc.setFactorOrdering("nd")
+
+    def residual(self, eta):
+        with self.b.localForm() as numbers:
+            numbers.set(0.0)
+        fem_petsc.assemble_vector(self.b, self.model.forms.residual)
+        self.b.axpy(-eta, self.dead)
+        self.b.array_w[self.model.fixed] = 0.0
+
+    def run(self, scene, layout, *, stability):
+        """The sweep; returns the tip's position at every point."""
+        model, forms = self.model, self.model.forms
+        model.load(scene, layout)
+        (n,) = model.carried
+        U, before, step = model.state.x.array, model.before.x.array, model.step.x.array
+        known = [(0.0, U.copy(), n.x.array.copy())]
+        tips = []
+        for eta, iterations in zip(ETAS, self.iterations, strict=True):
+            weights = [np.prod([(eta - b[0]) / (a[0] - b[0]) for b in known if b is not a]) for a in known]
+            U[:] = sum(w * a[1] for w, a in zip(weights, known, strict=True))
+            n.x.array[:] = sum(w * a[2] for w, a in zip(weights, known, strict=True))
+            self.residual(eta)
+            for _ in range(iterations):
+                self.A.zeroEntries()
+                fem_petsc.assemble_matrix(self.A, forms.tangent, bcs=self.held)
+                self.A.assemble()
+                self.ksp.setOperators(self.A)
+                self.ksp.solve(self.b, self.x)
+                before[:] = U
+                step[:] = -self.x.array
+                n.x.array[:] = compat.evaluate(forms.advance, model.mesh, model._local_cells).ravel()
+                U += step
+                self.residual(eta)
+            if stability:
+                self.K.zeroEntries()
+                fem_petsc.assemble_matrix(self.K, forms.second_variation, bcs=self.held_rotations)
+                self.K.assemble()
+                self.pc.setOperators(self.K)
+                self.pc.setUp()
+                self.pc.getFactorMatrix().getInertia()
+            known = [*known[-2:], (eta, U.copy(), n.x.array.copy())]
+            tips.append(U[model._rq[np.argmax(model._slots), :3]].copy())
+        return np.array(tips)
+
+
+def compare(degree, elements, runs):
+    """Processor times (s): public face, bare loop, bare loop with the stability count; and the largest difference."""
+    rod, scene = column()
+
+    def public():
+        return cf.solve(scene, ETAS, degree=degree, elements=elements)
+
+    path = public()
+    problem, _, _ = statics.solvers_of(scene, degree=degree, elements=elements)
+    bare = BareLoop(problem.model, path)
+    layout = path.layout
+    tips = bare.run(scene, layout, stability=False)
+    difference = np.abs(tips * path.scales.length + path.scales.origin - path.position(rod.end)).max()
+    tasks = (
+        public,
+        lambda: bare.run(scene, layout, stability=False),
+        lambda: bare.run(scene, layout, stability=True),
+    )
+    times = np.empty((runs, 3))
+    for i in range(runs):
+        for j, task in enumerate(tasks):
+            began = time.process_time()
+            task()
+            times[i, j] = time.process_time() - began
+    return np.median(times, axis=0), difference, int(path.iterations.sum())
+
+
+def main(runs=15):
+    """Print the table; returns (ratios to the bare loop, ratios to the one with the stability count, differences)."""
+    print(f"{compat.version()}, numpy {np.__version__}; medians of {runs} run(s), processor time")
+    print("degree  elements  Newton  public (ms)  bare (ms)  ratio  bare + stability (ms)  ratio  difference (m)")
+    results = []
+    for degree, elements in MESHES:
+        (public, bare, stable), difference, newton = compare(degree, elements, runs)
+        print(f"{degree:6d}  {elements:8d}  {newton:6d}  {1e3 * public:11.2f}  {1e3 * bare:9.2f}  {public / bare:5.2f}  "
+              f"{1e3 * stable:21.2f}  {public / stable:5.2f}  {difference:14.1e}")  # fmt: skip
+        results.append((public / bare, public / stable, difference))
+    return np.array(results).T
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--quick", action="store_true")
+    main(1 if parser.parse_args().quick else 15)
+    sys.exit(0)

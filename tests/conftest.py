@@ -1,0 +1,59 @@
+"""Fixtures, and what a suite under mpirun needs: one rank that talks, and no rank that waits for a failed one."""
+
+import json
+import os
+import sys
+from pathlib import Path
+
+import pytest
+from mpi4py import MPI
+
+import cosserat_fenicsx as cf
+
+COMM = MPI.COMM_WORLD
+
+
+@pytest.hookimpl(trylast=True)
+def pytest_configure(config):
+    if COMM.rank != 0:
+        config.pluginmanager.get_plugin("terminalreporter")._tw._file = open(os.devnull, "w")  # noqa: SIM115
+
+
+def pytest_collection_modifyitems(items):
+    if COMM.size > 1:
+        for item in items:
+            if "serial" in item.keywords:
+                item.add_marker(pytest.mark.skip(reason="needs one process"))
+
+
+@pytest.hookimpl(hookwrapper=True)
+def pytest_runtest_makereport(item, call):
+    report = (yield).get_result()
+    if COMM.size > 1 and report.failed:
+        print(f"\nrank {COMM.rank} of {COMM.size}: {item.nodeid} failed\n{report.longreprtext}", file=sys.stderr, flush=True)
+        COMM.Abort(1)
+
+
+@pytest.fixture
+def tmp_path_all(tmp_path):
+    """One temporary folder that all ranks share."""
+    return Path(COMM.bcast(str(tmp_path)))
+
+
+def column(*, length=20.0, diameter=0.2, eccentricity=0.2, arm=False, section=None, E=210e9):
+    """The paper's column with its unit load P_cr; returns (rod, scene)."""
+    steel = cf.Material(E=E, nu=0.3, density=7850.0)
+    rod = cf.Rod(cf.Line((0, 0, 0), (0, 0, length)), section or cf.Circle(diameter), steel, name="column")
+    P = cf.euler_load(rod)
+    if arm:
+        loads = [cf.EccentricForce(rod.end, (0, 0, -P), (eccentricity, 0))]
+    else:
+        loads = [cf.Force(rod.end, (0, 0, -P)), cf.Moment(rod.end, (0, P * eccentricity, 0))]
+    return rod, cf.Scene([rod], [cf.Clamp(rod.start)], loads)
+
+
+@pytest.fixture(scope="session")
+def reference():
+    """tests/reference/eccentric_cantilever.json by eta: strong form, 40 digits, confirmed to 2e-11 by collocation."""
+    file = Path(__file__).parent / "reference" / "eccentric_cantilever.json"
+    return {point["eta"]: point for point in json.loads(file.read_text())["points"]}

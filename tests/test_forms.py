@@ -1,0 +1,124 @@
+"""The forms themselves: Taylor test of every tangent, balance under rigid motions, and the second variation."""
+
+import numpy as np
+import pytest
+from conftest import column
+from mpi4py import MPI
+
+import cosserat_fenicsx as cf
+from cosserat_fenicsx.models.rodmesh import Layout
+from cosserat_fenicsx.models.spatial import Shape, SpatialModel
+from cosserat_fenicsx.problem import Problem
+from cosserat_fenicsx.stability import NegativeModes
+
+pytestmark = pytest.mark.serial
+
+
+def problem_of(variant, *, arm=False):
+    k = column(arm=arm)[0].stiffness
+    section = None
+    if variant == "field":
+        section = cf.Stiffness(shear=(np.inf, np.inf), axial=np.inf, bending=k.bending, torsion=k.torsion)
+    rod, scene = column(arm=arm, diameter=2.0, section=section)  # thick: the tangent's parts are of like size
+    layout = Layout.of(scene, 3)
+    formulation = "mixed" if variant in ("field", "condensed") else variant
+    shape = Shape.of(scene, layout, formulation=formulation, degree=2)
+    problem = Problem(SpatialModel(MPI.COMM_SELF, shape))
+    problem.load(scene, layout)
+    return problem
+
+
+def residual(problem, x):
+    y, b = problem.x.duplicate(), problem.b.duplicate()
+    y.array_w[:] = x
+    problem.function(None, y, b)
+    return b.array.copy()
+
+
+def tangent(problem, x):
+    residual(problem, x)
+    problem.jacobian(None, None, problem.A, problem.A)
+    return problem.A.copy()
+
+
+@pytest.mark.parametrize("arm", [False, True])
+@pytest.mark.parametrize("variant", ["displacement", "field", "multiplier"])
+def test_tangent_is_the_derivative_of_the_residual(variant, arm):
+    """Taylor: |F(x + h d) - F(x) - h J d| falls with h^2."""
+    problem = problem_of(variant, arm=arm)
+    random = np.random.default_rng(0)
+    free = np.setdiff1d(np.arange(problem.model.owned), problem.model.fixed)
+    x = problem.x.array.copy()
+    x[free] += 0.1 * random.normal(size=len(free))
+    problem.set_load_factor(0.7)
+    direction = np.zeros_like(x)
+    direction[free] = random.normal(size=len(free))
+    F, J = residual(problem, x), tangent(problem, x)
+    d = problem.x.duplicate()
+    d.array_w[:] = direction
+    Jd = (J * d).array
+    steps = 1e-3 * 0.5 ** np.arange(4)
+    errors = [np.linalg.norm(residual(problem, x + h * direction) - F - h * Jd) for h in steps]
+    rates = np.log2(np.array(errors[:-1]) / errors[1:])
+    np.testing.assert_allclose(rates, 2, atol=0.05)
+
+
+def test_condensed_tangent_meets_the_displacement_tangent_at_equilibrium():
+    """Where the carried n agrees with the motion, the mixed-integration-point tangent is the derivative."""
+    rod, scene = column()
+    path = cf.solve(scene, [0.9], elements=3, degree=2, comm=MPI.COMM_SELF)
+    problems = []
+    for formulation in ("mixed", "displacement"):
+        layout = Layout.of(scene, 3)
+        problem = Problem(SpatialModel(MPI.COMM_SELF, Shape.of(scene, layout, formulation=formulation, degree=2)))
+        problem.load(scene, layout)
+        problems.append(problem)
+    mixed, plain = problems
+    model = mixed.model
+    x = problem.x.array.copy()
+    x[model._rq] = path._records[0].rq[model._slots]
+    for problem in problems:
+        problem.set_load_factor(0.9)
+        residual(problem, x)
+    model.before.x.array[:] = x
+    model.step.x.array[:] = 0
+    for _ in range(2):  # the update with a zero step takes n to that of the motion
+        model.advance()
+    A, B = tangent(mixed, x), tangent(plain, x)
+    A.axpy(-1, B)
+    assert A.norm() < 1e-9 * B.norm()
+
+
+@pytest.mark.parametrize("variant", ["condensed", "displacement", "multiplier"])
+def test_a_rigid_motion_strains_nothing(variant):
+    problem = problem_of(variant)
+    model = problem.model
+    a = np.array([0.3, -0.5, 0.7, 0.4])
+    a /= np.linalg.norm(a)
+    w, v = a[0], a[1:]
+    x = problem.x.array.copy()
+    r = x[model._rq[:, :3]]
+    turned = r + 2 * np.cross(v, np.cross(v, r) + w * r)
+    x[model._rq[:, :3]] = turned + [1.0, 2.0, 3.0]
+    x[model._rq[:, 3:]] = a
+    assert np.abs(residual(problem, x)).max() < 1e-12 * model.stiffest
+
+
+def test_second_variation_counts_what_an_eigensolver_counts():
+    rod, scene = column(eccentricity=0.0)
+    layout = Layout.of(scene, 4)
+    model = SpatialModel(MPI.COMM_SELF, Shape.of(scene, layout, formulation="mixed", degree=2))
+    problem, stability = Problem(model), NegativeModes(model)
+    problem.load(scene, layout)
+    stability.load()
+    from cosserat_fenicsx.snes import Newton
+
+    newton = Newton(problem)
+    newton.allow(10)
+    for eta, expected in ((0.5, 0), (1.5, 2), (9.5, 4), (26.0, 6)):
+        problem.set_load_factor(eta)
+        assert newton.solve().converged
+        assert stability.count() == expected
+        rows = np.arange(stability.K.size[0], dtype=np.int32)
+        eigenvalues = np.linalg.eigvalsh(stability.K.getValues(rows, rows))
+        assert (eigenvalues < 0).sum() == expected
