@@ -17,6 +17,7 @@ _HOW_TO_INSTALL = (
 
 try:
     import dolfinx
+    import mpi4py.MPI  # noqa: F401  missing or broken, it is named below like the others
     import ufl
     from dolfinx import fem
     from dolfinx import mesh as dolfinx_mesh

@@ -32,14 +32,13 @@ class Line:
         if not length > 1e-12 * max(np.abs(self.start).max(), np.abs(self.end).max()):
             refuse(self, "end", self.end, f"a point apart from start = {self.start}")
         d3 = chord / length
-        if self.d1 is None:
-            d1 = _carried_x_axis(d3)
-        else:
+        if self.d1 is not None:
             store(self, d1=vector(self, "d1", self.d1, "direction"))
-            d1 = np.asarray(self.d1) - np.dot(self.d1, d3) * d3
-            if np.linalg.norm(d1) <= 1e-6 * np.linalg.norm(self.d1):
-                refuse(self, "d1", self.d1, "a direction across the line")
-            d1 = d1 / np.linalg.norm(d1)
+        d1 = np.asarray(_carried_x_axis(d3) if self.d1 is None else self.d1)
+        across = d1 - np.dot(d1, d3) * d3
+        if np.linalg.norm(across) <= 1e-6 * np.linalg.norm(d1):
+            refuse(self, "d1", self.d1, "a direction across the line")
+        d1 = across / np.linalg.norm(across)
         store(self, length=length, _frame=np.column_stack([d1, np.cross(d3, d1), d3]))
 
     def position(self, s):
@@ -58,8 +57,7 @@ def _carried_x_axis(t):
     if t[2] < -1 + 1e-12:
         return x
     axis = np.cross(z, t)  # Rodrigues' formula with sin and cos of the angle in `axis` and t_z
-    d1 = x + np.cross(axis, x) + np.cross(axis, np.cross(axis, x)) / (1 + t[2])
-    return d1 / np.linalg.norm(d1)
+    return x + np.cross(axis, x) + np.cross(axis, np.cross(axis, x)) / (1 + t[2])
 
 
 #: Curves by the words of the scene file.

@@ -116,18 +116,13 @@ def _rod(where, entry, materials):
 def _build(where, entry, classes, rods):
     """An object from a table whose keys are the class's arguments."""
     entry = dict(_table(where, entry))
-    if len(classes) == 1:
-        kind = classes[0]
-        if entry.pop("type", kind.__name__) != kind.__name__:
-            raise SceneError(f"{where}.type: expected '{kind.__name__}'")
-    else:
-        names = {cls.__name__: cls for cls in classes}
-        if "type" not in entry:
-            raise SceneError(f"{where}: 'type' is missing; known: {', '.join(names)}")
-        name = entry.pop("type")
-        if name not in names:
-            raise SceneError(f"{where}.type = {name!r}: {nearest(name, names)}")
-        kind = names[name]
+    names = {cls.__name__: cls for cls in classes}
+    if "type" not in entry and len(classes) > 1:
+        raise SceneError(f"{where}: 'type' is missing; known: {', '.join(names)}")
+    name = entry.pop("type", classes[0].__name__)
+    if name not in names:
+        raise SceneError(f"{where}.type = {name!r}: {nearest(name, names)}")
+    kind = names[name]
     arguments = {f.name: f for f in dataclasses.fields(kind) if f.init}
     _known_keys(f"{where} ({kind.__name__})", entry, arguments)
     required = [name for name, parameter in inspect.signature(kind).parameters.items()

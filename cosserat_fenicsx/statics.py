@@ -1,10 +1,11 @@
 """`solve`: from a scene to its equilibrium path, on a mesh that is fine enough for the accuracy asked for."""
 
+import cosserat_fenicsx.compat  # noqa: F401, I001  first: it says in words what of dolfinx is missing
+
 import functools
 import math
 import numbers
 
-import numpy as np
 from mpi4py import MPI
 
 from cosserat_fenicsx.continuation import Continuation, StepControl

@@ -58,7 +58,7 @@ def write_csv(path, file):
                 for i, axis in enumerate("xyz"):
                     names.append(f"{station} {quantity}_{axis} ({unit})")
                     columns.append(values[:, i])
-    with open(file, "w", newline="") as stream:
+    with open(file, "w", newline="", encoding="utf-8") as stream:
         writer = csv.writer(stream)
         writer.writerow(names)
         writer.writerows(zip(*(column.tolist() for column in columns), strict=True))

@@ -1,8 +1,8 @@
 """Files: a path as XDMF and HDF5 for ParaView, one of its points in whatever meshio writes.
 
 Written from the results with the system's h5py and with meshio, so that the files are the same for every release of
-dolfinx; every element becomes as many straight lines as its degree. (meshio's own time series refuses arrays of four
-components and dolfinx's XDMF crashes or misleads some readers: README, Files.)
+dolfinx; every element becomes as many straight lines as its degree. (meshio's own time series refuses a quaternion and
+dolfinx's XDMF crashes or misleads some readers: README, Files.)
 """
 
 from pathlib import Path
@@ -107,7 +107,8 @@ def _write_series(path, file):
                 grid, "Topology", TopologyType="Polyline", NodesPerElement="2", NumberOfElements=str(len(lines))
             )
             item(topology, "lines", lines)
-            for name, array in {"position": points, **data}.items():
+            q = data.pop("quaternion")  # some readers know no array of four components
+            for name, array in {"position": points, **data, "quaternion_a": q[:, 0], "quaternion_bcd": q[:, 1:]}.items():
                 kind = {1: "Scalar", 2: "Vector"}[array.ndim]
                 attribute = xml.SubElement(grid, "Attribute", Name=name, AttributeType=kind, Center="Node")
                 item(attribute, f"{name}_{k}", array)

@@ -1,0 +1,121 @@
+"""The command line as a person meets it: output, exit codes, no tracebacks."""
+
+import csv
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+pytestmark = pytest.mark.serial
+ROOT = Path(__file__).parent.parent
+DEMO = ROOT / "demos" / "eccentric_cantilever.toml"
+
+
+def cosserat(*arguments, **environment):
+    """Run the command line in a process of its own."""
+    return subprocess.run(
+        [sys.executable, "-m", "cosserat_fenicsx.cli", *map(str, arguments)],
+        capture_output=True,
+        encoding="utf-8",
+        cwd=ROOT,
+        env={**os.environ, **environment},
+    )
+
+
+def test_help_and_version_load_nothing_heavy():
+    code = "import sys, cosserat_fenicsx.cli; print({'numpy', 'dolfinx', 'petsc4py', 'mpi4py', 'pyvista'} & set(sys.modules))"
+    loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=ROOT)
+    assert loaded.stdout.strip() == "set()", loaded.stderr
+    help_ = cosserat("--help")
+    assert help_.returncode == 0 and "run" in help_.stdout and "explain" in help_.stdout
+    assert cosserat("--version").stdout.startswith("cosserat_fenicsx 0.")
+
+
+def test_run_prints_a_table_and_writes_files(tmp_path):
+    out = tmp_path / "new" / "out"
+    done = cosserat("run", DEMO, "--load-factors", "0.5,0.9", "-o", out)
+    assert done.returncode == 0, done.stderr
+    assert "2.20061545" in done.stdout and "est. error" in done.stdout
+    assert {f.name for f in out.iterdir()} == {"path.xdmf", "path.h5", "path.csv", "rods.png"}
+    rows = list(csv.DictReader((out / "path.csv").open()))
+    assert [row["load_factor"] for row in rows] == ["0.5", "0.9"]
+    assert float(rows[1]["column.end displacement_x (m)"]) == pytest.approx(2.200615447827733, rel=1e-8)
+    assert done.stderr == ""
+
+
+def test_run_of_a_range_lets_the_solver_choose():
+    done = cosserat("run", DEMO, "--load-factors", "0:0.9", "--elements", "8", "--degree", "3")
+    assert done.returncode == 0 and "not asked" in done.stdout and "2.2006154" in done.stdout
+
+
+def test_explain():
+    told = cosserat("explain", DEMO)
+    assert told.returncode == 0, told.stderr
+    for words in ("length 20 m", "Clamp at column.start", "spatial", "119 unknowns", "tol = 1e-06"):
+        assert words in told.stdout
+
+
+def test_explained_size_is_the_solved_size():
+    from cosserat_fenicsx import read_scene, solve
+
+    scene, _ = read_scene(DEMO)
+    for formulation in ("mixed", "multiplier"):
+        told = cosserat("explain", DEMO, "--elements", "3", "--formulation", formulation).stdout
+        path = solve(scene, [0.01], elements=3, formulation=formulation)
+        assert f" {path.unknowns} unknowns" in told
+
+
+def test_not_converged_is_exit_code_1_with_the_partial_path(tmp_path):
+    """Two elements cannot carry a load a billion times the critical one."""
+    done = cosserat("run", DEMO, "--load-factors", "0.5,1e9", "--elements", "2", "-o", tmp_path, "--no-picture")
+    assert done.returncode == 1
+    assert "no equilibrium was found beyond the load factor" in done.stderr
+    assert "0.5" in done.stdout and (tmp_path / "path.xdmf").is_file()
+
+
+@pytest.mark.parametrize(
+    "arguments, words",
+    [
+        (("run", "nowhere.toml"), "nowhere.toml: cannot be read"),
+        (("run", DEMO, "--load-factors", "1:2:3"), "expected A:B"),
+        (("run", DEMO, "--load-factors", "a"), "load factors 'a'"),
+        (("run", DEMO, "--tol", "-1"), "tol = -1.0"),
+        (("run", DEMO, "--formulation", "mixt"), "did you mean 'mixed'?"),
+        (("run", DEMO, "-o", DEMO), "eccentric_cantilever.toml"),
+        (("explain", DEMO, "--degree", "9"), "degree = 9"),
+        (("explode",), "invalid choice"),
+        ((), "usage"),
+    ],
+)
+def test_bad_input_is_exit_code_2_without_a_traceback(arguments, words):
+    refused = cosserat(*arguments)
+    assert refused.returncode == 2
+    assert words in refused.stderr + refused.stdout
+    assert "Traceback" not in refused.stderr
+
+
+def test_unwritable_folder(tmp_path):
+    (tmp_path / "file").write_text("")
+    refused = cosserat("run", DEMO, "-o", tmp_path / "file" / "out")
+    assert refused.returncode == 2 and "Not a directory" in refused.stderr and "Traceback" not in refused.stderr
+
+
+def test_dolfinx_missing(tmp_path):
+    """A module of that name that cannot be imported stands for a machine without it."""
+    (tmp_path / "dolfinx.py").write_text("raise ImportError('No module named dolfinx')")
+    refused = cosserat("run", DEMO, PYTHONPATH=str(tmp_path))
+    assert refused.returncode == 2
+    assert "dolfinx cannot be imported" in refused.stderr and "apt install python3-dolfinx" in refused.stderr
+    assert "Traceback" not in refused.stderr
+
+
+def test_petsc_for_complex_numbers():
+    import numpy as np
+
+    from cosserat_fenicsx.compat import require_real_scalars
+    from cosserat_fenicsx.errors import InstallationError
+
+    with pytest.raises(InstallationError, match="built for complex numbers"):
+        require_real_scalars(np.complex128)

@@ -1,0 +1,38 @@
+"""The demos run, under mpirun too, and give the number that they promise."""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from conftest import COMM
+
+DEMOS = Path(__file__).parent.parent / "demos"
+
+
+@pytest.fixture(autouse=True)
+def demos_on_the_path(monkeypatch):
+    monkeypatch.setattr(sys, "path", [str(DEMOS), *sys.path])
+
+
+def test_eccentric_cantilever(tmp_path_all, capsys):
+    import eccentric_cantilever
+
+    path, error = eccentric_cantilever.main(tmp_path_all, load_factors=(0.5, 0.9, 1.1))
+    assert error < 1e-6 and path.stable.all()
+    printed = capsys.readouterr().out
+    if COMM.rank == 0:
+        assert "2.200615" in printed and "beyond its pole" in printed
+        assert all((tmp_path_all / f).stat().st_size > 5000 for f in ("cantilever.xdmf", "cantilever.h5", "figure.png", "rod.png"))
+    else:
+        assert printed == ""
+    COMM.barrier()
+
+
+@pytest.mark.serial
+def test_overhead_quick():
+    """The bare loop and the public face give the same digits; what it costs is for the command to say."""
+    import overhead
+
+    _, _, difference = overhead.main(runs=1)
+    assert np.max(difference) < 1e-10

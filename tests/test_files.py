@@ -1,0 +1,124 @@
+"""Files and pictures, opened as a user would open them."""
+
+import numpy as np
+import pytest
+from conftest import COMM, column
+
+import cosserat_fenicsx as cf
+
+ETAS = [0.3, 0.9, 1.5]
+
+
+@pytest.fixture(scope="module")
+def solved():
+    rod, scene = column()
+    return rod, cf.solve(scene, ETAS, elements=4)
+
+
+@pytest.fixture
+def xdmf(solved, tmp_path_all):
+    file = tmp_path_all / "path.xdmf"
+    solved[1].write(file)
+    COMM.barrier()
+    return file
+
+
+def check(data, rod, path, k):
+    """All fields of the file against the path's own, and against each other."""
+    expected = path.fields(k, rod)
+    data = {name: np.asarray(data[name]) for name in data.keys()}
+    data["quaternion"] = np.column_stack([data["quaternion_a"], data["quaternion_bcd"]])
+    for name, field in (("position", "position"), ("displacement", "displacement"), ("quaternion", "quaternion"),
+                        ("d1", "d1"), ("d2", "d2"), ("d3", "d3"), ("n", "force"), ("m", "moment"),
+                        ("strain", "strain"), ("curvature", "curvature")):  # fmt: skip
+        scale = np.abs(expected[field]).max()
+        np.testing.assert_allclose(data[name], expected[field], atol=1e-6 * scale, err_msg=name)
+    d = [np.asarray(data[name]) for name in ("d1", "d2", "d3")]
+    np.testing.assert_allclose(np.cross(d[0], d[1]), d[2], atol=1e-6)
+    k = rod.stiffness  # laws (2)-(3): material strains from inertial n and m
+    np.testing.assert_allclose(np.einsum("ij,ij->i", d[2], data["n"]) / k.axial, data["strain"][:, 2], atol=1e-12)
+    np.testing.assert_allclose(np.einsum("ij,ij->i", d[1], data["m"]) / k.bending[1], data["curvature"][:, 1], atol=1e-9)
+
+
+def test_meshio_reads_the_xdmf(solved, xdmf):
+    import meshio
+
+    rod, path = solved
+    with meshio.xdmf.TimeSeriesReader(xdmf) as reader:
+        points, cells = reader.read_points_cells()
+        assert cells[0].type == "line" and len(cells[0].data) == 4 * 4
+        np.testing.assert_allclose(points[-1], [0, 0, 20])
+        assert reader.num_steps == len(ETAS)
+        for k, eta in enumerate(ETAS):
+            time, data, _ = reader.read_data(k)
+            assert time == eta
+            check(data, rod, path, k)
+
+
+@pytest.mark.serial
+def test_pyvista_reads_the_xdmf(solved, xdmf):
+    import pyvista
+
+    rod, path = solved
+    reader = pyvista.get_reader(str(xdmf))
+    assert reader.time_values == ETAS
+    for k, eta in enumerate(ETAS):
+        reader.set_active_time_value(eta)
+        check(reader.read().point_data, rod, path, k)
+
+
+@pytest.mark.serial
+@pytest.mark.parametrize("ending", [".vtu", ".vtk"])
+def test_one_state_in_other_formats(ending, solved, tmp_path):
+    import pyvista
+
+    rod, path = solved
+    file = tmp_path / f"state{ending}"
+    path.write(file, k=1)
+    data = pyvista.read(file)
+    np.testing.assert_allclose(data.points[-1], path.position(rod.end)[1], rtol=1e-6, atol=1e-6)
+    assert data["quaternion"].shape == (17, 4)
+
+
+def test_unwritable_and_unknown_files(solved, tmp_path_all):
+    _, path = solved
+    (tmp_path_all / "folder.xdmf").mkdir(exist_ok=True)
+    COMM.barrier()
+    with pytest.raises(OSError):
+        path.write(tmp_path_all / "folder.xdmf")
+    with pytest.raises(cf.SceneError, match="the ending '.xyzzy' is not known"):
+        path.write(tmp_path_all / "state.xyzzy")
+
+
+def test_an_empty_path_is_not_written(solved, tmp_path_all):
+    _, scene = column()
+    with pytest.raises(cf.NotConverged) as refusal:
+        cf.solve(scene, [0.5], elements=4, steps=cf.StepControl(max_iterations=1))
+    with pytest.raises(cf.SceneError, match="no point to write"):
+        refusal.value.path.write(tmp_path_all / "path.xdmf")
+
+
+def test_picture(solved, tmp_path_all):
+    """The tubes are there, in more than one colour, with the bar's title in black on white."""
+    _, path = solved
+    file = tmp_path_all / "rods.png"
+    path.plot(file)
+    if COMM.rank == 0:
+        from matplotlib.image import imread
+
+        image = imread(file)[:, :, :3]
+        assert image.shape == (1000, 1400, 3)
+        vivid = (image.max(axis=2) - image.min(axis=2)) > 0.25
+        assert 0.01 < vivid.mean() < 0.3
+        assert (image.min(axis=2) > 0.99).mean() > 0.5
+    COMM.barrier()
+
+
+@pytest.mark.serial
+def test_a_polynomial_field_is_interpolated_between_nodes(solved):
+    rod, path = solved
+    s = path.fields(2, rod)["s"]
+    at_nodes = np.array([path.position(rod.at(x))[2] for x in s])
+    np.testing.assert_allclose(at_nodes, path.centreline(2), atol=1e-12 * 20)
+    q = path.rotation(rod.at(7.777))
+    np.testing.assert_allclose(np.linalg.norm(q, axis=1), 1)

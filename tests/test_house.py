@@ -1,0 +1,105 @@
+"""The house: what may import what, the wheel and the plain checkout, files that stay small."""
+
+import ast
+import shutil
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+
+import pytest
+
+pytestmark = pytest.mark.serial
+ROOT = Path(__file__).parent.parent
+PACKAGE = ROOT / "cosserat_fenicsx"
+
+
+def imports(file):
+    """All modules that a file imports, wherever in it."""
+    for node in ast.walk(ast.parse(file.read_text())):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            yield node.module
+            yield from (f"{node.module}.{alias.name}" for alias in node.names)
+
+
+def inside(file):
+    return {name.removeprefix("cosserat_fenicsx.") for name in imports(file) if name.startswith("cosserat_fenicsx.")}
+
+
+def outside(file):
+    return {name.split(".")[0] for name in imports(file)}
+
+
+def test_forms_know_ufl_alone():
+    for file in (ROOT / "forms").glob("*.py"):
+        assert outside(file) <= {"ufl", "collections", "cosserat_fenicsx"}, file
+        assert all(name.startswith("forms") for name in inside(file)), file
+
+
+SCENE = ("checks", "curves", "errors", "loads", "materials", "rod", "scene", "scenefile", "sections", "supports")
+SOLVERS = ("continuation", "linear", "problem", "snes", "stability", "statics")
+RESULTS = ("plot", "recovery", "results", "tables", "xdmf")
+
+
+def test_data_flows_one_way():
+    for name in SCENE:
+        known = {part.split(".")[0] for part in inside(PACKAGE / f"{name}.py")}
+        assert known <= set(SCENE), name
+        assert outside(PACKAGE / f"{name}.py").isdisjoint({"dolfinx", "ufl", "petsc4py", "mpi4py"}), name
+    for name in RESULTS:
+        known = {part.split(".")[0] for part in inside(PACKAGE / f"{name}.py")}
+        assert known.isdisjoint({*SOLVERS, "models", "forms"}), name
+    for name in ("continuation", "problem", "snes", "stability"):  # solvers know no rung
+        known = {part.split(".")[0] for part in inside(PACKAGE / f"{name}.py")}
+        assert known.isdisjoint({"models", "forms", "results", *RESULTS}), name
+    for file in (PACKAGE / "models").glob("*.py"):
+        known = {part.split(".")[0] for part in inside(file)}
+        assert known.isdisjoint({*SOLVERS, *RESULTS}), file
+
+
+def test_pictures_are_imported_only_when_asked_for():
+    code = "import sys, cosserat_fenicsx as cf; cf.solve, cf.Path; print({'pyvista', 'matplotlib', 'meshio', 'vtk'} & set(sys.modules))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, encoding="utf-8", cwd=ROOT)
+    assert done.stdout.strip() == "set()", done.stderr
+
+
+def test_only_compat_asks_for_a_version():
+    for file in [*PACKAGE.rglob("*.py"), *(ROOT / "forms").glob("*.py"), *(ROOT / "demos").glob("*.py")]:
+        if file.name not in ("compat.py",):
+            assert "dolfinx.__version__" not in file.read_text(), file
+
+
+def test_files_stay_small():
+    for file in [*PACKAGE.rglob("*.py"), *(ROOT / "forms").glob("*.py"), *(ROOT / "tests").glob("*.py")]:
+        assert len(file.read_text().splitlines()) <= 350, file
+
+
+def test_the_wheel_holds_the_forms_and_works(tmp_path):
+    source = tmp_path / "source"  # a copy, so that no build/ is left in the checkout
+    for name in ("cosserat_fenicsx", "forms"):
+        shutil.copytree(ROOT / name, source / name)
+    for name in ("pyproject.toml", "README.md", "LICENSE"):
+        shutil.copy(ROOT / name, source)
+    built = subprocess.run(
+        [sys.executable, "-m", "build", "--wheel", "--no-isolation", "--outdir", tmp_path, source],
+        capture_output=True,
+        encoding="utf-8",
+        cwd=tmp_path,
+    )
+    assert built.returncode == 0, built.stdout + built.stderr
+    (wheel,) = tmp_path.glob("*.whl")
+    names = zipfile.ZipFile(wheel).namelist()
+    assert "cosserat_fenicsx/forms/spatial.py" in names and "cosserat_fenicsx/models/spatial.py" in names
+    zipfile.ZipFile(wheel).extractall(tmp_path / "site")
+    code = "import cosserat_fenicsx.forms.spatial as f, cosserat_fenicsx as cf; print(f.__file__); cf.solve"
+    done = subprocess.run([sys.executable, "-S", "-c", f"import sys; sys.path[:0] = {[str(tmp_path / 'site'), *sys.path]!r}; {code}"],
+                          capture_output=True, encoding="utf-8", cwd=tmp_path)  # fmt: skip
+    assert str(tmp_path / "site") in done.stdout, done.stderr
+
+
+def test_a_plain_checkout_works(tmp_path):
+    code = f"import sys; sys.path.insert(0, {str(ROOT)!r}); import cosserat_fenicsx.forms.spatial as f; print(f.__file__)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, encoding="utf-8", cwd=tmp_path)
+    assert done.stdout.strip() == str(ROOT / "forms" / "spatial.py"), done.stderr
