@@ -21,10 +21,14 @@ L, DIAMETER, ECCENTRICITY = 20.0, 0.2, 0.2  # m
 TABULATED = (0.1, 0.3, 0.5, 0.7, 0.8, 0.9, 0.95, 0.99, 1.0, 1.1, 1.3, 1.5, 2.0)
 
 
-def column():
-    """The paper's rod and scene."""
+def column(diameter=DIAMETER, rigid=False):
+    """The paper's rod and scene; `rigid` makes it inextensible and unshearable."""
     steel = cf.Material(E=210e9, nu=0.3, density=7850.0)
-    rod = cf.Rod(cf.Line((0, 0, 0), (0, 0, L)), cf.Circle(DIAMETER), steel, name="column")
+    section = cf.Circle(diameter)
+    if rigid:
+        k = section.stiffness(steel)
+        section = cf.Stiffness(shear=(np.inf, np.inf), axial=np.inf, bending=k.bending, torsion=k.torsion)
+    rod = cf.Rod(cf.Line((0, 0, 0), (0, 0, L)), section, steel, name="column")
     P = cf.euler_load(rod)
     scene = cf.Scene(
         rods=[rod],

@@ -36,3 +36,11 @@ def test_overhead_quick():
 
     _, _, difference = overhead.main(runs=1)
     assert np.max(difference) < 1e-10
+
+
+@pytest.mark.serial
+def test_accuracy_quick(tmp_path):
+    import accuracy
+
+    text = accuracy.main(quick=True, out=tmp_path)
+    assert "| mixed | P3 | 4.9e-07" in text and "EA = GA = infinity" in text and "eta = 0 to 9" in text

@@ -1,0 +1,107 @@
+"""The README's tables of accuracy, on the eccentric cantilever, in Markdown.
+
+    python demos/accuracy.py            writes out/accuracy.md and prints it
+    python demos/accuracy.py --quick    two meshes and two slendernesses
+"""
+
+import argparse
+import math
+import platform
+from pathlib import Path
+
+import numpy as np
+from eccentric_cantilever import ECCENTRICITY, L, column, exact
+
+import cosserat_fenicsx as cf
+from cosserat_fenicsx import analytic, compat
+
+ETAS = (0.9, 1.5)
+
+
+def relative_errors(rod, scene, truth, **arguments):
+    """|delta/exact - 1| at ETAS, and Newton's iterations; None where the path stops."""
+    try:
+        path = cf.solve(scene, list(ETAS), **arguments)
+    except cf.NotConverged:
+        return None
+    return np.abs(path.displacement(rod.end)[:, 0] / truth - 1), int(path.iterations.sum())
+
+
+def orders(meshes):
+    """Errors of delta by formulation, degree and mesh, and the last observed order above round-off."""
+    rod, scene = column()
+    truth = exact(rod, np.array(ETAS)).delta
+    yield "| formulation | degree | " + " | ".join(f"{n} elements" for n in meshes) + " | observed order | Newton iterations |"
+    yield "|---|---|" + "---|" * (len(meshes) + 2)
+    for formulation, degrees in (("mixed", (1, 2, 3, 4)), ("displacement", (1, 2, 3, 4)), ("multiplier", (2,))):
+        for degree in degrees:
+            found = [
+                relative_errors(rod, scene, truth, formulation=formulation, degree=degree, elements=n) for n in meshes
+            ]
+            errors = np.array([f[0] if f else (np.nan, np.nan) for f in found])
+            cells = [f"{e[0]:.1e}, {e[1]:.1e}" if f else "stops" for e, f in zip(errors, found, strict=True)]
+            rates = [_last_order(errors[:, i], meshes) for i in range(len(ETAS))]
+            newton = ", ".join(str(f[1]) if f else "-" for f in found)
+            yield f"| {formulation} | P{degree} | " + " | ".join(cells) + f" | {', '.join(rates)} | {newton} |"
+
+
+def _last_order(errors, meshes):
+    seen = [i for i in range(1, len(meshes)) if errors[i] > 2e-13]
+    if not seen:
+        return "round-off"
+    i = seen[-1]
+    return f"{math.log(errors[i - 1] / errors[i]) / math.log(meshes[i] / meshes[i - 1]):.1f}"
+
+
+def slenderness(ratios):
+    """Errors of delta at 8 elements, mixed, against the exact rod of the same slenderness."""
+    yield "| L/d | P2: eta = 0.9, 1.5 | P3: eta = 0.9, 1.5 | Newton iterations P2, P3 |"
+    yield "|---|---|---|---|"
+    for ratio in ratios:
+        rod, scene = column(diameter=L / ratio if math.isfinite(ratio) else 0.2, rigid=math.isinf(ratio))
+        k = rod.stiffness
+        truth = analytic.reissner(
+            np.array(ETAS), ECCENTRICITY, L, bending=k.bending[1], axial=k.axial, shear=k.shear[0]
+        ).delta
+        found = [relative_errors(rod, scene, truth, degree=p, elements=8) for p in (2, 3)]
+        name = f"{ratio:g}" if math.isfinite(ratio) else "EA = GA = infinity"
+        yield (f"| {name} | " + " | ".join(f"{e[0]:.1e}, {e[1]:.1e}" for e, _ in found)
+               + " | " + ", ".join(str(n) for _, n in found) + " |")  # fmt: skip
+
+
+def newton_work():
+    """Iterations of paths whose steps the solver chooses, rejected steps included, P4 at 8 elements."""
+    yield "| path, mixed | points | Newton iterations |"
+    yield "|---|---|---|"
+    rod, scene = column()
+    for far in (1.5, 4.0, 9.0):
+        path = cf.solve(scene, (0.0, far), elements=8)
+        yield f"| eccentric cantilever, eta = 0 to {far:g} | {len(path)} | {path.iterations.sum()} |"
+
+
+def main(quick=False, out="out"):
+    """Write and print the tables; returns the text."""
+    lines = [
+        f"{compat.version()}, numpy {np.__version__}, Python {platform.python_version()}, {platform.machine()}.",
+        "",
+        "Relative error of delta at eta = 0.9, 1.5 against the exact rod:",
+        "",
+        *orders((4, 8) if quick else (4, 8, 16, 32)),
+        "",
+        "Slenderness, 8 elements:",
+        "",
+        *slenderness((1e2, np.inf) if quick else (1e2, 1e3, 1e4, 1e5, np.inf)),
+        "",
+        *newton_work(),
+    ]
+    text = "\n".join(lines)
+    Path(out).mkdir(parents=True, exist_ok=True)
+    (Path(out) / "accuracy.md").write_text(text + "\n")
+    print(text)
+    return text
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--quick", action="store_true")
+    main(parser.parse_args().quick)
