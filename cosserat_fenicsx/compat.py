@@ -80,7 +80,9 @@ if _VERSION < (0, 8):
     def create_interval_mesh(comm, cells, x):
         """A mesh of straight intervals in space from `cells (n, 2)` and `x (m, 3)`, given on rank 0 alone."""
         cell = ufl.Cell("interval", geometric_dimension=3)
-        return dolfinx_mesh.create_mesh(comm, cells, x, ufl.Mesh(ufl.VectorElement("Lagrange", cell, 1)))
+        # FFCx 0.5 gives the element this variant when it compiles: forms signed before and after must have one name
+        coordinates = ufl.VectorElement("Lagrange", cell, 1, variant="equispaced")
+        return dolfinx_mesh.create_mesh(comm, cells, x, ufl.Mesh(coordinates))
 
     def evaluate(expression, mesh, cells):
         """Values of a compiled expression in `cells`, shape (cells, points * components)."""

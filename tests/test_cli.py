@@ -119,3 +119,13 @@ def test_petsc_for_complex_numbers():
 
     with pytest.raises(InstallationError, match="built for complex numbers"):
         require_real_scalars(np.complex128)
+
+
+def test_a_second_process_compiles_nothing(tmp_path):
+    """The names in the code cache must not depend on what was compiled before."""
+    counts = []
+    for _ in range(2):
+        done = cosserat("run", DEMO, "--load-factors", "0.5", "--degree", "1", "--elements", "2", XDG_CACHE_HOME=str(tmp_path))
+        assert done.returncode == 0, done.stderr
+        counts.append(len(list(tmp_path.rglob("*.so"))))
+    assert counts[0] == counts[1] > 0

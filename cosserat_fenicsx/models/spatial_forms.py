@@ -1,7 +1,7 @@
 """The forms of `forms/spatial.py` on a model's mesh, compiled.
 
-All UFL is built before the first compilation: on dolfinx 0.5 the names of the code cache depend on what was compiled
-in between, and a cache that misses costs a second.
+All forms are signed before the first is compiled: FFCx 0.5 completes the metadata of the integrals that it compiles in
+place, other forms share them, and a form signed later would miss the code cache, which costs a second.
 """
 
 from dataclasses import dataclass
@@ -128,8 +128,11 @@ def compile_forms(model, rotations, carried_n):
     second = 0.5 * (second + ufl.adjoint(second))
 
     fields = ufl.as_vector([*n, *m, *state.r_s])
-    points_2d, weights = basix.make_quadrature(basix.CellType.interval, 2 * points - 1)
     dead = sum(term for term, _ in dead) if dead else None
+    for form in (residual, tangent, second, dead):
+        if form is not None:
+            form.signature()
+    points_2d, weights = basix.make_quadrature(basix.CellType.interval, 2 * points - 1)
     return CompiledForms(
         fem.form(residual),
         fem.form(tangent),
