@@ -132,8 +132,12 @@ def _pyvista():
         os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
     try:
         import pyvista
+        import pyvista.plotting  # loads VTK's windows, and so the system's libraries
     except ImportError as missing:
-        raise SceneError(f"pictures need pyvista ({missing}): pip install 'cosserat-fenicsx[pictures]'") from None
+        raise SceneError(
+            f"pictures need pyvista ({missing}): pip install 'cosserat-fenicsx[pictures]', and on Debian "
+            "apt install libegl1 libgl1 libxrender1"
+        ) from None
     return pyvista
 
 
