@@ -96,7 +96,7 @@ def main(quick=False, out="out"):
     ]
     text = "\n".join(lines)
     Path(out).mkdir(parents=True, exist_ok=True)
-    (Path(out) / "accuracy.md").write_text(text + "\n")
+    (Path(out) / "accuracy.md").write_text(text + "\n", encoding="utf-8")
     print(text)
     return text
 

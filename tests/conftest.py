@@ -56,4 +56,4 @@ def column(*, length=20.0, diameter=0.2, eccentricity=0.2, arm=False, section=No
 def reference():
     """tests/reference/eccentric_cantilever.json by eta: strong form, 40 digits, confirmed to 2e-11 by collocation."""
     file = Path(__file__).parent / "reference" / "eccentric_cantilever.json"
-    return {point["eta"]: point for point in json.loads(file.read_text())["points"]}
+    return {point["eta"]: point for point in json.loads(file.read_text(encoding="utf-8"))["points"]}

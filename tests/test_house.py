@@ -16,7 +16,7 @@ PACKAGE = ROOT / "cosserat_fenicsx"
 
 def imports(file):
     """All modules that a file imports, wherever in it."""
-    for node in ast.walk(ast.parse(file.read_text())):
+    for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
@@ -68,12 +68,12 @@ def test_pictures_are_imported_only_when_asked_for():
 def test_only_compat_asks_for_a_version():
     for file in [*PACKAGE.rglob("*.py"), *(ROOT / "forms").glob("*.py"), *(ROOT / "demos").glob("*.py")]:
         if file.name not in ("compat.py",):
-            assert "dolfinx.__version__" not in file.read_text(), file
+            assert "dolfinx.__version__" not in file.read_text(encoding="utf-8"), file
 
 
 def test_files_stay_small():
     for file in [*PACKAGE.rglob("*.py"), *(ROOT / "forms").glob("*.py"), *(ROOT / "tests").glob("*.py")]:
-        assert len(file.read_text().splitlines()) <= 350, file
+        assert len(file.read_text(encoding="utf-8").splitlines()) <= 350, file
 
 
 def test_the_wheel_holds_the_forms_and_works(tmp_path):

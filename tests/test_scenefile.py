@@ -43,7 +43,7 @@ CHANGES = {
 @pytest.mark.parametrize("case", CHANGES)
 def test_refused(case, tmp_path):
     old, new, words = CHANGES[case]
-    text = DEMO.read_text()
+    text = DEMO.read_text(encoding="utf-8")
     assert old in text
     file = tmp_path / "scene.toml"
     file.write_text(text.replace(old, new))
