@@ -5,6 +5,7 @@ import numpy as np
 from cosserat_fenicsx.models.rodmesh import Layout
 from cosserat_fenicsx.models.spatial import Shape
 from cosserat_fenicsx.statics import FIRST_ELEMENTS, check_arguments, default_degree
+from cosserat_fenicsx.tables import describe
 
 _PER_NODE = 7
 
@@ -36,8 +37,8 @@ def explain(scene, load_factors, settings):
             f"GA = {s.shear[0]:.4g}, {s.shear[1]:.4g} N; L sqrt(EA/EI) = {slender:.4g}."
         )
     lines.append(
-        f"{len(scene.supports)} support(s): {', '.join(_item(x) for x in scene.supports)}. "
-        f"{len(scene.loads)} load(s): {', '.join(_item(x) for x in scene.loads) or 'none'}."
+        f"{len(scene.supports)} support(s): {', '.join(describe(x) for x in scene.supports)}. "
+        f"{len(scene.loads)} load(s): {', '.join(describe(x) for x in scene.loads) or 'none'}."
     )
     lines.append("Model: spatial (centreline r and quaternion q in space), which takes any scene.")
     lines.append(
@@ -60,11 +61,6 @@ def explain(scene, load_factors, settings):
         listed = ", ".join(f"{x:g}" for x in np.atleast_1d(load_factors))
         lines.append(f"Path: load factors {listed}, landed on exactly, with steps between where needed.")
     return "\n".join(lines)
-
-
-def _item(x):
-    where = f" at {x.station}" if x.station is not None else ""
-    return f"{type(x).__name__}{where}"
 
 
 def _unknowns(shape):

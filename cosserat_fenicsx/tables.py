@@ -14,7 +14,8 @@ def path_table(path):
     title = f"{path.scene.title}\n" if path.scene.title else ""
     table = Table(
         title=f"{title}{path.model} model, {path.formulation} formulation, degree {path.degree}, "
-        f"{' + '.join(map(str, path.elements))} elements, {path.unknowns} unknowns"
+        f"{' + '.join(map(str, path.elements))} elements, {path.unknowns} unknowns",
+        caption=f"loads, times the load factor: {', '.join(map(describe, path.scene.loads)) or 'none'}",
     )
     headings = ("load factor", *(f"{rod.name}.end {c} (m)" for c in ("dx", "dy", "dz")), "largest (m)", "stable",
                 "iterations", "est. error")  # fmt: skip
@@ -30,6 +31,11 @@ def path_table(path):
             "not asked" if np.isnan(path.error[k]) else f"{path.error[k]:.1e}",
         )
     return as_text(table)
+
+
+def describe(item):
+    """A support or a load in few words: its kind and its station."""
+    return f"{type(item).__name__}" + (f" at {item.station}" if item.station is not None else "")
 
 
 def stability(negative_modes):

@@ -1,0 +1,31 @@
+"""Progress: lines where there is no terminal, from rank 0 alone, and nothing where it is not wanted."""
+
+import io
+
+import pytest
+from conftest import COMM, column
+
+import cosserat_fenicsx as cf
+from cosserat_fenicsx import progress
+
+
+class Terminal(io.StringIO):
+    def isatty(self):
+        return True
+
+
+@pytest.mark.parametrize("wanted, seen", [(True, True), (False, False), (None, False)])
+def test_lines(wanted, seen, capsys):
+    _, scene = column()
+    cf.solve(scene, [0.5, 1.0], elements=4, progress=wanted)
+    text = capsys.readouterr().err
+    assert ("spatial, 119 unknowns: load factor" in text) == (seen and COMM.rank == 0)
+
+
+def test_bar_in_a_terminal(monkeypatch):
+    screen = Terminal()
+    monkeypatch.setattr(progress.sys, "stderr", screen)
+    monkeypatch.setattr(progress, "_PATIENCE", 0.0)
+    _, scene = column()
+    cf.solve(scene, [0.5, 1.0], elements=4)
+    assert ("119 unknowns" in screen.getvalue()) == (COMM.rank == 0)
