@@ -30,11 +30,11 @@ def test_eccentric_cantilever(tmp_path_all, capsys):
 
 
 @pytest.mark.serial
-def test_overhead_quick():
+def test_overhead_quick(tmp_path):
     """The bare loop and the public face give the same digits; what it costs is for the command to say."""
     import overhead
 
-    _, _, difference = overhead.main(runs=1)
+    _, _, difference = overhead.main(runs=1, out=tmp_path)
     assert np.max(difference) < 1e-10
 
 
