@@ -83,6 +83,7 @@ class Continuation:
         self.problem, self.model = problem, problem.model
         self.newton, self.stability, self.control = newton, stability, control
         newton.allow(control.max_iterations or (10 if self.model.shape.variant in ("condensed", "field") else 30))
+        self._live = [f.x.array for f in (self.model.state, *self.model.carried)]
         self.iterations = 0
         self.failure = ""
         self._history = [Point(0.0, self._numbers(), stability.count(), 0)]
@@ -182,13 +183,12 @@ class Continuation:
         return self.model.largest(a - b)
 
     def _numbers(self):
-        return [self.model.state.x.array.copy(), *(n.x.array.copy() for n in self.model.carried)]
+        return [numbers.copy() for numbers in self._live]
 
     def _put(self, numbers):
-        model = self.model
-        for function, values in zip((model.state, *model.carried), numbers, strict=True):
-            function.x.array[:] = values
-        self.problem.x.array_w[:] = numbers[0][: model.owned]
+        for live, values in zip(self._live, numbers, strict=True):
+            live[:] = values
+        self.problem.x.array_w[:] = numbers[0][: self.model.owned]
 
     def _restore(self):
         self._put(self.here.numbers)

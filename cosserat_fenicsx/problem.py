@@ -49,8 +49,11 @@ class Problem:
         self.model.load_factor.value = eta
 
     def _assemble(self, form, vector):
-        with vector.localForm() as numbers:
-            numbers.set(0.0)
+        if self._parallel:
+            with vector.localForm() as numbers:
+                numbers.set(0.0)
+        else:
+            vector.set(0.0)
         fem_petsc.assemble_vector(vector, form)
         if self._parallel:
             vector.ghostUpdate(PETSc.InsertMode.ADD, PETSc.ScatterMode.REVERSE)

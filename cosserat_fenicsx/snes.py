@@ -37,9 +37,10 @@ class Newton:
 
     def __init__(self, problem):
         self.problem = problem
-        self._root = math.sqrt(problem.model.unknowns)
-        comm = problem.model.comm
-        self.snes = snes = PETSc.SNES().create(comm)
+        model = problem.model
+        self._root, self._carries = math.sqrt(model.unknowns), bool(model.carried)
+        self._now, self._before, self._step = (f.x.array for f in (model.state, model.before, model.step))
+        self.snes = snes = PETSc.SNES().create(model.comm)
         snes.setType("newtonls")
         snes.setFunction(problem.function, problem.b)
         snes.setJacobian(problem.jacobian, problem.A)
@@ -66,11 +67,11 @@ class Newton:
         Returns:
             Solved. Where it has not converged, x is no equilibrium.
         """
-        problem, model = self.problem, self.problem.model
+        problem = self.problem
         self._steps = []
         x = problem.x
         problem.set_state(x)
-        model.before.x.array[:] = model.state.x.array
+        self._before[:] = self._now
         self.snes.solve(None, x)
         reason = self.snes.getConvergedReason()
         problem.set_state(x)
@@ -84,13 +85,10 @@ class Newton:
 
     def _advance(self):
         """Carry n over the step from `before` to the state."""
-        model = self.problem.model
-        if not model.carried:
-            return
-        now, before = model.state.x.array, model.before.x.array
-        np.subtract(now, before, out=model.step.x.array)
-        model.advance()
-        before[:] = now
+        if self._carries:
+            np.subtract(self._now, self._before, out=self._step)
+            self.problem.model.advance()
+            self._before[:] = self._now
 
     def _test(self, snes, iteration, norms):
         _, step, residual = norms

@@ -131,6 +131,7 @@ class SpatialModel:
         if shape.variant == "condensed":
             points = compat.at_quadrature_points(self.mesh, 2 * shape.points - 1, 3)
             carried_n = fem.Function(compat.function_space(self.mesh, points))
+            self._carried_values = carried_n.x.array.reshape(-1, 3)
             self._carried_nodes = compat.cell_nodes(carried_n.function_space).ravel()
         self.carried = () if carried_n is None else (carried_n,)
         self.forms = compile_forms(self, rotations, carried_n)
@@ -261,9 +262,9 @@ class SpatialModel:
 
     def advance(self):
         """Advance the carried fields by `step` from `before`; both must hold their ghosts."""
-        for n in self.carried:
+        if self.carried:
             values = compat.evaluate(self.forms.advance, self.mesh, self._local_cells)
-            n.x.array.reshape(-1, 3)[self._carried_nodes] = values.reshape(-1, 3)
+            self._carried_values[self._carried_nodes] = values.reshape(-1, 3)
 
     def largest(self, change):
         """Largest move (rod lengths) or turn (rad) in a change of the unknowns, over all ranks."""
