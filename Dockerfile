@@ -1,0 +1,22 @@
+# docker build -t cosserat . && docker run cosserat (the demo), or: docker run cosserat pytest
+FROM debian:trixie
+
+# The long step comes first and depends on nothing but the list, so a change of the code does not repeat it.
+COPY .ci/debian-packages.txt /tmp/
+RUN apt-get update \
+ && sed 's/#.*//' /tmp/debian-packages.txt \
+  | DEBIAN_FRONTEND=noninteractive xargs apt-get install -y --no-install-recommends make \
+ && rm -rf /var/lib/apt/lists/* \
+ && useradd --create-home rod \
+ && install --directory --owner=rod --group=rod /home/rod/cosserat
+
+USER rod
+WORKDIR /home/rod/cosserat
+COPY --chown=rod:rod . .
+RUN PIP_NO_CACHE_DIR=1 make setup
+
+# What the Makefile sets, for commands that do not go through it; the comments are there.
+ENV PATH=/home/rod/cosserat/.venv/bin:$PATH \
+    OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 OMPI_MCA_btl=^tcp \
+    MPLBACKEND=Agg VTK_DEFAULT_OPENGL_WINDOW=vtkEGLRenderWindow
+CMD ["make", "demo"]

@@ -1,0 +1,64 @@
+# Everything on a Debian 12 or 13 machine that has git and make. `make` alone lists the targets.
+PYTHON = .venv/bin/python
+# By full path, like /usr/bin/python3 below: another MPI or Python may come first on PATH, and dolfinx belongs to these.
+# A rank that fails leaves the others waiting for it: the time limit, in seconds, ends them.
+MPIRUN = /usr/bin/mpirun --oversubscribe --timeout 1800
+
+# Threads inside BLAS slow some solvers down a thousand times; ranks are the parallelism here.
+export OMP_NUM_THREADS = 1
+export OPENBLAS_NUM_THREADS = 1
+# Open MPI refuses root otherwise, and on Debian 13 complains about network interfaces that one machine does not need.
+export OMPI_ALLOW_RUN_AS_ROOT = 1
+export OMPI_ALLOW_RUN_AS_ROOT_CONFIRM = 1
+export OMPI_MCA_btl = ^tcp
+# Pictures without a screen.
+export MPLBACKEND = Agg
+export VTK_DEFAULT_OPENGL_WINDOW = vtkEGLRenderWindow
+# A numpy in the user's own site directory would hide the distribution's.
+export PYTHONNOUSERSITE = 1
+
+.PHONY: help setup packages demo test tables clean
+
+help:
+	@echo "make demo    solve the eccentric cantilever of the paper on two processes; writes out/"
+	@echo "make test    all tests on one, two and four processes"
+	@echo "make tables  the README's tables of accuracy and cost, measured anew and put into it"
+	@echo "make setup   only what all of these need first: the Debian packages and the environment .venv"
+	@echo "make clean   remove .venv, out and whatever else was built here"
+
+demo: setup
+	$(MPIRUN) -n 2 $(PYTHON) demos/eccentric_cantilever.py
+
+# pytest's cache directory is off in parallel: the ranks would write it all at once.
+test: setup
+	$(PYTHON) -m pytest
+	$(MPIRUN) -n 2 $(PYTHON) -m pytest -p no:cacheprovider --color=no
+	$(MPIRUN) -n 4 $(PYTHON) -m pytest -p no:cacheprovider --color=no
+
+tables: setup
+	$(PYTHON) demos/accuracy.py
+	$(PYTHON) demos/overhead.py
+	$(PYTHON) demos/readme_tables.py
+
+setup: .venv/.stamp
+
+# dolfinx and petsc4py are compiled against the distribution's numpy and break with a newer one: pip may not replace it.
+.venv/.stamp: pyproject.toml .ci/debian-packages.txt
+	@$(MAKE) --no-print-directory packages
+	/usr/bin/python3 -m venv --clear --system-site-packages .venv
+	/usr/bin/python3 -c 'import numpy, scipy; print(f"numpy=={numpy.__version__}\nscipy=={scipy.__version__}")' \
+	    > .venv/constraints.txt
+	$(PYTHON) -m pip install --disable-pip-version-check --constraint .venv/constraints.txt --editable '.[test]'
+	@touch $@
+
+packages:
+	@missing=$$(for name in $$(sed 's/#.*//' .ci/debian-packages.txt); do \
+	    dpkg-query --show --showformat='$${Status}' $$name 2>/dev/null | grep -q 'ok installed' || echo $$name; done); \
+	[ -n "$$missing" ] || exit 0; \
+	if [ $$(id -u) = 0 ]; then root=; elif command -v sudo >/dev/null; then root=sudo; else \
+	    echo "Please have root install these Debian packages, then try again:" $$missing; exit 1; fi; \
+	$$root apt-get update && $$root env DEBIAN_FRONTEND=noninteractive apt-get install -y --no-install-recommends $$missing
+
+clean:
+	rm -rf .venv out build dist *.egg-info .pytest_cache
+	find . -name __pycache__ -prune -exec rm -rf {} +
