@@ -132,8 +132,7 @@ def _write(path, out, *, picture):
     from cosserat_fenicsx.tables import write_csv
 
     path.write(out / "path.xdmf")
-    if _first_rank():
-        write_csv(path, out / "path.csv")
+    write_csv(path, out / "path.csv")
     written = ["path.xdmf", "path.h5", "path.csv"]
     if picture:
         path.plot(out / "rods.png")

@@ -5,9 +5,9 @@ import os
 from pathlib import Path
 
 import numpy as np
-from mpi4py import MPI
 
 from cosserat_fenicsx.errors import SceneError
+from cosserat_fenicsx.ranks import on_first
 
 _PREFIXES = ((1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "µ"))
 # A rod thinner than this part of the picture is drawn thicker, and the picture says so.
@@ -31,8 +31,21 @@ def rods(path, file=None, points=None):
     """
     if len(path) == 0:
         raise SceneError("the path has no point to draw")
-    if file is not None and MPI.COMM_WORLD.rank != 0:
-        return None
+    if file is None:
+        return _draw(path, points)
+    on_first(path.comm, lambda: _save(_draw(path, points), Path(file)))
+    return None
+
+
+def _save(plotter, file):
+    file.parent.mkdir(parents=True, exist_ok=True)
+    with open(file, "wb"):
+        pass  # an unwritable place is said here, plainly
+    plotter.screenshot(str(file))
+    plotter.close()
+
+
+def _draw(path, points):
     pyvista = _pyvista()
     shown = _spread(path) if points is None else list(points)
     plotter = pyvista.Plotter(off_screen=True, window_size=(1400, 1000))
@@ -85,22 +98,14 @@ def rods(path, file=None, points=None):
         note += f" (tubes drawn {', '.join(sorted(thicker))} thicker)"
     plotter.add_text(note, position="upper_edge", color="black", font_size=13)
     _aim(plotter, everywhere, span)
-    if file is None:
-        return plotter
-    file = Path(file)
-    file.parent.mkdir(parents=True, exist_ok=True)
-    with open(file, "wb"):
-        pass  # an unwritable place is said here, plainly
-    plotter.screenshot(str(file))
-    plotter.close()
-    return None
+    return plotter
 
 
 def chart(file, curves, *, xlabel, ylabel, title, ylim=None):
     """A chart of several curves.
 
     Args:
-        file: where to write it (rank 0 writes).
+        file: where to write it; under mpirun, call it on one rank.
         curves: list of (x, y, label, dict of matplotlib's line properties).
         xlabel, ylabel, title: words, with units.
         ylim: limits of the ordinate.
@@ -109,8 +114,6 @@ def chart(file, curves, *, xlabel, ylabel, title, ylim=None):
         SceneError: matplotlib is missing.
         OSError: the file cannot be written.
     """
-    if MPI.COMM_WORLD.rank != 0:
-        return
     try:
         from matplotlib.figure import Figure
     except ImportError as missing:

@@ -27,6 +27,7 @@ class Path:
         scene: the scene it belongs to.
         model, formulation, degree, elements, unknowns: what it was computed with (`elements`: of each rod).
         why: sentences that say why.
+        comm: the ranks that solved it; each holds all of it, the first writes files and pictures.
         load_factors: (n,).
         iterations: (n,) Newton iterations spent since the point before, rejected steps included.
         negative_modes: (n,) negative squares of the second variation; 0 at a stable point, -1 where it is singular.
@@ -36,8 +37,8 @@ class Path:
     Station queries return one row a point, in inertial components unless they say material.
     """
 
-    def __init__(self, scene, layout, scales, rule, *, model, formulation, degree, unknowns, why):
-        self.scene, self.layout, self.scales, self._rule = scene, layout, scales, rule
+    def __init__(self, scene, layout, scales, rule, *, comm, model, formulation, degree, unknowns, why):
+        self.scene, self.layout, self.scales, self._rule, self.comm = scene, layout, scales, rule, comm
         self.model, self.formulation, self.degree, self.unknowns = model, formulation, degree, unknowns
         self.elements, self.why = layout.counts, why
         self._records, self._error = [], None
@@ -58,6 +59,7 @@ class Path:
             model.layout,
             model.scales,
             rule,
+            comm=model.comm,
             model=model.name,
             formulation=formulation,
             degree=model.shape.degree,

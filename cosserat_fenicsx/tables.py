@@ -6,6 +6,8 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
+from cosserat_fenicsx.ranks import on_first
+
 
 def path_table(path):
     """Text: load factor, displacement of the end of the first rod, largest displacement, stability, work, error."""
@@ -64,7 +66,11 @@ def write_csv(path, file):
                 for i, axis in enumerate("xyz"):
                     names.append(f"{station} {quantity}_{axis} ({unit})")
                     columns.append(values[:, i])
+    on_first(path.comm, lambda: _write_rows(file, names, zip(*(column.tolist() for column in columns), strict=True)))
+
+
+def _write_rows(file, names, rows):
     with open(file, "w", newline="", encoding="utf-8") as stream:
         writer = csv.writer(stream)
         writer.writerow(names)
-        writer.writerows(zip(*(column.tolist() for column in columns), strict=True))
+        writer.writerows(rows)

@@ -9,9 +9,9 @@ from pathlib import Path
 from xml.etree import ElementTree as xml
 
 import numpy as np
-from mpi4py import MPI
 
 from cosserat_fenicsx.errors import SceneError
+from cosserat_fenicsx.ranks import on_first
 
 #: Names in the files, as in eq. (1), and the fields of `Path.fields` behind them.
 FIELDS = {
@@ -42,16 +42,7 @@ def write(path, file, k=-1):
     """
     if len(path) == 0:
         raise SceneError(f"{file}: the path has no point to write")
-    comm = MPI.COMM_WORLD
-    trouble = None
-    if comm.rank == 0:
-        try:
-            _write(path, Path(file), k)
-        except (OSError, SceneError) as problem:
-            trouble = problem
-    trouble = comm.bcast(trouble)
-    if trouble is not None:
-        raise trouble
+    on_first(path.comm, lambda: _write(path, Path(file), k))
 
 
 def _write(path, file, k):

@@ -96,9 +96,9 @@ def main(out="out", load_factors=TABULATED):
     path = cf.solve(scene, list(load_factors), tol=1e-6)
     table, error = report(rod, path)
     path.write(out / "cantilever.xdmf")
-    draw(rod, path, out / "figure.png")
     path.plot(out / "rod.png")
     if MPI.COMM_WORLD.rank == 0:
+        draw(rod, path, out / "figure.png")
         print(table)
         print(f"written to {out}/: cantilever.xdmf, cantilever.h5, figure.png, rod.png")
     return path, error

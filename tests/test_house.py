@@ -40,7 +40,7 @@ def test_forms_know_ufl_alone():
 
 SCENE = ("checks", "curves", "errors", "loads", "materials", "rod", "scene", "scenefile", "sections", "supports")
 SOLVERS = ("continuation", "linear", "problem", "snes", "stability", "statics")
-RESULTS = ("plot", "recovery", "results", "tables", "xdmf")
+RESULTS = ("plot", "ranks", "recovery", "results", "tables", "xdmf")
 
 
 def test_data_flows_one_way():
