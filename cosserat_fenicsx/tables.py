@@ -49,7 +49,7 @@ def stability(negative_modes):
 
 def as_text(table):
     """A rich table as plain text, as wide as it needs."""
-    console = Console(width=140)
+    console = Console(width=140, color_system=None)  # mpirun shows the ranks a terminal that there is not
     with console.capture() as capture:
         console.print(table)
     return capture.get().rstrip()
