@@ -2,8 +2,8 @@
 
 A slender rod has several equilibria under one load, and Newton from the straight state finds the unstable ones
 readily (the eccentric column jumps to the far side in one step at eta = 1.1). So a step is accepted only if Newton
-converged, if the prediction was near the result, and if no new negative mode appeared; where one persists down to the
-smallest step, the path itself has lost its stability, and its points say so.
+converged to somewhere near the prediction and not against its direction, and if no new negative mode appeared; where
+one persists down to a thousandth of the way, the path itself has lost its stability, and its points say so.
 """
 
 import math
@@ -19,6 +19,8 @@ from cosserat_fenicsx.stability import NegativeModes
 # aims at a fifth of it.
 _FAR = 0.5
 _AIM = 0.1
+# A step that is off its prediction by less than this may have any direction.
+_SLIGHT = 1e-3
 # Newton iterations beyond which the next step does not grow, and is halved.
 _EASY, _HARD = 5, 9
 
@@ -84,7 +86,7 @@ class Continuation:
         self.newton, self.stability, self.control = newton, stability, control
         newton.allow(control.max_iterations or (10 if self.model.shape.variant in ("condensed", "field") else 30))
         self._live = [f.x.array for f in (self.model.state, *self.model.carried)]
-        self.iterations = 0
+        self.iterations, self._step, self._shrink = 0, None, 0.5
         self.failure = ""
         self._history = [Point(0.0, self._numbers(), stability.count(), 0)]
 
@@ -107,12 +109,11 @@ class Continuation:
         control = self.control
         if not control.adaptive:
             return self._attempt(target, guard=False, on_step=on_step)
-        if not hasattr(self, "_step"):
-            self._step = control.first or way / 10
+        self._step = self._step or control.first or way / 10
         while self.here.load_factor != target:
             left = target - self.here.load_factor
             step = min(self._step, control.largest or np.inf)
-            if abs(left) <= 1.2 * step:
+            if abs(left) <= min(1.2 * step, control.largest or np.inf):
                 goal = target
             elif abs(left) < 2 * step:
                 goal = self.here.load_factor + left / 2
@@ -145,6 +146,9 @@ class Continuation:
         if adaptive and off > _FAR:
             self.failure = "the equilibrium jumped away from the path"
             self._shrink = float(np.clip((_AIM / off) ** (1 / len(self._history)), 0.1, 0.5))
+            return self._restore()
+        if adaptive and off > _SLIGHT and len(self._history) > 1 and self._turned_back(numbers[0], predicted[0]):
+            self.failure = "the equilibrium lies on the other side of the path's direction"
             return self._restore()
         negative = self.stability.count()
         if adaptive and guard and negative != here.negative_modes:
@@ -181,6 +185,12 @@ class Continuation:
     def _distance(self, a, b):
         """Largest difference of r (lengths) and of the rotation (rad, about twice that of q), over all ranks."""
         return self.model.largest(a - b)
+
+    def _turned_back(self, found, predicted):
+        """Whether a step went against its prediction: the mirrored branch of a nearly perfect pitchfork is stable about
+        a section's stiff axis, so that neither the distance nor the count of negative modes gives it away."""
+        here = self.here.numbers[0]
+        return self.model.inner(found - here, predicted - here) <= 0
 
     def _numbers(self):
         return [numbers.copy() for numbers in self._live]

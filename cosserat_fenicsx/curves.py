@@ -13,8 +13,8 @@ class Line:
 
     Args:
         start, end: inertial points, m.
-        d1: a vector whose part across the line gives d_1R; None for the x axis carried along by the smallest
-            rotation that takes the z axis to the line (a line along z has d_1R = x, d_2R = y).
+        d1: a vector whose part across the line gives d_1R; None for the horizontal across the line, d_2R being the
+            one that points upwards (along z); a vertical line has d_1R = x.
 
     Raises:
         SceneError: points that coincide, or d1 along the line.
@@ -34,7 +34,7 @@ class Line:
         d3 = chord / length
         if self.d1 is not None:
             store(self, d1=vector(self, "d1", self.d1, "direction"))
-        d1 = np.asarray(_carried_x_axis(d3) if self.d1 is None else self.d1)
+        d1 = np.asarray(_level_axis(d3) if self.d1 is None else self.d1)
         across = d1 - np.dot(d1, d3) * d3
         if np.linalg.norm(across) <= 1e-6 * np.linalg.norm(d1):
             refuse(self, "d1", self.d1, "a direction across the line")
@@ -51,13 +51,10 @@ class Line:
         return np.broadcast_to(self._frame, (*np.shape(s), 3, 3))
 
 
-def _carried_x_axis(t):
-    """The x axis under the smallest rotation from z to t (about x by pi for t = -z)."""
-    x, z = np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.0, 1.0])
-    if t[2] < -1 + 1e-12:
-        return x
-    axis = np.cross(z, t)  # Rodrigues' formula with sin and cos of the angle in `axis` and t_z
-    return x + np.cross(axis, x) + np.cross(axis, np.cross(axis, x)) / (1 + t[2])
+def _level_axis(t):
+    """The horizontal direction across t that makes t x d1 point upwards; x for a vertical t."""
+    across = np.cross([0.0, 0.0, 1.0], t)
+    return across if np.linalg.norm(across) > 1e-6 else np.array([1.0, 0.0, 0.0])
 
 
 #: Curves by the words of the scene file.

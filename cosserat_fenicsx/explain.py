@@ -44,7 +44,7 @@ def explain(scene, load_factors, settings):
     lines.append(
         {
             "condensed": "Formulation: mixed, the contact force carried at the Gauss points; unknowns r and q alone.",
-            "field": "Formulation: mixed, the contact force as an unknown, because a stiffness is infinite.",
+            "field": "Formulation: mixed, the contact force as an unknown, because a stiffness is infinite or next to it.",
         }.get(shape.variant, f"Formulation: {formulation}, as asked.")
     )
     unknowns = _unknowns(shape)

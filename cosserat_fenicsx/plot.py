@@ -2,38 +2,47 @@
 
 import math
 import os
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
+from cosserat_fenicsx.checks import positive
 from cosserat_fenicsx.errors import SceneError
+from cosserat_fenicsx.materials import Material
 from cosserat_fenicsx.ranks import on_first
+from cosserat_fenicsx.sections import Circle
 
 _PREFIXES = ((1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "µ"))
 # A rod thinner than this part of the picture is drawn thicker, and the picture says so.
 _THINNEST = 1 / 120
 
 
-def rods(path, file=None, points=None):
+def rods(path, file=None, points=None, magnify=1.0):
     """The deformed rods at some points of a path, coloured by bending moment, with the reference as a grey line.
 
     Args:
         path: a `Path` with at least one point.
         file: where to write a .png (rank 0 writes); None returns the plotter.
         points: indices of the points to show; None for up to five, evenly spread.
+        magnify: displacements are drawn this many times their size.
 
     Returns:
         The pyvista Plotter where `file` is None.
 
     Raises:
-        SceneError: an empty path, or pyvista is missing.
+        SceneError: an empty path, a file that is no .png, or pyvista is missing.
         OSError: the file cannot be written.
     """
     if len(path) == 0:
         raise SceneError("the path has no point to draw")
+    positive("plot", "magnify", magnify, "-")
     if file is None:
-        return _draw(path, points)
-    on_first(path.comm, lambda: _save(_draw(path, points), Path(file)))
+        return _draw(path, points, magnify)
+    file = Path(file)
+    if file.suffix != ".png":
+        raise SceneError(f"{file}: expected a name that ends in .png")
+    on_first(path.comm, lambda: _save(_draw(path, points, magnify), file))
     return None
 
 
@@ -45,60 +54,102 @@ def _save(plotter, file):
     plotter.close()
 
 
-def _draw(path, points):
+def _draw(path, points, magnify):
     pyvista = _pyvista()
-    shown = _spread(path) if points is None else list(points)
+    shown = _spread(path) if points is None else [range(len(path))[k] for k in points]
     plotter = pyvista.Plotter(off_screen=True, window_size=(1400, 1000))
     plotter.set_background("white")
     plotter.enable_anti_aliasing("ssaa")
-    fields = {(k, rod): path.fields(k, rod) for k in shown for rod in path.scene.rods}
-    everywhere = np.concatenate([f["position"] for f in fields.values()]
-                                + [f["position"] - f["displacement"] for f in fields.values()])  # fmt: skip
+    at_rest = [rod.curve.position(np.linspace(0, rod.length, 2)) for rod in path.scene.rods]
+    bodies = {(k, rod): _swept(path, k, rod, magnify) for k in shown for rod in path.scene.rods}
+    everywhere = np.concatenate([*at_rest, *(body.line for body in bodies.values())])
     span = everywhere.max(axis=0) - everywhere.min(axis=0)
     size = float(span.max())
-    peak = max(f["bending_moment"].max() for f in fields.values())
+    peak = max(body.moment.max() for body in bodies.values())
     scale, prefix = _prefix(peak)
     thicker = set()
-    for (k, rod), f in fields.items():
-        radius, factor = _radius(rod, size)
+    for body in bodies.values():
+        factor = max(1.0, size * _THINNEST / body.radius)
         if factor > 1:
-            thicker.add(f"{factor:.1f}x" if factor < 10 else f"{factor:.0f}x")
-        tube = _tube(pyvista, path, k, rod, radius)
-        tube["moment"] = tube["moment"] / scale
+            thicker.add(f"{factor:.2g}")
         plotter.add_mesh(
-            tube,
+            _surface(pyvista, body, factor, scale),
             scalars="moment",
             cmap="viridis",
             clim=(0, peak / scale or 1),
             smooth_shading=True,
+            split_sharp_edges=True,
             scalar_bar_args={
                 "title": f"bending moment ({prefix}N m)",
                 "color": "black",
                 "vertical": True,
-                "position_x": 0.87,
+                "position_x": 0.88,
                 "position_y": 0.2,
                 "height": 0.6,
-                "width": 0.06,
+                "width": 0.05,
                 "fmt": "%.3g",
                 "title_font_size": 22,
                 "label_font_size": 20,
             },
         )
-    for rod in path.scene.rods:
-        f = fields[shown[0], rod]
-        plotter.add_mesh(pyvista.lines_from_points(f["position"] - f["displacement"]), color="grey", line_width=2)
-    _label(plotter, path, shown, size)
+    for line in at_rest:
+        plotter.add_mesh(pyvista.lines_from_points(line), color="grey", line_width=2)
+    _label(plotter, path, shown, bodies, size)
     bounds, counts = _bounds(everywhere, size)
     plotter.show_bounds(
-        bounds=bounds, xtitle="x (m)", ytitle="y (m)", ztitle="z (m)", color="black", font_size=14,
-        location="outer", fmt="%.4g", **counts,
+        bounds=bounds, xtitle="x (m)", ytitle="y (m)", ztitle="z (m)", color="black", font_size=8,
+        location="outer", fmt="%.4g", use_3d_text=False, **counts,
     )  # fmt: skip
-    note = f"{path.scene.title or 'Deformed rods'}: shape by load factor"
-    if thicker:
-        note += f" (tubes drawn {', '.join(sorted(thicker))} thicker)"
-    plotter.add_text(note, position="upper_edge", color="black", font_size=13)
-    _aim(plotter, everywhere, span)
+    plotter.add_text(_note(path, shown, thicker, magnify), position="upper_edge", color="black", font_size=12)
+    _aim(plotter, np.reshape(bounds, (3, 2)), span)
     return plotter
+
+
+def _note(path, shown, thicker, magnify):
+    """The title: what is shown, and what is not to scale."""
+    which = "shapes by load factor" if len(shown) == len(path) else f"shapes at {len(shown)} of {len(path)} load factors"
+    parts = [f"{path.scene.title or 'Deformed rods'}: {which}"]
+    if magnify != 1:
+        parts.append(f"displacements magnified {magnify:g} times")
+    if thicker:
+        parts.append(f"sections drawn {' and '.join(sorted(thicker))} times their size")
+    return parts[0] + (f"\n({', '.join(parts[1:])})" if parts[1:] else "")
+
+
+@dataclass(frozen=True)
+class _Body:
+    """A deformed rod: centreline (n, 3), directors (n, 3, 3), outline (corners, 2), radius, bending moment (n,)."""
+
+    line: np.ndarray
+    directors: np.ndarray
+    outline: np.ndarray
+    radius: float
+    moment: np.ndarray
+
+
+def _swept(path, k, rod, magnify, pieces=200):
+    x = np.linspace(0, 1, pieces + 1)
+    line, directors = path.sample(k, rod, x)
+    reference = rod.curve.position(x * rod.length)
+    fields = path.fields(k, rod)
+    outline = np.array(rod.stiffness.outline or Circle(0.02 * rod.length).stiffness(Material(E=1.0)).outline)
+    moment = np.interp(x, fields["s"] / rod.length, fields["bending_moment"])
+    radius = float(np.linalg.norm(outline, axis=1).max())
+    return _Body(reference + magnify * (line - reference), directors, outline, radius, moment)
+
+
+def _surface(pyvista, body, factor, scale):
+    """The surface that the outline sweeps, closed at both ends."""
+    corners = len(body.outline)
+    points = body.line[:, None] + factor * np.einsum("nij,cj->nci", body.directors[:, :, :2], body.outline)
+    rings = np.arange(len(body.line) * corners).reshape(-1, corners)
+    right = np.roll(rings, -1, axis=1)
+    quads = np.stack([rings[:-1], right[:-1], right[1:], rings[1:]], axis=-1).reshape(-1, 4)
+    faces = np.column_stack([np.full(len(quads), 4), quads]).ravel()
+    caps = np.concatenate([[corners, *rings[0][::-1]], [corners, *rings[-1]]])
+    surface = pyvista.PolyData(points.reshape(-1, 3), np.concatenate([faces, caps]))
+    surface["moment"] = np.repeat(body.moment / scale, corners)
+    return surface
 
 
 def chart(file, curves, *, xlabel, ylabel, title, ylim=None):
@@ -147,6 +198,7 @@ def _pyvista():
 def _spread(path, most=5):
     """Up to five points, evenly spread along the way of the rods' ends."""
     ends = np.hstack([path.position(rod.end) for rod in path.scene.rods])
+    ends = np.hstack([ends, 1e-6 * path.scales.length * np.arange(len(path))[:, None]])  # a way even where none moves
     way = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(ends, axis=0), axis=1)))
     wanted = np.linspace(0, way[-1], most)
     return sorted({int(np.argmin(np.abs(way - w))) for w in wanted})
@@ -156,30 +208,14 @@ def _prefix(value):
     return next(((s, p) for s, p in _PREFIXES if abs(value) >= s), (1.0, ""))
 
 
-def _radius(rod, size):
-    """(drawn radius, how many times the real one)."""
-    least = size * _THINNEST
-    real = rod.stiffness.radius or least
-    return (real, 1.0) if real >= least else (least, least / real)
-
-
-def _tube(pyvista, path, k, rod, radius):
-    """A smooth tube through points of the element polynomials."""
-    x = np.linspace(0, 1, 201)
-    line = pyvista.lines_from_points(path.sample(k, rod, x))
-    f = path.fields(k, rod)
-    line["moment"] = np.interp(x, f["s"] / rod.length, f["bending_moment"])
-    return line.tube(radius=radius, n_sides=24)
-
-
-def _label(plotter, path, shown, size):
+def _label(plotter, path, shown, bodies, size):
     """Load factor, and a word where a point is unstable, beyond the end of the first rod."""
     rod = path.scene.rods[0]
     for k in shown:
-        f = path.fields(k, rod)
+        body = bodies[k, rod]
         text = f"{path.load_factors[k]:.3g}" + ("" if path.stable[k] else " (unstable)")
         plotter.add_point_labels(
-            [f["position"][-1] + 0.03 * size * f["d3"][-1]], [text], font_size=20, text_color="black", shape=None,
+            [body.line[-1] + 0.03 * size * body.directors[-1, :, 2]], [text], font_size=20, text_color="black", shape=None,
             show_points=False, always_visible=True, bold=False, justification_horizontal="center",
             justification_vertical="center",
         )  # fmt: skip
@@ -197,20 +233,30 @@ def _bounds(points, size):
     return tuple(np.column_stack([low, high]).ravel()), labels
 
 
-def _aim(plotter, points, span):
-    """Look across the plane of a plane scene, from a corner otherwise."""
+def _aim(plotter, bounds, span):
+    """Look across the plane of a plane scene, from a corner otherwise, and leave room for labels, title and bar."""
     thin = int(np.argmin(span))
-    centre = (points.max(axis=0) + points.min(axis=0)) / 2
     if span[thin] < 0.05 * span.max():
         view = np.zeros(3)
         view[thin] = -1.0 if thin == 1 else 1.0
-        up = (0, 0, 1) if thin != 2 else (0, 1, 0)
-        plotter.enable_parallel_projection()
+        up = np.array([0.0, 0.0, 1.0]) if thin != 2 else np.array([0.0, 1.0, 0.0])
     else:
-        view, up = np.array([1.0, -1.6, 0.8]), (0, 0, 1)
-    reach = 2.2 * float(np.linalg.norm(span))
-    plotter.camera.focal_point = tuple(centre)
-    plotter.camera.position = tuple(centre + reach * view / math.sqrt(view @ view))
-    plotter.camera.up = up
-    plotter.reset_camera()
-    plotter.camera.zoom(1.1)
+        view, up = np.array([1.0, -1.6, 0.8]), np.array([0.0, 0.0, 1.0])
+    view = view / np.linalg.norm(view)
+    right = np.cross(up, view)
+    right /= np.linalg.norm(right)
+    above = np.cross(view, right)
+    corners = np.array(np.meshgrid(*bounds)).reshape(3, -1).T
+    across, high = corners @ right, corners @ above
+    width, height = np.ptp(across), np.ptp(high)
+    aspect = plotter.window_size[0] / plotter.window_size[1]
+    # the drawing fills 62 % of the width, left of the bar, and 68 % of the height, below the title
+    half = max(height / 0.68, width / (0.62 * aspect)) / 2
+    centre = (across.max() + across.min()) / 2 * right + (high.max() + high.min()) / 2 * above
+    focus = centre + 0.12 * half * aspect * right + 0.02 * half * above
+    plotter.enable_parallel_projection()
+    plotter.camera.focal_point = tuple(focus)
+    plotter.camera.position = tuple(focus + 4 * (width + height) * view)
+    plotter.camera.up = tuple(up)
+    plotter.camera.parallel_scale = half
+    plotter.reset_camera_clipping_range()

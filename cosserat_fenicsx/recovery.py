@@ -52,13 +52,14 @@ class ElementRule:
         return cells[0], basis[0]
 
 
-def nodal_contact(path, record):
-    """(nodes, 6) n and m (dimensionless, inertial) of one record.
+def element_contact(path, record):
+    """(elements, p + 1, 6) n and m (dimensionless, inertial) of one record at the nodes of every element.
 
     Element ends from the element's balance tested with its end functions, which is as accurate as the nodal positions
     (order 2p); the nodes between by the polynomial through both ends and the Gauss points.
     """
     rule, scales, p = path._rule, path.scales, path.degree
+    basis = rule.basis(rule.gauss)
     result, cell0 = [], 0
     for rod, breaks in zip(path.scene.rods, path.layout.breaks, strict=True):
         cells = len(breaks) - 1
@@ -68,7 +69,6 @@ def nodal_contact(path, record):
         density = sum(
             (load.density(rod) for load in path.scene.loads if load.station is None), start=np.zeros(3)
         ) * (record.load_factor * scales.length / scales.force)
-        basis = rule.basis(rule.gauss)
         ends = []
         for end, sign in ((0, -1), (p, 1)):
             grad, value = rule.weights * rule.slopes[:, end], rule.weights * basis[:, end]
@@ -76,9 +76,13 @@ def nodal_contact(path, record):
             m_end = np.einsum("g,cgi->ci", grad, m) - h[:, None] * np.einsum("g,cgi->ci", value, np.cross(r_s, n))
             ends.append(sign * np.concatenate([n_end, m_end], axis=1))
         along = np.concatenate([ends[0][:, None], np.concatenate([n, m], axis=2), ends[1][:, None]], axis=1)
-        nodal = np.einsum("jg,cgi->cji", rule.from_ends_and_gauss, along)
-        result.append(np.concatenate([nodal[:1, 0], nodal[:, 1:].reshape(-1, 6)]))
+        result.append(np.einsum("jg,cgi->cji", rule.from_ends_and_gauss, along))
     return np.concatenate(result)
+
+
+def at_nodes(values):
+    """(nodes, k) from values at the nodes of every element of a rod (elements, p + 1, k): those before a shared node."""
+    return np.concatenate([values[:1, 0], values[:, 1:].reshape(-1, values.shape[2])])
 
 
 def directors(q):

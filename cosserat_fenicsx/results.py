@@ -5,8 +5,10 @@ from functools import cached_property
 
 import numpy as np
 
+from cosserat_fenicsx.checks import instance
 from cosserat_fenicsx.errors import SceneError
-from cosserat_fenicsx.recovery import ElementRule, directors, nodal_contact
+from cosserat_fenicsx.recovery import ElementRule, at_nodes, directors, element_contact
+from cosserat_fenicsx.rod import Station
 
 
 @dataclass(frozen=True)
@@ -51,7 +53,7 @@ class Path:
             "the spatial rod takes any scene",
             {
                 "condensed": "the contact force is carried at the Gauss points (formulation 'mixed')",
-                "field": "a stiffness is infinite, so the contact force is an unknown (formulation 'mixed')",
+                "field": "a stiffness is infinite or next to it, so the contact force is an unknown (formulation 'mixed')",
             }.get(model.shape.variant, f"formulation '{formulation}' was asked for"),
         ]
         return cls(
@@ -96,20 +98,22 @@ class Path:
 
     def position(self, station):
         """(n, 3) m, inertial."""
-        return self._at(station, self._all("position"))
+        r = self._at(station, self._all_rq[:, :, :3])
+        return r * self.scales.length + station.rod.curve.position(0.0)
 
     def displacement(self, station):
         """(n, 3) m, inertial, from the reference."""
-        return self.position(station) - station.rod.curve.position(station.s)
+        position = self.position(station)
+        return position - station.rod.curve.position(station.s)
 
     def rotation(self, station):
         """(n, 4) unit quaternion (scalar first) from the reference to the current section; its sign is continuous
         along the path and the rod."""
-        q = self._at(station, self._all("quaternion"))
+        q = self._at(station, self._all_rq[:, :, 3:])
         return q / np.linalg.norm(q, axis=1, keepdims=True)
 
     def rotation_angle(self, station):
-        """(n,) rad: angle of `rotation`, in [0, 2 pi]; not folded back at pi, because q is continuous along the path."""
+        """(n,) rad: angle of `rotation`, in [0, 2 pi]: q is continuous along the path, so it folds at 2 pi and not at pi."""
         q = self.rotation(station)
         half = np.arctan2(np.linalg.norm(q[:, 1:], axis=1), q[:, 0])
         return 2 * half
@@ -117,11 +121,11 @@ class Path:
     def force(self, station):
         """(n, 3) contact force n, N, inertial: what the part beyond (larger s) exerts on the part before. At a
         station with a point load, the value just before it; at rod.start the value just after."""
-        return self._at(station, self._all("force"))
+        return self._contact_at(station)[:, :3] * self.scales.force
 
     def moment(self, station):
         """(n, 3) contact moment m, N m, inertial; sides as in `force`."""
-        return self._at(station, self._all("moment"))
+        return self._contact_at(station)[:, 3:] * self.scales.moment
 
     def centreline(self, k=-1, rod=None):
         """(nodes, 3) m, inertial: the nodes of a rod (default the first) at point k."""
@@ -137,11 +141,12 @@ class Path:
         """
         i, rows = self._rows(rod)
         s = self.layout.node_s(self._rule.nodes)[i] * rod.length
-        record, contact = self._records[k], self._contact[k]
-        position = record.rq[rows, :3] * self.scales.length + self.scales.origin
+        record = self._records[k]
+        contact = at_nodes(self._contact[k][self._cells(i)])
+        position = record.rq[rows, :3] * self.scales.length + rod.curve.position(0.0)
         q = record.rq[rows, 3:] / np.linalg.norm(record.rq[rows, 3:], axis=1, keepdims=True)
         d = directors(q) @ rod.curve.frame(s)
-        n, m = contact[rows, :3] * self.scales.force, contact[rows, 3:] * self.scales.moment
+        n, m = contact[:, :3] * self.scales.force, contact[:, 3:] * self.scales.moment
         n_material, m_material = np.einsum("kij,ki->kj", d, n), np.einsum("kij,ki->kj", d, m)
         section = rod.stiffness
         return {
@@ -166,31 +171,39 @@ class Path:
              for k in range(len(self))]
         )  # fmt: skip
 
-    def _all(self, name):
-        if name in ("position", "quaternion"):
-            rq = np.array([record.rq for record in self._records]).reshape(len(self), -1, 7)
-            if name == "quaternion":
-                return rq[:, :, 3:]
-            return rq[:, :, :3] * self.scales.length + self.scales.origin
-        contact = self._contact
-        return contact[:, :, :3] * self.scales.force if name == "force" else contact[:, :, 3:] * self.scales.moment
+    @property
+    def _all_rq(self):
+        """(points, nodes, 7) r and q, dimensionless."""
+        return np.array([record.rq for record in self._records]).reshape(len(self), -1, 7)
 
     @cached_property
     def _contact(self):
-        """(points, nodes, 6) n and m at the nodes, dimensionless."""
-        return np.array([nodal_contact(self, record) for record in self._records])
+        """(points, elements, nodes of one, 6) n and m, dimensionless: two-valued where a load sits between elements."""
+        return np.array([element_contact(self, record) for record in self._records])
+
+    def _contact_at(self, station):
+        """(points, 6) n and m at a station, dimensionless."""
+        i, _ = self._rows(instance("Path", "station", station, Station, "a station such as rod.end").rod)
+        cell, weights = self._rule.locate(self.layout.breaks[i], station.s / station.rod.length)
+        return np.einsum("j,njk->nk", weights, self._contact[:, self._cells(i).start + cell])
+
+    def _cells(self, i):
+        """Slice of the elements of the i-th rod."""
+        first = sum(self.elements[:i])
+        return slice(first, first + self.elements[i])
 
     def _rows(self, rod):
         """(index of a rod, slice of its nodes)."""
         if rod not in self.scene.rods:
-            raise SceneError(f"rod '{rod.name}' is not in the scene of this path")
+            known = ", ".join(rod.name for rod in self.scene.rods)
+            raise SceneError(f"{rod!r} is no rod of this path's scene: expected one of {known}")
         i = self.scene.rods.index(rod)
         first = sum(n * self.degree + 1 for n in self.elements[:i])
         return i, slice(first, first + self.elements[i] * self.degree + 1)
 
     def _at(self, station, values):
         """Values (points, nodes, k) at a station, by the element's polynomial."""
-        i, rows = self._rows(station.rod)
+        i, rows = self._rows(instance("Path", "station", station, Station, "a station such as rod.end").rod)
         cell, weights = self._rule.locate(self.layout.breaks[i], station.s / station.rod.length)
         first = rows.start + cell * self.degree
         return np.einsum("j,njk->nk", weights, values[:, first : first + self.degree + 1])
@@ -198,32 +211,43 @@ class Path:
     # -- error -------------------------------------------------------------------------------------------------------
 
     def estimate_error(self, coarse):
-        """Estimate this path's error from the same load factors on a coarser mesh of the same degree.
+        """Estimate this path's error from the same load factors on the mesh of elements twice as long.
 
-        The difference of the positions at the coarse nodes, over h^p: one order and more below the order p + 1
-        of the centreline (2 p at element ends), so that the estimate errs on the safe side.
+        The difference of the positions at the coarse nodes and between them, over 2^p: one order and more below the order p + 1
+        of the centreline (2 p at element ends), so that the estimate errs on the safe side. Where hardly anything is
+        displaced (a shaft in torsion), relative to the turning of the sections, or to a billionth of the length.
         """
         difference = np.zeros(len(self))
-        largest = np.zeros(len(self))
+        largest = np.full(len(self), 1e-9 * self.scales.length)
         for i, rod in enumerate(self.scene.rods):
-            s = coarse.layout.node_s(coarse._rule.nodes)[i]
+            nodes = coarse.layout.node_s(coarse._rule.nodes)[i]
+            x = np.sort(np.concatenate([nodes, (nodes[:-1] + nodes[1:]) / 2]))
+            reference = rod.curve.position(x * rod.length)
             for k in range(len(self)):
-                a = coarse.fields(k, rod)["position"]
-                b = self.sample(k, rod, s)
+                a, frames = coarse.sample(k, rod, x)
+                b, _ = self.sample(k, rod, x)
                 difference[k] = max(difference[k], np.linalg.norm(a - b, axis=1).max())
-                moved = a - rod.curve.position(s * rod.length)
-                largest[k] = max(largest[k], np.linalg.norm(moved, axis=1).max())
-        ratio = max(fine / few for fine, few in zip(self.elements, coarse.elements, strict=True))
-        scale = np.where(largest > 0, largest, 1.0)
-        self._error = difference / scale / ratio**self.degree
+                turned = np.linalg.norm(frames - rod.curve.frame(x * rod.length), axis=(1, 2)).max() * rod.stiffness.gyration
+                largest[k] = max(largest[k], np.linalg.norm(a - reference, axis=1).max(), turned)
+        self._error = difference / largest / 2**self.degree
 
     def sample(self, k, rod, x):
-        """(len(x), 3) positions, m, at arc lengths x in [0, 1] of the rod's length, at point k."""
+        """Between the nodes, by the elements' polynomials, at point k.
+
+        Args:
+            k: the point.
+            rod: the rod.
+            x: arc lengths (n,) over the rod's length, in [0, 1].
+
+        Returns:
+            positions (n, 3), m, and directors (n, 3, 3) as columns, both inertial.
+        """
         i, rows = self._rows(rod)
-        r = self._records[k].rq[rows, :3]
         cells, weights = self._rule.locate_all(self.layout.breaks[i], x)
         nodes = cells[:, None] * self.degree + np.arange(self.degree + 1)
-        return np.einsum("kj,kjc->kc", weights, r[nodes]) * self.scales.length + self.scales.origin
+        rq = np.einsum("kj,kjc->kc", weights, self._records[k].rq[rows][nodes])
+        q = rq[:, 3:] / np.linalg.norm(rq[:, 3:], axis=1, keepdims=True)
+        return rq[:, :3] * self.scales.length + rod.curve.position(0.0), directors(q) @ rod.curve.frame(x * rod.length)
 
     # -- files and pictures ------------------------------------------------------------------------------------------
 
@@ -238,13 +262,14 @@ class Path:
 
         xdmf.write(self, file, k)
 
-    def plot(self, file=None, points=None):
+    def plot(self, file=None, points=None, *, magnify=1.0):
         """Picture of the deformed rods, coloured by bending moment, at some points of the path (default up to five).
 
         Args:
             file: a .png; None returns the pyvista plotter.
             points: indices of points.
+            magnify: displacements are drawn this many times their size.
         """
         from cosserat_fenicsx import plot
 
-        return plot.rods(self, file, points)
+        return plot.rods(self, file, points, magnify)

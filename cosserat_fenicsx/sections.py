@@ -19,7 +19,7 @@ class Stiffness:
         bending: (EI1, EI2), about d_1 and about d_2, N m^2; finite.
         torsion: GJ, N m^2; finite.
         mass: rho A, kg/m, where a load or a motion asks for mass.
-        radius: radius of the tube that a picture draws, m; None lets the picture choose.
+        outline: corners (x1, x2) along d_1 and d_2 of what a picture draws, m; None lets the picture choose.
 
     Raises:
         SceneError: a value that is not positive.
@@ -30,7 +30,7 @@ class Stiffness:
     bending: tuple
     torsion: float
     mass: float | None = None
-    radius: float | None = None
+    outline: tuple | None = None
 
     def __post_init__(self):
         for field, unit, check in (("shear", "N", stiffness), ("bending", "N m^2", positive)):
@@ -40,13 +40,21 @@ class Stiffness:
             store(self, **{field: tuple(check(self, field, value, unit) for value in values)})
         store(self, axial=stiffness(self, "axial", self.axial, "N"))
         store(self, torsion=positive(self, "torsion", self.torsion, "N m^2"))
-        for field, unit in (("mass", "kg/m"), ("radius", "m")):
-            if getattr(self, field) is not None:
-                store(self, **{field: positive(self, field, getattr(self, field), unit)})
+        if self.mass is not None:
+            store(self, mass=positive(self, "mass", self.mass, "kg/m"))
+        if self.outline is not None:
+            if not isinstance(self.outline, tuple | list) or len(self.outline) < 3:
+                refuse(self, "outline", self.outline, "three or more corners (x1, x2) (m)")
+            store(self, outline=tuple(vector(self, "outline", corner, "m", size=2) for corner in self.outline))
 
     def stiffness(self, material=None):
         """The section itself (a material is not needed)."""
         return self
+
+    @property
+    def gyration(self):
+        """Radius of gyration sqrt(EI/EA), m; 0 where EA is infinite."""
+        return math.sqrt(max(self.bending) / self.axial)
 
 
 @dataclass(frozen=True)
@@ -72,7 +80,7 @@ class Circle:
         nu = material.nu
         A, I = math.pi * self.diameter**2 / 4, math.pi * self.diameter**4 / 64
         k = self.shear_factor or 6 * (1 + nu) / (7 + 6 * nu)
-        return _isotropic(material, A, (I, I), 2 * I, (k, k), self.diameter / 2)
+        return _isotropic(material, A, (I, I), 2 * I, k, _circle(self.diameter / 2))
 
 
 @dataclass(frozen=True)
@@ -104,7 +112,7 @@ class Tube:
         m2 = (d / D) ** 2
         cowper = 6 * (1 + nu) * (1 + m2) ** 2 / ((7 + 6 * nu) * (1 + m2) ** 2 + (20 + 12 * nu) * m2)
         k = self.shear_factor or cowper
-        return _isotropic(material, A, (I, I), 2 * I, (k, k), D / 2)
+        return _isotropic(material, A, (I, I), 2 * I, k, _circle(D / 2))
 
 
 @dataclass(frozen=True)
@@ -131,8 +139,8 @@ class Rectangle:
         """The section's `Stiffness` in a material."""
         b, h, nu = self.width, self.height, material.nu
         k = self.shear_factor or 10 * (1 + nu) / (12 + 11 * nu)
-        radius = math.sqrt(b * h / math.pi)
-        return _isotropic(material, b * h, (b * h**3 / 12, h * b**3 / 12), _rectangle_torsion(b, h), (k, k), radius)
+        corners = ((b / 2, h / 2), (-b / 2, h / 2), (-b / 2, -h / 2), (b / 2, -h / 2))
+        return _isotropic(material, b * h, (b * h**3 / 12, h * b**3 / 12), _rectangle_torsion(b, h), k, corners)
 
 
 def _check_lengths(section, *fields):
@@ -143,15 +151,20 @@ def _check_lengths(section, *fields):
         store(section, shear_factor=k)
 
 
-def _isotropic(material, A, I, J, k, radius):
+def _circle(radius, corners=24):
+    angles = [2 * math.pi * i / corners for i in range(corners)]
+    return tuple((radius * math.cos(a), radius * math.sin(a)) for a in angles)
+
+
+def _isotropic(material, A, I, J, k, outline):
     mass = None if material.density is None else material.density * A
     return Stiffness(
-        shear=(k[0] * material.G * A, k[1] * material.G * A),
+        shear=(k * material.G * A, k * material.G * A),
         axial=material.E * A,
         bending=(material.E * I[0], material.E * I[1]),
         torsion=material.G * J,
         mass=mass,
-        radius=radius,
+        outline=outline,
     )
 
 

@@ -15,7 +15,6 @@ from cosserat_fenicsx import linear
 #: Newton stops when the error that remains after a step, by its contraction, is below this (root mean square, units L, 1).
 INCREMENT = 1e-11
 _HUGE = 1e3
-_EPS = float(np.finfo(float).eps)
 _Reason = PETSc.SNES.ConvergedReason
 
 
@@ -72,8 +71,11 @@ class Newton:
         x = problem.x
         problem.set_state(x)
         self._before[:] = self._now
-        self.snes.solve(None, x)
-        reason = self.snes.getConvergedReason()
+        try:
+            self.snes.solve(None, x)
+            reason = self.snes.getConvergedReason()
+        except PETSc.Error:  # KLU met a singular tangent
+            reason = _Reason.DIVERGED_LINEAR_SOLVE
         problem.set_state(x)
         if reason > 0:
             self._advance()
@@ -103,8 +105,7 @@ class Newton:
             return _Reason.DIVERGED_DTOL
         contraction = step / self._steps[-2] if iteration > 1 else 1.0
         remaining = step * contraction / (1 - contraction) if contraction < 0.9 else step
-        floor = 1e3 * _EPS * problem.model.stiffest
-        balanced = residual <= 1e-6 * (1 + abs(problem.load_factor) * problem.load_norm) + floor
+        balanced = residual <= 1e-6 * (1 + abs(problem.load_factor) * problem.load_norm) + problem.model.round_off
         if balanced and (remaining <= INCREMENT or step <= INCREMENT):
             return _Reason.CONVERGED_SNORM_RELATIVE
         if iteration >= self.max_iterations:

@@ -23,6 +23,8 @@ MODELS = ("auto", "spatial")
 #: Elements per rod of the first mesh, where the mesh is not given.
 FIRST_ELEMENTS = 4
 _MOST_ELEMENTS = 1024
+# Loads in units of EI/L^2 that point to a slip in the units.
+_ENORMOUS = 1e5
 
 
 def solve(
@@ -75,60 +77,75 @@ def solve(
     )
     with Progress(targets, progress, comm) as bar:
         if elements is not None:
-            return run(targets, free, elements, bar=bar)
-        return _refine(run, targets, free, tol, degree, bar)
+            return run(targets, free, Layout.of(scene, elements), bar=bar)
+        return _refine(run, targets, free, Layout.of(scene, FIRST_ELEMENTS), tol, degree, bar)
 
 
-def _refine(run, targets, free, tol, degree, bar):
+def _refine(run, targets, free, layout, tol, degree, bar):
     """Solve on finer and finer meshes until two of them agree to `tol`."""
-    elements, coarse, failed = FIRST_ELEMENTS, None, None
-    while elements <= _MOST_ELEMENTS:
+    coarse, failed, best = None, False, math.inf
+    while True:
+        elements = max(layout.counts)
         try:
-            fine = run(targets, free, elements, bar=bar)
-        except NotConverged as failure:
-            if failed is not None:
+            fine = run(targets, free, layout, bar=bar)
+        except NotConverged:
+            if failed or elements >= _MOST_ELEMENTS:
                 raise
-            failed, coarse = failure, None
-            elements *= 2
-            continue
-        failed = None
-        if free:  # the steps that one mesh chose are landed on by the finer ones
-            targets, free = fine.load_factors.tolist(), False
-        if coarse is not None:
-            fine.estimate_error(coarse)
-            if fine.error.max() <= tol:
-                return fine
-        coarse = fine
-        elements *= 2
-    raise NotConverged(
-        f"the accuracy tol = {tol:g} was not reached with {_MOST_ELEMENTS} elements of degree {degree} per rod: "
-        f"the estimated error is {coarse.error.max():.2g}. Ask for a larger tol or a higher degree.",
-        coarse,
+            failed, coarse = True, None
+        else:
+            failed = False
+            if free:  # the steps that one mesh chose are landed on by the finer ones
+                targets, free = fine.load_factors.tolist(), False
+            if coarse is not None:
+                fine.estimate_error(coarse)
+                reached = float(fine.error.max())
+                if reached <= tol:
+                    return fine
+                if elements >= _MOST_ELEMENTS or (reached > best and best < 1e-8):
+                    raise NotConverged(_not_accurate(tol, min(reached, best), elements, degree), fine)
+                best = min(best, reached)
+            coarse = fine
+        layout = layout.split(2)
+
+
+def _not_accurate(tol, reached, elements, degree):
+    advice = "a larger tol" if degree == 4 else "a larger tol, or degree 4"
+    return (
+        f"the accuracy tol = {tol:g} was not reached with {elements} elements of degree {degree} per rod: "
+        f"the estimated error stays at {reached:.2g}. Ask for {advice}."
     )
 
 
-@functools.lru_cache(maxsize=16)
-def _solvers(comm_handle, shape):
-    """Problem, Newton solver and stability count of a shape: compiled once, used for every scene of that shape."""
-    model = SpatialModel(MPI.Comm.f2py(comm_handle), shape)
+def _make_solvers(comm, shape):
+    """Problem, Newton solver and stability count of a shape."""
+    model = SpatialModel(comm, shape)
     problem = Problem(model)
     return problem, Newton(problem), NegativeModes(model)
 
 
-def solvers_of(scene, *, elements, formulation="mixed", degree=4, points=None, comm=None):
+@functools.lru_cache(maxsize=16)
+def _kept_solvers(alone, shape):
+    """Compiled once, used for every scene of that shape."""
+    return _make_solvers(MPI.COMM_SELF if alone else MPI.COMM_WORLD, shape)
+
+
+def solvers_of(scene, layout, *, formulation="mixed", degree=4, points=None, comm=None):
     """The loaded problem, Newton solver and stability count for a scene on a given mesh, as `solve` uses them."""
-    layout = Layout.of(scene, elements)
+    comm = comm or MPI.COMM_WORLD
     shape = Shape.of(scene, layout, formulation=formulation, degree=degree, points=points)
-    problem, newton, stability = _solvers((comm or MPI.COMM_WORLD).py2f(), shape)
+    if comm in (MPI.COMM_WORLD, MPI.COMM_SELF):
+        problem, newton, stability = _kept_solvers(comm == MPI.COMM_SELF, shape)
+    else:  # a user's communicator may be freed, and its handle given to another
+        problem, newton, stability = _make_solvers(comm, shape)
     problem.load(scene, layout)
     stability.load()
     return problem, newton, stability
 
 
-def _run(scene, targets, free, elements, *, formulation, degree, points, steps, comm, bar):
+def _run(scene, targets, free, layout, *, formulation, degree, points, steps, comm, bar):
     """One path on one mesh."""
     problem, newton, stability = solvers_of(
-        scene, elements=elements, formulation=formulation, degree=degree, points=points, comm=comm
+        scene, layout, formulation=formulation, degree=degree, points=points, comm=comm
     )
     continuation = Continuation(problem, newton, stability, steps)
     path = Path.of(problem.model, formulation)
@@ -150,7 +167,7 @@ def _run(scene, targets, free, elements, *, formulation, degree, points, steps, 
                 here = continuation.here.load_factor
                 raise NotConverged(
                     f"no equilibrium was found beyond the load factor {here:.6g} on the way to {target:g}: "
-                    f"{continuation.failure}. {_advice(steps)}",
+                    f"{continuation.failure}. {_advice(steps, here, abs(target) * problem.load_norm)}",
                     path,
                 )
             if not between:
@@ -160,13 +177,13 @@ def _run(scene, targets, free, elements, *, formulation, degree, points, steps, 
     return path
 
 
-def _advice(steps):
+def _advice(steps, here, load):
     if not steps.adaptive:
-        return "Let the steps adapt (StepControl(adaptive=True)) or ask for load factors in between."
-    return (
-        "The rod may have a limit point there, which load control cannot pass; otherwise try a smaller "
-        "StepControl.first, more elements, or formulation='mixed'. The points before are in .path."
-    )
+        return "Let the steps adapt, or ask for load factors in between."
+    if load > _ENORMOUS:
+        return f"The loads are {load:.1e} EI/L^2 there, which no slender rod bears: are the units those of SI (N, m, Pa)?"
+    where = "There may be a limit point, which load control cannot pass; otherwise try" if here else "Try"
+    return f"{where} load factors in between, more elements, or the formulation 'mixed'."
 
 
 def _targets(load_factors):
@@ -194,6 +211,8 @@ def check_arguments(scene, model, tol, elements):
     """
     if not isinstance(scene, Scene):
         raise SceneError(f"scene = {scene!r}: expected a Scene")
+    if not scene.loads:
+        raise SceneError("Scene.loads is empty: expected at least one load, such as Force(rod.end, (0, 0, -1))")
     if model not in MODELS:
         raise SceneError(f"model = {model!r}: {nearest(model, MODELS)}")
     if isinstance(tol, bool) or not isinstance(tol, numbers.Real) or not 1e-12 <= tol < 1:

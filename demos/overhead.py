@@ -99,11 +99,11 @@ def compare(degree, elements, runs):
         return cf.solve(scene, ETAS, degree=degree, elements=elements)
 
     path = public()
-    problem, _, _ = statics.solvers_of(scene, degree=degree, elements=elements)
+    problem, _, _ = statics.solvers_of(scene, path.layout, degree=degree)
     bare = BareLoop(problem.model, path)
     layout = path.layout
     tips = bare.run(scene, layout, stability=False)
-    difference = np.abs(tips * path.scales.length + path.scales.origin - path.position(rod.end)).max()
+    difference = np.abs(tips * path.scales.length + rod.curve.position(0.0) - path.position(rod.end)).max()
     tasks = (
         public,
         lambda: bare.run(scene, layout, stability=False),

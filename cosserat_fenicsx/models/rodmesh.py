@@ -28,13 +28,24 @@ class Layout:
         for rod in scene.rods:
             stations = {x.station.s / rod.length for x in (*scene.supports, *scene.loads)
                         if x.station is not None and x.station.rod is rod}  # fmt: skip
-            ends = sorted({0.0, 1.0} | {round(x, 12) for x in stations})
+            ends = [0.0]
+            for x in sorted(stations | {1.0}):  # stations that all but coincide share an element end
+                if x - ends[-1] > 1e-9:
+                    ends.append(x)
+            ends[-1] = 1.0
             pieces = [
                 np.linspace(a, b, max(1, round(elements * (b - a))) + 1)[:-1]
                 for a, b in zip(ends[:-1], ends[1:], strict=True)
             ]
             breaks.append(np.append(np.concatenate(pieces), 1.0))
         return cls(tuple(breaks))
+
+    def split(self, pieces):
+        """The layout with every element cut into equal pieces."""
+        parts = np.arange(pieces) / pieces
+        return Layout(tuple(
+            np.append((b[:-1, None] + np.diff(b)[:, None] * parts).ravel(), 1.0) for b in self.breaks
+        ))  # fmt: skip
 
     @property
     def counts(self):

@@ -2,24 +2,21 @@
 
 from dataclasses import dataclass
 
-import numpy as np
-
 
 @dataclass(frozen=True)
 class Scales:
-    """Units of length (m), force (N) and moment (N m), and the origin (m) that positions are counted from."""
+    """Units of length (m), force (N) and moment (N m)."""
 
     length: float
     force: float
     moment: float
-    origin: np.ndarray
 
     @classmethod
     def of(cls, scene):
         """Scales of the longest rod of a scene."""
         rod = max(scene.rods, key=lambda rod: rod.length)
         EI, L = max(rod.stiffness.bending), rod.length
-        return cls(L, EI / L**2, EI / L, np.asarray(scene.rods[0].curve.position(0.0)))
+        return cls(L, EI / L**2, EI / L)
 
     def of_unit(self, unit):
         """The scale of a load's vector by the name of its unit."""
