@@ -5,9 +5,10 @@ Only the standard library is imported until a command has to work, so that --hel
 
 import argparse
 import sys
+import tempfile
 from pathlib import Path
 
-from cosserat_fenicsx import __version__
+from cosserat_fenicsx import __version__, interrupts
 from cosserat_fenicsx.errors import CosseratError, Interrupted, NotConverged, SceneError
 
 #: Exit codes.
@@ -25,6 +26,7 @@ def main(arguments=None):
     if options.command is None:
         parser.print_help()
         return BAD_INPUT
+    interrupts.listen()
     try:
         return options.do(options)
     except CosseratError as problem:
@@ -40,7 +42,8 @@ def _parser():
     parser = argparse.ArgumentParser(
         prog="cosserat",
         description="Geometrically exact rods on FEniCSx: equilibrium paths of a scene described in a TOML file.",
-        epilog="Exit codes: 0 done, 1 not converged (what was reached is written), 2 bad input. "
+        epilog="Exit codes: 0 done, 1 not converged, 2 bad input, 130 interrupted; after 1 and 130 what was reached is "
+        "printed and written. "
         "In parallel: mpirun -n 2 cosserat run scene.toml",
     )
     parser.add_argument("--version", action="version", version=f"cosserat_fenicsx {__version__}")
@@ -48,7 +51,8 @@ def _parser():
 
     run = commands.add_parser("run", help="solve a scene; print a table, write files")
     _common(run)
-    run.add_argument("-o", "--output", metavar="DIR", help="write path.xdmf, path.csv and rods.png there")
+    run.add_argument("-o", "--output", metavar="DIR",
+                     help="write path.xdmf, path.h5, path.csv and rods.png there; without it only the table is shown")
     run.add_argument("--no-picture", action="store_true", help="write no rods.png")
     run.set_defaults(do=_run)
 
@@ -101,7 +105,7 @@ def _run(options):
     out = None
     if options.output:
         out = Path(options.output)
-        out.mkdir(parents=True, exist_ok=True)  # before the work, not after it
+        _prepare(out)  # before the work, not after it
     from cosserat_fenicsx.statics import solve
 
     code, trouble = DONE, None
@@ -112,12 +116,22 @@ def _run(options):
     except Interrupted as stop:
         path, trouble, code = stop.path, stop, INTERRUPTED
     if path is not None and len(path):
-        _report(path)
         if out is not None:
             _write(path, out, picture=not options.no_picture)
+        _report(path)
     if trouble is not None:
         _say(f"cosserat: {trouble}")
     return code
+
+
+def _prepare(out):
+    """Make the output folder, and see that it can be written to."""
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=out):
+            pass
+    except OSError as problem:
+        raise SceneError(f"output folder {out}: {problem.strerror}: expected a folder that can be written to") from None
 
 
 def _report(path):
@@ -131,8 +145,8 @@ def _report(path):
 def _write(path, out, *, picture):
     from cosserat_fenicsx.tables import write_csv
 
-    path.write(out / "path.xdmf")
     write_csv(path, out / "path.csv")
+    path.write(out / "path.xdmf")
     written = ["path.xdmf", "path.h5", "path.csv"]
     if picture:
         path.plot(out / "rods.png")

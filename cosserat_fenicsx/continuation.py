@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from cosserat_fenicsx.checks import number, refuse
+from cosserat_fenicsx.interrupts import obey
 from cosserat_fenicsx.snes import Newton
 from cosserat_fenicsx.stability import NegativeModes
 
@@ -130,6 +131,7 @@ class Continuation:
 
     def _attempt(self, eta, *, guard, on_step):
         """One step: predict, correct, judge. Accepts it (True) or restores the last point (False)."""
+        obey()
         here = self.here
         predicted = self._predict(eta) if self.control.adaptive else here.numbers
         self._put(predicted)

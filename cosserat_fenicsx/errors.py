@@ -35,7 +35,7 @@ class Interrupted(KeyboardInterrupt):
     """
 
     def __init__(self, path):
-        super().__init__("interrupted; the points already computed are kept in .path")
+        super().__init__(f"interrupted; {len(path)} load factor(s) done so far are kept")
         self.path = path
 
 

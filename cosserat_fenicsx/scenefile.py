@@ -155,7 +155,12 @@ def _station(where, text, rods):
             raise SceneError(f"{where} = '{text}': {expected}")
     if name not in rods:
         raise SceneError(f"{where} = '{text}': no rod is named '{name}', {nearest(name, rods)}")
-    return getattr(rods[name], place) if isinstance(place, str) else rods[name].at(place)
+    if isinstance(place, str):
+        return getattr(rods[name], place)
+    try:
+        return rods[name].at(place)
+    except SceneError as problem:
+        raise SceneError(f"{where} = '{text}': {problem}") from None
 
 
 def _entries(key, tables):

@@ -6,8 +6,10 @@ import functools
 import math
 import numbers
 
+import numpy as np
 from mpi4py import MPI
 
+from cosserat_fenicsx.checks import instance
 from cosserat_fenicsx.continuation import Continuation, StepControl
 from cosserat_fenicsx.errors import Interrupted, NotConverged, SceneError, nearest
 from cosserat_fenicsx.models.rodmesh import Layout
@@ -68,10 +70,10 @@ def solve(
     """
     comm = comm or MPI.COMM_WORLD
     targets, free = _targets(load_factors)
-    formulation = formulation or "mixed"
-    degree = degree or default_degree(formulation)
+    formulation = "mixed" if formulation is None else formulation
+    degree = default_degree(formulation) if degree is None else degree
     check_arguments(scene, model, tol, elements)
-    steps = steps or StepControl()
+    steps = instance("solve", "steps", StepControl() if steps is None else steps, StepControl, "a StepControl")
     run = functools.partial(
         _run, scene, formulation=formulation, degree=degree, points=gauss_points, steps=steps, comm=comm
     )
@@ -189,7 +191,10 @@ def _advice(steps, here, load):
 def _targets(load_factors):
     """([load factors], whether the solver may choose the steps between the two)."""
     free = isinstance(load_factors, tuple) and len(load_factors) == 2
-    values = [load_factors] if isinstance(load_factors, numbers.Real) else list(load_factors)
+    try:
+        values = list(np.atleast_1d(load_factors).tolist() if np.ndim(load_factors) == 0 else load_factors)
+    except TypeError:
+        raise SceneError(f"load_factors = {load_factors!r}: expected numbers") from None
     if not values:
         raise SceneError("load_factors is empty: expected at least one number")
     for value in values:

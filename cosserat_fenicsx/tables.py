@@ -10,27 +10,28 @@ from cosserat_fenicsx.ranks import on_first
 
 
 def path_table(path):
-    """Text: load factor, displacement of the end of the first rod, largest displacement, stability, work, error."""
+    """Text: load factor, motion of the end of the first rod, stability, work and estimated error at every point."""
     rod = path.scene.rods[0]
-    tip, largest = path.displacement(rod.end), path.largest_displacement()
+    tip, angle = path.displacement(rod.end), path.rotation_angle(rod.end)
     title = f"{path.scene.title}\n" if path.scene.title else ""
     table = Table(
         title=f"{title}{path.model} model, {path.formulation} formulation, degree {path.degree}, "
         f"{' + '.join(map(str, path.elements))} elements, {path.unknowns} unknowns",
-        caption=f"loads, times the load factor: {', '.join(map(describe, path.scene.loads)) or 'none'}",
+        caption=f"dx, dy, dz, rotation: of {rod.name}.end. stable: 'no (2)' has two negative modes. iterations: Newton's, since "
+        "the row above.\nest. error: of positions, relative to the largest displacement. Loads, times the load factor: "
+        f"{', '.join(map(describe, path.scene.loads)) or 'none'}.",
     )
-    headings = ("load factor", *(f"{rod.name}.end {c} (m)" for c in ("dx", "dy", "dz")), "largest (m)", "stable",
-                "iterations", "est. error")  # fmt: skip
+    headings = ("load factor", "dx (m)", "dy (m)", "dz (m)", "rotation (rad)", "stable", "iterations", "est. error")
     for heading in headings:
         table.add_column(heading, justify="right")
     for k, eta in enumerate(path.load_factors):
         table.add_row(
             f"{eta:.6g}",
-            *(f"{x + 0.0:.9g}" if abs(x) > 1e-12 * path.scales.length else "0" for x in tip[k]),
-            f"{largest[k]:.9g}",
+            *(f"{x:.9g}" if abs(x) > 1e-12 * path.scales.length else "0" for x in tip[k]),
+            f"{angle[k]:.9g}" if angle[k] > 1e-12 else "0",
             stability(path.negative_modes[k]),
             str(path.iterations[k]),
-            "not asked" if np.isnan(path.error[k]) else f"{path.error[k]:.1e}",
+            "unknown" if np.isnan(path.error[k]) else f"{path.error[k]:.1e}",
         )
     return as_text(table)
 
@@ -56,15 +57,17 @@ def as_text(table):
 
 
 def write_csv(path, file):
-    """Load factors, stability, work, error, and position (m), n (N) and m (N m) at both ends of every rod."""
+    """Load factors, stability, work, error; displacement (m), quaternion, contact force n (N) and moment m (N m) at both
+    ends of every rod. n and m are what the part beyond exerts: the reaction of a support at the start is their opposite."""
     names = ["load_factor", "negative_modes", "iterations", "estimated_error"]
     columns = [path.load_factors, path.negative_modes, path.iterations, path.error]
     for rod in path.scene.rods:
         for station in (rod.start, rod.end):
-            for quantity, unit in (("displacement", "m"), ("force", "N"), ("moment", "Nm")):
+            for quantity, name, axes in (("displacement", "displacement (m)", "xyz"), ("rotation", "quaternion", "abcd"),
+                                         ("force", "contact force (N)", "xyz"), ("moment", "contact moment (N m)", "xyz")):  # fmt: skip
                 values = getattr(path, quantity)(station)
-                for i, axis in enumerate("xyz"):
-                    names.append(f"{station} {quantity}_{axis} ({unit})")
+                for i, axis in enumerate(axes):
+                    names.append(f"{station} {name} {axis}")
                     columns.append(values[:, i])
     on_first(path.comm, lambda: _write_rows(file, names, zip(*(column.tolist() for column in columns), strict=True)))
 

@@ -39,7 +39,7 @@ def test_forms_know_ufl_alone():
 
 
 SCENE = ("checks", "curves", "errors", "loads", "materials", "rod", "scene", "scenefile", "sections", "supports")
-SOLVERS = ("continuation", "linear", "problem", "snes", "stability", "statics")
+SOLVERS = ("continuation", "interrupts", "linear", "problem", "snes", "stability", "statics")
 RESULTS = ("plot", "ranks", "recovery", "results", "tables", "xdmf")
 
 

@@ -1,5 +1,6 @@
 """The spatial rung: r and q in P_p, three formulations of eq. (1), dimensionless."""
 
+import numbers
 from dataclasses import dataclass
 from types import SimpleNamespace
 
@@ -50,9 +51,11 @@ class Shape:
         """
         if formulation not in FORMULATIONS:
             raise SceneError(f"formulation = {formulation!r}: {nearest(formulation, FORMULATIONS)}")
-        if degree not in (1, 2, 3, 4):
+        if isinstance(degree, bool) or not isinstance(degree, numbers.Integral) or not 1 <= degree <= 4:
             raise SceneError(f"degree = {degree!r}: expected 1, 2, 3 or 4")
-        if points is not None and (not isinstance(points, int) or not 1 <= points <= 12):
+        if points is not None and (
+            isinstance(points, bool) or not isinstance(points, numbers.Integral) or not 1 <= points <= 12
+        ):
             raise SceneError(f"gauss_points = {points!r}: expected a whole number from 1 to 12")
         infinite = any(np.isinf([*rod.stiffness.shear, rod.stiffness.axial]).any() for rod in scene.rods)
         if infinite and formulation != "mixed":

@@ -1,0 +1,7 @@
+"""`python -m cosserat_fenicsx` is the command line."""
+
+import sys
+
+from cosserat_fenicsx.cli import main
+
+sys.exit(main())
