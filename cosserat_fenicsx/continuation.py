@@ -85,7 +85,7 @@ class Continuation:
     def __init__(self, problem, newton: Newton, stability: NegativeModes, control: StepControl):
         self.problem, self.model = problem, problem.model
         self.newton, self.stability, self.control = newton, stability, control
-        newton.allow(control.max_iterations or (10 if self.model.shape.variant in ("condensed", "field") else 30))
+        newton.allow(control.max_iterations or (10 if self.model.carries_force else 30))
         self._live = [f.x.array for f in (self.model.state, *self.model.carried)]
         self.iterations, self._step, self._shrink = 0, None, 0.5
         self.failure = ""

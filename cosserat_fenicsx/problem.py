@@ -23,6 +23,7 @@ class Problem:
         self.model = model
         self.A = fem_petsc.create_matrix(model.forms.tangent)
         self._functions = [fem.Function(model.space) for _ in range(2)]  # own the numbers of b and of the dead loads
+        self._held = fem.Function(model.space)
         self.b, self._dead = (compat.petsc_vector(function) for function in self._functions)
         self.x = self.A.createVecRight()
         self._state = compat.petsc_vector(model.state)
@@ -33,7 +34,7 @@ class Problem:
         """Take the numbers of a scene; the state becomes its reference configuration."""
         model = self.model
         model.load(scene, layout)
-        self._supports = [clamp(fem.Function(model.space), model.fixed)]
+        self._supports = [clamp(self._held, model.fixed)]
         self._fixed_owned = model.fixed[model.fixed < model.owned]
         self._dead.set(0.0)
         if model.forms.dead is not None:

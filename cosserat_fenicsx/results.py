@@ -39,11 +39,11 @@ class Path:
     Station queries return one row a point, in inertial components unless they say material.
     """
 
-    def __init__(self, scene, layout, scales, rule, *, comm, model, formulation, degree, unknowns, why):
+    def __init__(self, scene, layout, scales, rule, *, comm, rounding, model, formulation, degree, unknowns, why):
         self.scene, self.layout, self.scales, self._rule, self.comm = scene, layout, scales, rule, comm
         self.model, self.formulation, self.degree, self.unknowns = model, formulation, degree, unknowns
         self.elements, self.why = layout.counts, why
-        self._records, self._error = [], None
+        self._records, self._error, self._rounding = [], None, rounding
 
     @classmethod
     def of(cls, model, formulation):
@@ -62,6 +62,7 @@ class Path:
             model.scales,
             rule,
             comm=model.comm,
+            rounding=0.0 if model.carries_force else model.round_off / 10,
             model=model.name,
             formulation=formulation,
             degree=model.shape.degree,
@@ -215,7 +216,8 @@ class Path:
 
         The difference of the positions at the coarse nodes and between them, over 2^p: one order and more below the order p + 1
         of the centreline (2 p at element ends), so that the estimate errs on the safe side. Where hardly anything is
-        displaced (a shaft in torsion), relative to the turning of the sections, or to a billionth of the length.
+        displaced (a shaft in torsion), relative to the turning of the sections, or to a billionth of the length. Without a
+        contact force of its own (formulation 'displacement') a slender rod's answer also feels the residual's rounding.
         """
         difference = np.zeros(len(self))
         largest = np.full(len(self), 1e-9 * self.scales.length)
@@ -229,7 +231,7 @@ class Path:
                 difference[k] = max(difference[k], np.linalg.norm(a - b, axis=1).max())
                 turned = np.linalg.norm(frames - rod.curve.frame(x * rod.length), axis=(1, 2)).max() * rod.stiffness.gyration
                 largest[k] = max(largest[k], np.linalg.norm(a - reference, axis=1).max(), turned)
-        self._error = difference / largest / 2**self.degree
+        self._error = np.maximum(difference / largest / 2**self.degree, self._rounding)
 
     def sample(self, k, rod, x):
         """Between the nodes, by the elements' polynomials, at point k.

@@ -21,6 +21,7 @@ class NegativeModes:
 
     def __init__(self, model):
         self.model = model
+        self._held = fem.Function(model.rotations)
         self.K = fem_petsc.create_matrix(model.forms.second_variation)
         self.K.setOption(PETSc.Mat.Option.SYMMETRIC, True)
         self.pc = PETSc.PC().create(model.comm)
@@ -28,8 +29,7 @@ class NegativeModes:
 
     def load(self):
         """Take the supports of the scene the model was loaded with."""
-        held = fem.Function(self.model.rotations)
-        self._supports = [clamp(held, self.model.fixed_rotations)]
+        self._supports = [clamp(self._held, self.model.fixed_rotations)]
 
     def count(self):
         """Number of negative squares at the model's state and load factor.

@@ -110,6 +110,7 @@ class SpatialModel:
         state: the unknowns (r, q, and what the variant adds), a dolfinx Function.
         before, step: the state before a Newton step and the step, for `advance`.
         carried: Functions advanced beside the unknowns: n at the Gauss points (condensed variant), or ().
+        carries_force: whether n is more than a function of (r, q).
         load_factor: the Constant eta.
         forms: the `CompiledForms`.
         fixed: local indices of the unknowns that supports hold.
@@ -150,6 +151,7 @@ class SpatialModel:
             self._carried_values = carried_n.x.array.reshape(-1, 3)
             self._carried_nodes = compat.cell_nodes(carried_n.function_space).ravel()
         self.carried = () if carried_n is None else (carried_n,)
+        self.carries_force = shape.variant in ("condensed", "field")
         self.forms = compile_forms(self, rotations, carried_n)
         self.rotations = rotations
 
@@ -158,7 +160,8 @@ class SpatialModel:
         self.nodes = np.sort(compat.element_nodes(V7))
         self._slots = rods.slots(V7, p)
         self._rq = np.arange(7 * len(self._slots)).reshape(-1, 7)  # node, component -> index into state.x.array
-        if self.space is not V7:
+        self._blocked = self.space is V7
+        if not self._blocked:
             cell_dofs = compat.cell_nodes(self.space)[:, : 7 * (p + 1)]
             self._rq[compat.cell_nodes(V7)] = cell_dofs.reshape(-1, p + 1, 7)
         self._owned_nodes = V7.dofmap.index_map.size_local
@@ -286,8 +289,9 @@ class SpatialModel:
 
     def largest(self, change):
         """Largest move (rod lengths) or turn (rad) in a change of the unknowns, over all ranks."""
-        rq = change[self._rq] ** 2
-        local = max(rq[:, :3].sum(axis=1).max(initial=0), 4 * rq[:, 3:].sum(axis=1).max(initial=0)) ** 0.5
+        rq = change.reshape(-1, 7) if self._blocked else change[self._rq]
+        moved, turned = np.einsum("ij,ij->i", rq[:, :3], rq[:, :3]), np.einsum("ij,ij->i", rq[:, 3:], rq[:, 3:])
+        local = max(moved.max(initial=0), 4 * turned.max(initial=0)) ** 0.5
         return self.comm.allreduce(local, op=MPI.MAX) if self.comm.size > 1 else local
 
     def inner(self, a, b):
