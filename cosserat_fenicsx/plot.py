@@ -83,12 +83,12 @@ def _draw(path, points, magnify):
                 "title": f"bending moment ({prefix}N m)",
                 "color": "black",
                 "vertical": True,
-                "position_x": 0.88,
+                "position_x": 0.86,
                 "position_y": 0.2,
                 "height": 0.6,
                 "width": 0.05,
                 "fmt": "%.3g",
-                "title_font_size": 22,
+                "title_font_size": 20,
                 "label_font_size": 20,
             },
         )
@@ -250,10 +250,10 @@ def _aim(plotter, bounds, span):
     across, high = corners @ right, corners @ above
     width, height = np.ptp(across), np.ptp(high)
     aspect = plotter.window_size[0] / plotter.window_size[1]
-    # the drawing fills 62 % of the width, left of the bar, and 68 % of the height, below the title
-    half = max(height / 0.68, width / (0.62 * aspect)) / 2
+    # the drawing fills 62 % of the width, left of the bar, and 64 % of the height, between title and axis
+    half = max(height / 0.64, width / (0.62 * aspect)) / 2
     centre = (across.max() + across.min()) / 2 * right + (high.max() + high.min()) / 2 * above
-    focus = centre + 0.12 * half * aspect * right + 0.02 * half * above
+    focus = centre + 0.12 * half * aspect * right - 0.03 * half * above
     plotter.enable_parallel_projection()
     plotter.camera.focal_point = tuple(focus)
     plotter.camera.position = tuple(focus + 4 * (width + height) * view)
