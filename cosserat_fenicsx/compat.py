@@ -6,6 +6,9 @@ Everything else in the package calls the functions below and never asks for a ve
 
 import contextlib
 import logging
+import platform
+
+import numpy as np
 
 from cosserat_fenicsx.errors import InstallationError
 
@@ -158,5 +161,7 @@ def petsc_vector(function):
 
 
 def version():
-    """Release of dolfinx and of PETSc, for reports."""
-    return f"dolfinx {dolfinx.__version__}, PETSc {'.'.join(map(str, PETSc.Sys.getVersion()))}"
+    """Releases of dolfinx, PETSc, numpy and Python, for reports."""
+    petsc = ".".join(map(str, PETSc.Sys.getVersion()))
+    python = platform.python_version()
+    return f"dolfinx {dolfinx.__version__}, PETSc {petsc}, numpy {np.__version__}, Python {python}"

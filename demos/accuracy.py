@@ -82,7 +82,7 @@ def newton_work():
 def main(quick=False, out="out"):
     """Write and print the tables; returns the text."""
     lines = [
-        f"{compat.version()}, numpy {np.__version__}, Python {platform.python_version()}, {platform.machine()}.",
+        f"{compat.version()}, {platform.machine()}.",
         "",
         "Relative error of delta at eta = 0.9, 1.5 against the exact rod:",
         "",

@@ -127,7 +127,7 @@ def main(runs=15, out="out"):
         Ratios to the bare loop, ratios to the one with the stability count, differences (m), one of each a mesh.
     """
     lines = [
-        f"{compat.version()}, numpy {np.__version__}; medians of {runs} run(s), processor time, one process.",
+        f"{compat.version()}; medians of {runs} run(s), processor time, one process.",
         "",
         "| degree, elements | Newton iterations | `cf.solve` (ms) | bare loop (ms) | ratio | with stability (ms) | ratio |",
         "|---|---|---|---|---|---|---|",
