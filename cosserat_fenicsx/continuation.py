@@ -59,7 +59,7 @@ class StepControl:
             refuse(self, "max_iterations", self.max_iterations, "a whole number above zero")
 
 
-@dataclass
+@dataclass(eq=False)
 class Point:
     """A converged point: load factor, unknowns and carried fields (local numbers), stability and work."""
 
@@ -173,10 +173,9 @@ class Continuation:
 
     def _predict(self, eta):
         """Numbers at eta by the polynomial through the last points (constant, secant, quadratic)."""
-        known = self._history
+        latest = {p.load_factor: p for p in self._history}  # one each, where the path came back to a load factor
+        known = sorted(latest.values(), key=self._history.index)
         etas = [p.load_factor for p in known]
-        if len(set(etas)) < len(etas):  # the path turned back on itself
-            known, etas = known[-1:], etas[-1:]
         weights = [math.prod((eta - b) / (a - b) for b in etas if b != a) for a in etas]  # Lagrange's
         predicted = [weights[-1] * numbers for numbers in known[-1].numbers]
         for weight, point in zip(weights[:-1], known[:-1], strict=True):
@@ -192,7 +191,8 @@ class Continuation:
         """Whether a step went against its prediction: the mirrored branch of a nearly perfect pitchfork is stable about
         a section's stiff axis, so that neither the distance nor the count of negative modes gives it away."""
         here = self.here.numbers[0]
-        return self.model.inner(found - here, predicted - here) <= 0
+        foreseen = predicted - here
+        return self.model.inner(found - here, foreseen) <= 0 < self.model.inner(foreseen, foreseen)
 
     def _numbers(self):
         return [numbers.copy() for numbers in self._live]
