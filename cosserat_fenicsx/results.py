@@ -43,7 +43,8 @@ class Path:
         self.scene, self.layout, self.scales, self._rule, self.comm = scene, layout, scales, rule, comm
         self.model, self.formulation, self.degree, self.unknowns = model, formulation, degree, unknowns
         self.elements, self.why = layout.counts, why
-        self._records, self._error, self._rounding = [], None, rounding
+        self._records, self._rounding = [], rounding
+        self._error = self._difference = None
 
     @classmethod
     def of(cls, model, formulation):
@@ -214,9 +215,10 @@ class Path:
     def estimate_error(self, coarse):
         """Estimate this path's error from the same load factors on the mesh of elements twice as long.
 
-        The difference of the positions at the coarse nodes and between them, over 2^p: one order and more below the order p + 1
-        of the centreline (2 p at element ends), so that the estimate errs on the safe side. Where hardly anything is
-        displaced (a shaft in torsion), relative to the turning of the sections, or to a billionth of the length. Without a
+        The difference of the positions, at the coarse nodes and between them, over half the gain that was seen from the
+        difference before to this one; not more than 2^p (the order is p + 1 along a rod, 2 p at element ends), and 1
+        where there was none before: an order must be seen before it is counted on. Where hardly anything is displaced
+        (a shaft in torsion), relative to the turning of the sections, or to a billionth of the length. Without a
         contact force of its own (formulation 'displacement') a slender rod's answer also feels the residual's rounding.
         """
         difference = np.zeros(len(self))
@@ -231,7 +233,12 @@ class Path:
                 difference[k] = max(difference[k], np.linalg.norm(a - b, axis=1).max())
                 turned = np.linalg.norm(frames - rod.curve.frame(x * rod.length), axis=(1, 2)).max() * rod.stiffness.gyration
                 largest[k] = max(largest[k], np.linalg.norm(a - reference, axis=1).max(), turned)
-        self._error = np.maximum(difference / largest / 2**self.degree, self._rounding)
+        self._difference = difference
+        gain = 1.0
+        if coarse._difference is not None:
+            seen = coarse._difference / np.maximum(difference, 1e-300)
+            gain = np.clip((seen - 1) / 2, 1, 2**self.degree)
+        self._error = np.maximum(difference / largest / gain, self._rounding)
 
     def sample(self, k, rod, x):
         """Between the nodes, by the elements' polynomials, at point k.

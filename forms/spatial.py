@@ -119,11 +119,22 @@ def multiplier(lam, lam_test, state, section, ds, derivative):
     For comparison only: it locks, and most spaces for lambda make the tangent singular (README, Formulations).
     """
     q = state.q
-    v = (directors(q) * section.R_R).T * state.r_s - _E3
-    u = section.R_R.T * curvature(q, state.q_s)
+    _, v, u = _as_they_stand(state, section)
     energy = (ufl.dot(v, scaled(section.K, v)) + ufl.dot(u, scaled(section.J, u))) / 2
     constraint = ufl.dot(q, q) - 1
     return derivative(ds(energy)) + derivative(ds(lam * constraint)) + ds(constraint * lam_test)
+
+
+def multiplier_contact(state, section):
+    """Contact force and moment of the multiplier form, inertial."""
+    T, v, u = _as_they_stand(state, section)
+    return T * scaled(section.K, v), T * scaled(section.J, u)
+
+
+def _as_they_stand(state, section):
+    """Directors of eq. (6) and the strains of eqs. (4)-(5) without a division by |q|^2."""
+    T = directors(state.q) * section.R_R
+    return T, T.T * state.r_s - _E3, section.R_R.T * curvature(state.q, state.q_s)
 
 
 def stability_direction(dr, theta, q):

@@ -81,6 +81,7 @@ def compile_forms(model, rotations, carried_n):
         phi_n = ufl.as_vector([phi[i] for i in (7, 8, 9)])
         internal = eq.mixed(n, state, section, test, phi_n, ds, ds_node)
     elif variant == "multiplier":
+        n, m = eq.multiplier_contact(state, section)
         load_test = eq.variation_tests_of(phi, state.q_node)
         lam = data.K[2] * U[7]  # lambda has the size of EA
         internal = eq.multiplier(lam, phi[7], state, section, ds, lambda a: ufl.derivative(a, U, phi))
