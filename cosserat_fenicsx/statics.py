@@ -191,8 +191,10 @@ def _advice(steps, here, load):
 def _targets(load_factors):
     """([load factors], whether the solver may choose the steps between the two)."""
     free = isinstance(load_factors, tuple) and len(load_factors) == 2
+    if isinstance(load_factors, numbers.Real | np.ndarray):
+        load_factors = np.atleast_1d(load_factors).tolist()
     try:
-        values = list(np.atleast_1d(load_factors).tolist() if np.ndim(load_factors) == 0 else load_factors)
+        values = list(load_factors)
     except TypeError:
         raise SceneError(f"load_factors = {load_factors!r}: expected numbers") from None
     if not values:

@@ -70,6 +70,7 @@ def test_refused(case):
 
 
 ARGUMENTS = {
+    "load factors of no kind": (dict(load_factors=None), "load_factors = None: expected numbers"),
     "no load factors": (dict(load_factors=[]), "load_factors is empty"),
     "NaN load factor": (dict(load_factors=[0.5, nan]), "load_factors holds nan: expected finite numbers"),
     "infinite load factor": (dict(load_factors=(0, inf)), "load_factors holds inf"),
@@ -91,6 +92,13 @@ def test_arguments_refused(case):
     with pytest.raises(cf.SceneError) as refusal:
         cf.solve(scene, **{"load_factors": [0.1], **arguments})
     assert words in str(refusal.value)
+
+
+@pytest.mark.parametrize("given", [0.1, np.float64(0.1), np.array(0.1), np.array([0.1]), [0.1], iter([0.1]), range(1)])
+def test_load_factors_in_many_guises(given):
+    _, scene = column()
+    expected = [0.0] if isinstance(given, range) else [0.1]
+    assert cf.solve(scene, given, elements=2, degree=1).load_factors.tolist() == expected
 
 
 def test_scene_refused():

@@ -96,13 +96,16 @@ def compile_forms(model, rotations, carried_n):
         tangent = derivative(internal)
 
     # Dead loads are a vector assembled once; live ones depend on q and enter residual and tangent.
-    dead, live = [], []
+    dead_terms, live_terms = [], []
     for work, place, vectors in model.terms:
         integral = at_points if place == "point" else ds
         term = integral(work(*vectors, load_test, state.q_node))
-        (live if {U, U_node} & set(term.coefficients()) else dead).append((term, (work, vectors, integral)))
+        if {U, U_node} & set(term.coefficients()):
+            live_terms.append((term, (work, vectors, integral)))
+        else:
+            dead_terms.append(term)
     residual = internal
-    for term, _ in live:
+    for term, _ in live_terms:
         residual -= model.load_factor * term
         tangent -= model.load_factor * derivative(term)
 
@@ -113,10 +116,10 @@ def compile_forms(model, rotations, carried_n):
     direction = ufl.as_vector(direction + [0] * (U.ufl_shape[0] - 7))
 
     def variation(a):
-        tangent = derivative(a)
-        if tangent == 0:  # no motion in it, such as a dead moment tested by a rotation
+        change = derivative(a)
+        if change == 0:  # no motion in it, such as a dead moment tested by a rotation
             return 0
-        expanded = ufl.algorithms.expand_derivatives(tangent)
+        expanded = ufl.algorithms.expand_derivatives(change)
         return ufl.algorithms.expand_derivatives(ufl.replace(expanded, {trial: direction}))
 
     if variant in ("condensed", "field"):
@@ -124,12 +127,12 @@ def compile_forms(model, rotations, carried_n):
         second = eq.carried_force_tangent(n, state, stiff, rigid, ds, ds_node, variation)
     else:
         second = variation(ds(eq.balance(n, m, state, rigid)))
-    for _, (work, vectors, integral) in live:
+    for _, (work, vectors, integral) in live_terms:
         second -= model.load_factor * variation(integral(work(*vectors, rigid, state.q_node)))
     second = 0.5 * (second + ufl.adjoint(second))
 
     fields = ufl.as_vector([*n, *m, *state.r_s])
-    dead = sum(term for term, _ in dead) if dead else None
+    dead = sum(dead_terms) if dead_terms else None
     for form in (residual, tangent, second, dead):
         if form is not None:
             form.signature()
