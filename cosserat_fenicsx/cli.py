@@ -51,8 +51,12 @@ def _parser():
 
     run = commands.add_parser("run", help="solve a scene; print a table, write files")
     _common(run)
-    run.add_argument("-o", "--output", metavar="DIR",
-                     help="write path.xdmf, path.h5, path.csv and rods.png there; without it only the table is shown")
+    run.add_argument(
+        "-o",
+        "--output",
+        metavar="DIR",
+        help="write path.xdmf, path.h5, path.csv and rods.png there; without it only the table is shown",
+    )
     run.add_argument("--no-picture", action="store_true", help="write no rods.png")
     run.set_defaults(do=_run)
 

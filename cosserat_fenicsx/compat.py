@@ -48,6 +48,7 @@ def require_real_scalars(scalar_type=PETSc.ScalarType):
 
 require_real_scalars()
 
+
 @contextlib.contextmanager
 def quiet_compiler():
     """Silence the just-in-time compiler's log: 0.5 reports every build and cache look-up at INFO on the root logger."""
@@ -68,9 +69,7 @@ if _VERSION < (0, 8):
 
     def at_quadrature_points(mesh, quadrature_degree, size):
         """An element whose `size`-component values live at the Gauss points of `quadrature_degree`."""
-        return ufl.VectorElement(
-            "Quadrature", mesh.ufl_cell(), quadrature_degree, dim=size, quad_scheme="default"
-        )
+        return ufl.VectorElement("Quadrature", mesh.ufl_cell(), quadrature_degree, dim=size, quad_scheme="default")
 
     def mixed(*elements):
         """The product of several elements."""

@@ -53,7 +53,9 @@ def explain(scene, load_factors, settings):
     )
     unknowns = _unknowns(shape)
     if elements:
-        lines.append(f"Mesh: {elements} element(s) of degree {degree} per rod, as asked: {unknowns} unknowns, no error estimate.")
+        lines.append(
+            f"Mesh: {elements} element(s) of degree {degree} per rod, as asked: {unknowns} unknowns, no error estimate."
+        )
     else:
         lines.append(
             f"Mesh: elements of degree {degree}, from {first} per rod ({unknowns} unknowns) doubled until two meshes agree "
@@ -70,7 +72,9 @@ def explain(scene, load_factors, settings):
 def _section(section):
     """A section with its measures."""
     given = ((f.name, getattr(section, f.name)) for f in dataclasses.fields(section))
-    measures = ", ".join(f"{name} {value:g} m" for name, value in given if isinstance(value, float) and "factor" not in name)
+    measures = ", ".join(
+        f"{name} {value:g} m" for name, value in given if isinstance(value, float) and "factor" not in name
+    )
     return f"{type(section).__name__}" + (f" ({measures})" if measures and not isinstance(section, Stiffness) else "")
 
 

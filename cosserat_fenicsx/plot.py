@@ -107,7 +107,9 @@ def _draw(path, points, magnify):
 
 def _note(path, shown, thicker, magnify):
     """The title: what is shown, and what is not to scale."""
-    which = "shapes by load factor" if len(shown) == len(path) else f"shapes at {len(shown)} of {len(path)} load factors"
+    which = (
+        "shapes by load factor" if len(shown) == len(path) else f"shapes at {len(shown)} of {len(path)} load factors"
+    )
     parts = [f"{path.scene.title or 'Deformed rods'}: {which}"]
     if magnify != 1:
         parts.append(f"displacements magnified {magnify:g} times")

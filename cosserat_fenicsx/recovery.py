@@ -66,9 +66,9 @@ def element_contact(path, record):
         n, m, r_s = np.split(record.gauss_fields[cell0 : cell0 + cells], 3, axis=2)
         cell0 += cells
         h = np.diff(breaks) * rod.length / scales.length
-        density = sum(
-            (load.density(rod) for load in path.scene.loads if load.station is None), start=np.zeros(3)
-        ) * (record.load_factor * scales.length / scales.force)
+        density = sum((load.density(rod) for load in path.scene.loads if load.station is None), start=np.zeros(3)) * (
+            record.load_factor * scales.length / scales.force
+        )
         ends = []
         for end, sign in ((0, -1), (p, 1)):
             grad, value = rule.weights * rule.slopes[:, end], rule.weights * basis[:, end]

@@ -1,22 +1,22 @@
 """Scene files in TOML: the words are the package's own class and argument names.
 
-    [[rods]]
-    name = "column"
-    curve = { type = "Line", start = [0, 0, 0], end = [0, 0, 20] }
-    section = { type = "Circle", diameter = 0.2 }
-    material = { E = 210e9, nu = 0.3 }
+[[rods]]
+name = "column"
+curve = { type = "Line", start = [0, 0, 0], end = [0, 0, 20] }
+section = { type = "Circle", diameter = 0.2 }
+material = { E = 210e9, nu = 0.3 }
 
-    [[supports]]
-    type = "Clamp"
-    station = "column.start"          # or "column.end", or "column@5.0" for s = 5 m
+[[supports]]
+type = "Clamp"
+station = "column.start"          # or "column.end", or "column@5.0" for s = 5 m
 
-    [[loads]]
-    type = "Force"
-    station = "column.end"
-    force = [0, 0, -1e5]
+[[loads]]
+type = "Force"
+station = "column.end"
+force = [0, 0, -1e5]
 
-    [solve]                           # optional: defaults of the command line
-    load_factors = [0.5, 1.0]
+[solve]                           # optional: defaults of the command line
+load_factors = [0.5, 1.0]
 """
 
 import dataclasses
@@ -101,7 +101,9 @@ def _rod(where, entry, materials):
     material = entry.get("material")
     if isinstance(material, str):
         if material not in materials:
-            raise SceneError(f"{where}.material = '{material}': {nearest(material, materials) or 'no [materials] given'}")
+            raise SceneError(
+                f"{where}.material = '{material}': {nearest(material, materials) or 'no [materials] given'}"
+            )
         material = materials[material]
     elif material is not None:
         material = _build(f"{where}.material", material, (Material,), {})

@@ -183,7 +183,9 @@ def _advice(steps, here, load):
     if not steps.adaptive:
         return "Let the steps adapt, or ask for load factors in between."
     if load > _ENORMOUS:
-        return f"The loads are {load:.1e} EI/L^2 there, which no slender rod bears: are the units those of SI (N, m, Pa)?"
+        return (
+            f"The loads are {load:.1e} EI/L^2 there, which no slender rod bears: are the units those of SI (N, m, Pa)?"
+        )
     where = "There may be a limit point, which load control cannot pass; otherwise try" if here else "Try"
     return f"{where} load factors in between, more elements, or the formulation 'mixed'."
 
@@ -224,5 +226,7 @@ def check_arguments(scene, model, tol, elements):
         raise SceneError(f"model = {model!r}: {nearest(model, MODELS)}")
     if isinstance(tol, bool) or not isinstance(tol, numbers.Real) or not 1e-12 <= tol < 1:
         raise SceneError(f"tol = {tol!r}: expected a number from 1e-12 to below 1")
-    if elements is not None and (isinstance(elements, bool) or not isinstance(elements, numbers.Integral) or elements < 1):
+    if elements is not None and (
+        isinstance(elements, bool) or not isinstance(elements, numbers.Integral) or elements < 1
+    ):
         raise SceneError(f"elements = {elements!r}: expected a whole number above zero")

@@ -66,7 +66,9 @@ def _write_series(path, file):
     try:
         import h5py
     except ImportError:
-        raise SceneError(f"{file}: writing .xdmf needs h5py: install the system's, 'apt install python3-h5py'") from None
+        raise SceneError(
+            f"{file}: writing .xdmf needs h5py: install the system's, 'apt install python3-h5py'"
+        ) from None
     numbers = file.with_suffix(".h5")
     root = xml.Element("Xdmf", Version="3.0")
     series = xml.SubElement(
@@ -99,7 +101,12 @@ def _write_series(path, file):
             )
             item(topology, "lines", lines)
             q = data.pop("quaternion")  # some readers know no array of four components
-            for name, array in {"position": points, **data, "quaternion_a": q[:, 0], "quaternion_bcd": q[:, 1:]}.items():
+            for name, array in {
+                "position": points,
+                **data,
+                "quaternion_a": q[:, 0],
+                "quaternion_bcd": q[:, 1:],
+            }.items():
                 kind = {1: "Scalar", 2: "Vector"}[array.ndim]
                 attribute = xml.SubElement(grid, "Attribute", Name=name, AttributeType=kind, Center="Node")
                 item(attribute, f"{name}_{k}", array)

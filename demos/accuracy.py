@@ -1,7 +1,7 @@
 """The README's tables of accuracy, on the eccentric cantilever, in Markdown.
 
-    python demos/accuracy.py            writes out/accuracy.md and prints it
-    python demos/accuracy.py --quick    two meshes and two slendernesses
+python demos/accuracy.py            writes out/accuracy.md and prints it
+python demos/accuracy.py --quick    two meshes and two slendernesses
 """
 
 import argparse
@@ -31,7 +31,11 @@ def orders(meshes):
     """Errors of delta by formulation, degree and mesh, and the last observed order above round-off."""
     rod, scene = column()
     truth = exact(rod, np.array(ETAS)).delta
-    yield "| formulation | degree | " + " | ".join(f"{n} elements" for n in meshes) + " | observed order | Newton iterations |"
+    yield (
+        "| formulation | degree | "
+        + " | ".join(f"{n} elements" for n in meshes)
+        + " | observed order | Newton iterations |"
+    )
     yield "|---|---|" + "---|" * (len(meshes) + 2)
     for formulation, degrees in (("mixed", (1, 2, 3, 4)), ("displacement", (1, 2, 3, 4)), ("multiplier", (2,))):
         for degree in degrees:

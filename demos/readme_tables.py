@@ -11,7 +11,9 @@ def main(out="out"):
     text = README.read_text(encoding="utf-8")
     for name in ("accuracy", "overhead"):
         table = (Path(out) / f"{name}.md").read_text(encoding="utf-8").strip()
-        text = re.sub(f"<!-- {name} -->.*<!-- /{name} -->", f"<!-- {name} -->\n{table}\n<!-- /{name} -->", text, flags=re.S)
+        text = re.sub(
+            f"<!-- {name} -->.*<!-- /{name} -->", f"<!-- {name} -->\n{table}\n<!-- /{name} -->", text, flags=re.S
+        )
     README.write_text(text, encoding="utf-8")
 
 

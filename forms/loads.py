@@ -7,7 +7,6 @@ everywhere but at the loaded end of one cell, so that it counts once, in paralle
 from collections import namedtuple
 
 import ufl
-
 from cosserat_fenicsx.forms.rotation import rotation_matrix
 
 #: Virtual displacement phi_r and virtual rotation phi, both inertial.

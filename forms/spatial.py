@@ -9,9 +9,15 @@ Three formulations share the two balances below and differ in what carries n and
 from collections import namedtuple
 
 import ufl
-
 from cosserat_fenicsx.forms.loads import Test
-from cosserat_fenicsx.forms.rotation import curvature, directors, rotation_matrix, small_rotation, turned_by, vector_part
+from cosserat_fenicsx.forms.rotation import (
+    curvature,
+    directors,
+    rotation_matrix,
+    small_rotation,
+    turned_by,
+    vector_part,
+)
 
 #: r, q and their derivatives along the rod. `q_node` is q under another name, for rules of its own (compat.alias).
 State = namedtuple("State", "r q r_s q_s q_node")
@@ -61,11 +67,7 @@ def compatibility(n, state, section):
 
 def balance(n, m, state, test):
     """Left side of eq. (1): (n, phi_r') + (m, phi') - (r' x n, phi)."""
-    return (
-        ufl.dot(n, test.phi_r_s)
-        + ufl.dot(m, test.phi_s)
-        - ufl.dot(ufl.cross(state.r_s, n), test.phi)
-    )
+    return ufl.dot(n, test.phi_r_s) + ufl.dot(m, test.phi_s) - ufl.dot(ufl.cross(state.r_s, n), test.phi)
 
 
 def unit_quaternion(state, test):

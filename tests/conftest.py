@@ -30,7 +30,11 @@ def pytest_collection_modifyitems(items):
 def pytest_runtest_makereport(item, call):
     report = (yield).get_result()
     if COMM.size > 1 and report.failed:
-        print(f"\nrank {COMM.rank} of {COMM.size}: {item.nodeid} failed\n{report.longreprtext}", file=sys.stderr, flush=True)
+        print(
+            f"\nrank {COMM.rank} of {COMM.size}: {item.nodeid} failed\n{report.longreprtext}",
+            file=sys.stderr,
+            flush=True,
+        )
         COMM.Abort(1)
 
 

@@ -54,7 +54,9 @@ def shoot(length, frame, K, J, density, loads, steps=10):
     def integrate(m0, eta, dense=False):
         y, pieces = np.r_[0, 0, 0, 1, 0, 0, 0, eta * n0, m0 * unit], []
         for a, b in zip(breaks[:-1], breaks[1:], strict=True):
-            piece = solve_ivp(slope, (a, b), y, args=(eta,), method="DOP853", rtol=1e-12, atol=1e-12, dense_output=dense)
+            piece = solve_ivp(
+                slope, (a, b), y, args=(eta,), method="DOP853", rtol=1e-12, atol=1e-12, dense_output=dense
+            )
             pieces.append(piece)
             y = piece.y[:, -1].copy()
             n, m = jumps(b, y, eta)

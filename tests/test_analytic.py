@@ -20,7 +20,9 @@ STIFFNESS = {
     "shear": 6 * (1 + NU) / (7 + 6 * NU) * E / (2 * (1 + NU)) * AREA,
 }
 RIGID = {"bending": 1.0, "axial": math.inf, "shear": math.inf}
-POINTS = json.loads((Path(__file__).parent / "reference" / "eccentric_cantilever.json").read_text(encoding="utf-8"))["points"]
+POINTS = json.loads((Path(__file__).parent / "reference" / "eccentric_cantilever.json").read_text(encoding="utf-8"))[
+    "points"
+]
 ETA = np.array([point["eta"] for point in POINTS])
 FIELDS = ("delta", "shortening", "tip_rotation")
 

@@ -127,7 +127,9 @@ def test_a_second_process_compiles_nothing(tmp_path):
     """The names in the code cache must not depend on what was compiled before."""
     counts = []
     for _ in range(2):
-        done = cosserat("run", DEMO, "--load-factors", "0.5", "--degree", "1", "--elements", "2", XDG_CACHE_HOME=str(tmp_path))
+        done = cosserat(
+            "run", DEMO, "--load-factors", "0.5", "--degree", "1", "--elements", "2", XDG_CACHE_HOME=str(tmp_path)
+        )
         assert done.returncode == 0, done.stderr
         counts.append(len(list(tmp_path.rglob("*.so"))))
     assert counts[0] == counts[1] > 0
@@ -137,7 +139,9 @@ def test_ctrl_c_keeps_what_is_done(tmp_path):
     """SIGINT in the middle of a long list: table, files, exit code."""
     scene = tmp_path / "scene.toml"
     head, _, _ = DEMO.read_text(encoding="utf-8").partition("[solve]")
-    scene.write_text(f"{head}[solve]\nload_factors = {[k / 5000 for k in range(1, 5000)]}\nelements = 64\n", encoding="utf-8")
+    scene.write_text(
+        f"{head}[solve]\nload_factors = {[k / 5000 for k in range(1, 5000)]}\nelements = 64\n", encoding="utf-8"
+    )
     command = [sys.executable, "-m", "cosserat_fenicsx", "run", str(scene), "-o", str(tmp_path), "--no-picture"]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, encoding="utf-8", cwd=ROOT)
     time.sleep(5)

@@ -23,7 +23,10 @@ def test_eccentric_cantilever(tmp_path_all, capsys):
     printed = capsys.readouterr().out
     if COMM.rank == 0:
         assert "2.200615" in printed and "beyond its pole" in printed
-        assert all((tmp_path_all / f).stat().st_size > 5000 for f in ("cantilever.xdmf", "cantilever.h5", "figure.png", "rod.png"))
+        assert all(
+            (tmp_path_all / f).stat().st_size > 5000
+            for f in ("cantilever.xdmf", "cantilever.h5", "figure.png", "rod.png")
+        )
     else:
         assert printed == ""
     COMM.barrier()

@@ -37,7 +37,9 @@ def check(data, rod, path, k):
     np.testing.assert_allclose(np.cross(d[0], d[1]), d[2], atol=1e-6)
     k = rod.stiffness  # laws (2)-(3): material strains from inertial n and m
     np.testing.assert_allclose(np.einsum("ij,ij->i", d[2], data["n"]) / k.axial, data["strain"][:, 2], atol=1e-12)
-    np.testing.assert_allclose(np.einsum("ij,ij->i", d[1], data["m"]) / k.bending[1], data["curvature"][:, 1], atol=1e-9)
+    np.testing.assert_allclose(
+        np.einsum("ij,ij->i", d[1], data["m"]) / k.bending[1], data["curvature"][:, 1], atol=1e-9
+    )
 
 
 def test_meshio_reads_the_xdmf(solved, xdmf):

@@ -100,6 +100,8 @@ def test_the_wheel_holds_the_forms_and_works(tmp_path):
 
 
 def test_a_plain_checkout_works(tmp_path):
-    code = f"import sys; sys.path.insert(0, {str(ROOT)!r}); import cosserat_fenicsx.forms.spatial as f; print(f.__file__)"
+    code = (
+        f"import sys; sys.path.insert(0, {str(ROOT)!r}); import cosserat_fenicsx.forms.spatial as f; print(f.__file__)"
+    )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, encoding="utf-8", cwd=tmp_path)
     assert done.stdout.strip() == str(ROOT / "forms" / "spatial.py"), done.stderr

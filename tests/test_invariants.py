@@ -57,15 +57,18 @@ def rich_scene():
     stiff = cf.Stiffness(shear=(np.inf, np.inf), axial=np.inf, bending=k.bending, torsion=k.torsion, mass=k.mass)
     rods = [cf.Rod(curve, cf.Rectangle(0.2, 0.3), steel, name="a"), cf.Rod(curve, stiff, name="b")]
     for rod in rods:
-        yield rod, cf.Scene(
-            [rod],
-            [cf.Clamp(rod.start)],
-            [
-                cf.Weight(),
-                cf.Force(rod.end, (2e4, 1e4, -3e4)),
-                cf.EccentricForce(rod.end, (0, 5e3, 0), (0.3, 0.4)),
-                cf.Moment(rod.at(7.0), (1e4, 0, 2e4)),
-            ],
+        yield (
+            rod,
+            cf.Scene(
+                [rod],
+                [cf.Clamp(rod.start)],
+                [
+                    cf.Weight(),
+                    cf.Force(rod.end, (2e4, 1e4, -3e4)),
+                    cf.EccentricForce(rod.end, (0, 5e3, 0), (0.3, 0.4)),
+                    cf.Moment(rod.at(7.0), (1e4, 0, 2e4)),
+                ],
+            ),
         )
 
 
@@ -95,9 +98,7 @@ def test_an_unstable_path_is_counted_alike_in_parallel():
 def test_the_way_does_not_matter():
     """8, 10 or 160 steps to one load: one answer, to round-off."""
     rod, scene = next(rich_scene())
-    ends = [
-        cf.solve(scene, np.linspace(0, 1, n + 1)[1:], elements=6).position(rod.end)[-1] for n in (8, 10, 160)
-    ]
+    ends = [cf.solve(scene, np.linspace(0, 1, n + 1)[1:], elements=6).position(rod.end)[-1] for n in (8, 10, 160)]
     np.testing.assert_allclose(ends[1], ends[0], atol=1e-11 * rod.length)
     np.testing.assert_allclose(ends[2], ends[0], atol=1e-11 * rod.length)
 

@@ -51,7 +51,10 @@ REFUSED = {
     "one of two supported": (lambda: cf.Scene([ROD, OTHER], [CLAMP]), "nothing holds rod 'other'"),
     "no support at all": (lambda: cf.Scene([ROD], [ROD.start]), "Scene.supports[0]"),
     "support elsewhere": (lambda: cf.Scene([ROD], [cf.Clamp(OTHER.start)]), "a rod that is not in the scene"),
-    "load elsewhere": (lambda: cf.Scene([ROD], [CLAMP], [cf.Force(OTHER.end, (0, 0, 1))]), "other.end, a station of a rod"),
+    "load elsewhere": (
+        lambda: cf.Scene([ROD], [CLAMP], [cf.Force(OTHER.end, (0, 0, 1))]),
+        "other.end, a station of a rod",
+    ),
     "load is a class": (lambda: cf.Scene([ROD], [CLAMP], [cf.Force]), "Scene.loads[0]"),
     "weight without mass": (lambda: cf.Scene([ROD], [CLAMP], [cf.Weight()]), "Material.density = None"),
     "step control": (lambda: cf.StepControl(first=0), "StepControl.first = 0"),

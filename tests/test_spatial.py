@@ -34,7 +34,9 @@ def test_against_the_strong_form(name):
         station = rod.at(place * L)
         acting += [cf.EccentricForce(station, F, arm), cf.Moment(station, M)]
     path = cf.solve(cf.Scene([rod], [cf.Clamp(rod.start)], acting), [1.0], tol=1e-9)
-    truth = shoot(L, curve.frame(0.0), (*k.shear, k.axial), (*k.bending, k.torsion), k.mass * np.array([1.0, -3.0, -9.0]), shot)
+    truth = shoot(
+        L, curve.frame(0.0), (*k.shear, k.axial), (*k.bending, k.torsion), k.mass * np.array([1.0, -3.0, -9.0]), shot
+    )
     assert np.linalg.norm(truth(L)["r"] - L * curve.frame(0.0)[:, 2]) > 0.15 * L  # the scene is a large one
     for s in (0.0, 0.1 * L, 0.4 * L, 0.41 * L, 0.55 * L, 0.7 * L, 0.93 * L, L):
         exact, station = truth(s), rod.at(s)
@@ -97,7 +99,9 @@ def test_the_estimate_covers_the_error_everywhere(degree, tol, loads):
     rod = cf.Rod(cf.Line((0, 0, 0), (0, 0, 20.0)), cf.Circle(0.2), STEEL)
     P = cf.euler_load(rod)
     small = [cf.Force(rod.at(20.0 * (i + 1) / (loads + 1)), (1e-6, 0, 0)) for i in range(loads)]
-    scene = cf.Scene([rod], [cf.Clamp(rod.start)], [cf.Force(rod.end, (0, 0, -P)), cf.Moment(rod.end, (0, 0.2 * P, 0)), *small])
+    scene = cf.Scene(
+        [rod], [cf.Clamp(rod.start)], [cf.Force(rod.end, (0, 0, -P)), cf.Moment(rod.end, (0, 0.2 * P, 0)), *small]
+    )
     path = cf.solve(scene, [0.9, 1.5, 4.0], tol=tol, degree=degree)
     fine = cf.solve(scene, [0.9, 1.5, 4.0], degree=4, elements=40)
     x = np.linspace(0, 1, 333)
@@ -111,10 +115,15 @@ def test_the_estimate_is_not_fooled_by_a_boundary_layer():
     """Pulled by 1e4 EI/L^2 the rod bends within L/100 of its clamp: two coarse meshes agree on too little."""
     rod = cf.Rod(cf.Line((0, 0, 0), (10.0, 0, 0)), cf.Circle(0.05), STEEL)
     F = rod.stiffness.bending[0] / 100
-    scene = cf.Scene([rod], [cf.Clamp(rod.start)], [cf.Force(rod.end, (1e4 * F, 0, 0)), cf.Force(rod.at(3.3), (0, 1e3 * F, 0))])
+    scene = cf.Scene(
+        [rod], [cf.Clamp(rod.start)], [cf.Force(rod.end, (1e4 * F, 0, 0)), cf.Force(rod.at(3.3), (0, 1e3 * F, 0))]
+    )
     path, fine = cf.solve(scene, [1.0], tol=1e-3), cf.solve(scene, [1.0], elements=256)
     x = np.linspace(0, 1, 301)
-    error = np.linalg.norm(path.sample(0, rod, x)[0] - fine.sample(0, rod, x)[0], axis=1).max() / fine.largest_displacement()[0]
+    error = (
+        np.linalg.norm(path.sample(0, rod, x)[0] - fine.sample(0, rod, x)[0], axis=1).max()
+        / fine.largest_displacement()[0]
+    )
     assert error <= path.error[0] <= 1e-3
 
 

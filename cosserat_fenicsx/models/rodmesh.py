@@ -64,9 +64,7 @@ class Layout:
 
     def node_s(self, nodes):
         """Arc length over rod length of every node of each rod, for reference nodes sorted in [0, 1]."""
-        return [
-            np.append((b[:-1, None] + np.diff(b)[:, None] * nodes[None, :-1]).ravel(), 1.0) for b in self.breaks
-        ]
+        return [np.append((b[:-1, None] + np.diff(b)[:, None] * nodes[None, :-1]).ravel(), 1.0) for b in self.breaks]
 
 
 class RodMesh:

@@ -11,7 +11,7 @@ from mpi4py import MPI
 from cosserat_fenicsx import compat
 from cosserat_fenicsx.errors import SceneError, nearest
 from cosserat_fenicsx.forms import loads as virtual_work
-from cosserat_fenicsx.models.rodmesh import Gather, Layout, RodMesh
+from cosserat_fenicsx.models.rodmesh import Gather, RodMesh
 from cosserat_fenicsx.models.scales import Scales
 from cosserat_fenicsx.models.spatial_forms import compile_forms
 
@@ -233,9 +233,7 @@ class SpatialModel:
         self._fix()
 
     def _load_terms(self, chord):
-        for (_, members), (_, place, functions) in zip(
-            _place_loads(self.scene, self.layout), self.terms, strict=True
-        ):
+        for (_, members), (_, place, functions) in zip(_place_loads(self.scene, self.layout), self.terms, strict=True):
             for function in functions:
                 function.x.array[:] = 0
             for load, (rod, vertex) in members:
