@@ -157,7 +157,7 @@ def test_very_slender_rods_on_fine_meshes():
     P = cf.euler_load(rod)
     scene = cf.Scene([rod], [cf.Clamp(rod.start)], [cf.Force(rod.end, (0, 0, -P)), cf.Moment(rod.end, (0, 0.2 * P, 0))])
     exact = cf.analytic.elastica(np.array([0.9, 1.5]), 0.2, 20.0).delta
-    for elements in (32, 128):
+    for elements in (16, 32, 64, 128):
         path = cf.solve(scene, [0.9, 1.5], elements=elements)
         np.testing.assert_allclose(path.displacement(rod.end)[:, 0], exact, rtol=1e-7)
         assert path.stable.all() and path.iterations.sum() < 100

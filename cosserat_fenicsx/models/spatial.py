@@ -17,9 +17,9 @@ from cosserat_fenicsx.models.spatial_forms import compile_forms
 
 FORMULATIONS = ("mixed", "displacement", "multiplier")
 
-# Bounds the stiffness where n is a field and only the sign of the second variation is asked for; unit EI/L^2.
-# Larger would drown the weak modes of anisotropic sections in rounding; this shifts a critical load by 1e-5 or so.
-_STIFF = 1e5
+# Bounds EA and GA where only the sign of the second variation is asked for, in EI/L^2, by variant: more would drown
+# the bending of slender rods and the weak modes of thin blades in rounding; this shifts a critical load by 1e-5 or less.
+_STIFF = {"condensed": 1e6, "field": 1e5}
 
 
 @dataclass(frozen=True)
@@ -216,10 +216,10 @@ class SpatialModel:
         J = np.array([[*rod.stiffness.bending, rod.stiffness.torsion] for rod in scene.rods])
         J = J / (scales.moment * scales.length)
         finite = np.where(np.isinf(K), 0.0, K)
-        stand_in = _STIFF * J[:, :2].max(axis=1, keepdims=True)
+        bound = _STIFF.get(self.shape.variant, np.inf) * J[:, :2].max(axis=1, keepdims=True)
         _fill(data.K, finite[rods.cell_rod])
         _fill(data.K_inv, (1 / K)[rods.cell_rod])
-        _fill(data.K_stiff, (np.minimum(K, stand_in) if self.shape.variant == "field" else K)[rods.cell_rod])
+        _fill(data.K_stiff, np.minimum(K, bound)[rods.cell_rod])
         _fill(data.J, J[rods.cell_rod])
         # |F| cannot fall below its own rounding: strains are differences of r over a node's spacing
         spacing = max(self.shape.counts) * self.shape.degree
