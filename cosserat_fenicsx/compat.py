@@ -6,6 +6,7 @@ Everything else in the package calls the functions below and never asks for a ve
 
 import contextlib
 import logging
+import math
 import platform
 
 import numpy as np
@@ -124,7 +125,8 @@ else:
 
     def evaluate(expression, mesh, cells):
         """Values of a compiled expression in `cells`, shape (cells, points * components)."""
-        return expression.eval(mesh, cells).reshape(len(cells), -1)
+        values = expression.eval(mesh, cells)
+        return values.reshape(len(cells), math.prod(values.shape[1:]))
 
     def geometry_dofs(mesh):
         """Indices into `mesh.geometry.x` of the two ends of every local cell, shape (cells, 2)."""
@@ -147,11 +149,11 @@ def element_nodes(space):
 
 
 def cell_nodes(space):
-    """Local node (block) indices of every local cell of a space, shape (cells, nodes per cell)."""
+    """Local node (block) indices of every local cell of a space, shape (cells, nodes per cell); a rank may have none."""
     cells = space.dofmap.list
     if not hasattr(cells, "array"):
         return cells
-    return cells.array.reshape(cells.num_nodes, -1)
+    return cells.array.reshape(cells.num_nodes, space.dofmap.dof_layout.num_dofs)
 
 
 def petsc_vector(function):

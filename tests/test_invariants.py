@@ -89,6 +89,15 @@ def test_number_of_ranks_changes_nothing():
                 np.testing.assert_allclose(a[name], b[name], atol=1e-9 * np.abs(b[name]).max(), err_msg=name)
 
 
+@pytest.mark.parametrize("elements", [1, 2])
+def test_ranks_without_an_element(elements):
+    for rod, scene in (column(), *rich_scene()):
+        together = cf.solve(scene, [0.5], elements=elements)
+        alone = cf.solve(scene, [0.5], elements=elements, comm=MPI.COMM_SELF)
+        np.testing.assert_allclose(together.centreline(), alone.centreline(), atol=1e-9 * rod.length)
+        np.testing.assert_allclose(together.force(rod.start), alone.force(rod.start), rtol=1e-6, atol=1e-3)
+
+
 def test_an_unstable_path_is_counted_alike_in_parallel():
     rod, scene = column(eccentricity=0.0)
     path = cf.solve(scene, [0.9, 1.2, 9.5], elements=8)

@@ -89,11 +89,11 @@ class RodMesh:
         else:
             cells, x = np.empty((0, 2), dtype=np.int64), np.empty((0, 3))
         self.mesh = compat.create_interval_mesh(comm, cells, x)
-        #: the scene's number of every local element, ghosts too
-        self.cells = np.asarray(self.mesh.topology.original_cell_index)
+        #: the scene's number of every local element, ghosts too; int64 also where a rank has none
+        self.cells = np.asarray(self.mesh.topology.original_cell_index, dtype=np.int64)
         self.cell_rod, self.cell_inner = rods[self.cells], inner[self.cells]
         ends = compat.geometry_dofs(self.mesh)[: len(self.cells)]
-        vertices = np.asarray(self.mesh.geometry.input_global_indices)
+        vertices = np.asarray(self.mesh.geometry.input_global_indices, dtype=np.int64)
         #: True where dolfinx runs an element from its end to its start
         self.reversed = vertices[ends[:, 0]] != v0[self.cells]
         self._vertex_rod = np.searchsorted(first_vertex, vertices, side="right") - 1
@@ -111,7 +111,8 @@ class RodMesh:
         first_node = np.concatenate([[0], np.cumsum(np.asarray(self.counts) * degree + 1)])
         slots = first_node[self.cell_rod][:, None] + self.cell_inner[:, None] * degree + along
         node = compat.cell_nodes(space)[: len(self.cells)]
-        of_node = np.empty(node.max() + 1, dtype=np.int64)
+        local = space.dofmap.index_map
+        of_node = np.empty(local.size_local + local.num_ghosts, dtype=np.int64)
         of_node[node] = slots
         return of_node
 

@@ -313,4 +313,4 @@ class SpatialModel:
 def _fill(function, values):
     """Set a cell-wise function from values (cells, components)."""
     cells = compat.cell_nodes(function.function_space)[:, 0]
-    function.x.array.reshape(len(cells), -1)[cells] = values
+    function.x.array.reshape(-1, values.shape[1])[cells] = values
