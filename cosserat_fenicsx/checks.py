@@ -43,6 +43,15 @@ def vector(owner, field, value, unit, size=3):
     return tuple(array.astype(float).tolist())
 
 
+def direction(owner, field, value):
+    """A unit tuple along three finite numbers that are not all zero."""
+    given = vector(owner, field, value, "direction")
+    size = math.hypot(*given)
+    if size == 0.0:
+        refuse(owner, field, value, "a direction, not zero")
+    return tuple(x / size for x in given)
+
+
 def instance(owner, field, value, kinds, expected):
     """`value`, refused where it is not one of `kinds`."""
     if not isinstance(value, kinds):

@@ -81,8 +81,8 @@ if _VERSION < (0, 8):
         return fem.FunctionSpace(mesh, element)
 
     def create_interval_mesh(comm, cells, x):
-        """A mesh of straight intervals in space from `cells (n, 2)` and `x (m, 3)`, given on rank 0 alone."""
-        cell = ufl.Cell("interval", geometric_dimension=3)
+        """A mesh of intervals on a line from `cells (n, 2)` and `x (m, 1)`, given on rank 0 alone."""
+        cell = ufl.Cell("interval", geometric_dimension=1)
         # FFCx 0.5 gives the element this variant when it compiles: forms signed before and after must have one name
         coordinates = ufl.VectorElement("Lagrange", cell, 1, variant="equispaced")
         return dolfinx_mesh.create_mesh(comm, cells, x, ufl.Mesh(coordinates))
@@ -117,8 +117,8 @@ else:
         return fem.functionspace(mesh, element)
 
     def create_interval_mesh(comm, cells, x):
-        """A mesh of straight intervals in space from `cells (n, 2)` and `x (m, 3)`, given on rank 0 alone."""
-        coordinates = basix.ufl.element("Lagrange", "interval", 1, shape=(3,))
+        """A mesh of intervals on a line from `cells (n, 2)` and `x (m, 1)`, given on rank 0 alone."""
+        coordinates = basix.ufl.element("Lagrange", "interval", 1, shape=(1,))
         if _VERSION < (0, 10):
             return dolfinx_mesh.create_mesh(comm, cells, x, coordinates)
         return dolfinx_mesh.create_mesh(comm, cells, coordinates, x)
@@ -156,9 +156,18 @@ def cell_nodes(space):
     return cells.array.reshape(cells.num_nodes, space.dofmap.dof_layout.num_dofs)
 
 
-def petsc_vector(function):
-    """The PETSc vector over a function's numbers."""
-    return function.vector if _VERSION < (0, 8) else function.x.petsc_vec
+def assemble_matrix(A, form):
+    """Add a bilinear form to a PETSc matrix by its own local-to-global map; unknowns it maps to -1 are left out."""
+    kernel = getattr(form, "_cpp_object", form)
+    constants, coefficients = dolfinx.cpp.fem.pack_constants(kernel), dolfinx.cpp.fem.pack_coefficients(kernel)
+    dolfinx.cpp.fem.petsc.assemble_matrix(A, kernel, constants, coefficients, [])
+
+
+def assemble_vector(array, form):
+    """Add a linear form to an array of local numbers, ghosts too."""
+    kernel = getattr(form, "_cpp_object", form)
+    constants, coefficients = dolfinx.cpp.fem.pack_constants(kernel), dolfinx.cpp.fem.pack_coefficients(kernel)
+    dolfinx.cpp.fem.assemble_vector(array, kernel, constants, coefficients)
 
 
 def version():

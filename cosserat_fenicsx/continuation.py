@@ -61,7 +61,7 @@ class StepControl:
 
 @dataclass(eq=False)
 class Point:
-    """A converged point: load factor, unknowns and carried fields (local numbers), stability and work."""
+    """A converged point: load factor, unknowns and carried fields (`Problem.numbers`), stability and work."""
 
     load_factor: float
     numbers: list = field(repr=False)
@@ -86,10 +86,9 @@ class Continuation:
         self.problem, self.model = problem, problem.model
         self.newton, self.stability, self.control = newton, stability, control
         newton.allow(control.max_iterations or (10 if self.model.carries_force else 30))
-        self._live = [f.x.array for f in (self.model.state, *self.model.carried)]
         self.iterations, self._step, self._shrink = 0, None, 0.5
         self.failure = ""
-        self._history = [Point(0.0, self._numbers(), stability.count(), 0)]
+        self._history = [Point(0.0, problem.numbers(), stability.count(), 0)]
 
     @property
     def here(self):
@@ -134,7 +133,7 @@ class Continuation:
         obey()
         here = self.here
         predicted = self._predict(eta) if self.control.adaptive else here.numbers
-        self._put(predicted)
+        self.problem.put(predicted)
         self.problem.set_load_factor(eta)
         solved = self.newton.solve()
         self.iterations += solved.iterations
@@ -142,7 +141,7 @@ class Continuation:
         if not solved.converged:
             self.failure = solved.reason
             return self._restore()
-        numbers = self._numbers()
+        numbers = self.problem.numbers()
         off = self._distance(numbers[0], predicted[0])
         adaptive = self.control.adaptive
         if adaptive and off > _FAR:
@@ -194,15 +193,7 @@ class Continuation:
         foreseen = predicted - here
         return self.model.inner(found - here, foreseen) <= 0 < self.model.inner(foreseen, foreseen)
 
-    def _numbers(self):
-        return [numbers.copy() for numbers in self._live]
-
-    def _put(self, numbers):
-        for live, values in zip(self._live, numbers, strict=True):
-            live[:] = values
-        self.problem.x.array_w[:] = numbers[0][: self.model.owned]
-
     def _restore(self):
-        self._put(self.here.numbers)
+        self.problem.put(self.here.numbers)
         self.problem.set_load_factor(self.here.load_factor)
         return False

@@ -5,12 +5,10 @@ import dataclasses
 import numpy as np
 
 from cosserat_fenicsx.models.rodmesh import Layout
-from cosserat_fenicsx.models.spatial import Shape
+from cosserat_fenicsx.models.shape import Shape
 from cosserat_fenicsx.sections import Rectangle, Stiffness
 from cosserat_fenicsx.statics import FIRST_ELEMENTS, check_arguments, default_degree
 from cosserat_fenicsx.tables import describe
-
-_PER_NODE = 7
 
 
 def explain(scene, load_factors, settings):
@@ -51,7 +49,7 @@ def explain(scene, load_factors, settings):
             "field": "Formulation: mixed, the contact force as an unknown, because a stiffness is infinite or next to it.",
         }.get(shape.variant, f"Formulation: {formulation}, as asked.")
     )
-    unknowns = _unknowns(shape)
+    unknowns = shape.unknowns
     if elements:
         lines.append(
             f"Mesh: {elements} element(s) of degree {degree} per rod, as asked: {unknowns} unknowns, no error estimate."
@@ -85,13 +83,3 @@ def _directions(rod):
         return f"Its width runs along d1 = ({d1}), its height along d2 = ({d2})."
     return f"d1 = ({d1}), d2 = ({d2})."
 
-
-def _unknowns(shape):
-    """Number of unknowns of a shape, without making its mesh."""
-    cells = sum(shape.counts)
-    total = _PER_NODE * (cells * shape.degree + len(shape.counts))
-    if shape.variant == "field":
-        total += 3 * shape.degree * cells
-    elif shape.variant == "multiplier":
-        total += cells + len(shape.counts)
-    return total

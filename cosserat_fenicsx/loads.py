@@ -1,7 +1,9 @@
 """What acts on a rod. All loads are multiplied by the load factor.
 
-A load says where it acts (`station` or the whole rod), which function of `forms.loads` is its virtual work, and the
-vectors that function takes, each with its unit. Nothing else in the package knows a load by name.
+A load says where it acts (`station`, or None for a line load), which function of `forms.loads` is its virtual work, and
+the vectors that function takes, each with its unit. A point load gives them once (`vectors(rod)`); a line load says
+which rods it acts on (`acts_on`) and gives a density along them (`density(rod, s)`, shape (n, 3)) of one `unit`. Nothing else in
+the package knows a load by name.
 """
 
 from dataclasses import dataclass
@@ -9,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from cosserat_fenicsx.checks import instance, refuse, store, vector
-from cosserat_fenicsx.rod import Station
+from cosserat_fenicsx.rod import Rod, Station
 
 
 @dataclass(frozen=True)
@@ -95,6 +97,58 @@ class EccentricForce:
 
 
 @dataclass(frozen=True)
+class FollowerForce:
+    """A point force that turns with the section.
+
+    Args:
+        station: where it acts.
+        force: N, material: along d_1, d_2, d_3 of the moving section.
+
+    Raises:
+        SceneError: not a station, or not three finite numbers.
+    """
+
+    station: Station
+    force: tuple
+
+    work, follows = "follower_force", True
+
+    def __post_init__(self):
+        _check_station(self)
+        store(self, force=vector(self, "force", self.force, "N"))
+
+    def vectors(self, rod):
+        """The vectors of the virtual work, with their units."""
+        return ((rod.curve.frame(self.station.s) @ self.force, "force"),)
+
+
+@dataclass(frozen=True)
+class FollowerMoment:
+    """A point moment that turns with the section.
+
+    Args:
+        station: where it acts.
+        moment: N m, material: about d_1, d_2, d_3 of the moving section.
+
+    Raises:
+        SceneError: not a station, or not three finite numbers.
+    """
+
+    station: Station
+    moment: tuple
+
+    work, follows = "follower_moment", True
+
+    def __post_init__(self):
+        _check_station(self)
+        store(self, moment=vector(self, "moment", self.moment, "N m"))
+
+    def vectors(self, rod):
+        """The vectors of the virtual work, with their units."""
+        return ((rod.curve.frame(self.station.s) @ self.moment, "moment"),)
+
+
+@dataclass(frozen=True)
 class Weight:
     """The weight of every rod of the scene, rho A g per unit of reference length.
 
@@ -107,7 +161,7 @@ class Weight:
 
     gravity: tuple = (0.0, 0.0, -9.81)
 
-    work = "line_force"
+    work, unit = "line_force", "force per length"
     station = None
 
     def __post_init__(self):
@@ -119,13 +173,81 @@ class Weight:
             field = "Stiffness.mass" if rod.material is None else "Material.density"
             refuse(f"Rod '{rod.name}': {field.split('.')[0]}", field.split(".")[1], None, "a value, which Weight needs")
 
-    def vectors(self, rod):
-        """The vectors of the virtual work, with their units."""
-        return ((self.density(rod), "force per length"),)
+    def acts_on(self, rod):
+        """All rods have weight."""
+        return True
 
-    def density(self, rod):
-        """Force per unit of reference length of a rod, N/m, inertial."""
-        return rod.stiffness.mass * np.asarray(self.gravity)
+    def density(self, rod, s):
+        """(n, 3) N/m, inertial, per unit of reference length at the arc lengths s (n,)."""
+        return rod.stiffness_at(s).mass[:, None] * np.asarray(self.gravity)
+
+
+@dataclass(frozen=True)
+class LineForce:
+    """A dead force along a rod, per unit of reference length.
+
+    Args:
+        rod: the rod.
+        force: N/m, inertial.
+
+    Raises:
+        SceneError: not a rod, or not three finite numbers.
+    """
+
+    rod: Rod
+    force: tuple
+
+    work, unit = "line_force", "force per length"
+    station = None
+
+    def __post_init__(self):
+        instance(self, "rod", self.rod, Rod, "a Rod")
+        store(self, force=vector(self, "force", self.force, "N/m"))
+
+    def check_rod(self, rod):
+        """Any rod will do."""
+
+    def acts_on(self, rod):
+        """Its rod alone."""
+        return rod is self.rod
+
+    def density(self, rod, s):
+        """(n, 3) N/m, inertial, at the arc lengths s (n,)."""
+        return np.broadcast_to(self.force, (len(s), 3))
+
+
+@dataclass(frozen=True)
+class LineMoment:
+    """A dead moment along a rod, per unit of reference length.
+
+    Args:
+        rod: the rod.
+        moment: N m/m, inertial.
+
+    Raises:
+        SceneError: not a rod, or not three finite numbers.
+    """
+
+    rod: Rod
+    moment: tuple
+
+    work, unit = "line_moment", "force"
+    station = None
+
+    def __post_init__(self):
+        instance(self, "rod", self.rod, Rod, "a Rod")
+        store(self, moment=vector(self, "moment", self.moment, "N m/m"))
+
+    def check_rod(self, rod):
+        """Any rod will do."""
+
+    def acts_on(self, rod):
+        """Its rod alone."""
+        return rod is self.rod
+
+    def density(self, rod, s):
+        """(n, 3) N m/m, inertial, at the arc lengths s (n,)."""
+        return np.broadcast_to(self.moment, (len(s), 3))
 
 
 def _check_station(load):
@@ -133,4 +255,4 @@ def _check_station(load):
 
 
 #: Loads by the words of the scene file.
-LOADS = (Force, Moment, EccentricForce, Weight)
+LOADS = (Force, Moment, EccentricForce, FollowerForce, FollowerMoment, LineForce, LineMoment, Weight)

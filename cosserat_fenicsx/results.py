@@ -7,7 +7,8 @@ import numpy as np
 
 from cosserat_fenicsx.checks import instance
 from cosserat_fenicsx.errors import SceneError
-from cosserat_fenicsx.recovery import ElementRule, at_nodes, directors, element_contact
+from cosserat_fenicsx.quaternions import directors
+from cosserat_fenicsx.recovery import at_nodes, element_contact
 from cosserat_fenicsx.rod import Station
 
 
@@ -49,7 +50,6 @@ class Path:
     @classmethod
     def of(cls, model, formulation):
         """An empty path for the scene that a model was loaded with."""
-        rule = ElementRule(model.nodes, model.forms.gauss, model.forms.weights)
         why = [
             "the spatial rod takes any scene",
             {
@@ -61,7 +61,7 @@ class Path:
             model.scene,
             model.layout,
             model.scales,
-            rule,
+            model.rule,
             comm=model.comm,
             rounding=0.0 if model.carries_force else model.round_off / 10,
             model=model.name,
@@ -100,13 +100,11 @@ class Path:
 
     def position(self, station):
         """(n, 3) m, inertial."""
-        r = self._at(station, self._all_rq[:, :, :3])
-        return r * self.scales.length + station.rod.curve.position(0.0)
+        return self.displacement(station) + station.rod.curve.position(station.s)
 
     def displacement(self, station):
         """(n, 3) m, inertial, from the reference."""
-        position = self.position(station)
-        return position - station.rod.curve.position(station.s)
+        return self._at(station, self._all_rq[:, :, :3] - self._rest) * self.scales.length
 
     def rotation(self, station):
         """(n, 4) unit quaternion (scalar first) from the reference to the current section; its sign is continuous
@@ -145,24 +143,24 @@ class Path:
         s = self.layout.node_s(self._rule.nodes)[i] * rod.length
         record = self._records[k]
         contact = at_nodes(self._contact[k][self._cells(i)])
-        position = record.rq[rows, :3] * self.scales.length + rod.curve.position(0.0)
+        displacement = (record.rq[rows, :3] - self._rest[rows]) * self.scales.length
         q = record.rq[rows, 3:] / np.linalg.norm(record.rq[rows, 3:], axis=1, keepdims=True)
         d = directors(q) @ rod.curve.frame(s)
         n, m = contact[:, :3] * self.scales.force, contact[:, 3:] * self.scales.moment
         n_material, m_material = np.einsum("kij,ki->kj", d, n), np.einsum("kij,ki->kj", d, m)
-        section = rod.stiffness
+        section = rod.stiffness_at(s)
         return {
             "s": s,
-            "position": position,
-            "displacement": position - rod.curve.position(s),
+            "position": rod.curve.position(s) + displacement,
+            "displacement": displacement,
             "quaternion": q,
             "d1": d[:, :, 0],
             "d2": d[:, :, 1],
             "d3": d[:, :, 2],
             "force": n,
             "moment": m,
-            "strain": n_material / [*section.shear, section.axial],
-            "curvature": m_material / [*section.bending, section.torsion],
+            "strain": n_material / section.K,
+            "curvature": m_material / section.J,
             "bending_moment": np.linalg.norm(m_material[:, :2], axis=1),
         }
 
@@ -177,6 +175,14 @@ class Path:
     def _all_rq(self):
         """(points, nodes, 7) r and q, dimensionless."""
         return np.array([record.rq for record in self._records]).reshape(len(self), -1, 7)
+
+    @cached_property
+    def _rest(self):
+        """(nodes, 3) positions at rest, dimensionless, from where each structure starts."""
+        return np.concatenate([
+            (rod.curve.position(x * rod.length) - self.scene.origin(rod)) / self.scales.length
+            for rod, x in zip(self.scene.rods, self.layout.node_s(self._rule.nodes), strict=True)
+        ])  # fmt: skip
 
     @cached_property
     def _contact(self):
@@ -256,9 +262,11 @@ class Path:
         i, rows = self._rows(rod)
         cells, weights = self._rule.locate_all(self.layout.breaks[i], x)
         nodes = cells[:, None] * self.degree + np.arange(self.degree + 1)
-        rq = np.einsum("kj,kjc->kc", weights, self._records[k].rq[rows][nodes])
-        q = rq[:, 3:] / np.linalg.norm(rq[:, 3:], axis=1, keepdims=True)
-        return rq[:, :3] * self.scales.length + rod.curve.position(0.0), directors(q) @ rod.curve.frame(x * rod.length)
+        record, s = self._records[k], np.asarray(x) * rod.length
+        moved = np.einsum("kj,kjc->kc", weights, (record.rq[rows, :3] - self._rest[rows])[nodes])
+        q = np.einsum("kj,kjc->kc", weights, record.rq[rows, 3:][nodes])
+        q /= np.linalg.norm(q, axis=1, keepdims=True)
+        return rod.curve.position(s) + moved * self.scales.length, directors(q) @ rod.curve.frame(s)
 
     # -- files and pictures ------------------------------------------------------------------------------------------
 

@@ -2,12 +2,18 @@
 
 import itertools
 import math
+from collections import namedtuple
 from dataclasses import dataclass, field
+
+import numpy as np
 
 from cosserat_fenicsx.checks import instance, number, refuse, store
 from cosserat_fenicsx.curves import CURVES
 from cosserat_fenicsx.materials import Material
 from cosserat_fenicsx.sections import SECTIONS, Stiffness
+
+#: Stiffnesses along a rod: K (n, 3), J (n, 3), mass (n,) or None.
+Along = namedtuple("Along", "K J mass")
 
 _unnamed = itertools.count(1)
 
@@ -48,6 +54,19 @@ class Rod:
     def length(self):
         """Reference arc length, m."""
         return self.curve.length
+
+    @property
+    def breaks(self):
+        """Interior arc lengths where the curve or the section is not smooth, m."""
+        return ()
+
+    def stiffness_at(self, s):
+        k, n = self.stiffness, len(s)
+        return Along(
+            np.tile([*k.shear, k.axial], (n, 1)),
+            np.tile([*k.bending, k.torsion], (n, 1)),
+            None if k.mass is None else np.full(n, k.mass),
+        )
 
     @property
     def start(self):

@@ -1,11 +1,13 @@
-"""A scene: rods, what holds them and what acts on them. Knows no solver and no mesh."""
+"""A scene: rods, what joins and holds them and what acts on them. Knows no solver and no mesh."""
 
 from dataclasses import dataclass
 
 from cosserat_fenicsx.checks import instance
 from cosserat_fenicsx.errors import SceneError
+from cosserat_fenicsx.joints import Joint
 from cosserat_fenicsx.loads import LOADS
 from cosserat_fenicsx.rod import Rod
+from cosserat_fenicsx.statical import check_held
 from cosserat_fenicsx.supports import SUPPORTS
 
 
@@ -14,22 +16,25 @@ class Scene:
     """Everything a solver needs to know.
 
     Args:
-        rods: the rods; for now each stands by itself (no joints).
-        supports: `Clamp`.
-        loads: `Force`, `Moment`, `EccentricForce`, `Weight`; all are multiplied by the load factor.
+        rods: the rods.
+        supports: `Clamp`, `Pin`, `Hinge`, `Roller`, `Prescribed`.
+        loads: `Force`, `Moment`, `EccentricForce`, `FollowerForce`, `FollowerMoment`, `LineForce`, `LineMoment`,
+            `Weight`; all are multiplied by the load factor.
+        joints: `Joint`s between stations that touch; rods without one stand by themselves.
         title: for tables and pictures.
 
     Raises:
-        SceneError: an empty or inconsistent scene.
+        SceneError: an empty or inconsistent scene, one that is held twice, or a mechanism.
     """
 
     rods: tuple
     supports: tuple
     loads: tuple = ()
+    joints: tuple = ()
     title: str = ""
 
     def __post_init__(self):
-        for field in ("rods", "supports", "loads"):
+        for field in ("rods", "supports", "loads", "joints"):
             value = getattr(self, field)
             if not isinstance(value, list | tuple):
                 raise SceneError(f"Scene.{field} = {value!r}: expected a list")
@@ -44,29 +49,63 @@ class Scene:
                 raise SceneError(f"Scene.rods: {names.count(name)} rods are named '{name}': expected one each")
         for i, support in enumerate(self.supports):
             instance("Scene", f"supports[{i}]", support, SUPPORTS, "a support such as Clamp(rod.start)")
-            self._check_station(f"supports[{i}]", support.station)
+            self._check_rod(f"supports[{i}]", support.station, support.station.rod)
+        for i, joint in enumerate(self.joints):
+            instance("Scene", f"joints[{i}]", joint, Joint, "a Joint(one.end, other.start)")
+            for end in (joint.first, joint.second):
+                self._check_rod(f"joints[{i}]", end, end.rod)
         for i, load in enumerate(self.loads):
-            if not hasattr(load, "work") or isinstance(load, type):
-                instance("Scene", f"loads[{i}]", load, LOADS, "a load such as Force(rod.end, (0, 0, -1))")
-            if load.station is not None:
-                self._check_station(f"loads[{i}]", load.station)
-            else:
-                for rod in self.rods:
-                    load.check_rod(rod)
-        held = {support.station.rod for support in self.supports}
-        for rod in self.rods:
-            if rod not in held:
-                raise SceneError(
-                    f"Scene.supports: nothing holds rod '{rod.name}', it is free to move: "
-                    f"expected a support such as Clamp({rod.name}.start)"
-                )
+            self._check_load(f"loads[{i}]", load)
+        check_held(self)
+        object.__setattr__(self, "_leaders", self._find_leaders())
 
-    def _check_station(self, field, station):
-        if station.rod not in self.rods:
+    def _check_load(self, field, load):
+        if not hasattr(load, "work") or isinstance(load, type):
+            instance("Scene", field, load, LOADS, "a load such as Force(rod.end, (0, 0, -1))")
+        if load.station is not None:
+            self._check_rod(field, load.station, load.station.rod)
+            return
+        if hasattr(load, "rod"):
+            self._check_rod(field, load.rod, load.rod)
+        for rod in self.rods:
+            if load.acts_on(rod):
+                load.check_rod(rod)
+
+    def _check_rod(self, field, place, rod):
+        if rod not in self.rods:
             raise SceneError(
-                f"Scene.{field} acts at {station}, a station of a rod that is not in the scene: "
+                f"Scene.{field} acts at {place}, a station of a rod that is not in the scene: "
                 f"expected one of {', '.join(rod.name for rod in self.rods)}"
             )
+
+    def _find_leaders(self):
+        """For every rod the first rod of the structure it is joined to."""
+        leaders = {rod: rod for rod in self.rods}
+
+        def find(rod):
+            while leaders[rod] is not rod:
+                rod = leaders[rod]
+            return rod
+
+        for joint in self.joints:
+            one, other = sorted((find(joint.first.rod), find(joint.second.rod)), key=self.rods.index)
+            leaders[other] = one
+        return {rod: find(rod) for rod in self.rods}
+
+    def origin(self, rod):
+        """(3,) m: where the structure that a rod belongs to starts. Solvers count positions from there, so that digits
+        are not lost on where a structure stands."""
+        return self._leaders[rod].curve.position(0.0)
+
+    def line_loads(self, rod):
+        """The loads that act along a rod."""
+        return [load for load in self.loads if load.station is None and load.acts_on(rod)]
+
+    def stations(self, rod):
+        """All stations of a rod that supports, loads and joints name."""
+        named = [x.station for x in (*self.supports, *self.loads) if x.station is not None]
+        named += [end for joint in self.joints for end in (joint.first, joint.second)]
+        return [station for station in named if station.rod is rod]
 
     def rod(self, name):
         """The rod of that name."""

@@ -15,6 +15,8 @@ from cosserat_fenicsx import linear
 #: Newton stops when the error that remains after a step, by its contraction, is below this (root mean square, units L, 1).
 INCREMENT = 1e-11
 _HUGE = 1e3
+# PETSc's code for an error in an external package: KLU met a singular tangent.
+_EXTERNAL = 76
 _Reason = PETSc.SNES.ConvergedReason
 
 
@@ -37,7 +39,11 @@ class Newton:
     def __init__(self, problem):
         self.problem = problem
         model = problem.model
-        self._root, self._carries = math.sqrt(model.unknowns), bool(model.carried)
+        numbering = model.numbering
+        self._motions = numbering.nodes * numbering.block
+        motions = model.comm.allreduce(self._motions)
+        self._others, self._root = motions < model.unknowns, math.sqrt(motions)
+        self._carries = bool(model.carried)
         self._now, self._before, self._step = (f.x.array for f in (model.state, model.before, model.step))
         self.snes = snes = PETSc.SNES().create(model.comm)
         snes.setType("newtonls")
@@ -74,7 +80,9 @@ class Newton:
         try:
             self.snes.solve(None, x)
             reason = self.snes.getConvergedReason()
-        except PETSc.Error:  # KLU met a singular tangent
+        except PETSc.Error as problem_of_petsc:
+            if problem_of_petsc.ierr != _EXTERNAL:
+                raise
             reason = _Reason.DIVERGED_LINEAR_SOLVE
         problem.set_state(x)
         if reason > 0:
@@ -99,7 +107,7 @@ class Newton:
         if iteration == 0:
             return _Reason.CONVERGED_ITERATING
         problem = self.problem
-        step /= self._root
+        step = self._motion(step) / self._root
         self._steps.append(step)
         if not step < _HUGE:
             return _Reason.DIVERGED_DTOL
@@ -111,6 +119,13 @@ class Newton:
         if iteration >= self.max_iterations:
             return _Reason.DIVERGED_MAX_IT
         return _Reason.CONVERGED_ITERATING
+
+    def _motion(self, step):
+        """Size of a step's motion alone: contact forces and reactions have another scale, and rounding of their own."""
+        if not self._others:
+            return step
+        moved = self.snes.getSolutionUpdate().array_r[: self._motions]
+        return math.sqrt(self.problem.model.comm.allreduce(float(moved @ moved)))
 
 
 _WORDS = {

@@ -4,42 +4,44 @@ The form never leaves |q| = 1, so that a stable state has none, whatever the for
 conservative and makes the tangent unsymmetric; its symmetric part in the rotation variables is what is counted.
 """
 
-from dolfinx import fem
-from dolfinx.fem import petsc as fem_petsc
+import numpy as np
 from petsc4py import PETSc
 
-from cosserat_fenicsx import linear
-from cosserat_fenicsx.problem import clamp
+from cosserat_fenicsx import compat, linear
 
 
 class NegativeModes:
-    """Counts negative squares at the model's state.
+    """Counts negative squares at a problem's state.
 
     Args:
-        model: a loaded model; its `rotations` space carries the second variation.
+        problem: a `Problem`; its model carries the second variation and the numbering of its own.
     """
 
-    def __init__(self, model):
-        self.model = model
-        self._held = fem.Function(model.rotations)
-        self.K = fem_petsc.create_matrix(model.forms.second_variation)
+    def __init__(self, problem):
+        self.problem, self.model = problem, problem.model
+        numbering = self.model.variation_numbering
+        self._tied = self.model.rows_of_tied(numbering) if problem.ties else np.empty((0, 6), dtype=np.int64)
+        self.K = numbering.matrix(self.model.variation_cell_dofs, self._tied[self._tied >= 0])
         self.K.setOption(PETSc.Mat.Option.SYMMETRIC, True)
-        self.pc = PETSc.PC().create(model.comm)
+        self.pc = PETSc.PC().create(self.model.comm)
         linear.factor_second_variation(self.pc, self.K)
 
-    def load(self):
-        """Take the supports of the scene the model was loaded with."""
-        self._supports = [clamp(self._held, self.model.fixed_rotations)]
+    def assemble(self):
+        """The second variation at the problem's state and load factor, in K."""
+        problem = self.problem
+        self.K.zeroEntries()
+        compat.assemble_matrix(self.K, self.model.forms.second_variation)
+        if problem.ties:
+            problem.ties.add_second_variation(self.K, self._tied, problem.load_factor)
+        self.K.assemble()
 
     def count(self):
-        """Number of negative squares at the model's state and load factor.
+        """Number of negative squares at the problem's state and load factor.
 
         Returns:
             int, or -1 where the second variation is singular to round-off.
         """
-        self.K.zeroEntries()
-        fem_petsc.assemble_matrix(self.K, self.model.forms.second_variation, bcs=self._supports)
-        self.K.assemble()
+        self.assemble()
         self.pc.setOperators(self.K)
         self.pc.setUp()
         negative, zero, _ = self.pc.getFactorMatrix().getInertia()

@@ -13,13 +13,15 @@ from cosserat_fenicsx.checks import instance
 from cosserat_fenicsx.continuation import Continuation, StepControl
 from cosserat_fenicsx.errors import Interrupted, NotConverged, SceneError, nearest
 from cosserat_fenicsx.models.rodmesh import Layout
-from cosserat_fenicsx.models.spatial import Shape, SpatialModel
+from cosserat_fenicsx.models.shape import Shape
+from cosserat_fenicsx.models.spatial import SpatialModel
 from cosserat_fenicsx.problem import Problem
 from cosserat_fenicsx.progress import Progress
 from cosserat_fenicsx.results import Path, Record
 from cosserat_fenicsx.scene import Scene
 from cosserat_fenicsx.snes import Newton
 from cosserat_fenicsx.stability import NegativeModes
+from cosserat_fenicsx.supports import Prescribed
 
 MODELS = ("auto", "spatial")
 #: Elements per rod of the first mesh, where the mesh is not given.
@@ -122,7 +124,7 @@ def _make_solvers(comm, shape):
     """Problem, Newton solver and stability count of a shape."""
     model = SpatialModel(comm, shape)
     problem = Problem(model)
-    return problem, Newton(problem), NegativeModes(model)
+    return problem, Newton(problem), NegativeModes(problem)
 
 
 @functools.lru_cache(maxsize=16)
@@ -140,7 +142,6 @@ def solvers_of(scene, layout, *, formulation="mixed", degree=4, points=None, com
     else:  # a user's communicator may be freed, and its handle given to another
         problem, newton, stability = _make_solvers(comm, shape)
     problem.load(scene, layout)
-    stability.load()
     return problem, newton, stability
 
 
@@ -220,8 +221,10 @@ def check_arguments(scene, model, tol, elements):
     """
     if not isinstance(scene, Scene):
         raise SceneError(f"scene = {scene!r}: expected a Scene")
-    if not scene.loads:
-        raise SceneError("Scene.loads is empty: expected at least one load, such as Force(rod.end, (0, 0, -1))")
+    if not scene.loads and not any(isinstance(support, Prescribed) for support in scene.supports):
+        raise SceneError(
+            "Scene.loads is empty: expected at least one load, such as Force(rod.end, (0, 0, -1)), or a Prescribed motion"
+        )
     if model not in MODELS:
         raise SceneError(f"model = {model!r}: {nearest(model, MODELS)}")
     if isinstance(tol, bool) or not isinstance(tol, numbers.Real) or not 1e-12 <= tol < 1:

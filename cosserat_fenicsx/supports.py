@@ -1,9 +1,16 @@
-"""What holds a rod."""
+"""What holds a rod.
+
+A support either holds a station entirely (`clamps`) or says which scalar equations hold there (`ties`); nothing else in
+the package knows a support by name.
+"""
 
 from dataclasses import dataclass
 
-from cosserat_fenicsx.checks import instance
+from cosserat_fenicsx import ties
+from cosserat_fenicsx.checks import direction, instance, refuse, store, vector
 from cosserat_fenicsx.rod import Station
+
+_A_STATION = "a station such as rod.start"
 
 
 @dataclass(frozen=True)
@@ -16,9 +23,121 @@ class Clamp:
 
     station: Station
 
+    clamps = True
+
     def __post_init__(self):
-        instance(self, "station", self.station, Station, "a station such as rod.start")
+        instance(self, "station", self.station, Station, _A_STATION)
+
+    def ties(self):
+        """No equations: the station has no unknowns left."""
+        return ()
+
+
+@dataclass(frozen=True)
+class Pin:
+    """The position of a station is held; it may turn about every axis.
+
+    Raises:
+        SceneError: not a station.
+    """
+
+    station: Station
+
+    clamps = False
+
+    def __post_init__(self):
+        instance(self, "station", self.station, Station, _A_STATION)
+
+    def ties(self):
+        """The equations that hold."""
+        return ties.same_place(self.station)
+
+
+@dataclass(frozen=True)
+class Hinge:
+    """The position of a station is held; it may turn about one axis, which is fixed in space.
+
+    Args:
+        station: where.
+        axis: direction of the axis, inertial.
+
+    Raises:
+        SceneError: not a station, or an axis that is no direction.
+    """
+
+    station: Station
+    axis: tuple
+
+    clamps = False
+
+    def __post_init__(self):
+        instance(self, "station", self.station, Station, _A_STATION)
+        store(self, axis=direction(self, "axis", self.axis))
+
+    def ties(self):
+        """The equations that hold."""
+        return (*ties.same_place(self.station), *ties.same_axis(self.station, None, self.axis))
+
+
+@dataclass(frozen=True)
+class Roller:
+    """A station stays in a plane; it may move along the plane and turn about every axis.
+
+    Args:
+        station: where.
+        normal: direction of the plane's normal, inertial.
+
+    Raises:
+        SceneError: not a station, or a normal that is no direction.
+    """
+
+    station: Station
+    normal: tuple
+
+    clamps = False
+
+    def __post_init__(self):
+        instance(self, "station", self.station, Station, _A_STATION)
+        store(self, normal=direction(self, "normal", self.normal))
+
+    def ties(self):
+        """The equations that hold."""
+        return (ties.PositionTie(self.station, None, self.normal, 0.0),)
+
+
+@dataclass(frozen=True)
+class Prescribed:
+    """A station is moved, in proportion to the load factor; what is None stays free.
+
+    Args:
+        station: where.
+        displacement: at load factor 1, m, inertial.
+        rotation: rotation vector at load factor 1, rad, inertial: the section is turned by load factor times it.
+
+    Raises:
+        SceneError: not a station, numbers that are not finite, or neither of the two.
+    """
+
+    station: Station
+    displacement: tuple | None = None
+    rotation: tuple | None = None
+
+    clamps = False
+
+    def __post_init__(self):
+        instance(self, "station", self.station, Station, _A_STATION)
+        if self.displacement is None and self.rotation is None:
+            refuse(self, "displacement", None, "a displacement (m) or a rotation (rad), or both")
+        if self.displacement is not None:
+            store(self, displacement=vector(self, "displacement", self.displacement, "m"))
+        if self.rotation is not None:
+            store(self, rotation=vector(self, "rotation", self.rotation, "rad"))
+
+    def ties(self):
+        """The equations that hold."""
+        moved = () if self.displacement is None else ties.same_place(self.station, None, self.displacement)
+        return moved if self.rotation is None else (*moved, *ties.turned(self.station, self.rotation))
 
 
 #: Supports by the words of the scene file.
-SUPPORTS = (Clamp,)
+SUPPORTS = (Clamp, Pin, Hinge, Roller, Prescribed)

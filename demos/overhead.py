@@ -20,7 +20,6 @@ from petsc4py import PETSc
 
 import cosserat_fenicsx as cf
 from cosserat_fenicsx import compat, statics
-from cosserat_fenicsx.problem import clamp
 
 ETAS = np.linspace(0.05, 1.5, 31)
 MESHES = ((2, 8), (3, 8), (3, 4))  # degree, elements
@@ -36,9 +35,11 @@ class BareLoop:
         self.K.setOption(PETSc.Mat.Option.SYMMETRIC, True)
         self.b, self.x = fem_petsc.create_vector(forms.residual), self.A.createVecRight()
         self.dead = fem_petsc.assemble_vector(forms.dead)
-        self.dead.array_w[model.fixed] = 0
-        self.held = [clamp(fem.Function(model.space), model.fixed)]
-        self.held_rotations = [clamp(fem.Function(model.rotations), model.fixed_rotations)]
+        (node,) = np.flatnonzero(model._slots == 0).astype(np.int32)  # the clamped one
+        self.clamped = model._rq[node]
+        self.dead.array_w[self.clamped] = 0
+        self.held = [fem.dirichletbc(fem.Function(model.space), np.array([node]))]
+        self.held_rotations = [fem.dirichletbc(fem.Function(model.rotations), np.array([node]))]
         self.ksp = PETSc.KSP().create()
         self.ksp.setType("preonly")
         self.ksp.getPC().setType("lu")
@@ -53,7 +54,7 @@ class BareLoop:
             numbers.set(0.0)
         fem_petsc.assemble_vector(self.b, self.model.forms.residual)
         self.b.axpy(-eta, self.dead)
-        self.b.array_w[self.model.fixed] = 0.0
+        self.b.array_w[self.clamped] = 0.0
 
     def run(self, scene, layout, *, stability):
         """The sweep; returns the tip's position at every point."""

@@ -31,3 +31,18 @@ def eccentric_force(F, arm, test, q):
 def line_force(f, test, q):
     """Dead force f (inertial) per unit of reference arc length."""
     return ufl.dot(f, test.phi_r)
+
+
+def line_moment(mu, test, q):
+    """Dead moment mu (inertial) per unit of reference arc length."""
+    return ufl.dot(mu, test.phi)
+
+
+def follower_force(F, test, q):
+    """Force that turns with the section; F is inertial, at rest."""
+    return ufl.dot(rotation_matrix(q) * F, test.phi_r)
+
+
+def follower_moment(M, test, q):
+    """Moment that turns with the section; M is inertial, at rest."""
+    return ufl.dot(rotation_matrix(q) * M, test.phi)

@@ -1,7 +1,7 @@
 """Eq. (1) of the paper, static part, on the centreline r and the quaternion q.
 
 Strong form: n' + f = 0, m' + r' x n + mu = 0, |q| = 1, with the laws (2)-(3) for material components,
-n = T K (v - v_R), m = T J (u - u_R), T = R(q) R_R, v_R = (0, 0, 1).
+n = T K (v - v_R), m = T J (u - u_R), T = R(q) R_R.
 Three formulations share the two balances below and differ in what carries n and in how |q| = 1 is held.
 `ds(a)` is the integral of a over the rod by p Gauss points an element, `ds_node(a)` the one with the nodes as points.
 """
@@ -23,10 +23,9 @@ from cosserat_fenicsx.forms.rotation import (
 State = namedtuple("State", "r q r_s q_s q_node")
 #: Virtual displacement phi_r, virtual rotation phi, test function phi_qa of the constraint, and the derivatives.
 Tests = namedtuple("Tests", "phi_r phi phi_qa phi_r_s phi_s")
-#: Material stiffness K = (GA1, GA2, EA), its inverse, J = (EI1, EI2, GJ), and the reference frame R_R = [d_1R d_2R d_3R].
-Section = namedtuple("Section", "K K_inv J R_R")
-
-_E3 = ufl.as_vector([0.0, 0.0, 1.0])
+#: Material stiffness K = (GA1, GA2, EA), its inverse, J = (EI1, EI2, GJ), the reference frame R_R = [d_1R d_2R d_3R], and
+#: the reference strain v_R: (0, 0, 1) up to the interpolation of a curved reference.
+Section = namedtuple("Section", "K K_inv J R_R v_R")
 
 
 def scaled(D, a):
@@ -40,8 +39,8 @@ def frame(state, section):
 
 
 def stretch_and_shear(state, section):
-    """Material strain v - v_R = T^T r' - e_3, eq. (4)."""
-    return frame(state, section).T * state.r_s - _E3
+    """Material strain v - v_R = T^T r' - v_R, eq. (4)."""
+    return frame(state, section).T * state.r_s - section.v_R
 
 
 def bending_and_torsion(state, section):
@@ -62,7 +61,7 @@ def contact_moment(state, section):
 def compatibility(n, state, section):
     """r' - T (v_R + K^-1 T^T n): zero where the contact force n and the motion agree."""
     T = frame(state, section)
-    return state.r_s - T * (_E3 + scaled(section.K_inv, T.T * n))
+    return state.r_s - T * (section.v_R + scaled(section.K_inv, T.T * n))
 
 
 def balance(n, m, state, test):
@@ -136,7 +135,7 @@ def multiplier_contact(state, section):
 def _as_they_stand(state, section):
     """Directors of eq. (6) and the strains of eqs. (4)-(5) without a division by |q|^2."""
     T = directors(state.q) * section.R_R
-    return T, T.T * state.r_s - _E3, section.R_R.T * curvature(state.q, state.q_s)
+    return T, T.T * state.r_s - section.v_R, section.R_R.T * curvature(state.q, state.q_s)
 
 
 def stability_direction(dr, theta, q):

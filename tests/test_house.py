@@ -38,8 +38,11 @@ def test_forms_know_ufl_alone():
         assert all(name.startswith("forms") for name in inside(file)), file
 
 
-SCENE = ("checks", "curves", "errors", "loads", "materials", "rod", "scene", "scenefile", "sections", "supports")
-SOLVERS = ("continuation", "interrupts", "linear", "problem", "snes", "stability", "statics")
+SCENE = (
+    *("checks", "curves", "errors", "joints", "loads", "materials", "rod", "scene", "scenefile", "sections"),
+    *("statical", "supports", "ties"),
+)
+SOLVERS = ("continuation", "interrupts", "linear", "problem", "snes", "stability", "statics", "tie_rows")
 RESULTS = ("plot", "ranks", "recovery", "results", "tables", "xdmf")
 
 
@@ -51,7 +54,7 @@ def test_data_flows_one_way():
     for name in RESULTS:
         known = {part.split(".")[0] for part in inside(PACKAGE / f"{name}.py")}
         assert known.isdisjoint({*SOLVERS, "models", "forms"}), name
-    for name in ("continuation", "problem", "snes", "stability"):  # solvers know no rung
+    for name in ("continuation", "problem", "snes", "stability", "tie_rows"):  # solvers know no rung
         known = {part.split(".")[0] for part in inside(PACKAGE / f"{name}.py")}
         assert known.isdisjoint({"models", "forms", "results", *RESULTS}), name
     for file in (PACKAGE / "models").glob("*.py"):

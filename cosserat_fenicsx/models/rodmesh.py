@@ -23,11 +23,11 @@ class Layout:
 
     @classmethod
     def of(cls, scene, elements):
-        """`elements` per rod, more only where supports and loads ask for an element end of their own."""
+        """`elements` per rod, more only where supports, loads, joints and kinks ask for an element end of their own."""
         breaks = []
         for rod in scene.rods:
-            stations = {x.station.s / rod.length for x in (*scene.supports, *scene.loads)
-                        if x.station is not None and x.station.rod is rod}  # fmt: skip
+            stations = {station.s / rod.length for station in scene.stations(rod)}
+            stations |= {s / rod.length for s in rod.breaks}
             ends = [0.0]
             for x in sorted(stations | {1.0}):  # stations that all but coincide share an element end
                 if x - ends[-1] > 1e-9:
@@ -62,13 +62,23 @@ class Layout:
         rod = scene.rods.index(station.rod)
         return rod, int(np.argmin(np.abs(self.breaks[rod] - station.s / station.rod.length)))
 
+    def sizes(self, scene):
+        """Length of every element, m, rods one after another."""
+        return np.concatenate([np.diff(b) * rod.length for rod, b in zip(scene.rods, self.breaks, strict=True)])
+
+    def inside(self, x):
+        """(elements, len(x)) arc length over rod length of places x in [0, 1] of every element, for each rod."""
+        return [b[:-1, None] + np.diff(b)[:, None] * x for b in self.breaks]
+
     def node_s(self, nodes):
         """Arc length over rod length of every node of each rod, for reference nodes sorted in [0, 1]."""
         return [np.append((b[:-1, None] + np.diff(b)[:, None] * nodes[None, :-1]).ravel(), 1.0) for b in self.breaks]
 
 
 class RodMesh:
-    """A dolfinx mesh of intervals in space, one chain per rod.
+    """A dolfinx mesh of intervals on the line of reference arc length, one chain per rod, each from its own zero.
+
+    Derivatives and integrals on it are those along the rods, however these are curved.
 
     Args:
         comm: MPI communicator.
@@ -84,10 +94,9 @@ class RodMesh:
         v0 = first_vertex[rods] + inner
         if comm.rank == 0:
             cells = np.column_stack([v0, v0 + 1]).astype(np.int64)
-            x = np.zeros((first_cell[-1] + len(counts), 3))
-            x[:, 2] = np.arange(len(x))  # placed later, by `place`
+            x = np.arange(first_cell[-1] + len(counts), dtype=float)[:, None]  # placed later, by `place`
         else:
-            cells, x = np.empty((0, 2), dtype=np.int64), np.empty((0, 3))
+            cells, x = np.empty((0, 2), dtype=np.int64), np.empty((0, 1))
         self.mesh = compat.create_interval_mesh(comm, cells, x)
         #: the scene's number of every local element, ghosts too; int64 also where a rank has none
         self.cells = np.asarray(self.mesh.topology.original_cell_index, dtype=np.int64)
@@ -99,10 +108,16 @@ class RodMesh:
         self._vertex_rod = np.searchsorted(first_vertex, vertices, side="right") - 1
         self._vertex_inner = vertices - first_vertex[self._vertex_rod]
 
-    def place(self, points):
-        """Move the element ends to `points`, one (n + 1, 3) array a rod (dimensionless)."""
-        offsets = np.concatenate([[0], np.cumsum([len(p) for p in points])])[:-1]
-        self.mesh.geometry.x[:] = np.concatenate(points)[offsets[self._vertex_rod] + self._vertex_inner]
+    def place(self, ends):
+        """Move the element ends to the arc lengths `ends`, one (n + 1,) array a rod (dimensionless)."""
+        offsets = np.concatenate([[0], np.cumsum([len(s) for s in ends])])[:-1]
+        self.mesh.geometry.x[:, 0] = np.concatenate(ends)[offsets[self._vertex_rod] + self._vertex_inner]
+
+    def fill(self, function, values):
+        """Set a function at the Gauss points from values (elements, points, k) in the scene's order."""
+        local = values[self.cells]
+        local[self.reversed] = local[self.reversed][:, ::-1]
+        function.x.array.reshape(-1, values.shape[2])[compat.cell_nodes(function.function_space)] = local
 
     def slots(self, space, degree):
         """The scene's number of every local node of a degree-`degree` space, and its local number, both (nodes,)."""

@@ -53,19 +53,19 @@ def compile_forms(model, rotations, carried_n):
     gauss, at_nodes, at_ends = _measures(model)
 
     def ds(a):
-        return a * data.stretch[0] * gauss
+        return a * gauss
 
     def ds_node(a):
-        return a * data.stretch[0] * at_nodes
+        return a * at_nodes
 
     def at_points(a):
         return a * at_ends
 
     def along(w):
-        return ufl.dot(ufl.grad(w), data.tangent)
+        return w.dx(0)  # the mesh is the line of arc length
 
     R_R = ufl.as_matrix([[data.R_R[3 * i + j] for j in range(3)] for i in range(3)])
-    section = eq.Section(data.K, data.K_inv, data.J, R_R)
+    section = eq.Section(data.K, data.K_inv, data.J, R_R, data.v_R)
     state = eq.state_of(U, along(U), U_node)
     phi, trial = ufl.TestFunction(model.space), ufl.TrialFunction(model.space)
     test = load_test = eq.tests_of(phi, along(phi))

@@ -1,0 +1,52 @@
+"""Nodes, Gauss points and polynomials of one element: numbers that models and results share."""
+
+from functools import cached_property
+
+import numpy as np
+
+
+class ElementRule:
+    """Nodes, Gauss points and polynomials of one element on [0, 1].
+
+    Args:
+        nodes: Lobatto nodes of P_p, ascending.
+        gauss, weights: Gauss points and weights, ascending.
+    """
+
+    def __init__(self, nodes, gauss, weights):
+        order = np.argsort(gauss)
+        self.nodes, self.gauss, self.weights = nodes, gauss[order], weights[order]
+
+    @cached_property
+    def _to_coefficients(self):
+        return np.linalg.inv(np.vander(2 * self.nodes - 1, increasing=True))
+
+    def basis(self, x):
+        """(len(x), p + 1) nodal basis functions at x in [0, 1]."""
+        return np.vander(2 * np.asarray(x) - 1, len(self.nodes), increasing=True) @ self._to_coefficients
+
+    @cached_property
+    def slopes(self):
+        """(gauss, p + 1) d/dx of the nodal basis at the Gauss points."""
+        p = len(self.nodes) - 1
+        x = 2 * self.gauss - 1
+        powers = np.column_stack([np.zeros_like(x)] + [k * x ** (k - 1) for k in range(1, p + 1)])
+        return 2 * powers @ self._to_coefficients
+
+    @cached_property
+    def from_ends_and_gauss(self):
+        """(p + 1, gauss + 2): values at the nodes from values at 0, the Gauss points and 1."""
+        support = 2 * np.concatenate([[0.0], self.gauss, [1.0]]) - 1
+        vandermonde = np.vander(support, increasing=True)
+        return np.vander(2 * self.nodes - 1, len(support), increasing=True) @ np.linalg.inv(vandermonde)
+
+    def locate_all(self, breaks, x):
+        """Element (n,) and basis functions (n, p + 1) at places x of a rod whose element ends are `breaks`."""
+        cells = np.clip(np.searchsorted(breaks, x, side="left") - 1, 0, len(breaks) - 2)
+        local = (x - breaks[cells]) / np.diff(breaks)[cells]
+        return cells, self.basis(np.clip(local, 0.0, 1.0))
+
+    def locate(self, breaks, x):
+        """`locate_all` for one place."""
+        cells, basis = self.locate_all(breaks, np.array([x]))
+        return cells[0], basis[0]

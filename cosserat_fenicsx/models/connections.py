@@ -1,0 +1,51 @@
+"""Where a scene's supports and joints act on a layout."""
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Connections:
+    """What decides which nodes have unknowns and which equations are added; vertices are (rod index, element end).
+
+    Attributes:
+        clamped: vertices without unknowns.
+        leaders: pairs (vertex, leader): rigidly joined vertices and the one whose unknowns they share.
+        ties: (kind, vertex of a, vertex of b or None) of every added equation, in the scene's order.
+    """
+
+    clamped: tuple
+    leaders: tuple
+    ties: tuple
+
+    @classmethod
+    def of(cls, scene, layout):
+        """The connections of a scene."""
+        leader = {}
+
+        def find(vertex):
+            while vertex in leader:
+                vertex = leader[vertex]
+            return vertex
+
+        for joint in scene.joints:
+            if joint.rigid:
+                one, other = sorted(find(layout.vertex(scene, end)) for end in (joint.first, joint.second))
+                if one != other:
+                    leader[other] = one
+        clamped = sorted({find(layout.vertex(scene, x.station)) for x in scene.supports if x.clamps})
+        kinds = tuple(
+            (type(tie).__name__, *(None if x is None else find(layout.vertex(scene, x)) for x in (tie.a, tie.b)))
+            for tie in ties_of(scene)
+        )
+        return cls(tuple(clamped), tuple((vertex, find(vertex)) for vertex in sorted(leader)), kinds)
+
+    @property
+    def tied(self):
+        """Vertices that added equations speak of, each once."""
+        return tuple(dict.fromkeys(x for _, a, b in self.ties for x in (a, b) if x is not None))
+
+
+def ties_of(scene):
+    """All scalar equations of supports and joints that are not held node by node."""
+    held = [*scene.supports, *(joint for joint in scene.joints if not joint.rigid)]
+    return [tie for item in held for tie in item.ties()]

@@ -1,0 +1,156 @@
+"""From dolfinx's numbers to the solver's unknowns.
+
+Clamped nodes have no unknowns, rigidly joined nodes share theirs, and added equations bring multipliers. Rods stay
+separate chains of the mesh, so that no release of dolfinx meets a branching point. A rank's part of the solver's vector holds
+its free nodes, node by node, then its other unknowns (of elements), then, on the last rank, the multipliers.
+"""
+
+import numpy as np
+from dolfinx import fem
+from petsc4py import PETSc
+
+
+class Numbering:
+    """The unknowns on one space.
+
+    Args:
+        space: dolfinx's space; `node_dofs` (local nodes, block) says which of its local numbers belong to which node.
+        owned: how many of the local nodes are this rank's.
+        slots: the scene's number of every local node.
+        clamped, leaders: slots without unknowns, and {slot: the slot whose unknowns it shares}.
+        multipliers: number of added equations.
+
+    Attributes:
+        nodes: free nodes of this rank.
+        block: unknowns of a node.
+        size: unknowns of this rank, total: of all ranks.
+        rows: solver's number of every local number of the space; -1 where clamped.
+        first_multiplier: solver's number of the first multiplier.
+    """
+
+    def __init__(self, space, node_dofs, owned, slots, clamped, leaders, multipliers=0):
+        self.space, self.comm = space, space.mesh.comm
+        comm, self.block = self.comm, node_dofs.shape[1]
+        dofmap = space.dofmap
+        self._blocked = dofmap.index_map_bs > 1
+        lead = np.array([leaders.get(slot, slot) for slot in slots.tolist()], dtype=np.int64)
+        free = ~np.isin(lead, list(clamped))
+        own = np.zeros(len(slots), dtype=bool)
+        own[:owned] = (free & (lead == slots))[:owned]
+        self.nodes = int(own.sum())
+        # PETSc inserts node by node only where all sizes are multiples of a node's: idle multipliers fill the last
+        self.idle = -multipliers % self.block if self._blocked else 0
+        dofs = dofmap.index_map.size_local * dofmap.index_map_bs
+        others = np.setdiff1d(np.arange(dofs), node_dofs[:owned].ravel())
+        last = comm.rank == comm.size - 1
+        self.multipliers = multipliers
+        self.size = self.nodes * self.block + len(others) + (multipliers + self.idle) * last
+        sizes = comm.allgather(self.size)
+        first, self.total = sum(sizes[: comm.rank]), sum(sizes)
+        self.first, self.first_multiplier = first, self.total - multipliers - self.idle
+        rows = fem.Function(space)  # carries the numbers to the ranks that see them as ghosts
+        numbers = rows.x.array
+        numbers[:] = -1
+        numbers[node_dofs[own]] = first + np.arange(self.nodes * self.block).reshape(-1, self.block)
+        numbers[others] = first + self.nodes * self.block + np.arange(len(others))
+        rows.x.scatter_forward()
+        self.rows = rows.x.array.astype(PETSc.IntType)
+        self._share(slots, lead, own, node_dofs, set(leaders.values()))
+        self.rows[node_dofs[~free]] = -1
+        self._connect(own.sum() != free[:owned].sum())
+
+    def _share(self, slots, lead, own, node_dofs, leading):
+        """Give every rank the numbers of the nodes that others share."""
+        here = {int(slots[i]): self.rows[node_dofs[i]] for i in np.flatnonzero(own) if int(slots[i]) in leading}
+        everywhere = {}
+        for part in self.comm.allgather(here):
+            everywhere.update(part)
+        for i in np.flatnonzero(np.isin(lead, list(leading))):
+            if int(lead[i]) in everywhere:
+                self.rows[node_dofs[i]] = everywhere[int(lead[i])]
+
+    def _connect(self, shared):
+        """How values move between the solver's vector and dolfinx's local numbers."""
+        self._free = np.flatnonzero(self.rows >= 0)
+        self._of_free = self.rows[self._free]
+        self._serial = self.comm.size == 1
+        self._shared = shared
+        if not self._serial:
+            self._local = PETSc.Vec().createSeq(len(self._free))
+            index = PETSc.IS().createGeneral(self._of_free, comm=PETSc.COMM_SELF)
+            self._scatter = PETSc.Scatter().create(self.vector(), index, self._local, None)
+
+    def vector(self):
+        """A vector of the solver's unknowns."""
+        vector = PETSc.Vec().create(self.comm)
+        vector.setSizes((self.size, self.total), bsize=self.block if self._blocked else 1)
+        vector.setUp()
+        return vector
+
+    def to_local(self, x, numbers):
+        """Put a solver's vector into dolfinx's local numbers, ghosts too; clamped ones stay."""
+        if self._serial:
+            numbers[self._free] = x.array_r[self._of_free]
+        else:
+            self._scatter.scatter(x, self._local, False, PETSc.ScatterMode.FORWARD)
+            numbers[self._free] = self._local.array_r
+
+    def from_local(self, numbers, x):
+        """The other way: take unknowns from local numbers; multipliers become zero."""
+        first = self.first
+        mine = (self._of_free >= first) & (self._of_free < first + self.size)
+        array = x.array_w
+        array[:] = 0.0
+        array[self._of_free[mine] - first] = numbers[self._free[mine]]
+
+    def add_up(self, numbers, b):
+        """Sum local contributions, of all ranks and joined nodes, into a solver's vector."""
+        if self._serial:
+            array = b.array_w
+            array[self.first_multiplier :] = 0.0
+            if self._shared:
+                array[:] = np.bincount(self._of_free, numbers[self._free], minlength=self.size)
+            else:
+                array[self._of_free] = numbers[self._free]
+        else:
+            b.set(0.0)
+            self._local.array_w[:] = numbers[self._free]
+            self._scatter.scatter(self._local, b, PETSc.InsertMode.ADD_VALUES, PETSc.ScatterMode.REVERSE)
+
+    def matrix(self, cell_dofs, tied):
+        """A matrix with room for all elements of this rank and for added equations.
+
+        Args:
+            cell_dofs: (cells, dofs) local numbers of every element of this rank.
+            tied: solver's numbers (any rank's) of the unknowns that added equations speak of; the same on all ranks.
+        """
+        A = PETSc.Mat().create(self.comm)
+        A.setType("aij")
+        A.setSizes(((self.size, self.total), (self.size, self.total)), bsize=self.block if self._blocked else 1)
+        A.setPreallocationNNZ(self._room(cell_dofs, tied))
+        if self._blocked:
+            whole = self.rows.reshape(-1, self.block)[:, 0]
+            blocks = np.where(whole >= 0, whole // self.block, -1).astype(PETSc.IntType)
+            numbers = PETSc.LGMap().create(blocks, bsize=self.block, comm=self.comm)
+        else:
+            numbers = PETSc.LGMap().create(self.rows, comm=self.comm)
+        A.setLGMap(numbers, numbers)
+        # said on every rank: one without rows would take part in other collective calls than the rest
+        A.setOption(PETSc.Mat.Option.NEW_NONZERO_ALLOCATION_ERR, True)
+        return A
+
+    def _room(self, cell_dofs, tied):
+        """Most non-zeros of every row of this rank: on its own columns, and on others'."""
+        count = np.zeros(len(self.rows))
+        wide = np.count_nonzero(self.rows[cell_dofs] >= 0, axis=1)
+        np.add.at(count, cell_dofs.ravel(), np.repeat(wide, cell_dofs.shape[1]))
+        room = self.vector()
+        if self._serial:
+            room.array_w[:] = np.bincount(self._of_free, count[self._free], minlength=self.size)
+        else:
+            self.add_up(count, room)
+        first, array = self.first, room.array_r.astype(PETSc.IntType)
+        mine = tied[(tied >= first) & (tied < first + self.size)] - first
+        array[mine] += len(tied) + self.multipliers
+        array[max(0, self.first_multiplier - first) :] += len(tied) + 1
+        return np.minimum(array, self.size), np.minimum(array, self.total - self.size)

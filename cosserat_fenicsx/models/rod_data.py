@@ -1,0 +1,65 @@
+"""What forms need to know of a scene's rods at the Gauss points: stiffness, reference frame and reference strain."""
+
+from collections import namedtuple
+
+import numpy as np
+from dolfinx import fem
+
+from cosserat_fenicsx import compat
+
+# Bounds EA and GA where only the sign of the second variation is asked for, in EI/L^2, by variant: more would drown
+# the bending of slender rods and the weak modes of thin blades in rounding; this shifts a critical load by 1e-5 or less.
+_STIFF = {"condensed": 1e6, "field": 1e5}
+
+#: Arrays (elements, points, k) in the scene's order, dimensionless: K, J, frames R_R (3 x 3) and strains v_R.
+RodData = namedtuple("RodData", "K J R_R v_R")
+
+
+def rod_data(scene, layout, scales, rule, reference):
+    """Stiffness and reference at the Gauss points.
+
+    The reference strain is that of the interpolated curve, so that the discrete rod is free of stress at rest; it
+    differs from (0, 0, 1) by the interpolation error, which costs no order.
+
+    Args:
+        rule: the `ElementRule`; reference: (nodes, 3) positions at rest over the unit of length.
+    """
+    parts, first = [], 0
+    for rod, breaks, x in zip(scene.rods, layout.breaks, layout.inside(rule.gauss), strict=True):
+        s, shape = x.ravel() * rod.length, x.shape
+        along, frames = rod.stiffness_at(s), rod.curve.frame(s).reshape(*shape, 3, 3)
+        p, cells = len(rule.nodes) - 1, len(breaks) - 1
+        nodes = reference[first + p * np.arange(cells)[:, None] + np.arange(p + 1)]
+        first += p * cells + 1
+        h = np.diff(breaks) * rod.length / scales.length
+        r_s = np.einsum("gj,cji->cgi", rule.slopes, nodes) / h[:, None, None]
+        parts.append(RodData(
+            along.K.reshape(*shape, 3) / scales.force,
+            along.J.reshape(*shape, 3) / (scales.moment * scales.length),
+            frames.reshape(*shape, 9),
+            np.einsum("cgij,cgi->cgj", frames, r_s),
+        ))  # fmt: skip
+    return RodData(*(np.concatenate(fields) for fields in zip(*parts, strict=True)))
+
+
+#: The same as dolfinx Functions; K_inv is zero where K is infinite, K_stiff is bounded.
+RodFields = namedtuple("RodFields", "K K_inv K_stiff J R_R v_R")
+
+
+def gauss_function(mesh, points, size):
+    """A Function of `size` components at the Gauss points of every element."""
+    return fem.Function(compat.function_space(mesh, compat.at_quadrature_points(mesh, 2 * points - 1, size)))
+
+
+def rod_fields(mesh, points):
+    """Empty `RodFields` on a mesh."""
+    return RodFields(*(gauss_function(mesh, points, size) for size in (3, 3, 3, 3, 9, 3)))
+
+
+def fill_fields(fields, rods, data, variant):
+    """Put `RodData` into `RodFields`."""
+    bound = _STIFF.get(variant, np.inf) * data.J[:, :, :2].max(axis=2, keepdims=True)
+    finite = np.where(np.isinf(data.K), 0.0, data.K)
+    values = RodFields(finite, 1 / data.K, np.minimum(data.K, bound), data.J, data.R_R, data.v_R)
+    for function, array in zip(fields, values, strict=True):
+        rods.fill(function, array)

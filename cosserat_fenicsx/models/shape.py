@@ -1,0 +1,106 @@
+"""What of a scene decides which code is compiled and which mesh is made."""
+
+import numbers
+from dataclasses import dataclass
+
+import numpy as np
+
+from cosserat_fenicsx.errors import SceneError, nearest
+from cosserat_fenicsx.forms import loads as virtual_work
+from cosserat_fenicsx.models.connections import Connections
+
+FORMULATIONS = ("mixed", "displacement", "multiplier")
+
+
+@dataclass(frozen=True)
+class Shape:
+    """What decides which code is compiled and which mesh is made; equal shapes share one model.
+
+    Attributes:
+        counts: elements of each rod.
+        degree: p of r and q.
+        variant: "condensed" or "field" (both formulation "mixed"), "displacement" or "multiplier".
+        points: Gauss points of an element.
+        terms: the kinds of loads, (function of forms.loads, "point" or "line", number of vectors), each as often as
+            loads of that kind share an element end.
+        connections: where supports and joints act.
+    """
+
+    counts: tuple
+    degree: int
+    variant: str
+    points: int
+    terms: tuple
+    connections: Connections
+
+    @classmethod
+    def of(cls, scene, layout, *, formulation, degree, points=None):
+        """The shape of a scene on a layout.
+
+        Raises:
+            SceneError: an unknown formulation, a degree outside 1..4, or an infinite stiffness where the
+                formulation cannot take it.
+        """
+        if formulation not in FORMULATIONS:
+            raise SceneError(f"formulation = {formulation!r}: {nearest(formulation, FORMULATIONS)}")
+        if isinstance(degree, bool) or not isinstance(degree, numbers.Integral) or not 1 <= degree <= 4:
+            raise SceneError(f"degree = {degree!r}: expected 1, 2, 3 or 4")
+        if points is not None and (
+            isinstance(points, bool) or not isinstance(points, numbers.Integral) or not 1 <= points <= 12
+        ):
+            raise SceneError(f"gauss_points = {points!r}: expected a whole number from 1 to 12")
+        infinite = any(np.isinf([*rod.stiffness.shear, rod.stiffness.axial]).any() for rod in scene.rods)
+        if infinite and formulation != "mixed":
+            raise SceneError(
+                f"formulation = '{formulation}' cannot take an infinite stiffness: expected 'mixed', "
+                "which carries the contact force as an unknown"
+            )
+        if formulation == "multiplier" and points is None:
+            points = degree + 2  # CG1 for lambda needs full quadrature (and then locks)
+        # On a fine mesh of a very slender rod rounding in the condensed tangent reaches the bending stiffness itself.
+        drowned = _rounding(scene, layout, degree) > 1.0
+        variant = {"mixed": "field" if infinite or drowned else "condensed"}.get(formulation, formulation)
+        terms = tuple(key for key, _ in place_loads(scene, layout))
+        connections = Connections.of(scene, layout)
+        if connections.ties and formulation == "multiplier":
+            raise SceneError("formulation = 'multiplier' knows clamps and rigid joints alone: expected 'mixed'")
+        return cls(layout.counts, degree, variant, points or degree, terms, connections)
+
+    @property
+    def unknowns(self):
+        """Number of unknowns, without making a mesh."""
+        cells, links = sum(self.counts), self.connections
+        nodes = cells * self.degree + len(self.counts) - len(links.clamped) - len(links.leaders)
+        others = {"field": 3 * self.degree * cells, "multiplier": cells + len(self.counts)}.get(self.variant, 0)
+        return 7 * nodes + others + len(links.ties)
+
+
+def _rounding(scene, layout, degree):
+    """Rounding of the stiffest entries of a condensed tangent over the bending stiffness of a node's spacing."""
+    return max(
+        np.finfo(float).eps * max(*rod.stiffness.shear, rod.stiffness.axial) * rod.length**2 / min(rod.stiffness.bending)
+        * (cells * degree) ** 2
+        for rod, cells in zip(scene.rods, layout.counts, strict=True)
+    )  # fmt: skip
+
+
+def place_loads(scene, layout):
+    """Load terms: [(key, [(load, rod index, vertex or None)])], loads of a kind sharing a term where they can."""
+    terms = []
+    for load in scene.loads:
+        work = getattr(virtual_work, load.work) if isinstance(load.work, str) else load.work
+        if load.station is not None:
+            places, place = [layout.vertex(scene, load.station)], "point"
+            vectors = len(load.vectors(load.station.rod))
+        else:
+            places = [(rod, None) for rod, which in enumerate(scene.rods) if load.acts_on(which)]
+            place, vectors = "line", 1
+        key = (work, place, vectors)
+        for known, members in terms:
+            if known == key and not {at for _, at in members} & set(places):
+                break
+        else:
+            members = []
+            terms.append((key, members))
+        members.extend((load, at) for at in places)
+    return sorted(terms, key=lambda term: (term[0][0].__name__, term[0][1]))

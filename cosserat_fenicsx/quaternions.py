@@ -1,0 +1,26 @@
+"""Unit quaternions as numbers, scalar first; the algebra of unknowns is in forms/rotation.py."""
+
+import numpy as np
+
+
+def directors(q):
+    """(k, 3, 3) rotation matrices of unit quaternions (k, 4), eq. (6); the columns are d_1, d_2, d_3."""
+    a, b, c, d = q.T
+    return np.array(
+        [
+            [a * a + b * b - c * c - d * d, 2 * (b * c - a * d), 2 * (b * d + a * c)],
+            [2 * (b * c + a * d), a * a - b * b + c * c - d * d, 2 * (c * d - a * b)],
+            [2 * (b * d - a * c), 2 * (c * d + a * b), a * a - b * b - c * c + d * d],
+        ]
+    ).transpose(2, 0, 1)
+
+
+def skew(u):
+    """The (3, 3) matrix of u x."""
+    return np.array([[0.0, -u[2], u[1]], [u[2], 0.0, -u[0]], [-u[1], u[0], 0.0]])
+
+
+def small_rotation(q):
+    """(3, 4): the inertial rotation 2 vec(dq conj(q))/|q|^2 of a change dq of one q (4,), as a matrix on dq."""
+    v = q[1:]
+    return 2 * np.column_stack([-v, q[0] * np.eye(3) + skew(v)]) / (q @ q)
