@@ -115,17 +115,17 @@ class Weight:
 
     def check_rod(self, rod):
         """Refuse a rod without mass."""
-        if rod.stiffness.mass is None:
+        if rod.profile.range[0].mass is None:
             field = "Stiffness.mass" if rod.material is None else "Material.density"
             refuse(f"Rod '{rod.name}': {field.split('.')[0]}", field.split(".")[1], None, "a value, which Weight needs")
 
     def vectors(self, rod):
         """The vectors of the virtual work, with their units."""
-        return ((self.density(rod), "force per length"),)
+        return ((self.density(rod, 0.0), "force per length"),)
 
-    def density(self, rod):
-        """Force per unit of reference length of a rod, N/m, inertial."""
-        return rod.stiffness.mass * np.asarray(self.gravity)
+    def density(self, rod, s):
+        """Force per unit of reference length of a rod at arc lengths s (...), m; (..., 3), N/m, inertial."""
+        return np.multiply.outer(rod.stiffness_at(s).mass, np.asarray(self.gravity))
 
 
 def _check_station(load):

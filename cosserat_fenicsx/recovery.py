@@ -66,13 +66,15 @@ def element_contact(path, record):
         n, m, r_s = np.split(record.gauss_fields[cell0 : cell0 + cells], 3, axis=2)
         cell0 += cells
         h = np.diff(breaks) * rod.length / scales.length
-        density = sum((load.density(rod) for load in path.scene.loads if load.station is None), start=np.zeros(3)) * (
-            record.load_factor * scales.length / scales.force
-        )
+        s_gauss = (breaks[:-1, None] + np.diff(breaks)[:, None] * rule.gauss) * rod.length
+        density = np.zeros((cells, len(rule.gauss), 3))
+        for load in path.scene.loads:
+            if load.station is None:
+                density += load.density(rod, s_gauss) * (record.load_factor * scales.length / scales.force)
         ends = []
         for end, sign in ((0, -1), (p, 1)):
             grad, value = rule.weights * rule.slopes[:, end], rule.weights * basis[:, end]
-            n_end = np.einsum("g,cgi->ci", grad, n) - h[:, None] * value.sum() * density
+            n_end = np.einsum("g,cgi->ci", grad, n) - h[:, None] * np.einsum("g,cgi->ci", value, density)
             m_end = np.einsum("g,cgi->ci", grad, m) - h[:, None] * np.einsum("g,cgi->ci", value, np.cross(r_s, n))
             ends.append(sign * np.concatenate([n_end, m_end], axis=1))
         along = np.concatenate([ends[0][:, None], np.concatenate([n, m], axis=2), ends[1][:, None]], axis=1)

@@ -5,6 +5,8 @@ name = "column"
 curve = { type = "Line", start = [0, 0, 0], end = [0, 0, 20] }
 section = { type = "Circle", diameter = 0.2 }
 material = { E = 210e9, nu = 0.3 }
+# a section that jumps: section = [{ to = 5.0, type = "Circle", diameter = 0.2 }, { type = "Circle", diameter = 0.1 }]
+# a curve from a file beside this one: curve = { type = "Spline", points = "survey.csv" }
 
 [[supports]]
 type = "Clamp"
@@ -66,18 +68,18 @@ def read_scene(file):
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as problem:
         raise SceneError(f"{file}: not valid TOML: {problem}") from None
     try:
-        return _scene(tables)
+        return _scene(tables, file.parent)
     except SceneError as problem:
         raise SceneError(f"{file}: {problem}") from None
 
 
-def _scene(tables):
+def _scene(tables, folder):
     _known_keys("the file", tables, {"title", "materials", "rods", "supports", "loads", "solve"})
     materials = {
         name: _build(f"materials.{name}", table, (Material,), {})
         for name, table in _table("materials", tables.get("materials", {})).items()
     }
-    rods = [_rod(f"rods[{i}]", entry, materials) for i, entry in _entries("rods", tables)]
+    rods = [_rod(f"rods[{i}]", entry, materials, folder) for i, entry in _entries("rods", tables)]
     stations = {rod.name: rod for rod in rods}
     supports = [_build(f"supports[{i}]", entry, SUPPORTS, stations) for i, entry in _entries("supports", tables)]
     loads = [_build(f"loads[{i}]", entry, LOADS, stations) for i, entry in _entries("loads", tables)]
@@ -93,7 +95,7 @@ def _scene(tables):
     return Scene(rods, supports, loads, title=title), settings
 
 
-def _rod(where, entry, materials):
+def _rod(where, entry, materials, folder):
     _known_keys(where, entry, {"name", "curve", "section", "material"})
     for key in ("curve", "section"):
         if key not in entry:
@@ -107,16 +109,29 @@ def _rod(where, entry, materials):
         material = materials[material]
     elif material is not None:
         material = _build(f"{where}.material", material, (Material,), {})
-    curve = _build(f"{where}.curve", entry["curve"], CURVES, {})
-    section = _build(f"{where}.section", entry["section"], SECTIONS, {})
+    curve = _build(f"{where}.curve", entry["curve"], CURVES, {}, folder)
+    section = _section(f"{where}.section", entry["section"])
     try:
         return Rod(curve, section, material, **({"name": entry["name"]} if "name" in entry else {}))
     except SceneError as problem:
         raise SceneError(f"{where}: {problem}") from None
 
 
-def _build(where, entry, classes, rods):
-    """An object from a table whose keys are the class's arguments."""
+def _section(where, entry):
+    """A section, or the pieces (s_end, section) of an array of them; the last may do without its `to`."""
+    if not isinstance(entry, list):
+        return _build(where, entry, SECTIONS, {})
+    pieces = []
+    for i, piece in enumerate(entry):
+        piece = dict(_table(f"{where}[{i}]", piece))
+        if "to" not in piece and i < len(entry) - 1:
+            raise SceneError(f"{where}[{i}]: 'to' is missing: expected the arc length (m) where this piece ends")
+        pieces.append((piece.pop("to", None), _build(f"{where}[{i}]", piece, SECTIONS, {})))
+    return pieces
+
+
+def _build(where, entry, classes, rods, folder=None):
+    """An object from a table whose keys are the class's arguments; names of files start at `folder`."""
     entry = dict(_table(where, entry))
     names = {cls.__name__: cls for cls in classes}
     if "type" not in entry and len(classes) > 1:
@@ -125,13 +140,14 @@ def _build(where, entry, classes, rods):
     if name not in names:
         raise SceneError(f"{where}.type = {name!r}: {nearest(name, names)}")
     kind = names[name]
-    arguments = {f.name: f for f in dataclasses.fields(kind) if f.init}
+    arguments = inspect.signature(kind).parameters
     _known_keys(f"{where} ({kind.__name__})", entry, arguments)
-    required = [name for name, parameter in inspect.signature(kind).parameters.items()
-                if parameter.default is inspect.Parameter.empty]  # fmt: skip
-    for name in required:
-        if name not in entry:
+    for name, parameter in arguments.items():
+        if name not in entry and parameter.default is inspect.Parameter.empty:
             raise SceneError(f"{where} ({kind.__name__}): '{name}' is missing")
+    for field in dataclasses.fields(kind):
+        if field.metadata.get("file") and isinstance(entry.get(field.name), str):
+            entry[field.name] = folder / entry[field.name]
     if "station" in entry:
         entry["station"] = _station(f"{where}.station", entry["station"], rods)
     try:

@@ -8,6 +8,8 @@ from dataclasses import dataclass
 
 from cosserat_fenicsx.checks import number, positive, refuse, stiffness, store, vector
 
+_ZETA_5 = 1.0369277551433699263  # sum of 1/n^5
+
 
 @dataclass(frozen=True)
 class Stiffness:
@@ -169,9 +171,10 @@ def _isotropic(material, A, I, J, k, outline):
 
 
 def _rectangle_torsion(b, h):
-    """Saint-Venant's torsion constant: a series in odd n whose tail beyond 4000 is below round-off."""
+    """Saint-Venant's torsion constant: of the series of tanh(n x)/n^5 in odd n, the part of 1/n^5 is summed exactly."""
     long, short = max(b, h), min(b, h)
-    series = sum(math.tanh(n * math.pi * long / (2 * short)) / n**5 for n in range(1, 4001, 2))
+    x = math.pi * long / (2 * short)
+    series = 31 / 32 * _ZETA_5 - sum((1 - math.tanh(n * x)) / n**5 for n in range(1, 15, 2))
     return long * short**3 / 3 * (1 - 192 * short / (math.pi**5 * long) * series)
 
 

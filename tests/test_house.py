@@ -38,7 +38,10 @@ def test_forms_know_ufl_alone():
         assert all(name.startswith("forms") for name in inside(file)), file
 
 
-SCENE = ("checks", "curves", "errors", "loads", "materials", "rod", "scene", "scenefile", "sections", "supports")
+SCENE = (
+    "checks", "curves", "errors", "frames", "loads", "materials", "polylines", "profiles", "quadrature", "rod", "scene",
+    "scenefile", "sections", "splines", "supports",
+)  # fmt: skip
 SOLVERS = ("continuation", "interrupts", "linear", "problem", "snes", "stability", "statics")
 RESULTS = ("plot", "ranks", "recovery", "results", "tables", "xdmf")
 
