@@ -60,7 +60,7 @@ def _draw(path, points, magnify):
     plotter = pyvista.Plotter(off_screen=True, window_size=(1400, 1000))
     plotter.set_background("white")
     plotter.enable_anti_aliasing("ssaa")
-    at_rest = [rod.curve.position(np.linspace(0, rod.length, 2)) for rod in path.scene.rods]
+    at_rest = [rod.curve.position(np.linspace(0, rod.length, 201)) for rod in path.scene.rods]
     bodies = {(k, rod): _swept(path, k, rod, magnify) for k in shown for rod in path.scene.rods}
     everywhere = np.concatenate([*at_rest, *(body.line for body in bodies.values())])
     span = everywhere.max(axis=0) - everywhere.min(axis=0)

@@ -14,6 +14,7 @@ from cosserat_fenicsx.sections import SECTIONS, Stiffness
 Stiffnesses = namedtuple("Stiffnesses", "K J mass")
 
 _SAMPLES = 33
+_UNKNOWN = [np.nan] * 7  # what a function gives
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,6 +30,8 @@ class Profile:
     Attributes:
         pieces: tuple of (s_end, section or function), ascending, the last s_end the rod's length.
         start: the `Stiffness` at s = 0.
+        range: the least and the largest of every stiffness along the rod, two `Stiffnesses` with K (3,), J (3,), mass ();
+            those of a function are the least and largest of samples.
 
     Raises:
         SceneError: pieces that do not ascend to the rod's length, or what is no section, at samples along the rod.
@@ -39,22 +42,23 @@ class Profile:
     material: Material | None
     pieces: tuple = field(init=False)
     start: Stiffness = field(init=False)
+    range: tuple = field(init=False)
 
     def __post_init__(self):
         given = self.given if isinstance(self.given, list | tuple) else [(None, self.given)]
         store(self, pieces=self._check_pieces(given))
         store(self, start=self._stiffness(self._piece(0.0, 0)))
-        fixed = [None if _is_law(section) else _row(self._stiffness(section)) for _, section in self.pieces]
-        store(
-            self, _fixed=np.array([row or [np.nan] * 7 for row in fixed]), _law=np.array([row is None for row in fixed])
-        )
-        ends = np.append(0.0, [end for end, _ in self.pieces])
-        x = (1 - np.cos(np.linspace(0, np.pi, _SAMPLES))) / 2
-        rows = np.concatenate([
-            self._rows(a + (b - a) * x, np.full(_SAMPLES, i)) if self._law[i] else self._fixed[[i]]
-            for i, (a, b) in enumerate(zip(ends[:-1], ends[1:], strict=True))
-        ])  # fmt: skip
-        store(self, _range=(_split(rows.min(axis=0)), _split(rows.max(axis=0))))
+        fixed = [_UNKNOWN if _is_law(section) else _row(self._stiffness(section)) for _, section in self.pieces]
+        store(self, _fixed=np.array(fixed), _law=[row is _UNKNOWN for row in fixed])
+        rows = [self._fixed[[not law for law in self._law]]]
+        before = 0.0
+        for i, (end, _) in enumerate(self.pieces):
+            if self._law[i]:
+                s = before + (end - before) * (1 - np.cos(np.linspace(0, np.pi, _SAMPLES))) / 2
+                rows.append(self._rows(s, np.full(_SAMPLES, i)))
+            before = end
+        rows = np.concatenate(rows)
+        store(self, range=(_split(rows.min(axis=0)), _split(rows.max(axis=0))))
 
     def _check_pieces(self, given):
         L, where = self.owner.length, f"Rod '{self.owner.name}'"
@@ -91,14 +95,6 @@ class Profile:
         """Whether the section is the same everywhere."""
         return len(self.pieces) == 1 and not self._law[0]
 
-    @property
-    def range(self):
-        """The least and the largest of all stiffnesses along the rod, two `Stiffnesses` with K (3,), J (3,), mass ().
-
-        Those of a function are the least and largest of samples.
-        """
-        return self._range
-
     def section(self, s, side):
         """The section at one arc length."""
         s = float(s)
@@ -119,7 +115,7 @@ class Profile:
 
     def _rows(self, s, index):
         rows = self._fixed[index]
-        for k in np.flatnonzero(self._law[index]):
+        for k in np.flatnonzero(np.array(self._law)[index]):
             rows[k] = _row(self._stiffness(self._piece(float(s[k]), index[k])))
         return rows
 

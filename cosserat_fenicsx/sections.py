@@ -6,7 +6,9 @@ Shear factors: Cowper, J. Appl. Mech. 33 (1966) 335, doi:10.1115/1.3625046; tors
 import math
 from dataclasses import dataclass
 
-from cosserat_fenicsx.checks import number, positive, refuse, stiffness, store, vector
+import numpy as np
+
+from cosserat_fenicsx.checks import number, positive, refuse, stiffness, store
 
 _ZETA_5 = 1.0369277551433699263  # sum of 1/n^5
 
@@ -45,9 +47,7 @@ class Stiffness:
         if self.mass is not None:
             store(self, mass=positive(self, "mass", self.mass, "kg/m"))
         if self.outline is not None:
-            if not isinstance(self.outline, tuple | list) or len(self.outline) < 3:
-                refuse(self, "outline", self.outline, "three or more corners (x1, x2) (m)")
-            store(self, outline=tuple(vector(self, "outline", corner, "m", size=2) for corner in self.outline))
+            store(self, outline=_corners(self, self.outline))
 
     def stiffness(self, material=None):
         """The section itself (a material is not needed)."""
@@ -151,6 +151,19 @@ def _check_lengths(section, *fields):
     if section.shear_factor is not None:
         k = number(section, "shear_factor", section.shear_factor, "a number in (0, 1]", lambda x: 0 < x <= 1)
         store(section, shear_factor=k)
+
+
+def _corners(section, outline):
+    expected = "three or more corners (x1, x2) of finite numbers (m)"
+    try:
+        corners = np.asarray(outline)
+    except ValueError:
+        refuse(section, "outline", outline, expected)
+    if corners.ndim != 2 or corners.shape[1] != 2 or len(corners) < 3 or corners.dtype.kind not in "iuf":
+        refuse(section, "outline", outline, expected)
+    if not np.isfinite(corners).all():
+        refuse(section, "outline", outline, expected)
+    return tuple(map(tuple, corners.astype(float).tolist()))
 
 
 def _circle(radius, corners=24):

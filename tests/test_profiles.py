@@ -122,6 +122,15 @@ def test_refused(case):
     assert words in str(refusal.value)
 
 
+@pytest.mark.parametrize(
+    "outline", [3, [(0, 0), (1, 0)], [(0, 0), (1, 0), (1,)], [(0, 0, 0)] * 3, [(0, 0), (1, 0), (math.inf, 0)]]
+)
+def test_outlines(outline):
+    with pytest.raises(cf.SceneError, match="Stiffness.outline = .*expected three or more corners"):
+        cf.Stiffness((1, 1), 1, (1, 1), 1, outline=outline)
+    assert cf.Stiffness((1, 1), 1, (1, 1), 1, outline=[[0, 0], [1, 0], [0, 1]]).outline == ((0, 0), (1, 0), (0, 1))
+
+
 def test_refused_without_material_and_side():
     for section in ([(4, THICK), (None, THIN)], lambda s: THICK):
         with pytest.raises(cf.SceneError, match="Rod.material = None"):
