@@ -113,7 +113,7 @@ class Spline:
             start = tangents[0]
             forward = np.einsum("pj,npj->np", start, tangents)
             rate = np.einsum("pj,npj->np", start, np.cross(tangents, second)) / (speed * (1 + forward))
-        rates = np.stack([speed, np.nan_to_num(rate)])[:, 1:-1] * half
+        rates = np.stack([speed, np.nan_to_num(rate, posinf=0.0, neginf=0.0)])[:, 1:-1] * half
         tails = np.abs(_GAUSS.series[-3:] @ rates).max(axis=1)
         # Towards a cusp the terms of a cubic's slope cancel; a series cannot be better than their rounding.
         a, b, c = np.linalg.norm(self._cubics[:3, span], axis=-1)

@@ -293,21 +293,6 @@ REFUSED = {
     "uniform, curvature": (lambda: cf.UniformCurvature(1, (0, inf, 0)), "UniformCurvature.curvature = (0, inf, 0)"),
     "uniform, no quaternion": (lambda: cf.UniformCurvature(1, (0, 0, 0), frame=(1, 0, 0)), "UniformCurvature.frame = (1, 0, 0): expected 4"),
     "uniform, quaternion of length 2": (lambda: cf.UniformCurvature(1, (0, 0, 0), frame=(2, 0, 0, 0)), "expected a quaternion of length 1"),
-    "spline of one point": (lambda: cf.Spline([(0, 0, 0)]), "expected two points or more"),
-    "spline of no point": (lambda: cf.Spline([]), "expected points of three numbers"),
-    "spline in a plane": (lambda: cf.Spline([(0, 0), (1, 1)]), "expected points of three numbers"),
-    "spline of ragged points": (lambda: cf.Spline([(0, 0, 0), (1, 1)]), "expected points of three numbers"),
-    "spline of words": (lambda: cf.Spline([("a", "b", "c")]), "expected points of three numbers"),
-    "spline of a number": (lambda: cf.Spline(3.0), "expected points of three numbers"),
-    "spline, NaN": (lambda: cf.Spline([(0, 0, 0), (1, nan, 0)]), "Spline.points[1] = (1.0, nan, 0.0): expected finite numbers"),
-    "spline, repeated": (lambda: cf.Spline([(0, 0, 0), (1, 1, 0), (1, 1, 0)]), "Spline.points[2] = (1.0, 1.0, 0.0): expected a point apart"),
-    "spline, one point twice": (lambda: cf.Spline([(1, 1, 0), (1, 1, 0)], closed=False), "Spline.points[1]"),
-    "closed spline of two": (lambda: cf.Spline([(0, 0, 0), (1, 0, 0), (0, 0, 0)], closed=True), "expected three points or more"),
-    "spline that turns back": (lambda: cf.Spline([(0, 0, 0), (1, 0, 0), (0, 0, 0)]), "a cusp at (1, 0, 0) m"),
-    "spline that turns back inside": (lambda: cf.Spline([(0, 0, 0), (1, 0, 0), (0.4, 0, 0)]), "a cusp at (1."),
-    "closed and flat": (lambda: cf.Spline([(0, 0, 0), (1, 0, 0), (3, 0, 0)], closed=True), "a cusp"),
-    "spline, d1": (lambda: cf.Spline([(0, 0, 0), (1, 0, 0)], d1=(1, 0, 0)), "Spline.d1"),
-    "spline, closed": (lambda: cf.Spline(RING, closed="yes"), "Spline.closed = 'yes'"),
 }  # fmt: skip
 
 

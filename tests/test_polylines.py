@@ -1,4 +1,4 @@
-"""Splines from files, and curves of every kind in scene files."""
+"""Points that splines take and refuse, from arrays and files, and curves of every kind in scene files."""
 
 import math
 
@@ -87,6 +87,33 @@ def test_refused_files(name, tmp_path, capfd):
         cf.Spline(tmp_path / name)
     assert words in str(refusal.value)
     assert capfd.readouterr() == ("", "")
+
+
+REFUSED = {
+    "spline of one point": (lambda: cf.Spline([(0, 0, 0)]), "expected two points or more"),
+    "spline of no point": (lambda: cf.Spline([]), "expected points of three numbers"),
+    "spline in a plane": (lambda: cf.Spline([(0, 0), (1, 1)]), "expected points of three numbers"),
+    "spline of ragged points": (lambda: cf.Spline([(0, 0, 0), (1, 1)]), "expected points of three numbers"),
+    "spline of words": (lambda: cf.Spline([("a", "b", "c")]), "expected points of three numbers"),
+    "spline of a number": (lambda: cf.Spline(3.0), "expected points of three numbers"),
+    "spline, NaN": (lambda: cf.Spline([(0, 0, 0), (1, math.nan, 0)]), "Spline.points[1] = (1.0, nan, 0.0): expected finite numbers"),
+    "spline, repeated": (lambda: cf.Spline([(0, 0, 0), (1, 1, 0), (1, 1, 0)]), "Spline.points[2] = (1.0, 1.0, 0.0): expected a point apart"),
+    "spline, one point twice": (lambda: cf.Spline([(1, 1, 0), (1, 1, 0)], closed=False), "Spline.points[1]"),
+    "closed spline of two": (lambda: cf.Spline([(0, 0, 0), (1, 0, 0), (0, 0, 0)], closed=True), "expected three points or more"),
+    "spline that turns back": (lambda: cf.Spline([(0, 0, 0), (1, 0, 0), (0, 0, 0)]), "a cusp at (1, 0, 0) m"),
+    "spline that turns back inside": (lambda: cf.Spline([(0, 0, 0), (1, 0, 0), (0.4, 0, 0)]), "a cusp at (1."),
+    "closed and flat": (lambda: cf.Spline([(0, 0, 0), (1, 0, 0), (3, 0, 0)], closed=True), "a cusp"),
+    "spline, d1": (lambda: cf.Spline([(0, 0, 0), (1, 0, 0)], d1=(1, 0, 0)), "Spline.d1"),
+    "spline, closed": (lambda: cf.Spline(POINTS, closed="yes"), "Spline.closed = 'yes'"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", REFUSED)
+def test_refused_points(case):
+    make, words = REFUSED[case]
+    with pytest.raises(cf.SceneError) as refusal:
+        make()
+    assert words in str(refusal.value)
 
 
 SCENE = """
