@@ -15,6 +15,7 @@ if (_checkout / "forms" / "spatial.py").is_file() and (_checkout / "pyproject.to
 
 _HOME = {
     "analytic": None,
+    "Arc": "curves",
     "Circle": "sections",
     "Clamp": "supports",
     "CosseratError": "errors",
@@ -24,6 +25,7 @@ _HOME = {
     "Force": "loads",
     "Hinge": "supports",
     "InstallationError": "errors",
+    "Helix": "curves",
     "Interrupted": "errors",
     "Joint": "joints",
     "Line": "curves",
@@ -40,9 +42,11 @@ _HOME = {
     "Roller": "supports",
     "Scene": "scene",
     "SceneError": "errors",
+    "Spline": "curves",
     "StepControl": "continuation",
     "Stiffness": "sections",
     "Tube": "sections",
+    "UniformCurvature": "curves",
     "Weight": "loads",
     "euler_load": "rod",
     "read_scene": "scenefile",

@@ -4,6 +4,7 @@ import dataclasses
 
 import numpy as np
 
+from cosserat_fenicsx.curves import Line, Spline
 from cosserat_fenicsx.models.rodmesh import Layout
 from cosserat_fenicsx.models.shape import Shape
 from cosserat_fenicsx.sections import Rectangle, Stiffness
@@ -30,13 +31,9 @@ def explain(scene, load_factors, settings):
     shape = Shape.of(scene, layout, formulation=formulation, degree=degree)
     lines = [scene.title] if scene.title else []
     for rod in scene.rods:
-        s = rod.stiffness
-        slender = rod.length * np.sqrt(s.axial / max(s.bending)) if np.isfinite(s.axial) else np.inf
         lines.append(
-            f"Rod '{rod.name}': {type(rod.curve).__name__}, length {rod.length:g} m, {_section(rod.section)}; "
-            f"EI = {s.bending[0]:.4g}, {s.bending[1]:.4g} N m^2, GJ = {s.torsion:.4g} N m^2, EA = {s.axial:.4g} N, "
-            f"GA = {s.shear[0]:.4g}, {s.shear[1]:.4g} N; slenderness L sqrt(EA/EI) = {slender:.4g}. "
-            f"{_directions(rod)}"
+            f"Rod '{rod.name}': {_curve(rod.curve)}, length {rod.length:g} m, {_sections(rod)}; "
+            f"{_stiffnesses(rod)}. {_directions(rod)}"
         )
     lines.append(
         f"{len(scene.supports)} support(s): {', '.join(describe(x) for x in scene.supports)}. "
@@ -67,6 +64,32 @@ def explain(scene, load_factors, settings):
     return "\n".join(lines)
 
 
+def _curve(curve):
+    """A curve with what matters of its shape."""
+    if isinstance(curve, Spline):
+        return f"{'closed ' if curve.closed else ''}Spline through {len(curve.points)} points"
+    shape = {"Arc": ("angle", "rad"), "Helix": ("turns", "turns"), "UniformCurvature": ("curvature", "1/m")}
+    if type(curve).__name__ not in shape:
+        return type(curve).__name__
+    name, unit = shape[type(curve).__name__]
+    values = np.atleast_1d(getattr(curve, name))
+    return f"{type(curve).__name__} ({', '.join(f'{x:g}' for x in values)} {unit})"
+
+
+def _sections(rod):
+    """The sections of a rod, one after the other."""
+    parts, before = [], 0.0
+    for end, section in rod.profile.pieces:
+        if callable(section):
+            part = " to ".join(_section(rod.section_at(s, side)) for s, side in ((before, "right"), (end, "left")))
+            part = f"changing from {part}"
+        else:
+            part = _section(section)
+        parts.append(part if len(rod.profile.pieces) == 1 else f"{part} up to s = {end:g} m")
+        before = end
+    return ", then ".join(parts)
+
+
 def _section(section):
     """A section with its measures."""
     given = ((f.name, getattr(section, f.name)) for f in dataclasses.fields(section))
@@ -76,10 +99,26 @@ def _section(section):
     return f"{type(section).__name__}" + (f" ({measures})" if measures and not isinstance(section, Stiffness) else "")
 
 
+def _stiffnesses(rod):
+    """The stiffnesses of a rod, least to largest where they change, and its slenderness."""
+    low, high = rod.profile.range
+
+    def spread(name, i):
+        least, most = getattr(low, name)[i], getattr(high, name)[i]
+        return f"{least:.4g}" + (f" to {most:.4g}" if most > least else "")
+
+    slender = rod.length * np.sqrt(high.K[2] / max(low.J[:2]))
+    return (
+        f"EI = {spread('J', 0)}, {spread('J', 1)} N m^2, GJ = {spread('J', 2)} N m^2, EA = {spread('K', 2)} N, "
+        f"GA = {spread('K', 0)}, {spread('K', 1)} N; slenderness L sqrt(EA/EI) = {slender:.4g}"
+    )
+
+
 def _directions(rod):
     """Where d_1 and d_2 point at the start, which matters to every section that is not round."""
     d1, d2 = (", ".join(f"{x:.3g}" for x in rod.curve.frame(0.0)[:, i] + 0.0) for i in (0, 1))
-    if isinstance(rod.section, Rectangle):
-        return f"Its width runs along d1 = ({d1}), its height along d2 = ({d2})."
-    return f"d1 = ({d1}), d2 = ({d2})."
+    at = "" if isinstance(rod.curve, Line) else " at the start"
+    if isinstance(rod.section_at(0.0), Rectangle):
+        return f"Its width runs along d1 = ({d1}), its height along d2 = ({d2}){at}."
+    return f"d1 = ({d1}), d2 = ({d2}){at}."
 

@@ -169,7 +169,7 @@ class Weight:
 
     def check_rod(self, rod):
         """Refuse a rod without mass."""
-        if rod.stiffness.mass is None:
+        if rod.profile.range[0].mass is None:
             field = "Stiffness.mass" if rod.material is None else "Material.density"
             refuse(f"Rod '{rod.name}': {field.split('.')[0]}", field.split(".")[1], None, "a value, which Weight needs")
 
@@ -179,7 +179,7 @@ class Weight:
 
     def density(self, rod, s):
         """(n, 3) N/m, inertial, per unit of reference length at the arc lengths s (n,)."""
-        return rod.stiffness_at(s).mass[:, None] * np.asarray(self.gravity)
+        return rod.stiffness_at(s).mass[..., None] * np.asarray(self.gravity)
 
 
 @dataclass(frozen=True)

@@ -60,7 +60,7 @@ def _draw(path, points, magnify):
     plotter = pyvista.Plotter(off_screen=True, window_size=(1400, 1000))
     plotter.set_background("white")
     plotter.enable_anti_aliasing("ssaa")
-    at_rest = [rod.curve.position(np.linspace(0, rod.length, 2)) for rod in path.scene.rods]
+    at_rest = [rod.curve.position(np.linspace(0, rod.length, 201)) for rod in path.scene.rods]
     bodies = {(k, rod): _swept(path, k, rod, magnify) for k in shown for rod in path.scene.rods}
     everywhere = np.concatenate([*at_rest, *(body.line for body in bodies.values())])
     span = everywhere.max(axis=0) - everywhere.min(axis=0)
@@ -120,7 +120,7 @@ def _note(path, shown, thicker, magnify):
 
 @dataclass(frozen=True)
 class _Body:
-    """A deformed rod: centreline (n, 3), directors (n, 3, 3), outline (corners, 2), radius, bending moment (n,)."""
+    """A deformed rod: centreline (n, 3), directors (n, 3, 3), outline (n, corners, 2), radius, bending moment (n,)."""
 
     line: np.ndarray
     directors: np.ndarray
@@ -134,16 +134,33 @@ def _swept(path, k, rod, magnify, pieces=200):
     line, directors = path.sample(k, rod, x)
     reference = rod.curve.position(x * rod.length)
     fields = path.fields(k, rod)
-    outline = np.array(rod.stiffness.outline or Circle(0.02 * rod.length).stiffness(Material(E=1.0)).outline)
+    outline = _outlines(rod, x * rod.length)
     moment = np.interp(x, fields["s"] / rod.length, fields["bending_moment"])
-    radius = float(np.linalg.norm(outline, axis=1).max())
+    radius = float(np.linalg.norm(outline, axis=2).max())
     return _Body(reference + magnify * (line - reference), directors, outline, radius, moment)
+
+
+def _outlines(rod, s):
+    """(n, corners, 2) corners of the section at arc lengths s, m; all get as many as the richest."""
+    sections = [rod.section_at(s[0])] * len(s) if rod.profile.constant else [rod.section_at(x, "left") for x in s]
+    given = [section.stiffness(rod.material).outline for section in sections]
+    drawn = [np.array(x or Circle(0.02 * rod.length).stiffness(Material(E=1.0)).outline) for x in given]
+    most = max(map(len, drawn))
+    return np.array([outline if len(outline) == most else _resampled(outline, most) for outline in drawn])
+
+
+def _resampled(outline, corners):
+    """A closed polygon with another number of corners, evenly along it."""
+    closed = np.concatenate([outline, outline[:1]])
+    way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(closed, axis=0), axis=1))])
+    at = np.linspace(0, way[-1], corners, endpoint=False)
+    return np.column_stack([np.interp(at, way, closed[:, i]) for i in range(2)])
 
 
 def _surface(pyvista, body, factor, scale):
     """The surface that the outline sweeps, closed at both ends."""
-    corners = len(body.outline)
-    points = body.line[:, None] + factor * np.einsum("nij,cj->nci", body.directors[:, :, :2], body.outline)
+    corners = body.outline.shape[1]
+    points = body.line[:, None] + factor * np.einsum("nij,ncj->nci", body.directors[:, :, :2], body.outline)
     rings = np.arange(len(body.line) * corners).reshape(-1, corners)
     right = np.roll(rings, -1, axis=1)
     quads = np.stack([rings[:-1], right[:-1], right[1:], rings[1:]], axis=-1).reshape(-1, 4)

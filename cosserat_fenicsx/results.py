@@ -148,7 +148,7 @@ class Path:
         d = directors(q) @ rod.curve.frame(s)
         n, m = contact[:, :3] * self.scales.force, contact[:, 3:] * self.scales.moment
         n_material, m_material = np.einsum("kij,ki->kj", d, n), np.einsum("kij,ki->kj", d, m)
-        section = rod.stiffness_at(s)
+        section = rod.stiffness_at(s, "left")  # like n and m, on a jump that of the element before
         return {
             "s": s,
             "position": rod.curve.position(s) + displacement,
@@ -238,7 +238,7 @@ class Path:
                 b, _ = self.sample(k, rod, x)
                 difference[k] = max(difference[k], np.linalg.norm(a - b, axis=1).max())
                 turned = (
-                    np.linalg.norm(frames - rod.curve.frame(x * rod.length), axis=(1, 2)).max() * rod.stiffness.gyration
+                    np.linalg.norm(frames - rod.curve.frame(x * rod.length), axis=(1, 2)).max() * _gyration(rod)
                 )
                 largest[k] = max(largest[k], np.linalg.norm(a - reference, axis=1).max(), turned)
         self._difference = difference
@@ -292,3 +292,9 @@ class Path:
         from cosserat_fenicsx import plot
 
         return plot.rods(self, file, points, magnify)
+
+
+def _gyration(rod):
+    """Largest radius of gyration sqrt(EI/EA) of a rod, m; 0 where EA is infinite."""
+    low, high = rod.profile.range
+    return float(np.sqrt(high.J[:2].max() / low.K[2]))

@@ -5,6 +5,8 @@ name = "column"
 curve = { type = "Line", start = [0, 0, 0], end = [0, 0, 20] }
 section = { type = "Circle", diameter = 0.2 }
 material = { E = 210e9, nu = 0.3 }
+# a section that jumps: section = [{ to = 5.0, type = "Circle", diameter = 0.2 }, { type = "Circle", diameter = 0.1 }]
+# a curve from a file beside this one: curve = { type = "Spline", points = "survey.csv" }
 
 [[supports]]
 type = "Clamp"
@@ -14,6 +16,10 @@ station = "column.start"          # or "column.end", or "column@5.0" for s = 5 m
 type = "Force"
 station = "column.end"
 force = [0, 0, -1e5]
+
+[[joints]]                        # optional, between rods that touch
+first = "column.end"
+second = "beam.start"
 
 [solve]                           # optional: defaults of the command line
 load_factors = [0.5, 1.0]
@@ -26,9 +32,10 @@ from pathlib import Path
 
 from cosserat_fenicsx.curves import CURVES
 from cosserat_fenicsx.errors import SceneError, nearest
+from cosserat_fenicsx.joints import Joint
 from cosserat_fenicsx.loads import LOADS
 from cosserat_fenicsx.materials import Material
-from cosserat_fenicsx.rod import Rod
+from cosserat_fenicsx.rod import Rod, Station
 from cosserat_fenicsx.scene import Scene
 from cosserat_fenicsx.sections import SECTIONS
 from cosserat_fenicsx.supports import SUPPORTS
@@ -66,21 +73,22 @@ def read_scene(file):
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as problem:
         raise SceneError(f"{file}: not valid TOML: {problem}") from None
     try:
-        return _scene(tables)
+        return _scene(tables, file.parent)
     except SceneError as problem:
         raise SceneError(f"{file}: {problem}") from None
 
 
-def _scene(tables):
-    _known_keys("the file", tables, {"title", "materials", "rods", "supports", "loads", "solve"})
+def _scene(tables, folder):
+    _known_keys("the file", tables, {"title", "materials", "rods", "supports", "joints", "loads", "solve"})
     materials = {
         name: _build(f"materials.{name}", table, (Material,), {})
         for name, table in _table("materials", tables.get("materials", {})).items()
     }
-    rods = [_rod(f"rods[{i}]", entry, materials) for i, entry in _entries("rods", tables)]
+    rods = [_rod(f"rods[{i}]", entry, materials, folder) for i, entry in _entries("rods", tables)]
     stations = {rod.name: rod for rod in rods}
     supports = [_build(f"supports[{i}]", entry, SUPPORTS, stations) for i, entry in _entries("supports", tables)]
     loads = [_build(f"loads[{i}]", entry, LOADS, stations) for i, entry in _entries("loads", tables)]
+    joints = [_build(f"joints[{i}]", entry, (Joint,), stations) for i, entry in _entries("joints", tables)]
     title = tables.get("title", "")
     if not isinstance(title, str):
         raise SceneError(f"title = {title!r}: expected a string")
@@ -90,10 +98,10 @@ def _scene(tables):
         if not isinstance(value, SOLVE_KEYS[key]) or isinstance(value, bool):
             names = " or ".join(kind.__name__ for kind in SOLVE_KEYS[key])
             raise SceneError(f"[solve].{key} = {value!r}: expected {names}")
-    return Scene(rods, supports, loads, title=title), settings
+    return Scene(rods, supports, loads, joints, title=title), settings
 
 
-def _rod(where, entry, materials):
+def _rod(where, entry, materials, folder):
     _known_keys(where, entry, {"name", "curve", "section", "material"})
     for key in ("curve", "section"):
         if key not in entry:
@@ -107,16 +115,29 @@ def _rod(where, entry, materials):
         material = materials[material]
     elif material is not None:
         material = _build(f"{where}.material", material, (Material,), {})
-    curve = _build(f"{where}.curve", entry["curve"], CURVES, {})
-    section = _build(f"{where}.section", entry["section"], SECTIONS, {})
+    curve = _build(f"{where}.curve", entry["curve"], CURVES, {}, folder)
+    section = _section(f"{where}.section", entry["section"])
     try:
         return Rod(curve, section, material, **({"name": entry["name"]} if "name" in entry else {}))
     except SceneError as problem:
         raise SceneError(f"{where}: {problem}") from None
 
 
-def _build(where, entry, classes, rods):
-    """An object from a table whose keys are the class's arguments."""
+def _section(where, entry):
+    """A section, or the pieces (s_end, section) of an array of them; the last may do without its `to`."""
+    if not isinstance(entry, list):
+        return _build(where, entry, SECTIONS, {})
+    pieces = []
+    for i, piece in enumerate(entry):
+        piece = dict(_table(f"{where}[{i}]", piece))
+        if "to" not in piece and i < len(entry) - 1:
+            raise SceneError(f"{where}[{i}]: 'to' is missing: expected the arc length (m) where this piece ends")
+        pieces.append((piece.pop("to", None), _build(f"{where}[{i}]", piece, SECTIONS, {})))
+    return pieces
+
+
+def _build(where, entry, classes, rods, folder=None):
+    """An object from a table whose keys are the class's arguments; names of files start at `folder`."""
     entry = dict(_table(where, entry))
     names = {cls.__name__: cls for cls in classes}
     if "type" not in entry and len(classes) > 1:
@@ -125,19 +146,29 @@ def _build(where, entry, classes, rods):
     if name not in names:
         raise SceneError(f"{where}.type = {name!r}: {nearest(name, names)}")
     kind = names[name]
-    arguments = {f.name: f for f in dataclasses.fields(kind) if f.init}
+    arguments = inspect.signature(kind).parameters
     _known_keys(f"{where} ({kind.__name__})", entry, arguments)
-    required = [name for name, parameter in inspect.signature(kind).parameters.items()
-                if parameter.default is inspect.Parameter.empty]  # fmt: skip
-    for name in required:
-        if name not in entry:
+    for name, parameter in arguments.items():
+        if name not in entry and parameter.default is inspect.Parameter.empty:
             raise SceneError(f"{where} ({kind.__name__}): '{name}' is missing")
-    if "station" in entry:
-        entry["station"] = _station(f"{where}.station", entry["station"], rods)
+    for field in dataclasses.fields(kind):
+        if field.metadata.get("file") and isinstance(entry.get(field.name), str):
+            entry[field.name] = folder / entry[field.name]
+    for name in [name for name in arguments if name in entry]:
+        if arguments[name].annotation is Station:
+            entry[name] = _station(f"{where}.{name}", entry[name], rods)
+        elif arguments[name].annotation is Rod:
+            entry[name] = _known_rod(f"{where}.{name}", entry[name], rods)
     try:
         return kind(**entry)
     except SceneError as problem:
         raise SceneError(f"{where}: {problem}") from None
+
+
+def _known_rod(where, name, rods):
+    if not isinstance(name, str) or name not in rods:
+        raise SceneError(f"{where} = {name!r}: no rod has this name, {nearest(name, rods)}")
+    return rods[name]
 
 
 def _station(where, text, rods):

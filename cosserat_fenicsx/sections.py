@@ -6,7 +6,11 @@ Shear factors: Cowper, J. Appl. Mech. 33 (1966) 335, doi:10.1115/1.3625046; tors
 import math
 from dataclasses import dataclass
 
-from cosserat_fenicsx.checks import number, positive, refuse, stiffness, store, vector
+import numpy as np
+
+from cosserat_fenicsx.checks import number, positive, refuse, stiffness, store
+
+_ZETA_5 = 1.0369277551433699263  # sum of 1/n^5
 
 
 @dataclass(frozen=True)
@@ -43,18 +47,11 @@ class Stiffness:
         if self.mass is not None:
             store(self, mass=positive(self, "mass", self.mass, "kg/m"))
         if self.outline is not None:
-            if not isinstance(self.outline, tuple | list) or len(self.outline) < 3:
-                refuse(self, "outline", self.outline, "three or more corners (x1, x2) (m)")
-            store(self, outline=tuple(vector(self, "outline", corner, "m", size=2) for corner in self.outline))
+            store(self, outline=_corners(self, self.outline))
 
     def stiffness(self, material=None):
         """The section itself (a material is not needed)."""
         return self
-
-    @property
-    def gyration(self):
-        """Radius of gyration sqrt(EI/EA), m; 0 where EA is infinite."""
-        return math.sqrt(max(self.bending) / self.axial)
 
 
 @dataclass(frozen=True)
@@ -151,6 +148,19 @@ def _check_lengths(section, *fields):
         store(section, shear_factor=k)
 
 
+def _corners(section, outline):
+    expected = "three or more corners (x1, x2) of finite numbers (m)"
+    try:
+        corners = np.asarray(outline)
+    except ValueError:
+        refuse(section, "outline", outline, expected)
+    if corners.ndim != 2 or corners.shape[1] != 2 or len(corners) < 3 or corners.dtype.kind not in "iuf":
+        refuse(section, "outline", outline, expected)
+    if not np.isfinite(corners).all():
+        refuse(section, "outline", outline, expected)
+    return tuple(map(tuple, corners.astype(float).tolist()))
+
+
 def _circle(radius, corners=24):
     angles = [2 * math.pi * i / corners for i in range(corners)]
     return tuple((radius * math.cos(a), radius * math.sin(a)) for a in angles)
@@ -169,9 +179,10 @@ def _isotropic(material, A, I, J, k, outline):
 
 
 def _rectangle_torsion(b, h):
-    """Saint-Venant's torsion constant: a series in odd n whose tail beyond 4000 is below round-off."""
+    """Saint-Venant's torsion constant: of the series of tanh(n x)/n^5 in odd n, the part of 1/n^5 is summed exactly."""
     long, short = max(b, h), min(b, h)
-    series = sum(math.tanh(n * math.pi * long / (2 * short)) / n**5 for n in range(1, 4001, 2))
+    x = math.pi * long / (2 * short)
+    series = 31 / 32 * _ZETA_5 - sum((1 - math.tanh(n * x)) / n**5 for n in range(1, 15, 2))
     return long * short**3 / 3 * (1 - 192 * short / (math.pi**5 * long) * series)
 
 

@@ -39,9 +39,9 @@ def test_forms_know_ufl_alone():
 
 
 SCENE = (
-    *("checks", "curves", "errors", "joints", "loads", "materials", "rod", "scene", "scenefile", "sections"),
-    *("statical", "supports", "ties"),
-)
+    "checks", "curves", "errors", "frames", "joints", "loads", "materials", "polylines", "profiles", "quadrature", "rod", "scene",
+    "scenefile", "sections", "splines", "statical", "supports", "ties",
+)  # fmt: skip
 SOLVERS = ("continuation", "interrupts", "linear", "problem", "snes", "stability", "statics", "tie_rows")
 RESULTS = ("plot", "ranks", "recovery", "results", "tables", "xdmf")
 

@@ -15,7 +15,7 @@ class Scales:
     def of(cls, scene):
         """Scales of the longest rod of a scene."""
         rod = max(scene.rods, key=lambda rod: rod.length)
-        EI, L = max(rod.stiffness.bending), rod.length
+        EI, L = float(rod.profile.range[1].J[:2].max()), rod.length
         return cls(L, EI / L**2, EI / L)
 
     def of_unit(self, unit):

@@ -49,7 +49,7 @@ class Shape:
             isinstance(points, bool) or not isinstance(points, numbers.Integral) or not 1 <= points <= 12
         ):
             raise SceneError(f"gauss_points = {points!r}: expected a whole number from 1 to 12")
-        infinite = any(np.isinf([*rod.stiffness.shear, rod.stiffness.axial]).any() for rod in scene.rods)
+        infinite = any(np.isinf(rod.profile.range[1].K).any() for rod in scene.rods)
         if infinite and formulation != "mixed":
             raise SceneError(
                 f"formulation = '{formulation}' cannot take an infinite stiffness: expected 'mixed', "
@@ -78,7 +78,7 @@ class Shape:
 def _rounding(scene, layout, degree):
     """Rounding of the stiffest entries of a condensed tangent over the bending stiffness of a node's spacing."""
     return max(
-        np.finfo(float).eps * max(*rod.stiffness.shear, rod.stiffness.axial) * rod.length**2 / min(rod.stiffness.bending)
+        np.finfo(float).eps * rod.profile.range[1].K.max() * rod.length**2 / rod.profile.range[0].J[:2].min()
         * (cells * degree) ** 2
         for rod, cells in zip(scene.rods, layout.counts, strict=True)
     )  # fmt: skip
