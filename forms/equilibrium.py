@@ -1,4 +1,4 @@
-"""Eq. (1) of the paper, static part, whatever the unknowns that carry the rotation: every rung is this on its own `Motion`.
+"""Eq. (1) of the paper, static part, whatever carries the rotation: every rung is this on a `Motion` of its own.
 
 Strong form: n' + f = 0, m' + r' x n + mu = 0, with the laws (2)-(3) for material components,
 n = T K (v - v_R), m = T J (u - u_R), T = R R_R. The contact force n may be a quantity of its own: a field of unknowns,
@@ -10,10 +10,10 @@ from collections import namedtuple
 
 import ufl
 
-#: What eq. (1) sees of a motion: r', the rotation R from the reference, and the vector of R^T R', which is R_R (u - u_R).
+#: What eq. (1) sees of a motion: r', the rotation R from the reference, and the axial vector of R^T R', R_R (u - u_R).
 Motion = namedtuple("Motion", "r_s R curvature")
-#: Material stiffness K = (GA1, GA2, EA), its inverse, J = (EI1, EI2, GJ), the reference frame R_R = [d_1R d_2R d_3R] and
-#: the reference strain v_R = R_R^T r_R', which is (0, 0, 1) on the curve itself; all vectors and matrices of UFL.
+#: Material stiffness K = (GA1, GA2, EA), its inverse, J = (EI1, EI2, GJ), the reference frame R_R = [d_1R d_2R d_3R]
+#: and the reference strain v_R = R_R^T r_R', which is (0, 0, 1) on the curve itself; vectors and a matrix of UFL.
 Section = namedtuple("Section", "K K_inv J R_R v_R")
 
 

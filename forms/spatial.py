@@ -18,7 +18,7 @@ from cosserat_fenicsx.forms.rotation import (
     vector_part,
 )
 
-#: The `equilibrium.Motion` of r and q, and q itself. `q_node` is q under another name, for rules of its own (compat.alias).
+#: The `equilibrium.Motion` of r and q, and q itself. `q_node` is q by another name, for rules of its own (compat.alias).
 State = namedtuple("State", "r_s R curvature q q_s q_node")
 #: Virtual displacement phi_r, virtual rotation phi, test function phi_qa of the constraint, and the derivatives.
 Tests = namedtuple("Tests", "phi_r phi phi_qa phi_r_s phi_s")
@@ -86,9 +86,13 @@ def variation_tests_of(w, q):
 
 
 def state_of(U, U_s, U_node):
-    """r and q out of the seven components (r, q)."""
-    q, q_s = _last(U), _last(U_s)
-    return State(_first(U_s), rotation_matrix(q), curvature(q, q_s) / ufl.dot(q, q), q, q_s, _last(U_node))
+    """The motion of the seven components (r, q)."""
+    return motion_of(_first(U_s), _last(U), _last(U_s), _last(U_node))
+
+
+def motion_of(r_s, q, q_s, q_node):
+    """The motion of r and q."""
+    return State(r_s, rotation_matrix(q), curvature(q, q_s) / ufl.dot(q, q), q, q_s, q_node)
 
 
 def _first(w):
