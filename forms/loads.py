@@ -1,8 +1,8 @@
 """The virtual work of every load: one function a kind, work per unit of the load factor, the same on every rung.
 
 The vectors come first, then the test functions and R, the rotation of the section from its reference: a material
-vector is given by its inertial components at rest, and R turns it. Where the contact force is known from statics there is
-no virtual displacement: phi_r is zero, and so is the work of a dead force.
+vector is given by its inertial components at rest, and R turns it. Where the contact force is known from statics there
+is no virtual displacement: phi_r is zero, and so is the work of a dead force.
 A point load is an integral over cells with one quadrature point on each cell end (`Points`): its coefficient is zero
 everywhere but at the loaded end of one cell, so that it counts once, in parallel and at branching points too.
 """

@@ -18,7 +18,7 @@ from cosserat_fenicsx.forms.rotation import (
     vector_part,
 )
 
-#: The `equilibrium.Motion` of r and q, and q itself. `q_node` is q by another name, for rules of its own (compat.alias).
+#: The `equilibrium.Motion` of r and q, and q itself. `q_node` is q by another name for other rules (compat.alias).
 State = namedtuple("State", "r_s R curvature q q_s q_node")
 #: Virtual displacement phi_r, virtual rotation phi, test function phi_qa of the constraint, and the derivatives.
 Tests = namedtuple("Tests", "phi_r phi phi_qa phi_r_s phi_s")
