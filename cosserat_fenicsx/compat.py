@@ -142,6 +142,11 @@ def alias(function):
     return fem.Function(function.function_space, function.x)
 
 
+def kernel(form):
+    """dolfinx's C++ object of a compiled form."""
+    return getattr(form, "_cpp_object", form)
+
+
 def element_nodes(space):
     """Reference coordinates in [0, 1] of the nodes of a blocked Lagrange space, in the order of its cell dofs."""
     points = space.element.interpolation_points

@@ -33,3 +33,18 @@ def eccentric_force(F, arm, test, R):
 def line_force(f, test, R):
     """Dead force f (inertial) per unit of reference arc length."""
     return ufl.dot(f, test.phi_r)
+
+
+def line_moment(mu, test, R):
+    """Dead moment mu (inertial) per unit of reference arc length."""
+    return ufl.dot(mu, test.phi)
+
+
+def follower_force(F, test, R):
+    """Force that turns with the section; F is inertial, at rest."""
+    return ufl.dot(R * F, test.phi_r)
+
+
+def follower_moment(M, test, R):
+    """Moment that turns with the section; M is inertial, at rest."""
+    return ufl.dot(R * M, test.phi)

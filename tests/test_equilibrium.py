@@ -111,13 +111,17 @@ def test_second_variation_is_the_change_of_the_balance(seed):
 def test_loads_that_turn():
     p = Point(4)
     F, arm = VECTOR([0.3, -0.2, 0.9]), VECTOR([0.4, 0.1, -0.6])
-    for work in (partial(loads.eccentric_force, F, arm), partial(loads.force, F), partial(loads.moment, F)):
+    dead = (loads.force, loads.moment, loads.line_force, loads.line_moment)
+    kinds = [partial(kind, F) for kind in (*dead, loads.follower_force, loads.follower_moment)]
+    for work in (*kinds, partial(loads.eccentric_force, F, arm)):
         expected = central(lambda h, work=work: value(work(p.test, p.motion(h).R)))
         found = value(equilibrium.load_variation(work, p.test, p.motion().R, p.direction.phi))
         np.testing.assert_allclose(found, expected, rtol=1e-8, atol=1e-10)
     turn = quaternion_matrix(p.q)
     expected = np.cross(turn @ value(arm), value(F)) @ value(p.test.phi) + value(F) @ value(p.test.phi_r)
     np.testing.assert_allclose(value(loads.eccentric_force(F, arm, p.test, p.motion().R)), expected, rtol=1e-13)
+    for kind, phi in ((loads.follower_force, p.test.phi_r), (loads.follower_moment, p.test.phi)):
+        np.testing.assert_allclose(value(kind(F, p.test, p.motion().R)), turn @ value(F) @ value(phi), rtol=1e-13)
 
 
 class PlanePoint:
