@@ -142,6 +142,11 @@ def alias(function):
     return fem.Function(function.function_space, function.x)
 
 
+def kernel(form):
+    """dolfinx's C++ object of a compiled form."""
+    return getattr(form, "_cpp_object", form)
+
+
 def element_nodes(space):
     """Reference coordinates in [0, 1] of the nodes of a blocked Lagrange space, in the order of its cell dofs."""
     points = space.element.interpolation_points
@@ -154,20 +159,6 @@ def cell_nodes(space):
     if not hasattr(cells, "array"):
         return cells
     return cells.array.reshape(cells.num_nodes, space.dofmap.dof_layout.num_dofs)
-
-
-def assemble_matrix(A, form):
-    """Add a bilinear form to a PETSc matrix by its own local-to-global map; unknowns it maps to -1 are left out."""
-    kernel = getattr(form, "_cpp_object", form)
-    constants, coefficients = dolfinx.cpp.fem.pack_constants(kernel), dolfinx.cpp.fem.pack_coefficients(kernel)
-    dolfinx.cpp.fem.petsc.assemble_matrix(A, kernel, constants, coefficients, [])
-
-
-def assemble_vector(array, form):
-    """Add a linear form to an array of local numbers, ghosts too."""
-    kernel = getattr(form, "_cpp_object", form)
-    constants, coefficients = dolfinx.cpp.fem.pack_constants(kernel), dolfinx.cpp.fem.pack_coefficients(kernel)
-    dolfinx.cpp.fem.assemble_vector(array, kernel, constants, coefficients)
 
 
 def version():

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from cosserat_fenicsx import compat
+from cosserat_fenicsx.packed import Packed
 from cosserat_fenicsx.tie_rows import TieRows
 
 
@@ -27,6 +27,9 @@ class Problem:
         self.A = numbering.matrix(model.cell_dofs, tied[tied >= 0])
         self.x, self.b, self._dead = (numbering.vector() for _ in range(3))
         self._local = np.zeros(len(numbering.rows))
+        moving = (model.state, *model.carried)
+        self._residual, self._tangent = Packed(model.forms.residual, moving), Packed(model.forms.tangent, moving)
+        self._loads = None if model.forms.dead is None else Packed(model.forms.dead, ())
         self._state = model.state.x.array
         self._live = [function.x.array for function in model.carried]
         self.load_factor = self.load_norm = 0.0
@@ -35,9 +38,12 @@ class Problem:
         """Take the numbers of a scene; the state becomes its reference configuration."""
         model = self.model
         model.load(scene, layout)
+        self._residual.refresh()
+        self._tangent.refresh()
         self._dead.set(0.0)
-        if model.forms.dead is not None:
-            self._assemble(model.forms.dead, self._dead)
+        if self._loads:
+            self._loads.refresh()
+            self._assemble(self._loads, self._dead)
         self.load_norm = self._dead.norm()
         self.set_load_factor(0.0)
         self.numbering.from_local(self._state, self.x)
@@ -50,7 +56,7 @@ class Problem:
 
     def _assemble(self, form, vector):
         self._local[:] = 0.0
-        compat.assemble_vector(self._local, form)
+        form.add_to_vector(self._local)
         self.numbering.add_up(self._local, vector)
 
     def set_state(self, x):
@@ -73,7 +79,7 @@ class Problem:
     def function(self, snes, x, b):
         """Residual at x for SNES."""
         self.set_state(x)
-        self._assemble(self.model.forms.residual, b)
+        self._assemble(self._residual, b)
         b.axpy(-self.load_factor, self._dead)
         if self.ties:
             self.ties.add_residual(b, self.load_factor)
@@ -81,7 +87,7 @@ class Problem:
     def jacobian(self, snes, x, A, P):
         """Tangent at the state that `function` was last called with."""
         P.zeroEntries()
-        compat.assemble_matrix(P, self.model.forms.tangent)
+        self._tangent.add_to_matrix(P)
         if self.ties:
             self.ties.add_tangent(P, self.load_factor)
         P.assemble()

@@ -7,7 +7,8 @@ conservative and makes the tangent unsymmetric; its symmetric part in the rotati
 import numpy as np
 from petsc4py import PETSc
 
-from cosserat_fenicsx import compat, linear
+from cosserat_fenicsx import linear
+from cosserat_fenicsx.packed import Packed
 
 
 class NegativeModes:
@@ -23,14 +24,19 @@ class NegativeModes:
         self._tied = self.model.rows_of_tied(numbering) if problem.ties else np.empty((0, 6), dtype=np.int64)
         self.K = numbering.matrix(self.model.variation_cell_dofs, self._tied[self._tied >= 0])
         self.K.setOption(PETSc.Mat.Option.SYMMETRIC, True)
+        self._form = Packed(self.model.forms.second_variation, (self.model.state, *self.model.carried))
         self.pc = PETSc.PC().create(self.model.comm)
         linear.factor_second_variation(self.pc, self.K)
+
+    def load(self):
+        """Take the numbers of the scene that the model was loaded with."""
+        self._form.refresh()
 
     def assemble(self):
         """The second variation at the problem's state and load factor, in K."""
         problem = self.problem
         self.K.zeroEntries()
-        compat.assemble_matrix(self.K, self.model.forms.second_variation)
+        self._form.add_to_matrix(self.K)
         if problem.ties:
             problem.ties.add_second_variation(self.K, self._tied, problem.load_factor)
         self.K.assemble()

@@ -35,12 +35,6 @@ def curvature(q, q_s):
     return 2 * conjugate_product(q, q_s)
 
 
-def turned_by(theta, q):
-    """The change (1/2) theta q of q under a small inertial rotation theta."""
-    w = (q[0] * theta + ufl.cross(theta, vector_part(q))) / 2
-    return ufl.as_vector([-ufl.dot(theta, vector_part(q)) / 2, w[0], w[1], w[2]])
-
-
 def small_rotation(dq, q):
     """The inertial rotation 2 vec(dq conj(q))/|q|^2 that a change dq of q amounts to."""
     v, dv = vector_part(q), vector_part(dq)

@@ -112,6 +112,7 @@ def test_second_variation_counts_what_an_eigensolver_counts():
     problem = Problem(model)
     stability = NegativeModes(problem)
     problem.load(scene, layout)
+    stability.load()
     from cosserat_fenicsx.snes import Newton
 
     newton = Newton(problem)

@@ -5,6 +5,7 @@ place, other forms share them, and a form signed later would miss the code cache
 """
 
 from dataclasses import dataclass
+from functools import partial
 
 import basix
 import numpy as np
@@ -12,7 +13,9 @@ import ufl
 from dolfinx import fem
 
 from cosserat_fenicsx import compat
+from cosserat_fenicsx.forms import equilibrium
 from cosserat_fenicsx.forms import spatial as eq
+from cosserat_fenicsx.forms.rotation import rotation_matrix
 
 
 @dataclass(frozen=True)
@@ -65,7 +68,7 @@ def compile_forms(model, rotations, carried_n):
         return w.dx(0)  # the mesh is the line of arc length
 
     R_R = ufl.as_matrix([[data.R_R[3 * i + j] for j in range(3)] for i in range(3)])
-    section = eq.Section(data.K, data.K_inv, data.J, R_R, data.v_R)
+    section = equilibrium.Section(data.K, data.K_inv, data.J, R_R, data.v_R)
     state = eq.state_of(U, along(U), U_node)
     phi, trial = ufl.TestFunction(model.space), ufl.TrialFunction(model.space)
     test = load_test = eq.tests_of(phi, along(phi))
@@ -74,7 +77,7 @@ def compile_forms(model, rotations, carried_n):
         names = a.coefficients() if isinstance(a, ufl.Form) else ufl.algorithms.extract_coefficients(a)
         return sum(ufl.derivative(a, u, trial) for u in (U, U_node) if u in names)
 
-    n, m = eq.contact_force(state, section), eq.contact_moment(state, section)
+    n, m = equilibrium.contact_force(state, section), equilibrium.contact_moment(state, section)
     advance = None
     if variant == "field":
         n = ufl.as_vector([U[i] for i in (7, 8, 9)])
@@ -91,15 +94,16 @@ def compile_forms(model, rotations, carried_n):
         n = carried_n
         tangent = eq.carried_force_tangent(n, state, section, test, ds, ds_node, derivative)
         state_before = eq.state_of(before, along(before), before)
-        advance = eq.carried_force_update(n, state_before, section, lambda a: ufl.derivative(a, before, step))
+        advance = equilibrium.carried_force_update(n, state_before, section, lambda a: ufl.derivative(a, before, step))
     else:
         tangent = derivative(internal)
 
     # Dead loads are a vector assembled once; live ones depend on q and enter residual and tangent.
+    R_node = rotation_matrix(state.q_node)
     dead_terms, live_terms = [], []
     for work, place, vectors in model.terms:
         integral = at_points if place == "point" else ds
-        term = integral(work(*vectors, load_test, state.q_node))
+        term = integral(work(*vectors, load_test, R_node))
         if {U, U_node} & set(term.coefficients()):
             live_terms.append((term, (work, vectors, integral)))
         else:
@@ -111,24 +115,12 @@ def compile_forms(model, rotations, carried_n):
 
     # The second variation in (r, theta) never leaves |q| = 1.
     psi, w = ufl.TestFunction(rotations), ufl.TrialFunction(rotations)
-    rigid = eq.rotation_tests_of(psi, along(psi))
-    direction = [*eq.stability_direction(w, ufl.as_vector([w[3], w[4], w[5]]), state.q)]
-    direction = ufl.as_vector(direction + [0] * (U.ufl_shape[0] - 7))
-
-    def variation(a):
-        change = derivative(a)
-        if change == 0:  # no motion in it, such as a dead moment tested by a rotation
-            return 0
-        expanded = ufl.algorithms.expand_derivatives(change)
-        return ufl.algorithms.expand_derivatives(ufl.replace(expanded, {trial: direction}))
-
-    if variant in ("condensed", "field"):
-        stiff = section._replace(K=data.K_stiff)
-        second = eq.carried_force_tangent(n, state, stiff, rigid, ds, ds_node, variation)
-    else:
-        second = variation(ds(eq.balance(n, m, state, rigid)))
+    rigid, direction = eq.rotation_tests_of(psi, along(psi)), eq.rotation_tests_of(w, along(w))
+    stiff = section._replace(K=data.K_stiff) if variant in ("condensed", "field") else section
+    second = ds(equilibrium.second_variation(n, state, stiff, rigid, direction))
     for _, (work, vectors, integral) in live_terms:
-        second -= model.load_factor * variation(integral(work(*vectors, rigid, state.q_node)))
+        change = equilibrium.load_variation(partial(work, *vectors), rigid, R_node, direction.phi)
+        second -= model.load_factor * integral(change)
     second = 0.5 * (second + ufl.adjoint(second))
 
     fields = ufl.as_vector([*n, *m, *state.r_s])

@@ -1,0 +1,193 @@
+"""Eq. (1) and its rungs as expressions, point by point at random states: against formulas by hand, finite differences,
+and the planar against the spatial."""
+
+from functools import partial
+
+import numpy as np
+import pytest
+import ufl
+
+from cosserat_fenicsx.forms import determinate, equilibrium, loads, planar, spatial
+
+pytestmark = pytest.mark.serial
+VECTOR = ufl.as_vector
+
+
+def value(expression):
+    """The number, vector or matrix of an expression without coefficients."""
+    shape = expression.ufl_shape
+    return np.array([float(expression[i](())) for i in np.ndindex(shape)]).reshape(shape) if shape else expression(())
+
+
+def quaternion_matrix(q):
+    w, v = q[0], q[1:]
+    skew = np.array([[0, -v[2], v[1]], [v[2], 0, -v[0]], [-v[1], v[0], 0]])
+    return np.eye(3) + 2 * (w * skew + skew @ skew) / (q @ q)
+
+
+def turned(q, theta):
+    """q after a rotation by the inertial rotation vector theta."""
+    angle = np.linalg.norm(theta)
+    w, v = np.cos(angle / 2), np.sin(angle / 2) * theta / angle
+    return np.array([w * q[0] - v @ q[1:], *(w * q[1:] + q[0] * v + np.cross(v, q[1:]))])
+
+
+class Point:
+    """A point of a rod in space at a random state, in a random direction, tested by random vectors."""
+
+    def __init__(self, seed):
+        random = np.random.default_rng(seed)
+        self.K, self.J = random.uniform(1, 3, (2, 3))
+        R_R = quaternion_matrix(random.normal(size=4))
+        self.v_R = np.array([0.1, -0.2, 1.1])
+        self.section = equilibrium.Section(
+            *map(VECTOR, (self.K, 1 / self.K, self.J)), ufl.as_matrix(R_R), VECTOR(self.v_R)
+        )
+        self.R_R = R_R
+        self.r_s, self.q, self.q_s = random.normal(size=3), random.normal(size=4), random.normal(size=4)
+        self.q /= np.linalg.norm(self.q)
+        self.q_s -= (self.q_s @ self.q) * self.q
+        self.test = spatial.Tests(*map(VECTOR, random.normal(size=(2, 3))), 0, *map(VECTOR, random.normal(size=(2, 3))))
+        self.d = random.normal(size=(3, 3))  # dr', the rotation, its derivative
+        self.direction = spatial.Tests(VECTOR([0] * 3), VECTOR(self.d[1]), 0, VECTOR(self.d[0]), VECTOR(self.d[2]))
+
+    def motion(self, h=0.0):
+        """The motion at h along the direction."""
+        dr_s, theta, theta_s = self.d
+        q, q_s = self.q, self.q_s
+        if h:
+            q = turned(self.q, h * theta)
+            # (exp(h theta/2) q)' to first order in h
+            lift = np.array([-theta_s @ self.q[1:], *(self.q[0] * theta_s + np.cross(theta_s, self.q[1:]))]) / 2
+            q_s = turned(self.q_s, h * theta) + h * lift
+        return spatial.motion_of(VECTOR(self.r_s + h * dr_s), VECTOR(q), VECTOR(q_s), VECTOR(q))
+
+
+def central(f, h=1e-5):
+    return (f(h) - f(-h)) / (2 * h)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_laws_and_balance_are_eqs_1_to_5(seed):
+    p = Point(seed)
+    motion = p.motion()
+    R = quaternion_matrix(p.q)
+    T = R @ p.R_R
+    q, q_s = p.q, p.q_s
+    u = p.R_R.T @ (2 * (q[0] * q_s[1:] - q_s[0] * q[1:] - np.cross(q[1:], q_s[1:])))
+    n, m = T @ (p.K * (T.T @ p.r_s - p.v_R)), T @ (p.J * u)
+    np.testing.assert_allclose(value(motion.R), R, atol=1e-14)
+    np.testing.assert_allclose(value(equilibrium.contact_force(motion, p.section)), n, rtol=1e-13)
+    np.testing.assert_allclose(value(equilibrium.contact_moment(motion, p.section)), m, rtol=1e-13)
+    phi, phi_r_s, phi_s = (value(a) for a in (p.test.phi, p.test.phi_r_s, p.test.phi_s))
+    expected = n @ phi_r_s + m @ phi_s - np.cross(p.r_s, n) @ phi
+    found = equilibrium.displacement(motion, p.section, p.test, lambda a: a)
+    np.testing.assert_allclose(value(found), expected, rtol=1e-12)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_the_law_read_backwards(seed):
+    p = Point(seed)
+    n = equilibrium.contact_force(p.motion(), p.section)
+    np.testing.assert_allclose(value(equilibrium.tangent_of_force(n, p.motion(), p.section)), p.r_s, rtol=1e-13)
+    np.testing.assert_allclose(value(equilibrium.compatibility(n, p.motion(), p.section)), 0, atol=1e-13)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_second_variation_is_the_change_of_the_balance(seed):
+    """Where n agrees with the motion; with n known, that of the moments."""
+    p = Point(seed)
+    expected = central(lambda h: value(equilibrium.displacement(p.motion(h), p.section, p.test, lambda a: a)))
+    n = equilibrium.contact_force(p.motion(), p.section)
+    found = value(equilibrium.second_variation(n, p.motion(), p.section, p.test, p.direction))
+    np.testing.assert_allclose(found, expected, rtol=1e-8)
+    known = VECTOR([0.3, -0.7, 0.5])
+    test = determinate.tests_of(p.test.phi, p.test.phi_s)
+    expected = central(lambda h: value(determinate.moments(known, p.motion(h), p.section, test, lambda a: a)))
+    found = value(determinate.second_variation(known, p.motion(), p.section, test, p.direction))
+    np.testing.assert_allclose(found, expected, rtol=1e-8)
+
+
+def test_loads_that_turn():
+    p = Point(4)
+    F, arm = VECTOR([0.3, -0.2, 0.9]), VECTOR([0.4, 0.1, -0.6])
+    dead = (loads.force, loads.moment, loads.line_force, loads.line_moment)
+    kinds = [partial(kind, F) for kind in (*dead, loads.follower_force, loads.follower_moment)]
+    for work in (*kinds, partial(loads.eccentric_force, F, arm)):
+        expected = central(lambda h, work=work: value(work(p.test, p.motion(h).R)))
+        found = value(equilibrium.load_variation(work, p.test, p.motion().R, p.direction.phi))
+        np.testing.assert_allclose(found, expected, rtol=1e-8, atol=1e-10)
+    turn = quaternion_matrix(p.q)
+    expected = np.cross(turn @ value(arm), value(F)) @ value(p.test.phi) + value(F) @ value(p.test.phi_r)
+    np.testing.assert_allclose(value(loads.eccentric_force(F, arm, p.test, p.motion().R)), expected, rtol=1e-13)
+    for kind, phi in ((loads.follower_force, p.test.phi_r), (loads.follower_moment, p.test.phi)):
+        np.testing.assert_allclose(value(kind(F, p.test, p.motion().R)), turn @ value(F) @ value(phi), rtol=1e-13)
+
+
+class PlanePoint:
+    """A point of a rod in a plane, as the planar rung and as the spatial one see it."""
+
+    def __init__(self, seed):
+        random = np.random.default_rng(seed)
+        self.K, self.J, angle = random.uniform(1, 3, 3), random.uniform(1, 3, 3), random.uniform(0, 6)
+        self.t = np.array([np.cos(angle), np.sin(angle)])
+        self.v_R = np.array([0.05, 1.1])
+        self.section = planar.section_of(*map(VECTOR, (self.K, 1 / self.K, self.J, self.t, self.v_R)))
+        self.r_s, self.theta, self.theta_s = random.normal(size=2), random.normal(), random.normal()
+        self.motion = planar.motion_of(VECTOR(self.r_s), ufl.as_ufl(self.theta), self.theta_s)
+        c, s = np.cos(self.theta / 2), np.sin(self.theta / 2)
+        q, q_s = VECTOR([c, 0, 0, s]), VECTOR([-s * self.theta_s / 2, 0, 0, c * self.theta_s / 2])
+        self.in_space = spatial.motion_of(VECTOR([*self.r_s, 0]), q, q_s, q)
+        (a, a_s), (b, b_s) = random.normal(size=(2, 2, 3))
+        self.phi, self.phi_s = a, a_s
+        self.test = planar.tests_of(VECTOR(a), VECTOR(a_s))
+        self.sideways = planar.sideways_tests_of(VECTOR(b), VECTOR(b_s))
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_planar_balance_by_hand(seed):
+    """Reissner's plane rod: n = GA gamma a + EA epsilon t, m = EI theta', moments n_2 r_1' - n_1 r_2'."""
+    p = PlanePoint(seed)
+    c, s = np.cos(p.theta), np.sin(p.theta)
+    t = np.array([[c, -s], [s, c]]) @ p.t
+    a = np.array([-t[1], t[0]])
+    n = p.K[0] * (a @ p.r_s - p.v_R[0]) * a + p.K[2] * (t @ p.r_s - p.v_R[1]) * t
+    m = p.J[1] * p.theta_s
+    expected = n @ p.phi_s[:2] + m * p.phi_s[2] - (p.r_s[0] * n[1] - p.r_s[1] * n[0]) * p.phi[2]
+    found = value(equilibrium.displacement(p.motion, p.section, p.test, lambda a: a))
+    np.testing.assert_allclose(found, expected, rtol=1e-12)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_planar_is_spatial_in_a_plane(seed):
+    p = PlanePoint(seed)
+    np.testing.assert_allclose(value(p.motion.R), value(p.in_space.R), atol=1e-14)
+    np.testing.assert_allclose(value(p.motion.curvature), value(p.in_space.curvature), atol=1e-14)
+    n, phi_n = VECTOR([0.4, -0.8, 0]), VECTOR([0.7, 0.2, 0])
+    turn = determinate.tests_of(p.test.phi, p.test.phi_s)
+    for form in (
+        lambda motion: equilibrium.mixed(n, motion, p.section, p.test, phi_n, lambda a: a),
+        lambda motion: equilibrium.second_variation(n, motion, p.section, p.test, p.test),
+        lambda motion: equilibrium.second_variation(n, motion, p.section, p.sideways, p.sideways),
+        lambda motion: determinate.second_variation(n, motion, p.section, p.sideways, p.sideways),
+        lambda motion: determinate.moments(n, motion, p.section, turn, lambda a: a),
+    ):
+        np.testing.assert_allclose(value(form(p.motion)), value(form(p.in_space)), rtol=1e-12)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_what_leaves_the_plane_decouples_exactly(seed):
+    p = PlanePoint(seed)
+    n = VECTOR([0.4, -0.8, 0])
+    for form in (equilibrium.second_variation, determinate.second_variation):
+        assert value(form(n, p.in_space, p.section, p.test, p.sideways)) == 0
+        assert value(form(n, p.in_space, p.section, p.sideways, p.test)) == 0
+        assert value(form(n, p.in_space, p.section, p.sideways, p.sideways)) != 0
+
+
+def test_an_axis_that_is_not_principal_couples():
+    p = PlanePoint(0)
+    c, s = np.cos(0.3), np.sin(0.3)
+    askew = p.section._replace(R_R=p.section.R_R * ufl.as_matrix([[c, -s, 0], [s, c, 0], [0, 0, 1]]))
+    n = VECTOR([0.4, -0.8, 0])
+    assert abs(value(equilibrium.second_variation(n, p.in_space, askew, p.test, p.sideways))) > 1e-3
