@@ -68,7 +68,7 @@ class Path:
             formulation=formulation,
             degree=model.shape.degree,
             unknowns=model.unknowns,
-            why=why,
+            why=[*why, *model.scene.cautions],
         )
 
     def append(self, record):

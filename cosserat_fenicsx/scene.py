@@ -107,6 +107,18 @@ class Scene:
         named += [end for joint in self.joints for end in (joint.first, joint.second)]
         return [station for station in named if station.rod is rod]
 
+    @property
+    def cautions(self):
+        """What a user of any answer should know, in sentences."""
+        following = [load for load in self.loads if getattr(load, "follows", False)]
+        if not following:
+            return []
+        kinds = " and ".join(dict.fromkeys(type(load).__name__ for load in following))
+        return [
+            f"{kinds}: a follower load has no potential, so a count of negative modes cannot see flutter; a column may sway "
+            "itself to pieces where statics calls it stable (Beck's column at 20.05 EI/L^2), and only dynamics can tell"
+        ]
+
     def rod(self, name):
         """The rod of that name."""
         return next(rod for rod in self.rods if rod.name == name)

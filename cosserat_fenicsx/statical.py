@@ -117,8 +117,8 @@ def _words(motion, start, size):
     if np.linalg.norm(turn) <= 1e-6:
         return f"move along ({_numbers(moved / np.abs(moved).max())})"
     point = start + size * np.cross(turn, moved) / (turn @ turn)
-    return f"turn about the axis ({_numbers(turn / np.abs(turn).max())}) through ({_numbers(point)}) m"
+    return f"turn about the axis ({_numbers(turn / np.abs(turn).max())}) through ({_numbers(point, size)}) m"
 
 
-def _numbers(x):
-    return ", ".join(f"{value:.4g}" for value in np.where(np.abs(x) < 1e-9 * np.abs(x).max(), 0.0, x))
+def _numbers(x, size=1.0):
+    return ", ".join(f"{value:.4g}" for value in np.where(np.abs(x) < 1e-9 * size, 0.0, x))

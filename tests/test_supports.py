@@ -1,0 +1,156 @@
+"""Supports and loads by duality: what a support does, its reactions as loads do too, and the other way round."""
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+from scipy.spatial.transform import Rotation
+
+import cosserat_fenicsx as cf
+
+TURN = Rotation.from_rotvec([0.7, -1.1, 0.4])
+SECTION = cf.Stiffness(shear=(3e3, 5e3), axial=8e3, bending=(1.0, 2.5), torsion=0.7, mass=1.0)
+
+
+def turned(x):
+    return TURN.apply(np.asarray(x, dtype=float))
+
+
+def bow():
+    """A bent rod of length 1 that lies askew in space."""
+    q = TURN.as_quat()
+    return cf.Rod(cf.UniformCurvature(1.0, (0.4, 0.9, 0.5), start=(3.0, 1.0, -2.0), frame=(q[3], *q[:3])), SECTION)
+
+
+def solve(rod, supports, loads, **settings):
+    scene = cf.Scene([rod], [cf.Clamp(rod.start), *supports], loads)
+    return cf.solve(scene, [0.4, 1.0], elements=6, **settings)
+
+
+def same_shape(rod, a, b, atol):
+    np.testing.assert_allclose(a.centreline(), b.centreline(), atol=atol)
+    for name in ("force", "moment"):
+        one, other = (path.fields(-1, rod)[name] for path in (a, b))
+        np.testing.assert_allclose(one, other, atol=1e3 * atol)
+
+
+LOADS = (turned((0.5, 0.8, 2.0)), turned((0.3, -0.2, 0.1)))
+
+
+def across(rod):
+    return cf.Force(rod.at(0.5), turned((1.5, -1.0, 0.5)))
+
+
+def test_a_prescribed_motion_is_what_its_reaction_would_do():
+    """A tip that is moved and turned as a force and a moment move and turn it feels that force and that moment."""
+    rod = bow()
+    force, moment = LOADS
+    pushed = solve(rod, [], [cf.Force(rod.end, force), cf.Moment(rod.end, moment), across(rod)])
+    q = pushed.rotation(rod.end)[-1]
+    turn = 2 * np.arctan2(np.linalg.norm(q[1:]), q[0]) * q[1:] / np.linalg.norm(q[1:])
+    u = pushed.displacement(rod.end)[-1]
+    moved = solve(rod, [cf.Prescribed(rod.end, displacement=u, rotation=turn)], [across(rod)])
+    np.testing.assert_allclose(moved.displacement(rod.end), [0.4 * u, u], atol=1e-12)
+    np.testing.assert_allclose(moved.force(rod.end)[-1], force, atol=1e-7)
+    np.testing.assert_allclose(moved.moment(rod.end)[-1], moment, atol=1e-8)
+    same_shape(rod, pushed, moved, 1e-10)
+    free_to_turn = solve(rod, [cf.Prescribed(rod.end, displacement=u)], [across(rod), cf.Moment(rod.end, moment)])
+    same_shape(rod, pushed, free_to_turn, 1e-10)
+
+
+@pytest.mark.parametrize("kind", ["pin", "hinge", "roller"])
+def test_reactions_replace_the_support(kind):
+    rod = bow()
+    axis = turned((0.2, 0.9, 0.3))
+    support = {"pin": cf.Pin(rod.end), "hinge": cf.Hinge(rod.end, axis), "roller": cf.Roller(rod.end, axis)}[kind]
+    # small enough for the reaction to stay below the buckling load of the rod without the support
+    loads = [cf.Force(rod.at(0.5), turned((0.9, -0.6, 0.3))), cf.LineForce(rod, turned((0.24, 0.6, 0.0)))]
+    held = solve(rod, [support], loads)
+    u, q = held.displacement(rod.end)[-1], held.rotation(rod.end)[-1]
+    force, moment = held.force(rod.end)[-1], held.moment(rod.end)[-1]
+    axis = axis / np.linalg.norm(axis)
+    assert np.linalg.norm(held.displacement(rod.at(0.5))[-1]) > 5e-4
+    if kind == "roller":
+        assert abs(u @ axis) < 1e-13 and np.linalg.norm(u) > 5e-3
+        np.testing.assert_allclose(np.cross(force, axis), 0, atol=1e-8)
+    else:
+        np.testing.assert_allclose(u, 0, atol=1e-13)
+    if kind == "hinge":
+        np.testing.assert_allclose(np.cross(q[1:], axis), 0, atol=1e-13)
+        assert np.linalg.norm(q[1:]) > 5e-4 and np.linalg.norm(moment) > 1e-3
+        assert abs(moment @ axis) < 1e-9
+    else:
+        np.testing.assert_allclose(moment, 0, atol=1e-9)
+    free = solve(rod, [], [*loads, cf.Force(rod.end, force), cf.Moment(rod.end, moment)])
+    same_shape(rod, held, free, 1e-9)
+
+
+def test_a_support_inside_the_rod():
+    rod = bow()
+    path = solve(rod, [cf.Pin(rod.at(0.37))], [cf.Force(rod.end, 0.3 * LOADS[0])])
+    np.testing.assert_allclose(path.displacement(rod.at(0.37)), 0, atol=1e-13)
+    np.testing.assert_allclose(path.force(rod.at(0.4))[-1], 0.3 * LOADS[0], atol=1e-8)
+
+
+def test_infinite_stiffness_between_supports():
+    rod = cf.Rod(bow().curve, cf.Stiffness((np.inf, np.inf), np.inf, (1.0, 2.5), 0.7))
+    path = solve(rod, [cf.Pin(rod.end)], [across(rod)])
+    line = path.sample(-1, rod, np.linspace(0, 1, 2001))[0]
+    assert np.linalg.norm(np.diff(line, axis=0), axis=1).sum() == pytest.approx(1.0, abs=1e-6)
+    assert path.stable.all()
+
+
+def test_follower_loads_are_dead_loads_where_they_end_up():
+    rod = bow()
+    force, moment = (0.9, -0.4, 0.6), (0.2, 0.3, -0.5)
+    follower = solve(rod, [], [cf.FollowerForce(rod.end, force), cf.FollowerMoment(rod.at(0.5), moment)])
+    turn = {s: follower.sample(-1, rod, np.array([s]))[1][0] for s in (0.5, 1.0)}
+    dead = solve(rod, [], [cf.Force(rod.end, turn[1.0] @ force), cf.Moment(rod.at(0.5), turn[0.5] @ moment)])
+    same_shape(rod, follower, dead, 1e-9)
+    assert any("follower" in sentence and "flutter" in sentence for sentence in follower.why)
+    assert not any("flutter" in sentence for sentence in dead.why)
+
+
+def test_line_moment_bends_without_force():
+    """m' = -mu, n = 0: the angle is mu (L s - s^2/2)/EI."""
+    rod = cf.Rod(cf.Line((0, 0, 0), (0, 0, 1.0)), SECTION)
+    path = solve(rod, [], [cf.LineMoment(rod, (0, 4.0, 0))])
+    x, z = (quad(lambda s, f=f: f(4.0 * (s - s * s / 2) / 2.5), 0, 1, epsabs=1e-14)[0] for f in (np.sin, np.cos))
+    np.testing.assert_allclose(path.position(rod.end)[-1], [x, 0, z], atol=1e-11)
+    np.testing.assert_allclose(path.moment(rod.at(0.3))[-1], [0, 4.0 * 0.7, 0], atol=1e-9)
+
+
+def test_weight_is_a_line_force_on_every_rod():
+    rods = [bow(), cf.Rod(cf.Line((0, 0, 0), (1.0, 0, 0)), SECTION)]
+    clamps = [cf.Clamp(rod.start) for rod in rods]
+    heavy = cf.solve(cf.Scene(rods, clamps, [cf.Weight((0, 1.0, -3.0))]), [1.0], elements=5)
+    lined = cf.solve(cf.Scene(rods, clamps, [cf.LineForce(rod, (0, 1.0, -3.0)) for rod in rods]), [1.0], elements=5)
+    one = cf.solve(cf.Scene(rods, clamps, [cf.LineForce(rods[1], (0, 1.0, -3.0))]), [1.0], elements=5)
+    for rod in rods:
+        np.testing.assert_allclose(heavy.centreline(rod=rod), lined.centreline(rod=rod), atol=1e-12)
+    np.testing.assert_allclose(one.centreline(rod=rods[1]), lined.centreline(rod=rods[1]), atol=1e-12)
+    assert np.abs(one.displacement(rods[0].end)).max() < 1e-13
+
+
+def test_refusals():
+    rod, other = bow(), cf.Rod(cf.Line((0, 0, 0), (1, 0, 0)), SECTION, name="other")
+    cases = {
+        "turn about the axis": lambda: cf.Scene([other], [cf.Pin(other.start), cf.Pin(other.end)]),
+        "rod 'other' can move along": lambda: cf.Scene([other], [cf.Roller(other.start, (1, 0, 0))]),
+        "supports[0] (Clamp at other.start) and supports[1] (Prescribed at other.start) hold the same motion twice":
+            lambda: cf.Scene([other], [cf.Clamp(other.start), cf.Prescribed(other.start, displacement=(1, 0, 0))]),
+        "hold the same motion twice, or contradict each other":
+            lambda: cf.Scene([other], [cf.Clamp(other.start), cf.Roller(other.end, (0, 0, 1)), cf.Pin(other.end)]),
+        "Hinge.axis = (0, 0, 0): expected a direction": lambda: cf.Hinge(rod.end, (0, 0, 0)),
+        "Roller.normal": lambda: cf.Roller(rod.end, (np.nan, 0, 0)),
+        "Prescribed.displacement = None": lambda: cf.Prescribed(rod.end),
+        "Prescribed.rotation": lambda: cf.Prescribed(rod.end, rotation=(1, 2)),
+        "FollowerForce.force": lambda: cf.FollowerForce(rod.end, "up"),
+        "LineForce.rod": lambda: cf.LineForce(rod.end, (0, 0, 1)),
+        "loads[0] acts at": lambda: cf.Scene([other], [cf.Clamp(other.start)], [cf.LineForce(rod, (0, 0, 1))]),
+        "knows clamps and rigid joints alone":
+            lambda: solve(rod, [cf.Pin(rod.end)], [across(rod)], formulation="multiplier"),
+    }  # fmt: skip
+    for words, case in cases.items():
+        with pytest.raises(cf.SceneError) as refusal:
+            case()
+        assert words in str(refusal.value), (words, str(refusal.value))
