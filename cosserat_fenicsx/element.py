@@ -40,11 +40,17 @@ class ElementRule:
         vandermonde = np.vander(support, increasing=True)
         return np.vander(2 * self.nodes - 1, len(support), increasing=True) @ np.linalg.inv(vandermonde)
 
-    def locate_all(self, breaks, x):
-        """Element (n,) and basis functions (n, p + 1) at places x of a rod whose element ends are `breaks`."""
+    def between_gauss(self, x):
+        """(len(x), gauss) polynomials through the Gauss points, at x in [0, 1]."""
+        points, x = 2 * self.gauss - 1, 2 * np.asarray(x) - 1
+        size = len(points)
+        return np.vander(x, size, increasing=True) @ np.linalg.inv(np.vander(points, size, increasing=True))
+
+    def locate_all(self, breaks, x, basis=None):
+        """Element (n,) and basis functions (n, p + 1), or another `basis`, at places x of a rod with element ends `breaks`."""
         cells = np.clip(np.searchsorted(breaks, x, side="left") - 1, 0, len(breaks) - 2)
         local = (x - breaks[cells]) / np.diff(breaks)[cells]
-        return cells, self.basis(np.clip(local, 0.0, 1.0))
+        return cells, (basis or self.basis)(np.clip(local, 0.0, 1.0))
 
     def locate(self, breaks, x):
         """`locate_all` for one place."""

@@ -76,6 +76,22 @@ class Problem:
             live[:] = values
         self.set_state(self.x)
 
+    def begin_at(self, rq, n, multipliers):
+        """Start from a motion and contact force that another mesh found.
+
+        Args:
+            rq: (nodes, 7), n: (elements, points, 3), in the scene's order; multipliers: reactions of added equations.
+        """
+        self.model.set_motion(rq, n)
+        self.numbering.from_local(self._state, self.x)
+        if self.ties:
+            self.ties.put(self.x, multipliers)
+        self.set_state(self.x)
+
+    def multipliers(self):
+        """Reactions of the added equations, on all ranks."""
+        return self.ties.everywhere() if self.ties else np.empty(0)
+
     def function(self, snes, x, b):
         """Residual at x for SNES."""
         self.set_state(x)

@@ -221,31 +221,36 @@ class Path:
     def estimate_error(self, coarse):
         """Estimate this path's error from the same load factors on the mesh of elements twice as long.
 
-        The difference of the positions, at the coarse nodes and between them, over half the gain that was seen from the
-        difference before to this one; not more than 2^p (the order is p + 1 along a rod, 2 p at element ends), and 1
-        where there was none before: an order must be seen before it is counted on. Where hardly anything is displaced
-        (a shaft in torsion), relative to the turning of the sections, or to a billionth of the length. Without a
-        contact force of its own (formulation 'displacement') a slender rod's answer also feels the residual's rounding.
+        The difference of the positions, at the coarse nodes and between them, over a share of the gain in accuracy
+        that one more halving brings (2^(p + 1) between the nodes): half of what was seen from the difference before to this one,
+        not more than 2^p; where there was none before, a quarter of 2^(p + 1), and that only if element ends,
+        whose order is 2 p, are seen to be ahead of what lies between them: an order must be seen before it is counted on.
+        Where hardly anything is displaced (a shaft in torsion), relative to the turning of the sections, or to a
+        billionth of the length. Without a contact force of its own (formulation 'displacement') a slender rod's
+        answer also feels the residual's rounding.
         """
-        difference = np.zeros(len(self))
+        difference, at_ends = np.zeros(len(self)), np.zeros(len(self))
         largest = np.full(len(self), 1e-9 * self.scales.length)
         for i, rod in enumerate(self.scene.rods):
             nodes = coarse.layout.node_s(coarse._rule.nodes)[i]
             x = np.sort(np.concatenate([nodes, (nodes[:-1] + nodes[1:]) / 2]))
-            reference = rod.curve.position(x * rod.length)
+            ends = np.isin(x, coarse.layout.breaks[i])
+            reference, rest = rod.curve.position(x * rod.length), rod.curve.frame(x * rod.length)
             for k in range(len(self)):
                 a, frames = coarse.sample(k, rod, x)
-                b, _ = self.sample(k, rod, x)
-                difference[k] = max(difference[k], np.linalg.norm(a - b, axis=1).max())
-                turned = (
-                    np.linalg.norm(frames - rod.curve.frame(x * rod.length), axis=(1, 2)).max() * _gyration(rod)
-                )
+                off = np.linalg.norm(a - self.sample(k, rod, x)[0], axis=1)
+                difference[k] = max(difference[k], off.max())
+                at_ends[k] = max(at_ends[k], off[ends].max())
+                turned = np.linalg.norm(frames - rest, axis=(1, 2)).max() * _gyration(rod)
                 largest[k] = max(largest[k], np.linalg.norm(a - reference, axis=1).max(), turned)
         self._difference = difference
-        gain = 1.0
-        if coarse._difference is not None:
+        p = self.degree
+        if coarse._difference is None:
+            ahead = difference > 4 * at_ends
+            gain = np.where(ahead, max(1.0, 2.0 ** (p - 1)), 1.0)
+        else:
             seen = coarse._difference / np.maximum(difference, 1e-300)
-            gain = np.clip((seen - 1) / 2, 1, 2**self.degree)
+            gain = np.clip((seen - 1) / 2, 1, 2**p)
         self._error = np.maximum(difference / largest / gain, self._rounding)
 
     def sample(self, k, rod, x):
@@ -267,6 +272,30 @@ class Path:
         q = np.einsum("kj,kjc->kc", weights, record.rq[rows, 3:][nodes])
         q /= np.linalg.norm(q, axis=1, keepdims=True)
         return rod.curve.position(s) + moved * self.scales.length, directors(q) @ rod.curve.frame(s)
+
+    def resampled(self, k, layout):
+        """Point k on another mesh, as something to start from.
+
+        Returns:
+            (r, q) at the nodes (N, 7) and n at the Gauss points (elements, points, 3), dimensionless, inertial.
+        """
+        rule, record = self._rule, self._records[k]
+        motions, forces = [], []
+        for i, rod in enumerate(self.scene.rods):
+            rows, breaks = self._rows(rod)[1], self.layout.breaks[i]
+            x = layout.node_s(rule.nodes)[i]
+            cells, weights = rule.locate_all(breaks, x)
+            nodes = cells[:, None] * self.degree + np.arange(self.degree + 1)
+            moved = np.column_stack([record.rq[rows, :3] - self._rest[rows], record.rq[rows, 3:]])
+            values = np.einsum("kj,kjc->kc", weights, moved[nodes])
+            values[:, :3] += (rod.curve.position(x * rod.length) - self.scene.origin(rod)) / self.scales.length
+            values[:, 3:] /= np.linalg.norm(values[:, 3:], axis=1, keepdims=True)
+            motions.append(values)
+            inside = layout.inside(rule.gauss)[i]
+            cells, weights = rule.locate_all(breaks, inside.ravel(), rule.between_gauss)
+            n = record.gauss_fields[self._cells(i), :, :3][cells]
+            forces.append(np.einsum("kj,kjc->kc", weights, n).reshape(*inside.shape, 3))
+        return np.concatenate(motions), np.concatenate(forces)
 
     # -- files and pictures ------------------------------------------------------------------------------------------
 

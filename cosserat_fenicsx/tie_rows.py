@@ -42,6 +42,17 @@ class TieRows:
             rq[self.rows >= 0] = values[:free]
             self.seen = rq, values[free:].copy()
 
+    def put(self, x, multipliers):
+        """Set the multipliers in a vector."""
+        if self._here:
+            x.setValues(self._multipliers, multipliers)
+        x.assemble()
+
+    def everywhere(self):
+        """The multipliers as last seen, on all ranks."""
+        comm = self.numbering.comm
+        return comm.bcast(self.seen[1] if self._here else None, root=comm.size - 1)
+
     def add_residual(self, b, eta):
         """Add reactions to the rows of the nodes, and the equations in rows of their own."""
         if self._here:

@@ -51,6 +51,8 @@ class SpatialModel:
         if shape.variant == "field":
             force = compat.lagrange(self.mesh, p - 1, 3, discontinuous=True)
             self.space = compat.function_space(self.mesh, compat.mixed(lagrange, force))
+            self._force_nodes = compat.element_nodes(compat.function_space(self.mesh, force))
+            self._force_dofs = compat.cell_nodes(self.space)[:, 7 * (p + 1) :]
         elif shape.variant == "multiplier":
             self.space = compat.function_space(self.mesh, compat.mixed(lagrange, compat.lagrange(self.mesh, 1, 1)))
         self.rotations = compat.function_space(self.mesh, compat.lagrange(self.mesh, p, 6))
@@ -180,6 +182,18 @@ class SpatialModel:
         reference = self.reference[self.tied_slots]
         self.ties = Ties(ties_of(self.scene), nodes, reference, self.scales.length) if nodes else None
         self.tied_reference = np.column_stack([reference, np.tile([1.0, 0, 0, 0], (len(reference), 1))])
+
+    def set_motion(self, rq, n):
+        """Take (r, q) at the nodes (N, 7) and n at the Gauss points (elements, points, 3), in the scene's order."""
+        self.state.x.array[self._rq] = rq[self._slots]
+        for function in self.carried:
+            self.rods.fill(function, n)
+        if self.shape.variant == "field":
+            for reverse in (False, True):
+                cells = np.flatnonzero(self.rods.reversed == reverse)
+                along = self.rule.between_gauss(1 - self._force_nodes if reverse else self._force_nodes)
+                values = np.einsum("jg,cgi->cji", along, n[self.rods.cells[cells]])
+                self.state.x.array[self._force_dofs[cells]] = values.reshape(len(cells), 3 * self.shape.degree)
 
     # -- what solvers and results ask for ----------------------------------------------------------------------------
 
