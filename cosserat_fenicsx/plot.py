@@ -228,16 +228,33 @@ def _prefix(value):
 
 
 def _label(plotter, path, shown, bodies, size):
-    """Load factor, and a word where a point is unstable, beyond the end of the first rod."""
-    rod = path.scene.rods[0]
-    for k in shown:
-        body = bodies[k, rod]
+    """Load factor, and a word where a point is unstable, where the shapes lie farthest apart; none over another."""
+    rods = path.scene.rods
+    spread = [np.ptp([bodies[k, rod].line for k in shown], axis=0).max(axis=1) for rod in rods]
+    rod = max(range(len(rods)), key=lambda i: (round(spread[i].max() / size, 6), -i))
+    place = len(spread[rod]) - 1 - int(np.argmax(spread[rod][::-1]))  # the last of equals: an end, not next to it
+    last = place == len(spread[rod]) - 1
+    placed = []
+    for k in reversed(shown):
+        body = bodies[k, rods[rod]]
+        at = body.line[place] + 0.03 * size * (1 if last else 1.3) * _beyond(body.directors[place, :, 2], last)
+        if any(np.linalg.norm(at - other) < 0.03 * size for other in placed):
+            continue
+        placed.append(at)
         text = f"{path.load_factors[k]:.3g}" + ("" if path.stable[k] else " (unstable)")
         plotter.add_point_labels(
-            [body.line[-1] + 0.03 * size * body.directors[-1, :, 2]], [text], font_size=20, text_color="black", shape=None,
-            show_points=False, always_visible=True, bold=False, justification_horizontal="center",
-            justification_vertical="center",
+            [at], [text], font_size=20, text_color="black", shape=None, show_points=False, always_visible=True, bold=False,
+            justification_horizontal="center", justification_vertical="center",
         )  # fmt: skip
+
+
+def _beyond(tangent, end):
+    """Where a label goes: on along the tangent at an end; beside the rod elsewhere, upwards if that is possible."""
+    if end:
+        return tangent
+    up = np.array([0.0, 0.0, 1.0]) if abs(tangent[2]) < 0.95 else np.array([1.0, 0.0, 0.0])
+    across = up - (up @ tangent) * tangent
+    return across / np.linalg.norm(across)
 
 
 def _bounds(points, size):

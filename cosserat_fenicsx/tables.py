@@ -10,14 +10,14 @@ from cosserat_fenicsx.ranks import on_first
 
 
 def path_table(path):
-    """Text: load factor, motion of the end of the first rod, stability, work and estimated error at every point."""
-    rod = path.scene.rods[0]
-    tip, angle = path.displacement(rod.end), path.rotation_angle(rod.end)
+    """Text: load factor, motion of the station that moves most, stability, work and estimated error at every point."""
+    station = _busiest(path)
+    tip, angle = path.displacement(station), path.rotation_angle(station)
     title = f"{path.scene.title}\n" if path.scene.title else ""
     table = Table(
         title=f"{title}{path.model} model, {path.formulation} formulation, degree {path.degree}, "
         f"{' + '.join(map(str, path.elements))} elements, {path.unknowns} unknowns",
-        caption=f"dx, dy, dz, rotation: of {rod.name}.end. stable: 'no (2)' has two negative modes. iterations: Newton's, since "
+        caption=f"dx, dy, dz, rotation: of {station}. stable: 'no (2)' has two negative modes. iterations: Newton's, since "
         "the row above.\nest. error: of positions, relative to the largest displacement. Loads, times the load factor: "
         f"{', '.join(map(describe, path.scene.loads)) or 'none'}.",
     )
@@ -36,9 +36,17 @@ def path_table(path):
     return as_text(table)
 
 
+def _busiest(path):
+    """The end of a rod, or the station of a load or support, that moves most."""
+    named = [station for rod in path.scene.rods for station in (rod.end, *path.scene.stations(rod))]
+    return max(named, key=lambda station: round(np.linalg.norm(path.displacement(station), axis=1).max(), 12))
+
+
 def describe(item):
     """A support or a load in few words: its kind and its station."""
-    return f"{type(item).__name__}" + (f" at {item.station}" if item.station is not None else "")
+    if item.station is not None:
+        return f"{type(item).__name__} at {item.station}"
+    return f"{type(item).__name__} on {item.rod.name}" if hasattr(item, "rod") else type(item).__name__
 
 
 def stability(negative_modes):

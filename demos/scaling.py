@@ -1,0 +1,93 @@
+"""How processor time and memory of a Newton step grow with the number of unknowns, 1e2 .. 1e6, on the spatial rung.
+
+    python demos/scaling.py             to 1e6 unknowns; writes out/scaling.md
+    python demos/scaling.py --quick     to 1e4
+
+Each size runs in a process of its own: a thick cantilever under a small force across, degree 4, one Newton step (residual,
+tangent, factorisation, solution, update of n) repeated from rest, and one count of negative modes; medians.
+"""
+
+import argparse
+import json
+import resource
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+from eccentric_cantilever import column
+
+from cosserat_fenicsx import compat, statics
+from cosserat_fenicsx.models.rodmesh import Layout
+
+SIZES = (4, 16, 64, 256, 1024, 4096, 16384, 35700)  # elements of degree 4: 28 unknowns each
+QUICK = SIZES[:5]
+_DEGREE = 4
+
+
+def measure(elements):
+    """Unknowns, seconds of a Newton step, seconds of a count of negative modes, largest memory of this process (MB)."""
+    _, scene = column()
+    layout = Layout.of(scene, elements)
+    problem, newton, stability = statics.solvers_of(scene, layout, degree=_DEGREE)
+    newton.allow(1)
+    start, steps, counts = problem.numbers(), [], []
+    for _ in range(max(3, min(100, 20000 // elements))):
+        problem.put(start)
+        problem.set_load_factor(1e-6)
+        began = time.process_time()
+        newton.solve()
+        steps.append(time.process_time() - began)
+        began = time.process_time()
+        stability.count()
+        counts.append(time.process_time() - began)
+    memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+    return problem.model.unknowns, float(np.median(steps)), float(np.median(counts)), memory
+
+
+def exponent(x, y):
+    """Of y = c x^exponent between the first and the last of some points."""
+    return float(np.log(y[-1] / y[0]) / np.log(x[-1] / x[0]))
+
+
+def main(sizes=SIZES, out="out"):
+    """Print the table, write it to out/scaling.md.
+
+    Returns:
+        The rows (unknowns, step, count, memory) as an array.
+    """
+    rows = []
+    for elements in sizes:
+        done = subprocess.run([sys.executable, __file__, "--one", str(elements)], capture_output=True, text=True, check=True)
+        rows.append(json.loads(done.stdout.splitlines()[-1]))
+        print(f"{rows[-1][0]:8d} unknowns: step {1e3 * rows[-1][1]:9.3f} ms", flush=True)
+    rows = np.array(rows)
+    unknowns, step, count, memory = rows.T
+    lines = [
+        f"{compat.version()}; medians, processor time, one process. Memory is the process's largest, everything loaded.",
+        "",
+        "| unknowns | Newton step (ms) | us an unknown | count of negative modes (ms) | memory (MB) |",
+        "|---|---|---|---|---|",
+        *(f"| {n:.0f} | {1e3 * a:.3f} | {1e6 * a / n:.2f} | {1e3 * b:.3f} | {m:.0f} |" for n, a, b, m in rows),
+        "",
+        f"Exponents between the first and the last row: step {exponent(unknowns, step):.3f}, count "
+        f"{exponent(unknowns, count):.3f}, memory above the smallest {exponent(unknowns[1:], memory[1:] - memory[0]):.3f}; "
+        f"largest between two rows: step {max(exponent(unknowns[i:i + 2], step[i:i + 2]) for i in range(len(rows) - 1)):.3f}.",
+    ]
+    text = "\n".join(lines)
+    Path(out).mkdir(parents=True, exist_ok=True)
+    (Path(out) / "scaling.md").write_text(text + "\n", encoding="utf-8")
+    print(text)
+    return rows
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--quick", action="store_true")
+    parser.add_argument("--one", type=int, help=argparse.SUPPRESS)
+    options = parser.parse_args()
+    if options.one:
+        print(json.dumps(measure(options.one)))
+    else:
+        main(QUICK if options.quick else SIZES)
