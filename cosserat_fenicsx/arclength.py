@@ -15,6 +15,8 @@ from cosserat_fenicsx.track import AIM, FAR, growth_of, through
 # A step is refused that is off its prediction by more than this times its length, or by more than the second where
 # negative modes appear or vanish though the load factor does not turn: it may have changed to another branch.
 _BEND, _SURE = 0.4, 0.1
+# A step passes through a point that is beside it by less than this over its length.
+_BESIDE = 0.1
 # The first step over the length of the path from the unloaded state, where there is no step before it.
 _FIRST = 0.02
 
@@ -49,17 +51,24 @@ class ArcLength:
             self._set_out(target)
         else:
             self._branch_off(first, slope)
+        begin, steps = first, 0
         for _ in range(self.control.most_steps):
             point, first = first or self._attempt(), None
             if point is not None:
                 try:
                     landing, crossings = self._locator.between(track.here, point, target, self._weight)
-                except Lost:
-                    point = self._shorten()
+                except Lost as far:
+                    track.failure = "what lies on a step could not be told"
+                    self._step = self._length(track.here, point)
+                    point = self._shorten(far.args[0])
             if point is None:
                 if self._step < self.control.smallest * self._scale:
                     return False
                 continue
+            begin, steps = begin or point, steps + 1
+            if steps > 3 and self._passes(begin, track.here, point):
+                track.failure = "the path is closed: it came back to where it was, and does not lead there"
+                return track.restore()
             for crossing in crossings:
                 if on_event and on_event(crossing):
                     track.restore()
@@ -132,6 +141,17 @@ class ArcLength:
             self._step *= shrunk
             self._scale *= shrunk
 
+    def _passes(self, place, a, b):
+        """Whether the step from a to b goes through a point, in the direction in which it was left."""
+        track, w = self.track, self._weight
+        chord, change = b.numbers[0] - a.numbers[0], b.load_factor - a.load_factor
+        moved, gain = place.numbers[0] - a.numbers[0], place.load_factor - a.load_factor
+        size = track.product(chord, chord) + w * change**2
+        along = track.product(moved, chord) + w * gain * change
+        beside = track.product(moved, moved) + w * gain**2 - along**2 / size
+        onward = track.product(place.along, chord) + w * place.rise * change
+        return 0 <= along < size and beside < (_BESIDE**2) * size and onward > 0
+
     def _length(self, a, b):
         moved, change = b.numbers[0] - a.numbers[0], b.load_factor - a.load_factor
         return math.sqrt(self.track.product(moved, moved) + self._weight * change**2)
@@ -187,6 +207,6 @@ class ArcLength:
         self._step = max(self._step, length * growth) if growth >= 1 else length * growth
         return point
 
-    def _shorten(self):
-        self._step /= 2
+    def _shorten(self, share=0.5):
+        self._step *= share
         self.track.restore()

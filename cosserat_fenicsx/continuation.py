@@ -79,25 +79,25 @@ class Continuation:
         self.track, self.control, self._watch = track, control, watch
         self.step, self._shrink = None, 0.5
 
-    def to(self, target, way, *, on_step=None, smallest=0.0):
+    def to(self, target, way, *, on_step=None, patience=None):
         """Step to the load factor `target`, landing on it exactly.
 
         Args:
             target: load factor.
             way: size of the whole path, which steps are measured against.
             on_step: called with every accepted `Point`.
-            smallest: give up below this step over the way, if it is larger than the `StepControl`'s.
+            patience: give up after this many refused steps without two between that went well; None to go on to
+                the `StepControl`'s smallest step.
 
         Returns:
-            bool: False where the steps became too small or the watch refused one; the track's `failure` says why, and
-            its state is that of `here`.
+            bool: False where patience ended, the steps became too small or the watch refused one; the track's
+            `failure` says why, and its state is that of `here`.
         """
         control, track = self.control, self.track
         if not control.adaptive:
             return self._attempt(target, guard=False, on_step=on_step)
         self.step = self.step or control.first or way / 10
-        self._refused = False
-        smallest = max(control.smallest, smallest) * way
+        self._refused, refusals, going = False, 0, False
         while track.here.load_factor != target:
             left = target - track.here.load_factor
             step = min(self.step, control.largest or np.inf)
@@ -109,9 +109,12 @@ class Continuation:
                 goal = track.here.load_factor + np.copysign(step, left)
             taken = abs(goal - track.here.load_factor)
             # A new negative mode is believed once the step that meets it is this small.
-            if not self._attempt(goal, guard=taken > 1e-3 * way, on_step=on_step):
+            if self._attempt(goal, guard=taken > 1e-3 * way, on_step=on_step):
+                refusals, going = 0 if going else refusals, True
+            else:
+                refusals, going = refusals + 1, False
                 self.step = taken * self._shrink
-                if self._refused or self.step < smallest:
+                if self._refused or self.step < control.smallest * way or refusals == patience:
                     self.step = None
                     return False
         return True

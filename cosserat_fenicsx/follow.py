@@ -1,14 +1,15 @@
 """Follows an equilibrium path: load control while it goes on, arc length where it does not, and onto a branch if asked."""
 
 from cosserat_fenicsx.arclength import ArcLength
+from cosserat_fenicsx.chord import Chord
 from cosserat_fenicsx.continuation import Continuation
-from cosserat_fenicsx.locator import Chord, Locator
+from cosserat_fenicsx.locator import Locator
 from cosserat_fenicsx.track import AIM, Track
 
 #: How the path is followed.
 CONTROLS = ("auto", "load", "arc")
-# Load control gives way to arc length below this step over the way: a real loss of stability is believed before that.
-_PATIENCE = 2e-4
+# Load control gives way to arc length after this many refused steps.
+_PATIENCE = 4
 # Halvings of the first step onto a branch.
 _TRIES = 8
 
@@ -52,7 +53,7 @@ class Follower:
         """
         auto = self._control == "auto" and self._steps.adaptive
         if self._control != "arc":
-            done = self._load.to(target, way, on_step=on_step, smallest=_PATIENCE if auto else 0.0)
+            done = self._load.to(target, way, on_step=on_step, patience=_PATIENCE if auto else None)
             if done or not (auto or self._fork):
                 return done
         track, done = self.track, False

@@ -260,9 +260,7 @@ class Path:
                 a, frames = coarse.sample(k, rod, x)
                 b, _ = self.sample(k, rod, x)
                 difference[k] = max(difference[k], np.linalg.norm(a - b, axis=1).max())
-                turned = (
-                    np.linalg.norm(frames - rod.curve.frame(x * rod.length), axis=(1, 2)).max() * _gyration(rod)
-                )
+                turned = np.linalg.norm(frames - rod.curve.frame(x * rod.length), axis=(1, 2)).max() * _gyration(rod)
                 largest[k] = max(largest[k], np.linalg.norm(a - reference, axis=1).max(), turned)
         self._difference = difference
         gain = 1.0

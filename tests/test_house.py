@@ -43,8 +43,8 @@ SCENE = (
     "scenefile", "sections", "splines", "statical", "supports", "ties",
 )  # fmt: skip
 SOLVERS = (
-    "arclength", "continuation", "eigen", "follow", "interrupts", "linear", "linear_buckling", "locator", "problem", "snes",
-    "stability", "statics", "tie_rows", "track",
+    "arclength", "chord", "continuation", "eigen", "follow", "interrupts", "linear", "linear_buckling", "locator", "problem",
+    "snes", "stability", "statics", "tie_rows", "track",
 )  # fmt: skip
 RESULTS = ("plot", "ranks", "recovery", "results", "tables", "xdmf")
 
