@@ -5,6 +5,9 @@ import numpy as np
 from cosserat_fenicsx.packed import Packed
 from cosserat_fenicsx.tie_rows import TieRows
 
+# Of the load factor, for derivatives by differences: the error is its square times that of prescribed rotations.
+_CHANGE = 1e-4
+
 
 class Problem:
     """Residual and tangent of a model as PETSc wants them, in the solver's unknowns (`models.numbering`).
@@ -25,7 +28,7 @@ class Problem:
         self.ties = TieRows(model, numbering) if model.shape.connections.ties else None
         tied = self.ties.rows if self.ties else np.empty(0, dtype=np.int64)
         self.A = numbering.matrix(model.cell_dofs, tied[tied >= 0])
-        self.x, self.b, self._dead = (numbering.vector() for _ in range(3))
+        self.x, self.b, self._dead, *self._difference = (numbering.vector() for _ in range(5))
         self._local = np.zeros(len(numbering.rows))
         moving = (model.state, *model.carried)
         self._residual, self._tangent = Packed(model.forms.residual, moving), Packed(model.forms.tangent, moving)
@@ -99,6 +102,20 @@ class Problem:
         b.axpy(-self.load_factor, self._dead)
         if self.ties:
             self.ties.add_residual(b, self.load_factor)
+
+    def load_derivative(self, x):
+        """d residual/d load factor at x by a central difference, exact for loads, which are affine in it; a vector that
+        the next call overwrites."""
+        eta = self.load_factor
+        change = _CHANGE * max(1.0, abs(eta))
+        for vector, ahead in zip(self._difference, (change, -change), strict=True):
+            self.set_load_factor(eta + ahead)
+            self.function(None, x, vector)
+        self.set_load_factor(eta)
+        derivative, behind = self._difference
+        derivative.axpy(-1.0, behind)
+        derivative.scale(0.5 / change)
+        return derivative
 
     def jacobian(self, snes, x, A, P):
         """Tangent at the state that `function` was last called with."""

@@ -1,6 +1,6 @@
 """Results as arrays with named fields, in SI units. Knows no solver; files and pictures are made by other rooms."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -23,6 +23,24 @@ class Record:
     iterations: int
 
 
+@dataclass(frozen=True, eq=False)
+class Event:
+    """A limit point or a bifurcation of a path.
+
+    Attributes:
+        kind: "limit", where the load factor turns, or "bifurcation", where another path crosses.
+        load_factor: located to a relative 1e-6.
+        mode: (N, 3) displacements, inertial, of all nodes of all rods in the scene's order, the largest of length 1: the
+            path's own direction at a limit point, the buckling mode at a bifurcation. `Path.mode` picks a rod.
+        after: index of the path's last point before it; -1 where there is none.
+    """
+
+    kind: str
+    load_factor: float
+    mode: np.ndarray = field(repr=False)
+    after: int
+
+
 class Path:
     """An equilibrium path: a sequence of converged points.
 
@@ -36,6 +54,7 @@ class Path:
         negative_modes: (n,) negative squares of the second variation; 0 at a stable point, -1 where it is singular.
         stable: (n,) bool.
         error: (n,) estimated error of the positions, relative to the largest displacement; NaN where not estimated.
+        events: the `Event`s met, in order: limit points and bifurcations.
 
     Station queries return one row a point, in inertial components unless they say material.
     """
@@ -44,7 +63,7 @@ class Path:
         self.scene, self.layout, self.scales, self._rule, self.comm = scene, layout, scales, rule, comm
         self.model, self.formulation, self.degree, self.unknowns = model, formulation, degree, unknowns
         self.elements, self.why = layout.counts, why
-        self._records, self._rounding = [], rounding
+        self._records, self._rounding, self.events = [], rounding, []
         self._error = self._difference = None
 
     @classmethod
@@ -170,6 +189,10 @@ class Path:
             [max(np.linalg.norm(self.fields(k, rod)["displacement"], axis=1).max() for rod in self.scene.rods)
              for k in range(len(self))]
         )  # fmt: skip
+
+    def mode(self, event, rod=None):
+        """(nodes, 3) the mode of an event at the nodes of a rod (default the first), see `Event`."""
+        return event.mode[self._rows(rod or self.scene.rods[0])[1]]
 
     @property
     def _all_rq(self):

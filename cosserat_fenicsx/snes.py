@@ -6,6 +6,7 @@ PETSc's default line search cripples eq. (1); so the line search is `basic` and 
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from petsc4py import PETSc
@@ -53,13 +54,22 @@ class Newton:
         snes.setConvergenceTest(self._test)
         ksp = snes.getKSP()
         ksp.setType("preonly")
-        linear.factor_tangent(ksp.getPC(), problem.A)
+        self._factor(ksp.getPC())
         # petsc4py 3.18 cannot reach the line search but by an option.
         option, options = f"cosserat_{id(self):x}_snes_linesearch_type", PETSc.Options()
         snes.setOptionsPrefix(option.removesuffix("snes_linesearch_type"))
         options[option] = "basic"
         snes.setFromOptions()
         options.delValue(option)
+
+    def _factor(self, pc):
+        """What solves with the tangent."""
+        linear.factor_tangent(pc, self.problem.A)
+
+    @cached_property
+    def bordered(self):
+        """Newton's method for the same problem with the load factor as one more unknown; made when first needed."""
+        return BorderedNewton(self.problem)
 
     def allow(self, iterations):
         """Give up beyond this number of iterations."""
@@ -126,6 +136,91 @@ class Newton:
             return step
         moved = self.snes.getSolutionUpdate().array_r[: self._motions]
         return math.sqrt(self.problem.model.comm.allreduce(float(moved @ moved)))
+
+
+class BorderedNewton(Newton):
+    """Newton's method for (x, eta): equilibrium, and a plane <normal, x - x_0> + weight (eta - eta_0) = 0.
+
+    SNES sees x alone. Where it solves with the tangent A, the bordered system is solved by block elimination (Keller,
+    in: Applications of Bifurcation Theory, 1977, 359): with A d1 = R, A d2 = dR/deta the step is -(d1 + d2 deta), and
+    the plane gives deta. The load factor is moved along, so that SNES's next residual and tangent are those of
+    the new (x, eta). The products with `normal` are the model's, over all ranks, and so the load factor is one on all.
+
+    Where a motion is neutral (a buckled round column may turn about its axis) the tangent is singular all along the path; no
+    step is then taken along that motion, which the residual does not resist.
+    """
+
+    def _factor(self, pc):
+        A = self.problem.A
+        self._slope, self._free = A.createVecRight(), A.createVecRight()
+        self._ksp = ksp = PETSc.KSP().create(A.comm)
+        ksp.setType("preonly")
+        linear.factor_tangent(ksp.getPC(), A)
+        ksp.setOperators(A)
+        pc.setType("python")
+        pc.setPythonContext(self)
+
+    def aim(self, normal, weight, neutral=None):
+        """Solve from now on in the plane through the problem's x and load factor.
+
+        Args:
+            normal: owned numbers of a change of the unknowns; None to hold the load factor.
+            weight: of the load factor.
+            neutral: owned numbers of a neutral motion, or None.
+        """
+        self._normal, self._weight, self.neutral = normal, weight, neutral
+        self._x0, self._eta0 = self.problem.x.array_r.copy(), self.problem.load_factor
+
+    def setUp(self, pc):
+        """PETSc calls this when the tangent is new."""
+        self._ksp.setOperators(*pc.getOperators())
+
+    def apply(self, pc, residual, step):
+        """PETSc calls this for the step, which it subtracts from x."""
+        problem, inner = self.problem, self.problem.model.inner
+        self._ksp.solve(residual, step)
+        self._ksp.solve(problem.load_derivative(problem.x), self._slope)
+        if self.neutral is not None:
+            self._leave_out_neutral(step)
+        if self._normal is None:
+            return
+        eta, normal = problem.load_factor, self._normal
+        off = problem.x.array_r - self._x0 - step.array_r
+        left = inner(normal, off) + self._weight * (eta - self._eta0)
+        rise = inner(normal, self._slope.array_r) - self._weight
+        change = left / rise if rise else math.inf
+        step.axpy(change, self._slope)
+        if math.isfinite(change):
+            problem.set_load_factor(eta + change)
+
+    def _leave_out_neutral(self, step):
+        """Take the neutral motion out of the step and the slope, and bring it up to date by inverse iteration."""
+        inner, motion = self.problem.model.inner, self.neutral
+        force = self.problem.load_derivative(self.problem.x)
+        force.array_w[:] = motion
+        self._ksp.solve(force, self._free)
+        free = self._free.array_r
+        size = inner(motion, free)
+        for vector in (step, self._slope):
+            vector.axpy(-inner(motion, vector.array_r) / size, self._free)
+        self.neutral = free / math.copysign(math.sqrt(inner(free, free)), size)
+
+    @property
+    def slope(self):
+        """(owned numbers,) dx/d eta at the last step of the last solve."""
+        return -self._slope.array_r
+
+    def slope_here(self, neutral=None):
+        """(owned numbers,) dx/d eta at the problem's x and load factor, without the neutral motion."""
+        problem = self.problem
+        problem.function(None, problem.x, problem.b)
+        problem.jacobian(None, problem.x, problem.A, problem.A)
+        self._ksp.setOperators(problem.A)
+        self._ksp.solve(problem.load_derivative(problem.x), self._slope)
+        self.neutral = neutral
+        if neutral is not None:
+            self._leave_out_neutral(self._slope)
+        return self.slope
 
 
 _WORDS = {

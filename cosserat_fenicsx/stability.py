@@ -7,8 +7,11 @@ conservative and makes the tangent unsymmetric; its symmetric part in the rotati
 import numpy as np
 from petsc4py import PETSc
 
-from cosserat_fenicsx import linear
+from cosserat_fenicsx import eigen, linear
 from cosserat_fenicsx.packed import Packed
+
+_ROUNDING = np.finfo(float).eps
+_LARGEST_ROW = PETSc.NormType.NORM_INFINITY
 
 
 class NegativeModes:
@@ -32,17 +35,31 @@ class NegativeModes:
         """Take the numbers of the scene that the model was loaded with."""
         self._form.refresh()
 
-    def assemble(self):
-        """The second variation at the problem's state and load factor, in K."""
+    def assemble(self, *, stress_alone=False):
+        """The second variation at the problem's state and load factor, in K.
+
+        Args:
+            stress_alone: leave out what holds whatever the stress: the stiffness against stretch and shear, and that
+                of supports and joints.
+        """
         problem = self.problem
         self.K.zeroEntries()
-        self._form.add_to_matrix(self.K)
+        if stress_alone:
+            with self.model.stress_alone():
+                self._form.refresh()
+                self._form.add_to_matrix(self.K)
+            self._form.refresh()
+        else:
+            self._form.add_to_matrix(self.K)
         if problem.ties:
-            problem.ties.add_second_variation(self.K, self._tied, problem.load_factor)
+            problem.ties.add_second_variation(self.K, self._tied, problem.load_factor, held=not stress_alone)
         self.K.assemble()
 
-    def count(self):
+    def count(self, *, neutral=False):
         """Number of negative squares at the problem's state and load factor.
+
+        Args:
+            neutral: whether the eigenvalue next to zero is that of a motion that changes nothing, and does not count.
 
         Returns:
             int, or -1 where the second variation is singular to round-off.
@@ -51,4 +68,70 @@ class NegativeModes:
         self.pc.setOperators(self.K)
         self.pc.setUp()
         negative, zero, _ = self.pc.getFactorMatrix().getInertia()
+        self._negative, self._zero, self._shift = negative, zero, 0.0
+        if neutral:
+            return negative - int(not zero and self._nearest(1)[0][0] < 0)
         return -1 if zero else negative
+
+    def _nearest(self, count):
+        """Eigenvalues next to zero and their vectors at the state that was counted last."""
+        if self._zero:  # MUMPS leaves null pivots out of its solutions: the same vectors with all eigenvalues shifted
+            self._zero, self._shift = 0, 10 * _ROUNDING * self.K.norm(_LARGEST_ROW)
+            self.K.shift(self._shift)
+            self.pc.setOperators(self.K)
+            self.pc.setUp()
+        values, vectors = eigen.nearest_zero(self.K, self.pc, count)
+        return values - self._shift, vectors
+
+    def is_neutral(self):
+        """Whether the eigenvalue next to zero is zero to round-off at the problem's state, which was counted last."""
+        values, _ = self._nearest(2)
+        return abs(values[0]) < 1e-4 * abs(values[-1]) and abs(values[0]) < _ROUNDING * self.K.norm(_LARGEST_ROW)
+
+    def eigenvalue(self, j):
+        """The j-th eigenvalue of the second variation at the problem's state, counted from 0 in ascending order; for
+        those next to zero."""
+        self.count()
+        above = j - self._negative  # 0: the smallest positive one, -1: the negative one next to zero
+        needed = 1 + (above if above >= 0 else -1 - above)
+        for wanted in (2 * needed, 4 * needed + 6, 16 * needed + 24):
+            values = np.sort(self._nearest(wanted)[0])
+            side = values[values >= 0] if above >= 0 else values[values < 0]
+            if len(side) >= needed:
+                return float(side[above])
+        return float(values[np.argmin(np.abs(values))])  # zero to round-off: the count says one sign, this another
+
+    def modes(self, count):
+        """The modes of the eigenvalues nearest zero, as changes of the unknowns (owned numbers), see `oriented`."""
+        self.count()
+        return oriented(self.model, self._nearest(count)[1])
+
+
+def oriented(model, vectors):
+    """Modes of one eigenvalue as changes of the unknowns (owned numbers), without the choice that eigensolvers leave.
+
+    They are turned among themselves so that the node that they move farthest moves along the first inertial axis that
+    it can move along, in the positive direction, by the first of them alone; and so on. A single mode gets its sign.
+    The largest displacement of each is 1 (in the model's unit of length).
+    """
+    modes = np.array([model.change_of(vector) for vector in vectors])
+    shapes = np.array([model.shape_of(mode) for mode in modes])
+    for k in range(len(modes)):
+        moved = np.einsum("mni,mni->n", shapes[k:], shapes[k:])
+        node = np.flatnonzero(moved >= (1 - 1e-6) * moved.max())[0]
+        by = shapes[k:, node, :]  # (modes, axes)
+        sizes = np.linalg.norm(by, axis=0)
+        axis = np.flatnonzero(sizes >= 0.1 * sizes.max())[0]
+        turn = _towards(by[:, axis])
+        modes[k:], shapes[k:] = turn @ modes[k:], np.tensordot(turn, shapes[k:], 1)
+    size = np.linalg.norm(shapes, axis=2).max(axis=1, initial=0)
+    return [mode / (s or 1.0) for mode, s in zip(modes, size, strict=True)]
+
+
+def _towards(a):
+    """An orthogonal matrix whose first row is a/|a|."""
+    size = np.linalg.norm(a)
+    if not size:
+        return np.eye(len(a))
+    q, r = np.linalg.qr(np.column_stack([a / size, np.eye(len(a))]))
+    return (q * np.sign(np.where(np.diag(r) == 0, 1, np.diag(r)))).T

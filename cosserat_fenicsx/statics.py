@@ -10,14 +10,15 @@ import numpy as np
 from mpi4py import MPI
 
 from cosserat_fenicsx.checks import instance
-from cosserat_fenicsx.continuation import Continuation, StepControl
+from cosserat_fenicsx.continuation import StepControl
 from cosserat_fenicsx.errors import Interrupted, NotConverged, SceneError, nearest
+from cosserat_fenicsx.follow import CONTROLS, Follower
 from cosserat_fenicsx.models.rodmesh import Layout
 from cosserat_fenicsx.models.shape import Shape
 from cosserat_fenicsx.models.spatial import SpatialModel
 from cosserat_fenicsx.problem import Problem
 from cosserat_fenicsx.progress import Progress
-from cosserat_fenicsx.results import Path, Record
+from cosserat_fenicsx.results import Event, Path, Record
 from cosserat_fenicsx.scene import Scene
 from cosserat_fenicsx.snes import Newton
 from cosserat_fenicsx.stability import NegativeModes
@@ -42,6 +43,9 @@ def solve(
     degree=None,
     gauss_points=None,
     steps=None,
+    control="auto",
+    branch=None,
+    until=None,
     progress=None,
     comm=None,
 ):
@@ -59,6 +63,13 @@ def solve(
         degree: 1 to 4, of r and q; default 4 (2 for the other formulations).
         gauss_points: of an element; default `degree`, which does not lock. More of them lock (README, Formulations).
         steps: a `StepControl`.
+        control: "auto" steps the load factor, and goes on in the arc length of the path where that meets a limit point,
+            through snap-through and snap-back, until the requested load factor is reached again. "load" never does:
+            a limit point raises NotConverged. "arc" goes in arc length from the start and never turns round: each
+            requested load factor is the next place along the path that has it.
+        branch: 1 or -1 to leave the path at its first bifurcation, along the mode or against it (see `Event.mode`; of
+            two modes at once the first); None to stay on it, stable or not.
+        until: called with the Path after every recorded point; True from it ends the path there. For a pair.
         progress: True, False, or None for a bar on long runs in a terminal.
         comm: MPI communicator; default all ranks. Every rank calls, every rank gets the same Path.
 
@@ -77,8 +88,9 @@ def solve(
     check_arguments(scene, model, tol, elements)
     steps = instance("solve", "steps", StepControl() if steps is None else steps, StepControl, "a StepControl")
     run = functools.partial(
-        _run, scene, formulation=formulation, degree=degree, points=gauss_points, steps=steps, comm=comm
-    )
+        _run, scene, formulation=formulation, degree=degree, points=gauss_points, comm=comm,
+        follow=_follow_options(steps, control, branch), until=_until(until, free),
+    )  # fmt: skip
     with Progress(targets, progress, comm) as bar:
         if elements is not None:
             return run(targets, free, Layout.of(scene, elements), bar=bar)
@@ -146,49 +158,87 @@ def solvers_of(scene, layout, *, formulation="mixed", degree=4, points=None, com
     return problem, newton, stability
 
 
-def _run(scene, targets, free, layout, *, formulation, degree, points, steps, comm, bar):
+def _run(scene, targets, free, layout, *, formulation, degree, points, follow, until, comm, bar):
     """One path on one mesh."""
     problem, newton, stability = solvers_of(
         scene, layout, formulation=formulation, degree=degree, points=points, comm=comm
     )
-    continuation = Continuation(problem, newton, stability, steps)
-    path = Path.of(problem.model, formulation)
-    bar.start(f"{path.model}, {problem.model.unknowns} unknowns")
+    model = problem.model
+    path = Path.of(model, formulation)
+
+    def meet(crossing):
+        shape = model.shape_of(crossing.direction)
+        size = np.linalg.norm(shape, axis=1).max()
+        event = Event(crossing.kind, crossing.point.load_factor, shape / (size or 1.0), len(path) - 1)
+        path.events.append(event)
+
+    follower = Follower(problem, newton, stability, on_event=meet, **follow)
+    track = follower.track
+    bar.start(f"{path.model}, {model.unknowns} unknowns")
     way = max(abs(eta) for eta in targets) or 1.0
     counted = 0
 
     def record(point):
         nonlocal counted
-        path.append(Record(point.load_factor, *problem.model.snapshot(), point.negative_modes,
-                           continuation.iterations - counted))  # fmt: skip
-        counted = continuation.iterations
+        path.append(Record(point.load_factor, *model.snapshot(), point.negative_modes, track.iterations - counted))
+        counted = track.iterations
+        if until and until(path):
+            raise _Enough
 
     try:
         for k, target in enumerate(targets):
             between = free and k == 1
             on_step = (lambda point: (record(point), bar.at(point))) if between else bar.at
-            if not continuation.to(target, way, on_step=on_step):
-                here = continuation.here.load_factor
+            at_start = k == 0 and track.here.load_factor == target
+            if not (at_start or follower.to(target, way, on_step=on_step)):
+                here = track.here.load_factor
                 raise NotConverged(
                     f"no equilibrium was found beyond the load factor {here:.6g} on the way to {target:g}: "
-                    f"{continuation.failure}. {_advice(steps, here, abs(target) * problem.load_norm)}",
+                    f"{track.failure}. {_advice(follow, here, abs(target) * problem.load_norm)}",
                     path,
                 )
             if not between:
-                record(continuation.here)
+                record(track.here)
+    except _Enough:
+        pass
     except KeyboardInterrupt:
         raise Interrupted(path) from None
     return path
 
 
-def _advice(steps, here, load):
-    if not steps.adaptive:
+class _Enough(Exception):
+    """The user's `until` was met."""
+
+
+def _follow_options(steps, control, branch):
+    """Arguments of `Follower`, checked."""
+    if control not in CONTROLS:
+        raise SceneError(f"control = {control!r}: {nearest(control, CONTROLS)}")
+    if branch not in (None, 1, -1) or isinstance(branch, bool):
+        raise SceneError(f"branch = {branch!r}: expected 1, -1 or None")
+    if branch and control == "load":
+        raise SceneError("branch: expected control 'auto' or 'arc', since load control cannot leave a path")
+    if not steps.adaptive and (branch or control == "arc"):
+        raise SceneError("steps = StepControl(adaptive=False): expected adaptive steps for arc length and branches")
+    return {"steps": steps, "control": control, "branch": branch or 0}
+
+
+def _until(until, free):
+    if until is not None and not (callable(until) and free):
+        raise SceneError("until: expected a function of the Path, with a pair of load factors (a, b)")
+    return until
+
+
+def _advice(follow, here, load):
+    if not follow["steps"].adaptive:
         return "Let the steps adapt, or ask for load factors in between."
     if load > _ENORMOUS:
         return (
             f"The loads are {load:.1e} EI/L^2 there, which no slender rod bears: are the units those of SI (N, m, Pa)?"
         )
-    where = "There may be a limit point, which load control cannot pass; otherwise try" if here else "Try"
+    where = "Try"
+    if here and follow["control"] == "load":
+        where = "There may be a limit point, which load control cannot pass (control='auto' can); otherwise try"
     return f"{where} load factors in between, more elements, or the formulation 'mixed'."
 
 

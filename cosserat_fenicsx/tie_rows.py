@@ -83,11 +83,12 @@ class TieRows:
             for i in rows:
                 A.setValue(i, i, value, _ADD)
 
-    def add_second_variation(self, K, rows, eta):
+    def add_second_variation(self, K, rows, eta, *, held=True):
         """Add what the equations mean for stability: held motions become stiff, reactions turn with the nodes.
 
         Args:
             rows: (tied nodes, 6) numbers in K of (displacement, rotation).
+            held: False for the second alone.
         """
         if not self._here:
             return
@@ -96,4 +97,4 @@ class TieRows:
         size = 6 * len(rows)
         gradient, change = gradient.reshape(-1, size), change.reshape(size, size)
         nodes = rows.ravel().astype(PETSc.IntType)
-        K.setValues(nodes, nodes, _HELD * gradient.T @ gradient + 0.5 * (change + change.T), _ADD)
+        K.setValues(nodes, nodes, _HELD * held * gradient.T @ gradient + 0.5 * (change + change.T), _ADD)

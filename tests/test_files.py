@@ -95,7 +95,7 @@ def test_unwritable_and_unknown_files(solved, tmp_path_all):
 def test_an_empty_path_is_not_written(solved, tmp_path_all):
     _, scene = column()
     with pytest.raises(cf.NotConverged) as refusal:
-        cf.solve(scene, [0.5], elements=4, steps=cf.StepControl(max_iterations=1))
+        cf.solve(scene, [0.5], elements=4, steps=cf.StepControl(max_iterations=1), control="load")
     with pytest.raises(cf.SceneError, match="no point to write"):
         refusal.value.path.write(tmp_path_all / "path.xdmf")
 

@@ -120,7 +120,7 @@ def test_not_converged_keeps_the_partial_path():
     """A perfect refusal: one Newton iteration is never enough."""
     _, scene = column()
     with pytest.raises(cf.NotConverged) as refusal:
-        cf.solve(scene, [0.0, 0.5, 1.0], elements=4, steps=cf.StepControl(max_iterations=1))
+        cf.solve(scene, [0.0, 0.5, 1.0], elements=4, steps=cf.StepControl(max_iterations=1), control="load")
     assert refusal.value.path.load_factors.tolist() == [0.0]
     assert "Newton's iterations ran out" in str(refusal.value)
 

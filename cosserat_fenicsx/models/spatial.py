@@ -1,5 +1,7 @@
 """The spatial rung: r and q in P_p, three formulations of eq. (1), dimensionless."""
 
+import contextlib
+
 import numpy as np
 from dolfinx import fem
 from mpi4py import MPI
@@ -207,6 +209,18 @@ class SpatialModel:
             trial[k, 3:, 3:] = small_rotation(node[3:])
         return trial, test
 
+    @contextlib.contextmanager
+    def stress_alone(self):
+        """Within it the second variation has no stiffness against stretch and shear: its change along a path is then
+        that of the contact force and moment, and of the load, but not of the directions of the stiffness."""
+        stiff = self.data.K_stiff.x.array
+        kept = stiff.copy()
+        stiff[:] = 0
+        try:
+            yield
+        finally:
+            stiff[:] = kept
+
     def advance(self):
         """Advance the carried fields by `step` from `before`; both must hold their ghosts."""
         if self.carried:
@@ -228,6 +242,29 @@ class SpatialModel:
     def _nodal(self, change):
         """(free nodes, 7) of this rank's part of the solver's vector."""
         return change[: 7 * self.numbering.nodes].reshape(-1, 7)
+
+    def shape_of(self, change):
+        """(N, 3) displacements in a change of this rank's part of the solver's vector at all nodes, the scene's order,
+        all ranks."""
+        vector, local = self.numbering.vector(), np.zeros_like(self.state.x.array)
+        vector.array_w[:] = change
+        self.numbering.to_local(vector, local)
+        return self._gather_nodes(local[self._rq[: self._owned_nodes, :3]])
+
+    def change_of(self, motion):
+        """This rank's part of the change of the solver's vector that a vector (r, theta) of the second variation's
+        numbering stands for, at the state."""
+        state = self.state.x.array
+        moved, change = np.zeros(6 * len(self._rq)), np.zeros_like(state)
+        self.variation_numbering.to_local(motion, moved)
+        moved, q = moved.reshape(-1, 6), state[self._rq[:, 3:]]
+        theta = moved[:, 3:]
+        change[self._rq[:, :3]] = moved[:, :3]
+        change[self._rq[:, 3]] = -np.einsum("ij,ij->i", theta, q[:, 1:]) / 2
+        change[self._rq[:, 4:]] = (q[:, :1] * theta + np.cross(theta, q[:, 1:])) / 2
+        vector = self.numbering.vector()
+        self.numbering.from_local(change, vector)
+        return vector.array_r.copy()
 
     def snapshot(self):
         """(r, q) at the nodes (N, 7) and (n, m, r') at the Gauss points (cells, points, 9), the scene's order, all

@@ -63,4 +63,3 @@ class Ties:
                 c[i] = 2 * e @ s
                 gradient[i, a, 3:] = s0 * e + np.cross(s, e)
         return c, gradient, tangent
-

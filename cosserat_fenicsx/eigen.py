@@ -1,0 +1,76 @@
+"""Eigenvalues by SLEPc: the only file that knows it."""
+
+import numpy as np
+from petsc4py import PETSc
+from slepc4py import SLEPc
+
+from cosserat_fenicsx import linear
+
+_TOLERANCE = 1e-12
+
+
+class _Inverse:
+    """The inverse of a factored matrix as a matrix."""
+
+    def __init__(self, pc):
+        self._pc = pc
+
+    def mult(self, mat, x, y):
+        """PETSc's name for y = K^-1 x."""
+        self._pc.apply(x, y)
+
+
+def nearest_zero(K, pc, count):
+    """Eigenvalues of a symmetric matrix next to zero, by the factorisation that is at hand.
+
+    Args:
+        K: the matrix.
+        pc: a PC that holds its factors.
+        count: how many.
+
+    Returns:
+        (values (n,), vectors): nearest first, n <= count; PETSc vectors of length one.
+    """
+    inverse = PETSc.Mat().createPython(K.getSizes(), _Inverse(pc), comm=K.comm)
+    inverse.setUp()
+    solver = SLEPc.EPS().create(K.comm)
+    solver.setOperators(inverse)
+    values, vectors = _solve(solver, SLEPc.EPS.ProblemType.HEP, SLEPc.EPS.Which.LARGEST_MAGNITUDE, count, K)
+    return 1 / values, vectors
+
+
+def largest_of_pencil(A, B, count):
+    """The largest eigenvalues nu of A x = nu B x, A symmetric, B symmetric and positive definite.
+
+    Returns:
+        (values (n,), vectors), see `nearest_zero`; the largest first.
+    """
+    solver = SLEPc.EPS().create(A.comm)
+    solver.setOperators(A, B)
+    ksp = solver.getST().getKSP()
+    ksp.setType("preonly")
+    linear.factor_second_variation(ksp.getPC(), B)
+    return _solve(solver, SLEPc.EPS.ProblemType.GHEP, SLEPc.EPS.Which.LARGEST_REAL, count, A)
+
+
+def _solve(solver, kind, which, count, like):
+    solver.setProblemType(kind)
+    solver.setWhichEigenpairs(which)
+    size = like.getSize()[0]
+    count = min(count, size)
+    solver.setDimensions(count, min(size, max(2 * count, count + 15)))
+    solver.setTolerances(_TOLERANCE, 500)
+    start = like.createVecRight()
+    first, last = start.getOwnershipRange()
+    start.array_w[:] = 1 + np.sin(np.arange(first, last) + 1.0)  # the same at every run and on any number of ranks
+    solver.setInitialSpace([start])
+    solver.solve()
+    found = min(solver.getConverged(), count)
+    values, vectors = [], []
+    for i in range(found):
+        vector = like.createVecRight()
+        values.append(solver.getEigenpair(i, vector).real)
+        vector.normalize()
+        vectors.append(vector)
+    solver.destroy()
+    return np.array(values), vectors

@@ -1,0 +1,135 @@
+"""Linear buckling: the load factors at which a stable state, extrapolated, loses its stability."""
+
+import math
+import numbers
+from dataclasses import dataclass, field
+
+import numpy as np
+from mpi4py import MPI
+
+from cosserat_fenicsx import eigen
+from cosserat_fenicsx.checks import number
+from cosserat_fenicsx.continuation import StepControl
+from cosserat_fenicsx.errors import NotConverged, SceneError
+from cosserat_fenicsx.follow import Follower
+from cosserat_fenicsx.models.rodmesh import Layout
+from cosserat_fenicsx.stability import oriented
+from cosserat_fenicsx.statics import FIRST_ELEMENTS, check_arguments, solvers_of
+
+_MOST_ELEMENTS = 256
+# The state is moved by this much of a unit load (EI/L^2, EI/L) to either side for the change of the second variation.
+_STEP = 1e-3
+# Load factors nearer than this to one another are one, with several modes.
+_SAME = 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class Buckling:
+    """Result of `buckling`.
+
+    Attributes:
+        scene: the scene.
+        load_factors: (n,) critical load factors, ascending from the state they are counted from.
+        modes: (n, N, 3) displacements, inertial, of all nodes of all rods in the scene's order; the largest has length 1.
+        error: (n,) estimated relative error of the load factors; NaN where the mesh was given.
+        elements: of each rod.
+        degree: of the elements.
+    """
+
+    scene: object = field(repr=False)
+    load_factors: np.ndarray
+    modes: np.ndarray = field(repr=False)
+    error: np.ndarray
+    elements: tuple
+    degree: int
+
+    def mode(self, k, rod=None):
+        """(nodes, 3) the k-th mode at the nodes of a rod (default the first)."""
+        i = 0 if rod is None else self.scene.rods.index(rod)
+        nodes = [count * self.degree + 1 for count in self.elements]
+        return self.modes[k, sum(nodes[:i]) : sum(nodes[: i + 1])]
+
+
+def buckling(scene, count=1, *, load_factor=0.0, tol=1e-5, elements=None, degree=4, comm=None):
+    """Critical load factors and modes by linear buckling.
+
+    K(eta) + lambda dK/deta is singular, with K the second variation at the load factor eta (0: the unloaded
+    reference) and dK/deta its change with the contact force and moment alone, as in textbooks and codes: the rod is
+    prestressed there, but neither bent nor shortened further. Where a structure bends much before it buckles, as an arch
+    does, this is an estimate, and the events of `solve` are the answer; a straight column's critical load is off by its
+    strain at buckling. From a prestressed state (`load_factor`) near the answer the estimate is good.
+
+    Args:
+        scene: a `Scene`.
+        count: how many.
+        load_factor: eta, a stable point of the path of load control.
+        tol: relative accuracy of the load factors: elements are doubled until two meshes agree to it, unless
+            `elements` is given.
+        elements: elements per rod; fixes the mesh.
+        degree: 1 to 4, of r and q.
+        comm: MPI communicator; default all ranks. Every rank calls.
+
+    Returns:
+        Buckling. It holds fewer than `count` load factors where no more lie on the side of positive load.
+
+    Raises:
+        SceneError: an argument outside its range.
+        NotConverged: the load factor is not reached, or the structure is unstable there; or the accuracy is not met.
+    """
+    check_arguments(scene, "auto", tol, elements)
+    if isinstance(count, bool) or not isinstance(count, numbers.Integral) or count < 1:
+        raise SceneError(f"count = {count!r}: expected a whole number above zero")
+    number("buckling", "load_factor", load_factor, "a finite number", math.isfinite)
+    comm = comm or MPI.COMM_WORLD
+    layout, coarse, best = Layout.of(scene, elements or FIRST_ELEMENTS), None, math.inf
+    while True:
+        load_factors, modes = _critical(scene, layout, count, load_factor, degree, comm)
+        error = np.full(len(load_factors), np.nan)
+        if coarse is not None and len(coarse) == len(load_factors):
+            error = np.abs(load_factors - coarse) / np.abs(load_factors - load_factor)
+            reached = error.max(initial=0.0)
+            if reached > max(tol, best) or (reached > tol and max(layout.counts) >= _MOST_ELEMENTS):
+                raise NotConverged(
+                    f"the accuracy tol = {tol:g} was not reached with {max(layout.counts)} elements of degree {degree} "
+                    f"per rod: the estimated error stays at {min(reached, best):.2g}. Ask for a larger tol."
+                )
+            best = reached
+        if elements or best <= tol:
+            return Buckling(scene, load_factors, modes, error, layout.counts, degree)
+        coarse, layout = load_factors, layout.split(2)
+
+
+def _critical(scene, layout, count, load_factor, degree, comm):
+    """Load factors (n,) and modes (n, N, 3) on one mesh."""
+    problem, newton, stability = solvers_of(scene, layout, degree=degree, comm=comm)
+    model = problem.model
+    follower = Follower(problem, newton, stability, StepControl(), control="load")
+    track = follower.track
+    if load_factor and not follower.to(load_factor, abs(load_factor)):
+        raise NotConverged(f"no equilibrium was found at the load factor {load_factor:g}: {track.failure}")
+    here = track.here
+    if here.negative_modes:
+        raise NotConverged(f"the structure is unstable at the load factor {load_factor:g}: expected a stable state")
+    slope = track.slope()
+    change = _STEP / (problem.load_derivative(problem.x).norm() or 1.0)
+    sides = []
+    for step in (change, -change):
+        numbers_there = [here.numbers[0] + step * slope, *(values.copy() for values in here.numbers[1:])]
+        if not track.at_load(numbers_there, load_factor + step).converged:
+            raise NotConverged(f"no equilibrium was found next to the load factor {load_factor:g}: {track.failure}")
+        stability.assemble(stress_alone=True)
+        sides.append(stability.K.copy())
+    slack, other = sides
+    slack.axpy(-1.0, other)
+    slack.scale(-0.5 / change)
+    track.restore()
+    stability.assemble()
+    values, vectors = eigen.largest_of_pencil(slack, stability.K, count + 2)
+    values, vectors = values[values > 0], vectors[: (values > 0).sum()]
+    modes, k = [], 0
+    while k < len(values):
+        same = int(np.count_nonzero(np.abs(values[k:] - values[k]) <= _SAME * values[k]))
+        modes += oriented(model, vectors[k : k + same])
+        k += same
+    shapes = np.array([model.shape_of(mode) for mode in modes[:count]])
+    return load_factor + 1 / values[:count], shapes.reshape(len(modes[:count]), -1, 3)
