@@ -9,7 +9,7 @@ def element_contact(path, record):
     Element ends from the element's balance tested with its end functions, which is as accurate as the nodal positions
     (order 2p); the nodes between by the polynomial through both ends and the Gauss points.
     """
-    rule, scales, p = path._rule, path.scales, path.degree
+    rule, scales, p = path.rule, path.scales, path.degree
     basis = rule.basis(rule.gauss)
     result, cell0 = [], 0
     for rod, breaks in zip(path.scene.rods, path.layout.breaks, strict=True):

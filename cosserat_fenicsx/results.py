@@ -14,13 +14,15 @@ from cosserat_fenicsx.rod import Station
 
 @dataclass(frozen=True)
 class Record:
-    """One equilibrium, dimensionless: (r, q) at the nodes (N, 7), (n, m, r') at the Gauss points (cells, points, 9)."""
+    """One equilibrium, dimensionless: (r, q) at the nodes (N, 7), (n, m, r') at the Gauss points (cells, points, 9), and
+    the reactions of the equations that supports and joints add."""
 
     load_factor: float
     rq: np.ndarray
     gauss_fields: np.ndarray
     negative_modes: int
     iterations: int
+    reactions: np.ndarray
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,11 +62,11 @@ class Path:
     """
 
     def __init__(self, scene, layout, scales, rule, *, comm, rounding, model, formulation, degree, unknowns, why):
-        self.scene, self.layout, self.scales, self._rule, self.comm = scene, layout, scales, rule, comm
+        self.scene, self.layout, self.scales, self.rule, self.comm = scene, layout, scales, rule, comm
         self.model, self.formulation, self.degree, self.unknowns = model, formulation, degree, unknowns
         self.elements, self.why = layout.counts, why
         self._records, self._rounding, self.events = [], rounding, []
-        self._error = self._difference = None
+        self._error = None
 
     @classmethod
     def of(cls, model, formulation):
@@ -98,6 +100,10 @@ class Path:
     def __len__(self):
         return len(self._records)
 
+    def __getitem__(self, k):
+        """Point k as it was solved: a `Record`."""
+        return self._records[k]
+
     def __repr__(self):
         reach = f"load factors {self.load_factors[0]:g} .. {self.load_factors[-1]:g}" if len(self) else "empty"
         return f"<Path: {len(self)} points, {reach}, {self.model}, {self.unknowns} unknowns>"
@@ -114,6 +120,10 @@ class Path:
     def error(self):
         """(n,) estimated error, see the class."""
         return np.full(len(self), np.nan) if self._error is None else self._error
+
+    def set_error(self, error):
+        """Take an estimate; it is never below what rounding leaves of the residual."""
+        self._error = np.maximum(error, self._rounding)
 
     # -- queries -----------------------------------------------------------------------------------------------------
 
@@ -159,7 +169,7 @@ class Path:
             bending 2, twist; 1/m), both material; bending_moment (N m, its size).
         """
         i, rows = self._rows(rod)
-        s = self.layout.node_s(self._rule.nodes)[i] * rod.length
+        s = self.layout.node_s(self.rule.nodes)[i] * rod.length
         record = self._records[k]
         contact = at_nodes(self._contact[k][self._cells(i)])
         displacement = (record.rq[rows, :3] - self._rest[rows]) * self.scales.length
@@ -204,7 +214,7 @@ class Path:
         """(nodes, 3) positions at rest, dimensionless, from where each structure starts."""
         return np.concatenate([
             (rod.curve.position(x * rod.length) - self.scene.origin(rod)) / self.scales.length
-            for rod, x in zip(self.scene.rods, self.layout.node_s(self._rule.nodes), strict=True)
+            for rod, x in zip(self.scene.rods, self.layout.node_s(self.rule.nodes), strict=True)
         ])  # fmt: skip
 
     @cached_property
@@ -215,7 +225,7 @@ class Path:
     def _contact_at(self, station):
         """(points, 6) n and m at a station, dimensionless."""
         i, _ = self._rows(instance("Path", "station", station, Station, "a station such as rod.end").rod)
-        cell, weights = self._rule.locate(self.layout.breaks[i], station.s / station.rod.length)
+        cell, weights = self.rule.locate(self.layout.breaks[i], station.s / station.rod.length)
         return np.einsum("j,njk->nk", weights, self._contact[:, self._cells(i).start + cell])
 
     def _cells(self, i):
@@ -235,46 +245,9 @@ class Path:
     def _at(self, station, values):
         """Values (points, nodes, k) at a station, by the element's polynomial."""
         i, rows = self._rows(instance("Path", "station", station, Station, "a station such as rod.end").rod)
-        cell, weights = self._rule.locate(self.layout.breaks[i], station.s / station.rod.length)
+        cell, weights = self.rule.locate(self.layout.breaks[i], station.s / station.rod.length)
         first = rows.start + cell * self.degree
         return np.einsum("j,njk->nk", weights, values[:, first : first + self.degree + 1])
-
-    # -- error -------------------------------------------------------------------------------------------------------
-
-    def estimate_error(self, coarse):
-        """Estimate this path's error from the same load factors on the mesh of elements twice as long.
-
-        The difference of the positions, at the coarse nodes and between them, over a share of the gain in accuracy
-        that one more halving brings (2^(p + 1) between the nodes): half of what was seen from the difference before to this one,
-        not more than 2^p; where there was none before, a quarter of 2^(p + 1), and that only if element ends,
-        whose order is 2 p, are seen to be ahead of what lies between them: an order must be seen before it is counted on.
-        Where hardly anything is displaced (a shaft in torsion), relative to the turning of the sections, or to a
-        billionth of the length. Without a contact force of its own (formulation 'displacement') a slender rod's
-        answer also feels the residual's rounding.
-        """
-        difference, at_ends = np.zeros(len(self)), np.zeros(len(self))
-        largest = np.full(len(self), 1e-9 * self.scales.length)
-        for i, rod in enumerate(self.scene.rods):
-            nodes = coarse.layout.node_s(coarse._rule.nodes)[i]
-            x = np.sort(np.concatenate([nodes, (nodes[:-1] + nodes[1:]) / 2]))
-            ends = np.isin(x, coarse.layout.breaks[i])
-            reference, rest = rod.curve.position(x * rod.length), rod.curve.frame(x * rod.length)
-            for k in range(len(self)):
-                a, frames = coarse.sample(k, rod, x)
-                off = np.linalg.norm(a - self.sample(k, rod, x)[0], axis=1)
-                difference[k] = max(difference[k], off.max())
-                at_ends[k] = max(at_ends[k], off[ends].max())
-                turned = np.linalg.norm(frames - rest, axis=(1, 2)).max() * _gyration(rod)
-                largest[k] = max(largest[k], np.linalg.norm(a - reference, axis=1).max(), turned)
-        self._difference = difference
-        p = self.degree
-        if coarse._difference is None:
-            ahead = difference > 4 * at_ends
-            gain = np.where(ahead, max(1.0, 2.0 ** (p - 1)), 1.0)
-        else:
-            seen = coarse._difference / np.maximum(difference, 1e-300)
-            gain = np.clip((seen - 1) / 2, 1, 2**p)
-        self._error = np.maximum(difference / largest / gain, self._rounding)
 
     def sample(self, k, rod, x):
         """Between the nodes, by the elements' polynomials, at point k.
@@ -287,38 +260,20 @@ class Path:
         Returns:
             positions (n, 3), m, and directors (n, 3, 3) as columns, both inertial.
         """
+        moved = self.motion(rod, x, [self._records[k]])[0]
+        s, q = np.asarray(x) * rod.length, moved[:, 3:]
+        return rod.curve.position(s) + moved[:, :3] * self.scales.length, directors(q) @ rod.curve.frame(s)
+
+    def motion(self, rod, x, records=None):
+        """(points, n, 7) displacement over `scales.length` and unit quaternion at arc lengths x (n,) over the rod's length."""
         i, rows = self._rows(rod)
-        cells, weights = self._rule.locate_all(self.layout.breaks[i], x)
+        cells, weights = self.rule.locate_all(self.layout.breaks[i], x)
         nodes = cells[:, None] * self.degree + np.arange(self.degree + 1)
-        record, s = self._records[k], np.asarray(x) * rod.length
-        moved = np.einsum("kj,kjc->kc", weights, (record.rq[rows, :3] - self._rest[rows])[nodes])
-        q = np.einsum("kj,kjc->kc", weights, record.rq[rows, 3:][nodes])
-        q /= np.linalg.norm(q, axis=1, keepdims=True)
-        return rod.curve.position(s) + moved * self.scales.length, directors(q) @ rod.curve.frame(s)
-
-    def resampled(self, k, layout):
-        """Point k on another mesh, as something to start from.
-
-        Returns:
-            (r, q) at the nodes (N, 7) and n at the Gauss points (elements, points, 3), dimensionless, inertial.
-        """
-        rule, record = self._rule, self._records[k]
-        motions, forces = [], []
-        for i, rod in enumerate(self.scene.rods):
-            rows, breaks = self._rows(rod)[1], self.layout.breaks[i]
-            x = layout.node_s(rule.nodes)[i]
-            cells, weights = rule.locate_all(breaks, x)
-            nodes = cells[:, None] * self.degree + np.arange(self.degree + 1)
-            moved = np.column_stack([record.rq[rows, :3] - self._rest[rows], record.rq[rows, 3:]])
-            values = np.einsum("kj,kjc->kc", weights, moved[nodes])
-            values[:, :3] += (rod.curve.position(x * rod.length) - self.scene.origin(rod)) / self.scales.length
-            values[:, 3:] /= np.linalg.norm(values[:, 3:], axis=1, keepdims=True)
-            motions.append(values)
-            inside = layout.inside(rule.gauss)[i]
-            cells, weights = rule.locate_all(breaks, inside.ravel(), rule.between_gauss)
-            n = record.gauss_fields[self._cells(i), :, :3][cells]
-            forces.append(np.einsum("kj,kjc->kc", weights, n).reshape(*inside.shape, 3))
-        return np.concatenate(motions), np.concatenate(forces)
+        nodal = np.array([record.rq[rows] for record in (self._records if records is None else records)])
+        nodal[:, :, :3] -= self._rest[rows]
+        moved = np.einsum("kj,nkjc->nkc", weights, nodal[:, nodes])
+        moved[:, :, 3:] /= np.linalg.norm(moved[:, :, 3:], axis=2, keepdims=True)
+        return moved
 
     # -- files and pictures ------------------------------------------------------------------------------------------
 
@@ -345,8 +300,3 @@ class Path:
 
         return plot.rods(self, file, points, magnify)
 
-
-def _gyration(rod):
-    """Largest radius of gyration sqrt(EI/EA) of a rod, m; 0 where EA is infinite."""
-    low, high = rod.profile.range
-    return float(np.sqrt(high.J[:2].max() / low.K[2]))

@@ -9,15 +9,18 @@ import numbers
 import numpy as np
 from mpi4py import MPI
 
+from cosserat_fenicsx.accuracy import on_mesh
 from cosserat_fenicsx.checks import instance
 from cosserat_fenicsx.continuation import StepControl
 from cosserat_fenicsx.errors import Interrupted, NotConverged, SceneError, nearest
 from cosserat_fenicsx.follow import CONTROLS, Follower
+from cosserat_fenicsx.interrupts import obey
 from cosserat_fenicsx.models.rodmesh import Layout
 from cosserat_fenicsx.models.shape import Shape
 from cosserat_fenicsx.models.spatial import SpatialModel
 from cosserat_fenicsx.problem import Problem
 from cosserat_fenicsx.progress import Progress
+from cosserat_fenicsx.refinement import refine
 from cosserat_fenicsx.results import Event, Path, Record
 from cosserat_fenicsx.scene import Scene
 from cosserat_fenicsx.snes import Newton
@@ -27,7 +30,8 @@ from cosserat_fenicsx.supports import Prescribed
 MODELS = ("auto", "spatial")
 #: Elements per rod of the first mesh, where the mesh is not given.
 FIRST_ELEMENTS = 4
-_MOST_ELEMENTS = 1024
+# A point is corrected from a coarser mesh in so many iterations, and moves and turns by no more than this (lengths, rad).
+_CORRECTIONS, _NEAR = 6, 0.1
 # Loads in units of EI/L^2 that point to a slip in the units.
 _ENORMOUS = 1e5
 
@@ -87,49 +91,22 @@ def solve(
     degree = default_degree(formulation) if degree is None else degree
     check_arguments(scene, model, tol, elements)
     steps = instance("solve", "steps", StepControl() if steps is None else steps, StepControl, "a StepControl")
-    run = functools.partial(
-        _run, scene, formulation=formulation, degree=degree, points=gauss_points, comm=comm,
-        follow=_follow_options(steps, control, branch), until=_until(until, free),
-    )  # fmt: skip
+    follow, until = _follow_options(steps, control, branch), _until(until, free)
+    how = dict(formulation=formulation, degree=degree, points=gauss_points, comm=comm)
+
+    def trace(layout, like=None):
+        """`like`: a path whose points are landed on, where the solver chose them."""
+        chosen = free and like is not None
+        etas = like.load_factors.tolist() if chosen else targets
+        return _trace(scene, etas, free and not chosen, layout, follow=follow, until=until, bar=bar, **how)
+
+    def correct(layout, coarse):
+        return None if coarse.events or until or not steps.adaptive else _correct(scene, coarse, layout, bar=bar, **how)
+
     with Progress(targets, progress, comm) as bar:
         if elements is not None:
-            return run(targets, free, Layout.of(scene, elements), bar=bar)
-        return _refine(run, targets, free, Layout.of(scene, FIRST_ELEMENTS), tol, degree, bar)
-
-
-def _refine(run, targets, free, layout, tol, degree, bar):
-    """Solve on finer and finer meshes until two of them agree to `tol`."""
-    coarse, failed, best = None, False, math.inf
-    while True:
-        elements = max(layout.counts)
-        try:
-            fine = run(targets, free, layout, bar=bar)
-        except NotConverged:
-            if failed or elements >= _MOST_ELEMENTS:
-                raise
-            failed, coarse = True, None
-        else:
-            failed = False
-            if free:  # the steps that one mesh chose are landed on by the finer ones
-                targets, free = fine.load_factors.tolist(), False
-            if coarse is not None:
-                fine.estimate_error(coarse)
-                reached = float(fine.error.max())
-                if reached <= tol:
-                    return fine
-                if elements >= _MOST_ELEMENTS or (reached > best and best < 1e-8):
-                    raise NotConverged(_not_accurate(tol, min(reached, best), elements, degree), fine)
-                best = min(best, reached)
-            coarse = fine
-        layout = layout.split(2)
-
-
-def _not_accurate(tol, reached, elements, degree):
-    advice = "a larger tol" if degree == 4 else "a larger tol, or degree 4"
-    return (
-        f"the accuracy tol = {tol:g} was not reached with {elements} elements of degree {degree} per rod: "
-        f"the estimated error stays at {reached:.2g}. Ask for {advice}."
-    )
+            return trace(Layout.of(scene, elements))
+        return refine(trace, correct, Layout.of(scene, FIRST_ELEMENTS), tol, degree)
 
 
 def _make_solvers(comm, shape):
@@ -158,8 +135,8 @@ def solvers_of(scene, layout, *, formulation="mixed", degree=4, points=None, com
     return problem, newton, stability
 
 
-def _run(scene, targets, free, layout, *, formulation, degree, points, follow, until, comm, bar):
-    """One path on one mesh."""
+def _trace(scene, targets, free, layout, *, formulation, degree, points, follow, until, comm, bar):
+    """One path on one mesh, stepping from the unloaded state."""
     problem, newton, stability = solvers_of(
         scene, layout, formulation=formulation, degree=degree, points=points, comm=comm
     )
@@ -180,7 +157,8 @@ def _run(scene, targets, free, layout, *, formulation, degree, points, follow, u
 
     def record(point):
         nonlocal counted
-        path.append(Record(point.load_factor, *model.snapshot(), point.negative_modes, track.iterations - counted))
+        path.append(Record(point.load_factor, *model.snapshot(), point.negative_modes, track.iterations - counted,
+                           problem.multipliers()))  # fmt: skip
         counted = track.iterations
         if until and until(path):
             raise _Enough
@@ -201,6 +179,35 @@ def _run(scene, targets, free, layout, *, formulation, degree, points, follow, u
                 record(track.here)
     except _Enough:
         pass
+    except KeyboardInterrupt:
+        raise Interrupted(path) from None
+    return path
+
+
+def _correct(scene, coarse, layout, *, formulation, degree, points, comm, bar):
+    """The points of a path on a finer mesh, each by Newton's method from the coarse one; None where one strays."""
+    problem, newton, stability = solvers_of(
+        scene, layout, formulation=formulation, degree=degree, points=points, comm=comm
+    )
+    model = problem.model
+    if not model.takes_motions:
+        return None
+    path = Path.of(model, formulation)
+    bar.start(f"{path.model}, {model.unknowns} unknowns")
+    newton.allow(_CORRECTIONS)
+    try:
+        for k, point in enumerate(coarse):
+            obey()
+            problem.set_load_factor(point.load_factor)
+            problem.begin_at(*on_mesh(coarse, k, layout), point.reactions)
+            start = problem.numbers()[0]
+            solved = newton.solve()
+            strayed = not solved.converged or model.largest(problem.numbers()[0] - start) > _NEAR
+            if strayed or stability.count() != point.negative_modes:
+                return None
+            path.append(Record(point.load_factor, *model.snapshot(), point.negative_modes, solved.iterations,
+                               problem.multipliers()))  # fmt: skip
+            bar.at(point)
     except KeyboardInterrupt:
         raise Interrupted(path) from None
     return path

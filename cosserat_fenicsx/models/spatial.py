@@ -27,6 +27,7 @@ class SpatialModel:
         before, step: the state before a Newton step and the step, for `advance`.
         carried: Functions advanced beside the unknowns: n at the Gauss points (condensed variant), or ().
         carries_force: whether n is more than a function of (r, q).
+        takes_motions: whether `set_motion` can start it from what another mesh found.
         load_factor: the Constant eta.
         forms: the `CompiledForms`.
         numbering, variation_numbering: the solver's unknowns, and those of the second variation in (r, theta).
@@ -68,6 +69,7 @@ class SpatialModel:
             self._carried_values = function.x.array.reshape(-1, 3)
             self._carried_nodes = compat.cell_nodes(function.function_space).ravel()
         self.carries_force = shape.variant in ("condensed", "field")
+        self.takes_motions = shape.variant != "multiplier"
         self.forms = compile_forms(self, self.rotations, *(self.carried or (None,)))
         self.rule = ElementRule(self.nodes, self.forms.gauss, self.forms.weights)
 
