@@ -1,4 +1,8 @@
-"""The tests' own truths, checked against closed forms, published numbers and the energy: bvp.py and random_scenes.py."""
+"""The tests' own truths against closed forms, published numbers and the energy: bvp.py and random_scenes.py."""
+
+import json
+import sys
+from pathlib import Path
 
 import bvp
 import numpy as np
@@ -79,7 +83,7 @@ def test_negative_modes_begin_at_the_critical_loads(J, critical, modes, shape):
 
 
 def energy(problem, x, q, first):
-    """Energy of rotations q(x) (n, 4), with r eliminated, by trapezoids of central differences: nothing of the strong form."""
+    """Energy of rotations q(x) (n, 4), r eliminated, by trapezoids of central differences: no strong form in it."""
     T = bvp.matrix(q.T) @ first
     h = (x[1] - x[0]) * problem.length
 
@@ -136,7 +140,7 @@ def test_what_is_not_reached_is_refused():
     with pytest.raises(bvp.NoTruth, match="did not converge"):
         bvp.at(problem, (300.0, -200.0, 100.0))
     with pytest.raises(bvp.NoTruth, match="differ by|maximum number"):
-        bvp.at(problem, bvp.equilibrium(problem).clamp_moment, tol=1e-13)
+        bvp.at(problem, bvp.equilibrium(problem).clamp_moment, tol=1e-13, nodes=1000)
 
 
 @pytest.mark.parametrize("seed", range(10))
@@ -150,3 +154,19 @@ def test_random_scenes_are_what_they_say(seed):
     assert found.accuracy < 1e-10 and found.folds == 0
     assert 20 <= drawn.slenderness <= 3e4 and max(drawn.J[:2]) <= 4 * min(drawn.J[:2])
     assert draw(seed) == drawn
+
+
+@pytest.mark.parametrize("name", ["critical_loads", "follower_force", "hinged_frame"])
+def test_reference_numbers_come_from_their_script(name, monkeypatch):
+    folder = Path(__file__).parent / "reference"
+    monkeypatch.setattr(sys, "path", [str(folder), *sys.path])
+    import make_statics
+
+    def numbers(entry):
+        if isinstance(entry, dict):
+            return [x for key, value in sorted(entry.items()) if key != "checks" for x in numbers(value)]
+        return [x for value in entry for x in numbers(value)] if isinstance(entry, list) else [entry]
+
+    made = numbers(getattr(make_statics, name)())
+    kept = numbers(json.loads((folder / "statics.json").read_text(encoding="utf-8"))[name])
+    assert made == [pytest.approx(x, rel=1e-9, abs=1e-9) if isinstance(x, float) else x for x in kept]
