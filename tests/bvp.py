@@ -1,9 +1,9 @@
 """An independent truth for one rod in space: the strong form, clamped at s = 0, under dead loads, on any reference.
 
-The path from the unloaded state is followed by arc length in the clamp's moment and the load factor (shooting with DOP853
-at 1e-7, derivatives by complex steps), its end is shot again at 1e-13, and scipy's solve_bvp (collocation) solves the same
-equations from there. What the last two differ by is the accuracy that is reported; where it is worse than was demanded,
-nothing is returned.
+The path from the unloaded state is followed by arc length in the clamp's moment and the load factor (shooting with
+DOP853 at 1e-7, derivatives by complex steps), its end is shot again at 1e-13, and scipy's solve_bvp (collocation)
+solves the same equations from there. What the last two differ by is the accuracy that is reported; where it is worse
+than was demanded, nothing is returned.
 """
 
 from dataclasses import dataclass, field

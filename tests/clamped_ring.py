@@ -1,7 +1,7 @@
-"""Zajac's ring (J. Appl. Mech. 29 (1962) 136): the twist at which a straight rod, bent to a ring, writhes out of its plane.
+"""Zajac's ring (J. Appl. Mech. 29 (1962) 136): the twist at which a straight rod, bent to a ring, leaves its plane.
 
-The rod of a round section and of length 2 pi R is bent to a circle and one end is turned about the tangent; both ends are
-clamped at the same place. The linear problem about the plane ring is shot from one end to the other.
+The rod of a round section and of length 2 pi R is bent to a circle and one end is turned about the tangent; both ends
+are clamped at the same place. The linear problem about the plane ring is shot from one end to the other.
 """
 
 import numpy as np
@@ -11,7 +11,7 @@ from scipy.optimize import minimize_scalar
 
 
 def singular_values(twist, torsion):
-    """Of the derivative of (closure, rotation of the end) by (n, m) of the start; R = EI = 1, GJ = torsion, twist in rad.
+    """Of the derivative of (closure, rotation of the end) by (n, m) of the start; R = EI = 1, GJ = torsion; rad.
 
     One of them is always 0: the ring turns about its tangent while its sections hold, as a round rod lets it.
     """

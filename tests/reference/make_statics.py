@@ -64,8 +64,9 @@ def bend_45():
                 }
             )
     about = (
-        "45-degree bend (Bathe & Bolourchi 1979): arc of radius 100 in the x-y plane, clamped at the origin with tangent x,"
-        " centre at (0, 100, 0); EA = 1e7, EI = 1e7/12, GA and GJ as given, dead load along z. Tip position, rotation q."
+        "45-degree bend (Bathe & Bolourchi 1979): arc of radius 100 in the x-y plane, clamped at the origin with "
+        "tangent x, centre at (0, 100, 0); EA = 1e7, EI = 1e7/12, GA and GJ as given, dead load along z. Tip "
+        "position, rotation q."
     )
     return {"about": about, "digits": 10, "checks": checks, "values": values}
 
@@ -95,8 +96,8 @@ def elastica():
             checks.append(check(f"Mattiasson's table, {load}", [w, u, angle], known[load], 6e-11))
         values.append({"load": load, "w": w, "u": u, "angle": angle})
     about = (
-        "Cantilever of length 1, EI = 1, inextensible, transverse dead tip force `load` = P L^2/EI (Mattiasson 1981):"
-        " w along the force, u towards the clamp, angle of the tip, by elliptic integrals."
+        "Cantilever of length 1, EI = 1, inextensible, transverse dead tip force `load` = P L^2/EI (Mattiasson "
+        "1981): w along the force, u towards the clamp, angle of the tip, by elliptic integrals."
     )
     return {"about": about, "digits": 11, "checks": checks, "values": values}
 
@@ -115,16 +116,16 @@ def helical_roll_up():
     known = (0.0048032, 0.0000725, -0.0764418)  # called a displacement there; it is the position from the clamp
     checks.append(check("REFERENCES, full load", values[-1]["position"], known, 1e-7))
     about = (
-        "Helical roll-up (Ibrahimbegovic 1997): straight rod from the origin along x, L = 10, EA = GA = 1e4, EI = GJ = 100,"
-        " dead tip force 50 f along z and dead tip moment 200 pi f about z, f = load_factor; tip position, rotation q,"
-        " moment in the clamp, inertial; on the branch of the unloaded state, which passes no limit point and no singular"
-        " tangent. accuracy: shooting against solve_bvp, length."
+        "Helical roll-up (Ibrahimbegovic 1997): straight rod from the origin along x, L = 10, EA = GA = 1e4, EI ="
+        " GJ = 100, dead tip force 50 f along z and dead tip moment 200 pi f about z, f = load_factor; tip "
+        "position, rotation q, moment in the clamp, inertial; on the branch of the unloaded state, which passes "
+        "no limit point and no singular tangent. accuracy: shooting against solve_bvp, length."
     )
     return {"about": about, "digits": 8, "checks": checks, "values": values}
 
 
 def pendulum(load, angle):
-    """Length of the inextensible rod whose tip has turned by an angle: phi'^2 = 2 P sin(phi) from the tip, up to pi and back."""
+    """Length of the inextensible rod whose tip turned by an angle: phi'^2 = 2 P sin(phi), up to pi and back."""
     half = beta(0.25, 0.5) / np.sqrt(2 * load)
 
     def until(a):  # phi = t^2 takes the singularity away
@@ -151,9 +152,9 @@ def follower_force():
             if not np.isfinite(section.EA):
                 checks.append(check(f"quadrature, {load}", pendulum(load, row["angle"]), 1.0, 1e-9))
     about = (
-        "Cantilever from the origin along x, L = EI = 1, follower tip force `load` = P L^2/EI along (-sin, cos)(angle), that is"
-        " perpendicular to the tip, towards +y at rest (as of Argyris & Symeonidis 1981); EA, GA as given; tip position and"
-        " rotation in the plane. Statics only: a follower force may flutter before."
+        "Cantilever from the origin along x, L = EI = 1, follower tip force `load` = P L^2/EI along (-sin, "
+        "cos)(angle), that is perpendicular to the tip, towards +y at rest (as of Argyris & Symeonidis 1981); EA,"
+        " GA as given; tip position and rotation in the plane. Statics only: a follower force may flutter before."
     )
     return {"about": about, "digits": 11, "checks": checks, "values": values}
 
@@ -196,9 +197,10 @@ def critical_loads():
         pair = (count(load * (1 - 1e-6)), count(load * (1 + 1e-6)))
         checks.append(check(f"conjugate points either side of {name}, 1e-6", pair, (0, 1), 0.5))
     about = (
-        "self_weight: q L^3/EI of a clamped-free column (Greenhill), root of J_-1/3; lateral: P L^2/sqrt(EI GJ) of a cantilever"
-        " of thin section under a tip force, root of J_-1/4 (the stiff bending infinite); beck: P L^2/EI of flutter under a"
-        " tangential tip force, and beck_frequency omega L^2 sqrt(rho A/EI), no rotary inertia, no shear."
+        "self_weight: q L^3/EI of a clamped-free column (Greenhill), root of J_-1/3; lateral: P L^2/sqrt(EI GJ) "
+        "of a cantilever of thin section under a tip force, root of J_-1/4 (the stiff bending infinite); beck: P "
+        "L^2/EI of flutter under a tangential tip force, and beck_frequency omega L^2 sqrt(rho A/EI), no rotary "
+        "inertia, no shear."
     )
     return {"about": about, "digits": 9, "checks": checks, "values": values}
 
@@ -210,10 +212,11 @@ def ring():
         found = critical_twist(torsion, 0.3 * free, 1.2 * free)
         checks.append(check(f"shooting of the clamped ring, GJ/EI = {torsion}", found / free, 1.0, 1e-9))
     about = (
-        "Zajac's ring (1962; Michell 1889): straight, round, inextensible and unshearable rod bent to a circle, both ends clamped"
-        " at one place, one of them turned about the tangent: the plane ring writhes at this twist times EI/GJ, rad. A clamped"
-        " ring and a free one have the same critical twist: a closed field less a rigid motion is a clamped field. The clamped"
-        " ring of a round rod may always turn about its tangent at the clamp (its sections hold): one mode of no stiffness."
+        "Zajac's ring (1962; Michell 1889): straight, round, inextensible and unshearable rod bent to a circle, "
+        "both ends clamped at one place, one of them turned about the tangent: the plane ring writhes at this "
+        "twist times EI/GJ, rad. A clamped ring and a free one have the same critical twist: a closed field less "
+        "a rigid motion is a clamped field. The clamped ring of a round rod may always turn about its tangent at "
+        "the clamp (its sections hold): one mode of no stiffness."
     )
     return {"about": about, "digits": 10, "checks": checks, "values": {"twist_GJ_over_EI": 2 * np.pi * np.sqrt(3)}}
 
