@@ -59,6 +59,24 @@ def test_straight_rods_are_those_of_the_other_truth():
             np.testing.assert_allclose(values[:, 0], other(s)[name], atol=1e-9)
 
 
+def test_line_moments_and_stiffness_that_varies():
+    """A torque per length on GJ = 1/(1 + s), and a pull on EA = 40/(1 + 3 s): twist and stretch in closed form."""
+
+    def J(s):
+        return np.array([1 + 0 * s, 2 + 0 * s, 1 / (1 + s)]).T
+
+    def K(s):
+        return np.array([30 + 0 * s, 30 + 0 * s, 40 / (1 + 3 * s)]).T
+
+    problem = bvp.Problem(2.0, straight, K, J, force=(0, 0, 0.8), line_moment=(0, 0, 0.3))
+    found = bvp.equilibrium(problem)
+    s = np.array([0.5, 2.0])
+    twist = 0.3 * (2 * s + s**2 / 2 - s**3 / 3)  # of 0.3 (2 - s)(1 + s)
+    np.testing.assert_allclose(found(s)["q"][3], np.sin(twist / 2), atol=1e-12)
+    np.testing.assert_allclose(found(s)["r"][2], s + 0.8 / 40 * (s + 1.5 * s**2), atol=1e-12)
+    assert found.index is None
+
+
 @pytest.mark.parametrize(
     "J, critical, modes, shape",
     [
