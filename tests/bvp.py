@@ -1,9 +1,9 @@
-"""An independent truth for one rod in space: the strong form, clamped at s = 0 and loaded by dead loads, on any reference.
+"""An independent truth for one rod in space: the strong form, clamped at s = 0, under dead loads, on any reference.
 
-Three of scipy's solvers work here: the path from the unloaded state is followed by arc length in the clamp's moment and the
-load factor (shooting with DOP853 at 1e-7, derivatives by complex steps), its end is shot again at 1e-13, and solve_bvp
-(collocation) solves the same equations from there. What the last two differ by is the accuracy that is reported; where it is
-worse than was demanded, nothing is returned.
+The path from the unloaded state is followed by arc length in the clamp's moment and the load factor (shooting with
+DOP853 at 1e-7, derivatives by complex steps), its end is shot again at 1e-13, and scipy's solve_bvp (collocation)
+solves the same equations from there. What the last two differ by is the accuracy that is reported; where it is worse
+than was demanded, nothing is returned.
 """
 
 from dataclasses import dataclass, field
@@ -20,9 +20,9 @@ class Equilibrium:
     """What was found, and how far it may be believed.
 
     accuracy: largest difference of r over L (and of q) between shooting and solve_bvp; nodes, rms: of solve_bvp.
-    folds: limit points that the path from the unloaded state passed; crossings: steps of 1e-5 or less in which the determinant
-    of the tangent changed its sign or negative modes came or went, limit points among them. index: negative modes of the
-    (symmetric part of the) second variation; None under a line moment.
+    folds: limit points that the path from the unloaded state passed; crossings: steps of 1e-5 or less in which the
+    determinant of the tangent changed its sign or negative modes came or went, limit points among them. index: negative
+    modes of the (symmetric part of the) second variation; None under a line moment.
     """
 
     problem: Problem
@@ -40,9 +40,9 @@ class Equilibrium:
     def verdict(self):
         """In words, how sure it is that careful load stepping from the unloaded state arrives here.
 
-        "connected": the path met no singular tangent and ends stable; "connected, indefinite": the same, but a dead moment
-        makes the symmetric part indefinite, which decides nothing; "beyond a bifurcation" or "beyond a limit point": other
-        equilibria are as good an answer; "near a clamp moment": no path was followed.
+        "connected": the path met no singular tangent and ends stable; "connected, indefinite": the same, but a dead
+        moment makes the symmetric part indefinite, which decides nothing; "beyond a bifurcation" or "beyond a limit
+        point": other equilibria are as good an answer; "near a clamp moment": no path was followed.
         """
         if len(self.path) == 1:
             return "near a clamp moment"
@@ -67,10 +67,10 @@ def tangent(D, before):
 
 
 def correct(problem, z, normal, rtol, tol, limit=6):
-    """Newton on the end condition and normal . (z - z0) = 0; returns z, derivative and number of iterations, or None."""
+    """Newton on the end condition and normal . (z - z0) = 0; (z, derivative, number of iterations) or None."""
     z0 = z.copy()
     for k in range(limit):
-        G, D, _ = problem.misfit(z, rtol)
+        G, D = problem.misfit(z, rtol)
         step = np.linalg.solve(np.vstack([D, normal]), -np.r_[G, normal @ (z - z0)])
         z = z + step
         if not np.all(np.isfinite(z)):
@@ -87,7 +87,7 @@ def follow(problem, most=400, rtol=1e-7):
         rows (clamp moment, load factor), number of limit points, number of singular tangents (limit points among them).
     """
     z = np.zeros(4)
-    _, D, _ = problem.misfit(z, rtol)
+    _, D = problem.misfit(z, rtol)
     t = tangent(D, np.array([0, 0, 0, 1.0]))
     path, folds, crossings, ds = [z], 0, 0, 0.25
     character = (1.0, 0)
@@ -133,8 +133,8 @@ def follow(problem, most=400, rtol=1e-7):
     raise NoTruth(f"the path stopped at load factor {z[3]:.4f} after {len(path)} points and {folds} limit points")
 
 
-def at(problem, clamp_moment, path=None, folds=0, crossings=0, tol=1e-10):
-    """The equilibrium at full load nearest to a clamp moment (3,) N m, or the end of a path, to the accuracy demanded."""
+def at(problem, clamp_moment, path=None, folds=0, crossings=0, tol=1e-10, nodes=20000):
+    """The equilibrium at full load nearest to a clamp moment (3,) N m, or the end of a path, to the accuracy tol."""
     z = np.r_[np.asarray(clamp_moment) / problem.units["moment"], 1.0]
     found = correct(problem, z, np.array([0, 0, 0, 1.0]), 1e-13, 1e-9)
     if found is None:
@@ -148,20 +148,36 @@ def at(problem, clamp_moment, path=None, folds=0, crossings=0, tol=1e-10):
     def ends(a, b):
         return np.r_[a[:7] - START, b[7:10] - problem.end_moment(b[3:7, None], 1.0)[:, 0]]
 
-    solved = solve_bvp(lambda s, v: problem.slope(s, v, 1.0), ends, x, shot.sol(x), tol=100 * tol, bc_tol=0.01 * tol, max_nodes=5000)  # fmt: skip
+    solved = solve_bvp(
+        lambda s, v: problem.slope(s, v, 1.0),
+        ends,
+        x,
+        shot.sol(x),
+        tol=100 * tol,  # of the residual; what is solved for is two orders better
+        bc_tol=0.01 * tol,
+        max_nodes=nodes,
+    )
     if not solved.success:
         raise NoTruth(f"solve_bvp: {solved.message}")
     x = np.linspace(0, 1, 301)
     difference = float(np.abs(solved.sol(x)[:7] - shot.sol(x)[:7]).max())
     if not difference <= tol:
         raise NoTruth(f"shooting and solve_bvp differ by {difference:.1e} of the length, asked was {tol:.1e}")
-    modes = None if np.any(problem.dimensionless["mu"]) else index(problem, z)
-    rms, nodes = float(solved.rms_residuals.max()), len(solved.x)
-    path = np.array([z]) if path is None else path
-    return Equilibrium(problem, difference, nodes, rms, folds, crossings, modes, z[:3] * problem.units["moment"], path, shot.sol)  # fmt: skip
+    return Equilibrium(
+        problem,
+        difference,
+        nodes=len(solved.x),
+        rms=float(solved.rms_residuals.max()),
+        folds=folds,
+        crossings=crossings,
+        index=None if np.any(problem.dimensionless["mu"]) else index(problem, z),
+        clamp_moment=z[:3] * problem.units["moment"],
+        path=np.array([z]) if path is None else path,
+        dense=shot.sol,
+    )
 
 
 def equilibrium(problem, tol=1e-10):
-    """Where the branch of the unloaded state first comes to full load. Raises NoTruth where it does not, or not to tol."""
+    """Where the branch of the unloaded state first comes to full load; NoTruth where it does not, or not to tol."""
     path, folds, crossings = follow(problem)
     return at(problem, path[-1][:3] * problem.units["moment"], path, folds, crossings, tol)

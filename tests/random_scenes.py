@@ -1,6 +1,6 @@
 """Random scenes of one clamped rod in space, as plain numbers: for the package, and for the truth in bvp.py.
 
-Run as a script it solves them all by bvp.py and prints what was found: python tests/random_scenes.py [how many] [first seed].
+As a script it solves them all by bvp.py and prints what was found: python tests/random_scenes.py [how many] [first].
 """
 
 import sys

@@ -1,4 +1,8 @@
-"""The tests' own truths, checked against closed forms, published numbers and the energy: bvp.py and random_scenes.py."""
+"""The tests' own truths against closed forms, published numbers and the energy: bvp.py and random_scenes.py."""
+
+import json
+import sys
+from pathlib import Path
 
 import bvp
 import numpy as np
@@ -55,6 +59,24 @@ def test_straight_rods_are_those_of_the_other_truth():
             np.testing.assert_allclose(values[:, 0], other(s)[name], atol=1e-9)
 
 
+def test_line_moments_and_stiffness_that_varies():
+    """A torque per length on GJ = 1/(1 + s), and a pull on EA = 40/(1 + 3 s): twist and stretch in closed form."""
+
+    def J(s):
+        return np.array([1 + 0 * s, 2 + 0 * s, 1 / (1 + s)]).T
+
+    def K(s):
+        return np.array([30 + 0 * s, 30 + 0 * s, 40 / (1 + 3 * s)]).T
+
+    problem = bvp.Problem(2.0, straight, K, J, force=(0, 0, 0.8), line_moment=(0, 0, 0.3))
+    found = bvp.equilibrium(problem)
+    s = np.array([0.5, 2.0])
+    twist = 0.3 * (2 * s + s**2 / 2 - s**3 / 3)  # of 0.3 (2 - s)(1 + s)
+    np.testing.assert_allclose(found(s)["q"][3], np.sin(twist / 2), atol=1e-12)
+    np.testing.assert_allclose(found(s)["r"][2], s + 0.8 / 40 * (s + 1.5 * s**2), atol=1e-12)
+    assert found.index is None
+
+
 @pytest.mark.parametrize(
     "J, critical, modes, shape",
     [
@@ -79,7 +101,7 @@ def test_negative_modes_begin_at_the_critical_loads(J, critical, modes, shape):
 
 
 def energy(problem, x, q, first):
-    """Energy of rotations q(x) (n, 4), with r eliminated, by trapezoids of central differences: nothing of the strong form."""
+    """Energy of rotations q(x) (n, 4), r eliminated, by trapezoids of central differences: no strong form in it."""
     T = bvp.matrix(q.T) @ first
     h = (x[1] - x[0]) * problem.length
 
@@ -136,7 +158,7 @@ def test_what_is_not_reached_is_refused():
     with pytest.raises(bvp.NoTruth, match="did not converge"):
         bvp.at(problem, (300.0, -200.0, 100.0))
     with pytest.raises(bvp.NoTruth, match="differ by|maximum number"):
-        bvp.at(problem, bvp.equilibrium(problem).clamp_moment, tol=1e-13)
+        bvp.at(problem, bvp.equilibrium(problem).clamp_moment, tol=1e-13, nodes=1000)
 
 
 @pytest.mark.parametrize("seed", range(10))
@@ -150,3 +172,19 @@ def test_random_scenes_are_what_they_say(seed):
     assert found.accuracy < 1e-10 and found.folds == 0
     assert 20 <= drawn.slenderness <= 3e4 and max(drawn.J[:2]) <= 4 * min(drawn.J[:2])
     assert draw(seed) == drawn
+
+
+@pytest.mark.parametrize("name", ["critical_loads", "follower_force", "hinged_frame"])
+def test_reference_numbers_come_from_their_script(name, monkeypatch):
+    folder = Path(__file__).parent / "reference"
+    monkeypatch.setattr(sys, "path", [str(folder), *sys.path])
+    import make_statics
+
+    def numbers(entry):
+        if isinstance(entry, dict):
+            return [x for key, value in sorted(entry.items()) if key != "checks" for x in numbers(value)]
+        return [x for value in entry for x in numbers(value)] if isinstance(entry, list) else [entry]
+
+    made = numbers(getattr(make_statics, name)())
+    kept = numbers(json.loads((folder / "statics.json").read_text(encoding="utf-8"))[name])
+    assert made == [pytest.approx(x, rel=1e-9, abs=1e-9) if isinstance(x, float) else x for x in kept]
