@@ -2,6 +2,9 @@
 
 import numpy as np
 
+# Positions differ by this much from rounding alone (lengths), at rest too, where nothing is displaced.
+_ROUNDING = 1e-14
+
 
 def estimate_error(fine, coarse, before=None):
     """Estimate the error of a path from the same points on the mesh of elements twice as long; sets `fine.error`.
@@ -29,7 +32,7 @@ def estimate_error(fine, coarse, before=None):
         # |R - 1| = sqrt(8) |sin(angle/2)|
         turned = np.sqrt(8) * np.linalg.norm(moved[:, :, 4:], axis=2).max(axis=1) * _gyration(rod) / fine.scales.length
         largest = np.maximum(largest, np.maximum(np.linalg.norm(moved[:, :, :3], axis=2).max(axis=1), turned))
-    relative, p = difference / np.maximum(largest, 1e-9), fine.degree
+    relative, p = np.maximum(difference - _ROUNDING, 0.0) / np.maximum(largest, 1e-9), fine.degree
     if before is None:
         gain = np.where(difference > 4 * at_ends, max(1.0, 2.0 ** (p - 1)), 1.0)
     else:
