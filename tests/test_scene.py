@@ -126,9 +126,9 @@ def test_not_converged_keeps_the_partial_path():
 
 
 def test_accuracy_that_cannot_be_met_is_refused(monkeypatch):
-    from cosserat_fenicsx import statics
+    from cosserat_fenicsx import refinement
 
-    monkeypatch.setattr(statics, "_MOST_ELEMENTS", 8)
+    monkeypatch.setattr(refinement, "_MOST_ELEMENTS", 8)
     _, scene = column()
     with pytest.raises(cf.NotConverged, match="the accuracy tol = 1e-06 was not reached with 8 elements") as refusal:
         cf.solve(scene, [1.5], degree=1)
