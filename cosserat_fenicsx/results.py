@@ -1,6 +1,6 @@
 """Results as arrays with named fields, in SI units. Knows no solver; files and pictures are made by other rooms."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -14,11 +14,14 @@ from cosserat_fenicsx.rod import Station
 
 @dataclass(frozen=True)
 class Record:
-    """One equilibrium, dimensionless: (r, q) at the nodes (N, 7), (n, m, r') at the Gauss points (cells, points, 9)."""
+    """One equilibrium, dimensionless: (r, q) at the nodes (N, 7), (n, m, r') at the Gauss points (cells, points, 9).
+
+    A record that is appended to a path may hold its model's own numbers instead, which the path's `expand` turns into these.
+    """
 
     load_factor: float
     rq: np.ndarray
-    gauss_fields: np.ndarray
+    gauss_fields: np.ndarray | None
     negative_modes: int
     iterations: int
 
@@ -40,23 +43,22 @@ class Path:
     Station queries return one row a point, in inertial components unless they say material.
     """
 
-    def __init__(self, scene, layout, scales, rule, *, comm, rounding, model, formulation, degree, unknowns, why):
+    def __init__(self, scene, layout, scales, rule, *, comm, rounding, model, formulation, degree, unknowns, why,
+                 expand):  # fmt: skip
         self.scene, self.layout, self.scales, self._rule, self.comm = scene, layout, scales, rule, comm
         self.model, self.formulation, self.degree, self.unknowns = model, formulation, degree, unknowns
         self.elements, self.why = layout.counts, why
-        self._records, self._rounding = [], rounding
+        self._expand, self._expanded, self._appended, self._rounding = expand, [], [], rounding
         self._error = self._difference = None
 
     @classmethod
-    def of(cls, model, formulation):
-        """An empty path for the scene that a model was loaded with."""
-        why = [
-            "the spatial rod takes any scene",
-            {
-                "condensed": "the contact force is carried at the Gauss points (formulation 'mixed')",
-                "field": "a stiffness is infinite or next to it, so the contact force is an unknown (formulation 'mixed')",
-            }.get(model.shape.variant, f"formulation '{formulation}' was asked for"),
-        ]
+    def of(cls, model, formulation, why=()):
+        """An empty path for the scene that a model was loaded with; `why` are sentences on the choice of the model."""
+        variant = {
+            "condensed": "the contact force is carried at the Gauss points (formulation 'mixed')",
+            "field": "a stiffness is infinite or next to it, so the contact force is an unknown (formulation 'mixed')",
+            "known": "the contact force is known beforehand (formulation 'mixed')",
+        }.get(model.shape.variant, f"formulation '{formulation}' was asked for")
         return cls(
             model.scene,
             model.layout,
@@ -68,23 +70,38 @@ class Path:
             formulation=formulation,
             degree=model.shape.degree,
             unknowns=model.unknowns,
-            why=why,
+            why=[*why, variant],
+            expand=model.expansion(),
         )
 
     def append(self, record):
         """Add a converged point."""
-        self._records.append(record)
-        self.__dict__.pop("_contact", None)
+        self._appended.append(record)
+        for name in ("_contact", "_all_rq"):
+            self.__dict__.pop(name, None)
+
+    @property
+    def _records(self):
+        """All records, in space."""
+        if self._appended:
+            new, self._appended = self._appended, []
+            gauss = None if new[0].gauss_fields is None else np.array([x.gauss_fields for x in new])
+            etas = np.array([x.load_factor for x in new])
+            rq, fields = self._expand(etas, np.array([x.rq for x in new]), gauss)
+            self._expanded += [
+                replace(x, rq=a, gauss_fields=b) for x, a, b in zip(new, rq, fields, strict=True)
+            ]
+        return self._expanded
 
     def __len__(self):
-        return len(self._records)
+        return len(self._expanded) + len(self._appended)
 
     def __repr__(self):
         reach = f"load factors {self.load_factors[0]:g} .. {self.load_factors[-1]:g}" if len(self) else "empty"
         return f"<Path: {len(self)} points, {reach}, {self.model}, {self.unknowns} unknowns>"
 
     def _array(self, name):
-        return np.array([getattr(record, name) for record in self._records])
+        return np.array([getattr(record, name) for record in (*self._expanded, *self._appended)])
 
     load_factors = property(lambda self: self._array("load_factor").astype(float))
     iterations = property(lambda self: self._array("iterations").astype(int))
@@ -171,7 +188,7 @@ class Path:
              for k in range(len(self))]
         )  # fmt: skip
 
-    @property
+    @cached_property
     def _all_rq(self):
         """(points, nodes, 7) r and q, dimensionless."""
         return np.array([record.rq for record in self._records]).reshape(len(self), -1, 7)
@@ -229,18 +246,16 @@ class Path:
         """
         difference = np.zeros(len(self))
         largest = np.full(len(self), 1e-9 * self.scales.length)
+        everywhere = slice(None)
         for i, rod in enumerate(self.scene.rods):
             nodes = coarse.layout.node_s(coarse._rule.nodes)[i]
             x = np.sort(np.concatenate([nodes, (nodes[:-1] + nodes[1:]) / 2]))
-            reference = rod.curve.position(x * rod.length)
-            for k in range(len(self)):
-                a, frames = coarse.sample(k, rod, x)
-                b, _ = self.sample(k, rod, x)
-                difference[k] = max(difference[k], np.linalg.norm(a - b, axis=1).max())
-                turned = (
-                    np.linalg.norm(frames - rod.curve.frame(x * rod.length), axis=(1, 2)).max() * _gyration(rod)
-                )
-                largest[k] = max(largest[k], np.linalg.norm(a - reference, axis=1).max(), turned)
+            a, frames = coarse.sample(everywhere, rod, x)
+            b, _ = self.sample(everywhere, rod, x)
+            moved = np.linalg.norm(a - rod.curve.position(x * rod.length), axis=2).max(axis=1)
+            turned = np.linalg.norm(frames - rod.curve.frame(x * rod.length), axis=(2, 3)).max(axis=1)
+            difference = np.maximum(difference, np.linalg.norm(a - b, axis=2).max(axis=1))
+            largest = np.maximum(np.maximum(largest, moved), turned * _gyration(rod))
         self._difference = difference
         gain = 1.0
         if coarse._difference is not None:
@@ -249,24 +264,27 @@ class Path:
         self._error = np.maximum(difference / largest / gain, self._rounding)
 
     def sample(self, k, rod, x):
-        """Between the nodes, by the elements' polynomials, at point k.
+        """Between the nodes, by the elements' polynomials, at point k or at a slice of points.
 
         Args:
-            k: the point.
+            k: the point, or a slice.
             rod: the rod.
             x: arc lengths (n,) over the rod's length, in [0, 1].
 
         Returns:
-            positions (n, 3), m, and directors (n, 3, 3) as columns, both inertial.
+            positions (n, 3), m, and directors (n, 3, 3) as columns, both inertial; with the points first for a slice.
         """
         i, rows = self._rows(rod)
         cells, weights = self._rule.locate_all(self.layout.breaks[i], x)
+        between = np.zeros((len(x), rows.stop - rows.start))
         nodes = cells[:, None] * self.degree + np.arange(self.degree + 1)
-        record, s = self._records[k], np.asarray(x) * rod.length
-        moved = np.einsum("kj,kjc->kc", weights, (record.rq[rows, :3] - self._rest[rows])[nodes])
-        q = np.einsum("kj,kjc->kc", weights, record.rq[rows, 3:][nodes])
-        q /= np.linalg.norm(q, axis=1, keepdims=True)
-        return rod.curve.position(s) + moved * self.scales.length, directors(q) @ rod.curve.frame(s)
+        np.put_along_axis(between, nodes, weights, axis=1)
+        rq, s = self._all_rq[k, rows], np.asarray(x) * rod.length
+        moved = between @ (rq[..., :3] - self._rest[rows])
+        q = between @ rq[..., 3:]
+        q /= np.linalg.norm(q, axis=-1, keepdims=True)
+        turn = directors(q.reshape(-1, 4)).reshape(*q.shape[:-1], 3, 3)
+        return rod.curve.position(s) + moved * self.scales.length, turn @ rod.curve.frame(s)
 
     # -- files and pictures ------------------------------------------------------------------------------------------
 

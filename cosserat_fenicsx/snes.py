@@ -53,7 +53,7 @@ class Newton:
         snes.setConvergenceTest(self._test)
         ksp = snes.getKSP()
         ksp.setType("preonly")
-        linear.factor_tangent(ksp.getPC(), problem.A)
+        linear.factor_tangent(ksp.getPC(), problem.A, model.tangent)
         # petsc4py 3.18 cannot reach the line search but by an option.
         option, options = f"cosserat_{id(self):x}_snes_linesearch_type", PETSc.Options()
         snes.setOptionsPrefix(option.removesuffix("snes_linesearch_type"))

@@ -10,8 +10,11 @@ import numpy as np
 from mpi4py import MPI
 
 from cosserat_fenicsx.checks import instance
+from cosserat_fenicsx.choose import choose
 from cosserat_fenicsx.continuation import Continuation, StepControl
-from cosserat_fenicsx.errors import Interrupted, NotConverged, SceneError, nearest
+from cosserat_fenicsx.errors import Interrupted, NotConverged, SceneError
+from cosserat_fenicsx.models.determinate import DeterminateModel
+from cosserat_fenicsx.models.planar import PlanarModel
 from cosserat_fenicsx.models.rodmesh import Layout
 from cosserat_fenicsx.models.shape import Shape
 from cosserat_fenicsx.models.spatial import SpatialModel
@@ -23,7 +26,7 @@ from cosserat_fenicsx.snes import Newton
 from cosserat_fenicsx.stability import NegativeModes
 from cosserat_fenicsx.supports import Prescribed
 
-MODELS = ("auto", "spatial")
+_MODELS = {model.name: model for model in (DeterminateModel, PlanarModel, SpatialModel)}
 #: Elements per rod of the first mesh, where the mesh is not given.
 FIRST_ELEMENTS = 4
 _MOST_ELEMENTS = 1024
@@ -51,7 +54,8 @@ def solve(
         scene: a `Scene`.
         load_factors: a list or array, landed on exactly in its order; or a pair (a, b), a tuple, between which the
             solver chooses its steps; or one number.
-        model: "auto" or "spatial".
+        model: "auto" takes the cheapest one that is enough, and goes to "spatial" where a planar answer buckles sideways;
+            "determinate", "planar" or "spatial" is that one.
         formulation: "mixed" (default), "displacement" or "multiplier"; see the README.
         tol: largest estimated error of the positions along the rods, relative to the largest displacement of the
             scene at that load factor. Elements are refined until it is met, unless `elements` is given.
@@ -74,15 +78,32 @@ def solve(
     targets, free = _targets(load_factors)
     formulation = "mixed" if formulation is None else formulation
     degree = default_degree(formulation) if degree is None else degree
-    check_arguments(scene, model, tol, elements)
+    check_arguments(scene, tol, elements)
+    choice = choose(scene, model=model, formulation=formulation, degree=degree, points=gauss_points)
     steps = instance("solve", "steps", StepControl() if steps is None else steps, StepControl, "a StepControl")
     run = functools.partial(
         _run, scene, formulation=formulation, degree=degree, points=gauss_points, steps=steps, comm=comm
     )
     with Progress(targets, progress, comm) as bar:
-        if elements is not None:
-            return run(targets, free, Layout.of(scene, elements), bar=bar)
-        return _refine(run, targets, free, Layout.of(scene, FIRST_ELEMENTS), tol, degree, bar)
+
+        def take(choice):
+            if elements is not None:
+                return run(targets, free, Layout.of(scene, elements), choice=choice, bar=bar)
+            chosen = functools.partial(run, choice=choice)
+            return _refine(chosen, targets, free, Layout.of(scene, FIRST_ELEMENTS), tol, degree, bar)
+
+        try:
+            return take(choice)
+        except _Sideways as buckled:
+            return take(choice.sideways(buckled.load_factor))
+
+
+class _Sideways(Exception):
+    """A planar answer that was to be promoted is unstable against motions out of its plane."""
+
+    def __init__(self, load_factor):
+        super().__init__(load_factor)
+        self.load_factor = load_factor
 
 
 def _refine(run, targets, free, layout, tol, degree, bar):
@@ -122,7 +143,7 @@ def _not_accurate(tol, reached, elements, degree):
 
 def _make_solvers(comm, shape):
     """Problem, Newton solver and stability count of a shape."""
-    model = SpatialModel(comm, shape)
+    model = _MODELS[shape.model](comm, shape)
     problem = Problem(model)
     return problem, Newton(problem), NegativeModes(problem)
 
@@ -133,10 +154,10 @@ def _kept_solvers(alone, shape):
     return _make_solvers(MPI.COMM_SELF if alone else MPI.COMM_WORLD, shape)
 
 
-def solvers_of(scene, layout, *, formulation="mixed", degree=4, points=None, comm=None):
+def solvers_of(scene, layout, *, formulation="mixed", degree=4, points=None, comm=None, model="spatial"):
     """The loaded problem, Newton solver and stability count for a scene on a given mesh, as `solve` uses them."""
     comm = comm or MPI.COMM_WORLD
-    shape = Shape.of(scene, layout, formulation=formulation, degree=degree, points=points)
+    shape = Shape.of(scene, layout, formulation=formulation, degree=degree, points=points, model=model)
     if comm in (MPI.COMM_WORLD, MPI.COMM_SELF):
         problem, newton, stability = _kept_solvers(comm == MPI.COMM_SELF, shape)
     else:  # a user's communicator may be freed, and its handle given to another
@@ -146,16 +167,21 @@ def solvers_of(scene, layout, *, formulation="mixed", degree=4, points=None, com
     return problem, newton, stability
 
 
-def _run(scene, targets, free, layout, *, formulation, degree, points, steps, comm, bar):
+def _run(scene, targets, free, layout, *, formulation, degree, points, steps, comm, choice, bar):
     """One path on one mesh."""
     problem, newton, stability = solvers_of(
-        scene, layout, formulation=formulation, degree=degree, points=points, comm=comm
+        scene, layout, formulation=formulation, degree=degree, points=points, comm=comm, model=choice.model
     )
     continuation = Continuation(problem, newton, stability, steps)
-    path = Path.of(problem.model, formulation)
+    path = Path.of(problem.model, formulation, choice.why)
     bar.start(f"{path.model}, {problem.model.unknowns} unknowns")
     way = max(abs(eta) for eta in targets) or 1.0
     counted = 0
+
+    def watch(point):
+        if choice.promoted and stability.sideways:
+            raise _Sideways(point.load_factor)
+        bar.at(point)
 
     def record(point):
         nonlocal counted
@@ -166,7 +192,7 @@ def _run(scene, targets, free, layout, *, formulation, degree, points, steps, co
     try:
         for k, target in enumerate(targets):
             between = free and k == 1
-            on_step = (lambda point: (record(point), bar.at(point))) if between else bar.at
+            on_step = (lambda point: (watch(point), record(point))) if between else watch
             if not continuation.to(target, way, on_step=on_step):
                 here = continuation.here.load_factor
                 raise NotConverged(
@@ -214,7 +240,7 @@ def default_degree(formulation):
     return 4 if formulation == "mixed" else 2
 
 
-def check_arguments(scene, model, tol, elements):
+def check_arguments(scene, tol, elements):
     """Refuse arguments of `solve` outside their range.
 
     Raises:
@@ -226,8 +252,6 @@ def check_arguments(scene, model, tol, elements):
         raise SceneError(
             "Scene.loads is empty: expected at least one load, such as Force(rod.end, (0, 0, -1)), or a Prescribed motion"
         )
-    if model not in MODELS:
-        raise SceneError(f"model = {model!r}: {nearest(model, MODELS)}")
     if isinstance(tol, bool) or not isinstance(tol, numbers.Real) or not 1e-12 <= tol < 1:
         raise SceneError(f"tol = {tol!r}: expected a number from 1e-12 to below 1")
     if elements is not None and (
