@@ -71,11 +71,12 @@ class TieRows:
         nodes = self.rows.ravel()
         size = len(nodes)
         of_nodes = np.einsum("kda,kalb,lbe->kdle", test, change, trial).reshape(size, size)
-        A.setValues(nodes, nodes, of_nodes, _ADD)
+        A.setValues(nodes, nodes, np.ascontiguousarray(of_nodes), _ADD)
         reactions = np.einsum("kda,ika->kdi", test, gradient).reshape(size, -1)
         equations = np.einsum("ikb,kbe->ike", gradient, trial).reshape(-1, size)
-        A.setValues(nodes, self._multipliers, reactions, _ADD)
-        A.setValues(self._multipliers, nodes, equations, _ADD)
+        # in C's order: petsc4py takes the numbers as they lie in memory
+        A.setValues(nodes, self._multipliers, np.ascontiguousarray(reactions), _ADD)
+        A.setValues(self._multipliers, nodes, np.ascontiguousarray(equations), _ADD)
         for rows, value in ((self._multipliers, 0.0), (self._idle, 1.0)):
             for i in rows:
                 A.setValue(i, i, value, _ADD)
@@ -95,4 +96,5 @@ class TieRows:
         gradient = np.einsum("ika,da->ikd", gradient, axes).reshape(len(gradient), -1)
         change = np.einsum("kalb,da,eb->kdle", change, axes, axes).reshape(rows.size, rows.size)
         nodes = rows.ravel().astype(PETSc.IntType)
-        K.setValues(nodes, nodes, _HELD * gradient.T @ gradient + 0.5 * (change + change.T), _ADD)
+        held = _HELD * gradient.T @ gradient + 0.5 * (change + change.T)
+        K.setValues(nodes, nodes, np.ascontiguousarray(held), _ADD)

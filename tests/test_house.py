@@ -39,8 +39,8 @@ def test_forms_know_ufl_alone():
 
 
 SCENE = (
-    "checks", "curves", "errors", "frames", "joints", "loads", "materials", "polylines", "profiles", "quadrature", "rod", "scene",
-    "scenefile", "sections", "splines", "statical", "supports", "ties",
+    "checks", "choose", "curves", "errors", "frames", "joints", "loads", "materials", "planes", "polylines", "profiles", "quadrature", "rod",
+    "scene", "scenefile", "sections", "splines", "statical", "supports", "ties",
 )  # fmt: skip
 SOLVERS = ("continuation", "interrupts", "linear", "problem", "snes", "stability", "statics", "tie_rows")
 RESULTS = ("plot", "ranks", "recovery", "results", "tables", "xdmf")

@@ -35,6 +35,7 @@ class RodModel:
         numbering: the solver's unknowns.
         second_variations: the `SecondVariation`s whose negative squares add up; those in (displacement, rotation) of
             the scene that is loaded have its axes.
+        variation_spaces: the spaces of their forms.
         ties: the `Ties` of the scene, or None.
         scales: the `Scales` of the scene that is loaded.
         axes: (3, 3) rows: the inertial directions that vectors have components along.
@@ -108,7 +109,7 @@ class RodModel:
         others = self._elements(p)
         if others:
             self.space = compat.function_space(self.mesh, compat.mixed(element, *others))
-        spaces = [
+        spaces = self.variation_spaces = [
             compat.function_space(self.mesh, compat.lagrange(self.mesh, p, size)) for size, _ in self.variations
         ]
         self.state, self.before, self.step = (fem.Function(self.space) for _ in range(3))

@@ -73,8 +73,8 @@ class PlanarModel(PlaneModel):
 
     def tie_maps(self, values):
         """See `RodModel`."""
-        trial = np.tile(self._variation_axes()[0].T, (len(values), 1, 1))
-        return trial, trial.transpose(0, 2, 1)
+        inside = self._variation_axes()[0]
+        return np.tile(inside.T, (len(values), 1, 1)), np.tile(inside, (len(values), 1, 1))
 
     def expansion(self):
         """See `RodModel`."""
