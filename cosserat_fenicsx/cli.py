@@ -74,7 +74,7 @@ def _common(parser):
     parser.add_argument("--elements", type=int, help="elements per rod; fixes the mesh, no error estimate")
     parser.add_argument("--degree", type=int, help="polynomial degree of r and q, 1 to 4 [4]")
     parser.add_argument("--formulation", help="mixed, displacement or multiplier [mixed]")
-    parser.add_argument("--model", help="auto or spatial [auto]")
+    parser.add_argument("--model", help="auto, determinate, planar or spatial [auto]")
 
 
 def _settings(options):

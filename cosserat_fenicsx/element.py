@@ -34,6 +34,13 @@ class ElementRule:
         return 2 * powers @ self._to_coefficients
 
     @cached_property
+    def from_slopes(self):
+        """(p + 1, gauss) values at the nodes, zero at 0, from slopes at the Gauss points (as many as p)."""
+        count = len(self.gauss)
+        powers = np.column_stack([(2 * self.nodes - 1) ** (k + 1) - (-1) ** (k + 1) for k in range(count)])
+        return powers / (2 * np.arange(1, count + 1)) @ np.linalg.inv(np.vander(2 * self.gauss - 1, increasing=True))
+
+    @cached_property
     def from_ends_and_gauss(self):
         """(p + 1, gauss + 2): values at the nodes from values at 0, the Gauss points and 1."""
         support = 2 * np.concatenate([[0.0], self.gauss, [1.0]]) - 1

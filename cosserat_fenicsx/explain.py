@@ -4,12 +4,20 @@ import dataclasses
 
 import numpy as np
 
+from cosserat_fenicsx.choose import choose, fitting
 from cosserat_fenicsx.curves import Line, Spline
 from cosserat_fenicsx.models.rodmesh import Layout
 from cosserat_fenicsx.models.shape import Shape
 from cosserat_fenicsx.sections import Rectangle, Stiffness
 from cosserat_fenicsx.statics import FIRST_ELEMENTS, check_arguments, default_degree
 from cosserat_fenicsx.tables import describe
+
+#: What the unknowns of a model are.
+_UNKNOWNS = {
+    "determinate": "the angle theta along the rods alone",
+    "planar": "centreline and angle theta in a plane",
+    "spatial": "centreline r and quaternion q in space",
+}
 
 
 def explain(scene, load_factors, settings):
@@ -25,10 +33,15 @@ def explain(scene, load_factors, settings):
     formulation = settings.get("formulation", "mixed")
     elements, tol = settings.get("elements"), settings.get("tol", 1e-6)
     degree = settings.get("degree", default_degree(formulation))
-    check_arguments(scene, settings.get("model", "auto"), tol, elements)
+    check_arguments(scene, tol, elements)
+    choice = choose(scene, model=settings.get("model", "auto"), formulation=formulation, degree=degree)
     first = elements or FIRST_ELEMENTS
     layout = Layout.of(scene, first)
-    shape = Shape.of(scene, layout, formulation=formulation, degree=degree)
+
+    def shape_of(model):
+        return Shape.of(scene, layout, formulation=formulation, degree=degree, model=model)
+
+    shape = shape_of(choice.model)
     lines = [scene.title] if scene.title else []
     for rod in scene.rods:
         lines.append(
@@ -39,11 +52,16 @@ def explain(scene, load_factors, settings):
         f"{len(scene.supports)} support(s): {', '.join(describe(x) for x in scene.supports)}. "
         f"{len(scene.loads)} load(s): {', '.join(describe(x) for x in scene.loads) or 'none'}."
     )
-    lines.append("Model: spatial (centreline r and quaternion q in space), which takes any scene.")
+    lines.append(f"Model: {choice.model} ({_UNKNOWNS[choice.model]}): {'; '.join(choice.why)}.")
+    if choice.promoted:
+        lines.append("Should it buckle sideways, out of its plane, the spatial model takes over.")
+    costs = (f"{shape_of(name).unknowns} {name}" for name in fitting(scene, formulation=formulation, degree=degree))
+    lines.append(f"Unknowns on the first mesh by model: {', '.join(costs)}.")
     lines.append(
         {
-            "condensed": "Formulation: mixed, the contact force carried at the Gauss points; unknowns r and q alone.",
+            "condensed": "Formulation: mixed, the contact force carried at the Gauss points; no unknowns of its own.",
             "field": "Formulation: mixed, the contact force as an unknown, because a stiffness is infinite or next to it.",
+            "known": "Formulation: mixed, the contact force known beforehand.",
         }.get(shape.variant, f"Formulation: {formulation}, as asked.")
     )
     unknowns = shape.unknowns

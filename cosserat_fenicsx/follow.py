@@ -103,7 +103,7 @@ class Follower:
                 numbers = track.problem.numbers()
                 if track.distance(numbers, guess) < 0.5 * track.distance(guess, base.numbers):
                     point = track.point(solved)
-                    if fork.partner is not None and track.stability.is_neutral():
+                    if fork.partner is not None and track.stability.whole.is_neutral():
                         track.neutral = fork.partner
                         point.negative_modes = track.stability.count(neutral=True)
                     return point

@@ -1,13 +1,20 @@
 """Which direct solver factors what, and the settings it must not be without."""
 
 
-def factor_tangent(pc, A):
-    """LU of an unsymmetric tangent: it must pivot, because q_a may be zero; PETSc's own does not."""
-    pc.setType("lu")
-    if A.comm.size == 1:
+def factor_tangent(pc, A, kind="general"):
+    """What solves with a tangent.
+
+    Args:
+        kind: "general": LU that pivots, because q_a may be zero, and so may the diagonal of an added equation; "plain":
+            LU that does not, PETSc's own, a third of the cost; "symmetric": Cholesky with signs.
+    """
+    pc.setType("cholesky" if kind == "symmetric" and A.comm.size == 1 else "lu")
+    if A.comm.size > 1:
+        _mumps(pc, A)
+    elif kind == "general":
         pc.setFactorSolverType("klu")
     else:
-        _mumps(pc, A)
+        pc.setFactorOrdering("nd")
 
 
 def factor_second_variation(pc, K):

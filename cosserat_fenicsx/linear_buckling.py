@@ -117,14 +117,14 @@ def _critical(scene, layout, count, load_factor, degree, comm):
         numbers_there = [here.numbers[0] + step * slope, *(values.copy() for values in here.numbers[1:])]
         if not track.at_load(numbers_there, load_factor + step).converged:
             raise NotConverged(f"no equilibrium was found next to the load factor {load_factor:g}: {track.failure}")
-        stability.assemble(stress_alone=True)
-        sides.append(stability.K.copy())
+        stability.whole.assemble(stress_alone=True)
+        sides.append(stability.whole.K.copy())
     slack, other = sides
     slack.axpy(-1.0, other)
     slack.scale(-0.5 / change)
     track.restore()
-    stability.assemble()
-    values, vectors = eigen.largest_of_pencil(slack, stability.K, count + 2)
+    stability.whole.assemble()
+    values, vectors = eigen.largest_of_pencil(slack, stability.whole.K, count + 2)
     values, vectors = values[values > 0], vectors[: (values > 0).sum()]
     modes, k = [], 0
     while k < len(values):

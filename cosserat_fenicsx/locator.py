@@ -108,7 +108,7 @@ class Locator:
         crossings = []
         for place, point, together in found:
             track.put(point.numbers, point.load_factor)
-            modes = track.stability.modes(together)
+            modes = track.stability.whole.modes(together)
             for i, mode in enumerate(modes):
                 partner = modes[i - 1] if len(modes) == 2 else None
                 crossings.append(Crossing("bifurcation", point, place, mode, partner))
@@ -120,7 +120,7 @@ class Locator:
 
         def eigenvalue(point, j=j):
             track.put(point.numbers, point.load_factor)
-            return track.stability.eigenvalue(j)
+            return track.stability.whole.eigenvalue(j)
 
         place = chord.root(eigenvalue)
         numbers, eta = chord.guess(place)

@@ -1,6 +1,7 @@
 """A compiled model with its PETSc matrix and vectors: made once, used for every load, step and scene of its shape."""
 
 import numpy as np
+from petsc4py import PETSc
 
 from cosserat_fenicsx.packed import Packed
 from cosserat_fenicsx.tie_rows import TieRows
@@ -13,7 +14,7 @@ class Problem:
     """Residual and tangent of a model as PETSc wants them, in the solver's unknowns (`models.numbering`).
 
     Args:
-        model: see `models.spatial.SpatialModel` for the protocol.
+        model: see `models.base.RodModel` for the protocol.
 
     Attributes:
         x: the solution vector; the model's state follows it.
@@ -28,6 +29,7 @@ class Problem:
         self.ties = TieRows(model, numbering) if model.shape.connections.ties else None
         tied = self.ties.rows if self.ties else np.empty(0, dtype=np.int64)
         self.A = numbering.matrix(model.cell_dofs, tied[tied >= 0])
+        self.A.setOption(PETSc.Mat.Option.SYMMETRIC, model.tangent == "symmetric")
         self.x, self.b, self._dead, *self._difference = (numbering.vector() for _ in range(5))
         self._local = np.zeros(len(numbering.rows))
         moving = (model.state, *model.carried)
@@ -47,7 +49,7 @@ class Problem:
         if self._loads:
             self._loads.refresh()
             self._assemble(self._loads, self._dead)
-        self.load_norm = self._dead.norm()
+        self.load_norm = self._dead.norm() + model.load_norm
         self.set_load_factor(0.0)
         self.numbering.from_local(self._state, self.x)
         self.set_state(self.x)

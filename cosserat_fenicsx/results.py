@@ -1,6 +1,6 @@
 """Results as arrays with named fields, in SI units. Knows no solver; files and pictures are made by other rooms."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -15,11 +15,14 @@ from cosserat_fenicsx.rod import Station
 @dataclass(frozen=True)
 class Record:
     """One equilibrium, dimensionless: (r, q) at the nodes (N, 7), (n, m, r') at the Gauss points (cells, points, 9), and
-    the reactions of the equations that supports and joints add."""
+    the reactions of the equations that supports and joints add.
+
+    A record that is appended to a path may hold its model's own numbers instead, which the path's `expand` turns into these.
+    """
 
     load_factor: float
     rq: np.ndarray
-    gauss_fields: np.ndarray
+    gauss_fields: np.ndarray | None
     negative_modes: int
     iterations: int
     reactions: np.ndarray
@@ -61,23 +64,22 @@ class Path:
     Station queries return one row a point, in inertial components unless they say material.
     """
 
-    def __init__(self, scene, layout, scales, rule, *, comm, rounding, model, formulation, degree, unknowns, why):
+    def __init__(self, scene, layout, scales, rule, *, comm, rounding, model, formulation, degree, unknowns, why,
+                 expand):  # fmt: skip
         self.scene, self.layout, self.scales, self.rule, self.comm = scene, layout, scales, rule, comm
         self.model, self.formulation, self.degree, self.unknowns = model, formulation, degree, unknowns
-        self.elements, self.why = layout.counts, why
-        self._records, self._rounding, self.events = [], rounding, []
+        self.elements, self.why, self.events = layout.counts, why, []
+        self._expand, self._expanded, self._appended, self._rounding = expand, [], [], rounding
         self._error = None
 
     @classmethod
-    def of(cls, model, formulation):
-        """An empty path for the scene that a model was loaded with."""
-        why = [
-            "the spatial rod takes any scene",
-            {
-                "condensed": "the contact force is carried at the Gauss points (formulation 'mixed')",
-                "field": "a stiffness is infinite or next to it, so the contact force is an unknown (formulation 'mixed')",
-            }.get(model.shape.variant, f"formulation '{formulation}' was asked for"),
-        ]
+    def of(cls, model, formulation, why=()):
+        """An empty path for the scene that a model was loaded with; `why` are sentences on the choice of the model."""
+        variant = {
+            "condensed": "the contact force is carried at the Gauss points (formulation 'mixed')",
+            "field": "a stiffness is infinite or next to it, so the contact force is an unknown (formulation 'mixed')",
+            "known": "the contact force is known beforehand (formulation 'mixed')",
+        }.get(model.shape.variant, f"formulation '{formulation}' was asked for")
         return cls(
             model.scene,
             model.layout,
@@ -89,16 +91,31 @@ class Path:
             formulation=formulation,
             degree=model.shape.degree,
             unknowns=model.unknowns,
-            why=[*why, *model.scene.cautions],
+            why=[*why, variant, *model.scene.cautions],
+            expand=model.expansion(),
         )
 
     def append(self, record):
         """Add a converged point."""
-        self._records.append(record)
-        self.__dict__.pop("_contact", None)
+        self._appended.append(record)
+        for name in ("_contact", "_all_rq"):
+            self.__dict__.pop(name, None)
+
+    @property
+    def _records(self):
+        """All records, in space."""
+        if self._appended:
+            new, self._appended = self._appended, []
+            gauss = None if new[0].gauss_fields is None else np.array([x.gauss_fields for x in new])
+            etas = np.array([x.load_factor for x in new])
+            rq, fields = self._expand(etas, np.array([x.rq for x in new]), gauss)
+            self._expanded += [
+                replace(x, rq=a, gauss_fields=b) for x, a, b in zip(new, rq, fields, strict=True)
+            ]
+        return self._expanded
 
     def __len__(self):
-        return len(self._records)
+        return len(self._expanded) + len(self._appended)
 
     def __getitem__(self, k):
         """Point k as it was solved: a `Record`."""
@@ -109,7 +126,7 @@ class Path:
         return f"<Path: {len(self)} points, {reach}, {self.model}, {self.unknowns} unknowns>"
 
     def _array(self, name):
-        return np.array([getattr(record, name) for record in self._records])
+        return np.array([getattr(record, name) for record in (*self._expanded, *self._appended)])
 
     load_factors = property(lambda self: self._array("load_factor").astype(float))
     iterations = property(lambda self: self._array("iterations").astype(int))
@@ -204,7 +221,7 @@ class Path:
         """(nodes, 3) the mode of an event at the nodes of a rod (default the first), see `Event`."""
         return event.mode[self._rows(rod or self.scene.rods[0])[1]]
 
-    @property
+    @cached_property
     def _all_rq(self):
         """(points, nodes, 7) r and q, dimensionless."""
         return np.array([record.rq for record in self._records]).reshape(len(self), -1, 7)

@@ -1,11 +1,13 @@
 """A scene: rods, what joins and holds them and what acts on them. Knows no solver and no mesh."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 from cosserat_fenicsx.checks import instance
 from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.joints import Joint
 from cosserat_fenicsx.loads import LOADS
+from cosserat_fenicsx.planes import find_plane
 from cosserat_fenicsx.rod import Rod
 from cosserat_fenicsx.statical import check_held
 from cosserat_fenicsx.supports import SUPPORTS
@@ -92,10 +94,24 @@ class Scene:
             leaders[other] = one
         return {rod: find(rod) for rod in self.rods}
 
+    def leader(self, rod):
+        """The first rod of the structure that a rod belongs to."""
+        return self._leaders[rod]
+
     def origin(self, rod):
         """(3,) m: where the structure that a rod belongs to starts. Solvers count positions from there, so that digits
         are not lost on where a structure stands."""
         return self._leaders[rod].curve.position(0.0)
+
+    @cached_property
+    def flatness(self):
+        """(the `Plane` that everything keeps to, "") or (None, what leaves it, in words)."""
+        return find_plane(self)
+
+    @property
+    def plane(self):
+        """The `Plane` that everything keeps to, or None."""
+        return self.flatness[0]
 
     def line_loads(self, rod):
         """The loads that act along a rod."""

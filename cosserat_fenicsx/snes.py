@@ -64,7 +64,7 @@ class Newton:
 
     def _factor(self, pc):
         """What solves with the tangent."""
-        linear.factor_tangent(pc, self.problem.A)
+        linear.factor_tangent(pc, self.problem.A, self.problem.model.tangent)
 
     @cached_property
     def bordered(self):
@@ -155,7 +155,7 @@ class BorderedNewton(Newton):
         self._slope, self._free = A.createVecRight(), A.createVecRight()
         self._ksp = ksp = PETSc.KSP().create(A.comm)
         ksp.setType("preonly")
-        linear.factor_tangent(ksp.getPC(), A)
+        linear.factor_tangent(ksp.getPC(), A, self.problem.model.tangent)
         ksp.setOperators(A)
         pc.setType("python")
         pc.setPythonContext(self)

@@ -1,7 +1,8 @@
 """Stability of an equilibrium by the negative squares of the second variation in (r, theta).
 
 The form never leaves |q| = 1, so that a stable state has none, whatever the formulation. A dead moment in space is not
-conservative and makes the tangent unsymmetric; its symmetric part in the rotation variables is what is counted.
+conservative and makes the tangent unsymmetric; its symmetric part in the rotation variables is what is counted. In a
+plane the second variation falls into two parts, the motions in the plane and those out of it.
 """
 
 import numpy as np
@@ -18,42 +19,27 @@ class NegativeModes:
     """Counts negative squares at a problem's state.
 
     Args:
-        problem: a `Problem`; its model carries the second variation and the numbering of its own.
+        problem: a `Problem`; its model carries the second variation, in parts.
+
+    Attributes:
+        parts: the `Part`s of the second variation.
+        sideways: how many of the negative squares that were counted last lead out of the plane; 0 in space.
     """
 
     def __init__(self, problem):
-        self.problem, self.model = problem, problem.model
-        numbering = self.model.variation_numbering
-        self._tied = self.model.rows_of_tied(numbering) if problem.ties else np.empty((0, 6), dtype=np.int64)
-        self.K = numbering.matrix(self.model.variation_cell_dofs, self._tied[self._tied >= 0])
-        self.K.setOption(PETSc.Mat.Option.SYMMETRIC, True)
-        self._form = Packed(self.model.forms.second_variation, (self.model.state, *self.model.carried))
-        self.pc = PETSc.PC().create(self.model.comm)
-        linear.factor_second_variation(self.pc, self.K)
+        self.parts = [Part(problem, i) for i in range(len(problem.model.second_variations))]
+        self.sideways = 0
 
     def load(self):
         """Take the numbers of the scene that the model was loaded with."""
-        self._form.refresh()
+        for part in self.parts:
+            part.load()
 
-    def assemble(self, *, stress_alone=False):
-        """The second variation at the problem's state and load factor, in K.
-
-        Args:
-            stress_alone: leave out what holds whatever the stress: the stiffness against stretch and shear, and that
-                of supports and joints.
-        """
-        problem = self.problem
-        self.K.zeroEntries()
-        if stress_alone:
-            with self.model.stress_alone():
-                self._form.refresh()
-                self._form.add_to_matrix(self.K)
-            self._form.refresh()
-        else:
-            self._form.add_to_matrix(self.K)
-        if problem.ties:
-            problem.ties.add_second_variation(self.K, self._tied, problem.load_factor, held=not stress_alone)
-        self.K.assemble()
+    @property
+    def whole(self):
+        """The one part of a rung in space; eigenvalues and modes are asked of it."""
+        (part,) = self.parts
+        return part
 
     def count(self, *, neutral=False):
         """Number of negative squares at the problem's state and load factor.
@@ -64,6 +50,62 @@ class NegativeModes:
         Returns:
             int, or -1 where the second variation is singular to round-off.
         """
+        counts = [part.count(neutral=neutral) for part in self.parts]
+        self.sideways = sum(n for n, part in zip(counts, self.parts, strict=True) if part.variation.sideways and n > 0)
+        return -1 if -1 in counts else sum(counts)
+
+
+class Part:
+    """A part of the second variation that decouples from the others.
+
+    Args:
+        problem: a `Problem`.
+        index: of the part among its model's `second_variations`.
+
+    Attributes:
+        variation: the model's `SecondVariation`.
+        K: its matrix; pc: the factorisation.
+    """
+
+    def __init__(self, problem, index):
+        self.problem, self.model, self._index = problem, problem.model, index
+        self.variation = variation = self.model.second_variations[index]
+        tied = variation.tied
+        self.K = variation.numbering.matrix(variation.cell_dofs, tied[tied >= 0])
+        self.K.setOption(PETSc.Mat.Option.SYMMETRIC, True)
+        self._form = Packed(variation.form, (self.model.state, *self.model.carried))
+        self.pc = PETSc.PC().create(self.model.comm)
+        linear.factor_second_variation(self.pc, self.K)
+
+    def load(self):
+        """Take the numbers of the scene that the model was loaded with."""
+        self.variation = self.model.second_variations[self._index]
+        self._form.refresh()
+
+    def assemble(self, *, stress_alone=False):
+        """The second variation at the problem's state and load factor, in K.
+
+        Args:
+            stress_alone: leave out what holds whatever the stress: the stiffness against stretch and shear, and that
+                of supports and joints.
+        """
+        problem, variation = self.problem, self.variation
+        self.K.zeroEntries()
+        if stress_alone:
+            with self.model.stress_alone():
+                self._form.refresh()
+                self._form.add_to_matrix(self.K)
+            self._form.refresh()
+        else:
+            self._form.add_to_matrix(self.K)
+        if problem.ties:
+            problem.ties.add_second_variation(
+                self.K, variation.tied, variation.axes, problem.load_factor, held=not stress_alone
+            )
+        self.K.assemble()
+
+    def count(self, *, neutral=False):
+        """See `NegativeModes.count`."""
         self.assemble()
         self.pc.setOperators(self.K)
         self.pc.setUp()

@@ -18,7 +18,7 @@ def check_held(scene):
     _no_mechanism(scene)
 
 
-def _rows(tie):
+def rows_of(tie):
     """What a tie holds of a and of b, as rows over (displacement, small rotation)."""
     if isinstance(tie, PositionTie):
         row = np.r_[tie.direction, 0, 0, 0]
@@ -34,12 +34,12 @@ def _all_rows(scene):
     for support in scene.supports:
         if support.clamps:
             yield from ((support, [(support.station, row)]) for row in np.eye(6))
-        yield from ((support, _rows(tie)) for tie in support.ties())
+        yield from ((support, rows_of(tie)) for tie in support.ties())
     for joint in scene.joints:
         if joint.rigid:
             yield from ((joint, [(joint.first, row), (joint.second, -row)]) for row in np.eye(6))
         else:
-            yield from ((joint, _rows(tie)) for tie in joint.ties())
+            yield from ((joint, rows_of(tie)) for tie in joint.ties())
 
 
 def _held_once(scene):

@@ -11,10 +11,13 @@ from mpi4py import MPI
 
 from cosserat_fenicsx.accuracy import on_mesh
 from cosserat_fenicsx.checks import instance
+from cosserat_fenicsx.choose import choose
 from cosserat_fenicsx.continuation import StepControl
 from cosserat_fenicsx.errors import Interrupted, NotConverged, SceneError, nearest
 from cosserat_fenicsx.follow import CONTROLS, Follower
 from cosserat_fenicsx.interrupts import obey
+from cosserat_fenicsx.models.determinate import DeterminateModel
+from cosserat_fenicsx.models.planar import PlanarModel
 from cosserat_fenicsx.models.rodmesh import Layout
 from cosserat_fenicsx.models.shape import Shape
 from cosserat_fenicsx.models.spatial import SpatialModel
@@ -27,7 +30,7 @@ from cosserat_fenicsx.snes import Newton
 from cosserat_fenicsx.stability import NegativeModes
 from cosserat_fenicsx.supports import Prescribed
 
-MODELS = ("auto", "spatial")
+_MODELS = {model.name: model for model in (DeterminateModel, PlanarModel, SpatialModel)}
 #: Elements per rod of the first mesh, where the mesh is not given.
 FIRST_ELEMENTS = 4
 # A point is corrected from a coarser mesh in so many iterations, and moves and turns by no more than this (lengths, rad).
@@ -59,7 +62,8 @@ def solve(
         scene: a `Scene`.
         load_factors: a list or array, landed on exactly in its order; or a pair (a, b), a tuple, between which the
             solver chooses its steps; or one number.
-        model: "auto" or "spatial".
+        model: "auto" takes the cheapest one that is enough, and goes to "spatial" where a planar answer buckles sideways;
+            "determinate", "planar" or "spatial" is that one.
         formulation: "mixed" (default), "displacement" or "multiplier"; see the README.
         tol: largest estimated error of the positions along the rods, relative to the largest displacement of the
             scene at that load factor. Elements are refined until it is met, unless `elements` is given.
@@ -89,29 +93,55 @@ def solve(
     targets, free = _targets(load_factors)
     formulation = "mixed" if formulation is None else formulation
     degree = default_degree(formulation) if degree is None else degree
-    check_arguments(scene, model, tol, elements)
+    check_arguments(scene, tol, elements)
+    choice = choose(
+        scene,
+        model=model,
+        formulation=formulation,
+        degree=degree,
+        points=gauss_points,
+        follows=branch is not None or control == "arc",
+    )
     steps = instance("solve", "steps", StepControl() if steps is None else steps, StepControl, "a StepControl")
     follow, until = _follow_options(steps, control, branch), _until(until, free)
     how = dict(formulation=formulation, degree=degree, points=gauss_points, comm=comm)
-
-    def trace(layout, like=None):
-        """`like`: a path whose points are landed on, where the solver chose them."""
-        chosen = free and like is not None
-        etas = like.load_factors.tolist() if chosen else targets
-        return _trace(scene, etas, free and not chosen, layout, follow=follow, until=until, bar=bar, **how)
-
-    def correct(layout, coarse):
-        return None if coarse.events or until or not steps.adaptive else _correct(scene, coarse, layout, bar=bar, **how)
-
     with Progress(targets, progress, comm) as bar:
-        if elements is not None:
-            return trace(Layout.of(scene, elements))
-        return refine(trace, correct, Layout.of(scene, FIRST_ELEMENTS), tol, degree)
+
+        def take(choice):
+            def trace(layout, like=None):
+                """`like`: a path whose points are landed on, where the solver chose them."""
+                chosen = free and like is not None
+                etas = like.load_factors.tolist() if chosen else targets
+                return _trace(
+                    scene, etas, free and not chosen, layout, follow=follow, until=until, bar=bar, choice=choice, **how
+                )
+
+            def correct(layout, coarse):
+                if coarse.events or until or not steps.adaptive:
+                    return None
+                return _correct(scene, coarse, layout, bar=bar, choice=choice, **how)
+
+            if elements is not None:
+                return trace(Layout.of(scene, elements))
+            return refine(trace, correct, Layout.of(scene, FIRST_ELEMENTS), tol, degree)
+
+        try:
+            return take(choice)
+        except _Promoted as found:
+            return take(choice.in_space(found.reason))
+
+
+class _Promoted(Exception):
+    """A plane answer that goes on in space alone."""
+
+    def __init__(self, reason):
+        super().__init__(reason)
+        self.reason = reason
 
 
 def _make_solvers(comm, shape):
     """Problem, Newton solver and stability count of a shape."""
-    model = SpatialModel(comm, shape)
+    model = _MODELS[shape.model](comm, shape)
     problem = Problem(model)
     return problem, Newton(problem), NegativeModes(problem)
 
@@ -122,10 +152,10 @@ def _kept_solvers(alone, shape):
     return _make_solvers(MPI.COMM_SELF if alone else MPI.COMM_WORLD, shape)
 
 
-def solvers_of(scene, layout, *, formulation="mixed", degree=4, points=None, comm=None):
+def solvers_of(scene, layout, *, formulation="mixed", degree=4, points=None, comm=None, model="spatial"):
     """The loaded problem, Newton solver and stability count for a scene on a given mesh, as `solve` uses them."""
     comm = comm or MPI.COMM_WORLD
-    shape = Shape.of(scene, layout, formulation=formulation, degree=degree, points=points)
+    shape = Shape.of(scene, layout, formulation=formulation, degree=degree, points=points, model=model)
     if comm in (MPI.COMM_WORLD, MPI.COMM_SELF):
         problem, newton, stability = _kept_solvers(comm == MPI.COMM_SELF, shape)
     else:  # a user's communicator may be freed, and its handle given to another
@@ -135,13 +165,13 @@ def solvers_of(scene, layout, *, formulation="mixed", degree=4, points=None, com
     return problem, newton, stability
 
 
-def _trace(scene, targets, free, layout, *, formulation, degree, points, follow, until, comm, bar):
+def _trace(scene, targets, free, layout, *, formulation, degree, points, follow, until, comm, choice, bar):
     """One path on one mesh, stepping from the unloaded state."""
     problem, newton, stability = solvers_of(
-        scene, layout, formulation=formulation, degree=degree, points=points, comm=comm
+        scene, layout, formulation=formulation, degree=degree, points=points, comm=comm, model=choice.model
     )
     model = problem.model
-    path = Path.of(model, formulation)
+    path = Path.of(model, formulation, choice.why)
 
     def meet(crossing):
         shape = model.shape_of(crossing.direction)
@@ -149,11 +179,23 @@ def _trace(scene, targets, free, layout, *, formulation, degree, points, follow,
         event = Event(crossing.kind, crossing.point.load_factor, shape / (size or 1.0), len(path) - 1)
         path.events.append(event)
 
-    follower = Follower(problem, newton, stability, on_event=meet, **follow)
+    in_space = choice.model == "spatial"
+    how = follow if in_space else {**follow, "control": "load"}
+    follower = Follower(problem, newton, stability, on_event=meet if in_space else None, **how)
     track = follower.track
     bar.start(f"{path.model}, {model.unknowns} unknowns")
     way = max(abs(eta) for eta in targets) or 1.0
     counted = 0
+
+    def watch(point):
+        if choice.promoted and point.negative_modes:
+            where = f"at the load factor {point.load_factor:.4g}"
+            raise _Promoted(
+                f"in its plane the scene buckles sideways {where}, where motions out of the plane lose their stability"
+                if stability.sideways
+                else f"it loses its stability in its plane {where}, and the spatial model follows what comes of it"
+            )
+        bar.at(point)
 
     def record(point):
         nonlocal counted
@@ -166,10 +208,12 @@ def _trace(scene, targets, free, layout, *, formulation, degree, points, follow,
     try:
         for k, target in enumerate(targets):
             between = free and k == 1
-            on_step = (lambda point: (record(point), bar.at(point))) if between else bar.at
+            on_step = (lambda point: (watch(point), record(point))) if between else watch
             at_start = k == 0 and track.here.load_factor == target
             if not (at_start or follower.to(target, way, on_step=on_step)):
                 here = track.here.load_factor
+                if choice.promoted and follow["control"] == "auto":
+                    raise _Promoted(f"load control ends at the load factor {here:.4g}: {track.failure}")
                 raise NotConverged(
                     f"no equilibrium was found beyond the load factor {here:.6g} on the way to {target:g}: "
                     f"{track.failure}. {_advice(follow, here, abs(target) * problem.load_norm)}",
@@ -184,15 +228,15 @@ def _trace(scene, targets, free, layout, *, formulation, degree, points, follow,
     return path
 
 
-def _correct(scene, coarse, layout, *, formulation, degree, points, comm, bar):
+def _correct(scene, coarse, layout, *, formulation, degree, points, comm, choice, bar):
     """The points of a path on a finer mesh, each by Newton's method from the coarse one; None where one strays."""
     problem, newton, stability = solvers_of(
-        scene, layout, formulation=formulation, degree=degree, points=points, comm=comm
+        scene, layout, formulation=formulation, degree=degree, points=points, comm=comm, model=choice.model
     )
     model = problem.model
     if not model.takes_motions:
         return None
-    path = Path.of(model, formulation)
+    path = Path.of(model, formulation, choice.why)
     bar.start(f"{path.model}, {model.unknowns} unknowns")
     newton.allow(_CORRECTIONS)
     try:
@@ -271,7 +315,7 @@ def default_degree(formulation):
     return 4 if formulation == "mixed" else 2
 
 
-def check_arguments(scene, model, tol, elements):
+def check_arguments(scene, tol, elements):
     """Refuse arguments of `solve` outside their range.
 
     Raises:
@@ -283,8 +327,6 @@ def check_arguments(scene, model, tol, elements):
         raise SceneError(
             "Scene.loads is empty: expected at least one load, such as Force(rod.end, (0, 0, -1)), or a Prescribed motion"
         )
-    if model not in MODELS:
-        raise SceneError(f"model = {model!r}: {nearest(model, MODELS)}")
     if isinstance(tol, bool) or not isinstance(tol, numbers.Real) or not 1e-12 <= tol < 1:
         raise SceneError(f"tol = {tol!r}: expected a number from 1e-12 to below 1")
     if elements is not None and (

@@ -12,18 +12,20 @@ class TieRows:
     """Added equations of one problem; the last rank does their work.
 
     Args:
-        model: its `rows_of_tied`, `ties`, `tie_maps` and `tied_reference` are used.
+        model: its `rows_of_tied`, `ties`, `tied_motion`, `tie_maps` and `tied_at_rest` are used.
         numbering: the problem's `Numbering`.
 
     Attributes:
         rows: (tied nodes, block) solver's numbers, -1 where clamped.
-        seen: (r, q) of the tied nodes and the multipliers as last seen; on the last rank.
+        seen: the tied nodes' unknowns and the multipliers as last seen; on the last rank.
     """
 
     def __init__(self, model, numbering):
         self.model, self.numbering = model, numbering
-        self.rows = model.rows_of_tied(numbering).astype(PETSc.IntType)
+        self.rows = model.rows_of_tied.astype(PETSc.IntType)
         self._here = numbering.comm.rank == numbering.comm.size - 1
+        links = model.shape.connections
+        self._added, self._ties = list(links.equations), len(links.ties)
         count = numbering.multipliers
         self._multipliers = (numbering.first_multiplier + np.arange(count)).astype(PETSc.IntType)
         self._idle = (numbering.first_multiplier + count + np.arange(numbering.idle)).astype(PETSc.IntType)
@@ -37,15 +39,21 @@ class TieRows:
         """Take the tied nodes' values and the multipliers out of a vector."""
         self._scatter.scatter(x, self._work, False, PETSc.ScatterMode.FORWARD)
         if self._here:
-            values, rq = self._work.array_r, self.model.tied_reference.copy()
+            values, nodal = self._work.array_r, self.model.tied_at_rest.copy()
             free = np.count_nonzero(self.rows >= 0)
-            rq[self.rows >= 0] = values[:free]
-            self.seen = rq, values[free:].copy()
+            nodal[self.rows >= 0] = values[:free]
+            multipliers = np.zeros(self._ties)
+            multipliers[self._added] = values[free:]
+            self.seen = nodal, multipliers
+
+    def _evaluate(self, eta):
+        nodal, multipliers = self.seen
+        return self.model.ties.evaluate(self.model.tied_motion(nodal), eta, multipliers)
 
     def put(self, x, multipliers):
         """Set the multipliers in a vector."""
         if self._here:
-            x.setValues(self._multipliers, multipliers)
+            x.setValues(self._multipliers, multipliers[self._added])
         x.assemble()
 
     def everywhere(self):
@@ -56,45 +64,49 @@ class TieRows:
     def add_residual(self, b, eta):
         """Add reactions to the rows of the nodes, and the equations in rows of their own."""
         if self._here:
-            rq, multipliers = self.seen
-            c, gradient, _ = self.model.ties.evaluate(rq, eta, multipliers)
-            _, test = self.model.tie_maps(rq)
+            nodal, multipliers = self.seen
+            c, gradient, _ = self._evaluate(eta)
+            _, test = self.model.tie_maps(nodal)
             reactions = np.einsum("kda,ika,i->kd", test, gradient, multipliers)
             b.setValues(self.rows.ravel(), reactions.ravel(), _ADD)
-            b.setValues(self._multipliers, c, _ADD)
+            b.setValues(self._multipliers, c[self._added], _ADD)
         b.assemble()
 
     def add_tangent(self, A, eta):
         """Add the derivative of `add_residual`."""
         if not self._here:
             return
-        rq, multipliers = self.seen
-        _, gradient, change = self.model.ties.evaluate(rq, eta, multipliers)
-        trial, test = self.model.tie_maps(rq)
+        _, gradient, change = self._evaluate(eta)
+        gradient = gradient[self._added]
+        trial, test = self.model.tie_maps(self.seen[0])
         nodes = self.rows.ravel()
         size = len(nodes)
         of_nodes = np.einsum("kda,kalb,lbe->kdle", test, change, trial).reshape(size, size)
-        A.setValues(nodes, nodes, of_nodes, _ADD)
+        A.setValues(nodes, nodes, np.ascontiguousarray(of_nodes), _ADD)
         reactions = np.einsum("kda,ika->kdi", test, gradient).reshape(size, -1)
         equations = np.einsum("ikb,kbe->ike", gradient, trial).reshape(-1, size)
-        A.setValues(nodes, self._multipliers, reactions, _ADD)
-        A.setValues(self._multipliers, nodes, equations, _ADD)
+        # in C's order: petsc4py takes the numbers as they lie in memory
+        A.setValues(nodes, self._multipliers, np.ascontiguousarray(reactions), _ADD)
+        A.setValues(self._multipliers, nodes, np.ascontiguousarray(equations), _ADD)
         for rows, value in ((self._multipliers, 0.0), (self._idle, 1.0)):
             for i in rows:
                 A.setValue(i, i, value, _ADD)
 
-    def add_second_variation(self, K, rows, eta, *, held=True):
+    def add_second_variation(self, K, rows, axes, eta, *, held=True):
         """Add what the equations mean for stability: held motions become stiff, reactions turn with the nodes.
 
+        All of them count, in the plane and out of it, also those that need no equation in a plane.
+
         Args:
-            rows: (tied nodes, 6) numbers in K of (displacement, rotation).
+            rows: (tied nodes, block) numbers in K.
+            axes: (block, 6) what K's unknowns are as (displacement, rotation).
             held: False for the second alone.
         """
         if not self._here:
             return
-        rq, multipliers = self.seen
-        _, gradient, change = self.model.ties.evaluate(rq, eta, multipliers)
-        size = 6 * len(rows)
-        gradient, change = gradient.reshape(-1, size), change.reshape(size, size)
+        _, gradient, change = self._evaluate(eta)
+        gradient = np.einsum("ika,da->ikd", gradient, axes).reshape(len(gradient), -1)
+        change = np.einsum("kalb,da,eb->kdle", change, axes, axes).reshape(rows.size, rows.size)
         nodes = rows.ravel().astype(PETSc.IntType)
-        K.setValues(nodes, nodes, _HELD * held * gradient.T @ gradient + 0.5 * (change + change.T), _ADD)
+        held_by = _HELD * held * gradient.T @ gradient
+        K.setValues(nodes, nodes, np.ascontiguousarray(held_by + 0.5 * (change + change.T)), _ADD)

@@ -1,4 +1,4 @@
-"""The README's tables of accuracy, on the eccentric cantilever, in Markdown.
+"""The README's tables of accuracy, on the eccentric cantilever in space (model "spatial"), in Markdown.
 
 python demos/accuracy.py            writes out/accuracy.md and prints it
 python demos/accuracy.py --quick    two meshes and two slendernesses
@@ -21,7 +21,7 @@ ETAS = (0.9, 1.5)
 def relative_errors(rod, scene, truth, **arguments):
     """|delta/exact - 1| at ETAS, and Newton's iterations; None where the path stops."""
     try:
-        path = cf.solve(scene, list(ETAS), **arguments)
+        path = cf.solve(scene, list(ETAS), model="spatial", **arguments)
     except cf.NotConverged:
         return None
     return np.abs(path.displacement(rod.end)[:, 0] / truth - 1), int(path.iterations.sum())
@@ -79,7 +79,7 @@ def newton_work():
     yield "|---|---|---|"
     rod, scene = column()
     for far in (1.5, 4.0, 9.0):
-        path = cf.solve(scene, (0.0, far), elements=8)
+        path = cf.solve(scene, (0.0, far), elements=8, model="spatial")
         yield f"| eccentric cantilever, eta = 0 to {far:g} | {len(path)} | {path.iterations.sum()} |"
 
 

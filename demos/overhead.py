@@ -31,15 +31,15 @@ class BareLoop:
     def __init__(self, model, path):
         self.model, self.iterations = model, path.iterations
         forms = model.forms
-        self.A, self.K = fem_petsc.create_matrix(forms.tangent), fem_petsc.create_matrix(forms.second_variation)
+        self.A, self.K = fem_petsc.create_matrix(forms.tangent), fem_petsc.create_matrix(forms.second_variations[0])
         self.K.setOption(PETSc.Mat.Option.SYMMETRIC, True)
         self.b, self.x = fem_petsc.create_vector(forms.residual), self.A.createVecRight()
         self.dead = fem_petsc.assemble_vector(forms.dead)
         (node,) = np.flatnonzero(model._slots == 0).astype(np.int32)  # the clamped one
-        self.clamped = model._rq[node]
+        self.clamped = model._nodal[node]
         self.dead.array_w[self.clamped] = 0
         self.held = [fem.dirichletbc(fem.Function(model.space), np.array([node]))]
-        self.held_rotations = [fem.dirichletbc(fem.Function(model.rotations), np.array([node]))]
+        self.held_rotations = [fem.dirichletbc(fem.Function(model.variation_spaces[0]), np.array([node]))]
         self.ksp = PETSc.KSP().create()
         self.ksp.setType("preonly")
         self.ksp.getPC().setType("lu")
@@ -82,13 +82,13 @@ class BareLoop:
                 self.residual(eta)
             if stability:
                 self.K.zeroEntries()
-                fem_petsc.assemble_matrix(self.K, forms.second_variation, bcs=self.held_rotations)
+                fem_petsc.assemble_matrix(self.K, forms.second_variations[0], bcs=self.held_rotations)
                 self.K.assemble()
                 self.pc.setOperators(self.K)
                 self.pc.setUp()
                 self.pc.getFactorMatrix().getInertia()
             known = [*known[-2:], (eta, U.copy(), n.x.array.copy())]
-            tips.append(U[model._rq[np.argmax(model._slots), :3]].copy())
+            tips.append(U[model._nodal[np.argmax(model._slots), :3]].copy())
         return np.array(tips)
 
 
@@ -98,7 +98,7 @@ def compare(degree, elements, runs):
     rod, scene = column()
 
     def public():
-        return cf.solve(scene, ETAS, degree=degree, elements=elements)
+        return cf.solve(scene, ETAS, degree=degree, elements=elements, model="spatial")
 
     path = public()
     problem, _, _ = statics.solvers_of(scene, path.layout, degree=degree)

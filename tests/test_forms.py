@@ -65,7 +65,7 @@ def test_tangent_is_the_derivative_of_the_residual(variant, arm):
 def test_condensed_tangent_meets_the_displacement_tangent_at_equilibrium():
     """Where the carried n agrees with the motion, the mixed-integration-point tangent is the derivative."""
     rod, scene = column()
-    path = cf.solve(scene, [0.9], elements=3, degree=2, comm=MPI.COMM_SELF)
+    path = cf.solve(scene, [0.9], model="spatial", elements=3, degree=2, comm=MPI.COMM_SELF)
     problems = []
     for formulation in ("mixed", "displacement"):
         layout = Layout.of(scene, 3)
@@ -74,7 +74,7 @@ def test_condensed_tangent_meets_the_displacement_tangent_at_equilibrium():
         problems.append(problem)
     mixed, plain = problems
     model = mixed.model
-    model.state.x.array[model._rq] = path._records[0].rq[model._slots]
+    model.state.x.array[model._nodal] = path._records[0].rq[model._slots]
     problem.numbering.from_local(model.state.x.array, problem.x)
     x = problem.x.array.copy()
     for problem in problems:
@@ -97,10 +97,10 @@ def test_a_rigid_motion_strains_nothing(variant):
     a /= np.linalg.norm(a)
     w, v = a[0], a[1:]
     x = model.state.x.array  # the clamped end too
-    r = x[model._rq[:, :3]]
+    r = x[model._nodal[:, :3]]
     turned = r + 2 * np.cross(v, np.cross(v, r) + w * r)
-    x[model._rq[:, :3]] = turned + [1.0, 2.0, 3.0]
-    x[model._rq[:, 3:]] = a
+    x[model._nodal[:, :3]] = turned + [1.0, 2.0, 3.0]
+    x[model._nodal[:, 3:]] = a
     problem.numbering.from_local(x, problem.x)
     assert np.abs(residual(problem, problem.x.array.copy())).max() < model.round_off
 
@@ -121,6 +121,7 @@ def test_second_variation_counts_what_an_eigensolver_counts():
         problem.set_load_factor(eta)
         assert newton.solve().converged
         assert stability.count() == expected
-        rows = np.arange(stability.K.size[0], dtype=np.int32)
-        eigenvalues = np.linalg.eigvalsh(stability.K.getValues(rows, rows))
+        (part,) = stability.parts
+        rows = np.arange(part.K.size[0], dtype=np.int32)
+        eigenvalues = np.linalg.eigvalsh(part.K.getValues(rows, rows))
         assert (eigenvalues < 0).sum() == expected

@@ -39,8 +39,8 @@ def test_forms_know_ufl_alone():
 
 
 SCENE = (
-    "checks", "curves", "errors", "frames", "joints", "loads", "materials", "polylines", "profiles", "quadrature", "rod", "scene",
-    "scenefile", "sections", "splines", "statical", "supports", "ties",
+    "checks", "choose", "curves", "errors", "frames", "joints", "loads", "materials", "planes", "polylines", "profiles", "quadrature", "rod",
+    "scene", "scenefile", "sections", "splines", "statical", "supports", "ties",
 )  # fmt: skip
 SOLVERS = (
     "arclength", "chord", "continuation", "eigen", "follow", "interrupts", "linear", "linear_buckling", "locator", "problem",

@@ -24,7 +24,7 @@ def test_packed_forms_are_the_forms(formulation, degree):
         model, forms = problem.model, problem.model.forms
         moving = [model.state, *model.carried]
         if packed is None:
-            packed = [Packed(form, moving) for form in (forms.residual, forms.tangent, forms.second_variation)]
+            packed = [Packed(form, moving) for form in (forms.residual, forms.tangent, forms.second_variations[0])]
         for form in packed:
             form.refresh()
         for eta in (0.3, 0.8):
@@ -41,7 +41,7 @@ def test_packed_forms_are_the_forms(formulation, degree):
                 np.testing.assert_array_equal(found, local.array_r)
             for form, mine, A in (
                 (forms.tangent, packed[1], problem.A),
-                (forms.second_variation, packed[2], stability.K),
+                (forms.second_variations[0], packed[2], stability.parts[0].K),
             ):
                 matrices = []
                 for add in (lambda A, form=form: fem_petsc.assemble_matrix(A, form), mine.add_to_matrix):

@@ -19,7 +19,7 @@ def test_lines(wanted, seen, capsys):
     _, scene = column()
     cf.solve(scene, [0.5, 1.0], elements=4, progress=wanted)
     text = capsys.readouterr().err
-    assert ("spatial, 112 unknowns: load factor" in text) == (seen and COMM.rank == 0)
+    assert ("determinate, 16 unknowns: load factor" in text) == (seen and COMM.rank == 0)
 
 
 def test_bar_in_a_terminal(monkeypatch):
@@ -28,4 +28,4 @@ def test_bar_in_a_terminal(monkeypatch):
     monkeypatch.setattr(progress, "_PATIENCE", 0.0)
     _, scene = column()
     cf.solve(scene, [0.5, 1.0], elements=4)
-    assert ("112 unknowns" in screen.getvalue()) == (COMM.rank == 0)
+    assert ("16 unknowns" in screen.getvalue()) == (COMM.rank == 0)

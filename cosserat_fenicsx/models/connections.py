@@ -2,6 +2,8 @@
 
 from dataclasses import dataclass
 
+from cosserat_fenicsx.planes import independent_in
+
 
 @dataclass(frozen=True)
 class Connections:
@@ -10,16 +12,18 @@ class Connections:
     Attributes:
         clamped: vertices without unknowns.
         leaders: pairs (vertex, leader): rigidly joined vertices and the one whose unknowns they share.
-        ties: (kind, vertex of a, vertex of b or None) of every added equation, in the scene's order.
+        ties: (kind, vertex of a, vertex of b or None) of all scalar equations of supports and joints, in the scene's order.
+        equations: indices of those that are added: in a plane only what holds a motion there, and nothing twice.
     """
 
     clamped: tuple
     leaders: tuple
     ties: tuple
+    equations: tuple
 
     @classmethod
-    def of(cls, scene, layout):
-        """The connections of a scene."""
+    def of(cls, scene, layout, plane=None):
+        """The connections of a scene, in space or in its plane."""
         leader = {}
 
         def find(vertex):
@@ -37,7 +41,8 @@ class Connections:
             (type(tie).__name__, *(None if x is None else find(layout.vertex(scene, x)) for x in (tie.a, tie.b)))
             for tie in ties_of(scene)
         )
-        return cls(tuple(clamped), tuple((vertex, find(vertex)) for vertex in sorted(leader)), kinds)
+        equations = tuple(range(len(kinds))) if plane is None else independent_in(plane, ties_of(scene))
+        return cls(tuple(clamped), tuple((vertex, find(vertex)) for vertex in sorted(leader)), kinds, equations)
 
     @property
     def tied(self):

@@ -42,7 +42,7 @@ def rod_data(scene, layout, scales, rule, reference):
     return RodData(*(np.concatenate(fields) for fields in zip(*parts, strict=True)))
 
 
-#: The same as dolfinx Functions; K_inv is zero where K is infinite, K_stiff is bounded.
+#: The same as dolfinx Functions; K_inv is zero where K is infinite, K_stiff is bounded. In a plane R_R is the tangent.
 RodFields = namedtuple("RodFields", "K K_inv K_stiff J R_R v_R")
 
 
@@ -51,9 +51,9 @@ def gauss_function(mesh, points, size):
     return fem.Function(compat.function_space(mesh, compat.at_quadrature_points(mesh, 2 * points - 1, size)))
 
 
-def rod_fields(mesh, points):
-    """Empty `RodFields` on a mesh."""
-    return RodFields(*(gauss_function(mesh, points, size) for size in (3, 3, 3, 3, 9, 3)))
+def rod_fields(mesh, points, frame, strain):
+    """Empty `RodFields` on a mesh, with so many numbers for R_R and for v_R."""
+    return RodFields(*(gauss_function(mesh, points, size) for size in (3, 3, 3, 3, frame, strain)))
 
 
 def fill_fields(fields, rods, data, variant):

@@ -9,6 +9,8 @@ from cosserat_fenicsx.errors import SceneError, nearest
 from cosserat_fenicsx.forms import loads as virtual_work
 from cosserat_fenicsx.models.connections import Connections
 
+#: Unknowns of a node, and numbers of a contact force, by the model's name.
+_SIZES = {"spatial": (7, 3), "planar": (3, 2), "determinate": (1, 0)}
 FORMULATIONS = ("mixed", "displacement", "multiplier")
 
 
@@ -17,15 +19,18 @@ class Shape:
     """What decides which code is compiled and which mesh is made; equal shapes share one model.
 
     Attributes:
+        model: "spatial", "planar" or "determinate".
         counts: elements of each rod.
-        degree: p of r and q.
-        variant: "condensed" or "field" (both formulation "mixed"), "displacement" or "multiplier".
+        degree: p of the unknowns of the nodes.
+        variant: "condensed" or "field" (both formulation "mixed"), "displacement" or "multiplier"; "known" where statics
+            gives the contact force.
         points: Gauss points of an element.
         terms: the kinds of loads, (function of forms.loads, "point" or "line", number of vectors), each as often as
             loads of that kind share an element end.
         connections: where supports and joints act.
     """
 
+    model: str
     counts: tuple
     degree: int
     variant: str
@@ -34,8 +39,8 @@ class Shape:
     connections: Connections
 
     @classmethod
-    def of(cls, scene, layout, *, formulation, degree, points=None):
-        """The shape of a scene on a layout.
+    def of(cls, scene, layout, *, formulation, degree, points=None, model="spatial"):
+        """The shape of a scene on a layout, for a model that it fits.
 
         Raises:
             SceneError: an unknown formulation, a degree outside 1..4, or an infinite stiffness where the
@@ -60,19 +65,22 @@ class Shape:
         # On a fine mesh of a very slender rod rounding in the condensed tangent reaches the bending stiffness itself.
         drowned = _rounding(scene, layout, degree) > 1.0
         variant = {"mixed": "field" if infinite or drowned else "condensed"}.get(formulation, formulation)
+        if model == "determinate":
+            variant = "known"
         terms = tuple(key for key, _ in place_loads(scene, layout))
-        connections = Connections.of(scene, layout)
+        connections = Connections.of(scene, layout, None if model == "spatial" else scene.plane)
         if connections.ties and formulation == "multiplier":
             raise SceneError("formulation = 'multiplier' knows clamps and rigid joints alone: expected 'mixed'")
-        return cls(layout.counts, degree, variant, points or degree, terms, connections)
+        return cls(model, layout.counts, degree, variant, points or degree, terms, connections)
 
     @property
     def unknowns(self):
         """Number of unknowns, without making a mesh."""
         cells, links = sum(self.counts), self.connections
         nodes = cells * self.degree + len(self.counts) - len(links.clamped) - len(links.leaders)
-        others = {"field": 3 * self.degree * cells, "multiplier": cells + len(self.counts)}.get(self.variant, 0)
-        return 7 * nodes + others + len(links.ties)
+        node, force = _SIZES[self.model]
+        others = {"field": force * self.degree * cells, "multiplier": cells + len(self.counts)}.get(self.variant, 0)
+        return node * nodes + others + len(links.equations)
 
 
 def _rounding(scene, layout, degree):

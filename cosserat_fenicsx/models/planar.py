@@ -1,0 +1,98 @@
+"""The planar rung: r in the plane and theta in P_p, dimensionless."""
+
+import numpy as np
+
+from cosserat_fenicsx.models.base import RodModel
+from cosserat_fenicsx.models.planar_forms import compile_forms
+
+
+class PlaneModel(RodModel):
+    """What rungs in a plane share: vectors have components along the plane's axes, sections the order (a, e_3, t)."""
+
+    frame_size, strain_size, force_size = 2, 2, 2
+
+    def _section_data(self, data):
+        """K, J in the order (a, e_3, t), the tangent t_R (2) and the strain v_R = (shear, stretch)."""
+        frames = np.einsum("ab,cgbi->cgai", self.axes, data.R_R.reshape(*data.K.shape[:2], 3, 3))
+        first = np.abs(frames[:, :, 2, 0]) > np.abs(frames[:, :, 2, 1])  # d_1 along the normal, otherwise d_2 (or any)
+        order = np.where(first[:, :, None], [1, 0, 2], [0, 1, 2])
+        t = frames[:, :, :2, 2]
+        r_s = np.einsum("cgai,cgi->cga", frames, data.v_R)
+        shear = t[..., 0] * r_s[..., 1] - t[..., 1] * r_s[..., 0]  # a = e_3 x t
+        stretch = np.einsum("cga,cga->cg", t, r_s[..., :2])
+        K, J = (np.take_along_axis(values, order, axis=2) for values in (data.K, data.J))
+        return data._replace(K=K, J=J, R_R=t, v_R=np.stack([shear, stretch], axis=2))
+
+    def _angles(self, rq):
+        """(N,) theta of (r, q): continuous along each rod, beyond full turns too."""
+        half = np.arctan2(rq[:, 4:] @ self.axes[2], rq[:, 3])
+        ends = np.cumsum([0, *(cells * self.shape.degree + 1 for cells in self.shape.counts)])
+        return 2 * np.concatenate([np.unwrap(half[a:b]) for a, b in zip(ends[:-1], ends[1:], strict=True)])
+
+    def _out_of_plane(self):
+        """(N, 3) what of the positions stays as it is, inertial."""
+        return np.outer(self.reference @ self.axes[2], self.axes[2])
+
+
+def in_space(axes, offset, r, theta, n, m, r_s):
+    """From a plane to space.
+
+    Args:
+        axes: (3, 3) rows e_1, e_2, e_3; offset: (N, 3) the constant part of the positions.
+        r, theta: at the nodes, (k, N, 2) and (k, N); n, m, r_s: at the Gauss points, (.., 2), (..), (.., 2).
+
+    Returns:
+        (r, q) (k, N, 7) and (n, m, r') (.., 9), inertial; q turns on where theta does, beyond full turns.
+    """
+    rq = np.concatenate(
+        [r @ axes[:2] + offset, np.cos(theta / 2)[..., None], np.sin(theta / 2)[..., None] * axes[2]], axis=-1
+    )
+    return rq, np.concatenate([n @ axes[:2], m[..., None] * axes[2], r_s @ axes[:2]], axis=-1)
+
+
+class PlanarModel(PlaneModel):
+    """Scenes in a plane."""
+
+    name, components, moves, turn = "planar", 3, 2, 1.0
+    variations = ((3, False), (3, True))
+
+    def _compile(self, spaces):
+        # the tangent of a condensed contact force has no saddle point to pivot for, unless equations are added
+        self.tangent = "plain" if self.carried and not self.numbering.multipliers else "general"
+        return compile_forms(self, spaces[0], *(self.carried or (None,)))
+
+    def _at_rest(self):
+        return np.column_stack([self.reference @ self.axes[:2].T, np.zeros(len(self.reference))])
+
+    def _variation_axes(self):
+        e1, e2, e3 = self.axes
+        inside, across = np.zeros((3, 6)), np.zeros((3, 6))
+        inside[0, :3], inside[1, :3], inside[2, 3:] = e1, e2, e3
+        across[0, :3], across[1, 3:], across[2, 3:] = e3, e1, e2
+        return inside, across
+
+    def tied_motion(self, values):
+        """See `RodModel`."""
+        offset = self._out_of_plane()[self.tied_slots]
+        none = np.zeros((0, 2))
+        return in_space(self.axes, offset, values[:, :2], values[:, 2], none, np.zeros(0), none)[0]
+
+    def tie_maps(self, values):
+        """See `RodModel`."""
+        inside = self._variation_axes()[0]
+        return np.tile(inside.T, (len(values), 1, 1)), np.tile(inside, (len(values), 1, 1))
+
+    def set_motion(self, rq, n):
+        """See `RodModel`."""
+        self._set_nodes(np.column_stack([rq[:, :3] @ self.axes[:2].T, self._angles(rq)]))
+        self._set_force(n @ self.axes[:2].T)
+
+    def expansion(self):
+        """See `RodModel`."""
+        axes, offset = self.axes, self._out_of_plane()
+
+        def expand(load_factors, nodal, gauss):
+            n, m, r_s = gauss[..., :2], gauss[..., 2], gauss[..., 3:]
+            return in_space(axes, offset, nodal[..., :2], nodal[..., 2], n, m, r_s)
+
+        return expand

@@ -1,0 +1,102 @@
+"""Rods that hang on a clamp as a tree: what hangs beyond an element is what it carries, and where it sits follows."""
+
+import numpy as np
+
+
+class Tree:
+    """The rods of a shape, in order from their clamps outwards.
+
+    Args:
+        shape: a `Shape` whose rods are trees, each with one clamped point and rigid joints alone.
+
+    Attributes:
+        cell_nodes: (elements, p + 1) nodes of every element, the scene's order.
+    """
+
+    def __init__(self, shape):
+        self._p, self._counts = shape.degree, shape.counts
+        p = shape.degree
+        self._first_cell = np.concatenate([[0], np.cumsum(shape.counts)])
+        self._first_node = self._first_cell * p + np.arange(len(shape.counts) + 1)
+        rod = np.repeat(np.arange(len(shape.counts)), shape.counts)
+        self.cell_nodes = (np.arange(self._first_cell[-1]) * p + rod)[:, None] + np.arange(p + 1)
+        self._order = self._walk(shape.connections)
+
+    def _walk(self, links):
+        """[(rod, the element end where it is entered, the node of another rod there, or None)], clamps first."""
+        points = {vertex: {vertex} for vertex in links.clamped}
+        for vertex, leader in links.leaders:
+            points.setdefault(leader, {leader}).add(vertex)
+        order, waiting, seen = [], [(clamp, None) for clamp in links.clamped], set()
+        while waiting:
+            point, before = waiting.pop(0)
+            for rod, entry in sorted(points[point]):
+                if rod in seen:
+                    continue
+                seen.add(rod)
+                order.append((rod, entry, before))
+                for other, members in points.items():
+                    here = [vertex for which, vertex in members if which == rod]
+                    if other != point and here:
+                        waiting.append((other, self._node(rod, here[0])))
+        return order
+
+    def _node(self, rod, vertex):
+        return int(self._first_node[rod] + vertex * self._p)
+
+    def _rods(self, order):
+        """For every rod: its nodes, its elements (slices), the element end where it is entered, the node there."""
+        for rod, entry, before in order:
+            nodes = slice(self._first_node[rod], self._first_node[rod + 1])
+            yield nodes, slice(self._first_cell[rod], self._first_cell[rod + 1]), entry, before
+
+    def forces(self, nodal, rule):
+        """The contact force at the Gauss points that balances dead forces.
+
+        The discrete balance (n, l_i') = f_i of an element's nodes but the one towards the clamp, where the sum of all
+        that lies beyond acts at its other end.
+
+        Args:
+            nodal: (N, 2) forces on the nodes; rule: the `ElementRule`.
+
+        Returns:
+            (elements, points, 2).
+        """
+        p, nodal = self._p, nodal.copy()
+        gradient = rule.weights * rule.slopes.T  # (p + 1, points)
+        n = np.empty((len(self.cell_nodes), len(rule.gauss), 2))
+        for nodes, cells, entry, before in self._rods(reversed(self._order)):
+            f, mine = nodal[nodes], n[cells]
+            ends, inner = f[::p], f[:-1].reshape(-1, p, 2)[:, 1:]
+            sums = inner.sum(axis=1)
+            carried = np.cumsum((ends[:0:-1] + np.pad(sums[:0:-1], ((1, 0), (0, 0)))), axis=0)[::-1]
+            beyond = np.concatenate([inner, carried[:, None]], axis=1)
+            carried = np.cumsum(ends[:-1] + np.pad(sums[:-1], ((1, 0), (0, 0))), axis=0)
+            behind = np.concatenate([carried[:, None], inner], axis=1)
+            mine[entry:] = np.linalg.solve(gradient[1:], beyond[entry:])
+            mine[:entry] = np.linalg.solve(gradient[:-1], behind[:entry])
+            if before is not None:
+                nodal[before] += f.sum(axis=0)
+        return n
+
+    def positions(self, tangents, rest, rule):
+        """Positions of all nodes from r' at the Gauss points.
+
+        Args:
+            tangents: (k, elements, points, 2) r' times the length of its element.
+            rest: (N, 2) positions at rest, where the clamps stay.
+            rule: the `ElementRule`.
+
+        Returns:
+            (k, N, 2).
+        """
+        within = np.einsum("jg,kcgi->kcji", rule.from_slopes, tangents)
+        r = np.empty((len(tangents), len(rest), 2))
+        for nodes, cells, entry, before in self._rods(self._order):
+            steps = within[:, cells]
+            ends = np.concatenate([np.zeros_like(steps[:, :1, 0]), np.cumsum(steps[:, :, -1], axis=1)], axis=1)
+            at = r[:, before] if before is not None else rest[nodes.start + entry * self._p]
+            ends += (at - ends[:, entry])[:, None]
+            r[:, nodes][:, :-1] = (ends[:, :-1, None] + steps[:, :, :-1]).reshape(len(r), -1, 2)
+            r[:, nodes.stop - 1] = ends[:, -1]
+        return r
