@@ -139,4 +139,3 @@ def _directions(rod):
     if isinstance(rod.section_at(0.0), Rectangle):
         return f"Its width runs along d1 = ({d1}), its height along d2 = ({d2}){at}."
     return f"d1 = ({d1}), d2 = ({d2}){at}."
-

@@ -189,7 +189,9 @@ def _check_supports(scene, plane):
             if apart > np.linalg.matrix_rank(np.array(rows), tol=_APART) or max(out, default=0.0) > _SLANT:
                 where = getattr(holder, "station", None) or f"{holder.first} with {holder.second}"
                 name = type(holder).__name__
-                raise _Leaves(f"{what} {i + 1} ({name} at {where}) holds or moves what is askew to the plane of the rods")
+                raise _Leaves(
+                    f"{what} {i + 1} ({name} at {where}) holds or moves what is askew to the plane of the rods"
+                )
 
 
 def _words(load):

@@ -110,7 +110,11 @@ def swinging_pair(plane):
     taper = cf.Rod(cf.Line(plane.point(0, 0, 0), plane.point(1, 0, 0), d1=plane.vector(0, 0, 1)),
                    lambda s: cf.Rectangle(0.02 - 0.01 * s, 0.03), STEEL, name="taper")  # fmt: skip
     other = cf.Rod(cf.Line(plane.point(0, 3, 1), plane.point(1, 3, 1)), cf.Circle(0.02), STEEL, name="other")
-    loads = [cf.Weight(plane.vector(0, 0, -9.81)), cf.Force(taper.end, plane.vector(0, 0, -40)), cf.Force(other.end, plane.vector(-10, 0, 60))]
+    loads = [
+        cf.Weight(plane.vector(0, 0, -9.81)),
+        cf.Force(taper.end, plane.vector(0, 0, -40)),
+        cf.Force(other.end, plane.vector(-10, 0, 60)),
+    ]
     return cf.Scene([taper, other], [cf.Clamp(taper.start), cf.Clamp(other.start)], loads)
 
 

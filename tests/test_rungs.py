@@ -145,7 +145,7 @@ def test_what_buckles_in_its_plane_is_not_promoted():
     """A flat strip that is wide across the plane: it loses its stability in the plane alone."""
     section = cf.Stiffness((1e6, 1e6), 1e6, (50.0, 1.0), 30.0)  # bends about d2, the normal
     rod = cf.Rod(cf.Line((0, 0, 0), (0, 0, 1.0), d1=(1, 0, 0)), section)
-    scene = cf.Scene([rod], [cf.Clamp(rod.start)], [cf.Force(rod.end, (0, 0, -np.pi**2 / 4))])
+    scene = cf.Scene([rod], [cf.Clamp(rod.start)], [cf.Force(rod.end, (0, 0, -(np.pi**2) / 4))])
     path = cf.solve(scene, [0.9, 1.1], elements=8)
     assert path.model == "determinate" and path.negative_modes.tolist() == [0, 1]
 
@@ -155,9 +155,11 @@ def test_supports_count_out_of_the_plane_too():
     section = cf.Stiffness((1e6, 1e6), 1e6, (1.0, 4.0), 2.0)
     rod = cf.Rod(cf.Line((0, 0, 0), (0, 0, 1.0), d1=(1, 0, 0)), section)
     roller = [cf.Roller(rod.end, (1, 0, 0)), cf.Roller(rod.end, (0, 1, 0))]
-    loads = [cf.Force(rod.end, (0, 0, -np.pi**2)), cf.Force(rod.at(0.5), (0.1, 0, 0))]
+    loads = [cf.Force(rod.end, (0, 0, -(np.pi**2))), cf.Force(rod.at(0.5), (0.1, 0, 0))]
     for foot, expected in ((cf.Clamp(rod.start), 2.0457), (cf.Hinge(rod.start, (0, 1, 0)), 2.0457)):
-        path = cf.solve(cf.Scene([rod], [foot, *roller], loads), [expected - 0.02, expected + 0.02], model="planar", elements=8)
+        path = cf.solve(
+            cf.Scene([rod], [foot, *roller], loads), [expected - 0.02, expected + 0.02], model="planar", elements=8
+        )
         assert path.negative_modes.tolist() == [0, 1]
         spatial = cf.solve(path.scene, [expected - 0.02, expected + 0.02], model="spatial", elements=8)
         assert spatial.negative_modes.tolist() == [0, 1]
@@ -201,7 +203,10 @@ def test_what_leaves_the_plane_is_named(kind, words):
 
 
 def test_why_not_determinate():
-    for draw, words in ((hinged_arch, "because of the Hinge at arch.start"), (lee_frame, "because of the Hinge at post.start")):
+    for draw, words in (
+        (hinged_arch, "because of the Hinge at arch.start"),
+        (lee_frame, "because of the Hinge at post.start"),
+    ):
         path = cf.solve(draw(Drawn()), [0.1], elements=2)
         assert path.model == "planar" and any(words in why for why in path.why)
     rod, scene = column()

@@ -58,9 +58,7 @@ class DeterminateModel(PlaneModel):
             return total
         form = compat.kernel(self.forms.force)
         local = np.zeros((len(self._slots), 3))
-        cpp.fem.assemble_vector(
-            local.reshape(-1), form, cpp.fem.pack_constants(form), cpp.fem.pack_coefficients(form)
-        )
+        cpp.fem.assemble_vector(local.reshape(-1), form, cpp.fem.pack_constants(form), cpp.fem.pack_coefficients(form))
         np.add.at(total, self._slots, local[:, :2])
         return self.comm.allreduce(total) if self.comm.size > 1 else total
 
