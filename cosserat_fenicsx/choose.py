@@ -103,7 +103,9 @@ def _not_a_tree(scene):
         clamps = sum(x.station.rod in rods for x in scene.supports)
         joints = sum(x.first.rod in rods for x in scene.joints)
         if clamps > 1:
-            return f"statics alone does not give the contact force of rod '{rods[0].name}', which is held {clamps} times"
+            return (
+                f"statics alone does not give the contact force of rod '{rods[0].name}', which is held {clamps} times"
+            )
         if joints >= len(rods):
             return f"statics alone does not give the contact force of rod '{rods[0].name}', which closes a ring"
     return ""

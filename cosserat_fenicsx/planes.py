@@ -85,12 +85,9 @@ def _find(scene):
     chords = [a for a, rod in zip(chords, scene.rods, strict=True) if np.linalg.norm(a) > 1e-9 * rod.length]
     drawn = _units([*(frame[:, 2] for _, frames in tangents for frame in frames), *chords])
     acting = [_vectors(scene, i, load) for i, load in enumerate(scene.loads)]
-    forces = _units([v for inside, _ in acting for v in inside])
     normal = _normal_of(drawn)
     if normal is None:
-        normal = _normal_of(np.concatenate([drawn, forces]))
-    if normal is None:
-        normal = _normal_of_a_line(drawn[0], [v for _, across in acting for v in across], scene)
+        normal = _normal_of_a_line(drawn[0], acting, scene)
     normal = normal * np.sign(normal[np.argmax(np.abs(normal))])
     if np.abs(drawn @ normal).max() > _SLANT:
         raise _Leaves("the rods do not lie in one plane")
@@ -144,11 +141,17 @@ def _normal_of(directions):
     return right[2] if len(sizes) > 1 and sizes[1] > _APART else None
 
 
-def _normal_of_a_line(tangent, moments, scene):
-    """Where all is along one line a moment tells the normal, or else the section, which bends where it is weakest."""
-    for moment in _units(moments):
-        if abs(moment @ tangent) < _SLANT:
-            return moment
+def _normal_of_a_line(tangent, acting, scene):
+    """Where all rods are along one line the first load that leaves it tells the normal, or else the section, which bends
+    where it is weakest."""
+    for inside, across in acting:
+        for force in _units(inside):
+            normal = np.cross(tangent, force)
+            if np.linalg.norm(normal) > _APART:
+                return normal / np.linalg.norm(normal)
+        for moment in _units(across):
+            if abs(moment @ tangent) < _SLANT:
+                return moment
     rod = scene.rods[0]
     low = rod.profile.range[0]
     return rod.curve.frame(0.0)[:, 0 if low.J[0] < low.J[1] else 1]
@@ -186,7 +189,9 @@ def _check_supports(scene, plane):
             if apart > np.linalg.matrix_rank(np.array(rows), tol=_APART) or max(out, default=0.0) > _SLANT:
                 where = getattr(holder, "station", None) or f"{holder.first} with {holder.second}"
                 name = type(holder).__name__
-                raise _Leaves(f"{what} {i + 1} ({name} at {where}) holds or moves what is askew to the plane of the rods")
+                raise _Leaves(
+                    f"{what} {i + 1} ({name} at {where}) holds or moves what is askew to the plane of the rods"
+                )
 
 
 def _words(load):

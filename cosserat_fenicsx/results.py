@@ -109,9 +109,7 @@ class Path:
             gauss = None if new[0].gauss_fields is None else np.array([x.gauss_fields for x in new])
             etas = np.array([x.load_factor for x in new])
             rq, fields = self._expand(etas, np.array([x.rq for x in new]), gauss)
-            self._expanded += [
-                replace(x, rq=a, gauss_fields=b) for x, a, b in zip(new, rq, fields, strict=True)
-            ]
+            self._expanded += [replace(x, rq=a, gauss_fields=b) for x, a, b in zip(new, rq, fields, strict=True)]
         return self._expanded
 
     def __len__(self):

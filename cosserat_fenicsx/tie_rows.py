@@ -44,11 +44,15 @@ class TieRows:
             nodal[self.rows >= 0] = values[:free]
             multipliers = np.zeros(self._ties)
             multipliers[self._added] = values[free:]
-            self.seen = nodal, multipliers
+            self.seen, self._added_values = (nodal, multipliers), (None, None)
 
     def _evaluate(self, eta):
-        nodal, multipliers = self.seen
-        return self.model.ties.evaluate(self.model.tied_motion(nodal), eta, multipliers)
+        """Those that are added, once for residual and tangent."""
+        if self._added_values[0] != eta:
+            nodal, multipliers = self.seen
+            rq = self.model.tied_motion(nodal)
+            self._added_values = eta, self.model.ties.evaluate(rq, eta, multipliers, self._added)
+        return self._added_values[1]
 
     def put(self, x, multipliers):
         """Set the multipliers in a vector."""
@@ -67,9 +71,9 @@ class TieRows:
             nodal, multipliers = self.seen
             c, gradient, _ = self._evaluate(eta)
             _, test = self.model.tie_maps(nodal)
-            reactions = np.einsum("kda,ika,i->kd", test, gradient, multipliers)
+            reactions = np.einsum("kda,ika,i->kd", test, gradient, multipliers[self._added])
             b.setValues(self.rows.ravel(), reactions.ravel(), _ADD)
-            b.setValues(self._multipliers, c[self._added], _ADD)
+            b.setValues(self._multipliers, c, _ADD)
         b.assemble()
 
     def add_tangent(self, A, eta):
@@ -77,7 +81,6 @@ class TieRows:
         if not self._here:
             return
         _, gradient, change = self._evaluate(eta)
-        gradient = gradient[self._added]
         trial, test = self.model.tie_maps(self.seen[0])
         nodes = self.rows.ravel()
         size = len(nodes)
@@ -104,7 +107,8 @@ class TieRows:
         """
         if not self._here:
             return
-        _, gradient, change = self._evaluate(eta)
+        nodal, multipliers = self.seen
+        _, gradient, change = self.model.ties.evaluate(self.model.tied_motion(nodal), eta, multipliers)
         gradient = np.einsum("ika,da->ikd", gradient, axes).reshape(len(gradient), -1)
         change = np.einsum("kalb,da,eb->kdle", change, axes, axes).reshape(rows.size, rows.size)
         nodes = rows.ravel().astype(PETSc.IntType)

@@ -145,8 +145,8 @@ def test_ctrl_c_keeps_what_is_done(tmp_path):
     scene = tmp_path / "scene.toml"
     head, _, _ = DEMO.read_text(encoding="utf-8").partition("[solve]")
     scene.write_text(
-        f"{head}[solve]\nload_factors = {[k / 5000 for k in range(1, 5000)]}\n"
-        "elements = 64\nmodel = 'spatial'\n", encoding="utf-8"
+        f"{head}[solve]\nload_factors = {[k / 5000 for k in range(1, 5000)]}\nelements = 64\nmodel = 'spatial'\n",
+        encoding="utf-8",
     )
     command = [sys.executable, "-m", "cosserat_fenicsx", "run", str(scene), "-o", str(tmp_path), "--no-picture"]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, encoding="utf-8", cwd=ROOT)

@@ -47,3 +47,15 @@ def test_accuracy_quick(tmp_path):
 
     text = accuracy.main(quick=True, out=tmp_path)
     assert "| mixed | P3 | 4.9e-07" in text and "EA = GA = infinity" in text and "eta = 0 to 9" in text
+
+
+@pytest.mark.serial
+def test_rungs_quick(tmp_path):
+    """Every model that a scene fits gives the same tip; the cheaper ones have fewer unknowns."""
+    import rungs
+
+    scenes = [(rungs.eccentric_cantilever, ((3, 4), None)), (rungs.lee_frame, ((4, 8),)), (rungs.spring, ((4, 24),))]
+    for (name, _), rows in rungs.main(runs=1, out=tmp_path, scenes=scenes).items():
+        sizes = [row[1] for row in rows]
+        assert rows[-1][0] == "spatial" and sizes == sorted(set(sizes)), name
+        assert all(error < 2e-6 for _, _, _, _, error, _ in rows), rows

@@ -173,7 +173,7 @@ class RodModel:
         for form, space, (size, sideways) in zip(self.forms.second_variations, spaces, self.variations, strict=True):
             dofs = np.arange(size * len(self._slots)).reshape(-1, size)
             numbering = Numbering(space, dofs, self._owned_nodes, *self._held)
-            cell_dofs = dofs[self._cell_nodes[:owned]].reshape(owned, -1)
+            cell_dofs = dofs[self._cell_nodes[:owned]].reshape(owned, size * (self.shape.degree + 1))
             tied = self._rows_of_tied(numbering, dofs)
             self._variations.append(SecondVariation(form, numbering, cell_dofs, tied, None, sideways))
 
@@ -280,10 +280,9 @@ class RodModel:
         nodal = self._gather_nodes(self.state.x.array[self._nodal[: self._owned_nodes]])
         if self.forms.fields is None:
             return nodal, None
-        points = len(self.forms.gauss)
+        points, size = len(self.forms.gauss), self.forms.fields_size
         values = compat.evaluate(self.forms.fields, self.mesh, self._owned_cells)
-        values = values.reshape(len(self._owned_cells), points, -1)
+        values = values.reshape(len(self._owned_cells), points, size)
         reverse = self.rods.reversed[: len(values)]
         values[reverse] = values[reverse][:, ::-1]
-        size = values.shape[2]
         return nodal, self._gather_cells(values.reshape(len(values), points * size)).reshape(-1, points, size)

@@ -29,7 +29,7 @@ class CompiledForms:
         residual, tangent: of the unknowns, live loads included.
         dead: virtual work of the loads that do not depend on the motion, per unit of load factor; or None.
         second_variations: symmetric forms in small displacements and rotations whose negative squares tell stability.
-        fields: what the Gauss points know of n, m and r'; or None.
+        fields, fields_size: what the Gauss points know of n, m and r', and how many numbers that is; or None.
         advance: the next carried n at the Gauss points; or None.
         force: virtual work of the dead forces alone on a displacement, where statics asks for it; or None.
         gauss, weights: points in [0, 1] of one element, and their weights.
@@ -40,6 +40,7 @@ class CompiledForms:
     dead: object
     second_variations: tuple
     fields: object
+    fields_size: int
     advance: object
     force: object
     gauss: np.ndarray
@@ -59,6 +60,7 @@ def compile_all(model, residual, tangent, dead, seconds, *, fields=None, advance
         _unless_none(fem.form, dead),
         tuple(fem.form(second) for second in seconds),
         _unless_none(lambda a: fem.Expression(a, points), fields),
+        0 if fields is None else len(fields),
         _unless_none(lambda a: fem.Expression(a, points), advance),
         _unless_none(fem.form, force),
         points[:, 0],

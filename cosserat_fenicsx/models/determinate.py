@@ -2,6 +2,7 @@
 
 import numpy as np
 from dolfinx import cpp
+from mpi4py import MPI
 
 from cosserat_fenicsx import compat
 from cosserat_fenicsx.models.determinate_forms import compile_forms
@@ -45,6 +46,11 @@ class DeterminateModel(PlaneModel):
         self._known = self._tree.forces(nodal, self.rule)
         self.rods.fill(self._force, self._known)
 
+    def largest(self, change):
+        """See `RodModel`: the unknowns are angles."""
+        local = float(np.abs(change).max(initial=0.0))
+        return self.comm.allreduce(local, op=MPI.MAX) if self.comm.size > 1 else local
+
     def _nodal_forces(self):
         """(N, 2) what the dead forces do on the displacements of the nodes, the scene's order, all ranks."""
         total = np.zeros((len(self.reference), 2))
@@ -52,9 +58,7 @@ class DeterminateModel(PlaneModel):
             return total
         form = compat.kernel(self.forms.force)
         local = np.zeros((len(self._slots), 3))
-        cpp.fem.assemble_vector(
-            local.reshape(-1), form, cpp.fem.pack_constants(form), cpp.fem.pack_coefficients(form)
-        )
+        cpp.fem.assemble_vector(local.reshape(-1), form, cpp.fem.pack_constants(form), cpp.fem.pack_coefficients(form))
         np.add.at(total, self._slots, local[:, :2])
         return self.comm.allreduce(total) if self.comm.size > 1 else total
 

@@ -23,8 +23,11 @@ class Ties:
     def __init__(self, ties, nodes, reference, length):
         self._ties, self._nodes, self._reference, self._length = ties, nodes, reference, length
 
-    def evaluate(self, rq, eta, multipliers):
+    def evaluate(self, rq, eta, multipliers, which=None):
         """Values and derivatives at (r, q) (tied nodes, 7) and a load factor.
+
+        Args:
+            multipliers: of all ties; which: indices of those that are asked for, None for all.
 
         Returns:
             c (ties,); gradients (ties, tied nodes, 6) over (displacement, rotation), which are also the reactions per
@@ -33,9 +36,11 @@ class Ties:
         count = len(rq)
         r, q = rq[:, :3], rq[:, 3:]
         turn = directors(q / np.linalg.norm(q, axis=1, keepdims=True))
-        c, gradient = np.zeros(len(self._ties)), np.zeros((len(self._ties), count, 6))
+        which = range(len(self._ties)) if which is None else which
+        c, gradient = np.zeros(len(which)), np.zeros((len(which), count, 6))
         tangent = np.zeros((count, 6, count, 6))
-        for i, (tie, (a, b), lam) in enumerate(zip(self._ties, self._nodes, multipliers, strict=True)):
+        for i, number in enumerate(which):
+            tie, (a, b), lam = self._ties[number], self._nodes[number], multipliers[number]
             if isinstance(tie, PositionTie):
                 n = np.asarray(tie.direction)
                 moved = r[a] - self._reference[a]

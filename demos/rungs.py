@@ -1,0 +1,155 @@
+"""What the cheapest sufficient model saves: every scene by every model that it fits, at the same mesh.
+
+    python demos/rungs.py            medians of 9 alternating runs, processor time, warm
+    python demos/rungs.py --quick    one run each, to see that the models agree
+
+Time is that of `solve` and of asking for the tip's position; the ratio is to the spatial model, run by run. The error is that of
+the tip, largest over the path, relative to its displacement: against the exact rod (`cosserat_fenicsx.analytic`) where there is one,
+else against the spatial model on four times as many elements of degree 4.
+"""
+
+import argparse
+import platform
+import time
+from pathlib import Path
+
+import numpy as np
+from eccentric_cantilever import column, exact
+
+import cosserat_fenicsx as cf
+from cosserat_fenicsx import compat
+from cosserat_fenicsx.choose import fitting
+
+STEEL = cf.Material(E=210e9, nu=0.3, density=7850.0)
+SWEEP = np.linspace(0.05, 1.5, 31)
+
+
+def eccentric_cantilever():
+    """The paper's column, 31 points."""
+    rod, scene = column()
+    delta = exact(rod, SWEEP).delta
+    return scene, rod.end, SWEEP, lambda tip: np.abs(tip[:, 0] / delta - 1).max()
+
+
+def elastica():
+    """An inextensible, unshearable cantilever under a transverse tip force of up to 10 EI/L^2."""
+    section = cf.Stiffness((np.inf, np.inf), np.inf, (1.0, 1.0), 1.0)
+    rod = cf.Rod(cf.Line((0, 0, 0), (1.0, 0, 0)), section, name="cantilever")
+    scene = cf.Scene([rod], [cf.Clamp(rod.start)], [cf.Force(rod.end, (0, 0, 10.0))])
+    return scene, rod.end, np.linspace(0.1, 1, 10), None
+
+
+def self_weight():
+    """A steel wire of 3 m and 4 mm, clamped level, under its weight."""
+    rod = cf.Rod(cf.Line((0, 0, 0), (3.0, 0, 0)), cf.Circle(0.004), STEEL, name="wire")
+    return cf.Scene([rod], [cf.Clamp(rod.start)], [cf.Weight()]), rod.end, np.linspace(0.1, 1, 10), None
+
+
+def bend():
+    """The 45-degree bend (Bathe & Bolourchi, 1979), loaded out of its plane."""
+    E = 1e7
+    material = cf.Material(E=E, nu=0.0)
+    rod = cf.Rod(cf.Arc((0, 100, 0), (0, 0, 0), np.pi / 4, axis=(0, 0, 1)),
+                 cf.Stiffness((E / 2, E / 2), E, (E / 12, E / 12), E / 12), material, name="bend")  # fmt: skip
+    return cf.Scene([rod], [cf.Clamp(rod.start)], [cf.Force(rod.end, (0, 0, 600.0))]), rod.end, np.linspace(0.1, 1, 10), None
+
+
+def lee_frame():
+    """Lee's frame (Lee, Manuel & Rossow, 1968) up to three quarters of its limit load, 18.5 kN."""
+    material = cf.Material(E=70.6e9, nu=0.3)
+    post = cf.Rod(cf.Line((0, 0, 0), (0, 0, 1.2), d1=(1, 0, 0)), cf.Rectangle(0.02, 0.03), material, name="post")
+    beam = cf.Rod(cf.Line((0, 0, 1.2), (1.2, 0, 1.2), d1=(0, 0, 1)), cf.Rectangle(0.02, 0.03), material, name="beam")
+    hinges = [cf.Hinge(end, (0, 1, 0)) for end in (post.start, beam.end)]
+    loaded = beam.at(0.24)
+    scene = cf.Scene([post, beam], hinges, [cf.Force(loaded, (0, 0, -18.5e3))], [cf.Joint(post.end, beam.start)])
+    return scene, loaded, np.linspace(0.075, 0.75, 10), None
+
+
+def spring():
+    """A helix of three turns, stretched by a dead force."""
+    rod = cf.Rod(cf.Helix((0, 0, 0), (0.05, 0, 0), 3, 0.03), cf.Circle(0.004), STEEL, name="spring")
+    return cf.Scene([rod], [cf.Clamp(rod.start)], [cf.Force(rod.end, (0, 0, 60.0))]), rod.end, np.linspace(0.1, 1, 10), None
+
+
+#: Scene, and the meshes (degree, elements) to solve it on; None: refined to the default tolerance.
+SCENES = (
+    (eccentric_cantilever, ((4, 4), (4, 8), None)),
+    (elastica, ((4, 8), None)),
+    (self_weight, ((4, 16),)),
+    (bend, ((4, 8),)),
+    (lee_frame, ((4, 8), None)),
+    (spring, ((4, 24),)),
+)
+
+
+def compare(draw, mesh, runs):
+    """Rows (model, unknowns, median time (s), median ratio to spatial, error of the tip, estimated error)."""
+    scene, station, etas, error = draw()
+    models = fitting(scene)
+    given = {} if mesh is None else dict(zip(("degree", "elements"), mesh, strict=True))
+
+    def run(model):
+        path = cf.solve(scene, etas, model=model, **given)
+        return path, path.displacement(station)
+
+    paths = {model: run(model) for model in models}
+    if error is None:
+        fine = 4 * max(paths["spatial"][0].elements)
+        truth = cf.solve(scene, etas, model="spatial", elements=fine).displacement(station)
+
+        def error(tip):
+            return (np.linalg.norm(tip - truth, axis=1) / np.linalg.norm(truth, axis=1)).max()
+
+    times = {model: np.empty(runs) for model in models}
+    for i in range(runs):
+        for model in models:
+            began = time.process_time()
+            run(model)
+            times[model][i] = time.process_time() - began
+    return [
+        (
+            model,
+            paths[model][0].unknowns,
+            np.median(times[model]),
+            np.median(times["spatial"] / times[model]),
+            error(paths[model][1]),
+            paths[model][0].error.max(),
+        )
+        for model in models
+    ]
+
+
+def main(runs=9, out="out", scenes=SCENES):
+    """Print the table and write it to out/rungs.md.
+
+    Returns:
+        {(scene, mesh): rows of `compare`}.
+    """
+    lines = [
+        f"{compat.version()}, {platform.machine()}.",
+        "",
+        "| scene | mesh | model | unknowns | ms | times faster than spatial | error of the tip | estimate |",
+        "|---|---|---|---|---|---|---|---|",
+    ]
+    found = {}
+    for draw, meshes in scenes:
+        for mesh in meshes:
+            rows = found[draw.__name__, mesh] = compare(draw, mesh, runs)
+            name = "refined" if mesh is None else f"P{mesh[0]}, {mesh[1]}"
+            for model, unknowns, seconds, ratio, error, estimate in rows:
+                told = f"{estimate:.0e}" if np.isfinite(estimate) else "-"
+                lines.append(
+                    f"| {draw.__name__.replace('_', ' ')} | {name} | {model} | {unknowns} | {1e3 * seconds:.1f} | "
+                    f"{ratio:.1f} | {error:.0e} | {told} |"
+                )
+    text = "\n".join(lines)
+    Path(out).mkdir(parents=True, exist_ok=True)
+    (Path(out) / "rungs.md").write_text(text + "\n", encoding="utf-8")
+    print(text)
+    return found
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--quick", action="store_true")
+    main(runs=1 if parser.parse_args().quick else 9)

@@ -1,0 +1,229 @@
+"""Every rung gives the same answer where it applies; the cheapest is taken, and what buckles sideways is promoted."""
+
+import numpy as np
+import pytest
+from conftest import column
+from mpi4py import MPI
+from plane_scenes import SCENES, STEEL, Drawn, hinged_arch, lee_frame, tree
+
+import cosserat_fenicsx as cf
+
+
+def same(found, truth, tolerance):
+    """Every field of every rod at every point, relative to its size, and to what rounding leaves of it: strains are
+    differences of r over a node's spacing, and forces are those times the stiffness."""
+    for k in range(len(truth)):
+        for rod in truth.scene.rods:
+            a, b = found.fields(k, rod), truth.fields(k, rod)
+            K = rod.profile.range[1].K
+            rounding = 1e-15 * len(a["s"]) * max(1.0, np.abs(a["position"] - a["position"][0]).max() / rod.length)
+            for name in a:
+                noise = {"force": rounding * K[np.isfinite(K)].max(initial=0), "strain": 10 * rounding}.get(name, 1e-12)
+                size = np.abs(b[name]).max()
+                np.testing.assert_allclose(
+                    a[name], b[name], rtol=0, atol=tolerance * size + noise, err_msg=f"{found.model} {rod.name} {name}"
+                )
+
+
+@pytest.mark.parametrize("seed", [None, 1, 2])
+@pytest.mark.parametrize("name", SCENES)
+def test_rungs_agree(name, seed):
+    draw, known = SCENES[name]
+    scene = draw(Drawn(seed))
+    truth = cf.solve(scene, [0.5, 1.0], model="spatial", elements=24)
+    models = ("determinate", "planar") if known else ("planar",)
+    for model in models:
+        path = cf.solve(scene, [0.5, 1.0], model=model, elements=24)
+        assert path.model == model and path.unknowns <= truth.unknowns / 2
+        assert path.negative_modes.tolist() == truth.negative_modes.tolist() == [0, 0]
+        same(path, truth, 2e-9)
+    auto = cf.solve(scene, [0.5, 1.0], elements=24)
+    assert auto.model == models[0]
+    if not known:
+        with pytest.raises(cf.SceneError, match="model = 'determinate' is not possible: statics alone does not"):
+            cf.solve(scene, [1.0], model="determinate")
+
+
+@pytest.mark.parametrize("model", ["determinate", "planar"])
+@pytest.mark.parametrize("slenderness", [1e2, 1e4, 1e5])
+def test_against_the_exact_rod(model, slenderness):
+    rod, scene = column(diameter=20.0 / slenderness)
+    k = rod.stiffness
+    exact = cf.analytic.reissner([0.9, 1.5], 0.2, 20.0, bending=k.bending[1], axial=k.axial, shear=k.shear[0])
+    for elements in (8, 64):
+        path = cf.solve(scene, [0.9, 1.5], model=model, elements=elements)
+        np.testing.assert_allclose(path.displacement(rod.end)[:, 0], exact.delta, rtol=1e-7)
+        assert path.stable.all() and path.iterations.sum() < 100
+
+
+@pytest.mark.parametrize("model", ["determinate", "planar"])
+@pytest.mark.parametrize("degree", [1, 2, 3])
+@pytest.mark.serial
+def test_tip_converges_with_order_2p(model, degree, reference):
+    rod, scene = column(arm=True)
+    truth = cf.solve(scene, [0.9], model="spatial", elements=48).displacement(rod.end)[0, 0]
+    errors = []
+    for elements in (8, 16, 32):
+        path = cf.solve(scene, [0.9], model=model, degree=degree, elements=elements)
+        errors.append(abs(path.displacement(rod.end)[0, 0] / truth - 1))
+    orders = [np.log2(a / b) for a, b in zip(errors[:-1], errors[1:], strict=True) if b > 1e-11]
+    assert orders and orders[-1] == pytest.approx(2 * degree, abs=0.3), errors
+
+
+@pytest.mark.parametrize("model", ["determinate", "planar", "spatial"])
+def test_full_turns(model):
+    """M = 2 pi EI/L a turn: q keeps its sign along rod and path, though the ring closes twice."""
+    rod = cf.Rod(cf.Line((0, 0, 0), (2.0, 0, 0)), cf.Circle(0.01), STEEL)
+    M = 2 * np.pi * rod.stiffness.bending[0] / rod.length
+    scene = cf.Scene([rod], [cf.Clamp(rod.start)], [cf.Moment(rod.end, (0, -M, 0))])
+    turns = [0.4, 0.6, 1.0, 1.5, 2.0]
+    path = cf.solve(scene, turns, model=model, elements=20)
+    half = np.pi * np.array(turns)
+    expected = np.column_stack([np.cos(half), 0 * half, -np.sin(half), 0 * half])
+    np.testing.assert_allclose(path.rotation(rod.end), expected, atol=1e-9)
+    np.testing.assert_allclose(path.position(rod.end)[[2, 4]], 0, atol=1e-9)
+
+
+@pytest.mark.parametrize("model", ["determinate", "planar"])
+def test_units_change_nothing(model):
+    rod, scene = column(arm=True)
+    si = cf.solve(scene, [0.5, 1.2], model=model, elements=8)
+    other_rod, other = column(length=20e3, diameter=200.0, eccentricity=200.0, E=210e9 * 1e-12, arm=True)
+    mm = cf.solve(other, [0.5, 1.2], model=model, elements=8)
+    np.testing.assert_allclose(mm.displacement(other_rod.end) / 1e3, si.displacement(rod.end), atol=1e-10 * 20)
+    np.testing.assert_allclose(mm.moment(other_rod.start) * 1e3, si.moment(rod.start), rtol=1e-10, atol=1e-3)
+    assert mm.iterations.tolist() == si.iterations.tolist()
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_number_of_ranks_changes_nothing(name):
+    draw, known = SCENES[name]
+    scene = draw(Drawn(3))
+    for model in ("determinate", "planar") if known else ("planar",):
+        for elements in (1, 9):
+            together = cf.solve(scene, [0.4], model=model, elements=elements)
+            alone = cf.solve(scene, [0.4], model=model, elements=elements, comm=MPI.COMM_SELF)
+            assert together.unknowns == alone.unknowns
+            assert together.negative_modes.tolist() == alone.negative_modes.tolist()
+            same(together, alone, 1e-9)
+
+
+@pytest.mark.parametrize("model", ["determinate", "planar", "spatial"])
+def test_a_perfect_round_column_loses_two_motions_at_once(model):
+    """One in the plane and one out of it: planar models count both."""
+    _, scene = column(eccentricity=0.0)
+    path = cf.solve(scene, [0.5, 0.999, 1.001, 8.9, 9.1], model=model, elements=8)
+    assert path.negative_modes.tolist() == [0, 0, 2, 2, 4]
+
+
+def thin_cantilever(stiff=(1e6, 1e6), axial=1e6):
+    """P L^2/sqrt(EI GJ) = 4.0126 (Timoshenko & Gere) at load factor 1, the load along the stiff way."""
+    section = cf.Stiffness(bending=(1e5, 1.0), torsion=0.7, shear=stiff, axial=axial)
+    rod = cf.Rod(cf.Line((0, 0, 0), (0, 0, 1.0)), section)
+    return rod, cf.Scene([rod], [cf.Clamp(rod.start)], [cf.Force(rod.end, (0, 4.0126 * np.sqrt(0.7), 0))])
+
+
+@pytest.mark.parametrize("model", ["determinate", "planar"])
+@pytest.mark.parametrize("rigid", [False, True])
+def test_lateral_buckling_is_seen_in_the_plane(model, rigid):
+    _, scene = thin_cantilever(*([(np.inf, np.inf), np.inf] if rigid else []))
+    path = cf.solve(scene, [0.9, 0.998, 1.002, 1.1], model=model, elements=8)
+    assert path.model == model and path.negative_modes.tolist() == [0, 0, 1, 1]
+
+
+def test_what_buckles_sideways_is_promoted():
+    rod, scene = thin_cantilever()
+    below, above = cf.solve(scene, [0.99]), cf.solve(scene, [0.99, 1.1])
+    assert below.model == "determinate" and below.stable.all()
+    assert above.model == "spatial" and above.negative_modes.tolist() == [0, 1]
+    assert "buckles sideways" in above.why[0]
+    assert float(above.why[0].split("load factor ")[1].split(",")[0]) == pytest.approx(1.0, abs=2e-3)
+    np.testing.assert_allclose(above.displacement(rod.end)[0], below.displacement(rod.end)[0], atol=1e-8)
+
+
+def test_what_buckles_in_its_plane_is_not_promoted():
+    """A flat strip that is wide across the plane: it loses its stability in the plane alone."""
+    section = cf.Stiffness((1e6, 1e6), 1e6, (50.0, 1.0), 30.0)  # bends about d2, the normal
+    rod = cf.Rod(cf.Line((0, 0, 0), (0, 0, 1.0), d1=(1, 0, 0)), section)
+    scene = cf.Scene([rod], [cf.Clamp(rod.start)], [cf.Force(rod.end, (0, 0, -(np.pi**2) / 4))])
+    path = cf.solve(scene, [0.9, 1.1], elements=8)
+    assert path.model == "determinate" and path.negative_modes.tolist() == [0, 1]
+
+
+def test_supports_count_out_of_the_plane_too():
+    """A strip that a pin would let buckle sideways, and that a hinge about the normal holds there."""
+    section = cf.Stiffness((1e6, 1e6), 1e6, (1.0, 4.0), 2.0)
+    rod = cf.Rod(cf.Line((0, 0, 0), (0, 0, 1.0), d1=(1, 0, 0)), section)
+    roller = [cf.Roller(rod.end, (1, 0, 0)), cf.Roller(rod.end, (0, 1, 0))]
+    loads = [cf.Force(rod.end, (0, 0, -(np.pi**2))), cf.Force(rod.at(0.5), (0.1, 0, 0))]
+    for foot, expected in ((cf.Clamp(rod.start), 2.0457), (cf.Hinge(rod.start, (0, 1, 0)), 2.0457)):
+        path = cf.solve(
+            cf.Scene([rod], [foot, *roller], loads), [expected - 0.02, expected + 0.02], model="planar", elements=8
+        )
+        assert path.negative_modes.tolist() == [0, 1]
+        spatial = cf.solve(path.scene, [expected - 0.02, expected + 0.02], model="spatial", elements=8)
+        assert spatial.negative_modes.tolist() == [0, 1]
+
+
+def leaves(kind):
+    """The column with something that leaves its plane."""
+    rod, scene = column()
+    P = cf.euler_load(rod)
+    extra, supports = [], list(scene.supports)
+    if kind == "force":
+        extra = [cf.Force(rod.at(10.0), (0, 1e-6 * P, 0))]
+    elif kind == "moment":
+        extra = [cf.Moment(rod.at(10.0), (0, 0, 1e-3 * P))]
+    elif kind == "support":
+        supports.append(cf.Roller(rod.end, (1, 1, 0)))
+    elif kind == "section":
+        rod = cf.Rod(cf.Line((0, 0, 0), (0, 0, 20.0), d1=(1, 1, 0)), cf.Rectangle(0.2, 0.3), STEEL, name="column")
+        supports = [cf.Clamp(rod.start)]
+        return rod, cf.Scene([rod], supports, [cf.Force(rod.end, (P, 0, -P))])
+    return rod, cf.Scene([rod], supports, [*scene.loads, *extra])
+
+
+@pytest.mark.parametrize(
+    "kind, words",
+    [
+        ("force", "load 3 (Force at column@10) points out of the plane of the rods"),
+        ("moment", "load 3 (Moment at column@10) does not turn in the plane of the rods"),
+        ("support", "support 2 (Roller at column.end) holds or moves what is askew to the plane of the rods"),
+        ("section", "a section of rod 'column' has its principal axes (EI) askew to the plane"),
+    ],
+)
+def test_what_leaves_the_plane_is_named(kind, words):
+    _, scene = leaves(kind)
+    path = cf.solve(scene, [0.1], elements=2)
+    assert path.model == "spatial" and words in path.why[0]
+    for model in ("planar", "determinate"):
+        with pytest.raises(cf.SceneError) as refusal:
+            cf.solve(scene, [0.1], model=model)
+        assert f"model = '{model}' is not possible: " in str(refusal.value) and words in str(refusal.value)
+
+
+def test_why_not_determinate():
+    for draw, words in (
+        (hinged_arch, "because of the Hinge at arch.start"),
+        (lee_frame, "because of the Hinge at post.start"),
+    ):
+        path = cf.solve(draw(Drawn()), [0.1], elements=2)
+        assert path.model == "planar" and any(words in why for why in path.why)
+    rod, scene = column()
+    follower = cf.Scene(scene.rods, scene.supports, [*scene.loads, cf.FollowerForce(rod.end, (1.0, 0, 0))])
+    path = cf.solve(follower, [0.1], elements=2)
+    assert path.model == "planar" and any("FollowerForce, turns with the rod" in why for why in path.why)
+    path = cf.solve(scene, [0.1], elements=2, formulation="displacement")
+    assert path.model == "spatial" and "'displacement'" in path.why[0]
+    path = cf.solve(scene, [0.1], elements=2, degree=2, gauss_points=3)
+    assert path.model == "planar"
+
+
+def test_points_keep_their_own_numbers_when_another_scene_is_solved():
+    """What is expanded late must not see the scene that was loaded since."""
+    first, second = tree(Drawn(1)), tree(Drawn(2))
+    path = cf.solve(first, [1.0], elements=4)
+    fresh = cf.solve(first, [1.0], elements=4)
+    before = fresh.position(first.rods[0].start).copy()
+    cf.solve(second, [0.3], elements=4)
+    np.testing.assert_array_equal(path.position(first.rods[0].start), before)
