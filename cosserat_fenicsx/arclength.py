@@ -53,12 +53,15 @@ class ArcLength:
             self._branch_off(first, slope)
         begin, steps = first, 0
         for _ in range(self.control.most_steps):
-            point, first = first or self._attempt(), None
+            branching, point, first = first is not None, first or self._attempt(), None
             if point is not None:
                 try:
-                    landing, crossings = self._locator.between(track.here, point, target, self._weight)
+                    look = self._locator.between
+                    landing, crossings = look(track.here, point, target, self._weight, probe=not branching)
                 except Lost as far:
                     track.failure = "what lies on a step could not be told"
+                    if branching:
+                        return track.restore()
                     self._step = self._length(track.here, point)
                     point = self._shorten(far.args[0])
             if point is None:

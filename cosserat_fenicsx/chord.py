@@ -4,6 +4,7 @@ Places between the points a (0) and b (1) are counted by the projection on the c
 Newton in the plane there, which does not mind where the load factor turns.
 """
 
+import itertools
 import math
 
 import numpy as np
@@ -17,6 +18,9 @@ _FINE, _MOST = 1e-8, 25
 _PROBES = (1 / 3, 2 / 3)
 # Places nearer to one another than this tell nothing new.
 _APART = 1e-5
+# How far beyond the ends a zero is looked for, and how far beside a place another will do.
+_BEYOND = 3.0
+_ASIDE = (0.0, 1e-3, -1e-3, 1e-2, -1e-2)
 
 
 class Chord:
@@ -66,7 +70,17 @@ class Chord:
         return float(np.dot(weights, [point.load_factor for point in points]))
 
     def at(self, place):
-        """The path's `Point` at a place, added to what is known; None where Newton fails."""
+        """A known place at or next to a place, and the path's `Point` there; None where Newton fails.
+
+        Very near to where the tangent is singular the bordered solves lose their digits: a little aside is as good.
+        """
+        for aside in _ASIDE:
+            point = self._point(place + aside)
+            if point is not None:
+                return place + aside, point
+        return None
+
+    def _point(self, place):
         track = self.track
         solved = track.on_plane(*self.guess(place), self.normal, self._weight * self.change)
         if not solved.converged:
@@ -97,6 +111,27 @@ class Chord:
         high = [point for at, point in self.known if at > place]
         return (low or high)[-1], (high or low)[0]
 
+    def polish(self, place, value):
+        """The place near another, perhaps beyond the ends, where a function of the path's points vanishes; None where it
+        does not. Its values need not be of one sign on either side of the ends."""
+        known = dict(self.known)
+        values = {at: value(known[at]) for at in _nearest(known, place)}
+        estimate = None
+        for _ in range(_MOST):
+            place = _next(values, place)
+            if place is None or not -_BEYOND < place < 1 + _BEYOND:
+                return None
+            eta = self.load_factor(place)
+            settled = estimate is not None and abs(eta - estimate) <= _FINE * max(abs(eta), abs(self.change))
+            if settled or min(abs(place - at) for at in values) < _APART:
+                return place
+            estimate = eta
+            found = self.at(place)
+            if found is None:
+                return None
+            values[found[0]] = value(found[1])
+        return None
+
     def root(self, value):
         """The place where a function of the path's points changes its sign.
 
@@ -114,16 +149,16 @@ class Chord:
             if settled or min(abs(place - at) for at in values) < _APART:
                 break
             estimate = eta
-            point = self.at(place)
-            if point is None:
+            found = self.at(place)
+            if found is None:
                 break
-            values[place] = value(point)
-            if values[place] == 0:
+            values[found[0]] = value(found[1])
+            if values[found[0]] == 0:
                 break
-            if values[place] * values[low] > 0:
-                low = place
+            if values[found[0]] * values[low] > 0:
+                low = max(low, found[0])
             else:
-                high = place
+                high = min(high, found[0])
         return place
 
 
@@ -134,6 +169,19 @@ def _nearest(places, place):
         if len(chosen) < 4 and all(abs(at - other) >= _APART for other in chosen):
             chosen.append(at)
     return chosen
+
+
+def _next(values, place):
+    """Where a function should vanish by its values: between two of different sign, else by the secant of the two least;
+    None where it grows towards both sides."""
+    ordered = sorted(values)
+    pairs = [(a, b) for a, b in itertools.pairwise(ordered) if values[a] * values[b] <= 0]
+    if pairs:
+        low, high = min(pairs, key=lambda pair: abs(pair[0] + pair[1] - 2 * place))
+        places = _nearest(values, (low + high) / 2)
+        return _zero(places, [values[at] for at in places], low, high)
+    (u, a), (v, b) = sorted(values.items(), key=lambda item: abs(item[1]))[:2]
+    return u - a * (v - u) / (b - a) if a != b else None
 
 
 def zero_of(function, low, high):

@@ -27,6 +27,9 @@ class Follower:
 
     Attributes:
         track: the `Track`.
+        locator: its `Locator`.
+        fork: the `Crossing` where the path is left, once it was met; left: whether it was.
+        used: "arc" once arc length was used, else "load".
     """
 
     def __init__(self, problem, newton, stability, steps, *, control="auto", branch=0, on_event=None):
@@ -34,10 +37,11 @@ class Follower:
         self.track = Track(problem, newton, stability, most)
         self._steps, self._control, self._branch, self._on_event = steps, control, branch, on_event
         self._sign = branch
-        self._locator = Locator(self.track)
+        self.locator = Locator(self.track)
         self._load = Continuation(self.track, steps, self._watch)
-        self._arc = ArcLength(self.track, steps, self._locator)
-        self._fork = None
+        self._arc = ArcLength(self.track, steps, self.locator)
+        self._auto = control == "auto" and steps.adaptive
+        self.fork, self.left, self.used = None, False, "load"
 
     def to(self, target, way, *, on_step=None):
         """Go on to the load factor `target`, landing on it exactly.
@@ -51,41 +55,48 @@ class Follower:
             bool: False where the path could not be continued; `track.failure` says why, and the state is that of
             `track.here`.
         """
-        auto = self._control == "auto" and self._steps.adaptive
-        if self._control != "arc":
-            done = self._load.to(target, way, on_step=on_step, patience=_PATIENCE if auto else None)
-            if done or not (auto or self._fork):
-                return done
-        track, done = self.track, False
-        here = track.here
-        if not self._fork:
-            done = self._arc.to(target, on_step=on_step, on_event=self._meet)
-        if self._fork:
-            fork, self._fork, self._branch = self._fork, None, 0  # the first bifurcation alone
-            first = self._onto(fork)
+        track, here = self.track, self.track.here
+        done = self._advance(target, way, on_step)
+        if self.fork and not self.left:
+            self.left, self._branch, self.used = True, 0, "arc"
+            first = self._onto(self.fork)
             if first is not None:
                 slope = track.slope_found()
                 done = self._arc.to(target, first=first, slope=slope, on_step=on_step, on_event=self._meet)
-        if done and len(track.history) > 1:
+        if not done and self._auto and track.here is here:  # arc length was of no help: load control has the last word
+            return self._load.to(target, way, on_step=on_step)
+        if done and self.used == "arc" and len(track.history) > 1:
             before, here = track.history[-2:]
             self._load.step = abs(here.load_factor - before.load_factor) or None
-        elif not done and auto and track.here is here:  # arc length was of no help: load control has the last word
-            return self._load.to(target, way, on_step=on_step)
         return done
+
+    def to_fork(self, target, way):
+        """Go on towards a load factor to the first bifurcation, and stay there; whether there was one."""
+        self._advance(target, way, None)
+        return self.fork is not None
+
+    def _advance(self, target, way, on_step):
+        """To the load factor, or to where the path is to be left: then False."""
+        if self._control != "arc":
+            done = self._load.to(target, way, on_step=on_step, patience=_PATIENCE if self._auto else None)
+            if done or not self._auto or (self.fork and not self.left):
+                return done
+        self.used = "arc"
+        return self._arc.to(target, on_step=on_step, on_event=self._meet)
 
     def _meet(self, crossing):
         """Report a crossing; True where the path is to be left there."""
         if self._on_event:
             self._on_event(crossing)
         if self._branch and crossing.kind == "bifurcation":
-            self._fork = crossing
-        return self._fork is not None
+            self.fork = crossing
+        return self.fork is not None and not self.left
 
     def _watch(self, a, b):
         """Negative modes changed on a step of load control: report what was crossed; False to leave the path there."""
         if not (self._on_event or self._branch):
             return True
-        crossings = self._locator.bifurcations(Chord.balanced(self.track, a, b))
+        crossings = self.locator.bifurcations(Chord.balanced(self.track, a, b))
         self.track.put(b.numbers, b.load_factor)
         return not any(self._meet(crossing) for crossing in crossings)
 

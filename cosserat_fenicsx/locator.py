@@ -1,6 +1,7 @@
 """What lies between two neighbouring points of a path: limit points, bifurcations, a requested load factor."""
 
 import itertools
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -47,8 +48,14 @@ class Locator:
     def __init__(self, track):
         self.track = track
 
-    def between(self, a, b, target, weight):
+    def between(self, a, b, target, weight, *, probe=True):
         """What lies between two points, in order.
+
+        Args:
+            a, b: the `Point`s; the track stands at a.
+            target: load factor.
+            weight: of the load factor in the metric.
+            probe: look for modes that come and go between them.
 
         Returns:
             (landing, crossings): the first `Point` with the load factor `target` after a, or None; the `Crossing`s
@@ -58,7 +65,7 @@ class Locator:
             Lost: the landing failed, or negative modes come and go.
         """
         chord = Chord(self.track, a, b, weight)
-        place = chord.comes_and_goes()
+        place = chord.comes_and_goes() if probe else None
         if place is not None:
             raise Lost(place)
         limits = self.limits(chord)
@@ -73,8 +80,9 @@ class Locator:
             crossings = [crossing for crossing in crossings if crossing.place <= place]
         return landing, crossings
 
-    def crossings(self, chord, limits):
-        """All `Crossing`s of a piece of path, in order, from its limit points."""
+    def crossings(self, chord, limits=None):
+        """All `Crossing`s of a piece of path, in order; its limit points where they are known."""
+        limits = self.limits(chord) if limits is None else limits
         return sorted([*limits, *self.bifurcations(chord, limits)], key=lambda crossing: crossing.place)
 
     def limits(self, chord):
@@ -93,7 +101,6 @@ class Locator:
     def bifurcations(self, chord, limits=()):
         """The `Crossing`s where an eigenvalue of the second variation changes its sign and the load factor does not
         turn; those of limit points are left out."""
-        track = self.track
         first, last = sorted(point.negative_modes for _, point in (chord.known[0], chord.known[-1]))
         if first < 0 or last - first == len(limits):  # singular to round-off at one of the two; or all explained
             return []
@@ -105,14 +112,32 @@ class Locator:
         for limit in limits:  # the eigenvalue that vanishes at a limit point is the nearest
             if found:
                 found.remove(min(found, key=lambda item: abs(item[0] - limit.place)))
-        crossings = []
-        for place, point, together in found:
-            track.put(point.numbers, point.load_factor)
-            modes = track.stability.whole.modes(together)
-            for i, mode in enumerate(modes):
-                partner = modes[i - 1] if len(modes) == 2 else None
-                crossings.append(Crossing("bifurcation", point, place, mode, partner))
-        return crossings
+        return [crossing for item in found for crossing in self._singular(chord, *item)]
+
+    def _singular(self, chord, place, point, together):
+        """The `Crossing`s next to where eigenvalues of the second variation vanish: where the tangent itself is singular.
+
+        The second variation is that of a rod of bounded stiffness, which shifts it slightly; and under loads that are not
+        conservative its symmetric part may become indefinite where no other path crosses: then there is no crossing.
+        """
+        track = self.track
+        track.put(point.numbers, point.load_factor)
+        modes = track.stability.whole.modes(together)
+        motion = modes[0] / math.sqrt(track.product(modes[0], modes[0]))
+
+        def resistance(known):
+            track.put(known.numbers, known.load_factor)
+            return track.newton.bordered.resistance(motion)
+
+        place = chord.polish(place, resistance)
+        if place is None:
+            return []
+        numbers, eta = chord.guess(place)
+        point = Point(eta, numbers, point.negative_modes, 0)
+        partners = modes[::-1] if together == 2 else [None] * together
+        return [
+            Crossing("bifurcation", point, place, mode, partner) for mode, partner in zip(modes, partners, strict=True)
+        ]
 
     def _vanishing(self, chord, j, last):
         """(place, `Point`, number of eigenvalues that vanish there together) for the j-th eigenvalue, of those below `last`."""
@@ -146,9 +171,10 @@ class Locator:
                 ends = track.distance(before.numbers, after.numbers)
                 if track.distance(numbers, predicted) <= 0.2 * ends:
                     return place, track.point(solved)
-            point = chord.at(place)
-            if point is None:
+            found = chord.at(place)
+            if found is None:
                 break
+            place, point = found
             if point.load_factor == target:
                 return place, point
             if (point.load_factor - target) * (after.load_factor - target) < 0:

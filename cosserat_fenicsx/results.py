@@ -15,7 +15,7 @@ from cosserat_fenicsx.rod import Station
 @dataclass(frozen=True)
 class Record:
     """One equilibrium, dimensionless: (r, q) at the nodes (N, 7), (n, m, r') at the Gauss points (cells, points, 9), and
-    the reactions of the equations that supports and joints add.
+    the reactions of the equations that supports and joints add; whether a motion is neutral there, see `Track`.
 
     A record that is appended to a path may hold its model's own numbers instead, which the path's `expand` turns into these.
     """
@@ -26,6 +26,7 @@ class Record:
     negative_modes: int
     iterations: int
     reactions: np.ndarray
+    neutral: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,6 +61,8 @@ class Path:
         stable: (n,) bool.
         error: (n,) estimated error of the positions, relative to the largest displacement; NaN where not estimated.
         events: the `Event`s met, in order: limit points and bifurcations.
+        left: whether the path was left at its first bifurcation, for a branch.
+        control: "load", or "arc" where the path, or a part of it, was followed in arc length.
 
     Station queries return one row a point, in inertial components unless they say material.
     """
@@ -70,6 +73,7 @@ class Path:
         self.model, self.formulation, self.degree, self.unknowns = model, formulation, degree, unknowns
         self.elements, self.why, self.events = layout.counts, why, []
         self._expand, self._expanded, self._appended, self._rounding = expand, [], [], rounding
+        self.control, self.left = "load", False
         self._error = None
 
     @classmethod

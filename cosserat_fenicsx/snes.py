@@ -210,12 +210,25 @@ class BorderedNewton(Newton):
         """(owned numbers,) dx/d eta at the last step of the last solve."""
         return -self._slope.array_r
 
-    def slope_here(self, neutral=None):
-        """(owned numbers,) dx/d eta at the problem's x and load factor, without the neutral motion."""
+    def _factor_here(self):
         problem = self.problem
         problem.function(None, problem.x, problem.b)
         problem.jacobian(None, problem.x, problem.A, problem.A)
         self._ksp.setOperators(problem.A)
+
+    def resistance(self, motion):
+        """What the tangent at the problem's x and load factor resists a motion (owned numbers) with: 1/<motion, A^-1
+        motion>, which changes its sign where the tangent becomes singular by that motion."""
+        self._factor_here()
+        force = self.problem.load_derivative(self.problem.x)
+        force.array_w[:] = motion
+        self._ksp.solve(force, self._free)
+        return 1 / self.problem.model.inner(motion, self._free.array_r)
+
+    def slope_here(self, neutral=None):
+        """(owned numbers,) dx/d eta at the problem's x and load factor, without the neutral motion."""
+        problem = self.problem
+        self._factor_here()
         self._ksp.solve(problem.load_derivative(problem.x), self._slope)
         self.neutral = neutral
         if neutral is not None:

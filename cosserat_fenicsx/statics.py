@@ -9,13 +9,11 @@ import numbers
 import numpy as np
 from mpi4py import MPI
 
-from cosserat_fenicsx.accuracy import on_mesh
 from cosserat_fenicsx.checks import instance
 from cosserat_fenicsx.choose import choose
 from cosserat_fenicsx.continuation import StepControl
-from cosserat_fenicsx.errors import Interrupted, NotConverged, SceneError, nearest
-from cosserat_fenicsx.follow import CONTROLS, Follower
-from cosserat_fenicsx.interrupts import obey
+from cosserat_fenicsx.errors import NotConverged, SceneError, nearest
+from cosserat_fenicsx.follow import CONTROLS
 from cosserat_fenicsx.models.determinate import DeterminateModel
 from cosserat_fenicsx.models.planar import PlanarModel
 from cosserat_fenicsx.models.rodmesh import Layout
@@ -24,19 +22,15 @@ from cosserat_fenicsx.models.spatial import SpatialModel
 from cosserat_fenicsx.problem import Problem
 from cosserat_fenicsx.progress import Progress
 from cosserat_fenicsx.refinement import refine
-from cosserat_fenicsx.results import Event, Path, Record
 from cosserat_fenicsx.scene import Scene
 from cosserat_fenicsx.snes import Newton
 from cosserat_fenicsx.stability import NegativeModes
 from cosserat_fenicsx.supports import Prescribed
+from cosserat_fenicsx.tracing import Promoted, Tracing
 
 _MODELS = {model.name: model for model in (DeterminateModel, PlanarModel, SpatialModel)}
 #: Elements per rod of the first mesh, where the mesh is not given.
 FIRST_ELEMENTS = 4
-# A point is corrected from a coarser mesh in so many iterations, and moves and turns by no more than this (lengths, rad).
-_CORRECTIONS, _NEAR = 6, 0.1
-# Loads in units of EI/L^2 that point to a slip in the units.
-_ENORMOUS = 1e5
 
 
 def solve(
@@ -104,39 +98,42 @@ def solve(
     )
     steps = instance("solve", "steps", StepControl() if steps is None else steps, StepControl, "a StepControl")
     follow, until = _follow_options(steps, control, branch), _until(until, free)
-    how = dict(formulation=formulation, degree=degree, points=gauss_points, comm=comm)
+
+    def take(choice, bar):
+        strayed = []
+
+        def tracing(layout):
+            solvers = solvers_of(
+                scene, layout, formulation=formulation, degree=degree, points=gauss_points, comm=comm, model=choice.model
+            )
+            return Tracing(solvers, formulation, follow, choice, bar)
+
+        def trace(layout, like=None):
+            """`like`: a path whose points are found again, where the solver chose them."""
+            if like is None or not free or like in strayed:
+                return tracing(layout).along(targets, free, until)
+            if like.control == "load":
+                return tracing(layout).along(like.load_factors.tolist(), False)
+            try:  # load factors that come more than once do not say where the points are
+                return tracing(layout).again(like)
+            except NotConverged:
+                strayed.append(like)
+                raise
+
+        def correct(layout, coarse):
+            if coarse.events or coarse.control == "arc" or until or not steps.adaptive:
+                return None
+            return tracing(layout).corrected(coarse)
+
+        if elements is not None:
+            return trace(Layout.of(scene, elements))
+        return refine(trace, correct, Layout.of(scene, FIRST_ELEMENTS), tol, degree)
+
     with Progress(targets, progress, comm) as bar:
-
-        def take(choice):
-            def trace(layout, like=None):
-                """`like`: a path whose points are landed on, where the solver chose them."""
-                chosen = free and like is not None
-                etas = like.load_factors.tolist() if chosen else targets
-                return _trace(
-                    scene, etas, free and not chosen, layout, follow=follow, until=until, bar=bar, choice=choice, **how
-                )
-
-            def correct(layout, coarse):
-                if coarse.events or until or not steps.adaptive:
-                    return None
-                return _correct(scene, coarse, layout, bar=bar, choice=choice, **how)
-
-            if elements is not None:
-                return trace(Layout.of(scene, elements))
-            return refine(trace, correct, Layout.of(scene, FIRST_ELEMENTS), tol, degree)
-
         try:
-            return take(choice)
-        except _Promoted as found:
-            return take(choice.in_space(found.reason))
-
-
-class _Promoted(Exception):
-    """A plane answer that goes on in space alone."""
-
-    def __init__(self, reason):
-        super().__init__(reason)
-        self.reason = reason
+            return take(choice, bar)
+        except Promoted as found:
+            return take(choice.in_space(found.reason), bar)
 
 
 def _make_solvers(comm, shape):
@@ -165,102 +162,6 @@ def solvers_of(scene, layout, *, formulation="mixed", degree=4, points=None, com
     return problem, newton, stability
 
 
-def _trace(scene, targets, free, layout, *, formulation, degree, points, follow, until, comm, choice, bar):
-    """One path on one mesh, stepping from the unloaded state."""
-    problem, newton, stability = solvers_of(
-        scene, layout, formulation=formulation, degree=degree, points=points, comm=comm, model=choice.model
-    )
-    model = problem.model
-    path = Path.of(model, formulation, choice.why)
-
-    def meet(crossing):
-        shape = model.shape_of(crossing.direction)
-        size = np.linalg.norm(shape, axis=1).max()
-        event = Event(crossing.kind, crossing.point.load_factor, shape / (size or 1.0), len(path) - 1)
-        path.events.append(event)
-
-    in_space = choice.model == "spatial"
-    how = follow if in_space else {**follow, "control": "load"}
-    follower = Follower(problem, newton, stability, on_event=meet if in_space else None, **how)
-    track = follower.track
-    bar.start(f"{path.model}, {model.unknowns} unknowns")
-    way = max(abs(eta) for eta in targets) or 1.0
-    counted = 0
-
-    def watch(point):
-        if choice.promoted and point.negative_modes:
-            where = f"at the load factor {point.load_factor:.4g}"
-            raise _Promoted(
-                f"in its plane the scene buckles sideways {where}, where motions out of the plane lose their stability"
-                if stability.sideways
-                else f"it loses its stability in its plane {where}, and the spatial model follows what comes of it"
-            )
-        bar.at(point)
-
-    def record(point):
-        nonlocal counted
-        path.append(Record(point.load_factor, *model.snapshot(), point.negative_modes, track.iterations - counted,
-                           problem.multipliers()))  # fmt: skip
-        counted = track.iterations
-        if until and until(path):
-            raise _Enough
-
-    try:
-        for k, target in enumerate(targets):
-            between = free and k == 1
-            on_step = (lambda point: (watch(point), record(point))) if between else watch
-            at_start = k == 0 and track.here.load_factor == target
-            if not (at_start or follower.to(target, way, on_step=on_step)):
-                here = track.here.load_factor
-                if choice.promoted and follow["control"] == "auto":
-                    raise _Promoted(f"load control ends at the load factor {here:.4g}: {track.failure}")
-                raise NotConverged(
-                    f"no equilibrium was found beyond the load factor {here:.6g} on the way to {target:g}: "
-                    f"{track.failure}. {_advice(follow, here, abs(target) * problem.load_norm)}",
-                    path,
-                )
-            if not between:
-                record(track.here)
-    except _Enough:
-        pass
-    except KeyboardInterrupt:
-        raise Interrupted(path) from None
-    return path
-
-
-def _correct(scene, coarse, layout, *, formulation, degree, points, comm, choice, bar):
-    """The points of a path on a finer mesh, each by Newton's method from the coarse one; None where one strays."""
-    problem, newton, stability = solvers_of(
-        scene, layout, formulation=formulation, degree=degree, points=points, comm=comm, model=choice.model
-    )
-    model = problem.model
-    if not model.takes_motions:
-        return None
-    path = Path.of(model, formulation, choice.why)
-    bar.start(f"{path.model}, {model.unknowns} unknowns")
-    newton.allow(_CORRECTIONS)
-    try:
-        for k, point in enumerate(coarse):
-            obey()
-            problem.set_load_factor(point.load_factor)
-            problem.begin_at(*on_mesh(coarse, k, layout), point.reactions)
-            start = problem.numbers()[0]
-            solved = newton.solve()
-            strayed = not solved.converged or model.largest(problem.numbers()[0] - start) > _NEAR
-            if strayed or stability.count() != point.negative_modes:
-                return None
-            path.append(Record(point.load_factor, *model.snapshot(), point.negative_modes, solved.iterations,
-                               problem.multipliers()))  # fmt: skip
-            bar.at(point)
-    except KeyboardInterrupt:
-        raise Interrupted(path) from None
-    return path
-
-
-class _Enough(Exception):
-    """The user's `until` was met."""
-
-
 def _follow_options(steps, control, branch):
     """Arguments of `Follower`, checked."""
     if control not in CONTROLS:
@@ -278,19 +179,6 @@ def _until(until, free):
     if until is not None and not (callable(until) and free):
         raise SceneError("until: expected a function of the Path, with a pair of load factors (a, b)")
     return until
-
-
-def _advice(follow, here, load):
-    if not follow["steps"].adaptive:
-        return "Let the steps adapt, or ask for load factors in between."
-    if load > _ENORMOUS:
-        return (
-            f"The loads are {load:.1e} EI/L^2 there, which no slender rod bears: are the units those of SI (N, m, Pa)?"
-        )
-    where = "Try"
-    if here and follow["control"] == "load":
-        where = "There may be a limit point, which load control cannot pass (control='auto' can); otherwise try"
-    return f"{where} load factors in between, more elements, or the formulation 'mixed'."
 
 
 def _targets(load_factors):

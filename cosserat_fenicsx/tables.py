@@ -33,7 +33,9 @@ def path_table(path):
             str(path.iterations[k]),
             "unknown" if np.isnan(path.error[k]) else f"{path.error[k]:.1e}",
         )
-    return as_text(table)
+    lines = [as_text(table), *(f"{event.kind} point at the load factor {event.load_factor:.7g}" if event.kind == "limit"
+                               else f"bifurcation at the load factor {event.load_factor:.7g}" for event in path.events)]  # fmt: skip
+    return "\n".join([*lines, f"{path.model} model: {'; '.join(path.why)}."])
 
 
 def _busiest(path):

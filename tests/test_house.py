@@ -44,7 +44,7 @@ SCENE = (
 )  # fmt: skip
 SOLVERS = (
     "arclength", "chord", "continuation", "eigen", "follow", "interrupts", "linear", "linear_buckling", "locator", "problem",
-    "refinement", "snes", "stability", "statics", "tie_rows", "track",
+    "refinement", "snes", "stability", "statics", "tie_rows", "tracing", "track",
 )  # fmt: skip
 RESULTS = ("accuracy", "plot", "ranks", "recovery", "results", "tables", "xdmf")
 
@@ -57,7 +57,7 @@ def test_data_flows_one_way():
     for name in RESULTS:
         known = {part.split(".")[0] for part in inside(PACKAGE / f"{name}.py")}
         assert known.isdisjoint({*SOLVERS, "models", "forms"}), name
-    for name in set(SOLVERS) - {"linear_buckling", "refinement", "statics"}:  # solvers know no rung
+    for name in set(SOLVERS) - {"linear_buckling", "refinement", "statics", "tracing"}:  # solvers know no rung
         known = {part.split(".")[0] for part in inside(PACKAGE / f"{name}.py")}
         assert known.isdisjoint({"models", "forms", "results", *RESULTS}), name
     for file in (PACKAGE / "models").glob("*.py"):

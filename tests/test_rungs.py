@@ -136,17 +136,22 @@ def test_what_buckles_sideways_is_promoted():
     below, above = cf.solve(scene, [0.99]), cf.solve(scene, [0.99, 1.1])
     assert below.model == "determinate" and below.stable.all()
     assert above.model == "spatial" and above.negative_modes.tolist() == [0, 1]
-    assert "buckles sideways" in above.why[0]
-    assert float(above.why[0].split("load factor ")[1].split(",")[0]) == pytest.approx(1.0, abs=2e-3)
+    assert "buckles sideways before the load factor" in above.why[0]
+    (event,) = above.events
+    assert event.kind == "bifurcation" and event.load_factor == pytest.approx(1.0, abs=2e-3)
     np.testing.assert_allclose(above.displacement(rod.end)[0], below.displacement(rod.end)[0], atol=1e-8)
 
 
-def test_what_buckles_in_its_plane_is_not_promoted():
-    """A flat strip that is wide across the plane: it loses its stability in the plane alone."""
+def test_what_buckles_in_its_plane_is_promoted_too():
+    """A flat strip that is wide across the plane loses its stability in the plane alone: space knows events and branches."""
     section = cf.Stiffness((1e6, 1e6), 1e6, (50.0, 1.0), 30.0)  # bends about d2, the normal
     rod = cf.Rod(cf.Line((0, 0, 0), (0, 0, 1.0), d1=(1, 0, 0)), section)
     scene = cf.Scene([rod], [cf.Clamp(rod.start)], [cf.Force(rod.end, (0, 0, -(np.pi**2) / 4))])
     path = cf.solve(scene, [0.9, 1.1], elements=8)
+    assert path.model == "spatial" and path.negative_modes.tolist() == [0, 1]
+    assert "loses its stability in its plane before the load factor" in path.why[0]
+    assert [event.kind for event in path.events] == ["bifurcation"]
+    path = cf.solve(scene, [0.9, 1.1], elements=8, model="determinate")
     assert path.model == "determinate" and path.negative_modes.tolist() == [0, 1]
 
 
