@@ -318,4 +318,3 @@ class Path:
         from cosserat_fenicsx import plot
 
         return plot.rods(self, file, points, magnify)
-

@@ -66,7 +66,9 @@ def main(count=200, first=0):
         verdict, rows = compare(drawn)
         for tol, said, error, estimate, spent in rows:
             right = error <= max(tol, 1e-10)
-            kinds[f"{verdict.split(':')[0]} | {said.split(':')[0]} | {'right' if right else 'wrong' if error == error else '-'}"] += 1
+            kinds[
+                f"{verdict.split(':')[0]} | {said.split(':')[0]} | {'right' if right else 'wrong' if error == error else '-'}"
+            ] += 1
             if error > 1e-10:
                 ratios.append(estimate / error)
             print(f"{drawn.seed:4d} {drawn.slenderness:7.0f} {verdict}: {tol:.0e} {error:.1e} {estimate:.1e} {spent:.2f} {said}",
@@ -74,7 +76,9 @@ def main(count=200, first=0):
     for kind, number in kinds.most_common():
         print(f"{number:5d}  {kind}")
     if ratios:
-        print(f"estimate over true error: least {min(ratios):.2g}, median {np.median(ratios):.2g}, largest {max(ratios):.2g}")
+        print(
+            f"estimate over true error: least {min(ratios):.2g}, median {np.median(ratios):.2g}, largest {max(ratios):.2g}"
+        )
 
 
 if __name__ == "__main__":
