@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import ufl
 from mpi4py import MPI
 from scipy.spatial.transform import Rotation
 
@@ -180,3 +181,34 @@ force = [0.2, 0, 0]
             cf.read_scene(file)
         assert words in str(refusal.value)
         file.write_text(file.read_text().replace(new, old))
+
+
+class Pressure:
+    """A load of a new kind, and all that it takes: a force along a rod that stays across it."""
+
+    station, unit, follows = None, "force per length", True
+
+    def __init__(self, rod, pressure):
+        self.rod, self.pressure = rod, pressure
+
+    @staticmethod
+    def work(f, test, R):
+        return ufl.dot(R * f, test.phi_r)
+
+    def acts_on(self, rod):
+        return rod is self.rod
+
+    def check_rod(self, rod):
+        pass
+
+    def density(self, rod, s):
+        return self.pressure * rod.curve.frame(s)[:, :, 1]
+
+
+def test_a_new_kind_of_load_takes_no_change_elsewhere():
+    """A ring under outer pressure p shrinks by the hoop force p R, wherever it is held."""
+    ring = cf.Rod(cf.Arc((0, 0, 0), (2.0, 0, 0), 2 * np.pi), cf.Stiffness((50.0, 50.0), 90.0, (1.0, 1.0), 0.7))
+    inwards = np.sign(ring.curve.frame(np.array([0.0]))[0, 0, 1]) * -0.2
+    scene = cf.Scene([ring], [cf.Clamp(ring.start)], [Pressure(ring, inwards)], [cf.Joint(ring.start, ring.end)])
+    path = cf.solve(scene, [1.0], elements=8)
+    np.testing.assert_allclose(path.displacement(ring.at(2 * np.pi))[0], (2 * 2.0 * 0.2 * 2.0 / 90.0, 0, 0), atol=1e-7)
