@@ -60,6 +60,11 @@ def _parser():
     run.add_argument("--no-picture", action="store_true", help="write no rods.png")
     run.set_defaults(do=_run)
 
+    buckling = commands.add_parser("buckling", help="critical load factors by linear buckling")
+    buckling.add_argument("scene", help="scene file (TOML)")
+    buckling.add_argument("--count", type=int, default=3, help="how many [3]")
+    buckling.set_defaults(do=_buckling)
+
     explain = commands.add_parser("explain", help="say which model would be solved and how large it is")
     _common(explain)
     explain.set_defaults(do=_explain)
@@ -75,6 +80,8 @@ def _common(parser):
     parser.add_argument("--degree", type=int, help="polynomial degree of r and q, 1 to 4 [4]")
     parser.add_argument("--formulation", help="mixed, displacement or multiplier [mixed]")
     parser.add_argument("--model", help="auto, determinate, planar or spatial [auto]")
+    parser.add_argument("--control", help="auto, load (stop at a limit point) or arc (along the path, never back) [auto]")
+    parser.add_argument("--branch", type=int, help="1 or -1: leave the path at its first bifurcation")
 
 
 def _settings(options):
@@ -82,7 +89,7 @@ def _settings(options):
     from cosserat_fenicsx.scenefile import read_scene
 
     scene, settings = read_scene(options.scene)
-    for name in ("tol", "elements", "degree", "formulation", "model"):
+    for name in ("tol", "elements", "degree", "formulation", "model", "control", "branch"):
         if getattr(options, name) is not None:
             settings[name] = getattr(options, name)
     if options.load_factors is not None:
@@ -156,6 +163,21 @@ def _write(path, out, *, picture):
         path.plot(out / "rods.png")
         written.append("rods.png")
     _say(f"written to {out}/: {', '.join(written)}", file=sys.stdout)
+
+
+def _buckling(options):
+    from cosserat_fenicsx.linear_buckling import buckling
+    from cosserat_fenicsx.scenefile import read_scene
+    from cosserat_fenicsx.tables import buckling_table
+
+    scene, _ = read_scene(options.scene)
+    try:
+        found = buckling(scene, options.count)
+    except NotConverged as failure:
+        _say(f"cosserat: {failure}")
+        return NOT_CONVERGED
+    _say(buckling_table(found), file=sys.stdout)
+    return DONE
 
 
 def _explain(options):

@@ -41,7 +41,9 @@ class Interrupted(KeyboardInterrupt):
 
 def nearest(word, known):
     """', did you mean ...?' for the known word nearest to `word`, or the list of known words."""
-    match = difflib.get_close_matches(str(word), list(known), n=1, cutoff=0.5)
+    word = str(word)
+    match = [name for name in known if word and (word.startswith(name) or name.startswith(word))]
+    match = match or difflib.get_close_matches(word, list(known), n=1, cutoff=0.5)
     if match:
         return f"did you mean '{match[0]}'?"
     return "known: " + ", ".join(sorted(known))

@@ -34,7 +34,10 @@ def explain(scene, load_factors, settings):
     elements, tol = settings.get("elements"), settings.get("tol", 1e-6)
     degree = settings.get("degree", default_degree(formulation))
     check_arguments(scene, tol, elements)
-    choice = choose(scene, model=settings.get("model", "auto"), formulation=formulation, degree=degree)
+    follows = settings.get("branch") is not None or settings.get("control") == "arc"
+    choice = choose(
+        scene, model=settings.get("model", "auto"), formulation=formulation, degree=degree, follows=follows
+    )
     first = elements or FIRST_ELEMENTS
     layout = Layout.of(scene, first)
 
@@ -51,10 +54,11 @@ def explain(scene, load_factors, settings):
     lines.append(
         f"{len(scene.supports)} support(s): {', '.join(describe(x) for x in scene.supports)}. "
         f"{len(scene.loads)} load(s): {', '.join(describe(x) for x in scene.loads) or 'none'}."
+        + "".join(f" {joint.first} is joined to {joint.second}{_release(joint)}." for joint in scene.joints)
     )
     lines.append(f"Model: {choice.model} ({_UNKNOWNS[choice.model]}): {'; '.join(choice.why)}.")
     if choice.promoted:
-        lines.append("Should it buckle sideways, out of its plane, the spatial model takes over.")
+        lines.append("Should it lose its stability, in its plane or out of it, the spatial model takes over.")
     costs = (f"{shape_of(name).unknowns} {name}" for name in fitting(scene, formulation=formulation, degree=degree))
     lines.append(f"Unknowns on the first mesh by model: {', '.join(costs)}.")
     lines.append(
@@ -106,6 +110,14 @@ def _sections(rod):
         parts.append(part if len(rod.profile.pieces) == 1 else f"{part} up to s = {end:g} m")
         before = end
     return ", then ".join(parts)
+
+
+def _release(joint):
+    """What a joint lets go."""
+    if joint.rigid:
+        return " rigidly"
+    axis = joint.release if joint.release == "all" else "(" + ", ".join(f"{x:.3g}" for x in joint.release) + ")"
+    return " by a ball" if axis == "all" else f" by a hinge about {axis}"
 
 
 def _section(section):

@@ -48,6 +48,8 @@ SOLVE_KEYS = {
     "tol": (int, float),
     "elements": (int,),
     "degree": (int,),
+    "control": (str,),
+    "branch": (int,),
 }
 
 

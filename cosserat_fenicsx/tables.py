@@ -44,6 +44,23 @@ def _busiest(path):
     return max(named, key=lambda station: round(np.linalg.norm(path.displacement(station), axis=1).max(), 12))
 
 
+def buckling_table(found):
+    """Text: critical load factors by linear buckling, and where each mode moves most."""
+    table = Table(
+        title=f"{found.scene.title or 'Linear buckling'}: degree {found.degree}, {' + '.join(map(str, found.elements))} elements",
+        caption="Load factors at which the unloaded state, extrapolated, loses its stability; estimated relative error. A "
+        "structure that bends much before it buckles needs `cosserat run` instead.",
+    )
+    for heading in ("critical load factor", "est. error", "mode moves most at (m)"):
+        table.add_column(heading, justify="right")
+    for k, (eta, error) in enumerate(zip(found.load_factors, found.error, strict=True)):
+        sizes = [(np.linalg.norm(found.mode(k, rod), axis=1), rod) for rod in found.scene.rods]
+        size, rod = max(sizes, key=lambda item: item[0].max())
+        s = rod.length * np.argmax(size) / (len(size) - 1)
+        table.add_row(f"{eta:.7g}", f"{error:.1e}", f"{rod.name}@{s:.4g}")
+    return as_text(table) if len(found.load_factors) else "No buckling under positive load factors."
+
+
 def describe(item):
     """A support or a load in few words: its kind and its station."""
     if item.station is not None:

@@ -155,3 +155,24 @@ def test_ctrl_c_keeps_what_is_done(tmp_path):
     out, err = process.communicate(timeout=60)
     assert process.returncode == 130 and "interrupted" in err and "Traceback" not in err
     assert "load factor" in out and (tmp_path / "path.csv").is_file() and (tmp_path / "path.xdmf").is_file()
+
+
+@pytest.mark.parametrize("scene", sorted(DEMO.parent.glob("*.toml")), ids=lambda file: file.stem)
+def test_every_demo_scene(scene, tmp_path):
+    """explain, run and buckling; what is promised of the bend and of Lee's frame comes out."""
+    told = cosserat("explain", scene)
+    assert told.returncode == 0 and "Model: " in told.stdout, told.stderr
+    done = cosserat("run", scene, "--tol", "1e-4", "-o", tmp_path, "--no-picture")
+    assert done.returncode == 0, done.stderr
+    assert (tmp_path / "path.csv").is_file() and (tmp_path / "path.xdmf").is_file()
+    if scene.stem == "bend_45":
+        assert "-23.5602" in done.stdout and "53.4748" in done.stdout
+    if scene.stem == "lees_frame":
+        snapped = cosserat("run", scene, "--load-factors", "0:2", "--tol", "1e-4")
+        assert "limit point at the load factor 1.85465" in snapped.stdout, snapped.stdout
+        assert "limit point at the load factor -0.9396" in snapped.stdout and "promoted from the planar" in snapped.stdout
+
+
+def test_buckling():
+    done = cosserat("buckling", DEMO, "--count", "2")
+    assert done.returncode == 0 and "critical load factor" in done.stdout, done.stderr
