@@ -193,6 +193,8 @@ class ArcLength:
         if not solved.converged:
             return self._shorten()
         numbers, found = track.problem.numbers(), track.problem.load_factor
+        if bound and abs(found - here.load_factor) > bound:
+            return self._shorten(0.9 * bound / abs(found - here.load_factor))
         off = track.distance(numbers, predicted)
         beside = numbers[0] - predicted[0]
         bend = math.sqrt(track.product(beside, beside) + self._weight * (found - eta) ** 2) / length

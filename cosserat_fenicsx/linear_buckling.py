@@ -19,6 +19,8 @@ from cosserat_fenicsx.statics import FIRST_ELEMENTS, check_arguments, solvers_of
 _MOST_ELEMENTS = 256
 # The state is moved by this much of a unit load (EI/L^2, EI/L) to either side for the change of the second variation.
 _STEP = 1e-3
+# No rod bears more than this, in the same units.
+_HUGE = 1e8
 # Load factors nearer than this to one another are one, with several modes.
 _SAME = 1e-6
 
@@ -111,7 +113,8 @@ def _critical(scene, layout, count, load_factor, degree, comm):
     if here.negative_modes:
         raise NotConverged(f"the structure is unstable at the load factor {load_factor:g}: expected a stable state")
     slope = track.slope()
-    change = _STEP / (problem.load_derivative(problem.x).norm() or 1.0)
+    unit = problem.load_derivative(problem.x).norm() or 1.0
+    change = _STEP / unit
     sides = []
     for step in (change, -change):
         numbers_there = [here.numbers[0] + step * slope, *(values.copy() for values in here.numbers[1:])]
@@ -125,11 +128,12 @@ def _critical(scene, layout, count, load_factor, degree, comm):
     track.restore()
     stability.whole.assemble()
     values, vectors = eigen.largest_of_pencil(slack, stability.whole.K, count + 2)
-    values, vectors = values[values > 0], vectors[: (values > 0).sum()]
+    values = values[values * _HUGE > unit]  # what is left is rounding of zero, or buckles under the opposite load
     modes, k = [], 0
     while k < len(values):
         same = int(np.count_nonzero(np.abs(values[k:] - values[k]) <= _SAME * values[k]))
         modes += oriented(model, vectors[k : k + same])
         k += same
     shapes = np.array([model.shape_of(mode) for mode in modes[:count]])
-    return load_factor + 1 / values[:count], shapes.reshape(len(modes[:count]), -1, 3)
+    nodes = sum(cells * degree + 1 for cells in layout.counts)
+    return load_factor + 1 / values[:count], shapes.reshape(-1, nodes, 3)

@@ -113,7 +113,8 @@ class Tracing:
             pass
         except KeyboardInterrupt:
             raise Interrupted(self.path) from None
-        self.path.control, self.path.left = self._follower.used, self._follower.left
+        finally:
+            self.path.control, self.path.left = self._follower.used, self._follower.left
         return self.path
 
     def _advice(self, here, load):

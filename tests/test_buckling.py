@@ -1,0 +1,85 @@
+"""Linear buckling against closed forms and against the bifurcations that it estimates."""
+
+import numpy as np
+import pytest
+from path_scenes import clamped_ring, shallow_arch
+
+import cosserat_fenicsx as cf
+
+STEEL = cf.Material(E=210e9, nu=0.3, density=7850.0)
+
+
+@pytest.mark.parametrize("section", [cf.Circle(0.2), cf.Rectangle(0.2, 0.25)])
+def test_euler_columns(section):
+    rod = cf.Rod(cf.Line((0, 0, 0), (0, 0, 20.0)), section, STEEL)
+    scene = cf.Scene([rod], [cf.Clamp(rod.start)], [cf.Force(rod.end, (0, 0, -cf.euler_load(rod)))])
+    found = cf.buckling(scene, 4)
+    ratio = max(rod.stiffness.bending) / min(rod.stiffness.bending)
+    # off by the strains at buckling, 1.5e-5 and nine times that
+    np.testing.assert_allclose(found.load_factors, [1, ratio, 9, 9 * ratio], rtol=4e-4)
+    np.testing.assert_allclose(found.load_factors[:2], [1, ratio], rtol=4e-5)
+    assert (found.error <= 1e-5).all()
+    s = np.linspace(0, 1, 4 * found.elements[0] + 1)[::4]  # element ends
+    for k, axis in ((0, 0), (1, 1)):
+        mode = found.mode(k, rod)[::4]
+        np.testing.assert_allclose(mode[:, axis], 1 - np.cos(np.pi / 2 * s), atol=1e-4)
+        np.testing.assert_allclose(np.delete(mode, axis, 1), 0, atol=1e-6)
+
+
+def test_from_a_prestressed_state_it_nears_the_bifurcation():
+    for out_of_plane, far in ((50.0, 3.0), (1.0, 1.0)):
+        _, scene = clamped_ring(out_of_plane)
+        (event, *_) = cf.solve(scene, (0.0, far), elements=16).events
+        errors = []
+        for share in (0.0, 0.5, 0.9, 0.99):
+            found = cf.buckling(scene, load_factor=share * event.load_factor, elements=16)
+            errors.append(abs(found.load_factors[0] / event.load_factor - 1))
+        assert errors == sorted(errors, reverse=True) and errors[-1] < 5e-3 < errors[0]
+
+
+@pytest.mark.parametrize("stiff", [dict(shear=(1e6, 1e6), axial=1e6), dict(shear=(np.inf, np.inf), axial=np.inf)])
+def test_lateral_buckling(stiff):
+    """P L^2/sqrt(EI GJ) = 4.0126 (Timoshenko & Gere); the other way round the load is as large."""
+    section = cf.Stiffness(bending=(1e4, 1.0), torsion=0.7, **stiff)
+    rod = cf.Rod(cf.Line((0, 0, 0), (0, 0, 1.0)), section)
+    for sign in (1, -1):
+        scene = cf.Scene([rod], [cf.Clamp(rod.start)], [cf.Force(rod.end, (0, sign * np.sqrt(0.7), 0))])
+        assert cf.buckling(scene).load_factors == pytest.approx([4.012599], rel=5e-4)
+
+
+def test_self_weight():
+    """q L^3/EI = 7.8373474 (Greenhill)."""
+    section = cf.Stiffness(shear=(1e7, 1e7), axial=1e7, bending=(1.0, 1.5), torsion=0.5, mass=1 / 9.81)
+    rod = cf.Rod(cf.Line((0, 0, 0), (0, 0, 1.0)), section)
+    found = cf.buckling(cf.Scene([rod], [cf.Clamp(rod.start)], [cf.Weight()]), 2)
+    np.testing.assert_allclose(found.load_factors, [7.8373474, 1.5 * 7.8373474], rtol=1e-5)
+
+
+def test_supports_by_equations():
+    """Euler's pinned column and the propped one (4.4934)^2 EI/L^2; a hinge turns with what it holds."""
+    section = cf.Stiffness((1e6, 1e6), 1e6, (1.0, 4.0), 1.0)
+    rod = cf.Rod(cf.Line((0, 0, 0), (0, 0, 1.0), d1=(1, 0, 0)), section)
+    axis = (1, 0, 0)  # bending about d1 = x is the weak one
+    guide = [cf.Roller(rod.end, (0, 1, 0)), cf.Roller(rod.end, (1, 0, 0))]
+    load = [cf.Force(rod.end, (0, 0, -1.0))]
+    for foot, exact in ((cf.Hinge(rod.start, axis), np.pi**2), (cf.Clamp(rod.start), 4.493409458**2)):
+        found = cf.buckling(cf.Scene([rod], [foot, *guide], load))
+        assert found.load_factors == pytest.approx([exact], rel=1e-4)
+
+
+def test_what_pulls_does_not_buckle():
+    rod = cf.Rod(cf.Line((0, 0, 0), (0, 0, 1.0)), cf.Circle(0.02), STEEL)
+    scene = cf.Scene([rod], [cf.Clamp(rod.start)], [cf.Force(rod.end, (0, 0, 1.0))])
+    found = cf.buckling(scene, 3)
+    assert len(found.load_factors) == 0 and found.modes.shape[0] == 0
+
+
+def test_refusals():
+    _, _, scene = shallow_arch()
+    for arguments, message in ((dict(count=0), "count = 0"), (dict(load_factor=np.inf), "buckling.load_factor = inf")):
+        with pytest.raises(cf.SceneError, match=message):
+            cf.buckling(scene, **arguments)
+    rod = cf.Rod(cf.Line((0, 0, 0), (0, 0, 20.0)), cf.Circle(0.2), STEEL)
+    column = cf.Scene([rod], [cf.Clamp(rod.start)], [cf.Force(rod.end, (0, 0, -cf.euler_load(rod)))])
+    with pytest.raises(cf.NotConverged, match="unstable at the load factor 1.5"):
+        cf.buckling(column, load_factor=1.5)

@@ -1,0 +1,234 @@
+"""Limit points, snap-through, snap-back, bifurcations and branches."""
+
+import numpy as np
+import pytest
+from conftest import column
+from path_scenes import (
+    ARCH_BIFURCATIONS,
+    ARCH_LIMITS,
+    LEE_LIMITS,
+    clamped_ring,
+    lees_frame,
+    pendulum_limits,
+    shallow_arch,
+    torsion_pendulum,
+)
+
+import cosserat_fenicsx as cf
+
+STEEL = cf.Material(E=210e9, nu=0.3, density=7850.0)
+
+
+def loads(path, kind):
+    return [event.load_factor for event in path.events if event.kind == kind]
+
+
+def perfect_column(section):
+    rod = cf.Rod(cf.Line((0, 0, 0), (0, 0, 20.0)), section, STEEL)
+    scene = cf.Scene([rod], [cf.Clamp(rod.start)], [cf.Force(rod.end, (0, 0, -cf.euler_load(rod)))])
+    return rod, scene
+
+
+def critical(rod, mode=1):
+    """Exact: EI theta'' + P (1 + P (1/GA - 1/EA)) theta = 0, over P_cr."""
+    k, P = rod.stiffness, cf.euler_load(rod)
+    c = P * (1 / k.shear[0] - 1 / k.axial)
+    ratio = sorted([(2 * n - 1) ** 2 * EI / min(k.bending) for n in (1, 2) for EI in k.bending])[mode - 1]
+    return (np.sqrt(1 + 4 * c * ratio) - 1) / (2 * c)
+
+
+@pytest.mark.parametrize("control", ["auto", "arc"])
+def test_limit_points_in_closed_form(control):
+    rod, scene, load = torsion_pendulum()
+    path = cf.solve(scene, (0.0, 20.0), elements=8, control=control)
+    np.testing.assert_allclose(loads(path, "limit"), pendulum_limits(load), rtol=1e-9)
+    assert len(path.events) == 2 and path.control == "arc"
+    assert path.load_factors[0] == 0 and path.load_factors[-1] == 20.0
+    limits = [event.after for event in path.events]
+    between = np.arange(len(path))
+    expected = (between > limits[0]) & (between <= limits[1])
+    np.testing.assert_array_equal(path.negative_modes, expected)
+    twist = path.rotation_angle(rod.end)  # folds at 2 pi
+    shown = np.where(load(twist) - path.load_factors > 1e-6, np.nan, twist)
+    np.testing.assert_allclose(load(twist)[: limits[1]], path.load_factors[: limits[1]], rtol=1e-9)
+    assert np.isfinite(shown[: limits[1]]).all() and (np.diff(shown[: limits[1]]) > 0).all()
+
+
+def test_load_control_alone_says_what_it_met():
+    _, scene, load = torsion_pendulum()
+    with pytest.raises(cf.NotConverged, match="There may be a limit point.*control='auto'") as refusal:
+        cf.solve(scene, (0.0, 20.0), elements=4, control="load")
+    reached = refusal.value.path.load_factors[-1]
+    assert pendulum_limits(load)[0] * 0.999 < reached < pendulum_limits(load)[0]
+
+
+def test_load_factors_are_the_next_along_the_path_or_the_next_of_load_control():
+    rod, scene, load = torsion_pendulum()
+    path = cf.solve(scene, [5.0, 5.0, 5.0, 3.0], elements=8, control="arc")  # 3.0 comes after the turn at 39.3
+    twist = path.rotation_angle(rod.end)
+    np.testing.assert_allclose(load(twist[:3]), 5.0, rtol=1e-9)
+    assert (np.diff(twist[:3]) > 0.5).all() and path.negative_modes[:3].tolist() == [0, 1, 0]
+    path = cf.solve(scene, [5.0, 10.0, 2.5, 1.0], elements=8)
+    assert path.stable.all() and len(path.events) == 4  # up through both limit points, and all the way back
+    np.testing.assert_allclose(load(path.rotation_angle(rod.end)[[0, 3]]), [5.0, 1.0], rtol=1e-9)
+
+
+@pytest.mark.parametrize("far", [45.0, 20000.0])
+@pytest.mark.parametrize("control", ["auto", "arc"])
+def test_shallow_arch(control, far):
+    """Also where the first step of load control would leap over the whole snap."""
+    rod, crown, scene = shallow_arch()
+    path = cf.solve(scene, (0.0, far), elements=16, control=control)
+    np.testing.assert_allclose(loads(path, "limit"), ARCH_LIMITS, rtol=2e-8)
+    np.testing.assert_allclose(loads(path, "bifurcation"), ARCH_BIFURCATIONS, rtol=2e-7)
+    skew = path.mode(next(event for event in path.events if event.kind == "bifurcation"), rod)
+    snap = path.mode(path.events[0], rod)
+    np.testing.assert_allclose(snap[:, :2], snap[::-1, :2] * [-1, 1], atol=1e-6)
+    np.testing.assert_allclose(skew[:, :2], skew[::-1, :2] * [1, -1], atol=1e-6)
+    for mode in (snap, skew):
+        assert np.linalg.norm(mode, axis=1).max() == pytest.approx(1)
+        np.testing.assert_allclose(mode[:, 2], 0, atol=1e-9)
+    assert {0, 1, 2} == set(cf.solve(scene, [33.0, 25.0, 17.0], elements=8, control="arc").negative_modes.tolist())
+
+
+def test_a_path_through_limit_points_meets_its_tolerance():
+    rod, crown, scene = shallow_arch()
+    path = cf.solve(scene, (0.0, 45.0), tol=1e-6)
+    assert path.error.max() <= 1e-6 and path.control == "arc" and min(path.elements) >= 16
+    np.testing.assert_allclose(loads(path, "limit"), ARCH_LIMITS, rtol=2e-8)
+    np.testing.assert_allclose(loads(path, "bifurcation"), ARCH_BIFURCATIONS, rtol=2e-7)
+    fine = cf.solve(scene, path.load_factors[[0, -1]].tolist(), elements=64)
+    np.testing.assert_allclose(path.displacement(crown)[-1], fine.displacement(crown)[-1], atol=2e-6)
+    listed = cf.solve(scene, [30.0, 40.0], tol=1e-6)
+    assert (listed.error <= 1e-6).all() and listed.stable.all() and len(loads(listed, "limit")) == 2
+
+
+@pytest.mark.parametrize("control", ["auto", "arc"])
+def test_lees_frame_snaps_back(control):
+    loaded, scene = lees_frame()
+    path = cf.solve(scene, (0.0, 20000.0), elements=8, control=control)
+    np.testing.assert_allclose(loads(path, "limit"), LEE_LIMITS, rtol=1e-5)
+    turns = np.diff(path.displacement(loaded)[:, 1])
+    assert (turns > 0).any() and (turns < 0).any()  # the displacement turns too: snap-back
+    assert path.iterations.sum() < 400
+
+
+@pytest.mark.parametrize("section, count", [(cf.Circle(0.2), 2), (cf.Rectangle(0.2, 0.25), 1)])
+def test_perfect_column_bifurcates_at_its_exact_critical_loads(section, count):
+    rod, scene = perfect_column(section)
+    path = cf.solve(scene, [0.5, 2.0], elements=16)
+    np.testing.assert_allclose(loads(path, "bifurcation"), [critical(rod, 1), critical(rod, 2)], rtol=2e-8)
+    assert path.negative_modes.tolist() == [0, 2] and path.control == "load"
+    assert [event.after for event in path.events] == [0, 0]
+    x, y = (path.mode(event, rod) for event in path.events)
+    s = path.fields(0, rod)["s"] / rod.length
+    shape = 1 - np.cos(np.pi / 2 * s)
+    np.testing.assert_allclose(x, shape[:, None] * [1.0, 0, 0], atol=1e-4)
+    np.testing.assert_allclose(y, shape[:, None] * [0, 1.0, 0], atol=1e-4)
+
+
+@pytest.mark.parametrize("section", [cf.Circle(0.2), cf.Rectangle(0.2, 0.25)])
+@pytest.mark.parametrize("branch", [1, -1])
+def test_branch_of_the_perfect_column(section, branch):
+    """The buckled column against the exact rod whose eccentricity tends to zero; the round one may also turn about its
+    axis, which changes nothing and does not count."""
+    rod, scene = perfect_column(section)
+    etas = [0.5, 1.0005, 1.1, 2.0]
+    path = cf.solve(scene, etas, elements=16, branch=branch)
+    k = rod.stiffness
+    exact = cf.analytic.reissner(
+        np.array(etas[1:]), 2e-10, 20.0, bending=min(k.bending), axial=k.axial, shear=k.shear[0]
+    )
+    tip = path.displacement(rod.end)
+    np.testing.assert_allclose(tip[1:, 0], branch * exact.delta, rtol=1e-6)
+    np.testing.assert_allclose(tip[1:, 2], -exact.shortening, rtol=1e-5)
+    assert np.abs(tip[:, 1]).max() < 1e-6 and np.abs(tip[0, :2]).max() < 1e-9
+    assert path.stable.all() and path.left and loads(path, "bifurcation") == pytest.approx([critical(rod)], rel=2e-8)
+
+
+def test_a_branch_meets_its_tolerance():
+    rod, scene = perfect_column(cf.Circle(0.2))
+    path = cf.solve(scene, (0.0, 2.0), branch=1, tol=1e-6)
+    assert path.error.max() <= 1e-6 and path.stable.all()
+    assert loads(path, "bifurcation") == pytest.approx([critical(rod)], rel=2e-8)
+    k = rod.stiffness
+    exact = cf.analytic.reissner(2.0, 2e-10, 20.0, bending=k.bending[0], axial=k.axial, shear=k.shear[0])
+    assert path.displacement(rod.end)[-1, 0] == pytest.approx(exact.delta, rel=1e-6)
+
+
+def test_a_ring_sways_and_tips():
+    """In its plane, whatever its stiffness across it; out of it where that is weak. The branches are mirror images."""
+    sways = []
+    for out_of_plane in (50.0, 1.0):
+        top, scene = clamped_ring(out_of_plane)
+        path = cf.solve(scene, (0.0, 4.0), elements=16)
+        in_plane = [event for event in path.events if abs(event.mode[:, 2]).max() < 1e-6]
+        sways.append(in_plane[0].load_factor)
+    assert sways[0] == pytest.approx(sways[1], rel=1e-7)
+    first = path.events[0]
+    assert first.load_factor < sways[0] and abs(first.mode[:, :2]).max() < 1e-6
+    there, back = (cf.solve(scene, [2.0, 4.0], elements=16, branch=branch) for branch in (1, -1))
+    assert there.stable.all() and back.stable.all()
+    assert (there.displacement(top)[:, 2] > 0.5).all()
+    np.testing.assert_allclose(there.displacement(top), back.displacement(top) * [1, 1, -1], atol=1e-8)
+
+
+def test_a_closed_branch_is_no_way_to_higher_loads():
+    _, _, scene = shallow_arch()
+    with pytest.raises(cf.NotConverged, match="the path is closed") as refusal:
+        cf.solve(scene, (0.0, 40.0), elements=8, branch=1)
+    assert refusal.value.path.left and 10 < len(refusal.value.path) < 60
+
+
+def test_until():
+    _, crown, scene = shallow_arch()
+    path = cf.solve(scene, (0.0, 45.0), elements=8, until=lambda path: path.displacement(crown)[-1, 1] < -1.0)
+    v = path.displacement(crown)[:, 1]
+    assert v[-1] < -1.0 and (v[:-1] >= -1.0).all() and len(loads(path, "limit")) == 1
+
+
+def test_prescribed_motion_by_arc_length():
+    """The load factor then moves a station, and enters the residual through the reactions' equations."""
+    rod, _ = perfect_column(cf.Circle(0.2))
+    motion = cf.Prescribed(rod.end, displacement=(3.0, 0.0, -6.0), rotation=(0.0, 1.2, 0.0))
+    scene = cf.Scene([rod], [cf.Clamp(rod.start), motion], [])
+    by_load, by_arc = (cf.solve(scene, [0.3, 1.0], elements=8, control=control) for control in ("load", "arc"))
+    for station in (rod.at(7.0), rod.end):
+        np.testing.assert_allclose(by_arc.position(station), by_load.position(station), atol=1e-9)
+    np.testing.assert_allclose(by_arc.force(rod.start), by_load.force(rod.start), rtol=1e-6, atol=1e-3)
+
+
+@pytest.mark.parametrize("eccentricity", [1e-3, 1e-5, 1e-7])
+def test_nearly_perfect_columns_follow_their_own_branch(eccentricity):
+    rod, scene = column(eccentricity=20.0 * eccentricity)
+    path = cf.solve(scene, [1.5], elements=8)
+    k = rod.stiffness
+    exact = cf.analytic.reissner(1.5, 20.0 * eccentricity, 20.0, bending=k.bending[0], axial=k.axial, shear=k.shear[0])
+    assert path.stable.all() and path.displacement(rod.end)[0, 0] == pytest.approx(exact.delta, rel=1e-6)
+    assert path.events == []
+
+
+@pytest.mark.parametrize(
+    "arguments, message",
+    [
+        (dict(control="arclength"), "control = 'arclength': did you mean"),
+        (dict(branch=2), "branch = 2: expected 1, -1 or None"),
+        (dict(branch=1, control="load"), "branch: expected control 'auto' or 'arc'"),
+        (dict(control="arc", steps=cf.StepControl(adaptive=False)), "expected adaptive steps"),
+        (dict(until=lambda path: True), "until: expected a function of the Path, with a pair"),
+    ],
+)
+def test_arguments_that_are_refused(arguments, message):
+    _, scene = column()
+    with pytest.raises(cf.SceneError, match=message):
+        cf.solve(scene, [0.5], **arguments)
+
+
+def test_step_control_bounds():
+    with pytest.raises(cf.SceneError, match="StepControl.most_steps = 0"):
+        cf.StepControl(most_steps=0)
+    _, scene, _ = torsion_pendulum()
+    with pytest.raises(cf.NotConverged, match="3 steps along the path did not lead there"):
+        cf.solve(scene, (0.0, 20.0), elements=4, control="arc", steps=cf.StepControl(most_steps=3))
+    path = cf.solve(scene, (0.0, 20.0), elements=4, control="arc", steps=cf.StepControl(largest=1.0))
+    assert np.abs(np.diff(path.load_factors)).max() <= 1.0
