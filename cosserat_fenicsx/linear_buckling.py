@@ -78,7 +78,7 @@ def buckling(scene, count=1, *, load_factor=0.0, tol=1e-5, elements=None, degree
         SceneError: an argument outside its range.
         NotConverged: the load factor is not reached, or the structure is unstable there; or the accuracy is not met.
     """
-    check_arguments(scene, "auto", tol, elements)
+    check_arguments(scene, tol, elements)
     if isinstance(count, bool) or not isinstance(count, numbers.Integral) or count < 1:
         raise SceneError(f"count = {count!r}: expected a whole number above zero")
     number("buckling", "load_factor", load_factor, "a finite number", math.isfinite)
