@@ -12,11 +12,12 @@ from cosserat_fenicsx.sections import Rectangle, Stiffness
 from cosserat_fenicsx.statics import FIRST_ELEMENTS, check_arguments, default_degree
 from cosserat_fenicsx.tables import describe
 
-#: What the unknowns of a model are.
+#: What the unknowns of a model are, in a plane (True) or in space.
 _UNKNOWNS = {
-    "determinate": "the angle theta along the rods alone",
-    "planar": "centreline and angle theta in a plane",
-    "spatial": "centreline r and quaternion q in space",
+    ("determinate", True): "the angle theta along the rods alone",
+    ("determinate", False): "the quaternion q along the rods alone",
+    ("planar", True): "centreline and angle theta in a plane",
+    ("spatial", False): "centreline r and quaternion q in space",
 }
 
 
@@ -52,8 +53,9 @@ def explain(scene, load_factors, settings):
         f"{len(scene.supports)} support(s): {', '.join(describe(x) for x in scene.supports)}. "
         f"{len(scene.loads)} load(s): {', '.join(describe(x) for x in scene.loads) or 'none'}."
     )
-    lines.append(f"Model: {choice.model} ({_UNKNOWNS[choice.model]}): {'; '.join(choice.why)}.")
-    if choice.promoted:
+    what = _UNKNOWNS[choice.model, shape.flat]
+    lines.append(f"Model: {choice.model} ({what}): {'; '.join(choice.why)}.")
+    if choice.promoted and shape.flat:
         lines.append("Should it buckle sideways, out of its plane, the spatial model takes over.")
     costs = (f"{shape_of(name).unknowns} {name}" for name in fitting(scene, formulation=formulation, degree=degree))
     lines.append(f"Unknowns on the first mesh by model: {', '.join(costs)}.")

@@ -13,7 +13,7 @@ from cosserat_fenicsx.checks import instance
 from cosserat_fenicsx.choose import choose
 from cosserat_fenicsx.continuation import Continuation, StepControl
 from cosserat_fenicsx.errors import Interrupted, NotConverged, SceneError
-from cosserat_fenicsx.models.determinate import DeterminateModel
+from cosserat_fenicsx.models.determinate import DeterminateInPlane, DeterminateInSpace
 from cosserat_fenicsx.models.planar import PlanarModel
 from cosserat_fenicsx.models.rodmesh import Layout
 from cosserat_fenicsx.models.shape import Shape
@@ -26,7 +26,12 @@ from cosserat_fenicsx.snes import Newton
 from cosserat_fenicsx.stability import NegativeModes
 from cosserat_fenicsx.supports import Prescribed
 
-_MODELS = {model.name: model for model in (DeterminateModel, PlanarModel, SpatialModel)}
+_MODELS = {
+    ("determinate", True): DeterminateInPlane,
+    ("determinate", False): DeterminateInSpace,
+    ("planar", True): PlanarModel,
+    ("spatial", False): SpatialModel,
+}
 #: Elements per rod of the first mesh, where the mesh is not given.
 FIRST_ELEMENTS = 4
 _MOST_ELEMENTS = 1024
@@ -143,7 +148,7 @@ def _not_accurate(tol, reached, elements, degree):
 
 def _make_solvers(comm, shape):
     """Problem, Newton solver and stability count of a shape."""
-    model = _MODELS[shape.model](comm, shape)
+    model = _MODELS[shape.model, shape.flat](comm, shape)
     problem = Problem(model)
     return problem, Newton(problem), NegativeModes(problem)
 

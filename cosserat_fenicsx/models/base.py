@@ -195,7 +195,7 @@ class RodModel:
         self.scene, self.layout, self.scales = scene, layout, Scales.of(scene)
         scales, rods = self.scales, self.rods
         rods.place([b * rod.length / scales.length for rod, b in zip(scene.rods, layout.breaks, strict=True)])
-        self.axes = np.eye(3) if self.shape.model == "spatial" else np.array(scene.plane.axes)
+        self.axes = np.array(scene.plane.axes) if self.shape.flat else np.eye(3)
         self.reference = np.concatenate([
             (rod.curve.position(x * rod.length) - scene.origin(rod)) / scales.length
             for rod, x in zip(scene.rods, layout.node_s(self.nodes), strict=True)
