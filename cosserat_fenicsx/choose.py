@@ -123,4 +123,14 @@ def _reasons(name, scene):
     if name == "planar":
         return [where]
     clamp = "one clamp" if len(scene.supports) == 1 else f"one clamp on each of {len(scene.supports)} structures"
-    return [where, f"{clamp} and dead loads: statics gives the contact force"]
+    known = f"{clamp} and dead loads: statics gives the contact force"
+    return [known, where] if plane is None else [where, known]
+
+
+def force_in_words(variant, formulation):
+    """What becomes of the contact force in a variant of a model (`Shape.variant`)."""
+    return {
+        "condensed": "the contact force is carried at the Gauss points (formulation 'mixed')",
+        "field": "a stiffness is infinite or next to it, so the contact force is an unknown (formulation 'mixed')",
+        "known": "the contact force is known beforehand (formulation 'mixed')",
+    }.get(variant, f"formulation '{formulation}' was asked for")

@@ -4,7 +4,7 @@ import dataclasses
 
 import numpy as np
 
-from cosserat_fenicsx.choose import choose, fitting
+from cosserat_fenicsx.choose import choose, fitting, force_in_words
 from cosserat_fenicsx.curves import Line, Spline
 from cosserat_fenicsx.models.rodmesh import Layout
 from cosserat_fenicsx.models.shape import Shape
@@ -59,13 +59,8 @@ def explain(scene, load_factors, settings):
         lines.append("Should it buckle sideways, out of its plane, the spatial model takes over.")
     costs = (f"{shape_of(name).unknowns} {name}" for name in fitting(scene, formulation=formulation, degree=degree))
     lines.append(f"Unknowns on the first mesh by model: {', '.join(costs)}.")
-    lines.append(
-        {
-            "condensed": "Formulation: mixed, the contact force carried at the Gauss points; no unknowns of its own.",
-            "field": "Formulation: mixed, the contact force as an unknown, because a stiffness is infinite or next to it.",
-            "known": "Formulation: mixed, the contact force known beforehand.",
-        }.get(shape.variant, f"Formulation: {formulation}, as asked.")
-    )
+    words = force_in_words(shape.variant, formulation)
+    lines.append(f"{words[0].upper()}{words[1:]}.")
     unknowns = shape.unknowns
     if elements:
         lines.append(

@@ -6,6 +6,7 @@ from functools import cached_property
 import numpy as np
 
 from cosserat_fenicsx.checks import instance
+from cosserat_fenicsx.differences import compare
 from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.quaternions import directors
 from cosserat_fenicsx.recovery import at_nodes, element_contact
@@ -16,7 +17,7 @@ from cosserat_fenicsx.rod import Station
 class Record:
     """One equilibrium, dimensionless: (r, q) at the nodes (N, 7), (n, m, r') at the Gauss points (cells, points, 9).
 
-    A record that is appended to a path may hold its model's own numbers instead, which the path's `expand` turns into these.
+    A record that is appended to a path may hold its model's own numbers; the path's `expand` makes these of them.
     """
 
     load_factor: float
@@ -54,11 +55,6 @@ class Path:
     @classmethod
     def of(cls, model, formulation, why=()):
         """An empty path for the scene that a model was loaded with; `why` are sentences on the choice of the model."""
-        variant = {
-            "condensed": "the contact force is carried at the Gauss points (formulation 'mixed')",
-            "field": "a stiffness is infinite or next to it, so the contact force is an unknown (formulation 'mixed')",
-            "known": "the contact force is known beforehand (formulation 'mixed')",
-        }.get(model.shape.variant, f"formulation '{formulation}' was asked for")
         return cls(
             model.scene,
             model.layout,
@@ -70,7 +66,7 @@ class Path:
             formulation=formulation,
             degree=model.shape.degree,
             unknowns=model.unknowns,
-            why=[*why, variant],
+            why=list(why),
             expand=model.expansion(),
         )
 
@@ -110,6 +106,10 @@ class Path:
     def error(self):
         """(n,) estimated error, see the class."""
         return np.full(len(self), np.nan) if self._error is None else self._error
+
+    def node_places(self):
+        """Arc length over rod length of the nodes of every rod."""
+        return self.layout.node_s(self._rule.nodes)
 
     # -- queries -----------------------------------------------------------------------------------------------------
 
@@ -238,22 +238,10 @@ class Path:
 
         The difference of the positions, at the coarse nodes and between them, over half the gain that was seen from the
         difference before to this one; not more than 2^p (the order is p + 1 along a rod, 2 p at element ends), and 1
-        where there was none before: an order must be seen before it is counted on. Where hardly anything is displaced
-        (a shaft in torsion), relative to the turning of the sections, or to a billionth of the length. Without a
-        contact force of its own (formulation 'displacement') a slender rod's answer also feels the residual's rounding.
+        where there was none before: an order must be seen before it is counted on. Relative as in `differences.compare`.
+        Without a contact force of its own (formulation 'displacement') a slender rod's answer also feels the residual's rounding.
         """
-        difference = np.zeros(len(self))
-        largest = np.full(len(self), 1e-9 * self.scales.length)
-        everywhere = slice(None)
-        for i, rod in enumerate(self.scene.rods):
-            nodes = coarse.layout.node_s(coarse._rule.nodes)[i]
-            x = np.sort(np.concatenate([nodes, (nodes[:-1] + nodes[1:]) / 2]))
-            a, frames = coarse.sample(everywhere, rod, x)
-            b, _ = self.sample(everywhere, rod, x)
-            moved = np.linalg.norm(a - rod.curve.position(x * rod.length), axis=2).max(axis=1)
-            turned = np.linalg.norm(frames - rod.curve.frame(x * rod.length), axis=(2, 3)).max(axis=1)
-            difference = np.maximum(difference, np.linalg.norm(a - b, axis=2).max(axis=1))
-            largest = np.maximum(np.maximum(largest, moved), turned * _gyration(rod))
+        difference, largest = compare(self, coarse)
         self._difference = difference
         gain = 1.0
         if coarse._difference is not None:
@@ -308,9 +296,3 @@ class Path:
         from cosserat_fenicsx import plot
 
         return plot.rods(self, file, points, magnify)
-
-
-def _gyration(rod):
-    """Largest radius of gyration sqrt(EI/EA) of a rod, m; 0 where EA is infinite."""
-    low, high = rod.profile.range
-    return float(np.sqrt(high.J[:2].max() / low.K[2]))

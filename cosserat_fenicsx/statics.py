@@ -10,7 +10,7 @@ import numpy as np
 from mpi4py import MPI
 
 from cosserat_fenicsx.checks import instance
-from cosserat_fenicsx.choose import choose
+from cosserat_fenicsx.choose import choose, force_in_words
 from cosserat_fenicsx.continuation import Continuation, StepControl
 from cosserat_fenicsx.errors import Interrupted, NotConverged, SceneError
 from cosserat_fenicsx.models.determinate import DeterminateInPlane, DeterminateInSpace
@@ -59,8 +59,8 @@ def solve(
         scene: a `Scene`.
         load_factors: a list or array, landed on exactly in its order; or a pair (a, b), a tuple, between which the
             solver chooses its steps; or one number.
-        model: "auto" takes the cheapest one that is enough, and goes to "spatial" where a planar answer buckles sideways;
-            "determinate", "planar" or "spatial" is that one.
+        model: "determinate", "planar" or "spatial"; or "auto", the cheapest one that is enough, which goes over to
+            "spatial" where a planar answer buckles sideways. `Path.why` says why.
         formulation: "mixed" (default), "displacement" or "multiplier"; see the README.
         tol: largest estimated error of the positions along the rods, relative to the largest displacement of the
             scene at that load factor. Elements are refined until it is met, unless `elements` is given.
@@ -178,7 +178,8 @@ def _run(scene, targets, free, layout, *, formulation, degree, points, steps, co
         scene, layout, formulation=formulation, degree=degree, points=points, comm=comm, model=choice.model
     )
     continuation = Continuation(problem, newton, stability, steps)
-    path = Path.of(problem.model, formulation, choice.why)
+    why = [*choice.why, force_in_words(problem.model.shape.variant, formulation)]
+    path = Path.of(problem.model, formulation, why)
     bar.start(f"{path.model}, {problem.model.unknowns} unknowns")
     way = max(abs(eta) for eta in targets) or 1.0
     counted = 0

@@ -94,8 +94,9 @@ class RodModel:
         raise NotImplementedError
 
     def expansion(self):
-        """A function from load factors (k,) and snapshots' arrays, stacked, to (r, q) (k, N, 7) and (n, m, r') (k, cells,
-        points, 9), dimensionless, inertial. It holds for the scene that is loaded now, also after another one is."""
+        """A function from load factors (k,) and snapshots' arrays, stacked, to (r, q) (k, N, 7) and (n, m, r')
+        (k, cells, points, 9), dimensionless, inertial. It holds for the scene that is loaded now, also after another
+        one is."""
         raise NotImplementedError
 
     # -- building ----------------------------------------------------------------------------------------------------
@@ -250,8 +251,8 @@ class RodModel:
         return change[: self.components * self.numbering.nodes].reshape(-1, self.components)
 
     def snapshot(self):
-        """What `expansion` needs: the nodes' unknowns (N, components), and what the Gauss points know (cells, points, k),
-        or None; the scene's order, all ranks, dimensionless."""
+        """What `expansion` needs: the nodes' unknowns (N, components), and what the Gauss points know
+        (cells, points, k), or None; the scene's order, all ranks, dimensionless."""
         nodal = self._gather_nodes(self.state.x.array[self._nodal[: self._owned_nodes]])
         if self.forms.fields is None:
             return nodal, None

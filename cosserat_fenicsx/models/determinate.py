@@ -1,4 +1,4 @@
-"""The determinate rungs: theta in P_p alone in a plane, q alone in space; statics gives n, and r follows. Dimensionless."""
+"""The determinate rungs: theta in P_p alone in a plane, q alone in space; statics gives n, and r follows."""
 
 import numpy as np
 from dolfinx import cpp

@@ -19,7 +19,7 @@ from cosserat_fenicsx.models.compiled import (
 
 
 def compile_in_plane(model, displacements, rotations, N):
-    """The `CompiledForms` of a `DeterminateInPlane`; its second variations are the one in the plane and the one out of it.
+    """The `CompiledForms` of a `DeterminateInPlane`; its second variations: in the plane and out of it.
 
     Args:
         model: supplies mesh, spaces, data and the load terms.

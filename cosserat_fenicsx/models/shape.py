@@ -28,8 +28,8 @@ class Shape:
         flat: whether it is that of a plane; "determinate" exists in both.
         counts: elements of each rod.
         degree: p of the unknowns of the nodes.
-        variant: "condensed" or "field" (both formulation "mixed"), "displacement" or "multiplier"; "known" where statics
-            gives the contact force.
+        variant: "condensed" or "field" (both formulation "mixed"), "displacement" or "multiplier"; "known" where
+            statics gives the contact force.
         points: Gauss points of an element.
         terms: the kinds of loads, (function of forms.loads, "point" or "line", number of vectors), each as often as
             loads of that kind share an element end.
