@@ -43,7 +43,7 @@ SCENE = (
     "scene", "scenefile", "sections", "splines", "statical", "supports", "ties",
 )  # fmt: skip
 SOLVERS = ("continuation", "interrupts", "linear", "problem", "snes", "stability", "statics", "tie_rows")
-RESULTS = ("plot", "ranks", "recovery", "results", "tables", "xdmf")
+RESULTS = ("differences", "plot", "ranks", "recovery", "results", "tables", "xdmf")
 
 
 def test_data_flows_one_way():

@@ -280,3 +280,33 @@ def test_determinate_in_space_counts_what_the_spatial_counts():
     twisted = cf.Scene(up.rods, up.supports, [*up.loads, cf.Moment(column_.end, (0, 0, 1e3))])
     paths = [cf.solve(twisted, [0.5, 0.95, 1.05, 9.5], model=model, elements=8) for model in ("determinate", "spatial")]
     assert paths[0].negative_modes.tolist() == paths[1].negative_modes.tolist() != [0, 0, 0, 0]
+
+
+@pytest.mark.parametrize("seed, release", [(0, None), (1, "all"), (2, "normal"), (4, "all")])
+def test_stability_with_ties_is_the_spatial_one(seed, release):
+    """Reactions of hinges and prescribed turns, in the plane and out of it, up to where a motion loses its stability."""
+    draw, random = Drawn(seed), np.random.default_rng(seed)
+    section = cf.Stiffness((1e5, 2e5), 3e5, tuple(random.uniform(0.3, 0.9, 2)), random.uniform(0.2, 0.5))
+    post = cf.Rod(cf.Line(draw.point(0, 0, 0), draw.point(0, 0, 1), d1=draw.vector(1, 0, 0)), section, name="post")
+    beam = cf.Rod(cf.Line(draw.point(0, 0, 1), draw.point(0.5, 0, 2), d1=draw.normal), section, name="beam")
+    supports = [cf.Clamp(post.start), cf.Hinge(beam.end, draw.normal)]
+    if seed == 4:
+        supports.append(cf.Prescribed(post.at(0.5), rotation=draw.vector(0, 0.1, 0)))
+    loads = [
+        cf.Force(beam.at(beam.length / 2), draw.vector(1, 0, -12)),
+        cf.Moment(beam.at(0.3), draw.vector(0, 1, 0)),
+        cf.FollowerForce(post.at(0.5), (1.0, 0, 0)),
+    ]
+    joint = cf.Joint(post.end, beam.start, release=draw.normal if release == "normal" else release)
+    scene = cf.Scene([post, beam], supports, loads, [joint])
+    etas = np.linspace(0.5, 6, 12)
+    paths = []
+    for model in ("planar", "spatial"):
+        try:
+            paths.append(cf.solve(scene, etas, model=model, elements=6))
+        except cf.NotConverged as stopped:
+            paths.append(stopped.path)
+    planar, spatial = paths
+    assert len(planar) == len(spatial) >= 4
+    assert planar.negative_modes.tolist() == spatial.negative_modes.tolist() and planar.negative_modes[-1] == 1
+    np.testing.assert_allclose(planar.position(beam.at(0.7)), spatial.position(beam.at(0.7)), atol=1e-7)
