@@ -77,11 +77,8 @@ def _obstacle(name, scene, formulation, degree, points):
         return ""
     if formulation != "mixed":
         return f"the formulation '{formulation}' is known to the spatial model alone"
-    plane, why = scene.flatness
-    if plane is None:
-        return why
     if name == "planar":
-        return ""
+        return scene.flatness[1]
     if points is not None and points != degree:
         return f"it takes as many Gauss points as the degree, {degree}, and {points} were asked for"
     return _not_a_tree(scene) or _live(scene)
@@ -112,16 +109,29 @@ def _not_a_tree(scene):
 
 
 def _live(scene):
+    """Which load statics does not know beforehand; or nothing."""
     for i, load in enumerate(scene.loads):
         if load.work not in _DEAD:
-            return f"load {i + 1}, a {type(load).__name__}, turns with the rod, so that statics does not know it beforehand"
+            how = "turns with the rod" if isinstance(load.work, str) else "is of a kind of its own"
+            return f"load {i + 1}, a {type(load).__name__}, {how}, so that statics does not know it beforehand"
     return ""
 
 
 def _reasons(name, scene):
-    """Why a scene fits a model in a plane."""
-    flat = f"all rods and loads lie in {scene.plane.words}"
+    """Why a scene fits a model, and what keeps it out of a plane."""
+    plane, obstacle = scene.flatness
+    where = f"planar is not possible: {obstacle}" if plane is None else f"all rods and loads lie in {plane.words}"
     if name == "planar":
-        return [flat]
+        return [where]
     clamp = "one clamp" if len(scene.supports) == 1 else f"one clamp on each of {len(scene.supports)} structures"
-    return [flat, f"{clamp} and dead loads: statics gives the contact force"]
+    known = f"{clamp} and dead loads: statics gives the contact force"
+    return [known, where] if plane is None else [where, known]
+
+
+def force_in_words(variant, formulation):
+    """What becomes of the contact force in a variant of a model (`Shape.variant`)."""
+    return {
+        "condensed": "the contact force is carried at the Gauss points (formulation 'mixed')",
+        "field": "a stiffness is infinite or next to it, so the contact force is an unknown (formulation 'mixed')",
+        "known": "the contact force is known beforehand (formulation 'mixed')",
+    }.get(variant, f"formulation '{formulation}' was asked for")

@@ -4,7 +4,7 @@ import dataclasses
 
 import numpy as np
 
-from cosserat_fenicsx.choose import choose, fitting
+from cosserat_fenicsx.choose import choose, fitting, force_in_words
 from cosserat_fenicsx.curves import Line, Spline
 from cosserat_fenicsx.models.rodmesh import Layout
 from cosserat_fenicsx.models.shape import Shape
@@ -12,11 +12,12 @@ from cosserat_fenicsx.sections import Rectangle, Stiffness
 from cosserat_fenicsx.statics import FIRST_ELEMENTS, check_arguments, default_degree
 from cosserat_fenicsx.tables import describe
 
-#: What the unknowns of a model are.
+#: What the unknowns of a model are, in a plane (True) or in space.
 _UNKNOWNS = {
-    "determinate": "the angle theta along the rods alone",
-    "planar": "centreline and angle theta in a plane",
-    "spatial": "centreline r and quaternion q in space",
+    ("determinate", True): "the angle theta along the rods alone",
+    ("determinate", False): "the quaternion q along the rods alone",
+    ("planar", True): "centreline and angle theta in a plane",
+    ("spatial", False): "centreline r and quaternion q in space",
 }
 
 
@@ -56,18 +57,14 @@ def explain(scene, load_factors, settings):
         f"{len(scene.loads)} load(s): {', '.join(describe(x) for x in scene.loads) or 'none'}."
         + "".join(f" {joint.first} is joined to {joint.second}{_release(joint)}." for joint in scene.joints)
     )
-    lines.append(f"Model: {choice.model} ({_UNKNOWNS[choice.model]}): {'; '.join(choice.why)}.")
+    what = _UNKNOWNS[choice.model, shape.flat]
+    lines.append(f"Model: {choice.model} ({what}): {'; '.join(choice.why)}.")
     if choice.promoted:
         lines.append("Should it lose its stability, in its plane or out of it, the spatial model takes over.")
     costs = (f"{shape_of(name).unknowns} {name}" for name in fitting(scene, formulation=formulation, degree=degree))
     lines.append(f"Unknowns on the first mesh by model: {', '.join(costs)}.")
-    lines.append(
-        {
-            "condensed": "Formulation: mixed, the contact force carried at the Gauss points; no unknowns of its own.",
-            "field": "Formulation: mixed, the contact force as an unknown, because a stiffness is infinite or next to it.",
-            "known": "Formulation: mixed, the contact force known beforehand.",
-        }.get(shape.variant, f"Formulation: {formulation}, as asked.")
-    )
+    words = force_in_words(shape.variant, formulation)
+    lines.append(f"{words[0].upper()}{words[1:]}.")
     unknowns = shape.unknowns
     if elements:
         lines.append(

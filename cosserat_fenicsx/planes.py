@@ -142,8 +142,8 @@ def _normal_of(directions):
 
 
 def _normal_of_a_line(tangent, acting, scene):
-    """Where all rods are along one line the first load that leaves it tells the normal, or else the section, which bends
-    where it is weakest."""
+    """Where all rods are along one line the first load that leaves it tells the normal, or else the section, which
+    bends where it is weakest."""
     for inside, across in acting:
         for force in _units(inside):
             normal = np.cross(tangent, force)

@@ -15,6 +15,12 @@ def directors(q):
     ).transpose(2, 0, 1)
 
 
+def conjugate_product(p, q):
+    """Vector parts (..., 3) of conj(p) q."""
+    v, w = p[..., 1:], q[..., 1:]
+    return p[..., :1] * w - q[..., :1] * v - np.cross(v, w)
+
+
 def skew(u):
     """The (3, 3) matrix of u x."""
     return np.array([[0.0, -u[2], u[1]], [u[2], 0.0, -u[0]], [-u[1], u[0], 0.0]])

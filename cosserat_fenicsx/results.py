@@ -6,6 +6,7 @@ from functools import cached_property
 import numpy as np
 
 from cosserat_fenicsx.checks import instance
+from cosserat_fenicsx.differences import compare
 from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.quaternions import directors
 from cosserat_fenicsx.recovery import at_nodes, element_contact
@@ -17,7 +18,7 @@ class Record:
     """One equilibrium, dimensionless: (r, q) at the nodes (N, 7), (n, m, r') at the Gauss points (cells, points, 9), and
     the reactions of the equations that supports and joints add; whether a motion is neutral there, see `Track`.
 
-    A record that is appended to a path may hold its model's own numbers instead, which the path's `expand` turns into these.
+    A record that is appended to a path may hold its model's own numbers; the path's `expand` makes these of them.
     """
 
     load_factor: float
@@ -79,11 +80,6 @@ class Path:
     @classmethod
     def of(cls, model, formulation, why=()):
         """An empty path for the scene that a model was loaded with; `why` are sentences on the choice of the model."""
-        variant = {
-            "condensed": "the contact force is carried at the Gauss points (formulation 'mixed')",
-            "field": "a stiffness is infinite or next to it, so the contact force is an unknown (formulation 'mixed')",
-            "known": "the contact force is known beforehand (formulation 'mixed')",
-        }.get(model.shape.variant, f"formulation '{formulation}' was asked for")
         return cls(
             model.scene,
             model.layout,
@@ -95,7 +91,7 @@ class Path:
             formulation=formulation,
             degree=model.shape.degree,
             unknowns=model.unknowns,
-            why=[*why, variant, *model.scene.cautions],
+            why=[*why, *model.scene.cautions],
             expand=model.expansion(),
         )
 

@@ -50,7 +50,8 @@ class Newton:
         snes.setType("newtonls")
         snes.setFunction(problem.function, problem.b)
         snes.setJacobian(problem.jacobian, problem.A)
-        snes.setUpdate(self._carry)
+        if self._carries:
+            snes.setUpdate(self._carry)
         snes.setConvergenceTest(self._test)
         ksp = snes.getKSP()
         ksp.setType("preonly")

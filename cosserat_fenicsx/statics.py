@@ -14,7 +14,7 @@ from cosserat_fenicsx.choose import choose
 from cosserat_fenicsx.continuation import StepControl
 from cosserat_fenicsx.errors import NotConverged, SceneError, nearest
 from cosserat_fenicsx.follow import CONTROLS
-from cosserat_fenicsx.models.determinate import DeterminateModel
+from cosserat_fenicsx.models.determinate import DeterminateInPlane, DeterminateInSpace
 from cosserat_fenicsx.models.planar import PlanarModel
 from cosserat_fenicsx.models.rodmesh import Layout
 from cosserat_fenicsx.models.shape import Shape
@@ -28,7 +28,12 @@ from cosserat_fenicsx.stability import NegativeModes
 from cosserat_fenicsx.supports import Prescribed
 from cosserat_fenicsx.tracing import Promoted, Tracing
 
-_MODELS = {model.name: model for model in (DeterminateModel, PlanarModel, SpatialModel)}
+_MODELS = {
+    ("determinate", True): DeterminateInPlane,
+    ("determinate", False): DeterminateInSpace,
+    ("planar", True): PlanarModel,
+    ("spatial", False): SpatialModel,
+}
 #: Elements per rod of the first mesh, where the mesh is not given.
 FIRST_ELEMENTS = 4
 
@@ -56,8 +61,8 @@ def solve(
         scene: a `Scene`.
         load_factors: a list or array, landed on exactly in its order; or a pair (a, b), a tuple, between which the
             solver chooses its steps; or one number.
-        model: "auto" takes the cheapest one that is enough, and goes to "spatial" where a planar answer buckles sideways;
-            "determinate", "planar" or "spatial" is that one.
+        model: "determinate", "planar" or "spatial"; or "auto", the cheapest one that is enough, which goes over to
+            "spatial" where a planar answer buckles sideways. `Path.why` says why.
         formulation: "mixed" (default), "displacement" or "multiplier"; see the README.
         tol: largest estimated error of the positions along the rods, relative to the largest displacement of the
             scene at that load factor. Elements are refined until it is met, unless `elements` is given.
@@ -138,7 +143,7 @@ def solve(
 
 def _make_solvers(comm, shape):
     """Problem, Newton solver and stability count of a shape."""
-    model = _MODELS[shape.model](comm, shape)
+    model = _MODELS[shape.model, shape.flat](comm, shape)
     problem = Problem(model)
     return problem, Newton(problem), NegativeModes(problem)
 

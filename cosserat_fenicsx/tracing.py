@@ -7,6 +7,7 @@ import numpy as np
 
 from cosserat_fenicsx.accuracy import on_mesh
 from cosserat_fenicsx.chord import Chord
+from cosserat_fenicsx.choose import force_in_words
 from cosserat_fenicsx.errors import Interrupted, NotConverged
 from cosserat_fenicsx.follow import Follower
 from cosserat_fenicsx.interrupts import obey
@@ -46,7 +47,7 @@ class Tracing:
     def __init__(self, solvers, formulation, follow, choice, bar):
         self.problem, _, self.stability = solvers
         self.model, self._options, self._choice, self._bar = self.problem.model, follow, choice, bar
-        self.path = Path.of(self.model, formulation, choice.why)
+        self.path = Path.of(self.model, formulation, [*choice.why, force_in_words(self.model.shape.variant, formulation)])
         if choice.model == "spatial":
             self._follower = Follower(*solvers, on_event=self._meet, **follow)
         else:  # in a plane load control alone, and no events: what asks for more is promoted
@@ -65,11 +66,12 @@ class Tracing:
         self._bar.at(point)
         if self._choice.promoted and point.negative_modes:
             where = f"before the load factor {point.load_factor:.4g}"
-            raise Promoted(
-                f"in its plane the scene buckles sideways {where}, where motions out of the plane lose their stability"
-                if self.stability.sideways
-                else f"it loses its stability in its plane {where}, and the spatial model follows what comes of it"
-            )
+            if self.stability.sideways:
+                raise Promoted(
+                    f"in its plane the scene buckles sideways {where}, where motions out of the plane lose their stability"
+                )
+            in_plane = " in its plane" if self.model.shape.flat else ""
+            raise Promoted(f"it loses its stability{in_plane} {where}, and the spatial model follows what comes of it")
 
     def _record(self, point):
         track = self.track

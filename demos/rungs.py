@@ -3,9 +3,9 @@
     python demos/rungs.py            medians of 9 alternating runs, processor time, warm
     python demos/rungs.py --quick    one run each, to see that the models agree
 
-Time is that of `solve` and of asking for the tip's position; the ratio is to the spatial model, run by run. The error is that of
-the tip, largest over the path, relative to its displacement: against the exact rod (`cosserat_fenicsx.analytic`) where there is one,
-else against the spatial model on four times as many elements of degree 4.
+Time is that of `solve` and of asking for the tip's position; the ratio is to the spatial model, run by run. The error
+is that of the tip, largest over the path, relative to its displacement: against the exact rod
+(`cosserat_fenicsx.analytic`) where there is one, else against the spatial model on four times as many elements.
 """
 
 import argparse
@@ -51,7 +51,12 @@ def bend():
     material = cf.Material(E=E, nu=0.0)
     rod = cf.Rod(cf.Arc((0, 100, 0), (0, 0, 0), np.pi / 4, axis=(0, 0, 1)),
                  cf.Stiffness((E / 2, E / 2), E, (E / 12, E / 12), E / 12), material, name="bend")  # fmt: skip
-    return cf.Scene([rod], [cf.Clamp(rod.start)], [cf.Force(rod.end, (0, 0, 600.0))]), rod.end, np.linspace(0.1, 1, 10), None
+    return (
+        cf.Scene([rod], [cf.Clamp(rod.start)], [cf.Force(rod.end, (0, 0, 600.0))]),
+        rod.end,
+        np.linspace(0.1, 1, 10),
+        None,
+    )
 
 
 def lee_frame():
@@ -68,7 +73,12 @@ def lee_frame():
 def spring():
     """A helix of three turns, stretched by a dead force."""
     rod = cf.Rod(cf.Helix((0, 0, 0), (0.05, 0, 0), 3, 0.03), cf.Circle(0.004), STEEL, name="spring")
-    return cf.Scene([rod], [cf.Clamp(rod.start)], [cf.Force(rod.end, (0, 0, 60.0))]), rod.end, np.linspace(0.1, 1, 10), None
+    return (
+        cf.Scene([rod], [cf.Clamp(rod.start)], [cf.Force(rod.end, (0, 0, 60.0))]),
+        rod.end,
+        np.linspace(0.1, 1, 10),
+        None,
+    )
 
 
 #: Scene, and the meshes (degree, elements) to solve it on; None: refined to the default tolerance.

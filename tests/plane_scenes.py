@@ -118,6 +118,13 @@ def swinging_pair(plane):
     return cf.Scene([taper, other], [cf.Clamp(taper.start), cf.Clamp(other.start)], loads)
 
 
+def thin_cantilever(stiff=(1e6, 1e6), axial=1e6):
+    """P L^2/sqrt(EI GJ) = 4.0126 (Timoshenko & Gere) at load factor 1, the load along the stiff way."""
+    section = cf.Stiffness(bending=(1e5, 1.0), torsion=0.7, shear=stiff, axial=axial)
+    rod = cf.Rod(cf.Line((0, 0, 0), (0, 0, 1.0)), section)
+    return rod, cf.Scene([rod], [cf.Clamp(rod.start)], [cf.Force(rod.end, (0, 4.0126 * np.sqrt(0.7), 0))])
+
+
 #: Scene and whether statics gives its contact force.
 SCENES = {
     scene.__name__: (scene, known)

@@ -1,10 +1,10 @@
-"""Every rung gives the same answer where it applies; the cheapest is taken, and what buckles sideways is promoted."""
+"""Every rung gives the same answer, and the same count of negative modes, where it applies."""
 
 import numpy as np
 import pytest
 from conftest import column
 from mpi4py import MPI
-from plane_scenes import SCENES, STEEL, Drawn, hinged_arch, lee_frame, tree
+from plane_scenes import SCENES, STEEL, Drawn, thin_cantilever, tree
 
 import cosserat_fenicsx as cf
 
@@ -116,43 +116,12 @@ def test_a_perfect_round_column_loses_two_motions_at_once(model):
     assert path.negative_modes.tolist() == [0, 0, 2, 2, 4]
 
 
-def thin_cantilever(stiff=(1e6, 1e6), axial=1e6):
-    """P L^2/sqrt(EI GJ) = 4.0126 (Timoshenko & Gere) at load factor 1, the load along the stiff way."""
-    section = cf.Stiffness(bending=(1e5, 1.0), torsion=0.7, shear=stiff, axial=axial)
-    rod = cf.Rod(cf.Line((0, 0, 0), (0, 0, 1.0)), section)
-    return rod, cf.Scene([rod], [cf.Clamp(rod.start)], [cf.Force(rod.end, (0, 4.0126 * np.sqrt(0.7), 0))])
-
-
 @pytest.mark.parametrize("model", ["determinate", "planar"])
 @pytest.mark.parametrize("rigid", [False, True])
 def test_lateral_buckling_is_seen_in_the_plane(model, rigid):
     _, scene = thin_cantilever(*([(np.inf, np.inf), np.inf] if rigid else []))
     path = cf.solve(scene, [0.9, 0.998, 1.002, 1.1], model=model, elements=8)
     assert path.model == model and path.negative_modes.tolist() == [0, 0, 1, 1]
-
-
-def test_what_buckles_sideways_is_promoted():
-    rod, scene = thin_cantilever()
-    below, above = cf.solve(scene, [0.99]), cf.solve(scene, [0.99, 1.1])
-    assert below.model == "determinate" and below.stable.all()
-    assert above.model == "spatial" and above.negative_modes.tolist() == [0, 1]
-    assert "buckles sideways before the load factor" in above.why[0]
-    (event,) = above.events
-    assert event.kind == "bifurcation" and event.load_factor == pytest.approx(1.0, abs=2e-3)
-    np.testing.assert_allclose(above.displacement(rod.end)[0], below.displacement(rod.end)[0], atol=1e-8)
-
-
-def test_what_buckles_in_its_plane_is_promoted_too():
-    """A flat strip that is wide across the plane loses its stability in the plane alone: space knows events and branches."""
-    section = cf.Stiffness((1e6, 1e6), 1e6, (50.0, 1.0), 30.0)  # bends about d2, the normal
-    rod = cf.Rod(cf.Line((0, 0, 0), (0, 0, 1.0), d1=(1, 0, 0)), section)
-    scene = cf.Scene([rod], [cf.Clamp(rod.start)], [cf.Force(rod.end, (0, 0, -(np.pi**2) / 4))])
-    path = cf.solve(scene, [0.9, 1.1], elements=8)
-    assert path.model == "spatial" and path.negative_modes.tolist() == [0, 1]
-    assert "loses its stability in its plane before the load factor" in path.why[0]
-    assert [event.kind for event in path.events] == ["bifurcation"]
-    path = cf.solve(scene, [0.9, 1.1], elements=8, model="determinate")
-    assert path.model == "determinate" and path.negative_modes.tolist() == [0, 1]
 
 
 def test_supports_count_out_of_the_plane_too():
@@ -170,60 +139,6 @@ def test_supports_count_out_of_the_plane_too():
         assert spatial.negative_modes.tolist() == [0, 1]
 
 
-def leaves(kind):
-    """The column with something that leaves its plane."""
-    rod, scene = column()
-    P = cf.euler_load(rod)
-    extra, supports = [], list(scene.supports)
-    if kind == "force":
-        extra = [cf.Force(rod.at(10.0), (0, 1e-6 * P, 0))]
-    elif kind == "moment":
-        extra = [cf.Moment(rod.at(10.0), (0, 0, 1e-3 * P))]
-    elif kind == "support":
-        supports.append(cf.Roller(rod.end, (1, 1, 0)))
-    elif kind == "section":
-        rod = cf.Rod(cf.Line((0, 0, 0), (0, 0, 20.0), d1=(1, 1, 0)), cf.Rectangle(0.2, 0.3), STEEL, name="column")
-        supports = [cf.Clamp(rod.start)]
-        return rod, cf.Scene([rod], supports, [cf.Force(rod.end, (P, 0, -P))])
-    return rod, cf.Scene([rod], supports, [*scene.loads, *extra])
-
-
-@pytest.mark.parametrize(
-    "kind, words",
-    [
-        ("force", "load 3 (Force at column@10) points out of the plane of the rods"),
-        ("moment", "load 3 (Moment at column@10) does not turn in the plane of the rods"),
-        ("support", "support 2 (Roller at column.end) holds or moves what is askew to the plane of the rods"),
-        ("section", "a section of rod 'column' has its principal axes (EI) askew to the plane"),
-    ],
-)
-def test_what_leaves_the_plane_is_named(kind, words):
-    _, scene = leaves(kind)
-    path = cf.solve(scene, [0.1], elements=2)
-    assert path.model == "spatial" and words in path.why[0]
-    for model in ("planar", "determinate"):
-        with pytest.raises(cf.SceneError) as refusal:
-            cf.solve(scene, [0.1], model=model)
-        assert f"model = '{model}' is not possible: " in str(refusal.value) and words in str(refusal.value)
-
-
-def test_why_not_determinate():
-    for draw, words in (
-        (hinged_arch, "because of the Hinge at arch.start"),
-        (lee_frame, "because of the Hinge at post.start"),
-    ):
-        path = cf.solve(draw(Drawn()), [0.1], elements=2)
-        assert path.model == "planar" and any(words in why for why in path.why)
-    rod, scene = column()
-    follower = cf.Scene(scene.rods, scene.supports, [*scene.loads, cf.FollowerForce(rod.end, (1.0, 0, 0))])
-    path = cf.solve(follower, [0.1], elements=2)
-    assert path.model == "planar" and any("FollowerForce, turns with the rod" in why for why in path.why)
-    path = cf.solve(scene, [0.1], elements=2, formulation="displacement")
-    assert path.model == "spatial" and "'displacement'" in path.why[0]
-    path = cf.solve(scene, [0.1], elements=2, degree=2, gauss_points=3)
-    assert path.model == "planar"
-
-
 def test_points_keep_their_own_numbers_when_another_scene_is_solved():
     """What is expanded late must not see the scene that was loaded since."""
     first, second = tree(Drawn(1)), tree(Drawn(2))
@@ -232,3 +147,87 @@ def test_points_keep_their_own_numbers_when_another_scene_is_solved():
     before = fresh.position(first.rods[0].start).copy()
     cf.solve(second, [0.3], elements=4)
     np.testing.assert_array_equal(path.position(first.rods[0].start), before)
+
+
+def in_space(kind):
+    """Scenes out of any plane whose contact force statics gives."""
+    section = (
+        cf.Stiffness((300.0, 50.0), 200.0, (169.0, 1014.0), 84.5, mass=0.04)
+        if kind == "soft"
+        else cf.Rectangle(0.1, 0.3)
+    )
+    if kind == "helix":
+        rod = cf.Rod(cf.Helix((1, 2, 3), (1.05, 2, 3), 3, 0.03), cf.Circle(0.004), STEEL, name="spring")
+        return cf.Scene([rod], [cf.Clamp(rod.end)], [cf.Force(rod.start, (2, 1, 40.0)), cf.Weight()])
+    rod = cf.Rod(cf.Line((100.0, -50.0, 7.0), (103.0, -46.0, 19.0), d1=(1.0, 0.5, 0.0)), section, STEEL, name="stem")
+    F, L = rod.stiffness.bending[0] / rod.length**2, rod.length
+    loads = [
+        cf.Weight((1.0, -3.0, -9.0)),
+        cf.EccentricForce(rod.end, (0.3 * F, 0.4 * F, -0.2 * F), (0.05 * L, -0.08 * L)),
+        cf.Moment(rod.at(0.4 * L), (0.1 * F * L, 0, 0.2 * F * L)),
+    ]
+    twig = cf.Rod(
+        cf.Line(rod.curve.position(0.6 * L), rod.curve.position(0.6 * L) + np.array([0, 3.0, 1.0])),
+        section,
+        STEEL,
+        name="twig",
+    )
+    loads.append(cf.Force(twig.end, (0.2 * F, 0, -0.4 * F)))
+    return cf.Scene([twig, rod], [cf.Clamp(rod.at(0.1 * L))], loads, [cf.Joint(rod.at(0.6 * L), twig.start)])
+
+
+@pytest.mark.parametrize("kind", ["helix", "soft", "steel"])
+def test_determinate_in_space_agrees(kind):
+    scene = in_space(kind)
+    path, truth = (cf.solve(scene, [0.3, 1.0], elements=24, model=model) for model in ("auto", "spatial"))
+    assert path.model == "determinate" and path.unknowns == 4 * truth.unknowns // 7
+    assert "statics gives the contact force" in " ".join(path.why)
+    assert path.negative_modes.tolist() == truth.negative_modes.tolist()
+    same(path, truth, 5e-9)
+    alone = cf.solve(scene, [0.3, 1.0], elements=24, comm=MPI.COMM_SELF)
+    same(path, alone, 1e-9)
+
+
+def test_determinate_in_space_counts_what_the_spatial_counts():
+    """Under a dead moment in space, which has no potential, and past lateral buckling."""
+    rod, scene = thin_cantilever()
+    tilted = cf.Scene(
+        [rod], scene.supports, [*scene.loads, cf.Force(rod.end, (1e-5, 0, 0)), cf.Moment(rod.end, (0, 0, 0.1))]
+    )
+    etas = [0.5, 0.98, 1.1]
+    paths = [cf.solve(tilted, etas, model=model, elements=8) for model in ("determinate", "spatial")]
+    assert paths[0].negative_modes.tolist() == paths[1].negative_modes.tolist()
+    column_, up = column(eccentricity=0.0)
+    twisted = cf.Scene(up.rods, up.supports, [*up.loads, cf.Moment(column_.end, (0, 0, 1e3))])
+    paths = [cf.solve(twisted, [0.5, 0.95, 1.05, 9.5], model=model, elements=8) for model in ("determinate", "spatial")]
+    assert paths[0].negative_modes.tolist() == paths[1].negative_modes.tolist() != [0, 0, 0, 0]
+
+
+@pytest.mark.parametrize("seed, release", [(0, None), (1, "all"), (2, "normal"), (4, "all")])
+def test_stability_with_ties_is_the_spatial_one(seed, release):
+    """Reactions of hinges and prescribed turns, in the plane and out of it, up to where a motion loses its stability."""
+    draw, random = Drawn(seed), np.random.default_rng(seed)
+    section = cf.Stiffness((1e5, 2e5), 3e5, tuple(random.uniform(0.3, 0.9, 2)), random.uniform(0.2, 0.5))
+    post = cf.Rod(cf.Line(draw.point(0, 0, 0), draw.point(0, 0, 1), d1=draw.vector(1, 0, 0)), section, name="post")
+    beam = cf.Rod(cf.Line(draw.point(0, 0, 1), draw.point(0.5, 0, 2), d1=draw.normal), section, name="beam")
+    supports = [cf.Clamp(post.start), cf.Hinge(beam.end, draw.normal)]
+    if seed == 4:
+        supports.append(cf.Prescribed(post.at(0.5), rotation=draw.vector(0, 0.1, 0)))
+    loads = [
+        cf.Force(beam.at(beam.length / 2), draw.vector(1, 0, -12)),
+        cf.Moment(beam.at(0.3), draw.vector(0, 1, 0)),
+        cf.FollowerForce(post.at(0.5), (1.0, 0, 0)),
+    ]
+    joint = cf.Joint(post.end, beam.start, release=draw.normal if release == "normal" else release)
+    scene = cf.Scene([post, beam], supports, loads, [joint])
+    etas = np.linspace(0.5, 6, 12)
+    paths = []
+    for model in ("planar", "spatial"):
+        try:
+            paths.append(cf.solve(scene, etas, model=model, elements=6))
+        except cf.NotConverged as stopped:
+            paths.append(stopped.path)
+    planar, spatial = paths
+    assert len(planar) == len(spatial) >= 4
+    assert planar.negative_modes.tolist() == spatial.negative_modes.tolist() and planar.negative_modes[-1] == 1
+    np.testing.assert_allclose(planar.position(beam.at(0.7)), spatial.position(beam.at(0.7)), atol=1e-7)

@@ -100,8 +100,9 @@ class RodModel:
         raise NotImplementedError
 
     def expansion(self):
-        """A function from load factors (k,) and snapshots' arrays, stacked, to (r, q) (k, N, 7) and (n, m, r') (k, cells,
-        points, 9), dimensionless, inertial. It holds for the scene that is loaded now, also after another one is."""
+        """A function from load factors (k,) and snapshots' arrays, stacked, to (r, q) (k, N, 7) and (n, m, r')
+        (k, cells, points, 9), dimensionless, inertial. It holds for the scene that is loaded now, also after another
+        one is."""
         raise NotImplementedError
 
     # -- building ----------------------------------------------------------------------------------------------------
@@ -203,7 +204,7 @@ class RodModel:
         self.scene, self.layout, self.scales = scene, layout, Scales.of(scene)
         scales, rods = self.scales, self.rods
         rods.place([b * rod.length / scales.length for rod, b in zip(scene.rods, layout.breaks, strict=True)])
-        self.axes = np.eye(3) if self.shape.model == "spatial" else np.array(scene.plane.axes)
+        self.axes = np.array(scene.plane.axes) if self.shape.flat else np.eye(3)
         self.reference = np.concatenate([
             (rod.curve.position(x * rod.length) - scene.origin(rod)) / scales.length
             for rod, x in zip(scene.rods, layout.node_s(self.nodes), strict=True)
@@ -275,8 +276,8 @@ class RodModel:
         return change[: self.components * self.numbering.nodes].reshape(-1, self.components)
 
     def snapshot(self):
-        """What `expansion` needs: the nodes' unknowns (N, components), and what the Gauss points know (cells, points, k),
-        or None; the scene's order, all ranks, dimensionless."""
+        """What `expansion` needs: the nodes' unknowns (N, components), and what the Gauss points know
+        (cells, points, k), or None; the scene's order, all ranks, dimensionless."""
         nodal = self._gather_nodes(self.state.x.array[self._nodal[: self._owned_nodes]])
         if self.forms.fields is None:
             return nodal, None

@@ -48,7 +48,7 @@ class CompiledForms:
 
 
 def compile_all(model, residual, tangent, dead, seconds, *, fields=None, advance=None, force=None):
-    """The `CompiledForms` of UFL forms and expressions; `seconds` need not be symmetric, their symmetric parts count."""
+    """The `CompiledForms` of UFL forms and expressions; of `seconds` the symmetric parts count."""
     seconds = [0.5 * (second + ufl.adjoint(second)) for second in seconds]
     for form in (residual, tangent, *seconds, dead, force):
         if form is not None:

@@ -12,7 +12,8 @@ class Connections:
     Attributes:
         clamped: vertices without unknowns.
         leaders: pairs (vertex, leader): rigidly joined vertices and the one whose unknowns they share.
-        ties: (kind, vertex of a, vertex of b or None) of all scalar equations of supports and joints, in the scene's order.
+        ties: (kind, vertex of a, vertex of b or None) of all scalar equations of supports and joints, in the scene's
+            order.
         equations: indices of those that are added: in a plane only what holds a motion there, and nothing twice.
     """
 

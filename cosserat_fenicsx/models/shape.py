@@ -9,8 +9,13 @@ from cosserat_fenicsx.errors import SceneError, nearest
 from cosserat_fenicsx.forms import loads as virtual_work
 from cosserat_fenicsx.models.connections import Connections
 
-#: Unknowns of a node, and numbers of a contact force, by the model's name.
-_SIZES = {"spatial": (7, 3), "planar": (3, 2), "determinate": (1, 0)}
+#: Unknowns of a node, and numbers of a contact force, by the model's name and whether it is that of a plane.
+_SIZES = {
+    ("spatial", False): (7, 3),
+    ("planar", True): (3, 2),
+    ("determinate", True): (1, 0),
+    ("determinate", False): (4, 0),
+}
 FORMULATIONS = ("mixed", "displacement", "multiplier")
 
 
@@ -20,10 +25,11 @@ class Shape:
 
     Attributes:
         model: "spatial", "planar" or "determinate".
+        flat: whether it is that of a plane; "determinate" exists in both.
         counts: elements of each rod.
         degree: p of the unknowns of the nodes.
-        variant: "condensed" or "field" (both formulation "mixed"), "displacement" or "multiplier"; "known" where statics
-            gives the contact force.
+        variant: "condensed" or "field" (both formulation "mixed"), "displacement" or "multiplier"; "known" where
+            statics gives the contact force.
         points: Gauss points of an element.
         terms: the kinds of loads, (function of forms.loads, "point" or "line", number of vectors), each as often as
             loads of that kind share an element end.
@@ -31,6 +37,7 @@ class Shape:
     """
 
     model: str
+    flat: bool
     counts: tuple
     degree: int
     variant: str
@@ -68,17 +75,18 @@ class Shape:
         if model == "determinate":
             variant = "known"
         terms = tuple(key for key, _ in place_loads(scene, layout))
-        connections = Connections.of(scene, layout, None if model == "spatial" else scene.plane)
+        plane = None if model == "spatial" else scene.plane
+        connections = Connections.of(scene, layout, plane)
         if connections.ties and formulation == "multiplier":
             raise SceneError("formulation = 'multiplier' knows clamps and rigid joints alone: expected 'mixed'")
-        return cls(model, layout.counts, degree, variant, points or degree, terms, connections)
+        return cls(model, plane is not None, layout.counts, degree, variant, points or degree, terms, connections)
 
     @property
     def unknowns(self):
         """Number of unknowns, without making a mesh."""
         cells, links = sum(self.counts), self.connections
         nodes = cells * self.degree + len(self.counts) - len(links.clamped) - len(links.leaders)
-        node, force = _SIZES[self.model]
+        node, force = _SIZES[self.model, self.flat]
         others = {"field": force * self.degree * cells, "multiplier": cells + len(self.counts)}.get(self.variant, 0)
         return node * nodes + others + len(links.equations)
 

@@ -57,17 +57,17 @@ class Tree:
         that lies beyond acts at its other end.
 
         Args:
-            nodal: (N, 2) forces on the nodes; rule: the `ElementRule`.
+            nodal: (N, d) forces on the nodes; rule: the `ElementRule`.
 
         Returns:
-            (elements, points, 2).
+            (elements, points, d).
         """
         p, nodal = self._p, nodal.copy()
         gradient = rule.weights * rule.slopes.T  # (p + 1, points)
-        n = np.empty((len(self.cell_nodes), len(rule.gauss), 2))
+        n = np.empty((len(self.cell_nodes), len(rule.gauss), nodal.shape[1]))
         for nodes, cells, entry, before in self._rods(reversed(self._order)):
             f, mine = nodal[nodes], n[cells]
-            ends, inner = f[::p], f[:-1].reshape(-1, p, 2)[:, 1:]
+            ends, inner = f[::p], f[:-1].reshape(-1, p, f.shape[1])[:, 1:]
             sums = inner.sum(axis=1)
             carried = np.cumsum((ends[:0:-1] + np.pad(sums[:0:-1], ((1, 0), (0, 0)))), axis=0)[::-1]
             beyond = np.concatenate([inner, carried[:, None]], axis=1)
@@ -83,20 +83,20 @@ class Tree:
         """Positions of all nodes from r' at the Gauss points.
 
         Args:
-            tangents: (k, elements, points, 2) r' times the length of its element.
-            rest: (N, 2) positions at rest, where the clamps stay.
+            tangents: (k, elements, points, d) r' times the length of its element.
+            rest: (N, d) positions at rest, where the clamps stay.
             rule: the `ElementRule`.
 
         Returns:
-            (k, N, 2).
+            (k, N, d).
         """
         within = np.einsum("jg,kcgi->kcji", rule.from_slopes, tangents)
-        r = np.empty((len(tangents), len(rest), 2))
+        r = np.empty((len(tangents), *rest.shape))
         for nodes, cells, entry, before in self._rods(self._order):
             steps = within[:, cells]
             ends = np.concatenate([np.zeros_like(steps[:, :1, 0]), np.cumsum(steps[:, :, -1], axis=1)], axis=1)
             at = r[:, before] if before is not None else rest[nodes.start + entry * self._p]
             ends += (at - ends[:, entry])[:, None]
-            r[:, nodes][:, :-1] = (ends[:, :-1, None] + steps[:, :, :-1]).reshape(len(r), -1, 2)
+            r[:, nodes][:, :-1] = (ends[:, :-1, None] + steps[:, :, :-1]).reshape(len(r), -1, rest.shape[1])
             r[:, nodes.stop - 1] = ends[:, -1]
         return r
