@@ -6,7 +6,6 @@ from functools import cached_property
 import numpy as np
 
 from cosserat_fenicsx.checks import instance
-from cosserat_fenicsx.differences import compare
 from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.quaternions import directors
 from cosserat_fenicsx.recovery import at_nodes, element_contact
