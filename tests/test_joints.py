@@ -99,7 +99,7 @@ def test_ranks_agree_on_branching_structures(release):
 def test_number_of_unknowns():
     """Nodes of the free arms, the shared point once, six-component nodes have seven unknowns; a hinge adds five."""
     _, rigid, elements = star()
-    path = cf.solve(rigid, [0.1], elements=elements, degree=2)
+    path = cf.solve(rigid, [0.1], elements=elements, degree=2, model="spatial")
     nodes = 4 * 2 * elements + 1
     assert path.unknowns == 7 * (nodes - 1)
     _, hinged, elements = star((1.0, 0, 0))
