@@ -17,12 +17,13 @@ export VTK_DEFAULT_OPENGL_WINDOW = vtkEGLRenderWindow
 # A numpy in the user's own site directory would hide the distribution's.
 export PYTHONNOUSERSITE = 1
 
-.PHONY: help setup packages demo test tables clean
+.PHONY: help setup packages demo test tables random clean
 
 help:
 	@echo "make demo    solve the eccentric cantilever of the paper on two processes; writes out/"
 	@echo "make test    all tests on one, two and four processes"
 	@echo "make tables  the README's tables of accuracy and cost, measured anew and put into it"
+	@echo "make random  200 random scenes against the strong form, at three tolerances (about 5 minutes)"
 	@echo "make setup   only what all of these need first: the Debian packages and the environment .venv"
 	@echo "make clean   remove .venv, out and whatever else was built here"
 
@@ -38,7 +39,12 @@ test: setup
 tables: setup
 	$(PYTHON) demos/accuracy.py
 	$(PYTHON) demos/overhead.py
+	$(PYTHON) demos/rungs.py
+	$(PYTHON) demos/scaling.py
 	$(PYTHON) demos/readme_tables.py
+
+random: setup
+	$(PYTHON) tests/random_comparison.py 200
 
 setup: .venv/.stamp
 

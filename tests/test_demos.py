@@ -59,3 +59,12 @@ def test_rungs_quick(tmp_path):
         sizes = [row[1] for row in rows]
         assert rows[-1][0] == "spatial" and sizes == sorted(set(sizes)), name
         assert all(error < 2e-6 for _, _, _, _, error, _ in rows), rows
+
+
+@pytest.mark.serial
+def test_scaling_quick(tmp_path):
+    """The sizes are what they say; what they cost is for the command to say."""
+    import scaling
+
+    rows = scaling.main(sizes=(4, 16), out=tmp_path)
+    assert rows[:, 0].tolist() == [112, 448] and (rows[:, 1:] > 0).all()
