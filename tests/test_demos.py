@@ -66,5 +66,5 @@ def test_scaling_quick(tmp_path):
     """The sizes are what they say; what they cost is for the command to say."""
     import scaling
 
-    rows = scaling.main(sizes=(4, 16), out=tmp_path)
-    assert rows[:, 0].tolist() == [112, 448] and (rows[:, 1:] > 0).all()
+    rows = scaling.main(sizes=(4, 16, 64), out=tmp_path)
+    assert rows[:, 0].tolist() == [112, 448, 1792] and (rows[:, 1:] > 0).all()
