@@ -7,6 +7,8 @@ from plane_scenes import STEEL, Drawn, hinged_arch, lee_frame, thin_cantilever
 
 import cosserat_fenicsx as cf
 
+pytestmark = pytest.mark.serial  # the choice knows no ranks
+
 
 def test_what_buckles_sideways_is_promoted():
     rod, scene = thin_cantilever()

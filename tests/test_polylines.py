@@ -9,6 +9,8 @@ import pytest
 import cosserat_fenicsx as cf
 from cosserat_fenicsx.explain import explain
 
+pytestmark = pytest.mark.serial  # no ranks in it
+
 POINTS = np.array([(0, 0, 0), (1.0, 0.2, 0.1), (1.8, 1.1, 0.7), (2.0, 2.3, 0.4)])
 
 

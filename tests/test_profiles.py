@@ -8,6 +8,8 @@ from scipy.optimize import brentq
 
 import cosserat_fenicsx as cf
 
+pytestmark = pytest.mark.serial  # no ranks in it
+
 STEEL = cf.Material(E=210e9, density=7850.0)
 LINE = cf.Line((0, 0, 0), (0, 0, 10))
 THICK, THIN = cf.Circle(0.2), cf.Tube(0.1, 0.05)
