@@ -10,8 +10,8 @@ def estimate_error(fine, coarse, before=None):
     """Estimate the error of a path from the same points on the mesh of elements twice as long; sets `fine.error`.
 
     The difference of the positions, at the coarse nodes and between them, over a share of the gain in accuracy that one
-    more halving brings (2^(p + 1) between the nodes): half of what was seen from the difference `before` to this one, not
-    more than 2^p; where there was none before, a quarter of 2^(p + 1), and that only if element ends, whose order is 2 p, are
+    more halving brings (2^(p + 1) between the nodes): a quarter of what was seen from the difference `before` to this one, not
+    more than 2^(p - 1); where there was none before, a sixteenth of 2^(p + 1), and that only if element ends, whose order is 2 p, are
     seen to be ahead of what lies between them: an order must be seen before it is counted on. Where hardly
     anything is displaced (a shaft in torsion), relative to the turning of the sections, or to a billionth of the
     length. Without a contact force of its own (formulation 'displacement') a slender rod's answer also feels the
@@ -34,9 +34,9 @@ def estimate_error(fine, coarse, before=None):
         largest = np.maximum(largest, np.maximum(np.linalg.norm(moved[:, :, :3], axis=2).max(axis=1), turned))
     relative, p = np.maximum(difference - _ROUNDING, 0.0) / np.maximum(largest, 1e-9), fine.degree
     if before is None:
-        gain = np.where(difference > 4 * at_ends, max(1.0, 2.0 ** (p - 1)), 1.0)
+        gain = np.where(difference > 4 * at_ends, max(1.0, 2.0 ** (p - 3)), 1.0)
     else:
-        gain = np.clip((before / np.maximum(relative, 1e-300) - 1) / 2, 1, 2**p)
+        gain = np.clip((before / np.maximum(relative, 1e-300) - 1) / 4, 1, 2 ** max(p - 1, 0))
     fine.set_error(relative / gain)
     return relative
 

@@ -3,6 +3,7 @@
 Then small motions out of the plane decouple from those in it, and (x, z, theta) are all that equilibrium needs.
 """
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,7 +16,9 @@ from cosserat_fenicsx.ties import PositionTie, TurnTie
 _SLANT = 1e-9
 # Directions that differ by less do not tell the plane by themselves.
 _APART = 1e-6
-_SAMPLES = 17
+# Places along a rod that is not straight or not the same everywhere, in golden steps: no turn of a helix, no twist and no wave
+# of a section repeats at all of them.
+_SAMPLES, _GOLDEN = 401, (math.sqrt(5) - 1) / 2
 #: Works of loads that keep to a plane if their vectors do.
 _WORKS = {
     "force", "moment", "eccentric_force", "follower_force", "follower_moment", "line_force", "line_moment",
@@ -110,7 +113,8 @@ def _sample(rod):
     if isinstance(rod.curve, Line) and rod.profile.constant:
         s = np.zeros(1)
     else:
-        s = np.unique(np.concatenate([np.linspace(0, rod.length, _SAMPLES), rod.breaks]))
+        inside = rod.length * (np.arange(1, _SAMPLES) * _GOLDEN % 1.0)
+        s = np.unique(np.concatenate([[0.0, rod.length], inside, rod.breaks]))
     return s, rod.curve.frame(s).reshape(-1, 3, 3)
 
 

@@ -12,6 +12,7 @@ import numpy as np
 from petsc4py import PETSc
 
 from cosserat_fenicsx import linear
+from cosserat_fenicsx.errors import NotConverged
 
 #: Newton stops when the error that remains after a step, by its contraction, is below this (root mean square, units L, 1).
 INCREMENT = 1e-11
@@ -220,17 +221,30 @@ class BorderedNewton(Newton):
     def resistance(self, motion):
         """What the tangent at the problem's x and load factor resists a motion (owned numbers) with: 1/<motion, A^-1
         motion>, which changes its sign where the tangent becomes singular by that motion."""
-        self._factor_here()
         force = self.problem.load_derivative(self.problem.x)
         force.array_w[:] = motion
-        self._ksp.solve(force, self._free)
+        try:
+            self._factor_here()
+            self._ksp.solve(force, self._free)
+        except PETSc.Error as found:
+            if found.ierr != _EXTERNAL:
+                raise
+            return 0.0  # singular to the last digit
         return 1 / self.problem.model.inner(motion, self._free.array_r)
 
     def slope_here(self, neutral=None):
         """(owned numbers,) dx/d eta at the problem's x and load factor, without the neutral motion."""
         problem = self.problem
-        self._factor_here()
-        self._ksp.solve(problem.load_derivative(problem.x), self._slope)
+        try:
+            self._factor_here()
+            self._ksp.solve(problem.load_derivative(problem.x), self._slope)
+        except PETSc.Error as found:
+            if found.ierr != _EXTERNAL:
+                raise
+            raise NotConverged(
+                f"the tangent is singular at the load factor {problem.load_factor:.6g}: the path branches there, or something is not "
+                "determined, such as the axial force of an inextensible rod between two supports"
+            ) from None
         self.neutral = neutral
         if neutral is not None:
             self._leave_out_neutral(self._slope)

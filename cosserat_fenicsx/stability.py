@@ -128,7 +128,7 @@ class Part:
     def is_neutral(self):
         """Whether the eigenvalue next to zero is zero to round-off at the problem's state, which was counted last."""
         values, _ = self._nearest(2)
-        return abs(values[0]) < 1e-4 * abs(values[-1]) and abs(values[0]) < _ROUNDING * self.K.norm(_LARGEST_ROW)
+        return abs(values[0]) < 1e-3 * abs(values[-1]) and abs(values[0]) < 30 * _ROUNDING * self.K.norm(_LARGEST_ROW)
 
     def eigenvalue(self, j):
         """The j-th eigenvalue of the second variation at the problem's state, counted from 0 in ascending order; for

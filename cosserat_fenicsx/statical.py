@@ -35,11 +35,35 @@ def _all_rows(scene):
         if support.clamps:
             yield from ((support, [(support.station, row)]) for row in np.eye(6))
         yield from ((support, rows_of(tie)) for tie in support.ties())
+    together = _Together()
     for joint in scene.joints:
+        if joint.rigid and not together.join(joint.first, joint.second):
+            continue  # a rigid joint that closes a loop of rigid joints says nothing new
         if joint.rigid:
             yield from ((joint, [(joint.first, row), (joint.second, -row)]) for row in np.eye(6))
         else:
             yield from ((joint, rows_of(tie)) for tie in joint.ties())
+
+
+class _Together:
+    """Stations that rigid joints have made one."""
+
+    def __init__(self):
+        self._groups = []
+
+    def join(self, *stations):
+        """Join two; False where they were one already."""
+        keys = {_key(station) for station in stations}
+        if any(keys <= group for group in self._groups):
+            return False
+        met = [group for group in self._groups if group & keys]
+        self._groups = [group for group in self._groups if not group & keys] + [keys.union(*met)]
+        return True
+
+
+def _key(station):
+    """What tells stations apart: nearer ones share an element end."""
+    return station.rod, round(station.s / station.rod.length, 9)
 
 
 def _held_once(scene):
@@ -48,7 +72,7 @@ def _held_once(scene):
     for holder, parts in _all_rows(scene):
         row = {}
         for station, values in parts:
-            key = (station.rod, station.s)
+            key = _key(station)
             if key not in stations:
                 stations.append(key)
             row[stations.index(key)] = values

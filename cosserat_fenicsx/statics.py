@@ -23,6 +23,7 @@ from cosserat_fenicsx.problem import Problem
 from cosserat_fenicsx.progress import Progress
 from cosserat_fenicsx.refinement import refine
 from cosserat_fenicsx.scene import Scene
+from cosserat_fenicsx.sections import SECTIONS
 from cosserat_fenicsx.snes import Newton
 from cosserat_fenicsx.stability import NegativeModes
 from cosserat_fenicsx.supports import Prescribed
@@ -36,6 +37,8 @@ _MODELS = {
 }
 #: Elements per rod of the first mesh, where the mesh is not given.
 FIRST_ELEMENTS = 4
+# Where a section is a function of s: most elements of the first mesh, and how well it must integrate 1/EI.
+_FINEST_FIRST, _SEEN = 256, 1e-3
 
 
 def solve(
@@ -132,13 +135,41 @@ def solve(
 
         if elements is not None:
             return trace(Layout.of(scene, elements))
-        return refine(trace, correct, Layout.of(scene, FIRST_ELEMENTS), tol, degree)
+        return refine(trace, correct, first_layout(scene, degree), tol, degree)
 
     with Progress(targets, progress, comm) as bar:
         try:
             return take(choice, bar)
         except Promoted as found:
             return take(choice.in_space(found.reason), bar)
+
+
+def first_layout(scene, degree):
+    """The first mesh: as fine as a section that changes by a function of s asks for, so that nothing falls between its points."""
+    layout = Layout.of(scene, FIRST_ELEMENTS)
+    while max(layout.counts) < _FINEST_FIRST and not all(
+        _sees(rod, breaks, degree) for rod, breaks in zip(scene.rods, layout.breaks, strict=True)
+    ):
+        layout = layout.split(2)
+    return layout
+
+
+def _sees(rod, breaks, degree):
+    """Whether Gauss points on elements integrate the flexibilities 1/EI as well as many more points do."""
+    if all(isinstance(section, SECTIONS) for _, section in rod.profile.pieces):
+        return True
+    x, weights = np.polynomial.legendre.leggauss(degree)
+    finer = max(8, _FINEST_FIRST // (len(breaks) - 1))
+
+    def integrals(ends):
+        s = ends[:-1, None] + np.diff(ends)[:, None] * (x + 1) / 2
+        flexible = 1 / rod.stiffness_at(s.ravel() * rod.length).J.reshape(*s.shape, 3)
+        return np.einsum("g,cgi,c->ci", weights / 2, flexible, np.diff(ends))
+
+    steps = np.arange(finer) / finer
+    fine_ends = np.append((breaks[:-1, None] + np.diff(breaks)[:, None] * steps).ravel(), 1.0)
+    fine = integrals(fine_ends).reshape(len(breaks) - 1, finer, 3).sum(axis=1)
+    return bool((np.abs(integrals(breaks) - fine).sum(axis=0) <= _SEEN * fine.sum(axis=0)).all())
 
 
 def _make_solvers(comm, shape):

@@ -4,8 +4,8 @@ import numpy as np
 from petsc4py import PETSc
 
 _ADD = PETSc.InsertMode.ADD_VALUES
-#: Stiffness that holds an added equation where only the sign of the second variation is asked for, in EI/L^2.
-_HELD = 1e8
+#: Stiffness that holds an added equation where only the sign of the second variation is asked for, over that of an element.
+_HELD = 1e3
 
 
 class TieRows:
@@ -109,8 +109,9 @@ class TieRows:
             return
         nodal, multipliers = self.seen
         _, gradient, change = self.model.ties.evaluate(self.model.tied_motion(nodal), eta, multipliers)
+        local = np.max(gradient**2 * self.model.tied_stiffness, axis=(1, 2))
         gradient = np.einsum("ika,da->ikd", gradient, axes).reshape(len(gradient), -1)
         change = np.einsum("kalb,da,eb->kdle", change, axes, axes).reshape(rows.size, rows.size)
         nodes = rows.ravel().astype(PETSc.IntType)
-        held_by = _HELD * held * gradient.T @ gradient
+        held_by = _HELD * held * gradient.T @ (local[:, None] * gradient)
         K.setValues(nodes, nodes, np.ascontiguousarray(held_by + 0.5 * (change + change.T)), _ADD)

@@ -19,6 +19,8 @@ _ENORMOUS = 1e5
 _CORRECTIONS, _NEAR = 6, 0.1
 # A point on a finer mesh may lie this far beside the coarse one, over the way between the coarse one's neighbours.
 _ASIDE = 0.3
+# So far from one another are points that have not moved (an inextensible column before it buckles).
+_NOTHING = 1e-7
 
 
 class _Enough(Exception):
@@ -113,6 +115,9 @@ class Tracing:
                     self._record(track.here)
         except _Enough:
             pass
+        except NotConverged as failure:
+            failure.path = self.path if failure.path is None else failure.path
+            raise
         except KeyboardInterrupt:
             raise Interrupted(self.path) from None
         finally:
@@ -219,7 +224,7 @@ class Tracing:
         track.neutral = self._neutral() if neutral else None
         solved = track.at_load(guess, eta) if at_load else track.on_plane(guess, eta, normal, weight)
         off = self.problem.numbers()[0] - guess[0]
-        if solved.converged and track.product(off, off) <= _ASIDE**2 * track.product(normal, normal):
+        if solved.converged and track.product(off, off) <= _ASIDE**2 * track.product(normal, normal) + _NOTHING**2:
             return track.point(solved)
         reason = "it lies elsewhere there" if solved.converged else track.failure
         raise NotConverged(f"a point of the path was not found on a finer mesh: {reason}", self.path)

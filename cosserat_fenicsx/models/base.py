@@ -11,7 +11,7 @@ from cosserat_fenicsx.element import ElementRule
 from cosserat_fenicsx.models.connections import ties_of
 from cosserat_fenicsx.models.load_terms import LoadTerms
 from cosserat_fenicsx.models.numbering import Numbering
-from cosserat_fenicsx.models.rod_data import fill_fields, gauss_function, rod_data, rod_fields
+from cosserat_fenicsx.models.rod_data import bounded, fill_fields, gauss_function, rod_data, rod_fields
 from cosserat_fenicsx.models.rodmesh import Gather, RodMesh
 from cosserat_fenicsx.models.scales import Scales
 from cosserat_fenicsx.models.ties import Ties
@@ -210,8 +210,11 @@ class RodModel:
             for rod, x in zip(scene.rods, layout.node_s(self.nodes), strict=True)
         ])  # fmt: skip
         self.section = self._section_data(rod_data(scene, layout, scales, self.rule, self.reference))
-        fill_fields(self.data, rods, self.section, self.shape.variant)
-        self.round_off = self._round_off(layout.sizes(scene) / scales.length)
+        sizes = layout.sizes(scene) / scales.length
+        lengths = np.repeat([rod.length / scales.length for rod in scene.rods], layout.counts)
+        stiff = bounded(self.section, self.shape.variant, sizes, lengths)
+        fill_fields(self.data, rods, self.section, stiff)
+        self.round_off = self._round_off(sizes)
         self._loads.fill(scene, layout, scales, self.rule, self.axes)
         at_rest, x = self._at_rest(), self.state.x.array
         x[:] = 0
@@ -220,6 +223,19 @@ class RodModel:
             function.x.array[:] = 0
         self.tied_at_rest = at_rest[self.tied_slots]
         self._tie()
+        self._local_stiffness(stiff, sizes)
+
+    def _local_stiffness(self, stiff, sizes):
+        """What one element resists a displacement and a rotation of each tied node with, (tied nodes, 6)."""
+        links, first = self.shape.connections, self.layout.first_cells
+        bend, K = self.section.J.max(axis=(1, 2)), stiff.max(axis=(1, 2))
+        self.tied_stiffness = np.zeros((len(links.tied), 6))
+        for k, vertex in enumerate(links.tied):
+            for rod, v in (vertex, *(other for other, leader in links.leaders if leader == vertex)):
+                for cell in {first[rod] + max(v - 1, 0), first[rod] + min(v, self.shape.counts[rod] - 1)}:
+                    h = sizes[cell]
+                    local = [K[cell] / h + 12 * bend[cell] / h**3] * 3 + [bend[cell] / h + K[cell] * h] * 3
+                    self.tied_stiffness[k] = np.maximum(self.tied_stiffness[k], local)
 
     def _round_off(self, sizes):
         """|F| cannot fall below its own rounding: strains are differences of r over a node's spacing."""

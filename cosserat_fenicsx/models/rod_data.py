@@ -7,9 +7,12 @@ from dolfinx import fem
 
 from cosserat_fenicsx import compat
 
-# Bounds EA and GA where only the sign of the second variation is asked for, in EI/L^2, by variant: more would drown
-# the bending of slender rods and the weak modes of thin blades in rounding; this shifts a critical load by 1e-5 or less.
+# EA and GA are bounded where only the sign of the second variation is asked for: more would drown the bending of slender
+# rods and the weak modes of thin blades in rounding. In EI/L^2 of each rod, by variant: what bends in n half waves has its critical
+# load shifted by about (n pi)^2 over the bound, so it is a hundred times higher where rounding leaves room: below the bending
+# stiffness about the weak axis by _ROOM times (element over rod)^2.
 _STIFF = {"condensed": 1e6, "field": 1e5}
+_HIGHER, _ROOM = 100.0, 1e10
 
 #: Arrays (elements, points, k) in the scene's order, dimensionless: K, J, frames R_R (3 x 3) and strains v_R.
 RodData = namedtuple("RodData", "K J R_R v_R")
@@ -56,10 +59,18 @@ def rod_fields(mesh, points, frame, strain):
     return RodFields(*(gauss_function(mesh, points, size) for size in (3, 3, 3, 3, frame, strain)))
 
 
-def fill_fields(fields, rods, data, variant):
-    """Put `RodData` into `RodFields`."""
-    bound = _STIFF.get(variant, np.inf) * data.J[:, :, :2].max(axis=2, keepdims=True)
+def bounded(data, variant, sizes, lengths):
+    """K where only the sign of the second variation is asked for; sizes of the elements and lengths of their rods, (elements,)."""
+    strong, weak = (bend(data.J, axis=2, keepdims=True) for bend in (np.max, np.min))
+    lengths, sizes = lengths[:, None, None], sizes[:, None, None]
+    least = _STIFF.get(variant, np.inf) * strong / lengths**2
+    room = _ROOM * weak * sizes**2 / lengths**4
+    return np.minimum(data.K, np.maximum(least, np.minimum(_HIGHER * least, room)))
+
+
+def fill_fields(fields, rods, data, stiff):
+    """Put `RodData` and the bounded K into `RodFields`."""
     finite = np.where(np.isinf(data.K), 0.0, data.K)
-    values = RodFields(finite, 1 / data.K, np.minimum(data.K, bound), data.J, data.R_R, data.v_R)
+    values = RodFields(finite, 1 / data.K, stiff, data.J, data.R_R, data.v_R)
     for function, array in zip(fields, values, strict=True):
         rods.fill(function, array)
