@@ -125,8 +125,8 @@ class ArcLength:
         track = self.track
         moved = track.here.numbers[0] - track.origin.numbers[0]
         change = track.here.load_factor - track.origin.load_factor
-        local = track.product(slope, slope)
-        self._weight = min(local, track.product(moved, moved) / change**2) if change else local
+        local = track.square(slope)
+        self._weight = min(local, track.square(moved) / change**2) if change else local
         self._weight = self._weight or 1.0
 
     def _weigh_less(self):

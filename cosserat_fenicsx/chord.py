@@ -50,7 +50,7 @@ class Chord:
     def balanced(cls, track, a, b):
         """With the weight by which the unknowns and the load factor go equally far."""
         moved, change = b.numbers[0] - a.numbers[0], b.load_factor - a.load_factor
-        return cls(track, a, b, (track.product(moved, moved) / change**2 if change else 0.0) or 1.0)
+        return cls(track, a, b, (track.square(moved) / change**2 if change else 0.0) or 1.0)
 
     def _near(self, place):
         """Up to four known places nearest to a place, and their points."""

@@ -12,7 +12,7 @@ import numpy as np
 
 from cosserat_fenicsx.checks import number, refuse
 from cosserat_fenicsx.interrupts import obey
-from cosserat_fenicsx.track import AIM, FAR, Track, growth_of, through
+from cosserat_fenicsx.track import AIM, FAR, NOTHING, Track, growth_of, through
 
 # A step that is off its prediction by less than this may have any direction and any size.
 _SLIGHT = 1e-3
@@ -155,7 +155,7 @@ class Continuation:
         """Whether a step is off its prediction by less than a share of its length."""
         track = self.track
         move, off = found - track.here.numbers[0], found - predicted
-        return track.product(off, off) <= share**2 * track.product(move, move)
+        return track.product(off, off) <= share**2 * track.product(move, move) + NOTHING**2
 
     def _near(self, found, predicted, off, eta):
         """Whether a step that is off its prediction may still be one along the path."""

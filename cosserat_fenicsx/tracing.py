@@ -12,6 +12,7 @@ from cosserat_fenicsx.errors import Interrupted, NotConverged
 from cosserat_fenicsx.follow import Follower
 from cosserat_fenicsx.interrupts import obey
 from cosserat_fenicsx.results import Event, Path, Record
+from cosserat_fenicsx.track import NOTHING
 
 # Loads in units of EI/L^2 that point to a slip in the units.
 _ENORMOUS = 1e5
@@ -19,8 +20,6 @@ _ENORMOUS = 1e5
 _CORRECTIONS, _NEAR = 6, 0.1
 # A point on a finer mesh may lie this far beside the coarse one, over the way between the coarse one's neighbours.
 _ASIDE = 0.3
-# So far from one another are points that have not moved (an inextensible column before it buckles).
-_NOTHING = 1e-7
 
 
 class _Enough(Exception):
@@ -184,7 +183,8 @@ class Tracing:
                     point = track.origin
                     track.put(point.numbers, 0.0)
                 else:
-                    point = self._found(*guesses[k], normal, weight * change, coarse[k].neutral, at_load=k in (0, last))
+                    still = k in (0, last) or not track.square(normal)
+                    point = self._found(*guesses[k], normal, weight * change, coarse[k].neutral, at_load=still)
                 track.aim(point, track.slope(), normal, change, weight)
                 if before is not None and k > left + 1:  # the step onto a branch shows no sign of the bifurcation
                     for crossing in self._follower.locator.crossings(Chord(track, before, point, weight)):
@@ -202,7 +202,7 @@ class Tracing:
     def _balance(self, a, b):
         """The weight of the load factor by which it goes as far as the unknowns from one guess to the next; or 0."""
         moved, change = b[0][0] - a[0][0], b[1] - a[1]
-        return self.track.product(moved, moved) / change**2 if change else 0.0
+        return self.track.square(moved) / change**2 if change else 0.0
 
     def _to_fork(self, coarse):
         """Find again what was met up to where the path was left; index of the last point before that."""
@@ -224,7 +224,7 @@ class Tracing:
         track.neutral = self._neutral() if neutral else None
         solved = track.at_load(guess, eta) if at_load else track.on_plane(guess, eta, normal, weight)
         off = self.problem.numbers()[0] - guess[0]
-        if solved.converged and track.product(off, off) <= _ASIDE**2 * track.product(normal, normal) + _NOTHING**2:
+        if solved.converged and track.product(off, off) <= _ASIDE**2 * track.product(normal, normal) + NOTHING**2:
             return track.point(solved)
         reason = "it lies elsewhere there" if solved.converged else track.failure
         raise NotConverged(f"a point of the path was not found on a finer mesh: {reason}", self.path)

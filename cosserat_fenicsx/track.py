@@ -11,6 +11,8 @@ from cosserat_fenicsx.stability import NegativeModes
 #: A step may turn a section or move a point by this much away from its prediction (rad, rod lengths); the next step
 #: aims at a fifth of it.
 FAR, AIM = 0.5, 0.1
+#: Less than this is no motion but rounding: an inextensible column stands still until it buckles.
+NOTHING = 1e-8
 # Newton iterations beyond which the next step does not grow, and is halved.
 _EASY, _HARD = 5, 9
 
@@ -135,6 +137,11 @@ class Track:
     def distance(self, a, b):
         """Largest difference of r (lengths) and of the rotation (rad, about twice that of q), over all ranks."""
         return self.model.largest(a[0] - b[0])
+
+    def square(self, a):
+        """`product` with itself; zero where that is rounding alone."""
+        square = self.product(a, a)
+        return square if square > NOTHING**2 else 0.0
 
     def product(self, a, b):
         """Inner product of two changes (numbers, load factor) without the load factor's part."""

@@ -85,3 +85,14 @@ def test_why_not_determinate():
     assert path.model == "spatial" and "'displacement'" in path.why[0]
     path = cf.solve(scene, [0.1], elements=2, degree=2, gauss_points=3)
     assert path.model == "planar"
+
+
+@pytest.mark.parametrize("turns", [8, 16, 32])
+def test_a_helix_is_in_no_plane(turns):
+    """However its turns fall on the places that are looked at."""
+    rod = cf.Rod(cf.Helix((0, 0, 0), (0.1, 0, 0), turns, 0.05), cf.Stiffness((1e3, 1e3), 1e3, (1.0, 1.0), 0.7))
+    scene = cf.Scene([rod], [cf.Clamp(rod.start)], [cf.Force(rod.end, (0, 0, 0.05))])
+    assert scene.plane is None and "do not lie in one plane" in scene.flatness[1]
+    twisted = cf.Rod(cf.UniformCurvature(1.0, (0, 0, turns * np.pi)), cf.Stiffness((1e3, 1e3), 1e3, (1.0, 5.0), 0.7))
+    scene = cf.Scene([twisted], [cf.Clamp(twisted.start)], [cf.Force(twisted.end, (1.0, 0, 0))])
+    assert "askew to the plane" in scene.flatness[1]

@@ -212,3 +212,15 @@ def test_a_new_kind_of_load_takes_no_change_elsewhere():
     scene = cf.Scene([ring], [cf.Clamp(ring.start)], [Pressure(ring, inwards)], [cf.Joint(ring.start, ring.end)])
     path = cf.solve(scene, [1.0], elements=8)
     np.testing.assert_allclose(path.displacement(ring.at(2 * np.pi))[0], (2 * 2.0 * 0.2 * 2.0 / 90.0, 0, 0), atol=1e-7)
+
+
+def test_every_pair_of_three_rods_may_be_joined():
+    rods = [line((0, 0, 0), tip, f"r{i}") for i, tip in enumerate([(0, 0, -1.0), (1.0, 0, 0.3), (-0.4, 0.9, 0.5)])]
+    pairs = [(0, 1), (1, 2), (2, 0)]
+    loads = [cf.Force(rods[1].end, FORCE)]
+    shapes = []
+    for joined in (pairs, pairs[:2]):
+        joints = [cf.Joint(rods[i].start, rods[j].start) for i, j in joined]
+        path = cf.solve(cf.Scene(rods, [cf.Clamp(rods[0].end)], loads, joints), [1.0], elements=3)
+        shapes.append(path.position(rods[2].end))
+    np.testing.assert_allclose(shapes[0], shapes[1], atol=1e-13)

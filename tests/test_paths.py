@@ -235,3 +235,15 @@ def test_step_control_bounds():
         cf.solve(scene, (0.0, 20.0), elements=4, control="arc", steps=cf.StepControl(most_steps=3))
     path = cf.solve(scene, (0.0, 20.0), elements=4, control="arc", steps=cf.StepControl(largest=1.0))
     assert np.abs(np.diff(path.load_factors)).max() <= 1.0
+
+
+@pytest.mark.parametrize("weak", [1.0, 3.0])
+@pytest.mark.parametrize("elements", [None, 8])
+def test_an_inextensible_column_stands_still_until_it_buckles(weak, elements):
+    rod = cf.Rod(cf.Line((0, 0, 0), (0, 0, 1.0)), cf.Stiffness((np.inf, np.inf), np.inf, (1.0, weak), 1.0))
+    scene = cf.Scene([rod], [cf.Clamp(rod.start)], [cf.Force(rod.end, (0, 0, -(np.pi**2) / 4))])
+    path = cf.solve(scene, (0, 1.2), elements=elements)
+    found = [event.load_factor for event in path.events]
+    np.testing.assert_allclose(found, 1.0, rtol=1e-8)
+    assert len(found) == (2 if weak == 1.0 else 1) and path.load_factors[-1] == 1.2 and (np.diff(path.load_factors) > 0).all()
+    assert np.abs(path.displacement(rod.end)).max() < 1e-12

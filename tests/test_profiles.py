@@ -139,3 +139,18 @@ def test_refused_without_material_and_side():
             cf.Rod(LINE, section)
     with pytest.raises(cf.SceneError, match="side = 'middle': expected 'left' or 'right'"):
         cf.Rod(LINE, [(4, THICK), (None, THIN)], STEEL).stiffness_at(1.0, side="middle")
+
+
+@pytest.mark.parametrize("place", [0.31, 0.68, 0.9])
+def test_a_weak_spot_between_the_points_of_a_coarse_mesh_is_seen(place):
+    def section(s):
+        EI = 1 - 0.98 * np.exp(-(((s - place) / 0.005) ** 2))
+        return cf.Stiffness((1e3, 1e3), 1e3, (EI, EI), EI)
+
+    rod = cf.Rod(cf.Line((0, 0, 0), (0, 0, 1.0)), section)
+    scene = cf.Scene([rod], [cf.Clamp(rod.start)], [cf.Force(rod.end, (0.5, 0, 0))])
+    path = cf.solve(scene, [1.0], tol=1e-3)
+    fine = cf.solve(scene, [1.0], elements=2000)
+    x = np.linspace(0, 1, 301)
+    error = np.linalg.norm(path.sample(0, rod, x)[0] - fine.sample(0, rod, x)[0], axis=1).max()
+    assert error / fine.largest_displacement()[0] <= path.error[0] <= 1e-3

@@ -154,3 +154,29 @@ def test_refusals():
         with pytest.raises(cf.SceneError) as refusal:
             case()
         assert words in str(refusal.value), (words, str(refusal.value))
+
+
+def test_a_small_rod_beside_a_large_one_keeps_its_stability():
+    """What holds a short stiff post is stiff by its measure, not by that of a long wire in the same scene."""
+    steel = cf.Material(E=210e9, nu=0.3)
+    wire = cf.Rod(cf.Line((10, 0, 0), (110, 0, 0)), cf.Circle(0.02), steel, name="wire")
+    post = cf.Rod(cf.Line((0, 0, 0), (0, 0, 5.0)), cf.Circle(0.2), steel, name="post")
+    P = np.pi**2 * post.stiffness.bending[0] / 5.0**2  # pinned at both ends
+    supports = [cf.Clamp(wire.start), cf.Hinge(post.start, (0, 1, 0)), cf.Roller(post.end, (1, 0, 0)), cf.Roller(post.end, (0, 1, 0))]
+    scene = cf.Scene([wire, post], supports, [cf.Force(post.end, (0, 0, -P)), cf.Force(wire.end, (1.0, 0, 0))])
+    path = cf.solve(scene, [0.5, 0.99], model="spatial", elements=8)
+    assert path.stable.all()
+
+
+def test_what_is_not_determined_is_said_in_words():
+    rod = cf.Rod(cf.Line((0, 0, 0), (0, 0, 1.0)), cf.Stiffness((np.inf, np.inf), np.inf, (1.0, 1.0), 1.0))
+    scene = cf.Scene([rod], [cf.Clamp(rod.start), cf.Pin(rod.end)], [cf.LineForce(rod, (1.0, 0, 0))])
+    for model in ("auto", "spatial", "planar"):
+        with pytest.raises(cf.NotConverged, match="tangent is singular"):
+            cf.solve(scene, [1.0], model=model)
+
+
+def test_nearly_one_station():
+    rod = cf.Rod(cf.Line((0, 0, 0), (0, 0, 1.0)), SECTION)
+    with pytest.raises(cf.SceneError, match="hold the same motion twice"):
+        cf.Scene([rod], [cf.Clamp(rod.start), cf.Pin(rod.at(0.3)), cf.Pin(rod.at(0.1 + 0.2))])
