@@ -41,24 +41,25 @@ def estimate_error(fine, coarse, before=None):
     return relative
 
 
-def on_mesh(path, k, layout):
-    """Point k of a path on another mesh, as something to start from.
+def on_mesh(path, layout):
+    """The points of a path on another mesh, as something to start from.
 
     Returns:
-        (r, q) at the nodes (N, 7) and n at the Gauss points (elements, points, 3), dimensionless, inertial.
+        (r, q) at the nodes (points, N, 7) and n at the Gauss points (points, elements, points of one, 3), dimensionless,
+        inertial.
     """
-    rule, scene, record = path.rule, path.scene, path[k]
+    rule, scene = path.rule, path.scene
+    n = np.array([record.gauss_fields[:, :, :3] for record in path])
     motions, forces, first = [], [], 0
     for i, rod in enumerate(scene.rods):
         x, inside, breaks = layout.node_s(rule.nodes)[i], layout.inside(rule.gauss)[i], path.layout.breaks[i]
-        motion = path.motion(rod, x, [record])[0]
-        motion[:, :3] += (rod.curve.position(x * rod.length) - scene.origin(rod)) / path.scales.length
+        motion = path.motion(rod, x)
+        motion[:, :, :3] += (rod.curve.position(x * rod.length) - scene.origin(rod)) / path.scales.length
         motions.append(motion)
         cells, weights = rule.locate_all(breaks, inside.ravel(), rule.between_gauss)
-        n = record.gauss_fields[first + cells, :, :3]
+        forces.append(np.einsum("kj,pkjc->pkc", weights, n[:, first + cells]).reshape(-1, *inside.shape, 3))
         first += len(breaks) - 1
-        forces.append(np.einsum("kj,kjc->kc", weights, n).reshape(*inside.shape, 3))
-    return np.concatenate(motions), np.concatenate(forces)
+    return np.concatenate(motions, axis=1), np.concatenate(forces, axis=1)
 
 
 def _gyration(rod):

@@ -144,9 +144,9 @@ class Tracing:
             return None
         track.max_iterations = _CORRECTIONS
         try:
-            for k, point in enumerate(coarse):
+            for point, rq, n in zip(coarse, *on_mesh(coarse, path.layout), strict=True):
                 obey()
-                problem.begin_at(*on_mesh(coarse, k, path.layout), point.reactions)
+                problem.begin_at(rq, n, point.reactions)
                 start = problem.numbers()
                 solved = track.at_load(start, point.load_factor)
                 if not solved.converged or track.distance(problem.numbers(), start) > _NEAR:
@@ -169,9 +169,9 @@ class Tracing:
         """
         problem, track, last = self.problem, self.track, len(coarse) - 1
         guesses = []
-        for k in range(last + 1):
-            problem.begin_at(*on_mesh(coarse, k, self.path.layout), coarse[k].reactions)
-            guesses.append((problem.numbers(), coarse.load_factors[k]))
+        for point, rq, n in zip(coarse, *on_mesh(coarse, self.path.layout), strict=True):
+            problem.begin_at(rq, n, point.reactions)
+            guesses.append((problem.numbers(), point.load_factor))
         weight = min(filter(None, (self._balance(a, b) for a, b in itertools.pairwise(guesses))), default=1.0)
         before, left = None, self._to_fork(coarse) if coarse.left else -1
         try:

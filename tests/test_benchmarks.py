@@ -118,7 +118,8 @@ def test_order_of_loads_does_not_matter():
         alone = cf.solve(held(rod, first), [1.0], elements=6)
         problem.load(held(rod, force, moment), together.layout)
         problem.set_load_factor(1.0)
-        problem.begin_at(*on_mesh(alone, 0, together.layout), alone[0].reactions)
+        (rq,), (n,) = on_mesh(alone, together.layout)
+        problem.begin_at(rq, n, alone[0].reactions)
         assert newton.solve().converged
         rq, _ = problem.model.snapshot()
         np.testing.assert_allclose(rq, together[0].rq, atol=1e-12)
