@@ -106,6 +106,8 @@ def solve(
     )
     steps = instance("solve", "steps", StepControl() if steps is None else steps, StepControl, "a StepControl")
     follow, until = _follow_options(steps, control, branch), _until(until, free)
+    if not steps.adaptive:
+        _check_jumps(scene, targets)
 
     def take(choice, bar):
         strayed = []
@@ -209,6 +211,18 @@ def _follow_options(steps, control, branch):
     if not steps.adaptive and (branch or control == "arc"):
         raise SceneError("steps = StepControl(adaptive=False): expected adaptive steps for arc length and branches")
     return {"steps": steps, "control": control, "branch": branch or 0}
+
+
+def _check_jumps(scene, targets):
+    """One step cannot tell a prescribed rotation from the same one with a full turn more or less."""
+    farthest = max(abs(b - a) for a, b in zip([0.0, *targets[:-1]], targets, strict=True))
+    for support in scene.supports:
+        turn = farthest * math.hypot(*(getattr(support, "rotation", None) or (0.0,)))
+        if turn >= math.pi:
+            raise SceneError(
+                f"steps = StepControl(adaptive=False): {type(support).__name__} at {support.station} would turn by {turn:.3g} rad in "
+                "one step: expected load factors that turn it by less than pi at a time"
+            )
 
 
 def _until(until, free):

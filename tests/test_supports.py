@@ -180,3 +180,11 @@ def test_nearly_one_station():
     rod = cf.Rod(cf.Line((0, 0, 0), (0, 0, 1.0)), SECTION)
     with pytest.raises(cf.SceneError, match="hold the same motion twice"):
         cf.Scene([rod], [cf.Clamp(rod.start), cf.Pin(rod.at(0.3)), cf.Pin(rod.at(0.1 + 0.2))])
+
+
+def test_one_jump_of_more_than_half_a_turn_is_refused():
+    rod = bow()
+    turning = cf.Prescribed(rod.end, rotation=(0, 1.0, 0))
+    scene = cf.Scene([rod], [cf.Clamp(rod.start), turning])
+    with pytest.raises(cf.SceneError, match=r"would turn by 5 rad in one step"):
+        cf.solve(scene, [5.0], elements=4, steps=cf.StepControl(adaptive=False))
