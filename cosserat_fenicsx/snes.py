@@ -64,6 +64,13 @@ class Newton:
         snes.setFromOptions()
         options.delValue(option)
 
+    def _start_over(self):
+        """A new PC after an error in the middle of a solution: PETSc counts those it has begun and not ended, up to two."""
+        pc = PETSc.PC().create(self.problem.A.comm)
+        pc.setOperators(self.problem.A)
+        self._factor(pc)
+        self.snes.getKSP().setPC(pc)
+
     def _factor(self, pc):
         """What solves with the tangent."""
         linear.factor_tangent(pc, self.problem.A, self.problem.model.tangent)
@@ -95,6 +102,7 @@ class Newton:
         except PETSc.Error as problem_of_petsc:
             if problem_of_petsc.ierr != _EXTERNAL:
                 raise
+            self._start_over()
             reason = _Reason.DIVERGED_LINEAR_SOLVE
         problem.set_state(x)
         if reason > 0:
@@ -223,28 +231,34 @@ class BorderedNewton(Newton):
         motion>, which changes its sign where the tangent becomes singular by that motion."""
         force = self.problem.load_derivative(self.problem.x)
         force.array_w[:] = motion
-        try:
-            self._factor_here()
-            self._ksp.solve(force, self._free)
-        except PETSc.Error as found:
-            if found.ierr != _EXTERNAL:
-                raise
+        if not self._solved_here(force, self._free):
             return 0.0  # singular to the last digit
         return 1 / self.problem.model.inner(motion, self._free.array_r)
 
-    def slope_here(self, neutral=None):
-        """(owned numbers,) dx/d eta at the problem's x and load factor, without the neutral motion."""
-        problem = self.problem
+    def _solved_here(self, force, motion):
+        """motion = A^-1 force at the problem's x and load factor; False where A is singular."""
+        self._factor_here()
         try:
-            self._factor_here()
-            self._ksp.solve(problem.load_derivative(problem.x), self._slope)
-        except PETSc.Error as found:
+            self._ksp.solve(force, motion)
+        except PETSc.Error as found:  # KLU says it so, MUMPS by the reason
             if found.ierr != _EXTERNAL:
                 raise
+            self._start_over()
+            return False
+        return self._ksp.getConvergedReason() >= 0
+
+    def slope_here(self, neutral=None):
+        """(owned numbers,) dx/d eta at the problem's x and load factor, without the neutral motion.
+
+        Raises:
+            NotConverged: the tangent is singular.
+        """
+        problem = self.problem
+        if not self._solved_here(problem.load_derivative(problem.x), self._slope):
             raise NotConverged(
                 f"the tangent is singular at the load factor {problem.load_factor:.6g}: the path branches there, or something is not "
                 "determined, such as the axial force of an inextensible rod between two supports"
-            ) from None
+            )
         self.neutral = neutral
         if neutral is not None:
             self._leave_out_neutral(self._slope)
