@@ -40,6 +40,7 @@ tables: setup
 	$(PYTHON) demos/accuracy.py
 	$(PYTHON) demos/overhead.py
 	$(PYTHON) demos/rungs.py
+	$(PYTHON) demos/choice.py
 	$(PYTHON) demos/scaling.py
 	$(PYTHON) demos/readme_tables.py
 

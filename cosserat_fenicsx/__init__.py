@@ -24,7 +24,7 @@ _HOME = {
     "EccentricForce": "loads",
     "FollowerForce": "loads",
     "FollowerMoment": "loads",
-    "Event": "results",
+    "Event": "records",
     "Force": "loads",
     "Hinge": "supports",
     "InstallationError": "errors",

@@ -80,7 +80,9 @@ def _common(parser):
     parser.add_argument("--degree", type=int, help="polynomial degree of r and q, 1 to 4 [4]")
     parser.add_argument("--formulation", help="mixed, displacement or multiplier [mixed]")
     parser.add_argument("--model", help="auto, determinate, planar or spatial [auto]")
-    parser.add_argument("--control", help="auto, load (stop at a limit point) or arc (along the path, never back) [auto]")
+    parser.add_argument(
+        "--control", help="auto, load (stop at a limit point) or arc (along the path, never back) [auto]"
+    )
     parser.add_argument("--branch", type=int, help="1 or -1: leave the path at its first bifurcation")
 
 

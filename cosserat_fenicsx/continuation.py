@@ -162,7 +162,7 @@ class Continuation:
         track = self.track
         if off > FAR:
             track.failure = "the equilibrium jumped away from the path"
-            self._shrink = float(np.clip((AIM / off) ** (1 / len(track.history)), 0.1, 0.5))
+            self._shrink = min(max((AIM / off) ** (1 / len(track.history)), 0.1), 0.5)
             return False
         here = track.here.numbers
         move, foreseen = found[0] - here[0], predicted[0] - here[0]
@@ -193,7 +193,9 @@ class Continuation:
 
     def _predict(self, eta):
         """Numbers at eta by the polynomial through the last points (constant, secant, quadratic)."""
-        history = self.track.history
-        latest = {p.load_factor: p for p in history}  # one each, where the path came back to a load factor
-        known = sorted(latest.values(), key=history.index)
-        return through(known, [p.load_factor for p in known], eta)[0]
+        known = self.track.history
+        places = [point.load_factor for point in known]
+        if len(set(places)) < len(places):  # the path came back to a load factor: its last point counts
+            latest = dict(zip(places, known, strict=True))
+            places, known = list(latest), list(latest.values())
+        return through(known, places, eta)[0]

@@ -1,7 +1,7 @@
 """Reference centrelines with their frames R_R(s) = [d_1R d_2R d_3R]; d_3R is the tangent, s the arc length.
 
-The protocol of a curve: `length`, m; `breaks`, the arc lengths inside it where it is not smooth, m; `position(s)` and
-`frame(s)`, both exact to round-off, for an arc length or an array of them.
+The protocol of a curve: `length`, m; `breaks`, the arc lengths inside it where it is not smooth, m; `uniform`, whether its
+curvature and twist are constant; `position(s)` and `frame(s)`, both exact to round-off, for an arc length or an array of them.
 """
 
 import math
@@ -32,7 +32,7 @@ class Line:
     d1: tuple | None = None
     length: float = field(init=False)
 
-    breaks = ()
+    breaks, uniform = (), True
 
     def __post_init__(self):
         store(self, start=vector(self, "start", self.start, "m"), end=vector(self, "end", self.end, "m"))
@@ -60,7 +60,7 @@ class _Uniform:
     Subclasses store `start`, `length`, `_frame` = R_R(0) and `_curvature` = u.
     """
 
-    breaks = ()
+    breaks, uniform = (), True
 
     def position(self, s):
         """Inertial points at the arc lengths s (n,), m; shape (n, 3)."""

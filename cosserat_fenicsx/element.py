@@ -25,6 +25,11 @@ class ElementRule:
         """(len(x), p + 1) nodal basis functions at x in [0, 1]."""
         return np.vander(2 * np.asarray(x) - 1, len(self.nodes), increasing=True) @ self._to_coefficients
 
+    @property
+    def leading(self):
+        """(p + 1,) weights of the nodes' values in the coefficient of x^p, x in [-1, 1]."""
+        return self._to_coefficients[-1]
+
     @cached_property
     def slopes(self):
         """(gauss, p + 1) d/dx of the nodal basis at the Gauss points."""

@@ -36,9 +36,7 @@ def explain(scene, load_factors, settings):
     degree = settings.get("degree", default_degree(formulation))
     check_arguments(scene, tol, elements)
     follows = settings.get("branch") is not None or settings.get("control") == "arc"
-    choice = choose(
-        scene, model=settings.get("model", "auto"), formulation=formulation, degree=degree, follows=follows
-    )
+    choice = choose(scene, model=settings.get("model", "auto"), formulation=formulation, degree=degree, follows=follows)
     first = elements or FIRST_ELEMENTS
     layout = Layout.of(scene, first)
 

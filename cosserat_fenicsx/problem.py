@@ -81,13 +81,13 @@ class Problem:
             live[:] = values
         self.set_state(self.x)
 
-    def begin_at(self, rq, n, multipliers):
+    def begin_at(self, values, n, multipliers):
         """Start from a motion and contact force that another mesh found.
 
         Args:
-            rq: (nodes, 7), n: (elements, points, 3), in the scene's order; multipliers: reactions of added equations.
+            values, n: see `RodModel.set_motion`; multipliers: reactions of added equations.
         """
-        self.model.set_motion(rq, n)
+        self.model.set_motion(values, n)
         self.numbering.from_local(self._state, self.x)
         if self.ties:
             self.ties.put(self.x, multipliers)

@@ -91,6 +91,11 @@ class Profile:
         return tuple(end for end, _ in self.pieces[:-1])
 
     @property
+    def uniform(self):
+        """Whether the section is the same everywhere between the `breaks`."""
+        return not any(self._law)
+
+    @property
     def constant(self):
         """Whether the section is the same everywhere."""
         return len(self.pieces) == 1 and not self._law[0]

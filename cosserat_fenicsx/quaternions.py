@@ -21,12 +21,25 @@ def conjugate_product(p, q):
     return p[..., :1] * w - q[..., :1] * v - np.cross(v, w)
 
 
+def cross(u, v):
+    """(k, 3) cross products of rows; np.cross takes five times as long on a few."""
+    result = np.empty_like(u)
+    result[:, 0] = u[:, 1] * v[:, 2] - u[:, 2] * v[:, 1]
+    result[:, 1] = u[:, 2] * v[:, 0] - u[:, 0] * v[:, 2]
+    result[:, 2] = u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]
+    return result
+
+
 def skew(u):
     """The (3, 3) matrix of u x."""
     return np.array([[0.0, -u[2], u[1]], [u[2], 0.0, -u[0]], [-u[1], u[0], 0.0]])
 
 
-def small_rotation(q):
-    """(3, 4): the inertial rotation 2 vec(dq conj(q))/|q|^2 of a change dq of one q (4,), as a matrix on dq."""
-    v = q[1:]
-    return 2 * np.column_stack([-v, q[0] * np.eye(3) + skew(v)]) / (q @ q)
+def small_rotations(q):
+    """(k, 3, 4): the inertial rotations 2 vec(dq conj(q))/|q|^2 of changes dq of q (k, 4), as matrices on dq."""
+    a, b, c, d = (q * (2 / (q * q).sum(axis=1, keepdims=True))).T
+    result = np.empty((len(q), 3, 4))
+    for i, row in enumerate(((-b, a, -d, c), (-c, d, a, -b), (-d, -c, b, a))):
+        for j, column in enumerate(row):
+            result[:, i, j] = column
+    return result

@@ -1,8 +1,13 @@
-"""Finer and finer meshes until two of them agree: a path is traced until it is well resolved, and corrected from there on."""
+"""Finer and finer meshes until two of them agree: a path is traced until it is well resolved, and corrected from there on.
+
+How fine is found out at a few of its points; then all of them go to that mesh at once.
+"""
 
 import math
 
-from cosserat_fenicsx.accuracy import estimate_error
+import numpy as np
+
+from cosserat_fenicsx.accuracy import estimate_error, hardest, spread_error
 from cosserat_fenicsx.errors import NotConverged
 
 _MOST_ELEMENTS = 1024
@@ -23,32 +28,53 @@ def refine(trace, correct, layout, tol, degree):
     Raises:
         NotConverged: two meshes in a row cannot be solved, or the accuracy is not reached.
     """
-    coarse = like = before = None
+    whole = looked_at = before = which = (
+        None  # all points, and those that are looked at, on the last mesh that they were found on
+    )
+    level, level_of_whole, apart_of_whole = 0, -1, None
     failed, best = False, math.inf
     while True:
         elements = max(layout.counts)
         try:
-            fine = None if coarse is None else correct(layout, coarse)
-            if fine is not None and estimate_error(fine, coarse, before).max() > _RESOLVED:
-                fine = None
-            if fine is None:
-                fine = trace(layout, like)
+            fine = None if looked_at is None else correct(layout, looked_at)
+            apart = None if fine is None else estimate_error(fine, looked_at, before)
+            if fine is None or apart.max() > _RESOLVED:
+                fine, coarse = trace(layout, whole), whole
+                apart = estimate_error(fine, coarse, apart_of_whole) if level == level_of_whole + 1 > 0 else None
+                whole, level_of_whole, apart_of_whole = fine, level, apart
+            elif len(fine) == len(whole):
+                whole, level_of_whole, apart_of_whole = fine, level, apart
+            elif fine.error.max() <= tol:
+                few, fine = fine, _all_points(correct, layout, whole, fine, which) or trace(layout, whole)
+                spread_error(fine, few)
+                whole, level_of_whole, apart_of_whole = fine, level, None
         except NotConverged:
             if failed or elements >= _MOST_ELEMENTS:
                 raise
-            failed, coarse, before = True, None, None
+            failed, looked_at, before = True, None, None
         else:
-            failed, like = False, fine
-            if coarse is not None:
-                before = estimate_error(fine, coarse, before)
+            failed = False
+            if apart is not None:
                 reached = float(fine.error.max())
-                if reached <= tol:
+                if reached <= tol and fine is whole:
                     return fine
                 if elements >= _MOST_ELEMENTS or (reached > best and best < 1e-8):
-                    raise NotConverged(_not_accurate(tol, min(reached, best), elements, degree), fine)
+                    raise NotConverged(_not_accurate(tol, min(reached, best), elements, degree), whole)
                 best = min(best, reached)
-            coarse = fine
-        layout = layout.split(2)
+            if fine is whole:
+                looked_at, which = hardest(whole)
+                before = None if apart_of_whole is None else apart_of_whole[which]
+            else:
+                looked_at, before = fine, apart
+        layout, level = layout.split(2), level + 1
+
+
+def _all_points(correct, layout, whole, few, which):
+    """The points of a path on a mesh where a few of them, `which`, were found; None where that will not do."""
+    others = np.ones(len(whole), dtype=bool)
+    others[which] = False
+    rest = correct(layout, whole.at_points(np.flatnonzero(others)))
+    return rest and few.with_points(rest, others)
 
 
 def _not_accurate(tol, reached, elements, degree):

@@ -1,6 +1,7 @@
 """Results as arrays with named fields, in SI units. Knows no solver; files and pictures are made by other rooms."""
 
-from dataclasses import dataclass, field, replace
+import copy
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
@@ -10,41 +11,6 @@ from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.quaternions import directors
 from cosserat_fenicsx.recovery import at_nodes, element_contact
 from cosserat_fenicsx.rod import Station
-
-
-@dataclass(frozen=True)
-class Record:
-    """One equilibrium, dimensionless: (r, q) at the nodes (N, 7), (n, m, r') at the Gauss points (cells, points, 9), and
-    the reactions of the equations that supports and joints add; whether a motion is neutral there, see `Track`.
-
-    A record that is appended to a path may hold its model's own numbers; the path's `expand` makes these of them.
-    """
-
-    load_factor: float
-    rq: np.ndarray
-    gauss_fields: np.ndarray | None
-    negative_modes: int
-    iterations: int
-    reactions: np.ndarray
-    neutral: bool = False
-
-
-@dataclass(frozen=True, eq=False)
-class Event:
-    """A limit point or a bifurcation of a path.
-
-    Attributes:
-        kind: "limit", where the load factor turns, or "bifurcation", where another path crosses.
-        load_factor: located to a relative 1e-6.
-        mode: (N, 3) displacements, inertial, of all nodes of all rods in the scene's order, the largest of length 1: the
-            path's own direction at a limit point, the buckling mode at a bifurcation. `Path.mode` picks a rod.
-        after: index of the path's last point before it; -1 where there is none.
-    """
-
-    kind: str
-    load_factor: float
-    mode: np.ndarray = field(repr=False)
-    after: int
 
 
 class Path:
@@ -117,6 +83,31 @@ class Path:
     def __getitem__(self, k):
         """Point k as it was solved: a `Record`."""
         return self._records[k]
+
+    def at_points(self, which):
+        """The path of some of its points alone, without events.
+
+        Args:
+            which: their indices.
+        """
+        part = copy.copy(self)
+        for name in ("_contact", "_all_rq"):
+            part.__dict__.pop(name, None)
+        part.events, part._expanded, part._appended = [], [self[k] for k in which], []
+        part._error = None if self._error is None else self._error[which]
+        return part
+
+    def with_points(self, others, which):
+        """The path of these points and those of another one on the same mesh.
+
+        Args:
+            others: a Path.
+            which: for every point of the whole, in order, whether it is of `others`.
+        """
+        mine, theirs = iter(self._records), iter(others._records)
+        whole = self.at_points([])
+        whole._expanded = [next(theirs if other else mine) for other in which]
+        return whole
 
     def __repr__(self):
         reach = f"load factors {self.load_factors[0]:g} .. {self.load_factors[-1]:g}" if len(self) else "empty"

@@ -67,6 +67,11 @@ class Rod:
                 breaks.append(s)
         return tuple(breaks)
 
+    @property
+    def uniform(self):
+        """Whether curvature, twist and section are constant between the `breaks`: no spline, no section that is a function of s."""
+        return self.curve.uniform and self.profile.uniform
+
     def stiffness_at(self, s, side="right"):
         """Stiffnesses and mass at reference arc lengths.
 

@@ -89,23 +89,21 @@ class Newton:
         """Newton from the problem's x (and carried fields) at the model's load factor; x and the state follow.
 
         Returns:
-            Solved. Where it has not converged, x is no equilibrium.
+            Solved. Where it has not converged, x is no equilibrium, and the state may be elsewhere.
         """
         problem = self.problem
         self._steps = []
-        x = problem.x
-        problem.set_state(x)
-        self._before[:] = self._now
+        if self._carries:
+            self._before[:] = self._now
         try:
-            self.snes.solve(None, x)
+            self.snes.solve(None, problem.x)
             reason = self.snes.getConvergedReason()
         except PETSc.Error as problem_of_petsc:
             if problem_of_petsc.ierr != _EXTERNAL:
                 raise
             self._start_over()
             reason = _Reason.DIVERGED_LINEAR_SOLVE
-        problem.set_state(x)
-        if reason > 0:
+        if reason > 0:  # the residual was asked for at x last: the state is there
             self._advance()
         return Solved(reason > 0, len(self._steps), _WORDS.get(reason, f"PETSc's reason {reason}"))
 
@@ -131,14 +129,21 @@ class Newton:
         self._steps.append(step)
         if not step < _HUGE:
             return _Reason.DIVERGED_DTOL
-        contraction = step / self._steps[-2] if iteration > 1 else 1.0
-        remaining = step * contraction / (1 - contraction) if contraction < 0.9 else step
         balanced = residual <= 1e-6 * (1 + abs(problem.load_factor) * problem.load_norm) + problem.model.round_off
-        if balanced and (remaining <= INCREMENT or step <= INCREMENT):
+        if balanced and (step <= INCREMENT or self._remaining() <= INCREMENT):
             return _Reason.CONVERGED_SNORM_RELATIVE
         if iteration >= self.max_iterations:
             return _Reason.DIVERGED_MAX_IT
         return _Reason.CONVERGED_ITERATING
+
+    def _remaining(self):
+        """The error that is left after the last step. Newton's steps contract by c, then by c^2 and so on; only a tenth of that
+        is counted on."""
+        if len(self._steps) < 2:
+            return math.inf
+        before, step = self._steps[-2:]
+        contraction = step / before
+        return step * contraction * min(10 * contraction, 1.0) / (1 - contraction) if contraction < 0.9 else step
 
     def _motion(self, step):
         """Size of a step's motion alone: contact forces and reactions have another scale, and rounding of their own."""

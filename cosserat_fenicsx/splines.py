@@ -50,6 +50,8 @@ class Spline:
     length: float = field(init=False)
     breaks: tuple = field(init=False, repr=False, compare=False)
 
+    uniform = False
+
     def __post_init__(self):
         from scipy.interpolate import CubicSpline  # scenes without splines need not wait for it
 

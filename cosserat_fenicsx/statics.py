@@ -23,7 +23,6 @@ from cosserat_fenicsx.problem import Problem
 from cosserat_fenicsx.progress import Progress
 from cosserat_fenicsx.refinement import refine
 from cosserat_fenicsx.scene import Scene
-from cosserat_fenicsx.sections import SECTIONS
 from cosserat_fenicsx.snes import Newton
 from cosserat_fenicsx.stability import NegativeModes
 from cosserat_fenicsx.supports import Prescribed
@@ -39,6 +38,8 @@ _MODELS = {
 FIRST_ELEMENTS = 4
 # Where a section is a function of s: most elements of the first mesh, and how well it must integrate 1/EI.
 _FINEST_FIRST, _SEEN = 256, 1e-3
+# Chord over arc of a quarter of an element, on an average: that of an arc of one radian.
+_STRAIGHT = 0.958
 
 
 def solve(
@@ -114,7 +115,13 @@ def solve(
 
         def tracing(layout):
             solvers = solvers_of(
-                scene, layout, formulation=formulation, degree=degree, points=gauss_points, comm=comm, model=choice.model
+                scene,
+                layout,
+                formulation=formulation,
+                degree=degree,
+                points=gauss_points,
+                comm=comm,
+                model=choice.model,
             )
             return Tracing(solvers, formulation, follow, choice, bar)
 
@@ -147,7 +154,8 @@ def solve(
 
 
 def first_layout(scene, degree):
-    """The first mesh: as fine as a section that changes by a function of s asks for, so that nothing falls between its points."""
+    """The first mesh: as fine as the turns of a curve and a section that changes by a function of s ask for, so that nothing
+    falls between its points."""
     layout = Layout.of(scene, FIRST_ELEMENTS)
     while max(layout.counts) < _FINEST_FIRST and not all(
         _sees(rod, breaks, degree) for rod, breaks in zip(scene.rods, layout.breaks, strict=True)
@@ -157,8 +165,13 @@ def first_layout(scene, degree):
 
 
 def _sees(rod, breaks, degree):
-    """Whether Gauss points on elements integrate the flexibilities 1/EI as well as many more points do."""
-    if all(isinstance(section, SECTIONS) for _, section in rod.profile.pieces):
+    """Whether the quarters of elements are next to straight, and Gauss points on elements integrate the flexibilities 1/EI as
+    well as many more points do."""
+    quarters = (breaks[:-1, None] + np.diff(breaks)[:, None] * np.arange(4) / 4).ravel()
+    chords = np.diff(rod.curve.position(np.append(quarters, 1.0) * rod.length), axis=0)
+    if np.linalg.norm(chords, axis=1).sum() < _STRAIGHT * rod.length:
+        return False
+    if rod.profile.uniform:
         return True
     x, weights = np.polynomial.legendre.leggauss(degree)
     finer = max(8, _FINEST_FIRST // (len(breaks) - 1))

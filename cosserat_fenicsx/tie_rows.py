@@ -25,7 +25,7 @@ class TieRows:
         self.rows = model.rows_of_tied.astype(PETSc.IntType)
         self._here = numbering.comm.rank == numbering.comm.size - 1
         links = model.shape.connections
-        self._added, self._ties = list(links.equations), len(links.ties)
+        self._added, self._all = tuple(links.equations), tuple(range(len(links.ties)))
         count = numbering.multipliers
         self._multipliers = (numbering.first_multiplier + np.arange(count)).astype(PETSc.IntType)
         self._idle = (numbering.first_multiplier + count + np.arange(numbering.idle)).astype(PETSc.IntType)
@@ -42,8 +42,8 @@ class TieRows:
             values, nodal = self._work.array_r, self.model.tied_at_rest.copy()
             free = np.count_nonzero(self.rows >= 0)
             nodal[self.rows >= 0] = values[:free]
-            multipliers = np.zeros(self._ties)
-            multipliers[self._added] = values[free:]
+            multipliers = np.zeros(len(self._all))
+            multipliers[list(self._added)] = values[free:]
             self.seen, self._added_values = (nodal, multipliers), (None, None)
 
     def _evaluate(self, eta):
@@ -51,13 +51,13 @@ class TieRows:
         if self._added_values[0] != eta:
             nodal, multipliers = self.seen
             rq = self.model.tied_motion(nodal)
-            self._added_values = eta, self.model.ties.evaluate(rq, eta, multipliers, self._added)
+            self._added_values = eta, self.model.ties.evaluate(rq, eta, multipliers[list(self._added)], self._added)
         return self._added_values[1]
 
     def put(self, x, multipliers):
         """Set the multipliers in a vector."""
         if self._here:
-            x.setValues(self._multipliers, multipliers[self._added])
+            x.setValues(self._multipliers, multipliers[list(self._added)])
         x.assemble()
 
     def everywhere(self):
@@ -71,8 +71,8 @@ class TieRows:
             nodal, multipliers = self.seen
             c, gradient, _ = self._evaluate(eta)
             _, test = self.model.tie_maps(nodal)
-            reactions = np.einsum("kda,ika,i->kd", test, gradient, multipliers[self._added])
-            b.setValues(self.rows.ravel(), reactions.ravel(), _ADD)
+            reactions = (multipliers[list(self._added)] @ gradient.reshape(len(c), -1)).reshape(-1, 6)
+            b.setValues(self.rows.ravel(), (test @ reactions[:, :, None]).ravel(), _ADD)
             b.setValues(self._multipliers, c, _ADD)
         b.assemble()
 
@@ -84,10 +84,13 @@ class TieRows:
         trial, test = self.model.tie_maps(self.seen[0])
         nodes = self.rows.ravel()
         size = len(nodes)
-        of_nodes = np.einsum("kda,kalb,lbe->kdle", test, change, trial).reshape(size, size)
+        count = len(self.rows)
+        turned = (test @ change.reshape(count, 6, -1)).reshape(size, count, 6)
+        of_nodes = (turned.swapaxes(0, 1) @ trial).swapaxes(0, 1).reshape(size, size)
         A.setValues(nodes, nodes, np.ascontiguousarray(of_nodes), _ADD)
-        reactions = np.einsum("kda,ika->kdi", test, gradient).reshape(size, -1)
-        equations = np.einsum("ikb,kbe->ike", gradient, trial).reshape(-1, size)
+        by_node = gradient.swapaxes(0, 1)  # (tied nodes, ties, 6)
+        reactions = (test @ by_node.swapaxes(1, 2)).reshape(size, -1)
+        equations = (by_node @ trial).swapaxes(0, 1).reshape(-1, size)
         # in C's order: petsc4py takes the numbers as they lie in memory
         A.setValues(nodes, self._multipliers, np.ascontiguousarray(reactions), _ADD)
         A.setValues(self._multipliers, nodes, np.ascontiguousarray(equations), _ADD)
@@ -108,10 +111,10 @@ class TieRows:
         if not self._here:
             return
         nodal, multipliers = self.seen
-        _, gradient, change = self.model.ties.evaluate(self.model.tied_motion(nodal), eta, multipliers)
+        _, gradient, change = self.model.ties.evaluate(self.model.tied_motion(nodal), eta, multipliers, self._all)
         local = np.max(gradient**2 * self.model.tied_stiffness, axis=(1, 2))
-        gradient = np.einsum("ika,da->ikd", gradient, axes).reshape(len(gradient), -1)
-        change = np.einsum("kalb,da,eb->kdle", change, axes, axes).reshape(rows.size, rows.size)
+        gradient = (gradient @ axes.T).reshape(len(gradient), -1)
+        change = (axes @ (change @ axes.T).reshape(len(rows), 6, -1)).reshape(rows.size, rows.size)
         nodes = rows.ravel().astype(PETSc.IntType)
         held_by = _HELD * held * gradient.T @ (local[:, None] * gradient)
         K.setValues(nodes, nodes, np.ascontiguousarray(held_by + 0.5 * (change + change.T)), _ADD)

@@ -6,12 +6,13 @@ import itertools
 import numpy as np
 
 from cosserat_fenicsx.accuracy import on_mesh
-from cosserat_fenicsx.chord import Chord
 from cosserat_fenicsx.choose import force_in_words
+from cosserat_fenicsx.chord import Chord
 from cosserat_fenicsx.errors import Interrupted, NotConverged
 from cosserat_fenicsx.follow import Follower
 from cosserat_fenicsx.interrupts import obey
-from cosserat_fenicsx.results import Event, Path, Record
+from cosserat_fenicsx.records import Event, Record
+from cosserat_fenicsx.results import Path
 from cosserat_fenicsx.track import NOTHING
 
 # Loads in units of EI/L^2 that point to a slip in the units.
@@ -48,7 +49,9 @@ class Tracing:
     def __init__(self, solvers, formulation, follow, choice, bar):
         self.problem, _, self.stability = solvers
         self.model, self._options, self._choice, self._bar = self.problem.model, follow, choice, bar
-        self.path = Path.of(self.model, formulation, [*choice.why, force_in_words(self.model.shape.variant, formulation)])
+        self.path = Path.of(
+            self.model, formulation, [*choice.why, force_in_words(self.model.shape.variant, formulation)]
+        )
         if choice.model == "spatial":
             self._follower = Follower(*solvers, on_event=self._meet, **follow)
         else:  # in a plane load control alone, and no events: what asks for more is promoted
@@ -144,9 +147,9 @@ class Tracing:
             return None
         track.max_iterations = _CORRECTIONS
         try:
-            for point, rq, n in zip(coarse, *on_mesh(coarse, path.layout), strict=True):
+            for point, values, n in self._starts(coarse):
                 obey()
-                problem.begin_at(rq, n, point.reactions)
+                problem.begin_at(values, n, point.reactions)
                 start = problem.numbers()
                 solved = track.at_load(start, point.load_factor)
                 if not solved.converged or track.distance(problem.numbers(), start) > _NEAR:
@@ -160,6 +163,11 @@ class Tracing:
             raise Interrupted(path) from None
         return path
 
+    def _starts(self, coarse):
+        """The points of a path on a coarser mesh, and what `Problem.begin_at` takes of each."""
+        rq, n = on_mesh(coarse, self.path.layout)
+        return zip(coarse, self.model.unknowns_of(rq), n, strict=True)
+
     def again(self, coarse):
         """The points of a path on a coarser mesh: each in the plane through its coarse state, across the path; the two ends
         at their load factors.
@@ -169,8 +177,8 @@ class Tracing:
         """
         problem, track, last = self.problem, self.track, len(coarse) - 1
         guesses = []
-        for point, rq, n in zip(coarse, *on_mesh(coarse, self.path.layout), strict=True):
-            problem.begin_at(rq, n, point.reactions)
+        for point, values, n in self._starts(coarse):
+            problem.begin_at(values, n, point.reactions)
             guesses.append((problem.numbers(), point.load_factor))
         weight = min(filter(None, (self._balance(a, b) for a, b in itertools.pairwise(guesses))), default=1.0)
         before, left = None, self._to_fork(coarse) if coarse.left else -1

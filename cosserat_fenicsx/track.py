@@ -159,7 +159,13 @@ def through(points, places, at):
     Returns:
         (numbers, load factor).
     """
-    weights = [math.prod((at - b) / (a - b) for b in places if b != a) for a in places]  # Lagrange's
+    weights = []  # Lagrange's
+    for a in places:
+        weight = 1.0
+        for b in places:
+            if b != a:
+                weight *= (at - b) / (a - b)
+        weights.append(weight)
     numbers = [weights[0] * values for values in points[0].numbers]
     for weight, point in zip(weights[1:], points[1:], strict=True):
         for total, values in zip(numbers, point.numbers, strict=True):
@@ -169,7 +175,7 @@ def through(points, places, at):
 
 def growth_of(off, order, iterations):
     """How much longer the next step may be than one that was `off` a prediction of that order, as a factor."""
-    growth = float(np.clip((AIM / max(off, 1e-12)) ** (1 / order), 0.5, 2.0))
+    growth = min(max((AIM / max(off, 1e-12)) ** (1 / order), 0.5), 2.0)
     if iterations >= _HARD:
         return 0.5
     return min(growth, 1.0) if iterations > _EASY else growth

@@ -59,7 +59,9 @@ def main(sizes=SIZES, out="out"):
     """
     rows = []
     for elements in sizes:
-        done = subprocess.run([sys.executable, __file__, "--one", str(elements)], capture_output=True, text=True, check=True)
+        done = subprocess.run(
+            [sys.executable, __file__, "--one", str(elements)], capture_output=True, text=True, check=True
+        )
         rows.append(json.loads(done.stdout.splitlines()[-1]))
         print(f"{rows[-1][0]:8d} unknowns: step {1e3 * rows[-1][1]:9.3f} ms", flush=True)
     rows = np.array(rows)
@@ -73,7 +75,7 @@ def main(sizes=SIZES, out="out"):
         "",
         f"Exponents between the first and the last row: step {exponent(unknowns, step):.3f}, count "
         f"{exponent(unknowns, count):.3f}, memory above the smallest {exponent(unknowns[1:], memory[1:] - memory[0]):.3f}; "
-        f"largest between two rows: step {max(exponent(unknowns[i:i + 2], step[i:i + 2]) for i in range(len(rows) - 1)):.3f}.",
+        f"largest between two rows: step {max(exponent(unknowns[i : i + 2], step[i : i + 2]) for i in range(len(rows) - 1)):.3f}.",
     ]
     text = "\n".join(lines)
     Path(out).mkdir(parents=True, exist_ok=True)

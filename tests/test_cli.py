@@ -170,7 +170,9 @@ def test_every_demo_scene(scene, tmp_path):
     if scene.stem == "lees_frame":
         snapped = cosserat("run", scene, "--load-factors", "0:2", "--tol", "1e-4")
         assert "limit point at the load factor 1.85465" in snapped.stdout, snapped.stdout
-        assert "limit point at the load factor -0.9396" in snapped.stdout and "promoted from the planar" in snapped.stdout
+        assert (
+            "limit point at the load factor -0.9396" in snapped.stdout and "promoted from the planar" in snapped.stdout
+        )
 
 
 def test_buckling():

@@ -62,6 +62,18 @@ def test_rungs_quick(tmp_path):
 
 
 @pytest.mark.serial
+def test_choice_quick(tmp_path):
+    """What is chosen is as accurate as its error bar says, and so is what was picked by hand."""
+    import choice
+
+    found = choice.main(runs=1, out=tmp_path, scenes=choice.SCENES[:1], counts=(2, 4, 8))
+    (rows, ratio) = found["eccentric_cantilever"]
+    (_, model, *_, error, estimate), (_, by_hand, *_, picked, _) = rows
+    assert (model, by_hand) == ("determinate", "determinate") and ratio > 0
+    assert error <= estimate <= 1e-6 and picked <= 1e-6
+
+
+@pytest.mark.serial
 def test_scaling_quick(tmp_path):
     """The sizes are what they say; what they cost is for the command to say."""
     import scaling

@@ -6,7 +6,6 @@ from functools import partial
 import numpy as np
 import pytest
 import ufl
-
 from cosserat_fenicsx.forms import determinate, equilibrium, loads, planar, spatial
 
 pytestmark = pytest.mark.serial

@@ -46,7 +46,7 @@ SOLVERS = (
     "arclength", "chord", "continuation", "eigen", "follow", "interrupts", "linear", "linear_buckling", "locator", "problem",
     "refinement", "snes", "stability", "statics", "tie_rows", "tracing", "track",
 )  # fmt: skip
-RESULTS = ("accuracy", "plot", "ranks", "recovery", "results", "tables", "xdmf")
+RESULTS = ("accuracy", "plot", "ranks", "records", "recovery", "results", "tables", "xdmf")
 
 
 def test_data_flows_one_way():

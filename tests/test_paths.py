@@ -245,5 +245,9 @@ def test_an_inextensible_column_stands_still_until_it_buckles(weak, elements):
     path = cf.solve(scene, (0, 1.2), elements=elements)
     found = [event.load_factor for event in path.events]
     np.testing.assert_allclose(found, 1.0, rtol=1e-8)
-    assert len(found) == (2 if weak == 1.0 else 1) and path.load_factors[-1] == 1.2 and (np.diff(path.load_factors) > 0).all()
+    assert (
+        len(found) == (2 if weak == 1.0 else 1)
+        and path.load_factors[-1] == 1.2
+        and (np.diff(path.load_factors) > 0).all()
+    )
     assert np.abs(path.displacement(rod.end)).max() < 1e-12

@@ -162,7 +162,12 @@ def test_a_small_rod_beside_a_large_one_keeps_its_stability():
     wire = cf.Rod(cf.Line((10, 0, 0), (110, 0, 0)), cf.Circle(0.02), steel, name="wire")
     post = cf.Rod(cf.Line((0, 0, 0), (0, 0, 5.0)), cf.Circle(0.2), steel, name="post")
     P = np.pi**2 * post.stiffness.bending[0] / 5.0**2  # pinned at both ends
-    supports = [cf.Clamp(wire.start), cf.Hinge(post.start, (0, 1, 0)), cf.Roller(post.end, (1, 0, 0)), cf.Roller(post.end, (0, 1, 0))]
+    supports = [
+        cf.Clamp(wire.start),
+        cf.Hinge(post.start, (0, 1, 0)),
+        cf.Roller(post.end, (1, 0, 0)),
+        cf.Roller(post.end, (0, 1, 0)),
+    ]
     scene = cf.Scene([wire, post], supports, [cf.Force(post.end, (0, 0, -P)), cf.Force(wire.end, (1.0, 0, 0))])
     path = cf.solve(scene, [0.5, 0.99], model="spatial", elements=8)
     assert path.stable.all()

@@ -1,5 +1,6 @@
 """What all rungs share: the mesh, the numbering of unknowns, the numbers of a scene, and what solvers ask for."""
 
+import math
 from collections import namedtuple
 
 import numpy as np
@@ -91,12 +92,12 @@ class RodModel:
 
     def tie_maps(self, values):
         """For added equations: from changes of a tied node's unknowns to (displacement, rotation),
-        (nodes, 6, components), and from (force, moment) to the node's rows, (nodes, components, 6)."""
+        (nodes, 6, components), and from (force, moment) to the node's rows, (nodes, components, 6); one for all nodes where
+        these are alike."""
         raise NotImplementedError
 
-    def set_motion(self, rq, n):
-        """Take (r, q) at the nodes (N, 7) and n at the Gauss points (elements, points, 3), inertial, in the scene's order,
-        as something to start from."""
+    def unknowns_of(self, rq):
+        """The nodes' unknowns (.., N, components) of (r, q) (.., N, 7), the scene's order."""
         raise NotImplementedError
 
     def expansion(self):
@@ -249,12 +250,11 @@ class RodModel:
         reference = self.reference[self.tied_slots]
         self.ties = Ties(ties_of(self.scene), nodes, reference, self.scales.length) if nodes else None
 
-    def _set_nodes(self, values):
-        """Put unknowns of all nodes (N, components), in the scene's order, into the state."""
+    def set_motion(self, values, n):
+        """Something to start from, in the scene's order: the nodes' unknowns (N, components), and n at the Gauss points
+        (elements, points, 3), inertial, where the variant keeps it."""
         self.state.x.array[self._nodal] = values[self._slots]
-
-    def _set_force(self, n):
-        """Put a contact force at the Gauss points (elements, points, force_size) where the variant keeps it."""
+        n = n @ self.axes[: self.force_size].T
         for function in self.carried:
             self.rods.fill(function, n)
         if self.shape.variant == "field":
@@ -276,20 +276,20 @@ class RodModel:
 
     def largest(self, change):
         """Largest move (rod lengths) or turn (rad) in a change of this rank's part of the solver's vector."""
-        nodal = self._of_nodes(change)
-        moved, turned = nodal[:, : self.moves], nodal[:, self.moves :]
-        squares = np.einsum("ij,ij->i", moved, moved), np.einsum("ij,ij->i", turned, turned)
-        local = max(squares[0].max(initial=0), self.turn**2 * squares[1].max(initial=0)) ** 0.5
+        squares, moves = np.square(self._of_nodes(change).reshape(-1, self.components)), self.moves
+        turned = squares[:, moves:].sum(axis=1).max(initial=0)
+        moved = squares[:, :moves].sum(axis=1).max(initial=0) if moves else 0.0
+        local = math.sqrt(max(moved, self.turn**2 * turned))
         return self.comm.allreduce(local, op=MPI.MAX) if self.comm.size > 1 else local
 
     def inner(self, a, b):
         """Inner product of two changes of the nodes' unknowns over all nodes and ranks."""
-        local = float(np.einsum("ij,ij->", self._of_nodes(a), self._of_nodes(b)))
+        local = float(self._of_nodes(a) @ self._of_nodes(b))
         return self.comm.allreduce(local) if self.comm.size > 1 else local
 
     def _of_nodes(self, change):
-        """(free nodes, components) of this rank's part of the solver's vector."""
-        return change[: self.components * self.numbering.nodes].reshape(-1, self.components)
+        """The nodes' part of this rank's part of the solver's vector, node by node."""
+        return change[: self.components * self.numbering.nodes]
 
     def snapshot(self):
         """What `expansion` needs: the nodes' unknowns (N, components), and what the Gauss points know

@@ -68,9 +68,9 @@ class DeterminateInPlane(_KnownForce, PlaneModel):
         none = np.zeros(3)
         return np.array([[*none, *e3]]), np.array([[*none, *e1], [*none, *e2]])
 
-    def set_motion(self, rq, n):
+    def unknowns_of(self, rq):
         """See `RodModel`."""
-        self._set_nodes(self._angles(rq)[:, None])
+        return self._angles(rq)[..., None]
 
     def expansion(self):
         """See `RodModel`."""
@@ -109,9 +109,9 @@ class DeterminateInSpace(_KnownForce):
     def _variation_axes(self):
         return (np.eye(6)[3:],)
 
-    def set_motion(self, rq, n):
+    def unknowns_of(self, rq):
         """See `RodModel`."""
-        self._set_nodes(rq[:, 3:])
+        return rq[..., 3:]
 
     def expansion(self):
         """See `RodModel`."""

@@ -24,10 +24,11 @@ class PlaneModel(RodModel):
         return data._replace(K=K, J=J, R_R=t, v_R=np.stack([shear, stretch], axis=2))
 
     def _angles(self, rq):
-        """(N,) theta of (r, q): continuous along each rod, beyond full turns too."""
-        half = np.arctan2(rq[:, 4:] @ self.axes[2], rq[:, 3])
+        """(.., N) theta of (r, q), (.., N, 7): continuous along each rod, beyond full turns too."""
+        half = np.arctan2(rq[..., 4:] @ self.axes[2], rq[..., 3])
         ends = np.cumsum([0, *(cells * self.shape.degree + 1 for cells in self.shape.counts)])
-        return 2 * np.concatenate([np.unwrap(half[a:b]) for a, b in zip(ends[:-1], ends[1:], strict=True)])
+        rods = [np.unwrap(half[..., a:b]) for a, b in zip(ends[:-1], ends[1:], strict=True)]
+        return 2 * np.concatenate(rods, axis=-1)
 
     def _out_of_plane(self):
         """(N, 3) what of the positions stays as it is, inertial."""
@@ -73,19 +74,21 @@ class PlanarModel(PlaneModel):
 
     def tied_motion(self, values):
         """See `RodModel`."""
-        offset = self._out_of_plane()[self.tied_slots]
-        none = np.zeros((0, 2))
-        return in_space(self.axes, offset, values[:, :2], values[:, 2], none, np.zeros(0), none)[0]
+        e3, half = self.axes[2], values[:, 2:] / 2
+        rq = np.empty((len(values), 7))
+        rq[:, :3] = values[:, :2] @ self.axes[:2]
+        rq[:, :3] += (self.reference[self.tied_slots] @ e3)[:, None] * e3
+        rq[:, 3:4], rq[:, 4:] = np.cos(half), np.sin(half) * e3
+        return rq
 
     def tie_maps(self, values):
         """See `RodModel`."""
         inside = self._variation_axes()[0]
-        return np.tile(inside.T, (len(values), 1, 1)), np.tile(inside, (len(values), 1, 1))
+        return inside.T[None], inside[None]
 
-    def set_motion(self, rq, n):
+    def unknowns_of(self, rq):
         """See `RodModel`."""
-        self._set_nodes(np.column_stack([rq[:, :3] @ self.axes[:2].T, self._angles(rq)]))
-        self._set_force(n @ self.axes[:2].T)
+        return np.concatenate([rq[..., :3] @ self.axes[:2].T, self._angles(rq)[..., None]], axis=-1)
 
     def expansion(self):
         """See `RodModel`."""

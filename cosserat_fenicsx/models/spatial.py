@@ -7,7 +7,7 @@ import numpy as np
 from cosserat_fenicsx import compat
 from cosserat_fenicsx.models.base import RodModel
 from cosserat_fenicsx.models.spatial_forms import compile_forms
-from cosserat_fenicsx.quaternions import small_rotation
+from cosserat_fenicsx.quaternions import small_rotations
 
 
 class SpatialModel(RodModel):
@@ -39,14 +39,12 @@ class SpatialModel(RodModel):
         trial, test = np.zeros((len(values), 6, 7)), np.zeros((len(values), 7, 6))
         trial[:, :3, :3] = test[:, :3, :3] = np.eye(3)
         test[:, 4:, 3:] = np.eye(3)
-        for k, node in enumerate(values):
-            trial[k, 3:, 3:] = small_rotation(node[3:])
+        trial[:, 3:, 3:] = small_rotations(values[:, 3:])
         return trial, test
 
-    def set_motion(self, rq, n):
+    def unknowns_of(self, rq):
         """See `RodModel`."""
-        self._set_nodes(rq)
-        self._set_force(n)
+        return rq
 
     @contextlib.contextmanager
     def stress_alone(self):

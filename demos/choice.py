@@ -1,0 +1,135 @@
+"""What the choice of `solve` costs: "auto" with its error bar against the best model, degree and mesh picked by hand.
+
+    python demos/choice.py           every demo scene (about 3 minutes)
+    python demos/choice.py --quick   one scene, few meshes
+
+By hand: every model that a scene fits, degrees 2 to 4, 1, 2, 3, 4, 6, 8 .. elements a rod, with the error known beforehand from a
+fine mesh, so that the cheapest one below the tolerance can be picked; it estimates nothing. Times are processor times of
+`solve`, warm, medians of alternating runs. Errors are those of the positions along the rods, over the largest displacement, as `path.error`.
+"""
+
+import argparse
+import platform
+import time
+from pathlib import Path
+
+import numpy as np
+
+import cosserat_fenicsx as cf
+from cosserat_fenicsx import compat
+from cosserat_fenicsx.choose import fitting
+from cosserat_fenicsx.scenefile import read_scene
+
+SCENES = ("eccentric_cantilever", "bend_45", "lees_frame", "helical_spring", "riser", "tripod")
+COUNTS = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64)
+_PLACES = np.linspace(0, 1, 101)
+# Meshes by hand whose first run takes this many times as long as the best so far are not run again.
+_HOPELESS = 1.5
+
+
+def positions(path):
+    """(points, places of all rods, 3) displacements over the unit of length."""
+    return np.concatenate([path.motion(rod, _PLACES)[:, :, :3] for rod in path.scene.rods], axis=1)
+
+
+def error(path, truth):
+    """Largest error along the rods over the largest displacement, over all points."""
+    off = np.linalg.norm(positions(path) - truth, axis=2).max(axis=1)
+    return float((off / np.linalg.norm(truth, axis=2).max(axis=1)).max())
+
+
+def timed(solve):
+    """(seconds of processor time, Path or None)."""
+    began = time.process_time()
+    try:
+        path = solve()
+    except cf.NotConverged:
+        path = None
+    return time.process_time() - began, path
+
+
+def compare(scene, etas, tol, runs, counts=COUNTS):
+    """Rows (name, model, degree, elements, unknowns, seconds, error, estimate): "auto", then the best by hand.
+
+    The third answer is the ratio of their times, the median of alternating runs.
+    """
+
+    def auto():
+        return cf.solve(scene, etas, tol=tol)
+
+    auto()  # warm
+    chosen = auto()
+    fine = 2 * max(max(chosen.elements), 16)
+    truth = positions(cf.solve(scene, etas, model=chosen.model, elements=fine, degree=4))
+    best = None
+    for model in fitting(scene):
+        if chosen.model == "spatial" and model != "spatial":
+            continue  # a plane answer was found not to be enough
+        for degree in (2, 3, 4):
+            for elements in counts:
+
+                def by_hand(model=model, degree=degree, elements=elements):
+                    return cf.solve(scene, etas, model=model, degree=degree, elements=elements, tol=tol)
+
+                _, path = timed(by_hand)  # compiles
+                if path is None or error(path, truth) > tol:
+                    continue
+                seconds = timed(by_hand)[0]
+                if best is None or seconds < _HOPELESS * best[0]:
+                    seconds = min(seconds, *(timed(by_hand)[0] for _ in range(4)))
+                if best is None or seconds < best[0]:
+                    best = seconds, by_hand, path
+                if seconds > _HOPELESS * best[0]:
+                    break
+    _, by_hand, path = best
+    samples = np.array([(timed(auto)[0], timed(by_hand)[0]) for _ in range(runs)])
+    rows = [
+        (name, p.model, p.degree, max(p.elements), p.unknowns, seconds, error(p, truth), float(p.error.max()))
+        for name, p, seconds in zip(("auto", "best by hand"), (chosen, path), np.median(samples, axis=0), strict=True)
+    ]
+    return rows, float(np.median(samples[:, 0] / samples[:, 1]))
+
+
+def load_factors_of(options):
+    """A scene file's load factors, those of a range in ten steps."""
+    if isinstance(options, str):
+        return np.linspace(*map(float, options.split(":")), 11)[1:].tolist()
+    return list(options)
+
+
+def main(runs=9, out="out", scenes=SCENES, counts=COUNTS):
+    """Print the table and write it to out/choice.md.
+
+    Returns:
+        {scene: what `compare` found}.
+    """
+    lines = [
+        f"{compat.version()}, {platform.machine()}.",
+        "",
+        "| scene | tol | | model | degree | elements | unknowns | ms | error | estimate | auto over by hand |",
+        "|---|---|---|---|---|---|---|---|---|---|---|",
+    ]
+    found = {}
+    for name in scenes:
+        scene, options = read_scene(Path(__file__).parent / f"{name}.toml")
+        tol = options.get("tol", 1e-6)
+        rows, ratio = found[name] = compare(scene, load_factors_of(options["load_factors"]), tol, runs, counts)
+        for who, model, degree, elements, unknowns, seconds, off, estimate in rows:
+            told = f"{estimate:.0e}" if np.isfinite(estimate) else "-"
+            lines.append(
+                f"| {name.replace('_', ' ')} | {tol:.0e} | {who} | {model} | {degree} | {elements} | {unknowns} | "
+                f"{1e3 * seconds:.1f} | {off:.0e} | {told} | {f'{ratio:.2f}' if who == 'auto' else ''} |"
+            )
+            print(lines[-1], flush=True)
+    Path(out).mkdir(parents=True, exist_ok=True)
+    (Path(out) / "choice.md").write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return found
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--quick", action="store_true")
+    if parser.parse_args().quick:
+        main(runs=1, scenes=SCENES[:1], counts=(2, 4, 8))
+    else:
+        main()
