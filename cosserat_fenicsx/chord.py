@@ -8,7 +8,6 @@ import itertools
 import math
 
 import numpy as np
-from scipy.optimize import brentq
 
 from cosserat_fenicsx.track import through
 
@@ -189,6 +188,8 @@ def zero_of(function, low, high):
     a, b = function(low), function(high)
     if a * b > 0:
         return low if abs(a) < abs(b) else high
+    from scipy.optimize import brentq  # a quarter of a second that most runs need not wait for
+
     return brentq(function, low, high, xtol=1e-15)
 
 
