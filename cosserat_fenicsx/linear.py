@@ -1,12 +1,24 @@
 """Which direct solver factors what, and the settings it must not be without."""
 
+from petsc4py import PETSc
+
+
+def solve_with_tangent(ksp, kind="general"):
+    """How a KSP uses the factors of a tangent: a factorisation that pivots within blocks alone loses digits on slender rods,
+    which two steps of refinement bring back."""
+    ksp.setType("richardson" if kind == "blocks" else "preonly")
+    if kind == "blocks":
+        ksp.setNormType(PETSc.KSP.NormType.NONE)
+        ksp.setTolerances(max_it=3)
+
 
 def factor_tangent(pc, A, kind="general"):
-    """What solves with a tangent.
+    """What solves with a tangent, one process or many.
 
     Args:
-        kind: "general": LU that pivots, because q_a may be zero, and so may the diagonal of an added equation; "plain":
-            LU that does not, PETSc's own, a third of the cost; "symmetric": Cholesky with signs.
+        kind: "general": LU that pivots everywhere, because the diagonal of an added equation, or of a contact force's, may be
+            zero; "blocks": PETSc's own of a matrix stored by blocks, which pivots within those of the nodes (q_a may be
+            zero), a third of the cost; "plain": PETSc's own, which does not pivot; "symmetric": Cholesky with signs.
     """
     pc.setType("cholesky" if kind == "symmetric" and A.comm.size == 1 else "lu")
     if A.comm.size > 1:

@@ -28,7 +28,7 @@ class Problem:
         numbering = self.numbering
         self.ties = TieRows(model, numbering) if model.shape.connections.ties else None
         tied = self.ties.rows if self.ties else np.empty(0, dtype=np.int64)
-        self.A = numbering.matrix(model.cell_dofs, tied[tied >= 0])
+        self.A = numbering.matrix(model.cell_dofs, tied[tied >= 0], blocks=model.tangent == "blocks")
         self.A.setOption(PETSc.Mat.Option.SYMMETRIC, model.tangent == "symmetric")
         self.x, self.b, self._dead, *self._difference = (numbering.vector() for _ in range(5))
         self._local = np.zeros(len(numbering.rows))

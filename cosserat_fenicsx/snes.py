@@ -54,9 +54,7 @@ class Newton:
         if self._carries:
             snes.setUpdate(self._carry)
         snes.setConvergenceTest(self._test)
-        ksp = snes.getKSP()
-        ksp.setType("preonly")
-        self._factor(ksp.getPC())
+        self._prepare(snes.getKSP())
         # petsc4py 3.18 cannot reach the line search but by an option.
         option, options = f"cosserat_{id(self):x}_snes_linesearch_type", PETSc.Options()
         snes.setOptionsPrefix(option.removesuffix("snes_linesearch_type"))
@@ -70,6 +68,10 @@ class Newton:
         pc.setOperators(self.problem.A)
         self._factor(pc)
         self.snes.getKSP().setPC(pc)
+
+    def _prepare(self, ksp):
+        linear.solve_with_tangent(ksp, self.problem.model.tangent)
+        self._factor(ksp.getPC())
 
     def _factor(self, pc):
         """What solves with the tangent."""
@@ -165,12 +167,16 @@ class BorderedNewton(Newton):
     step is then taken along that motion, which the residual does not resist.
     """
 
+    def _prepare(self, ksp):
+        ksp.setType("preonly")
+        self._factor(ksp.getPC())
+
     def _factor(self, pc):
-        A = self.problem.A
+        A, kind = self.problem.A, self.problem.model.tangent
         self._slope, self._free = A.createVecRight(), A.createVecRight()
         self._ksp = ksp = PETSc.KSP().create(A.comm)
-        ksp.setType("preonly")
-        linear.factor_tangent(ksp.getPC(), A, self.problem.model.tangent)
+        linear.solve_with_tangent(ksp, kind)
+        linear.factor_tangent(ksp.getPC(), A, kind)
         ksp.setOperators(A)
         pc.setType("python")
         pc.setPythonContext(self)

@@ -106,6 +106,10 @@ class RodModel:
         one is."""
         raise NotImplementedError
 
+    def _without_saddle(self):
+        """What factors the tangent where it has no saddle point to pivot for."""
+        return "general" if self.shape.slender or self.comm.size > 1 else "blocks"
+
     # -- building ----------------------------------------------------------------------------------------------------
 
     def _build(self):
@@ -135,6 +139,8 @@ class RodModel:
         self.carries_force = shape.variant not in ("displacement", "multiplier")
         self.takes_motions = shape.variant != "multiplier"
         self.forms = self._compile(spaces)
+        if self.tangent == "general" and self.space is self.nodal_space and not self.numbering.multipliers:
+            self.tangent = self._without_saddle()
         self.rule = ElementRule(self.nodes, self.forms.gauss, self.forms.weights)
         self._prepare_variations(spaces)
 

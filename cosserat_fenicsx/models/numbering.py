@@ -51,7 +51,8 @@ class Numbering:
         rows = fem.Function(space)  # carries the numbers to the ranks that see them as ghosts
         numbers = rows.x.array
         numbers[:] = -1
-        numbers[node_dofs[own]] = first + np.arange(self.nodes * self.block).reshape(-1, self.block)
+        chain = np.flatnonzero(own)[np.argsort(slots[own])]  # along the rods
+        numbers[node_dofs[chain]] = first + np.arange(self.nodes * self.block).reshape(-1, self.block)
         numbers[others] = first + self.nodes * self.block + np.arange(len(others))
         rows.x.scatter_forward()
         self.rows = rows.x.array.astype(PETSc.IntType)
@@ -117,17 +118,19 @@ class Numbering:
             self._local.array_w[:] = numbers[self._free]
             self._scatter.scatter(self._local, b, PETSc.InsertMode.ADD_VALUES, PETSc.ScatterMode.REVERSE)
 
-    def matrix(self, cell_dofs, tied):
+    def matrix(self, cell_dofs, tied, *, blocks=False):
         """A matrix with room for all elements of this rank and for added equations.
 
         Args:
             cell_dofs: (cells, dofs) local numbers of every element of this rank.
             tied: solver's numbers (any rank's) of the unknowns that added equations speak of; the same on all ranks.
+            blocks: whether it is to be stored by the blocks of nodes.
         """
         A = PETSc.Mat().create(self.comm)
-        A.setType("aij")
+        A.setType("baij" if blocks else "aij")
         A.setSizes(((self.size, self.total), (self.size, self.total)), bsize=self.block if self._blocked else 1)
-        A.setPreallocationNNZ(self._room(cell_dofs, tied))
+        room = self._room(cell_dofs, tied)
+        A.setPreallocationNNZ(tuple(-(-r[:: self.block] // self.block) for r in room) if blocks else room)
         if self._blocked:
             whole = self.rows.reshape(-1, self.block)[:, 0]
             blocks = np.where(whole >= 0, whole // self.block, -1).astype(PETSc.IntType)

@@ -58,9 +58,10 @@ class PlanarModel(PlaneModel):
     variations = ((3, False), (3, True))
 
     def _compile(self, spaces):
-        # the tangent of a condensed contact force has no saddle point to pivot for, unless equations are added
-        self.tangent = "plain" if self.carried and not self.numbering.multipliers else "general"
         return compile_forms(self, spaces[0], *(self.carried or (None,)))
+
+    def _without_saddle(self):
+        return "plain" if self.shape.slender or self.comm.size > 1 else "blocks"
 
     def _at_rest(self):
         return np.column_stack([self.reference @ self.axes[:2].T, np.zeros(len(self.reference))])

@@ -16,6 +16,8 @@ _SIZES = {
     ("determinate", True): (1, 0),
     ("determinate", False): (4, 0),
 }
+# What `_rounding` may be for a factorisation that pivots within nodes alone.
+_ROOM_FOR_BLOCKS = 1e-4
 FORMULATIONS = ("mixed", "displacement", "multiplier")
 
 
@@ -34,6 +36,7 @@ class Shape:
         terms: the kinds of loads, (function of forms.loads, "point" or "line", number of vectors), each as often as
             loads of that kind share an element end.
         connections: where supports and joints act.
+        slender: whether rounding leaves no room for a factorisation that pivots within nodes alone.
     """
 
     model: str
@@ -44,6 +47,7 @@ class Shape:
     points: int
     terms: tuple
     connections: Connections
+    slender: bool
 
     @classmethod
     def of(cls, scene, layout, *, formulation, degree, points=None, model="spatial"):
@@ -70,8 +74,8 @@ class Shape:
         if formulation == "multiplier" and points is None:
             points = degree + 2  # CG1 for lambda needs full quadrature (and then locks)
         # On a fine mesh of a very slender rod rounding in the condensed tangent reaches the bending stiffness itself.
-        drowned = _rounding(scene, layout, degree) > 1.0
-        variant = {"mixed": "field" if infinite or drowned else "condensed"}.get(formulation, formulation)
+        rounding = _rounding(scene, layout, degree)
+        variant = {"mixed": "field" if infinite or rounding > 1.0 else "condensed"}.get(formulation, formulation)
         if model == "determinate":
             variant = "known"
         terms = tuple(key for key, _ in place_loads(scene, layout))
@@ -79,7 +83,8 @@ class Shape:
         connections = Connections.of(scene, layout, plane)
         if connections.ties and formulation == "multiplier":
             raise SceneError("formulation = 'multiplier' knows clamps and rigid joints alone: expected 'mixed'")
-        return cls(model, plane is not None, layout.counts, degree, variant, points or degree, terms, connections)
+        counts, slender = layout.counts, rounding > _ROOM_FOR_BLOCKS
+        return cls(model, plane is not None, counts, degree, variant, points or degree, terms, connections, slender)
 
     @property
     def unknowns(self):
