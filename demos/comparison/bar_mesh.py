@@ -41,7 +41,9 @@ def _joined(grids):
     for grid in grids:
         index = number[start : start + grid.shape[0] * grid.shape[1]].reshape(grid.shape[:2])
         start += index.size
-        cells += [index[i : i + 3, j : j + 3] for i in range(0, len(index) - 1, 2) for j in range(0, index.shape[1] - 1, 2)]
+        cells += [
+            index[i : i + 3, j : j + 3] for i in range(0, len(index) - 1, 2) for j in range(0, index.shape[1] - 1, 2)
+        ]
     return every[np.sort(first)], np.array(cells)
 
 

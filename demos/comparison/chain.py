@@ -1,21 +1,29 @@
 """A chain of two-node planar elements, (u, w, theta) at every node, clamped at the first: banded Newton systems.
 
 u is axial (along z), w transverse (along x), in units of L; forces in EI/L^2. An element law takes nodal unknowns
-(n, 6) and gives the gradient (n, 6) and the Hessian (n, 6, 6) of the elements' energies.
+(n, 6) and gives the gradient (n, 6) and the Hessian (n, 6, 6) of the elements' energies; `law_of` makes it from the elements' length.
 """
 
 import numpy as np
-from comparison.column import CRITICAL
 from scipy.linalg import eigvals_banded, solve_banded
+
+from comparison.column import CRITICAL
+from cosserat_fenicsx.checks import refuse
 
 _BAND = 5  # the half bandwidth of node-by-node numbering
 
 
 class Chain:
-    """A column of equal elements as a problem of `follow`; unknowns: (u, w, theta) of the free nodes."""
+    """A column of equal elements as a problem of `follow`; unknowns: (u, w, theta) of the free nodes.
 
-    def __init__(self, column, elements, law):
-        self.column, self.elements, self.law = column, elements, law
+    Raises:
+        SceneError: a number of elements that is not whole and positive.
+    """
+
+    def __init__(self, column, elements, law_of):
+        if not isinstance(elements, int | np.integer) or elements < 1:
+            refuse("Chain", "elements", elements, "a whole number above zero")
+        self.column, self.elements, self.law = column, elements, law_of(1 / elements)
         self.size = 3 * elements
         self._e = column.relative[2]
 
@@ -64,9 +72,9 @@ class Chain:
         for i in range(3):
             for j in range(3):
                 band[_BAND + i - j, j::3] = hessian[:, 3 + i, 3 + j]
-                band[_BAND + i - j, j : -3 : 3] += hessian[1:, i, j]
+                band[_BAND + i - j, j:-3:3] += hessian[1:, i, j]
                 band[_BAND + i - j - 3, 3 + j :: 3] = hessian[1:, i, 3 + j]
-                band[_BAND + i - j + 3, j : -3 : 3] = hessian[1:, 3 + i, j]
+                band[_BAND + i - j + 3, j:-3:3] = hessian[1:, 3 + i, j]
         if self.column.arm:
             band[_BAND, -1] += eta * CRITICAL * self._e * np.sin(x[-1])
         return band

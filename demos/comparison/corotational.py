@@ -6,6 +6,7 @@ many elements is Reissner's rod but for terms of the square of the strains, here
 """
 
 import numpy as np
+
 from comparison.chain import Chain
 from comparison.column import Column, Curve
 from comparison.follow import Stopped, follow
@@ -22,6 +23,9 @@ def solve(etas, elements, *, column=None, adaptive=True):
 
     Returns:
         A `Curve`; `stopped` says in words why it ends early, if it does.
+
+    Raises:
+        SceneError: a number of elements that is not whole and positive, load factors that are no numbers or descend.
     """
     return chain_path(problem(elements, column), etas, adaptive)
 
@@ -30,15 +34,14 @@ def problem(elements, column=None):
     """The column as a problem of `follow`."""
     column = column or Column()
     axial, shear, _ = column.relative
-    return Chain(column, elements, lambda nodal: beam(nodal, 1 / elements, axial, shear))
+    return Chain(column, elements, lambda length: lambda nodal: beam(nodal, length, axial, shear))
 
 
 def chain_path(problem, etas, adaptive=True):
     """A `Curve` of a problem through `etas`, as far as load control goes."""
     points, stopped = [], ""
     try:
-        for point in follow(problem, etas, adaptive=adaptive):
-            points.append(point)
+        points.extend(follow(problem, etas, adaptive=adaptive))
     except Stopped as why:
         stopped = str(why)
     return Curve.of(problem, points, stopped)

@@ -11,10 +11,12 @@ A problem knows, in its own dimensionless units:
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.optimize import brentq
+
+from cosserat_fenicsx.checks import refuse
 
 TOLERANCE = 1e-10  # of the last step of Newton's method, relative to the state
 
@@ -55,9 +57,10 @@ def newton(problem, x, eta, before=None, most=20, tolerance=TOLERANCE):
 
 
 def follow(problem, etas, *, adaptive=True, points=(), largest=0.25, tolerance=TOLERANCE):
-    """Equilibria at the load factors `etas`, ascending, under load control; a generator of `Point`.
+    """Equilibria at the load factors `etas` under load control; an iterator of `Point`.
 
     Args:
+        etas: finite; ascending where adaptive.
         adaptive: False jumps from one load factor to the next from the last state as it is, and believes whatever Newton's
             method converges to; True extrapolates, halves steps that fail, leave their prediction or lose stability.
         points: up to three earlier points to start from instead of the unloaded state.
@@ -65,34 +68,51 @@ def follow(problem, etas, *, adaptive=True, points=(), largest=0.25, tolerance=T
         tolerance: of the last step, relative to the state.
 
     Raises:
+        SceneError: load factors that are not numbers, or that descend.
         Stopped: no equilibrium was found that continues the path.
     """
     known = list(points) or [Point(0.0, np.zeros(problem.size))]
-    step, work = largest, 0
+    etas = np.asarray(etas, dtype=float)
+    if not np.isfinite(etas).all() or (adaptive and (np.diff([known[-1].eta, *etas]) < 0).any()):
+        refuse("follow", "etas", etas.tolist(), "finite load factors, ascending from the one to start from")
+    if adaptive:
+        return _steps(problem, known, etas, largest, tolerance)
+    return _jumps(problem, known[-1], etas, tolerance)
+
+
+def _jumps(problem, last, etas, tolerance):
+    """One Newton's method a load factor, each from the state before."""
+    for eta in etas:
+        x, iterations = newton(problem, last.x, eta, tolerance=tolerance)
+        if x is None:
+            raise Stopped(f"Newton's method does not converge at the load factor {eta:.6g}")
+        last = Point(float(eta), x, iterations, problem.negative_modes(x, eta))
+        yield last
+
+
+def _steps(problem, known, etas, largest, tolerance):
+    """Steps of their own size, each load factor landed on."""
+    step = largest
     for target in etas:
-        while known[-1].eta < target or not adaptive:
+        work = 0
+        while known[-1].eta < target:
             last = known[-1]
             # equal parts of what is left, so that no sliver remains before the target
-            eta = last.eta + (target - last.eta) / max(math.ceil((target - last.eta) / step - 1e-9), 1)
-            eta = target if not adaptive or abs(eta - target) < 1e-12 else eta
-            start = _predicted(problem, known, eta) if adaptive else last.x
+            parts = max(math.ceil((target - last.eta) / step - 1e-9), 1)
+            eta = float(target) if parts == 1 else last.eta + (target - last.eta) / parts
+            start = _predicted(problem, known, eta)
             x, iterations = newton(problem, start, eta, last.x, tolerance=tolerance)
             work += iterations
             negative = problem.negative_modes(x, eta) if x is not None else 0
-            if adaptive and (x is None or negative or np.abs(x - start).max() > 0.3 * np.abs(x).max()):
+            if x is None or negative or np.abs(x - start).max() > 0.3 * np.abs(x).max():
                 step = (eta - last.eta) / 2
                 if step < 1e-5:
                     raise Stopped(_why(x, last.eta))
                 continue
-            if x is None:
-                raise Stopped(f"Newton's method does not converge at the load factor {eta:.6g}")
-            if adaptive and iterations <= 5:
+            if iterations <= 5:
                 step = min(2 * step, largest)
-            known = [*known[-2:], Point(eta, x, work, negative)]
-            if eta == target:
-                work = 0
-                yield known[-1]
-                break
+            known = [*known[-2:], Point(eta, x, 0, negative)]
+        yield replace(known[-1], iterations=work)
 
 
 def _why(x, eta):

@@ -13,14 +13,16 @@ With a = u', g = w' - phi, b = w' phi - phi^2/2, c = -u' phi, the strains' expan
     2 W_4 = EA (b^2 - u'^2 phi^2) + GA (c^2 + 2 g (phi^3/6 - w' phi^2/2)).
 """
 
+from functools import partial
 from itertools import permutations
 
 import numpy as np
+from numpy.polynomial import Polynomial as P
+
 from comparison.chain import Chain
 from comparison.column import Column, LimitPoint
 from comparison.corotational import chain_path
 from comparison.follow import limit_point, trace
-from numpy.polynomial import Polynomial as P
 
 
 def solve(etas, elements, *, column=None, adaptive=True):
@@ -32,8 +34,7 @@ def problem(elements, column=None):
     """The column of equal elements as a problem of `follow`."""
     column = column or Column()
     axial, shear, _ = column.relative
-    tensors = energy(1 / elements, axial, shear)
-    return Chain(column, elements, lambda nodal: derivatives(tensors, nodal))
+    return Chain(column, elements, lambda length: partial(derivatives, energy(length, axial, shear)))
 
 
 def limit(problem):
@@ -78,10 +79,14 @@ def energy(length, axial, shear, bending=1.0):
         _third_order(*fields, ds, axial, shear)
         if where == 0
         else np.moveaxis(_third_order(*fields, ds, axial, shear), where, 0)
-        for where, fields in enumerate([(bubbles, linear, linear), (linear, bubbles, linear), (linear, linear, bubbles)])
+        for where, fields in enumerate(
+            [(bubbles, linear, linear), (linear, bubbles, linear), (linear, linear, bubbles)]
+        )
     )
     stiffness = 2 * _second_order(bubbles, bubbles, ds, axial, shear, bending)
-    relaxed = np.einsum("aij,akl->ijkl", force, np.linalg.solve(stiffness, force.reshape(len(force), -1)).reshape(force.shape))
+    relaxed = np.einsum(
+        "aij,akl->ijkl", force, np.linalg.solve(stiffness, force.reshape(len(force), -1)).reshape(force.shape)
+    )
     return _symmetric(second), _symmetric(third), _symmetric(fourth - relaxed / 2)
 
 
@@ -98,6 +103,7 @@ def derivatives(tensors, nodal):
 def _linear_solution(length, shear, bending):
     """(u, w, phi) of the linear Timoshenko beam for a unit of each nodal unknown, as polynomials of s."""
     s, zero = P([0, 1]), P([0])
+
     # GA (w' - phi) = Q and EI phi'' = -Q: phi = a + b s - Q s^2/(2 EI), w = d + a s + b s^2/2 - Q s^3/(6 EI) + Q s/GA
     def bent(a, b, d, Q):
         return d + a * s + b * s**2 / 2 - Q * s**3 / (6 * bending) + Q * s / shear, a + b * s - Q * s**2 / (2 * bending)
@@ -115,7 +121,9 @@ def _linear_solution(length, shear, bending):
 def _bubbles(length, degree=6):
     """Polynomials that vanish at both ends, for u, w and phi each; degree 5 holds the second-order solution."""
     s, zero = P([0, 1]) / length, P([0])
-    legendre = [s * (1 - s) * np.polynomial.Legendre.basis(k, domain=[0, length]).convert(kind=P) for k in range(degree - 1)]
+    legendre = [
+        s * (1 - s) * np.polynomial.Legendre.basis(k, domain=[0, length]).convert(kind=P) for k in range(degree - 1)
+    ]
     return [tuple(b if field == k else zero for field in range(3)) for k in range(3) for b in legendre]
 
 

@@ -1,15 +1,16 @@
 """The truncated energy that ever more elements of the reconstructed MCRE tend to (forms/truncated.py), on dolfinx."""
 
-import dolfinx.fem.petsc
 import numpy as np
 import ufl
-from comparison.column import CRITICAL, Column
-from cosserat_fenicsx import compat
 from cosserat_fenicsx.forms import truncated
 from dolfinx import fem
+from dolfinx.fem import petsc as fem_petsc
 from mpi4py import MPI
 from scipy.sparse import csr_matrix
 from scipy.sparse.linalg import splu
+
+from comparison.column import CRITICAL, Column
+from cosserat_fenicsx import compat
 
 
 class TruncatedColumn:
@@ -42,7 +43,7 @@ class TruncatedColumn:
     def residual(self, x, eta):
         """Internal minus external forces."""
         self._U.x.array[self._free] = x
-        vector = fem.petsc.assemble_vector(self._first)
+        vector = fem_petsc.assemble_vector(self._first)
         internal = vector.array[self._free]
         vector.destroy()
         return internal - eta * self._load
@@ -67,7 +68,7 @@ class TruncatedColumn:
 
     def _tangent(self, x):
         self._U.x.array[self._free] = x
-        A = fem.petsc.assemble_matrix(self._second)
+        A = fem_petsc.assemble_matrix(self._second)
         A.assemble()
         start, column, values = A.getValuesCSR()
         matrix = csr_matrix((values, column, start), shape=A.size)[self._free][:, self._free]

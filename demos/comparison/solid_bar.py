@@ -8,17 +8,18 @@ Inside, lengths are in units of L and stresses in units of EI/L^4, for the EI of
 """
 
 import basix
-import dolfinx.fem.petsc
 import numpy as np
 import ufl
-from comparison.bar_mesh import half_disc, moments, swept
-from comparison.column import CRITICAL, Column
-from cosserat_fenicsx import compat
 from cosserat_fenicsx.forms import solid
 from dolfinx import fem
 from dolfinx import mesh as dolfinx_mesh
+from dolfinx.fem import petsc as fem_petsc
 from mpi4py import MPI
 from petsc4py import PETSc
+
+from comparison.bar_mesh import half_disc, moments, swept
+from comparison.column import CRITICAL, Column
+from cosserat_fenicsx import compat
 
 _GAUSS_POINTS = {"quadrature_degree": 5}  # three in each direction
 
@@ -71,7 +72,10 @@ class SolidBar:
         area, inertia = section
         column = self.column
         E = column.E / (column.bending / column.length**4)
-        lame = [fem.Constant(mesh, E * column.nu / (1 + column.nu) / (1 - 2 * column.nu)), fem.Constant(mesh, E / 2 / (1 + column.nu))]
+        lame = [
+            fem.Constant(mesh, E * column.nu / (1 + column.nu) / (1 - 2 * column.nu)),
+            fem.Constant(mesh, E / 2 / (1 + column.nu)),
+        ]
         H, before = ufl.grad(self._u), ufl.grad(self._before)
         test, trial = ufl.TestFunction(space), ufl.TrialFunction(space)
         dx = ufl.dx(domain=mesh, metadata=_GAUSS_POINTS)
@@ -83,15 +87,17 @@ class SolidBar:
         traction = -solid.eccentric_traction(ufl.SpatialCoordinate(mesh)[0], *face_data) * test[2] * face
         with compat.quiet_compiler():
             self._residual = fem.form(solid.virtual_work(H, ufl.grad(test), lame) * dx)
-            self._tangent = fem.form(solid.carried_stress_tangent(H, before, ufl.grad(trial), ufl.grad(test), lame) * dx)
+            self._tangent = fem.form(
+                solid.carried_stress_tangent(H, before, ufl.grad(trial), ufl.grad(test), lame) * dx
+            )
             self._traction = fem.form(traction)
         self._load = CRITICAL * self._assembled(self._traction)
-        self._K = fem.petsc.create_matrix(self._tangent)
+        self._K = fem_petsc.create_matrix(self._tangent)
         self._K.setOption(PETSc.Mat.Option.SYMMETRIC, True)
         self._solver = _cholesky(self._K)
 
     def _assembled(self, form):
-        vector = fem.petsc.assemble_vector(form)
+        vector = fem_petsc.assemble_vector(form)
         values = vector.array.copy()
         vector.destroy()
         values[self._fixed] = 0.0
@@ -110,7 +116,7 @@ class SolidBar:
         """Solve with the tangent of the mixed-integration-point Newton method."""
         self._u.x.array[:], self._before.x.array[:] = x, before
         self._K.zeroEntries()
-        fem.petsc.assemble_matrix(self._K, self._tangent, self._held)
+        fem_petsc.assemble_matrix(self._K, self._tangent, self._held)
         self._K.assemble()
         self._solver.setOperators(self._K)
         self._solver.setUp()
