@@ -1,6 +1,6 @@
 """Figure 3 of the paper, whole: delta against eta from 0 to 2 for every model of the eccentrically compressed column.
 
-    python demos/figure3.py            about two minutes; leaves in out/: figure3.png, figure3.md, figure3.json
+    python demos/figure3.py            about four minutes; leaves in out/: figure3.png, figure3.md, figure3.json
     python demos/figure3.py --quick    coarse meshes, for a look or a test
     python demos/figure3.py --fresh    from the start, whatever an earlier run has left
 
@@ -19,6 +19,7 @@ import machine
 import numpy as np
 from comparison import curves, picture, verdicts
 from comparison.follow import Point
+from mpi4py import MPI
 
 
 class Store:
@@ -133,6 +134,8 @@ def main(out="out", quick=False, fresh=False):
     Returns:
         The dict that figure3.json holds.
     """
+    if MPI.COMM_WORLD.size > 1:
+        sys.exit("figure3.py: expected one process, not several: the curves follow each other")
     settings = curves.QUICK if quick else curves.FULL
     data = compute(Store(out, settings, fresh), settings)
     out = Path(out)

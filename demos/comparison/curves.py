@@ -53,7 +53,7 @@ FULL = Settings(
     clamped_etas=(0.9, 1.0),
 )
 QUICK = Settings(
-    etas=tuple(_WHOLE.tolist()[1::2]),
+    etas=tuple(np.union1d(_WHOLE[1::2], 0.9).tolist()),
     coarse_etas=(0.5, 0.9, 1.0, 1.5, 2.0),
     rungs=(16, 32, 64),
     mcre=(1, 2, 32),
@@ -143,15 +143,16 @@ def solid(settings, keep, clamp, points=(), so_far=None):
     bar = SolidBar(Column(arm=True), settings.along, settings.refinement, clamp)
     wanted = settings.coarse_etas if clamp == "plane" else settings.clamped_etas
     curve = so_far or {"eta": [], "delta": [], "unknowns": bar.size, "elements": bar.elements, "iterations": []}
-    known = list(points)
+    known, began = list(points), time.perf_counter() - curve.get("seconds", 0.0)
     etas = [eta for eta in wanted if eta not in curve["eta"]]
     with Progress(etas, None, MPI.COMM_SELF) as progress:
         progress.start("3D elasticity" + (", foot fixed" if clamp == "face" else ""))
-        for point in follow(bar, etas, points=known, tolerance=1e-6):  # of the last step: the error is its square
+        for point in follow(bar, etas, points=known, tolerance=1e-4):  # of the last step: the error is its square
             known = [*known[-2:], point]
             curve["eta"].append(point.eta)
             curve["delta"].append(float(bar.tip(point.x)[0]))
             curve["iterations"].append(point.iterations)
+            curve["seconds"] = round(time.perf_counter() - began, 2)
             keep(curve, known)
             progress.at(SimpleNamespace(load_factor=point.eta))
     return curve
@@ -161,6 +162,6 @@ def timed(name, compute):
     """The curve that `compute()` returns, with its seconds in it, and a line for who waits."""
     began = time.perf_counter()
     found = compute()
-    found["seconds"] = round(time.perf_counter() - began, 2)
+    found.setdefault("seconds", round(time.perf_counter() - began, 2))
     print(f"{name}: {found['seconds']:.1f} s", file=sys.stderr, flush=True)
     return found

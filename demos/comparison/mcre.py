@@ -75,19 +75,15 @@ def energy(length, axial, shear, bending=1.0):
     third = _third_order(linear, linear, linear, ds, axial, shear)
     fourth = _fourth_order(linear, ds, axial, shear)
     # the second-order part of the solution: bubbles in equilibrium with the forces that W_3 makes
-    force = sum(
-        _third_order(*fields, ds, axial, shear)
-        if where == 0
-        else np.moveaxis(_third_order(*fields, ds, axial, shear), where, 0)
-        for where, fields in enumerate(
-            [(bubbles, linear, linear), (linear, bubbles, linear), (linear, linear, bubbles)]
-        )
+    force = (
+        _third_order(bubbles, linear, linear, ds, axial, shear)
+        + np.moveaxis(_third_order(linear, bubbles, linear, ds, axial, shear), 1, 0)
+        + np.moveaxis(_third_order(linear, linear, bubbles, ds, axial, shear), 2, 0)
     )
     stiffness = 2 * _second_order(bubbles, bubbles, ds, axial, shear, bending)
-    relaxed = np.einsum(
-        "aij,akl->ijkl", force, np.linalg.solve(stiffness, force.reshape(len(force), -1)).reshape(force.shape)
-    )
-    return _symmetric(second), _symmetric(third), _symmetric(fourth - relaxed / 2)
+    answer = np.linalg.solve(stiffness, force.reshape(len(force), -1)).reshape(force.shape)
+    fourth = fourth - np.einsum("aij,akl->ijkl", force, answer) / 2
+    return _symmetric(second), _symmetric(third), _symmetric(fourth)
 
 
 def derivatives(tensors, nodal):

@@ -107,7 +107,7 @@ def mcre(curves):
     points = ", ".join(f"{curve['limit_point']['eta']:.3f} with {n}" for n, curve in found.items() if n != "limit")
     many, end = found[str(MANY)]["limit_point"], found["limit"]["limit_point"]
     yield "MCRE (here: a reconstruction)", "one of its five curves", (
-        f"loses its stability at a limit point and has no equilibrium beyond: eta = {points} elements; delta is {many['delta']:.3f} m there "
+        f"loses its stability at a limit point, beyond which its path has no equilibrium: eta = {points} elements; delta is {many['delta']:.3f} m there "
         f"with {MANY}. The truncated energy that ever shorter elements tend to has it at {end['eta']:.4f}, {end['delta']:.3f} m")  # fmt: skip
     delta = curves["mcre"]["delta_at_0.6"]
     yield "MCRE before its limit point", "one of its five curves", (
