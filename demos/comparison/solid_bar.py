@@ -20,6 +20,7 @@ from petsc4py import PETSc
 from comparison.bar_mesh import half_disc, moments, swept
 from comparison.column import CRITICAL, Column
 from cosserat_fenicsx import compat
+from cosserat_fenicsx.checks import refuse
 
 _GAUSS_POINTS = {"quadrature_degree": 5}  # three in each direction
 
@@ -36,9 +37,14 @@ class SolidBar:
 
     Attributes:
         elements: hexahedra of the half bar.
+
+    Raises:
+        SceneError: a clamp of another name.
     """
 
     def __init__(self, column=None, along=40, refinement=2, clamp="plane"):
+        if clamp not in ("plane", "face"):
+            refuse("SolidBar", "clamp", clamp, '"plane" or "face"')
         self.column = column = column or Column()
         radius = column.diameter / column.length / 2
         points, quads = half_disc(radius, refinement)
@@ -62,8 +68,8 @@ class SolidBar:
     def _supports(self, space, x, clamp):
         """Boundary conditions, component by component."""
         foot, centre = np.abs(x[:, 2]) < 1e-9, np.abs(x[:, 0]) + np.abs(x[:, 1]) < 1e-9
-        fixed = {0: foot if clamp == "face" else foot & centre, 1: np.abs(x[:, 1]) < 1e-9, 2: foot}
-        fixed[1] = fixed[1] | (foot if clamp == "face" else fixed[1])
+        whole = foot if clamp == "face" else foot & centre
+        fixed = {0: whole, 1: whole | (np.abs(x[:, 1]) < 1e-9), 2: foot}
         dofs = {i: (3 * np.flatnonzero(where) + i).astype(np.int32) for i, where in fixed.items()}
         self._fixed = np.concatenate(list(dofs.values()))
         return [fem.dirichletbc(PETSc.ScalarType(0), found, space.sub(i)) for i, found in dofs.items()]
