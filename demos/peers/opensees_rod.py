@@ -1,0 +1,83 @@
+"""OpenSeesPy: corotational frames in a plane or in space, Newton under load control; see `speak` for what comes and goes.
+
+The sample is the analysis alone, from the model at rest (`reset`) over all load factors; the model is built before it.
+"""
+
+import math
+
+import openseespy.opensees as ops
+from openseespy import opensees as module
+from speak import Stopped, serve
+
+#: What the finest meshes converge to: extensible and shear-rigid.
+SOLVED = "shear-rigid"
+
+
+def prepare(problem, configuration):
+    n, spatial = configuration["elements"], configuration["element"].startswith("spatial")
+    kind = configuration["element"].split()[1]
+    L, R = problem["length"], problem["radius"]
+    ops.wipe()
+    ops.model("basic", "-ndm", 3 if spatial else 2, "-ndf", 6 if spatial else 3)
+    for i in range(n + 1):
+        s = L * i / n
+        x, y = (R * math.sin(s / R), R * (1 - math.cos(s / R))) if R else (s, 0.0)
+        ops.node(i + 1, *((x, y, 0.0) if spatial else (x, y)))
+    ops.fix(1, *([1] * (6 if spatial else 3)))
+    ops.geomTransf("Corotational", 1, *((0, 0, 1) if spatial else ()))
+    E, EI = 1.0, problem["EI"]
+    section = (problem["EA"], E, EI) if not spatial else (problem["EA"], E, E, problem["GJ"], EI, EI)
+    if kind != "elastic":
+        numbers = (E, problem["EA"], EI) if not spatial else (E, problem["EA"], EI, EI, 1.0, problem["GJ"])
+        ops.section("Elastic", 1, *numbers)
+        rule, points = configuration["rule"]
+        ops.beamIntegration(rule, 1, 1, points)
+    for i in range(1, n + 1):
+        if kind == "elastic":
+            ops.element("elasticBeamColumn", i, i, i + 1, *section, 1)
+        else:
+            ops.element(kind, i, i, i + 1, 1, 1, *configuration.get("inner", []))
+    ops.timeSeries("Linear", 1)
+    ops.pattern("Plain", 1, 1)
+    (fx, fy, fz), (mx, my, mz) = problem["force"], problem["moment"]
+    ops.load(n + 1, *((fx, fy, fz, mx, my, mz) if spatial else (fx, fy, mz)))
+    ops.constraints("Plain")
+    ops.numberer("Plain")
+    ops.system(configuration.get("system", "BandGeneral"))
+    ops.test("NormDispIncr", configuration["tol"], configuration.get("iterations", 12), 0)
+    ops.algorithm("Newton")
+    ops.integrator("LoadControl", 1.0)
+    ops.analysis("Static")
+    built = problem, configuration
+
+    def solve():
+        if _State.built is not built:  # one model at a time: build it again
+            raise Stopped("another model was built since")
+        ops.reset()
+        ops.setTime(0.0)
+        tips, reached = [], 0.0
+        for factor in problem["load_factors"]:
+            step = (factor - reached) / configuration.get("substeps", 1)
+            while reached < factor - 1e-12:
+                step = min(step, factor - reached)
+                ops.integrator("LoadControl", step)
+                if ops.analyze(1) == 0:
+                    reached += step
+                elif step > 1e-3 * factor:
+                    step /= 2  # the failed step was taken back
+                else:
+                    raise Stopped(f"no convergence beyond the load factor {reached:g}")
+            u = ops.nodeDisp(n + 1)
+            tips.append((u[0], u[1], u[2] if spatial else 0.0))
+        return tips
+
+    _State.built = built
+    return solve
+
+
+class _State:
+    built = None
+
+
+if __name__ == "__main__":
+    serve(prepare, {"openseespy": module.version()})
