@@ -42,7 +42,7 @@ def deck(problem, configuration):
 
 def _places(L, n):
     """Arc lengths of the nodes. Half an element at the clamp and at the tip is stiff: the end elements are short."""
-    ends = [0.0, *(L * (0.002 + 0.996 * i / (n - 2)) for i in range(n - 1)), L]
+    ends = [0.0, *(L * (2e-4 + 0.9996 * i / (n - 2)) for i in range(n - 1)), L]
     return [s for a, b in zip(ends, ends[1:]) for s in (a, (a + b) / 2)] + [L]  # noqa: B905, RUF007
 
 

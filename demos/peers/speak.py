@@ -16,7 +16,7 @@ class Stopped(Exception):
     """The peer's solver did not reach every load factor; says in a few words what happened."""
 
 
-def serve(prepare, versions):
+def serve(prepare, versions, keep=8):
     """Answer requests until the input ends.
 
     Args:
@@ -24,6 +24,7 @@ def serve(prepare, versions):
             solve() goes from the unloaded state over all load factors and returns the tip's displacements. It may
             return (tip, seconds) where the work is done by another program.
         versions: names and versions, for the record.
+        keep: how many models can live beside each other.
     """
     out = os.fdopen(os.dup(1), "w", encoding="utf-8")
     os.dup2(2, 1)  # what a peer prints is not an answer
@@ -33,7 +34,7 @@ def serve(prepare, versions):
         key = json.dumps([request["problem"], request["configuration"]], sort_keys=True)
         try:
             if key not in kept:
-                while len(kept) > 8:
+                while len(kept) >= keep:
                     kept.pop(next(iter(kept)))
                 kept[key] = prepare(request["problem"], request["configuration"])
             reply = _measure(kept[key], request.get("warm", 1), request.get("samples", 1))
