@@ -106,7 +106,7 @@ def sample(peer, row, found, limit):
     """One more sample of a row, or why there is none."""
     problem = problems()[row["problem"]]
     slow = bool(row["seconds"]) and min(row["seconds"]) > SLOW
-    cold = row["kind"] in ("spatial rod", "spatial B32R")  # tens of thousands of steps, or a program with no warm state
+    cold = row["peer"] in ("PyElastica", "CalculiX")  # compiles before it is asked; a program with no warm state
     began = time.monotonic()
     answer = peer.ask(problem, row["configuration"], warm=0 if slow or cold else 1, samples=1, limit=limit)
     found.spent += time.monotonic() - began

@@ -77,7 +77,7 @@ def _head(found):
         "",
         "Processor time of one thread, warm, medians of "
         f"{found.about['rounds']} alternating rounds. What is timed: here the whole call of `solve` and the tip's position, with the stability",
-        "count; for Exudyn `SolveStatic`, for OpenSeesPy the analysis from `reset` on (the model of both is built before and not counted); for",
+        "count; for Exudyn `SolveStatic`, for OpenSeesPy the analysis (the model of both is built before and not counted); for",
         "PyElastica the whole relaxation; for CalculiX the whole program. Time at an accuracy: the cheapest configuration measured whose error,",
         "against the truth of its own mechanical model, is below it. The error is that of delta, largest over the load factors, on the eccentric",
         "cantilever, and of the position of the tip, over its displacement, elsewhere.",

@@ -32,7 +32,8 @@ def _thin(peer, found):
     if peer == OWN:
         kept = ({"degree": 2, "elements": 4}, {"degree": 4, "elements": 4}, {"degree": 4, "elements": 16})
         return [c for c in found if "degree" in c and c["formulation"] == "mixed" and _has(c, kept)]
-    return [c for c in found if c["elements"] in (8, 12, 16) and c["element"] not in ("planar ANCF cable",)][:3]
+    few = 1 if peer in ("PyElastica", "CalculiX") else 4
+    return [c for c in found if c["elements"] in (12, 16) and c.get("substeps", 1) == 1][:few]
 
 
 def _has(configuration, kept):
@@ -64,9 +65,13 @@ def _exudyn(problem):
         if problem != "bend":
             found += _grid("planar 3-node", (4, 6, 8, 12, 16, 24, 32, 40, 64), (1e-3, 1e-5), substeps)
             found += _grid("planar ANCF cable", (8, 12, 16, 20, 24, 32, 48, 64), (1e-3, 1e-5), substeps)
-        found += _grid("spatial 2-node", (8, 16, 32, 48, 64, 128, 256), (1e-4,), substeps)
-        found += _grid("spatial 2-node", (512, 1024), (1e-5,), substeps)
-    return [c for c in found if not (problem == "sweep" and c["elements"] > 512)]
+        if problem != "bend":  # a hundred times slower there
+            found += _grid("spatial 2-node", (8, 16, 32, 48, 64, 128, 256), (1e-4,), substeps)
+            found += _grid("spatial 2-node", (512,), (1e-5,), substeps)
+        if problem != "sweep":  # slower there
+            found += _grid("spatial 2-node EP", (8, 16, 32, 64, 128, 256), (1e-4,), substeps)
+            found += _grid("spatial 2-node EP", (512,), (1e-6,), substeps)
+    return found
 
 
 def _opensees(problem):

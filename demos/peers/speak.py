@@ -16,15 +16,14 @@ class Stopped(Exception):
     """The peer's solver did not reach every load factor; says in a few words what happened."""
 
 
-def serve(prepare, versions, keep=8):
+def serve(prepare, versions):
     """Answer requests until the input ends.
 
     Args:
         prepare: prepare(problem, configuration) builds the model once, outside of every sample, and returns solve();
             solve() goes from the unloaded state over all load factors and returns the tip's displacements. It may
-            return (tip, seconds) where the work is done by another program.
+            return (tip, seconds), the processor time of its own choosing, where not all of it counts.
         versions: names and versions, for the record.
-        keep: how many models can live beside each other.
     """
     out = os.fdopen(os.dup(1), "w", encoding="utf-8")
     os.dup2(2, 1)  # what a peer prints is not an answer
@@ -34,7 +33,7 @@ def serve(prepare, versions, keep=8):
         key = json.dumps([request["problem"], request["configuration"]], sort_keys=True)
         try:
             if key not in kept:
-                while len(kept) >= keep:
+                while len(kept) >= 8:
                     kept.pop(next(iter(kept)))
                 kept[key] = prepare(request["problem"], request["configuration"])
             reply = _measure(kept[key], request.get("warm", 1), request.get("samples", 1))
