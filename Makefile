@@ -17,13 +17,14 @@ export VTK_DEFAULT_OPENGL_WINDOW = vtkEGLRenderWindow
 # A numpy in the user's own site directory would hide the distribution's.
 export PYTHONNOUSERSITE = 1
 
-.PHONY: help setup packages demo test tables random clean
+.PHONY: help setup packages demo test tables random work-precision clean
 
 help:
 	@echo "make demo    solve the eccentric cantilever of the paper on two processes; writes out/"
 	@echo "make test    all tests on one, two and four processes"
 	@echo "make tables  the README's tables of accuracy and cost, measured anew and put into it"
 	@echo "make random  200 random scenes against the strong form, at three tolerances (about 5 minutes)"
+	@echo "make work-precision  speed against accuracy, beside Exudyn, OpenSeesPy, PyElastica and CalculiX (half an hour at most)"
 	@echo "make setup   only what all of these need first: the Debian packages and the environment .venv"
 	@echo "make clean   remove .venv, out and whatever else was built here"
 
@@ -45,6 +46,10 @@ tables: setup
 
 random: setup
 	$(PYTHON) tests/random_comparison.py 200
+
+# Goes on where it was broken off; `$(PYTHON) demos/work_precision.py --fresh` forgets the samples that are there.
+work-precision: setup
+	$(PYTHON) demos/work_precision.py
 
 setup: .venv/.stamp
 

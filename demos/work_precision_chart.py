@@ -13,15 +13,15 @@ from peers.environments import OWN
 from peers.problems import TITLES
 from work_precision_table import answered, median
 
-#: (problem, file, subtitle, own rows shown, None: all; peers' rows shown).
+#: (problem, file, subtitle, whether only the spatial ones of the own models are shown).
 _VIEWS = (
-    ("sweep", "sweep", "every model that the plane problem allows", None),
+    ("sweep", "sweep", "every model that the plane problem allows", False),
     ("sweep", "sweep_spatial", "forced into space (model \"spatial\")", True),
-    ("single", "single", "every model that the plane problem allows", None),
-    ("bend", "bend", "a problem in space", None),
-    ("roll-up 1", "roll_up_1", "every model that the plane problem allows", None),
-    ("roll-up 2", "roll_up_2", "every model that the plane problem allows", None),
-    ("roll-up 4", "roll_up_4", "every model that the plane problem allows", None),
+    ("single", "single", "every model that the plane problem allows", False),
+    ("bend", "bend", "a problem in space", False),
+    ("roll-up 1", "roll_up_1", "every model that the plane problem allows", False),
+    ("roll-up 2", "roll_up_2", "every model that the plane problem allows", False),
+    ("roll-up 4", "roll_up_4", "every model that the plane problem allows", False),
 )  # fmt: skip
 _OURS = {"determinate": "#08519c", "planar": "#3182bd", "spatial": "#31a354", "auto": "black"}
 _THEIRS = {"Exudyn": "#d95f02", "OpenSeesPy": "#b2182b", "PyElastica": "#7570b3", "CalculiX": "#8c6d31"}
@@ -58,7 +58,11 @@ def _groups(rows):
     for row in rows:
         ours = row["peer"] == OWN
         model = row["configuration"].get("model")
-        label = f"cosserat_fenicsx, {'auto (its own choice)' if model == 'auto' else model}" if ours else f"{row['peer']}: {row['kind']}"
+        label = (
+            f"cosserat_fenicsx, {'auto (its own choice)' if model == 'auto' else model}"
+            if ours
+            else f"{row['peer']}: {row['kind']}"
+        )
         groups.setdefault((not ours, label), []).append(row)
     counted, found = {}, {}
     for (theirs, label), members in sorted(groups.items()):
@@ -80,11 +84,18 @@ def _chart(rows, title, problem, file):
         axes.plot(x, y, style, marker=marker, color=colour, ms=6 if ours else 5, lw=2.6 if ours else 1.3, label=label)
     axes.set_xscale("log")
     axes.set_yscale("log")
-    axes.set_xlim(0.4 * min(max(r["error"], _ROUND_OFF) for r in rows), 2.0)
-    measured = r"of the tip displacement $\delta$" if problem in ("sweep", "single") else "of the tip's position, over its displacement"
+    axes.set_xlim(0.4 * min(_points(rows)[0]), 2.0)
+    times = _points(rows)[1]
+    axes.set_ylim(0.3 * min(times), 2 * max(times))  # below: room for the words
+    axes.yaxis.set_major_formatter(lambda seconds, _: f"{seconds:g} s" if seconds >= 1 else f"{1e3 * seconds:g} ms")
+    measured = (
+        r"of the tip displacement $\delta$"
+        if problem in ("sweep", "single")
+        else "of the tip's position, over its displacement"
+    )
     most = ", largest over the load factors" if problem == "sweep" else ""
     axes.set_xlabel(f"relative error {measured}{most} (-)")
-    axes.set_ylabel("processor time of one warm answer, one thread (s)")
+    axes.set_ylabel("processor time of one warm answer, one thread")
     axes.set_title(title)
     axes.grid(which="major", alpha=0.4)
     axes.annotate("better: faster,\nmore accurate", (0.015, 0.02), (0.09, 0.10), xycoords="axes fraction", textcoords="axes fraction",

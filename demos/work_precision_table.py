@@ -42,7 +42,13 @@ def cheapest(rows, accuracy):
 def called(row):
     """A configuration in words."""
     c = row["configuration"]
-    mesh = f"P{c['degree']}, {c['elements']} elements" if "degree" in c else f"{c['elements']} elements" if "elements" in c else f"tol {c['tol']:.0e}"
+    mesh = (
+        f"P{c['degree']}, {c['elements']} elements"
+        if "degree" in c
+        else f"{c['elements']} elements"
+        if "elements" in c
+        else f"tol {c['tol']:.0e}"
+    )
     more = f", {c['substeps']} steps" if c.get("substeps", 1) > 1 else ""
     name = "" if row["peer"] == OWN else f"{row['peer']} "
     return f"{name}{row['kind']}, {mesh}{more}"
@@ -67,11 +73,15 @@ def ratios(rows):
 
 def text(found, rows):
     """The whole table, in Markdown."""
-    return "\n".join([*_head(found), "", *_ratios(rows), "", *_times(rows), "", *_stopped(rows), *_waits(found)]).rstrip()
+    return "\n".join(
+        [*_head(found), "", *_ratios(rows), "", *_times(rows), "", *_stopped(rows), *_waits(found)]
+    ).rstrip()
 
 
 def _head(found):
-    told = ", ".join(f"{peer} {found.versions[peer].get(peer.lower(), '')}".strip() for peer in found.versions if peer != OWN)
+    told = ", ".join(
+        f"{peer} {found.versions[peer].get(peer.lower(), '')}".strip() for peer in found.versions if peer != OWN
+    )
     lines = [
         f"{in_words(found.about['machine'])}. Peers: {told or 'none'}. Random seed of the order {found.about['seed']}.",
         "",
@@ -127,8 +137,15 @@ def _stopped(rows):
 def _waits(found):
     if not found.waits:
         return []
-    lines = ["| what a person waits for | caches | processor time | wall clock | what is computed |", "|---|---|---|---|---|"]
+    lines = [
+        "| what a person waits for | caches | processor time | wall clock | what is computed |",
+        "|---|---|---|---|---|",
+    ]
     for row in found.waits:
-        told = [f"{statistics.median(row[key]):.2f} s" for key in ("processor", "wall")] if row["wall"] else [row["failed"], "-"]
+        told = (
+            [f"{statistics.median(row[key]):.2f} s" for key in ("processor", "wall")]
+            if row["wall"]
+            else [row["failed"], "-"]
+        )
         lines.append(f"| {row['who']} | {row['caches']} | {' | '.join(told)} | {row['what']} |")
     return lines

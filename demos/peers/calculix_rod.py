@@ -34,7 +34,13 @@ def deck(problem, configuration):
     controls = f"*CONTROLS,PARAMETERS=FIELD\n{configuration['tol']:g},{configuration['tol']:g}"
     loads = [*problem["force"], *problem["moment"]]
     for factor in problem["load_factors"]:
-        lines += ["*STEP,NLGEOM,INC=200", "*STATIC", f"{1 / configuration.get('substeps', 1):g},1.,1e-4,1.", controls, "*CLOAD"]
+        lines += [
+            "*STEP,NLGEOM,INC=200",
+            "*STATIC",
+            f"{1 / configuration.get('substeps', 1):g},1.,1e-4,1.",
+            controls,
+            "*CLOAD",
+        ]
         lines += [f"{tip},{i + 1},{factor * load:.15g}" for i, load in enumerate(loads) if load]
         lines += ["*NODE PRINT,NSET=TIP,FREQUENCY=1000", "U", "*END STEP"]
     return "\n".join(lines) + "\n"

@@ -42,10 +42,10 @@ def _has(configuration, kept):
 
 def _own(problem):
     rungs = ("determinate", "spatial") if problem == "bend" else ("determinate", "planar", "spatial")
-    pairs = [(rung, "mixed") for rung in rungs] + [(rung, "displacement") for rung in rungs if rung != "determinate"]
+    pairs = [*((rung, "mixed") for rung in rungs), ("spatial", "displacement"), ("spatial", "multiplier")]
     fixed = [
         {"model": rung, "formulation": formulation, "degree": degree, "elements": elements}
-        for rung, formulation in [*pairs, ("spatial", "multiplier")]
+        for rung, formulation in pairs
         for degree in (1, 2, 3, 4)
         for elements in _MESHES
     ]
@@ -53,31 +53,37 @@ def _own(problem):
 
 
 def _substeps(problem):
-    """Load steps from one load factor to the next, as few as may do; a peer's solver halves them where it can."""
-    return {"sweep": (1,), "single": (1, 3), "bend": (1, 4), "roll-up 1": (1, 4, 8), "roll-up 2": (2, 8, 16)}.get(
-        problem, (4, 16, 32)
-    )
+    """Load steps from one load factor to the next, as few as may do; a peer's solver divides them where it can."""
+    more = {"single": (1, 3), "bend": (1, 4), "roll-up 1": (1, 4, 8), "roll-up 2": (2, 8, 16), "roll-up 4": (4, 16, 32)}
+    return more.get(problem, (1,))
 
 
 def _exudyn(problem):
     found = []
     for substeps in _substeps(problem):
-        if problem != "bend":
+        if problem == "sweep":
             found += _grid("planar 3-node", (4, 6, 8, 12, 16, 24, 32, 40, 64), (1e-3, 1e-5), substeps)
             found += _grid("planar ANCF cable", (8, 12, 16, 20, 24, 32, 48, 64), (1e-3, 1e-5), substeps)
+        elif problem != "bend":
+            found += _grid("planar 3-node", (4, 8, 16, 32, 64), (1e-3, 1e-5), substeps)
+            found += _grid("planar ANCF cable", (8, 16, 32, 64), (1e-5,), substeps)
         if problem != "bend":  # a hundred times slower there
-            found += _grid("spatial 2-node", (8, 16, 32, 48, 64, 128, 256), (1e-4,), substeps)
+            found += _grid("spatial 2-node", (16, 48, 64, 128, 256), (1e-4,), substeps)
+        if problem == "sweep":
             found += _grid("spatial 2-node", (512,), (1e-5,), substeps)
-        if problem != "sweep":  # slower there
-            found += _grid("spatial 2-node EP", (8, 16, 32, 64, 128, 256), (1e-4,), substeps)
-            found += _grid("spatial 2-node EP", (512,), (1e-6,), substeps)
+        else:  # slower in the sweep
+            found += _grid("spatial 2-node EP", (8, 16, 64, 256), (1e-4,), substeps)
     return found
 
 
 def _opensees(problem):
-    found = []
-    for substeps in _substeps(problem):
+    found, rolled = [], problem.startswith("roll-up")
+    for substeps in _substeps(problem)[: 2 if rolled else None]:
         for space in ("spatial",) if problem == "bend" else ("planar", "spatial"):
+            if rolled:  # few of them come around
+                found += _grid(f"{space} elastic", (8, 32, 128), (1e-4,), substeps)
+                found += _grid(f"{space} CBDI", (8, 16, 32), (1e-5,), substeps)
+                continue
             found += _grid(f"{space} elastic", (8, 16, 32, 48, 64, 128, 256), (1e-4,), substeps)
             found += _grid(f"{space} CBDI", (3, 4, 6, 8, 10, 12, 16), (1e-3, 1e-5), substeps)
             found += _grid(f"{space} CBDI", (20, 24, 32, 48), (1e-4, 1e-6), substeps, inner=1e-16)

@@ -13,7 +13,6 @@ import openseespy.opensees as ops
 from speak import Stopped, serve
 
 
-
 def _build(problem, configuration):
     n, spatial = configuration["elements"], configuration["element"].startswith("spatial")
     kind = configuration["element"].split()[1]
