@@ -7,15 +7,16 @@
 Leaves in out/: work_precision.json (every sample), work_precision.md (the table), work_precision_*.png.
 
 Every peer is a process of its own, in an environment of its own, on one thread. A sample is processor time of the
-process around one warm solution from the unloaded state; a round asks every configuration for one sample, in an order
-that changes from round to round, so that peers alternate. A number is the median over at least five rounds.
+process around one warm solution from the unloaded state; a round asks every configuration for three samples (slow ones
+for one), in an order that changes from round to round, so that peers alternate, until a configuration has five or more.
+A number is their median.
 """
 
 import argparse
 import json
 import random
 import time
-from collections import Counter, defaultdict
+from collections import Counter
 from pathlib import Path
 
 import work_precision_chart as chart
@@ -28,8 +29,8 @@ from peers.process import Peer
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 from waiting import waits
 
-ROUNDS, SEED = 5, 2026
-LIMIT = 10.0  # s of a request, twice that for the slow peers
+SAMPLES, A_VISIT, SEED = 5, 3, 2026  # at least so many of a row; so many at a visit of a fast one
+LIMIT = 5.0  # s of a request, four times that for the slow peers
 SLOW_PEERS = ("PyElastica", "CalculiX")  # compile before they are asked; or are programs with no warm state
 SLOW = 0.5  # s: from here on there is no warm-up run, and no repetition where the same peer has something better
 BUDGET = 25 * 60.0  # s of measuring; a round that would begin later is left out, and the table says so
@@ -45,7 +46,7 @@ class Record:
 
     def __init__(self, file, fresh=False):
         self.file, self.rows, self.spent, self._saved = file, {}, 0.0, 0.0
-        self.about = {"machine": record(), "seed": SEED, "rounds": ROUNDS, "limit_s": LIMIT}
+        self.about = {"machine": record(), "seed": SEED, "samples": SAMPLES, "limit_s": LIMIT}
         self.missing, self.waits, self.versions = {}, [], {}
         if file.exists() and not fresh:
             self._continue(json.loads(file.read_text(encoding="utf-8")))
@@ -103,15 +104,14 @@ def start(peers, install, found):
     return started
 
 
-def sample(peer, row, found, limit):
-    """One more sample of a row, or why there is none."""
+def sample(peer, row, found, wanted, limit):
+    """More samples of a row, or why there are none."""
     problem = problems()[row["problem"]]
     slow = bool(row["seconds"]) and min(row["seconds"]) > SLOW
     cold = row["peer"] in SLOW_PEERS
     began = time.monotonic()
-    answer = peer.ask(
-        problem, row["configuration"], warm=0 if slow or cold else 1, samples=1, limit=2 * limit if cold else limit
-    )
+    visit = {"warm": 0, "samples": 1} if slow or cold else {"warm": 1, "samples": min(A_VISIT, wanted)}
+    answer = peer.ask(problem, row["configuration"], **visit, limit=4 * limit if cold else limit)
     found.spent += time.monotonic() - began
     if "failed" in answer:
         row["failed"] = answer["failed"]
@@ -141,44 +141,44 @@ def worth(row, rows):
     )
 
 
-def measure(started, names, found, *, quick, rounds, limit, budget):
-    """Rounds of samples, until every row has `rounds` of them or the time is spent."""
+def measure(started, names, found, *, quick, wanted, limit, budget):
+    """Rounds of samples, until every row has `wanted` of them or the time is spent."""
     rows = [
         found.row(name, peer, configuration)
         for peer in started
         for name in names
         for configuration in configurations(peer, name, quick)
     ]
-    like = defaultdict(list)
-    for row in rows:
-        like[row["peer"], row["problem"]].append(row)
     columns = TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn()
     with Progress(*columns) as bar:
-        for number in range(rounds):
-            if found.spent > budget:
-                print(f"{budget / 60:.0f} minutes are spent: {number} rounds of {rounds}", flush=True)
-                break
-            _round(number, rows, like, started, found, limit, bar, f"round {number + 1} of {rounds}")
+        for name in names:  # one after the other, so that all of a chart is measured at one time
+            here = [row for row in rows if row["problem"] == name]
+            like = {peer: [row for row in here if row["peer"] == peer] for peer in started}
+            for number in range(wanted):
+                todo = [r for r in here if len(r["seconds"]) < wanted and worth(r, like[r["peer"]])]
+                if todo and number and found.spent > budget:
+                    print(f"{name}: the time is spent, {len(todo)} rows keep fewer samples", flush=True)
+                    break
+                random.Random(SEED + number).shuffle(todo)
+                _round(todo, like, started, found, wanted, limit, bar, f"{name}, round {number + 1}")
     return rows
 
 
-def _round(number, rows, like, started, found, limit, bar, name):
-    """One sample of every row that has not got that many yet and is worth it."""
-    todo = [r for r in rows if len(r["seconds"]) <= number and worth(r, like[r["peer"], r["problem"]])]
-    random.Random(SEED + number).shuffle(todo)
+def _round(todo, like, started, found, wanted, limit, bar, name):
+    """Samples of every row that is still worth it."""
     task, told = bar.add_task(name, total=len(todo)), time.monotonic()
     for i, row in enumerate(todo):
-        bar.update(task, description=f"{name}: {row['problem']}, {row['peer']}", completed=i)
+        bar.update(task, description=f"{name}: {row['peer']}", completed=i)
         if not bar.console.is_terminal and time.monotonic() - told > 30:  # a bar that nobody sees
             told = time.monotonic()
             print(f"{name}: {i} of {len(todo)}", flush=True)
-        if worth(row, like[row["peer"], row["problem"]]):
-            sample(started[row["peer"]], row, found, limit)
+        if worth(row, like[row["peer"]]):
+            sample(started[row["peer"]], row, found, wanted, limit)
             found.write()
     bar.update(task, description=name, completed=len(todo))
 
 
-def main(out="out", quick=False, fresh=False, peers=PEERS, names=None, rounds=None):
+def main(out="out", quick=False, fresh=False, peers=PEERS, names=None, wanted=None):
     """Measure, write the JSON, the table and the charts.
 
     Args:
@@ -186,7 +186,7 @@ def main(out="out", quick=False, fresh=False, peers=PEERS, names=None, rounds=No
         quick: few configurations, nothing is installed.
         fresh: forget earlier samples.
         peers, names: which peers and problems; default all (a quick run: all peers on two problems).
-        rounds: samples of every configuration.
+        wanted: samples of every configuration, at least.
 
     Returns:
         The `Record`.
@@ -195,7 +195,7 @@ def main(out="out", quick=False, fresh=False, peers=PEERS, names=None, rounds=No
     names = names or (("sweep", "bend") if quick else tuple(problems()))
     found = Record(out / ("work_precision_quick.json" if quick else "work_precision.json"), fresh or quick)
     started = start(peers, not quick, found)
-    limits = {"rounds": rounds or (2 if quick else ROUNDS), "limit": 5.0 if quick else LIMIT, "budget": BUDGET}
+    limits = {"wanted": wanted or (2 if quick else SAMPLES), "limit": LIMIT / 4 if quick else LIMIT, "budget": BUDGET}
     try:
         rows = measure(started, names, found, quick=quick, **limits)
         if not quick:

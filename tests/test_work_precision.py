@@ -58,9 +58,9 @@ def test_broken_off_run_goes_on(tmp_path, monkeypatch):
     with monkeypatch.context() as patch:
         patch.setattr(work_precision, "sample", _after(1, work_precision.sample))
         with pytest.raises(SystemExit, match="goes on"):
-            work_precision.main(**run, rounds=1)
+            work_precision.main(**run, wanted=1)
     (first,) = [row["seconds"] for row in json.loads(file.read_text())["samples"] if row["seconds"]]
-    rows = work_precision.main(**run, rounds=2).rows.values()
+    rows = work_precision.main(**run, wanted=2).rows.values()
     assert [len(row["seconds"]) for row in rows] == [2, 2] and first[0] in [row["seconds"][0] for row in rows]
     monkeypatch.setattr(work_precision, "fingerprint", lambda peer: "other")
     assert not work_precision.Record(file).rows
