@@ -2,6 +2,7 @@
 
     python demos/work_precision.py            all of it, at most half an hour; goes on where it was broken off
     python demos/work_precision.py --fresh    forgets the samples that are there
+    python demos/work_precision.py --problems sweep
     python demos/work_precision.py --quick    a few configurations, at most a minute, nothing is installed
 
 Leaves in out/: work_precision.json (every sample), work_precision.md (the table), work_precision_*.png.
@@ -30,8 +31,10 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from waiting import waits
 
 SAMPLES, A_VISIT, SEED = 5, 3, 2026  # at least so many of a row; so many at a visit of a fast one
-LIMIT = 5.0  # s of a request, four times that for the slow peers
-SLOW_PEERS = ("PyElastica", "CalculiX")  # compile before they are asked; or are programs with no warm state
+#: Time limits of a request, s: here it may compile a form; the last two compile, relax or are whole programs.
+LIMITS = {OWN: 40.0, "Exudyn": 5.0, "OpenSeesPy": 5.0, "PyElastica": 20.0, "CalculiX": 20.0}
+SLOW_PEERS = ("PyElastica", "CalculiX")
+QUICK_LIMIT = 5.0  # s, of all peers in a quick run
 SLOW = 0.5  # s: from here on there is no warm-up run, and no repetition where the same peer has something better
 BUDGET = 25 * 60.0  # s of measuring; a round that would begin later is left out, and the table says so
 
@@ -46,20 +49,21 @@ class Record:
 
     def __init__(self, file, fresh=False):
         self.file, self.rows, self.spent, self._saved = file, {}, 0.0, 0.0
-        self.about = {"machine": record(), "seed": SEED, "samples": SAMPLES, "limit_s": LIMIT}
+        self.about = {"machine": record(), "seed": SEED, "samples": SAMPLES, "limits_s": LIMITS}
         self.missing, self.waits, self.versions = {}, [], {}
         if file.exists() and not fresh:
             self._continue(json.loads(file.read_text(encoding="utf-8")))
 
     def _continue(self, before):
-        same = ("cpu", "platform")
-        if any(before["about"]["machine"].get(key) != self.about["machine"][key] for key in same):
-            return  # another machine: its samples say nothing here
+        machine = before["about"]["machine"]
+        same = all(machine.get(key) == self.about["machine"][key] for key in ("cpu", "platform"))
         prints = {peer: fingerprint(peer) for peer in PEERS}
+        if not same or any(row["fingerprint"] != prints[row["peer"]] for row in before["samples"]):
+            print(f"{self.file}: from another machine or other sources, so all is measured anew", flush=True)
+            return  # what is compared belongs to one run
         for row in before["samples"]:
-            if row["fingerprint"] == prints[row["peer"]]:
-                self.rows[self.key(row["problem"], row["peer"], row["configuration"])] = row
-        self.spent, self.versions = before["spent_s"] if self.rows else 0.0, before["versions"]
+            self.rows[self.key(row["problem"], row["peer"], row["configuration"])] = row
+        self.spent, self.versions = before["spent_s"], before["versions"]
 
     @staticmethod
     def key(problem, peer, configuration):
@@ -104,14 +108,18 @@ def start(peers, install, found):
     return started
 
 
-def sample(peer, row, found, wanted, limit):
+def sample(peer, row, found, wanted, limits):
     """More samples of a row, or why there are none."""
     problem = problems()[row["problem"]]
     slow = bool(row["seconds"]) and min(row["seconds"]) > SLOW
     cold = row["peer"] in SLOW_PEERS
     began = time.monotonic()
-    visit = {"warm": 0, "samples": 1} if slow or cold else {"warm": 1, "samples": min(A_VISIT, wanted)}
-    answer = peer.ask(problem, row["configuration"], **visit, limit=4 * limit if cold else limit)
+    visit = (
+        {"warm": 0, "samples": 1}
+        if slow or cold
+        else {"warm": 1, "samples": min(A_VISIT, wanted - len(row["seconds"]))}
+    )
+    answer = peer.ask(problem, row["configuration"], **visit, limit=limits[peer.name])
     found.spent += time.monotonic() - began
     if "failed" in answer:
         row["failed"] = answer["failed"]
@@ -141,7 +149,7 @@ def worth(row, rows):
     )
 
 
-def measure(started, names, found, *, quick, wanted, limit, budget):
+def measure(started, names, found, *, quick, wanted, limits, budget):
     """Rounds of samples, until every row has `wanted` of them or the time is spent."""
     rows = [
         found.row(name, peer, configuration)
@@ -160,11 +168,11 @@ def measure(started, names, found, *, quick, wanted, limit, budget):
                     print(f"{name}: the time is spent, {len(todo)} rows keep fewer samples", flush=True)
                     break
                 random.Random(SEED + number).shuffle(todo)
-                _round(todo, like, started, found, wanted, limit, bar, f"{name}, round {number + 1}")
+                _round(todo, like, started, found, wanted, limits, bar, f"{name}, round {number + 1}")
     return rows
 
 
-def _round(todo, like, started, found, wanted, limit, bar, name):
+def _round(todo, like, started, found, wanted, limits, bar, name):
     """Samples of every row that is still worth it."""
     task, told = bar.add_task(name, total=len(todo)), time.monotonic()
     for i, row in enumerate(todo):
@@ -173,7 +181,7 @@ def _round(todo, like, started, found, wanted, limit, bar, name):
             told = time.monotonic()
             print(f"{name}: {i} of {len(todo)}", flush=True)
         if worth(row, like[row["peer"]]):
-            sample(started[row["peer"]], row, found, wanted, limit)
+            sample(started[row["peer"]], row, found, wanted, limits)
             found.write()
     bar.update(task, description=name, completed=len(todo))
 
@@ -195,9 +203,10 @@ def main(out="out", quick=False, fresh=False, peers=PEERS, names=None, wanted=No
     names = names or (("sweep", "bend") if quick else tuple(problems()))
     found = Record(out / ("work_precision_quick.json" if quick else "work_precision.json"), fresh or quick)
     started = start(peers, not quick, found)
-    limits = {"wanted": wanted or (2 if quick else SAMPLES), "limit": LIMIT / 4 if quick else LIMIT, "budget": BUDGET}
+    limits = {peer: QUICK_LIMIT if quick and peer != OWN else limit for peer, limit in LIMITS.items()}
+    wanted = wanted or (2 if quick else SAMPLES)
     try:
-        rows = measure(started, names, found, quick=quick, **limits)
+        rows = measure(started, names, found, quick=quick, wanted=wanted, limits=limits, budget=BUDGET)
         if not quick:
             found.waits = waits(started, rows)
     except KeyboardInterrupt:
@@ -222,4 +231,6 @@ if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--quick", action="store_true", help="at most a minute, nothing is installed")
     parser.add_argument("--fresh", action="store_true", help="forget the samples of earlier runs")
-    main(quick=parser.parse_args().quick, fresh=parser.parse_args().fresh)
+    parser.add_argument("--problems", nargs="+", choices=tuple(problems()), help="only these")
+    given = parser.parse_args()
+    main(quick=given.quick, fresh=given.fresh, names=given.problems)
