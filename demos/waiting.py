@@ -63,17 +63,27 @@ def _times(words, told, surrounding, caches):
                 place.mkdir()
                 empty = {"XDG_CACHE_HOME": str(place), "NUMBA_CACHE_DIR": str(place)}
             began = time.perf_counter()
-            pipes = dict(stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, cwd=folder)
+            pipes = {
+                "stdin": subprocess.PIPE,
+                "stdout": subprocess.PIPE,
+                "stderr": subprocess.DEVNULL,
+                "cwd": folder,
+            }
             process = subprocess.Popen(words, env={**surrounding, **empty}, **pipes)
             watch = threading.Timer(LIMIT, process.kill)
             watch.start()
             process.stdin.write(told.encode())
             process.stdin.close()
+            said = process.stdout.read()
+            process.stdout.close()
             _, status, used = os.wait4(process.pid, 0)
             watch.cancel()
             process.returncode = os.waitstatus_to_exitcode(status)
-            if process.returncode:
-                return {"processor": [], "wall": [], "failed": f"exit code {process.returncode}"}
+            if process.returncode or b'"failed"' in said:
+                why = (
+                    said.decode(errors="replace")[:100] if not process.returncode else f"exit code {process.returncode}"
+                )
+                return {"processor": [], "wall": [], "failed": why}
             if caches == "cold" or run:
                 wall.append(time.perf_counter() - began)
                 processor.append(used.ru_utime + used.ru_stime)

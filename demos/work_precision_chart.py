@@ -16,7 +16,7 @@ from work_precision_table import answered, median
 #: (problem, file, subtitle, whether only the spatial ones of the own models are shown).
 _VIEWS = (
     ("sweep", "sweep", "every model that the plane problem allows", False),
-    ("sweep", "sweep_spatial", "forced into space (model \"spatial\")", True),
+    ("sweep", "sweep_spatial", "forced into space; peers that stay in the plane are shown too", True),
     ("single", "single", "every model that the plane problem allows", False),
     ("bend", "bend", "a problem in space", False),
     ("roll-up 1", "roll_up_1", "every model that the plane problem allows", False),
@@ -27,6 +27,8 @@ _OURS = {"determinate": "#08519c", "planar": "#3182bd", "spatial": "#31a354", "a
 _THEIRS = {"Exudyn": "#d95f02", "OpenSeesPy": "#b2182b", "PyElastica": "#7570b3", "CalculiX": "#8c6d31"}
 _MARKS = "osD^vP"
 _ROUND_OFF = 1e-14  # errors below are shown here
+_BETTER = 0.9
+_ELEMENTS = {"elastic": "elasticBeamColumn", "CBDI": "forceBeamColumnCBDI", "EP": "Euler parameters"}
 
 
 def draw(found, rows, out, stem):
@@ -36,7 +38,9 @@ def draw(found, rows, out, stem):
         here = [r for r in answered(rows, problem) if not (r["peer"] == OWN and spatial and not r["spatial"])]
         if here:
             names.append(f"{stem}_{file}.png")
-            _chart(here, f"{TITLES[problem]}\n{subtitle}", problem, Path(out) / names[-1])
+            silent = sorted({r["peer"] for r in rows if r["problem"] == problem} - {r["peer"] for r in here})
+            absent = f"; no answer from {', '.join(silent)}" if silent else ""
+            _chart(here, f"{TITLES[problem]}\n{subtitle}{absent}", problem, Path(out) / names[-1])
     if any(row["wall"] for row in found.waits):
         names.append(f"{stem}_waiting.png")
         _bars(found.waits, Path(out) / names[-1])
@@ -44,10 +48,10 @@ def draw(found, rows, out, stem):
 
 
 def frontier(rows):
-    """Rows that no other beats in both error and time, the most accurate first."""
+    """Rows that no other beats in both error and time, the most accurate first; a slightly smaller error is none."""
     best = []
     for row in sorted(rows, key=lambda row: (median(row), row["error"])):
-        if not best or row["error"] < best[-1]["error"]:
+        if not best or row["error"] < _BETTER * best[-1]["error"]:
             best.append(row)
     return best[::-1]
 
@@ -61,7 +65,7 @@ def _groups(rows):
         label = (
             f"cosserat_fenicsx, {'auto (its own choice)' if model == 'auto' else model}"
             if ours
-            else f"{row['peer']}: {row['kind']}"
+            else f"{row['peer']}: {_in_full(row['kind'])}"
         )
         groups.setdefault((not ours, label), []).append(row)
     counted, found = {}, {}
@@ -72,6 +76,11 @@ def _groups(rows):
         style = "--" if theirs and members[0]["spatial"] else "-"
         found[label] = colour, _MARKS[number % len(_MARKS)] if theirs else "o", style, members
     return found
+
+
+def _in_full(element):
+    """An element by the name that its solver gives it."""
+    return " ".join(_ELEMENTS.get(word, word) for word in element.split())
 
 
 def _chart(rows, title, problem, file):
@@ -100,7 +109,7 @@ def _chart(rows, title, problem, file):
     axes.grid(which="major", alpha=0.4)
     axes.annotate("better: faster,\nmore accurate", (0.015, 0.02), (0.09, 0.10), xycoords="axes fraction", textcoords="axes fraction",
                   fontsize=10, arrowprops={"arrowstyle": "->"})  # fmt: skip
-    axes.text(0.99, 0.01, "small dots: every mesh, degree and formulation measured; lines: the best of each", fontsize=8,
+    axes.text(0.99, 0.01, "small dots: every mesh, degree and formulation measured; lines: the best of each; dashed: peers in space", fontsize=8,
               transform=axes.transAxes, ha="right", color="0.3")  # fmt: skip
     figure.legend(*axes.get_legend_handles_labels(), loc="outside lower center", ncols=3, fontsize=8.5, frameon=False)
     figure.savefig(file, dpi=130)

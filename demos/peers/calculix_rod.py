@@ -4,6 +4,7 @@ The sample is the whole program, which has no warm state: reading the input deck
 factor is a step of its own; the program chooses increments inside it. Displacements are printed with seven digits.
 """
 
+import itertools
 import math
 import os
 import re
@@ -49,7 +50,7 @@ def deck(problem, configuration):
 def _places(L, n):
     """Arc lengths of the nodes. Half an element at the clamp and at the tip is stiff: the end elements are short."""
     ends = [0.0, *(L * (2e-4 + 0.9996 * i / (n - 2)) for i in range(n - 1)), L]
-    return [s for a, b in zip(ends, ends[1:]) for s in (a, (a + b) / 2)] + [L]  # noqa: B905, RUF007
+    return [s for a, b in itertools.pairwise(ends) for s in (a, (a + b) / 2)] + [L]
 
 
 def prepare(problem, configuration):
@@ -58,14 +59,14 @@ def prepare(problem, configuration):
     def solve():
         with tempfile.TemporaryDirectory() as folder:
             Path(folder, "rod.inp").write_text(text, encoding="ascii")
-            silent = dict(stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+            silent = {"stdout": subprocess.PIPE, "stderr": subprocess.STDOUT, "text": True}
             process = subprocess.Popen([PROGRAM, "rod"], cwd=folder, **silent)
             said = process.stdout.read()
             _, status, used = os.wait4(process.pid, 0)
             process.returncode = os.waitstatus_to_exitcode(status)
             printed = Path(folder, "rod.dat")
             found = printed.read_text(encoding="ascii") if printed.exists() else ""
-        rows = re.findall(r"displacements.*?time\s+\S+\s+\d+\s+(\S+)\s+(\S+)\s+(\S+)", found, re.S)
+        rows = re.findall(r"displacements.*?time\s+\S+\s+\d+\s+(\S+)\s+(\S+)\s+(\S+)", found, re.DOTALL)
         if len(rows) < len(problem["load_factors"]):
             wrong = re.search(r"\*ERROR.*", said)
             reached = problem["load_factors"][len(rows) - 1] if rows else 0
@@ -76,7 +77,9 @@ def prepare(problem, configuration):
 
 
 def version():
-    said = subprocess.run([PROGRAM, "-v"], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True).stdout
+    said = subprocess.run(
+        [PROGRAM, "-v"], check=False, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
+    ).stdout
     return re.search(r"[Vv]ersion\s+(\S+)", said)[1]
 
 

@@ -47,7 +47,7 @@ def _relax(problem, configuration):
     simulator.add_forcing_to(rod).using(_TipLoad, applied, problem["force"], problem["moment"])
     period = 2 * math.pi / (3.516 * math.sqrt(problem["EI"] / (density * A * L**4)))
     step = configuration.get("courant", 0.6) * _size(problem, n) / math.sqrt(problem["EA"] / (density * A))
-    damping = dict(uniform_damping_constant=configuration.get("damping", 0.3) * 2 * math.pi / period, time_step=step)
+    damping = {"uniform_damping_constant": configuration.get("damping", 0.3) * 2 * math.pi / period, "time_step": step}
     simulator.dampen(rod).using(ea.AnalyticalLinearDamper, **damping)
     simulator.finalize()
     rod.compute_internal_forces_and_torques(0.0)
@@ -77,7 +77,7 @@ def _rod(problem, n, density):
     size = _size(problem, n)
     s = size * (np.arange(n + 1) - 0.5)
     place = [R * np.sin(s / R), R * (1 - np.cos(s / R)), 0 * s] if R else [s, 0 * s, 0 * s]
-    given = dict(position=np.array(place))
+    given = {"position": np.array(place)}
     tangents = np.diff(given["position"], axis=1)
     tangents /= np.linalg.norm(tangents, axis=0)
     normals = np.tile([[0.0], [0.0], [1.0]], n)

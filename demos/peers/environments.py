@@ -93,7 +93,7 @@ def _calculix(install):
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
     wanted = _run("apt-get", "install", "--simulate", "--no-install-recommends", "calculix-ccx")
-    packages = re.findall(r"^Inst (\S+)", wanted, re.M)
+    packages = re.findall(r"^Inst (\S+)", wanted, re.MULTILINE)
     if packages:
         _run("apt-get", "download", *packages, cwd=folder)
         for archive in folder.glob("*.deb"):
@@ -110,9 +110,9 @@ def _only_if(install, peer):
 
 
 def _run(*words, cwd=None):
-    told = dict(stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, cwd=cwd)
+    told = {"stdout": subprocess.PIPE, "stderr": subprocess.STDOUT, "text": True, "cwd": cwd}
     try:
-        done = subprocess.run([str(word) for word in words], timeout=600, **told)
+        done = subprocess.run([str(word) for word in words], timeout=600, check=False, **told)
     except (OSError, subprocess.TimeoutExpired) as error:
         raise Missing(f"{words[0]}: {error}") from None
     if done.returncode:

@@ -33,7 +33,7 @@ def prepare(problem, configuration):
     mbs.AddLoad(item.LoadForceVector(markerNumber=point, loadVector=problem["force"], loadVectorUserFunction=loaded))
     if any(problem["moment"]):
         section = mbs.AddMarker(item.MarkerNodeRigid(nodeNumber=tip))
-        moment = dict(loadVector=problem["moment"], loadVectorUserFunction=loaded)
+        moment = {"loadVector": problem["moment"], "loadVectorUserFunction": loaded}
         mbs.AddLoad(item.LoadTorqueVector(markerNumber=section, **moment))
     sensor = mbs.AddSensor(item.SensorNode(nodeNumber=tip, storeInternal=True, outputVariableType=DISPLACEMENT))
     mbs.Assemble()
@@ -80,7 +80,7 @@ def _rod(mbs, problem, configuration):
         angle = s / R if R else 0.0
         place = [R * math.sin(angle), R * (1 - math.cos(angle))] if R else [s, 0.0]
         nodes.append(mbs.AddNode(_node(element, place, angle)))
-    stiff = dict(bendingStiffness=problem["EI"], axialStiffness=problem["EA"])
+    stiff = {"bendingStiffness": problem["EI"], "axialStiffness": problem["EA"]}
     if element.startswith("spatial"):
         section = exu.BeamSection()
         section.stiffnessMatrix = np.diag(

@@ -61,7 +61,7 @@ class Peer:
 
     def _running(self):
         if self._process is None or self._process.poll() is not None:
-            pipes = dict(stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, bufsize=0)
+            pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "stderr": subprocess.DEVNULL, "bufsize": 0}
             self._process = subprocess.Popen(self.words, env=surroundings(self.name), start_new_session=True, **pipes)
         return self._process
 
