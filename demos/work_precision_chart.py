@@ -51,7 +51,7 @@ def frontier(rows):
     """Rows that no other beats in both error and time, the most accurate first; a slightly smaller error is none."""
     best = []
     for row in sorted(rows, key=lambda row: (median(row), row["error"])):
-        if not best or row["error"] < _BETTER * best[-1]["error"]:
+        if not best or max(row["error"], _ROUND_OFF) < _BETTER * best[-1]["error"]:
             best.append(row)
     return best[::-1]
 
