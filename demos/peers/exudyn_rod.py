@@ -13,8 +13,8 @@ from exudyn import itemInterface as item
 from speak import Stopped, serve
 
 DISPLACEMENT = exu.OutputVariableType.Displacement
-#: Nodes of an element, rotation of a node; and of ANCF's cable the slopes.
-NODES = {"planar 3-node": 3, "planar 2-node": 2, "planar ANCF cable": 2, "spatial 2-node": 2, "spatial 2-node EP": 2}
+#: Nodes of an element. "EP": rotations by Euler parameters; the other spatial one has rotation vectors.
+NODES = {"planar 3-node": 3, "planar ANCF cable": 2, "spatial 2-node": 2, "spatial 2-node EP": 2}
 
 
 def prepare(problem, configuration):
@@ -60,8 +60,7 @@ def _settings(configuration, steps, sparse):
     static.newton.residualMode = 1
     static.newton.relativeTolerance = configuration["tol"]
     static.newton.absoluteTolerance = configuration["tol"]
-    static.newton.useModifiedNewton = configuration.get("modified", False)
-    static.computeLoadsJacobian = configuration.get("load_jacobian", False)
+    static.computeLoadsJacobian = False  # dead loads
     static.verboseMode = 0
     settings.solution.file.write = False
     settings.solution.sensors.writePeriod = 1e-9
