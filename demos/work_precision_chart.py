@@ -126,11 +126,12 @@ def _bars(waits, file):
     for i, row in enumerate(shown):
         seconds = statistics.median(row["wall"])
         axes.barh(i, seconds, color=_THEIRS.get(row["who"], "#3182bd"), alpha=0.9 if row["caches"] == "warm" else 0.45)
-        axes.text(seconds, i, f"  {seconds:.2f} s", va="center", fontsize=9)
+        worked = statistics.median(row["processor"])
+        axes.text(seconds, i, f"  {seconds:.2f} s\n  (processor {worked:.2f} s)", va="center", fontsize=8)
     names = [f"{row['who']}, {row['caches']}\n{row['what']}" for row in shown]
     axes.set_yticks(np.arange(len(shown)), names, fontsize=8)
     axes.invert_yaxis()
-    axes.margins(x=0.15)
+    axes.margins(x=0.2)
     axes.set_xlabel("wall clock from the start of the process to its end (s), median")
     axes.set_title("What a person waits for an answer: eccentric cantilever, whole processes")
     axes.grid(axis="x", alpha=0.4)
