@@ -102,7 +102,7 @@ def _chart(rows, title, problem, file):
         if problem in ("sweep", "single")
         else "of the tip's position, over its displacement"
     )
-    most = ", largest over the load factors" if problem == "sweep" else ""
+    most = ", largest over the load factors" if problem == "sweep" or problem.startswith("roll-up") else ""
     axes.set_xlabel(f"relative error {measured}{most} (-)")
     axes.set_ylabel("processor time of one warm answer, one thread")
     axes.set_title(title)
