@@ -1,0 +1,236 @@
+"""Speed against accuracy: this package and its peers on the same problems, one chart each (`make work-precision`).
+
+    python demos/work_precision.py            all of it, at most half an hour; goes on where it was broken off
+    python demos/work_precision.py --fresh    forgets the samples that are there
+    python demos/work_precision.py --problems sweep
+    python demos/work_precision.py --quick    a few configurations, at most a minute, nothing is installed
+
+Leaves in out/: work_precision.json (every sample), work_precision.md (the table), work_precision_*.png.
+
+Every peer is a process of its own, in an environment of its own, on one thread. A sample is processor time of the
+process around one warm solution from the unloaded state; a round asks every configuration for three samples (slow ones
+for one), in an order that changes from round to round, so that peers alternate, until a configuration has five or more.
+A number is their median.
+"""
+
+import argparse
+import json
+import random
+import time
+from collections import Counter
+from pathlib import Path
+
+import work_precision_chart as chart
+import work_precision_table as table
+from machine import record
+from peers.configurations import PEERS, configurations, kind, model
+from peers.environments import OWN, Missing, fingerprint
+from peers.problems import error, problems
+from peers.process import Peer
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+from waiting import waits
+
+SAMPLES, A_VISIT, SEED = 5, 3, 2026  # at least so many of a row; so many at a visit of a fast one
+#: Time limits of a request, s: here it may compile a form; the last two compile, relax or are whole programs.
+LIMITS = {OWN: 40.0, "Exudyn": 5.0, "OpenSeesPy": 5.0, "PyElastica": 20.0, "CalculiX": 20.0}
+SLOW_PEERS = ("PyElastica", "CalculiX")
+QUICK_LIMIT = 5.0  # s, of all peers in a quick run
+SLOW = 0.5  # s: from here on there is no warm-up run, and no repetition where the same peer has something better
+BUDGET = 24 * 60.0  # s of measuring; a round that would begin later is left out, and the table says so
+
+
+class Record:
+    """What was measured so far, in a file that is whole at any time.
+
+    Args:
+        file: out/work_precision.json.
+        fresh: begin anew.
+    """
+
+    def __init__(self, file, fresh=False):
+        self.file, self.rows, self.spent, self._saved = file, {}, 0.0, 0.0
+        self.about = {"machine": record(), "seed": SEED, "samples": SAMPLES, "limits_s": LIMITS}
+        self.missing, self.waits, self.versions = {}, [], {}
+        if file.exists() and not fresh:
+            self._continue(json.loads(file.read_text(encoding="utf-8")))
+
+    def _continue(self, before):
+        machine = before["about"]["machine"]
+        same = all(machine.get(key) == self.about["machine"][key] for key in ("cpu", "platform"))
+        prints = {peer: fingerprint(peer) for peer in PEERS}
+        if not same or any(row["fingerprint"] != prints[row["peer"]] for row in before["samples"]):
+            print(f"{self.file}: from another machine or other sources, so all is measured anew", flush=True)
+            return  # what is compared belongs to one run
+        for row in before["samples"]:
+            self.rows[self.key(row["problem"], row["peer"], row["configuration"])] = row
+        self.spent, self.versions = before["spent_s"], before["versions"]
+
+    @staticmethod
+    def key(problem, peer, configuration):
+        return json.dumps([problem, peer, configuration], sort_keys=True)
+
+    def row(self, problem, peer, configuration):
+        """The row of a configuration, made where there is none."""
+        key = self.key(problem, peer, configuration)
+        if key not in self.rows:
+            name, spatial = kind(peer, configuration)
+            self.rows[key] = {
+                "problem": problem, "peer": peer, "kind": name, "spatial": spatial, "configuration": configuration,
+                "model": model(peer, configuration), "fingerprint": fingerprint(peer),
+                "seconds": [], "error": None, "failed": None,
+            }  # fmt: skip
+        return self.rows[key]
+
+    def write(self, now=False):
+        """Save, every few seconds or at once."""
+        if not now and time.monotonic() - self._saved < 5:
+            return
+        self._saved = time.monotonic()
+        told = {"about": self.about, "versions": self.versions, "missing": self.missing, "spent_s": self.spent,
+                "waits": self.waits, "samples": list(self.rows.values())}  # fmt: skip
+        self.file.parent.mkdir(parents=True, exist_ok=True)
+        part = self.file.with_suffix(".part")
+        part.write_text(json.dumps(told, indent=1), encoding="utf-8")
+        part.replace(self.file)
+
+
+def start(peers, install, found):
+    """The peers' processes by name; what is missing is noted and left out."""
+    started = {}
+    for name in peers:
+        print(f"{name}: environment ...", flush=True)
+        try:
+            started[name] = Peer(name, install)
+            found.missing.pop(name, None)
+        except Missing as error:
+            found.missing[name] = str(error)
+            print(f"{name} is missing: {error}", flush=True)
+    return started
+
+
+def sample(peer, row, found, wanted, limits):
+    """More samples of a row, or why there are none."""
+    problem = problems()[row["problem"]]
+    slow = bool(row["seconds"]) and min(row["seconds"]) > SLOW
+    cold = row["peer"] in SLOW_PEERS
+    began = time.monotonic()
+    visit = (
+        {"warm": 0, "samples": 1}
+        if slow or cold
+        else {"warm": 1, "samples": min(A_VISIT, wanted - len(row["seconds"]))}
+    )
+    answer = peer.ask(problem, row["configuration"], **visit, limit=limits[peer.name])
+    found.spent += time.monotonic() - began
+    if "failed" in answer:
+        row["failed"] = answer["failed"]
+    else:
+        row["seconds"] += answer["seconds"]
+        row["error"] = error(row["problem"], row["model"], answer["tip"])
+        row["failed"] = None
+    if "versions" in answer:
+        found.versions[peer.name] = answer["versions"]
+
+
+def worth(row, rows):
+    """Whether another sample can matter: not where the same element, or this package, is clearly better elsewhere.
+
+    All of this package's rows below SLOW are repeated. Otherwise a row is not repeated that another of its kind (of its
+    peer, where it is slow) beats in error and by half in time; its point in the chart then has fewer samples.
+    """
+    if row["failed"] or not row["seconds"]:
+        return not row["failed"]
+    slow = min(row["seconds"]) > SLOW
+    if row["peer"] == OWN and not slow:
+        return True
+    return not any(
+        1.5 * min(r["seconds"]) < min(row["seconds"]) and r["error"] <= row["error"]
+        for r in rows
+        if r["seconds"] and (slow or r["kind"] == row["kind"])
+    )
+
+
+def measure(started, names, found, *, quick, wanted, limits, budget):
+    """Rounds of samples, until every row has `wanted` of them or the time is spent."""
+    rows = [
+        found.row(name, peer, configuration)
+        for peer in started
+        for name in names
+        for configuration in configurations(peer, name, quick)
+    ]
+    columns = TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn()
+    with Progress(*columns) as bar:
+        for name in names:  # one after the other, so that all of a chart is measured at one time
+            here = [row for row in rows if row["problem"] == name]
+            like = {peer: [row for row in here if row["peer"] == peer] for peer in started}
+            for number in range(wanted):
+                todo = [r for r in here if len(r["seconds"]) < wanted and worth(r, like[r["peer"]])]
+                if todo and number and found.spent > budget:
+                    print(f"{name}: the time is spent, {len(todo)} rows keep fewer samples", flush=True)
+                    break
+                random.Random(SEED + number).shuffle(todo)
+                _round(todo, like, started, found, wanted, limits, bar, f"{name}, round {number + 1}")
+    return rows
+
+
+def _round(todo, like, started, found, wanted, limits, bar, name):
+    """Samples of every row that is still worth it."""
+    task, told = bar.add_task(name, total=len(todo)), time.monotonic()
+    for i, row in enumerate(todo):
+        bar.update(task, description=f"{name}: {row['peer']}", completed=i)
+        if not bar.console.is_terminal and time.monotonic() - told > 30:  # a bar that nobody sees
+            told = time.monotonic()
+            print(f"{name}: {i} of {len(todo)}", flush=True)
+        if worth(row, like[row["peer"]]):
+            sample(started[row["peer"]], row, found, wanted, limits)
+            found.write()
+    bar.update(task, description=name, completed=len(todo))
+
+
+def main(out="out", quick=False, fresh=False, peers=PEERS, names=None, wanted=None):
+    """Measure, write the JSON, the table and the charts.
+
+    Args:
+        out: folder.
+        quick: few configurations, nothing is installed.
+        fresh: forget earlier samples.
+        peers, names: which peers and problems; default all (a quick run: all peers on two problems).
+        wanted: samples of every configuration, at least.
+
+    Returns:
+        The `Record`.
+    """
+    out = Path(out)
+    names = names or (("sweep", "bend") if quick else tuple(problems()))
+    found = Record(out / ("work_precision_quick.json" if quick else "work_precision.json"), fresh or quick)
+    started = start(peers, not quick, found)
+    limits = {peer: QUICK_LIMIT if quick and peer != OWN else limit for peer, limit in LIMITS.items()}
+    wanted = wanted or (2 if quick else SAMPLES)
+    try:
+        rows = measure(started, names, found, quick=quick, wanted=wanted, limits=limits, budget=BUDGET)
+        if not quick:
+            found.waits = waits(started, rows)
+    except KeyboardInterrupt:
+        raise SystemExit(f"\nbroken off; {found.file} keeps the samples, the same command goes on from them") from None
+    finally:
+        for peer in started.values():
+            peer.end()
+        found.write(now=True)
+    text = table.text(found, rows)
+    stem = found.file.stem
+    (out / f"{stem}.md").write_text(text + "\n", encoding="utf-8")
+    pictures = chart.draw(found, rows, out, stem)
+    print(text)
+    told = Counter(row["failed"] is not None for row in rows)
+    print(
+        f"\n{told[False]} configurations answered, {told[True]} did not; written: {found.file}, {stem}.md, {', '.join(pictures)}"
+    )
+    return found
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--quick", action="store_true", help="at most a minute, nothing is installed")
+    parser.add_argument("--fresh", action="store_true", help="forget the samples of earlier runs")
+    parser.add_argument("--problems", nargs="+", choices=tuple(problems()), help="only these")
+    given = parser.parse_args()
+    main(quick=given.quick, fresh=given.fresh, names=given.problems)

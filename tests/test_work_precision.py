@@ -1,0 +1,128 @@
+"""Speed against accuracy: the machinery, this package's own accuracy, and whichever peers are installed already."""
+
+import json
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+pytestmark = pytest.mark.serial
+DEMOS = Path(__file__).parent.parent / "demos"
+
+
+@pytest.fixture(autouse=True)
+def demos_on_the_path(monkeypatch):
+    monkeypatch.setattr(sys, "path", [str(DEMOS), *sys.path])
+
+
+def test_quick(tmp_path, capsys):
+    """Every own answer is as accurate as its degree allows; every peer answers, or is told of with a reason."""
+    import work_precision
+    from peers.configurations import PEERS
+    from peers.environments import OWN
+
+    found = work_precision.main(out=tmp_path, quick=True)
+    told = json.loads((tmp_path / "work_precision_quick.json").read_text())
+    assert {"date", "cpu", "cores", "platform"} <= told["about"]["machine"].keys() and told["about"]["seed"] == 2026
+    rows = told["samples"]
+    own = [row for row in rows if row["peer"] == OWN]
+    assert {row["configuration"]["model"] for row in own} == {"determinate", "planar", "spatial"}
+    for row in own:
+        bound = {(2, 4): 1e-3, (4, 4): 1e-8, (4, 16): 1e-12}
+        configuration = row["configuration"]
+        assert row["error"] < bound[configuration["degree"], configuration["elements"]], row
+        assert len(row["seconds"]) == 2 and min(row["seconds"]) > 0
+    for peer in set(PEERS) - {OWN}:
+        answers = [row for row in rows if row["peer"] == peer]
+        assert peer in found.missing or answers
+        assert all(row["failed"] or (row["seconds"] and row["error"] < 0.1) for row in answers), peer
+    printed = capsys.readouterr().out
+    assert "forced to spatial against the fastest planar peer" in printed
+    assert all(f"{peer} is missing" in printed for peer in found.missing)
+    for name in ("sweep", "sweep_spatial", "bend"):
+        assert (tmp_path / f"work_precision_quick_{name}.png").stat().st_size > 20000
+
+
+def test_broken_off_run_goes_on(tmp_path, monkeypatch):
+    """Samples are kept, those of other sources forgotten; an interruption says how to go on."""
+    import work_precision
+    from peers.environments import OWN
+
+    file = tmp_path / "work_precision.json"
+    monkeypatch.setattr(work_precision, "waits", lambda *_: [])
+    few = [{"model": "determinate", "formulation": "mixed", "degree": 2, "elements": n} for n in (1, 2)]
+    monkeypatch.setattr(work_precision, "configurations", lambda *_: few)
+    run = {"out": tmp_path, "peers": (OWN,), "names": ("single",)}
+
+    with monkeypatch.context() as patch:
+        patch.setattr(work_precision, "sample", _after(1, work_precision.sample))
+        with pytest.raises(SystemExit, match="goes on"):
+            work_precision.main(**run, wanted=1)
+    (first,) = [row["seconds"] for row in json.loads(file.read_text())["samples"] if row["seconds"]]
+    rows = work_precision.main(**run, wanted=2).rows.values()
+    assert [len(row["seconds"]) for row in rows] == [2, 2] and first[0] in [row["seconds"][0] for row in rows]
+    monkeypatch.setattr(work_precision, "fingerprint", lambda peer: "other")
+    assert not work_precision.Record(file).rows
+    assert not work_precision.Record(file, fresh=True).rows
+
+
+def _after(count, sample):
+    left = iter(range(count))
+
+    def broken(*arguments):
+        if next(left, None) is None:
+            raise KeyboardInterrupt
+        sample(*arguments)
+
+    return broken
+
+
+def test_truths_belong_to_their_models():
+    """The 45-degree bend of section 2 of the references' list, the paper's column, and what shear adds."""
+    from peers import problems
+
+    rest = 100 * np.array([np.sin(np.pi / 4), 1 - np.cos(np.pi / 4), 0])
+    tip = problems.truth("bend", "Reissner")[0] + rest
+    np.testing.assert_allclose(tip, (47.15043857, 15.68480053, 53.47485879), atol=2e-8)
+    rigid = problems.truth("bend", "shear-rigid")[0] + rest
+    assert 1e-3 < np.linalg.norm(rigid - tip) < 1e-2
+    assert problems.truth("single", "Reissner")[0, 1] == pytest.approx(2.200615447828, abs=1e-9)
+    assert problems.error("bend", "Reissner", problems.truth("bend", "Reissner")) == 0
+
+
+def test_a_peer_that_hangs_or_dies_is_reported():
+    from peers.process import Peer
+
+    script = "import sys, time, json\nfor line in sys.stdin:\n    c = json.loads(line)['configuration']\n"
+    script += "    time.sleep(c['sleep'])\n    sys.exit(3) if c['die'] else print('{\"seconds\": [1.0]}', flush=True)"
+    with Peer("cosserat_fenicsx") as peer:
+        peer.words = [sys.executable, "-c", script]
+
+        def ask(sleep, die):
+            return peer.ask({}, {"sleep": sleep, "die": die}, warm=0, samples=1, limit=2.0)
+
+        assert ask(60, False) == {"failed": "time limit of 2 s"}
+        assert ask(0, False) == {"seconds": [1.0]}
+        assert ask(0, True) == {"failed": "the process ended with code 3"}
+
+
+def test_a_missing_peer_is_named(tmp_path, monkeypatch):
+    from peers.environments import Missing, command
+
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    for peer in ("Exudyn", "OpenSeesPy", "PyElastica", "CalculiX"):
+        with pytest.raises(Missing, match=f"{peer} is not installed yet"):
+            command(peer, install=False)
+
+
+def test_time_at_an_accuracy():
+    """The cheapest that is good enough, not the nearest; the frontier drops what is beaten in both."""
+    from work_precision_chart import frontier
+    from work_precision_table import cheapest
+
+    rows = [
+        {"error": error, "seconds": [seconds] * 5} for error, seconds in ((1e-2, 1), (1e-4, 3), (1e-6, 2), (1e-9, 9))
+    ]
+    assert cheapest(rows, 1e-3) is rows[2] and cheapest(rows, 1e-8) is rows[3] and cheapest(rows, 1e-10) is None
+    assert frontier(rows) == [rows[3], rows[2], rows[0]]
