@@ -132,20 +132,20 @@ class Newton:
         if not step < _HUGE:
             return _Reason.DIVERGED_DTOL
         balanced = residual <= 1e-6 * (1 + abs(problem.load_factor) * problem.load_norm) + problem.model.round_off
-        if balanced and (step <= INCREMENT or self._remaining() <= INCREMENT):
+        if balanced and (step <= INCREMENT or self._little_is_left()):
             return _Reason.CONVERGED_SNORM_RELATIVE
         if iteration >= self.max_iterations:
             return _Reason.DIVERGED_MAX_IT
         return _Reason.CONVERGED_ITERATING
 
-    def _remaining(self):
-        """The error that is left after the last step. Newton's steps contract by c, then by c^2 and so on; only a tenth of that
-        is counted on."""
+    def _little_is_left(self):
+        """Whether the error after the last step is below INCREMENT, if steps go on contracting as they did, c; or far below, if
+        they contract as Newton's do, by c^2, of which only a tenth is counted on."""
         if len(self._steps) < 2:
-            return math.inf
+            return False
         before, step = self._steps[-2:]
-        contraction = step / before
-        return step * contraction * min(10 * contraction, 1.0) / (1 - contraction) if contraction < 0.9 else step
+        c = step / before
+        return c < 0.9 and step * c * min(1.0, 100 * c) <= INCREMENT * (1 - c)
 
     def _motion(self, step):
         """Size of a step's motion alone: contact forces and reactions have another scale, and rounding of their own."""
