@@ -1,19 +1,20 @@
-"""Put the tables that `make tables` has left in out/ between their markers in README.md."""
+"""Put the tables that `make tables`, `make figure3` and their like have left in out/ between their markers in README.md."""
 
 import re
 from pathlib import Path
 
 README = Path(__file__).parent.parent / "README.md"
+TABLES = ("accuracy", "overhead", "rungs", "choice", "scaling", "figure3", "work_precision", "failures")
 
 
 def main(out="out"):
-    """Replace what stands between <!-- name --> and <!-- /name --> by out/name.md."""
+    """Replace what stands between <!-- name --> and <!-- /name --> by out/name.md, where there is one."""
     text = README.read_text(encoding="utf-8")
-    for name in ("accuracy", "overhead", "rungs", "choice", "scaling"):
-        table = (Path(out) / f"{name}.md").read_text(encoding="utf-8").strip()
-        text = re.sub(
-            f"<!-- {name} -->.*<!-- /{name} -->", f"<!-- {name} -->\n{table}\n<!-- /{name} -->", text, flags=re.S
-        )
+    for name in TABLES:
+        file = Path(out) / f"{name}.md"
+        if file.exists():
+            table = f"<!-- {name} -->\n{file.read_text(encoding='utf-8').strip()}\n<!-- /{name} -->"
+            text = re.sub(f"<!-- {name} -->.*<!-- /{name} -->", lambda _, table=table: table, text, flags=re.DOTALL)
     README.write_text(text, encoding="utf-8")
 
 
