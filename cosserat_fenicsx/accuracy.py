@@ -1,5 +1,7 @@
 """Paths of one scene on two meshes: how far apart they are, what that says of the finer one's error, and one from the other."""
 
+from collections import namedtuple
+
 import numpy as np
 
 # Positions differ by this much from rounding alone (lengths), at rest too, where nothing is displaced.
@@ -8,6 +10,8 @@ _ROUNDING = 1e-14
 _AHEAD, _FAR_AHEAD = 4, 30
 # A point whose leading coefficients are smaller than this times another's says something else of the error.
 _SMOOTHER = 0.1
+# Points that are displaced by less than this times the most displaced one say nothing.
+_SEEN = 1e-3
 
 
 def estimate_error(fine, coarse, before=None):
@@ -25,15 +29,8 @@ def estimate_error(fine, coarse, before=None):
     Returns:
         (n,) the differences relative to the largest displacements, to be the `before` of the next halving.
     """
-    difference, at_ends = np.zeros(len(fine)), np.zeros(len(fine))
-    for i, rod in enumerate(fine.scene.rods):
-        nodes = coarse.layout.node_s(coarse.rule.nodes)[i]
-        x = np.sort(np.concatenate([nodes, (nodes[:-1] + nodes[1:]) / 2]))
-        ends = np.isin(x, coarse.layout.breaks[i])
-        off = np.linalg.norm(coarse.motion(rod, x)[:, :, :3] - fine.motion(rod, x)[:, :, :3], axis=2)
-        difference = np.maximum(difference, off.max(axis=1))
-        at_ends = np.maximum(at_ends, off[:, ends].max(axis=1))
-    relative, p = np.maximum(difference - _ROUNDING, 0.0) / _sizes(fine)[0], fine.degree
+    difference, at_ends = _apart(fine, coarse)
+    relative, p = np.maximum(difference - _ROUNDING, 0.0) / _sizes(fine).largest, fine.degree
     if before is None:
         ahead, far = difference > _AHEAD * at_ends, difference > _FAR_AHEAD * at_ends
         uniform = all(rod.uniform for rod in fine.scene.rods)
@@ -45,51 +42,84 @@ def estimate_error(fine, coarse, before=None):
 
 
 def hardest(path, most=3):
-    """A few points of a path that tell how fine a mesh all of it needs: the one that is least like a polynomial of lower degree,
-    the most displaced one, the last, and the one that is most like it where that says something else. All of them where they
-    are few or the path has events.
+    """A few points of a path that tell how fine a mesh all of it needs: the one with the largest error, or, where that is not known, the
+    one that is least like a polynomial of lower degree; the most displaced one, the last, and the one that is most like such a
+    polynomial where that says something else. All of them where they are few or the path has events.
 
     Returns:
         (Path of these points, their indices).
     """
     if len(path) <= most or path.events:  # events have to be found again on every mesh
         return path, np.arange(len(path))
-    sizes, rough = _sizes(path)
-    which = {int(np.argmax(rough / sizes)), int(np.argmax(sizes)), len(path) - 1}
-    if rough.min() < _SMOOTHER * rough.max():
-        which.add(int(np.argmin(rough)))
+    sizes, rough, _ = _sizes(path)
+    known = np.isfinite(path.error).all()
+    which = {int(np.argmax(path.error if known else rough / sizes)), int(np.argmax(sizes)), len(path) - 1}
+    seen = np.flatnonzero(sizes >= _SEEN * sizes.max())
+    if rough[seen].min() < _SMOOTHER * rough.max():
+        which.add(int(seen[np.argmin(rough[seen])]))
     which = np.array(sorted(which))
     return path.at_points(which), which
 
 
-def spread_error(path, few):
-    """Set `path.error` from that of a few of its points on the same mesh, see `hardest`: between element ends it grows with the
-    leading coefficients of the elements' polynomials, by a power that the few tell."""
-    sizes, rough = _sizes(path)
-    sizes_of_few, rough_of_few = _sizes(few)
-    order = np.argsort(rough_of_few)
-    known, errors = (
-        rough_of_few[order] + _ROUNDING,
-        np.maximum.accumulate((few.error * sizes_of_few)[order] + _ROUNDING),
-    )
-    rough = rough + _ROUNDING
-    within = np.clip(rough, known[0], known[-1])
-    error = np.exp(np.interp(np.log(within), np.log(known), np.log(errors))) * rough / within
-    path.set_error(error / sizes)
+def spread_error(path, few, which, coarse):
+    """Set `path.error` from that of a few of its points on the same mesh.
+
+    The others' errors follow from how far they are from the same points on the coarse mesh that they were first found on: by the
+    power law through the few that lie next in this, in proportion beyond them.
+
+    Args:
+        few: some points of the path, with their errors; which: their indices.
+        coarse: the whole path on a coarser mesh.
+    """
+    sizes, apart = _sizes(path).largest, np.maximum(_apart(path, coarse)[0] - _ROUNDING, 0.0)
+    known, errors = apart[which], few.error * sizes[which]
+    told = (known > 100 * _ROUNDING) & (errors > 0)
+    error = apart.copy()
+    if told.any():
+        order = np.argsort(known[told])
+        known, errors = known[told][order], np.maximum.accumulate(errors[told][order])
+        within = np.clip(apart, known[0], known[-1])
+        error *= np.exp(np.interp(np.log(within), np.log(known), np.log(errors))) / within
+    error /= sizes
+    error[which] = few.error
+    path.set_error(error)
+
+
+def _apart(fine, coarse):
+    """Largest distances of the positions on two meshes, at all places and at element ends alone: (points,) both, lengths. Where
+    sections turn more than they move, positions are those off the axis too, at the radius of gyration."""
+    difference, at_ends, turning = np.zeros(len(fine)), np.zeros(len(fine)), _sizes(fine).turning
+    for i, rod in enumerate(fine.scene.rods):
+        nodes = coarse.layout.node_s(coarse.rule.nodes)[i]
+        x = np.sort(np.concatenate([nodes, (nodes[:-1] + nodes[1:]) / 2]))
+        ends = np.isin(x, coarse.layout.breaks[i])
+        off = coarse.motion(rod, x) - fine.motion(rod, x)
+        radius = 2 * _gyration(rod) / fine.scales.length
+        turned = turning[:, None] * radius * np.linalg.norm(off[:, :, 3:], axis=2)
+        off = np.maximum(np.linalg.norm(off[:, :, :3], axis=2), turned)
+        difference = np.maximum(difference, off.max(axis=1))
+        at_ends = np.maximum(at_ends, off[:, ends].max(axis=1))
+    return difference, at_ends
+
+
+_Sizes = namedtuple("_Sizes", "largest leading turning")
 
 
 def _sizes(path):
-    """What errors are relative to, and the largest leading coefficient of an element's displacement: (points,) both, lengths."""
-    largest, leading, p = np.full(len(path), 1e-9), np.zeros(len(path)), path.degree
+    """What errors are relative to, the largest leading coefficient of an element's displacement, both lengths, and whether the
+    turning of the sections is the larger part of the first; (points,) each."""
+    moved, turned = np.full(len(path), 1e-9), np.zeros(len(path))
+    leading, p = np.zeros(len(path)), path.degree
     for i, rod in enumerate(path.scene.rods):
-        moved = path.motion(rod, path.layout.node_s(path.rule.nodes)[i])
+        motion = path.motion(rod, path.layout.node_s(path.rule.nodes)[i])
         # |R - 1| = sqrt(8) |sin(angle/2)|
-        turned = np.sqrt(8) * np.linalg.norm(moved[:, :, 4:], axis=2).max(axis=1) * _gyration(rod) / path.scales.length
-        largest = np.maximum(largest, np.maximum(np.linalg.norm(moved[:, :, :3], axis=2).max(axis=1), turned))
+        angle = np.sqrt(8) * np.linalg.norm(motion[:, :, 4:], axis=2).max(axis=1)
+        turned = np.maximum(turned, angle * _gyration(rod) / path.scales.length)
+        moved = np.maximum(moved, np.linalg.norm(motion[:, :, :3], axis=2).max(axis=1))
         elements = p * np.arange(path.elements[i])[:, None] + np.arange(p + 1)
-        of_degree_p = np.einsum("j,kcji->kci", path.rule.leading, moved[:, elements, :3])
+        of_degree_p = np.einsum("j,kcji->kci", path.rule.leading, motion[:, elements, :3])
         leading = np.maximum(leading, np.linalg.norm(of_degree_p, axis=2).max(axis=1))
-    return largest, leading
+    return _Sizes(np.maximum(moved, turned), leading, turned > moved)
 
 
 def on_mesh(path, layout):

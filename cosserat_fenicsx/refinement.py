@@ -8,7 +8,7 @@ import math
 import numpy as np
 
 from cosserat_fenicsx.accuracy import estimate_error, hardest, spread_error
-from cosserat_fenicsx.errors import NotConverged
+from cosserat_fenicsx.errors import Interrupted, NotConverged
 
 _MOST_ELEMENTS = 1024
 # Two meshes that agree to this, relative to the largest displacement, are on one branch: the finer may start from the coarser.
@@ -28,53 +28,83 @@ def refine(trace, correct, layout, tol, degree):
     Raises:
         NotConverged: two meshes in a row cannot be solved, or the accuracy is not reached.
     """
-    whole = looked_at = before = which = (
-        None  # all points, and those that are looked at, on the last mesh that they were found on
-    )
-    level, level_of_whole, apart_of_whole = 0, -1, None
-    failed, best = False, math.inf
-    while True:
+    search = _Search(trace, correct, tol, degree)
+    try:
+        while True:
+            found = search.on(layout)
+            if found is not None:
+                return found
+            layout = layout.split(2)
+    except Interrupted as stop:  # what is complete on a coarser mesh is worth more than a part on a finer one
+        raise Interrupted(stop.path if search.whole is None else search.whole) from None
+
+
+class _Search:
+    """Where the search for a mesh stands.
+
+    Attributes:
+        whole: all points of the path on the last mesh that all were found on, or None.
+    """
+
+    def __init__(self, trace, correct, tol, degree):
+        self._trace, self._correct, self._tol, self._degree = trace, correct, tol, degree
+        self.whole = self._few = self._which = None  # `_few`: points that are looked at, on the last mesh
+        self._apart, self._apart_of_whole = None, None  # their differences to the mesh before, and of all points
+        self._level, self._level_of_whole = -1, -2
+        self._failed, self._best = False, math.inf
+
+    def on(self, layout):
+        """Look at the next mesh; a path that is accurate, or None."""
+        self._level += 1
         elements = max(layout.counts)
         try:
-            fine = None if looked_at is None else correct(layout, looked_at)
-            apart = None if fine is None else estimate_error(fine, looked_at, before)
-            if fine is None or apart.max() > _RESOLVED:
-                fine, coarse = trace(layout, whole), whole
-                apart = estimate_error(fine, coarse, apart_of_whole) if level == level_of_whole + 1 > 0 else None
-                whole, level_of_whole, apart_of_whole = fine, level, apart
-            elif len(fine) == len(whole):
-                whole, level_of_whole, apart_of_whole = fine, level, apart
-            elif fine.error.max() <= tol:
-                few, fine = fine, _all_points(correct, layout, whole, fine, which) or trace(layout, whole)
-                spread_error(fine, few)
-                whole, level_of_whole, apart_of_whole = fine, level, None
+            found = self._found_on(layout)
         except NotConverged:
-            if failed or elements >= _MOST_ELEMENTS:
+            if self._failed or elements >= _MOST_ELEMENTS:
                 raise
-            failed, looked_at, before = True, None, None
-        else:
-            failed = False
-            if apart is not None:
-                reached = float(fine.error.max())
-                if reached <= tol and fine is whole:
-                    return fine
-                if elements >= _MOST_ELEMENTS or (reached > best and best < 1e-8):
-                    raise NotConverged(_not_accurate(tol, min(reached, best), elements, degree), whole)
-                best = min(best, reached)
-            if fine is whole:
-                looked_at, which = hardest(whole)
-                before = None if apart_of_whole is None else apart_of_whole[which]
-            else:
-                looked_at, before = fine, apart
-        layout, level = layout.split(2), level + 1
+            self._failed, self._few, self._apart = True, None, None
+            return None
+        self._failed = False
+        if np.isfinite(found.error).all():
+            reached = float(found.error.max())
+            if reached <= self._tol and found is self.whole:
+                return found
+            if elements >= _MOST_ELEMENTS or (reached > self._best and self._best < 1e-8):
+                if found is not self.whole:
+                    found = self._all_points(layout, found)
+                raise NotConverged(_not_accurate(self._tol, min(reached, self._best), elements, self._degree), found)
+            self._best = min(self._best, reached)
+        if found is self.whole:
+            self._few, self._which = hardest(found)
+            self._apart = None if self._apart_of_whole is None else self._apart_of_whole[self._which]
+        return None
 
+    def _found_on(self, layout):
+        """The points that are looked at, or all, on a mesh, with their errors where these are known."""
+        few = None if self._few is None else self._correct(layout, self._few)
+        apart = None if few is None else estimate_error(few, self._few, self._apart)
+        if few is None or apart.max() > _RESOLVED:
+            whole, apart = self._trace(layout, self.whole), None
+            if self._level == self._level_of_whole + 1:
+                apart = estimate_error(whole, self.whole, self._apart_of_whole)
+            return self._keep(whole, apart)
+        if len(few) == len(self.whole):
+            return self._keep(few, apart)
+        self._few, self._apart = few, apart
+        return self._all_points(layout, few) if few.error.max() <= self._tol else few
 
-def _all_points(correct, layout, whole, few, which):
-    """The points of a path on a mesh where a few of them, `which`, were found; None where that will not do."""
-    others = np.ones(len(whole), dtype=bool)
-    others[which] = False
-    rest = correct(layout, whole.at_points(np.flatnonzero(others)))
-    return rest and few.with_points(rest, others)
+    def _keep(self, whole, apart):
+        self.whole, self._apart_of_whole, self._level_of_whole = whole, apart, self._level
+        return whole
+
+    def _all_points(self, layout, few):
+        """All points on a mesh where a few of them are known."""
+        others = np.ones(len(self.whole), dtype=bool)
+        others[self._which] = False
+        rest = self._correct(layout, self.whole.at_points(np.flatnonzero(others)))
+        whole = self._trace(layout, self.whole) if rest is None else few.with_points(rest, others)
+        spread_error(whole, few, self._which, self.whole)
+        return self._keep(whole, None)
 
 
 def _not_accurate(tol, reached, elements, degree):

@@ -5,6 +5,7 @@ import cosserat_fenicsx.compat  # noqa: F401, I001  first: it says in words what
 import functools
 import math
 import numbers
+from dataclasses import replace
 
 import numpy as np
 from mpi4py import MPI
@@ -12,6 +13,7 @@ from mpi4py import MPI
 from cosserat_fenicsx.checks import instance
 from cosserat_fenicsx.choose import choose
 from cosserat_fenicsx.continuation import StepControl
+from cosserat_fenicsx.curves import Line
 from cosserat_fenicsx.errors import NotConverged, SceneError, nearest
 from cosserat_fenicsx.follow import CONTROLS
 from cosserat_fenicsx.models.determinate import DeterminateInPlane, DeterminateInSpace
@@ -40,6 +42,8 @@ FIRST_ELEMENTS = 4
 _FINEST_FIRST, _SEEN = 256, 1e-3
 # Chord over arc of a quarter of an element, on an average: that of an arc of one radian.
 _STRAIGHT = 0.958
+# A prescribed rotation turns by no more than this in a step, rad: a step cannot tell it from one with a full turn more or less.
+_LARGEST_TURN = 1.0
 
 
 def solve(
@@ -109,6 +113,8 @@ def solve(
     follow, until = _follow_options(steps, control, branch), _until(until, free)
     if not steps.adaptive:
         _check_jumps(scene, targets)
+    elif _turn(scene):
+        follow["steps"] = replace(steps, largest=min(steps.largest or math.inf, _LARGEST_TURN / _turn(scene)))
 
     def take(choice, bar):
         strayed = []
@@ -166,25 +172,30 @@ def first_layout(scene, degree):
 
 def _sees(rod, breaks, degree):
     """Whether the quarters of elements are next to straight, and Gauss points on elements integrate the flexibilities 1/EI as
-    well as many more points do."""
+    well as many more points do: of a section that changes, or that turns about the curve."""
     quarters = (breaks[:-1, None] + np.diff(breaks)[:, None] * np.arange(4) / 4).ravel()
     chords = np.diff(rod.curve.position(np.append(quarters, 1.0) * rod.length), axis=0)
     if np.linalg.norm(chords, axis=1).sum() < _STRAIGHT * rod.length:
         return False
-    if rod.profile.uniform:
+    low, high = rod.profile.range
+    twisted = not isinstance(rod.curve, Line) and low.J[0] != high.J[1]
+    if rod.profile.uniform and not twisted:
         return True
     x, weights = np.polynomial.legendre.leggauss(degree)
     finer = max(8, _FINEST_FIRST // (len(breaks) - 1))
 
     def integrals(ends):
         s = ends[:-1, None] + np.diff(ends)[:, None] * (x + 1) / 2
-        flexible = 1 / rod.stiffness_at(s.ravel() * rod.length).J.reshape(*s.shape, 3)
-        return np.einsum("g,cgi,c->ci", weights / 2, flexible, np.diff(ends))
+        flexible = 1 / rod.stiffness_at(s.ravel() * rod.length).J[:, :2]
+        if twisted:  # as tensors of inertial components
+            across = rod.curve.frame(s.ravel() * rod.length)[:, :, :2]
+            flexible = np.einsum("kai,ki,kbi->kab", across, flexible, across)
+        return np.einsum("g,cgi,c->ci", weights / 2, flexible.reshape(*s.shape, -1), np.diff(ends))
 
     steps = np.arange(finer) / finer
     fine_ends = np.append((breaks[:-1, None] + np.diff(breaks)[:, None] * steps).ravel(), 1.0)
-    fine = integrals(fine_ends).reshape(len(breaks) - 1, finer, 3).sum(axis=1)
-    return bool((np.abs(integrals(breaks) - fine).sum(axis=0) <= _SEEN * fine.sum(axis=0)).all())
+    fine = integrals(fine_ends).reshape(len(breaks) - 1, finer, -1).sum(axis=1)
+    return bool((np.abs(integrals(breaks) - fine).sum(axis=0) <= _SEEN * np.abs(fine).sum(axis=0).max()).all())
 
 
 def _make_solvers(comm, shape):
@@ -229,13 +240,17 @@ def _follow_options(steps, control, branch):
 def _check_jumps(scene, targets):
     """One step cannot tell a prescribed rotation from the same one with a full turn more or less."""
     farthest = max(abs(b - a) for a, b in zip([0.0, *targets[:-1]], targets, strict=True))
-    for support in scene.supports:
-        turn = farthest * math.hypot(*(getattr(support, "rotation", None) or (0.0,)))
-        if turn >= math.pi:
-            raise SceneError(
-                f"steps = StepControl(adaptive=False): {type(support).__name__} at {support.station} would turn by {turn:.3g} rad in "
-                "one step: expected load factors that turn it by less than pi at a time"
-            )
+    turn = farthest * _turn(scene)
+    if turn >= math.pi:
+        raise SceneError(
+            f"steps = StepControl(adaptive=False): a Prescribed rotation would turn by {turn:.3g} rad in one step: expected load "
+            "factors that turn it by less than pi at a time"
+        )
+
+
+def _turn(scene):
+    """Largest prescribed rotation of a scene at load factor 1, rad; 0.0 where there is none."""
+    return max((math.hypot(*(getattr(x, "rotation", None) or (0.0,))) for x in scene.supports), default=0.0)
 
 
 def _until(until, free):

@@ -42,3 +42,49 @@ def test_every_point_of_a_path(scene, etas, tol):
     off = np.linalg.norm(positions(path) - truth, axis=2).max(axis=1) / np.linalg.norm(truth, axis=2).max(axis=1)
     assert (np.maximum(off, 1e-11) <= np.maximum(path.error, 1e-11)).all() and path.error.max() <= tol
     assert (path.error <= 30 * np.maximum(off, 1e-11)).all()
+
+
+@pytest.mark.parametrize(
+    "etas", [(0.0, 1.0), [0.0, 0.5, 1.0], np.linspace(-1, 1, 9), [1e-12, 1e-3, 0.3, 0.6, 1.0]], ids=str
+)
+def test_points_without_load(etas):
+    """Where nothing moves there is no error to speak of."""
+    rod, scene = column()
+    path = cf.solve(scene, etas if isinstance(etas, tuple) else list(etas))
+    assert path.error.max() <= 1e-6 and max(path.elements) <= 16
+
+
+def test_a_smooth_rod_does_not_hide_another():
+    """A long beam under a line load, whose quartic is met exactly, beside a short arc that is pulled straight."""
+
+    def stiff(bending):
+        return cf.Stiffness((1e6, 1e6), 1e6, (bending, bending), bending)
+
+    long = cf.Rod(cf.Line((0, 0, 0), (300.0, 0, 0)), stiff(1e3), name="long")
+    arc = cf.Rod(cf.Arc((0, 0, 0), (np.sin(0.5), 0, -np.cos(0.5)), 1.0, axis=(0, 1, 0)), stiff(1.0), name="arc")
+    held = [cf.Clamp(long.start), cf.Prescribed(long.end, rotation=(0, 0, 0)), cf.Roller(long.end, (0, 0, 1)),
+            cf.Roller(long.end, (0, 1, 0)), cf.Clamp(arc.start),
+            cf.Prescribed(arc.end, displacement=(0.03, 0, 0), rotation=(0, 0, 0))]  # fmt: skip
+    scene = cf.Scene([long, arc], held, [cf.LineForce(long, (0, 0, 384e3 / 300.0**4))])
+    etas = np.linspace(-0.98, 1, 20).tolist()
+    path, truth = cf.solve(scene, etas, tol=1e-6), positions(cf.solve(scene, etas, elements=64))
+    off = np.linalg.norm(positions(path) - truth, axis=2).max(axis=1) / np.linalg.norm(truth, axis=2).max(axis=1)
+    assert (off <= np.maximum(path.error, 1e-11)).all() and path.error.max() <= 1e-6
+
+
+def test_an_interrupted_search_hands_over_what_is_complete(monkeypatch):
+    from cosserat_fenicsx import tracing
+
+    def stop():
+        raise KeyboardInterrupt
+
+    _, scene = column()
+    corrected = tracing.Tracing.corrected
+    monkeypatch.setattr(
+        tracing.Tracing,
+        "corrected",
+        lambda *arguments: monkeypatch.setattr(tracing, "obey", stop) or corrected(*arguments),
+    )
+    with pytest.raises(cf.Interrupted) as stopped:
+        cf.solve(scene, np.linspace(0.1, 0.9, 8).tolist())
+    assert len(stopped.value.path) == 8

@@ -193,3 +193,15 @@ def test_one_jump_of_more_than_half_a_turn_is_refused():
     scene = cf.Scene([rod], [cf.Clamp(rod.start), turning])
     with pytest.raises(cf.SceneError, match=r"would turn by 5 rad in one step"):
         cf.solve(scene, [5.0], elements=4, steps=cf.StepControl(adaptive=False))
+
+
+@pytest.mark.serial
+@pytest.mark.parametrize("load_factors", [[1.0], [0.3, 0.6, 1.0]])
+def test_many_turns_are_not_mistaken_for_fewer(load_factors):
+    """Ten turns of a shaft, in torsion and in bending: each step is short enough to tell a turn from none."""
+    rod = cf.Rod(cf.Line((0, 0, 0), (1.0, 0, 0)), cf.Stiffness((1e4, 1e4), 1e4, (1.0, 1.0), 0.5))
+    for axis, stiffness in (((1, 0, 0), 0.5), ((0, 1, 0), 1.0)):
+        turns = cf.Prescribed(rod.end, rotation=tuple(20 * np.pi * np.array(axis)))
+        path = cf.solve(cf.Scene([rod], [cf.Clamp(rod.start), turns]), load_factors, elements=32)
+        expected = 20 * np.pi * stiffness * np.outer(path.load_factors, axis)
+        np.testing.assert_allclose(path.moment(rod.start), expected, atol=1e-5)
