@@ -53,6 +53,14 @@ _HOME = {
     "Weight": "loads",
     "euler_load": "rod",
     "read_scene": "scenefile",
+    "InitialVelocity": "initial",
+    "Ramp": "signals",
+    "Step": "signals",
+    "Triangle": "signals",
+    "Sine": "signals",
+    "Table": "signals",
+    "History": "history",
+    "simulate": "dynamics",
     "solve": "statics",
 }
 __all__ = sorted(_HOME)

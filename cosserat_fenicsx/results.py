@@ -67,6 +67,9 @@ class Path:
     Station queries return one row a point, in inertial components unless they say material.
     """
 
+    #: how a person calls the points
+    counted = "load factor(s)"
+
     def __init__(self, scene, layout, scales, rule, *, comm, rounding, model, formulation, degree, unknowns, why,
                  expand):  # fmt: skip
         self.scene, self.layout, self.scales, self.rule, self.comm = scene, layout, scales, rule, comm

@@ -80,20 +80,25 @@ class TieRows:
         """Add the derivative of `add_residual`."""
         if not self._here:
             return
-        _, gradient, change = self._evaluate(eta)
-        trial, test = self.model.tie_maps(self.seen[0])
+        of_nodes, reactions, equations = self._derivatives(eta)
         nodes = self.rows.ravel()
-        size = len(nodes)
-        of_nodes = np.einsum("kda,kalb,lbe->kdle", test, change, trial).reshape(size, size)
-        A.setValues(nodes, nodes, np.ascontiguousarray(of_nodes), _ADD)
-        reactions = np.einsum("kda,ika->kdi", test, gradient).reshape(size, -1)
-        equations = np.einsum("ikb,kbe->ike", gradient, trial).reshape(-1, size)
         # in C's order: petsc4py takes the numbers as they lie in memory
+        A.setValues(nodes, nodes, np.ascontiguousarray(of_nodes), _ADD)
         A.setValues(nodes, self._multipliers, np.ascontiguousarray(reactions), _ADD)
         A.setValues(self._multipliers, nodes, np.ascontiguousarray(equations), _ADD)
         for rows, value in ((self._multipliers, 0.0), (self._idle, 1.0)):
             for i in rows:
                 A.setValue(i, i, value, _ADD)
+
+    def _derivatives(self, eta):
+        """Of the reactions by the nodes and by the multipliers, and of the equations by the nodes, as matrices."""
+        _, gradient, change = self._evaluate(eta)
+        trial, test = self.model.tie_maps(self.seen[0])
+        size = self.rows.size
+        of_nodes = np.einsum("kda,kalb,lbe->kdle", test, change, trial).reshape(size, size)
+        reactions = np.einsum("kda,ika->kdi", test, gradient).reshape(size, -1)
+        equations = np.einsum("ikb,kbe->ike", gradient, trial).reshape(-1, size)
+        return of_nodes, reactions, equations
 
     def add_second_variation(self, K, rows, axes, eta, *, held=True):
         """Add what the equations mean for stability: held motions become stiff, reactions turn with the nodes.

@@ -23,6 +23,10 @@ class Ties:
     def __init__(self, ties, nodes, reference, length):
         self._ties, self._nodes, self._reference, self._length = ties, nodes, reference, length
 
+    def with_numbers_of(self, ties):
+        """The same equations with other numbers, those of motions at another time."""
+        return Ties(ties, self._nodes, self._reference, self._length)
+
     def evaluate(self, rq, eta, multipliers, which=None):
         """Values and derivatives at (r, q) (tied nodes, 7) and a load factor.
 

@@ -1,0 +1,209 @@
+"""Models that move: a rung with inertia, between the two ends of a step in time."""
+
+import math
+
+import numpy as np
+from dolfinx import fem
+from mpi4py import MPI
+
+from cosserat_fenicsx import compat
+from cosserat_fenicsx.checks import refuse
+from cosserat_fenicsx.models.connections import ties_of
+from cosserat_fenicsx.models.moving_forms import compile_spatial
+from cosserat_fenicsx.models.rod_data import gauss_function
+from cosserat_fenicsx.models.spatial import SpatialModel
+
+
+class Moving:
+    """What a rung adds to a `RodModel` to move; it must come first among the bases.
+
+    Inertia is integrated with the nodes as points, as |q| = 1 is: the order is that of the elements, every nodal q is a
+    rotation, and momenta belong to nodes.
+
+    Attributes:
+        state: unknowns of the nodes at the end of a step; start, velocity: unknowns and their rates at its beginning.
+        h: the Constant h, the length of the step.
+        time: unit of time, s.
+        damped: whether any section is.
+    """
+
+    variations = ()
+    #: numbers of the inertia of a node's section against turning
+    inertia_size = 0
+
+    def _motion_fields(self):
+        """The Functions that the forms know beside those of a `RodModel`."""
+        mesh, points = self.mesh, self.shape.points
+        self.start, self.velocity = fem.Function(self.space), fem.Function(self.space)
+        self.h = fem.Constant(mesh, np.float64(1))
+        self.mass, self.inertia = self._at_element_nodes(1), self._at_element_nodes(self.inertia_size)
+        self.Kt, self.Jt = gauss_function(mesh, points, 3), gauss_function(mesh, points, 3)
+
+    def _at_element_nodes(self, size):
+        element = compat.lagrange(self.mesh, self.shape.degree, size, discontinuous=True)
+        return fem.Function(compat.function_space(self.mesh, element))
+
+    def load(self, scene, layout):
+        """See `RodModel`; mass and inertia too.
+
+        Raises:
+            SceneError: a rod without mass or inertia.
+        """
+        check_inertia(scene)
+        super().load(scene, layout)
+        scales = self.scales
+        heaviest = max(float(rod.profile.range[1].mass) for rod in scene.rods)
+        self.time = math.sqrt(heaviest * scales.length**2 / scales.force)
+        self._origins = np.concatenate([
+            np.tile(scene.origin(rod) / scales.length, (cells * self.shape.degree + 1, 1))
+            for rod, cells in zip(scene.rods, layout.counts, strict=True)
+        ])  # fmt: skip
+        mass, inertia = [], []
+        for rod, x in zip(scene.rods, layout.inside(self.nodes), strict=True):
+            s = x * rod.length
+            after, before = rod.stiffness_at(s, "right"), rod.stiffness_at(s, "left")
+            first = np.arange(s.shape[1]) == 0  # on a jump each element has its own side
+            mass.append(np.where(first, after.mass, before.mass) / heaviest)
+            J = np.where(first[:, None], after.inertia, before.inertia) / (heaviest * scales.length**2)
+            inertia.append(self._section_inertia(J, rod.curve.frame(s.ravel()).reshape(*s.shape, 3, 3)))
+        self._fill_nodes(self.mass, np.concatenate(mass)[..., None])
+        self._fill_nodes(self.inertia, np.concatenate(inertia))
+        self.start.x.array[:] = self.state.x.array
+        self.velocity.x.array[:] = 0.0
+        self.damped = False
+
+    def _fill_nodes(self, function, values):
+        """Values (elements, p + 1, k) at the nodes of every element, in the scene's order, into a Function."""
+        local = values[self.rods.cells]
+        local[self.rods.reversed] = local[self.rods.reversed][:, ::-1]
+        space = function.function_space
+        order = np.argsort(np.argsort(compat.element_nodes(space)))
+        function.x.array.reshape(-1, values.shape[2])[compat.cell_nodes(space)] = local[:, order]
+
+    # -- what a rung fills in ----------------------------------------------------------------------------------------
+
+    def _section_inertia(self, J, frames):
+        """(elements, p + 1, inertia_size) from Jrho about d_1, d_2, d_3 (.., 3) and the frames at rest (.., 3, 3)."""
+        raise NotImplementedError
+
+    def passed(self):
+        """(local numbers,) the step from `start` to `state` as something that loads do work on: displacements, and
+        small rotations where tests have rotations."""
+        raise NotImplementedError
+
+    def set_velocity(self, linear, angular):
+        """Take velocities (N, 3) and angular velocities (N, 3) of all nodes, dimensionless, inertial, the scene's order."""
+        raise NotImplementedError
+
+    def rates(self):
+        """A function from the nodes' unknowns and their rates, (.., components) each, to velocities and angular
+        velocities (.., 6), inertial, dimensionless."""
+        raise NotImplementedError
+
+    def _momenta_of(self, p):
+        """Linear and angular momenta, (n, 3) each, inertial, in the rows (n, components) of nodes."""
+        raise NotImplementedError
+
+    def _positions(self):
+        """(n, 3) of the local nodes, inertial, from where their structure starts."""
+        raise NotImplementedError
+
+    # -- what steppers and results ask for ---------------------------------------------------------------------------
+
+    def loads_at(self, t):
+        """Put the loads at the time t (s) into the forms' Functions."""
+        self._loads.at(t)
+
+    @property
+    def moving_loads(self):
+        """The Functions of loads that depend on time."""
+        return self._loads.moving
+
+    def ties_at(self, t):
+        """The `Ties` at the time t (s)."""
+        return self.ties.with_numbers_of(ties_of(self.scene, t))
+
+    def largest_local(self, change):
+        """Largest move (lengths) or turn (rad) in a change of the local numbers, over all ranks."""
+        nodal = change[self._nodal]
+        squares = np.square(nodal[:, : self.moves]).sum(axis=1), self.turn**2 * np.square(nodal[:, self.moves :]).sum(axis=1)
+        local = math.sqrt(max(x.max(initial=0.0) for x in squares))
+        return self.comm.allreduce(local, op=MPI.MAX) if self.comm.size > 1 else local
+
+    def snapshot_of_rates(self):
+        """(N, components) `velocity` at the nodes, the scene's order, all ranks, dimensionless."""
+        return self._gather_nodes(self.velocity.x.array[self._nodal[: self._owned_nodes]])
+
+    def momenta(self, tested):
+        """Linear (3,) and angular momentum (3,) about the inertial origin, over all ranks, dimensionless.
+
+        Args:
+            tested: (local numbers,) the assembled `forms.momentum`, contributions of this rank's elements.
+        """
+        linear, angular = self._momenta_of(tested[self._nodal])
+        place = self._positions() + self._origins[self._slots]
+        both = np.concatenate([linear.sum(axis=0), (np.cross(place, linear) + angular).sum(axis=0)])
+        return np.split(self.comm.allreduce(both), 2)
+
+
+def check_inertia(scene):
+    """Refuse a rod that cannot move.
+
+    Raises:
+        SceneError: a rod without mass or inertia.
+    """
+    for rod in scene.rods:
+        low = rod.profile.range[0]
+        for field, value in (("mass", low.mass), ("inertia", low.inertia)):
+            if value is None:
+                owner, name = ("Stiffness", field) if rod.material is None else ("Material", "density")
+                refuse(f"Rod '{rod.name}': {owner}", name, None, "a value, which a motion needs")
+
+
+class MovingSpatial(Moving, SpatialModel):
+    """The spatial rung with inertia."""
+
+    variations = ()
+    inertia_size = 6
+
+    def _compile(self, spaces):
+        self._motion_fields()
+        return compile_spatial(self)
+
+    def _section_inertia(self, J, frames):
+        I_R = np.einsum("...ij,...j,...kj->...ik", frames, J, frames)
+        return I_R[..., [0, 0, 0, 1, 1, 2], [0, 1, 2, 1, 2, 2]]
+
+    def passed(self):
+        """See `Moving`."""
+        nodal = self._nodal
+        now, before = self.state.x.array[nodal], self.start.x.array[nodal]
+        work = np.zeros_like(self.state.x.array)
+        work[nodal[:, :3]] = now[:, :3] - before[:, :3]
+        work[nodal[:, 4:]] = turned_by(now[:, 3:] - before[:, 3:], (now[:, 3:] + before[:, 3:]) / 2)
+        return work
+
+    def set_velocity(self, linear, angular):
+        """See `Moving`."""
+        slots, nodal, x = self._slots, self._nodal, self.velocity.x.array
+        q, turning = self.state.x.array[nodal[:, 3:]], angular[slots]
+        x[nodal[:, :3]] = linear[slots]
+        x[nodal[:, 3]] = -np.einsum("ij,ij->i", turning, q[:, 1:]) / 2
+        x[nodal[:, 4:]] = (q[:, :1] * turning + np.cross(turning, q[:, 1:])) / 2
+
+    def rates(self):
+        """See `Moving`."""
+        return lambda nodal, rates: np.concatenate([rates[..., :3], turned_by(rates[..., 3:], nodal[..., 3:])], axis=-1)
+
+    def _momenta_of(self, p):
+        return p[:, :3], p[:, 4:]
+
+    def _positions(self):
+        return self.state.x.array[self._nodal[:, :3]]
+
+
+def turned_by(dq, q):
+    """(.., 3) the inertial rotations 2 vec(dq conj(q))/|q|^2 of changes dq of q, (.., 4) each."""
+    v, dv = q[..., 1:], dq[..., 1:]
+    turned = 2 * (q[..., :1] * dv - dq[..., :1] * v - np.cross(dv, v))
+    return turned / np.einsum("...i,...i->...", q, q)[..., None]

@@ -1,0 +1,6 @@
+"""Schemes: how a motion goes from t to t + h. A new scheme is one file here, and its forms."""
+
+from cosserat_fenicsx.steppers.momentum import Momentum
+
+#: Steppers by the names of `simulate`; each follows `protocol.Stepper`.
+SCHEMES = {"momentum": Momentum}

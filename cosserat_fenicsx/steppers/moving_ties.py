@@ -1,0 +1,58 @@
+"""Equations of supports and joints in a step of time: they hold at its end, their reactions act half way."""
+
+import numpy as np
+
+from cosserat_fenicsx.tie_rows import TieRows
+
+
+class MovingTies(TieRows):
+    """See `TieRows`. Reactions along directions half way keep the order 2, and turning what they hold takes no work."""
+
+    def begin(self, ties):
+        """A step starts at what was seen last; `ties` are those of its end."""
+        self._ties_at_end = ties
+        if self._here:
+            self._start = self.seen[0].copy()
+            self._added_values = (None, None)
+
+    def _middle(self):
+        return (self.seen[0] + self._start) / 2
+
+    def _evaluate(self, eta):
+        if self._added_values[0] != eta:
+            nodal, multipliers = self.seen
+            ties, motion_of = self._ties_at_end, self.model.tied_motion
+            c, self._at_end, _ = ties.evaluate(motion_of(nodal), eta, multipliers, self._added)
+            _, gradient, change = ties.evaluate(motion_of(self._middle()), eta, multipliers, self._added)
+            self._added_values = eta, (c, gradient, change)
+        return self._added_values[1]
+
+    def _derivatives(self, eta):
+        _, gradient, change = self._evaluate(eta)
+        trial, test = self.model.tie_maps(self._middle())
+        trial_at_end, _ = self.model.tie_maps(self.seen[0])
+        size = self.rows.size
+        of_nodes = np.einsum("kda,kalb,lbe->kdle", test, change, trial / 2).reshape(size, size)
+        reactions = np.einsum("kda,ika->kdi", test, gradient).reshape(size, -1)
+        equations = np.einsum("ikb,kbe->ike", self._at_end, trial_at_end).reshape(-1, size)
+        return of_nodes, reactions, equations
+
+    def work(self, eta):
+        """What the reactions did on the structure in the step; on the last rank, else 0."""
+        if not self._here:
+            return 0.0
+        _, gradient, _ = self._evaluate(eta)
+        nodal, multipliers = self.seen
+        trial, _ = self.model.tie_maps(self._middle())
+        passed = np.einsum("kbe,ke->kb", trial, nodal - self._start)
+        return -float(np.einsum("ikb,kb,i->", gradient, passed, multipliers[self._added]))
+
+    def violation(self, ties, eta):
+        """Largest |c| of `ties` where the nodes are, with the index of that equation; on all ranks."""
+        comm, found = self.numbering.comm, (0.0, 0)
+        if self._here:
+            nodal, multipliers = self.seen
+            c, _, _ = ties.evaluate(self.model.tied_motion(nodal), eta, multipliers, self._added)
+            k = int(np.argmax(np.abs(c), axis=0)) if len(c) else 0
+            found = (float(np.abs(c).max(initial=0.0)), self._added[k] if len(c) else 0)
+        return comm.bcast(found, root=comm.size - 1)
