@@ -131,7 +131,8 @@ class _Run:
             self._steps += 1
             return h
         if halvings == _HALVINGS:
-            self._save(t)
+            if self.history[-1].time < t:
+                self._save(t)
             raise NotConverged(
                 f"the motion was lost at t = {t:.6g} s, where a step of {h:.3g} s still fails: {solved.reason}. Try a smaller dt or tol, "
                 "more elements, or damping.",
@@ -187,10 +188,14 @@ def _pace(duration, tol, dt):
     """What chooses the steps."""
     if dt is not None:
         if tol is not None:
-            raise SceneError(f"simulate: dt = {dt!r} and tol = {tol!r}: expected one of them, a fixed or an adaptive step")
+            raise SceneError(
+                f"simulate: dt = {dt!r} and tol = {tol!r}: expected one of them, a fixed or an adaptive step"
+            )
         return Fixed(min(_positive("dt", dt), duration))
     tol = _TOL if tol is None else tol
-    return Adaptive(number("simulate", "tol", tol, "a number from 1e-10 to below 1", lambda x: 1e-10 <= x < 1), duration)
+    return Adaptive(
+        number("simulate", "tol", tol, "a number from 1e-10 to below 1", lambda x: 1e-10 <= x < 1), duration
+    )
 
 
 def _positive(name, value):
@@ -199,7 +204,9 @@ def _positive(name, value):
 
 def _marks(scene, duration, save_every):
     """[(time, whether something jumps there, whether it is saved)], the first at 0, the last the end."""
-    jumps = {t for item in scene.moving for signal in signals_of(item).values() for t in signal.jumps if 0 < t < duration}
+    jumps = {
+        t for item in scene.moving for signal in signals_of(item).values() for t in signal.jumps if 0 < t < duration
+    }
     saved = set()
     if save_every is not None:
         count = math.ceil(duration / save_every - 1e-9)

@@ -132,10 +132,12 @@ class Prescribed:
         instance(self, "station", self.station, Station, _A_STATION)
         if self.displacement is None and self.rotation is None:
             refuse(self, "displacement", None, "a displacement (m) or a rotation (rad), or both")
-        if self.displacement is not None:
-            store(self, displacement=vector_or_signal(self, "displacement", self.displacement, "m", self.jumps))
-        if self.rotation is not None:
-            store(self, rotation=vector_or_signal(self, "rotation", self.rotation, "rad", self.jumps))
+        given = [("displacement", self.displacement, "m"), ("rotation", self.rotation, "rad")]
+        moving = any(callable(value) for _, value, _ in given)
+        for field, value, unit in given:
+            if value is not None:
+                jumps = () if moving and not callable(value) else self.jumps
+                store(self, **{field: vector_or_signal(self, field, value, unit, jumps)})
 
     def ties(self):
         """The equations that hold; at the time 0 where the motion depends on time."""

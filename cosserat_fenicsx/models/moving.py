@@ -123,11 +123,11 @@ class Moving:
         """The `Ties` at the time t (s)."""
         return self.ties.with_numbers_of(ties_of(self.scene, t))
 
-    def largest_local(self, change):
-        """Largest move (lengths) or turn (rad) in a change of the local numbers, over all ranks."""
+    def largest_of(self, change, turns):
+        """Largest move (lengths), or turn (rad) times `turns`, in a change of the local numbers, over all ranks."""
         nodal = change[self._nodal]
-        squares = np.square(nodal[:, : self.moves]).sum(axis=1), self.turn**2 * np.square(nodal[:, self.moves :]).sum(axis=1)
-        local = math.sqrt(max(x.max(initial=0.0) for x in squares))
+        moved, turned = (np.square(x).sum(axis=1).max(initial=0.0) for x in np.split(nodal, [self.moves], axis=1))
+        local = math.sqrt(max(moved, (turns * self.turn) ** 2 * turned))
         return self.comm.allreduce(local, op=MPI.MAX) if self.comm.size > 1 else local
 
     def snapshot_of_rates(self):

@@ -4,6 +4,11 @@ import numpy as np
 
 from cosserat_fenicsx.steppers.newton import StepNewton
 
+# Error estimates look back over three times so many steps: what changes within a few steps is not resolved, but small.
+_APART = 8
+#: What an error of 1 rad counts as, in lengths.
+TURNS = 0.1
+
 
 class Momentum:
     """See `steppers.Stepper`."""
@@ -37,7 +42,10 @@ class Momentum:
             self._state[:] = self._start
             problem.begin()
             return solved
-        self._past = [*self._past[-2:], (unit, self._start.copy(), rates.copy(), (self.work, self.dissipated))]
+        self._past = [
+            *self._past[1 - 3 * _APART :],
+            (unit, self._start.copy(), rates.copy(), (self.work, self.dissipated)),
+        ]
         self.work += problem.work()
         self.dissipated += problem.dissipated()
         rates[:] = 2 / unit * (self._state - self._start) - rates
@@ -56,14 +64,14 @@ class Momentum:
 
         Positions alone, since velocities carry what fast waves leave; those are not resolved, and small.
         """
-        if len(self._past) < 3:
+        if len(self._past) < 3 * _APART:
             return None
         steps = np.array([h for h, *_ in self._past])
-        states = [state for _, state, *_ in self._past] + [self._state]
-        times = np.concatenate([[0.0], np.cumsum(steps)])
+        states = [state for _, state, *_ in self._past[::_APART]] + [self._state]
+        times = np.concatenate([[0.0], np.cumsum(steps)])[::_APART]
         weights = [1 / np.prod([a - b for b in times if b != a]) for a in times]
         third = sum(w * x for w, x in zip(weights, states, strict=True))  # a sixth of the derivative
-        return 0.5 * steps[-1] ** 3 * self.problem.model.largest_local(third)
+        return 0.5 * steps[-1] ** 3 * self.problem.model.largest_of(third, TURNS)
 
     def undo(self):
         """See `Stepper`."""

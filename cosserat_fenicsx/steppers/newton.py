@@ -102,7 +102,11 @@ class StepNewton:
             return _Reason.DIVERGED_DTOL
         rate = step / self._steps[-2] if iteration > 1 else 1.0
         enough = INCREMENT * min(1.0, self.problem.h)
-        if step <= enough or (rate < 0.9 and step * rate / (1 - rate) <= enough) or (step <= ROUNDING and rate > 0.5 and iteration > 1):
+        if (
+            step <= enough
+            or (rate < 0.9 and step * rate / (1 - rate) <= enough)
+            or (step <= ROUNDING and rate > 0.5 and iteration > 1)
+        ):
             return _Reason.CONVERGED_SNORM_RELATIVE
         if iteration >= _MOST:
             return _Reason.DIVERGED_MAX_IT
