@@ -21,6 +21,7 @@ _HOME = {
     "Circle": "sections",
     "Clamp": "supports",
     "CosseratError": "errors",
+    "Damping": "damping",
     "EccentricForce": "loads",
     "FollowerForce": "loads",
     "FollowerMoment": "loads",

@@ -37,6 +37,7 @@ import tomllib
 from pathlib import Path
 
 from cosserat_fenicsx.curves import CURVES
+from cosserat_fenicsx.damping import Damping
 from cosserat_fenicsx.errors import SceneError, nearest
 from cosserat_fenicsx.initial import InitialVelocity
 from cosserat_fenicsx.joints import Joint
@@ -113,7 +114,7 @@ def _scene(tables, folder):
 
 
 def _rod(where, entry, materials, folder):
-    _known_keys(where, entry, {"name", "curve", "section", "material"})
+    _known_keys(where, entry, {"name", "curve", "section", "material", "damping"})
     for key in ("curve", "section"):
         if key not in entry:
             raise SceneError(f"{where}: '{key}' is missing: expected a table with a type")
@@ -128,8 +129,11 @@ def _rod(where, entry, materials, folder):
         material = _build(f"{where}.material", material, (Material,), {})
     curve = _build(f"{where}.curve", entry["curve"], CURVES, {}, folder)
     section = _section(f"{where}.section", entry["section"])
+    more = {"name": entry["name"]} if "name" in entry else {}
+    if "damping" in entry:
+        more["damping"] = _build(f"{where}.damping", entry["damping"], (Damping,), {})
     try:
-        return Rod(curve, section, material, **({"name": entry["name"]} if "name" in entry else {}))
+        return Rod(curve, section, material, **more)
     except SceneError as problem:
         raise SceneError(f"{where}: {problem}") from None
 

@@ -67,10 +67,16 @@ def averaged_stress(before, after, middle, section, viscosity, h, test):
     return balance(n, m, middle, test)
 
 
-def dissipation(before, after, section, viscosity, h):
-    """What damping takes in a step, per length."""
+def viscous_loss(before, after, section, viscosity, h):
+    """What Kelvin-Voigt damping takes in a step, per length."""
     total = 0
     for Kt, strain in ((viscosity.Kt, stretch_and_shear), (viscosity.Jt, bending_and_torsion)):
         rate = (strain(after, section) - strain(before, section)) / h
         total += h * ufl.dot(rate, scaled(Kt, rate))
     return total
+
+
+def contact(motion, section, viscosity, rate):
+    """(n, m), eqs. (2)-(3) with their viscous terms, inertial; `rate(a)` is the time derivative of an expression."""
+    T, e, u = frame(motion, section), stretch_and_shear(motion, section), bending_and_torsion(motion, section)
+    return T * (scaled(section.K, e) + scaled(viscosity.Kt, rate(e))), T * (scaled(section.J, u) + scaled(viscosity.Jt, rate(u)))

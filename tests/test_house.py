@@ -39,7 +39,7 @@ def test_forms_know_ufl_alone():
 
 
 SCENE = (
-    "checks", "choose", "curves", "errors", "frames", "initial", "joints", "loads", "materials", "planes", "polylines", "profiles", "quadrature", "rod",
+    "checks", "choose", "curves", "damping", "errors", "frames", "initial", "joints", "loads", "materials", "planes", "polylines", "profiles", "quadrature", "rod",
     "scene", "scenefile", "sections", "signals", "splines", "statical", "supports", "ties",
 )  # fmt: skip
 SOLVERS = (

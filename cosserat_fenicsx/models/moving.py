@@ -8,6 +8,7 @@ from mpi4py import MPI
 
 from cosserat_fenicsx import compat
 from cosserat_fenicsx.checks import refuse
+from cosserat_fenicsx.damping import Damping
 from cosserat_fenicsx.models.connections import ties_of
 from cosserat_fenicsx.models.moving_forms import compile_spatial
 from cosserat_fenicsx.models.rod_data import gauss_function
@@ -36,7 +37,8 @@ class Moving:
         mesh, points = self.mesh, self.shape.points
         self.start, self.velocity = fem.Function(self.space), fem.Function(self.space)
         self.h = fem.Constant(mesh, np.float64(1))
-        self.mass, self.inertia = self._at_element_nodes(1), self._at_element_nodes(self.inertia_size)
+        self.mass, self.drag = self._at_element_nodes(1), self._at_element_nodes(1)
+        self.inertia = self._at_element_nodes(self.inertia_size)
         self.Kt, self.Jt = gauss_function(mesh, points, 3), gauss_function(mesh, points, 3)
 
     def _at_element_nodes(self, size):
@@ -58,19 +60,38 @@ class Moving:
             np.tile(scene.origin(rod) / scales.length, (cells * self.shape.degree + 1, 1))
             for rod, cells in zip(scene.rods, layout.counts, strict=True)
         ])  # fmt: skip
-        mass, inertia = [], []
+        mass, inertia, drag = [], [], []
         for rod, x in zip(scene.rods, layout.inside(self.nodes), strict=True):
             s = x * rod.length
             after, before = rod.stiffness_at(s, "right"), rod.stiffness_at(s, "left")
             first = np.arange(s.shape[1]) == 0  # on a jump each element has its own side
             mass.append(np.where(first, after.mass, before.mass) / heaviest)
             J = np.where(first[:, None], after.inertia, before.inertia) / (heaviest * scales.length**2)
+            drag.append(np.full(s.shape, rod.damping.drag * self.time if rod.damping else 0.0))
             inertia.append(self._section_inertia(J, rod.curve.frame(s.ravel()).reshape(*s.shape, 3, 3)))
         self._fill_nodes(self.mass, np.concatenate(mass)[..., None])
+        self._fill_nodes(self.drag, np.concatenate(drag)[..., None])
         self._fill_nodes(self.inertia, np.concatenate(inertia))
         self.start.x.array[:] = self.state.x.array
         self.velocity.x.array[:] = 0.0
-        self.damped = False
+        self._damp()
+
+    def _damp(self):
+        """Take the viscosity of the rods."""
+        scene, layout, scales = self.scene, self.layout, self.scales
+        damped = [rod.damping or Damping() for rod in scene.rods]
+        Kt, Jt = [], []
+        for rod, damping, x in zip(scene.rods, damped, layout.inside(self.rule.gauss), strict=True):
+            K, J = damping.viscosity(rod.stiffness_at(x * rod.length))
+            Kt.append(K / (scales.force * self.time))
+            Jt.append(J / (scales.moment * scales.length * self.time))
+        for function, values in ((self.Kt, Kt), (self.Jt, Jt)):
+            self.rods.fill(function, self._in_order(np.concatenate(values)))
+        self.damped = damped != [Damping()] * len(damped)
+
+    def _in_order(self, values):
+        """Values (elements, points, 3) along or about d_1, d_2, d_3, in the order of the rung's sections."""
+        return values
 
     def _fill_nodes(self, function, values):
         """Values (elements, p + 1, k) at the nodes of every element, in the scene's order, into a Function."""

@@ -62,27 +62,34 @@ def compile_spatial(model):
 
     def momentum(w, w_t):
         (_, q), (r_t, q_t) = parts(w), parts(w_t)
-        return inertia.momentum(r_t, inertia.angular_momentum(q, q_t, body), body, test) * dx.nodes
+        return inertia.momentum(r_t, inertia.angular_momentum(q, q_t, body), body, test)
 
     rates_after = 2 * (nodal - nodal0) / model.h - rates
-    residual = 1 / model.h * momentum(nodal, rates_after)
+    residual = 1 / model.h * momentum(nodal, rates_after) * dx.nodes
     residual += inertia.averaged_stress(before, after, middle, section, viscosity, model.h, test) * dx.gauss
+    # drag: -drag times the momenta half way, with the velocities (U - U0)/h
+    passed, halfway = (nodal - nodal0) / model.h, (nodal + nodal0) / 2
+    residual += model.drag[0] * momentum(halfway, passed) * dx.nodes
     residual += eq.unit_quaternion(after._replace(q_node=parts(nodal)[1]), test) * dx.nodes
-    R_middle = rotation_matrix(parts((nodal + nodal0) / 2)[1])
+    R_middle = rotation_matrix(parts(halfway)[1])
     loads = load_work(model, dx, test, R_middle, {U, nodal})
     derivative = derivative_in(trial, *dict.fromkeys((U, nodal)))
     residual, tangent = with_live_loads(model, loads, residual, derivative(residual), derivative)
 
-    q, (r_t, q_t) = parts(nodal)[1], parts(rates)
-    kinetic = inertia.kinetic_energy(r_t, inertia.angular_velocity(q, q_t), body) * dx.nodes
-    n, m = equilibrium.contact_force(after, section), equilibrium.contact_moment(after, section)
+    def kinetic(w, w_t):
+        (_, q), (r_t, q_t) = parts(w), parts(w_t)
+        return inertia.kinetic_energy(r_t, inertia.angular_velocity(q, q_t), body)
+
+    n, m = inertia.contact(after, section, viscosity, lambda a: ufl.derivative(a, U, V))
+    lost = inertia.viscous_loss(before, after, section, viscosity, model.h) * dx.gauss
+    lost += 2 * model.h * model.drag[0] * kinetic(halfway, passed) * dx.nodes
     live = sum(term for term, _, _ in loads.live) if loads.live else None
     others = {
-        "momentum": momentum(nodal, rates),
+        "momentum": momentum(nodal, rates) * dx.nodes,
         "live": live,
-        "kinetic": kinetic,
+        "kinetic": kinetic(nodal, rates) * dx.nodes,
         "strain": inertia.strain_energy(after, section) * dx.gauss,
-        "dissipated": inertia.dissipation(before, after, section, viscosity, model.h) * dx.gauss,
+        "dissipated": lost,
     }
     return compile_motion(model, residual, tangent, loads.dead, ufl.as_vector([*n, *m, *after.r_s]), others)
 
