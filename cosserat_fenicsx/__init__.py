@@ -36,6 +36,8 @@ _HOME = {
     "LineForce": "loads",
     "LineMoment": "loads",
     "Material": "materials",
+    "Modes": "modes",
+    "modes": "modes",
     "Moment": "loads",
     "NotConverged": "errors",
     "Path": "results",

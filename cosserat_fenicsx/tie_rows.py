@@ -65,6 +65,14 @@ class TieRows:
         comm = self.numbering.comm
         return comm.bcast(self.seen[1] if self._here else None, root=comm.size - 1)
 
+    def gradients(self):
+        """(ties, tied nodes, 6) of all equations where the nodes are, over (displacement, rotation), on all ranks."""
+        comm, found = self.numbering.comm, None
+        if self._here:
+            nodal, multipliers = self.seen
+            _, found, _ = self.model.ties.evaluate(self.model.tied_motion(nodal), 0.0, multipliers)
+        return comm.bcast(found, root=comm.size - 1)
+
     def add_residual(self, b, eta):
         """Add reactions to the rows of the nodes, and the equations in rows of their own."""
         if self._here:

@@ -7,11 +7,10 @@ from dolfinx import fem
 from mpi4py import MPI
 
 from cosserat_fenicsx import compat
-from cosserat_fenicsx.checks import refuse
 from cosserat_fenicsx.damping import Damping
 from cosserat_fenicsx.models.connections import ties_of
 from cosserat_fenicsx.models.moving_forms import compile_spatial
-from cosserat_fenicsx.models.rod_data import gauss_function
+from cosserat_fenicsx.models.rod_data import check_inertia, gauss_function, nodal_inertia
 from cosserat_fenicsx.models.spatial import SpatialModel
 
 
@@ -60,18 +59,11 @@ class Moving:
             np.tile(scene.origin(rod) / scales.length, (cells * self.shape.degree + 1, 1))
             for rod, cells in zip(scene.rods, layout.counts, strict=True)
         ])  # fmt: skip
-        mass, inertia, drag = [], [], []
-        for rod, x in zip(scene.rods, layout.inside(self.nodes), strict=True):
-            s = x * rod.length
-            after, before = rod.stiffness_at(s, "right"), rod.stiffness_at(s, "left")
-            first = np.arange(s.shape[1]) == 0  # on a jump each element has its own side
-            mass.append(np.where(first, after.mass, before.mass) / heaviest)
-            J = np.where(first[:, None], after.inertia, before.inertia) / (heaviest * scales.length**2)
-            drag.append(np.full(s.shape, rod.damping.drag * self.time if rod.damping else 0.0))
-            inertia.append(self._section_inertia(J, rod.curve.frame(s.ravel()).reshape(*s.shape, 3, 3)))
-        self._fill_nodes(self.mass, np.concatenate(mass)[..., None])
-        self._fill_nodes(self.drag, np.concatenate(drag)[..., None])
-        self._fill_nodes(self.inertia, np.concatenate(inertia))
+        mass, J, frames = nodal_inertia(scene, layout, self.nodes)
+        drags = [rod.damping.drag * self.time if rod.damping else 0.0 for rod in scene.rods]
+        self._fill_nodes(self.mass, mass[..., None] / heaviest)
+        self._fill_nodes(self.inertia, self._section_inertia(J / (heaviest * scales.length**2), frames))
+        self._fill_nodes(self.drag, np.repeat(drags, layout.counts)[:, None, None] * np.ones((1, len(self.nodes), 1)))
         self.start.x.array[:] = self.state.x.array
         self.velocity.x.array[:] = 0.0
         self._damp()
@@ -165,20 +157,6 @@ class Moving:
         place = self._positions() + self._origins[self._slots]
         both = np.concatenate([linear.sum(axis=0), (np.cross(place, linear) + angular).sum(axis=0)])
         return np.split(self.comm.allreduce(both), 2)
-
-
-def check_inertia(scene):
-    """Refuse a rod that cannot move.
-
-    Raises:
-        SceneError: a rod without mass or inertia.
-    """
-    for rod in scene.rods:
-        low = rod.profile.range[0]
-        for field, value in (("mass", low.mass), ("inertia", low.inertia)):
-            if value is None:
-                owner, name = ("Stiffness", field) if rod.material is None else ("Material", "density")
-                refuse(f"Rod '{rod.name}': {owner}", name, None, "a value, which a motion needs")
 
 
 class MovingSpatial(Moving, SpatialModel):
