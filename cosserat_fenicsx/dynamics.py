@@ -57,7 +57,8 @@ def simulate(
             and of rotations (rad), as far as the error of single steps tells; steps adapt to it. Default 1e-3, unless `dt`
             is given. The mesh does not adapt: compare with more `elements`.
         dt: fixed step, s; shorter where it would step over a jump or a saved time. A step that fails is halved.
-        scheme: "momentum" (exact linear and angular momentum, order 2).
+        scheme: "momentum" (exact linear and angular momentum, order 2); "triple-jump" (three steps of it, one back in time: order
+            4, for smooth motions without damping, fixed dt).
         save_every: s between saved states, landed on exactly; None saves every step.
         start: None for the reference, a `Path` for its last equilibrium, or (Path, k); rods must be the same objects.
         load_factor: multiplies all loads and prescribed motions, as in `solve`.
@@ -77,7 +78,9 @@ def simulate(
     comm = comm or MPI.COMM_WORLD
     instance("simulate", "scene", scene, Scene, "a Scene")
     duration = _positive("duration", duration)
-    pace = _pace(duration, tol, dt)
+    if scheme not in SCHEMES:
+        raise SceneError(f"scheme = {scheme!r}: {nearest(scheme, SCHEMES)}")
+    pace = _pace(duration, tol, dt, scheme)
     save_every = None if save_every is None else _positive("save_every", save_every)
     number("simulate", "load_factor", load_factor, "a finite number", math.isfinite)
     if isinstance(elements, bool) or not isinstance(elements, numbers.Integral) or elements < 1:
@@ -125,7 +128,7 @@ class _Run:
         solved = self._stepper.step(t, h)
         self._iterations += solved.iterations
         if solved.converged:
-            if not halvings and not self._pace.accepts(self._stepper.error(), h):
+            if not halvings and not self._pace.accepts(self._stepper, h):
                 self._stepper.undo()
                 return 0.0
             self._steps += 1
@@ -162,8 +165,6 @@ class _Run:
 
 def _solvers(scene, layout, degree, scheme, load_factor, comm):
     """The loaded problem and stepper of a scene on a mesh."""
-    if scheme not in SCHEMES:
-        raise SceneError(f"scheme = {scheme!r}: {nearest(scheme, SCHEMES)}")
     shape = Shape.of(scene, layout, formulation="displacement", degree=degree)
     if comm in (MPI.COMM_WORLD, MPI.COMM_SELF):
         problem, stepper = _kept(comm == MPI.COMM_SELF, shape, scheme)
@@ -184,7 +185,7 @@ def _kept(alone, shape, scheme):
     return _make(MPI.COMM_SELF if alone else MPI.COMM_WORLD, shape, scheme)
 
 
-def _pace(duration, tol, dt):
+def _pace(duration, tol, dt, scheme):
     """What chooses the steps."""
     if dt is not None:
         if tol is not None:
@@ -192,6 +193,8 @@ def _pace(duration, tol, dt):
                 f"simulate: dt = {dt!r} and tol = {tol!r}: expected one of them, a fixed or an adaptive step"
             )
         return Fixed(min(_positive("dt", dt), duration))
+    if not SCHEMES[scheme].adapts:
+        raise SceneError(f"scheme = '{scheme}' knows no error of its steps: expected dt, a fixed step (s)")
     tol = _TOL if tol is None else tol
     return Adaptive(
         number("simulate", "tol", tol, "a number from 1e-10 to below 1", lambda x: 1e-10 <= x < 1), duration

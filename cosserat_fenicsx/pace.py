@@ -17,8 +17,8 @@ class Fixed:
         """The next step where so much is left to the next time to land on, s."""
         return left / max(1, math.ceil(left / self._dt - 1e-9))
 
-    def accepts(self, error, h):
-        """Whether a step of length h with an estimated local error stands."""
+    def accepts(self, stepper, h):
+        """Whether a stepper's last step, of length h, stands."""
         return True
 
     def failed(self, h):
@@ -49,8 +49,9 @@ class Adaptive:
         """See `Fixed`."""
         return left / max(1, math.ceil(left / self._dt - 1e-9))
 
-    def accepts(self, error, h):
+    def accepts(self, stepper, h):
         """See `Fixed`."""
+        error = stepper.error()
         if error is None:
             return True
         allowed = self._rate * h

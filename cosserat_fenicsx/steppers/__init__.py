@@ -1,6 +1,7 @@
 """Schemes: how a motion goes from t to t + h. A new scheme is one file here, and its forms."""
 
 from cosserat_fenicsx.steppers.momentum import Momentum
+from cosserat_fenicsx.steppers.triple_jump import TripleJump
 
 #: Steppers by the names of `simulate`; each follows `protocol.Stepper`.
-SCHEMES = {"momentum": Momentum}
+SCHEMES = {"momentum": Momentum, "triple-jump": TripleJump}

@@ -13,7 +13,7 @@ TURNS = 0.1
 class Momentum:
     """See `steppers.Stepper`."""
 
-    order = 2
+    order, adapts = 2, True
 
     def __init__(self, problem):
         self.problem, self._newton = problem, StepNewton(problem)
@@ -33,7 +33,7 @@ class Momentum:
     def step(self, t, h):
         """See `Stepper`."""
         problem, rates = self.problem, self._velocity
-        if self._h is None or abs(h - self._h) > 1e-9 * h:
+        if self._h is None or abs(h - self._h) > 1e-9 * abs(h):
             problem.fresh, self._h = True, h
         problem.aim(t, h)
         unit = problem.h

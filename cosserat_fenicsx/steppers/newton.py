@@ -101,7 +101,7 @@ class StepNewton:
         if not step < _HUGE:
             return _Reason.DIVERGED_DTOL
         rate = step / self._steps[-2] if iteration > 1 else 1.0
-        enough = INCREMENT * min(1.0, self.problem.h)
+        enough = INCREMENT * min(1.0, abs(self.problem.h))
         if (
             step <= enough
             or (rate < 0.9 and step * rate / (1 - rate) <= enough)

@@ -8,10 +8,12 @@ class Stepper(Protocol):
 
     Attributes:
         order: of the error in the step h.
+        adapts: whether `error` and `undo` are known.
         work, dissipated: dimensionless, since `begin`: what loads and supports have done, and what damping has taken.
     """
 
     order: int
+    adapts: bool
     work: float
     dissipated: float
 
@@ -25,8 +27,8 @@ class Stepper(Protocol):
         """Go from the time t to t + h, s.
 
         Returns:
-            `Solved`. The problem's x and the model's state and velocity are those of t + h, its `start` that of t; where it has
-            not converged, all is as it was at t.
+            `Solved`. The problem's x and the model's state and velocity are those of t + h; where it has not converged, all is
+            as it was at t.
         """
 
     def error(self):
