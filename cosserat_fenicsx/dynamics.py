@@ -12,6 +12,7 @@ from cosserat_fenicsx.checks import instance, number, refuse
 from cosserat_fenicsx.errors import Interrupted, NotConverged, SceneError, nearest
 from cosserat_fenicsx.history import History, Instant, Ledger
 from cosserat_fenicsx.interrupts import obey
+from cosserat_fenicsx.models.conserving import ConservingSpatial
 from cosserat_fenicsx.models.moving import MovingSpatial
 from cosserat_fenicsx.models.rodmesh import Layout
 from cosserat_fenicsx.models.shape import Shape
@@ -21,8 +22,8 @@ from cosserat_fenicsx.scene import Scene
 from cosserat_fenicsx.signals import signals_of
 from cosserat_fenicsx.start import put_start
 from cosserat_fenicsx.steppers import SCHEMES
-from cosserat_fenicsx.steppers.step_problem import StepProblem
 
+_MODELS = {"momentum": MovingSpatial, "energy": ConservingSpatial}
 #: Elements a rod and degree where none are asked for.
 ELEMENTS, DEGREE = 8, 3
 _TOL = 1e-3
@@ -175,8 +176,9 @@ def _solvers(scene, layout, degree, scheme, load_factor, comm):
 
 
 def _make(comm, shape, scheme):
-    problem = StepProblem(MovingSpatial(comm, shape))
-    return problem, SCHEMES[scheme](problem)
+    stepper = SCHEMES[scheme]
+    problem = stepper.problem_class(_MODELS[stepper.forms](comm, shape))
+    return problem, stepper(problem)
 
 
 @functools.lru_cache(maxsize=8)

@@ -123,6 +123,16 @@ class Moving:
 
     # -- what steppers and results ask for ---------------------------------------------------------------------------
 
+    @property
+    def rate_arrays(self):
+        """The local numbers that tell how fast the state changes."""
+        return (self.velocity.x.array,)
+
+    def accept(self, h):
+        """Take the rates of `state` after a step of length h: the trapezoidal rule."""
+        rates = self.velocity.x.array
+        rates[:] = 2 / h * (self.state.x.array - self.start.x.array) - rates
+
     def loads_at(self, t):
         """Put the loads at the time t (s) into the forms' Functions."""
         self._loads.at(t)
@@ -185,10 +195,8 @@ class MovingSpatial(Moving, SpatialModel):
     def set_velocity(self, linear, angular):
         """See `Moving`."""
         slots, nodal, x = self._slots, self._nodal, self.velocity.x.array
-        q, turning = self.state.x.array[nodal[:, 3:]], angular[slots]
         x[nodal[:, :3]] = linear[slots]
-        x[nodal[:, 3]] = -np.einsum("ij,ij->i", turning, q[:, 1:]) / 2
-        x[nodal[:, 4:]] = (q[:, :1] * turning + np.cross(turning, q[:, 1:])) / 2
+        x[nodal[:, 3:]] = spun(self.state.x.array[nodal[:, 3:]], angular[slots])
 
     def rates(self):
         """See `Moving`."""
@@ -199,6 +207,13 @@ class MovingSpatial(Moving, SpatialModel):
 
     def _positions(self):
         return self.state.x.array[self._nodal[:, :3]]
+
+
+def spun(q, omega):
+    """(.., 4) the rates omega q/2 of q (.., 4) that angular velocities omega (.., 3) amount to."""
+    v = q[..., 1:]
+    scalar = -np.einsum("...i,...i->...", omega, v)[..., None]
+    return np.concatenate([scalar, q[..., :1] * omega + np.cross(omega, v)], axis=-1) / 2
 
 
 def turned_by(dq, q):

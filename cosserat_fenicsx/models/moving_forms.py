@@ -26,7 +26,8 @@ class MotionForms(CompiledForms):
     Attributes:
         residual: without the dead loads, and without the momenta at the start of the step, over h.
         momentum: momenta of the state and its velocity, tested.
-        live: virtual work of the live loads half way, per unit of load factor; or None.
+        live: virtual work of the live loads half way, per unit of load factor; or None. live_tangent: its derivative, where
+            it is no part of the tangent.
         kinetic, strain: energies of the state; dissipated: what damping takes in the step.
     """
 
@@ -35,11 +36,36 @@ class MotionForms(CompiledForms):
     kinetic: object
     strain: object
     dissipated: object
+    live_tangent: object = None
+
+
+@dataclass(frozen=True)
+class SpatialData:
+    """The data of a moving spatial model as forms read them."""
+
+    section: equilibrium.Section
+    viscosity: inertia.Viscosity
+    body: inertia.Inertia
+
+    @classmethod
+    def of(cls, model):
+        """Those of a model."""
+        data, I = model.data, model.inertia
+        R_R = ufl.as_matrix([[data.R_R[3 * i + j] for j in range(3)] for i in range(3)])
+        I_R = ufl.as_matrix([[I[0], I[1], I[2]], [I[1], I[3], I[4]], [I[2], I[4], I[5]]])
+        section = equilibrium.Section(data.K, data.K_inv, data.J, R_R, data.v_R)
+        return cls(section, inertia.Viscosity(model.Kt, model.Jt), inertia.Inertia(model.mass[0], I_R))
+
+
+def parts_of(w):
+    """r and q of seven components."""
+    return ufl.as_vector([w[i] for i in range(3)]), ufl.as_vector([w[i] for i in range(3, 7)])
 
 
 def compile_spatial(model):
     """The `MotionForms` of a moving spatial model, momentum scheme."""
-    data, dx = model.data, measures(model)
+    dx, data = measures(model), SpatialData.of(model)
+    section, viscosity, body = data.section, data.viscosity, data.body
     # other rules than Gauss's need names of their own where that has one point (compat.alias)
     named = compat.alias if model.shape.degree == 1 else (lambda function: function)
     U, U0, V = model.state, model.start, model.velocity
@@ -48,20 +74,12 @@ def compile_spatial(model):
     def along(w):
         return ufl.grad(w)[:, 0]  # the mesh is the line of arc length
 
-    def parts(w):
-        return ufl.as_vector([w[i] for i in range(3)]), ufl.as_vector([w[i] for i in range(3, 7)])
-
-    I = model.inertia
-    body = inertia.Inertia(model.mass[0], ufl.as_matrix([[I[0], I[1], I[2]], [I[1], I[3], I[4]], [I[2], I[4], I[5]]]))
-    R_R = ufl.as_matrix([[data.R_R[3 * i + j] for j in range(3)] for i in range(3)])
-    section = equilibrium.Section(data.K, data.K_inv, data.J, R_R, data.v_R)
-    viscosity = inertia.Viscosity(model.Kt, model.Jt)
     before, after, middle = (eq.state_of(w, along(w), w) for w in (U0, U, (U + U0) / 2))
     phi, trial = ufl.TestFunction(model.space), ufl.TrialFunction(model.space)
     test = eq.tests_of(phi, along(phi))
 
     def momentum(w, w_t):
-        (_, q), (r_t, q_t) = parts(w), parts(w_t)
+        (_, q), (r_t, q_t) = parts_of(w), parts_of(w_t)
         return inertia.momentum(r_t, inertia.angular_momentum(q, q_t, body), body, test)
 
     rates_after = 2 * (nodal - nodal0) / model.h - rates
@@ -70,14 +88,14 @@ def compile_spatial(model):
     # drag: -drag times the momenta half way, with the velocities (U - U0)/h
     passed, halfway = (nodal - nodal0) / model.h, (nodal + nodal0) / 2
     residual += model.drag[0] * momentum(halfway, passed) * dx.nodes
-    residual += eq.unit_quaternion(after._replace(q_node=parts(nodal)[1]), test) * dx.nodes
-    R_middle = rotation_matrix(parts(halfway)[1])
+    residual += eq.unit_quaternion(after._replace(q_node=parts_of(nodal)[1]), test) * dx.nodes
+    R_middle = rotation_matrix(parts_of(halfway)[1])
     loads = load_work(model, dx, test, R_middle, {U, nodal})
     derivative = derivative_in(trial, *dict.fromkeys((U, nodal)))
     residual, tangent = with_live_loads(model, loads, residual, derivative(residual), derivative)
 
     def kinetic(w, w_t):
-        (_, q), (r_t, q_t) = parts(w), parts(w_t)
+        (_, q), (r_t, q_t) = parts_of(w), parts_of(w_t)
         return inertia.kinetic_energy(r_t, inertia.angular_velocity(q, q_t), body)
 
     n, m = inertia.contact(after, section, viscosity, lambda a: ufl.derivative(a, U, V))

@@ -37,6 +37,15 @@ class MovingTies(TieRows):
         equations = np.einsum("ikb,kbe->ike", self._at_end, trial_at_end).reshape(-1, size)
         return of_nodes, reactions, equations
 
+    def make_room(self, A):
+        """Put zeros where `add_tangent` will add."""
+        if self._here:
+            tied, added = self.rows[self.rows >= 0], self._multipliers
+            for rows, columns in ((tied, tied), (tied, added), (added, tied)):
+                A.setValues(rows, columns, np.zeros((len(rows), len(columns))), addv=True)
+            for i in (*added, *self._idle):
+                A.setValue(i, i, 0.0, addv=True)
+
     def work(self, eta):
         """What the reactions did on the structure in the step; on the last rank, else 0."""
         if not self._here:
@@ -46,13 +55,3 @@ class MovingTies(TieRows):
         trial, _ = self.model.tie_maps(self._middle())
         passed = np.einsum("kbe,ke->kb", trial, nodal - self._start)
         return -float(np.einsum("ikb,kb,i->", gradient, passed, multipliers[self._added]))
-
-    def violation(self, ties, eta):
-        """Largest |c| of `ties` where the nodes are, with the index of that equation; on all ranks."""
-        comm, found = self.numbering.comm, (0.0, 0)
-        if self._here:
-            nodal, multipliers = self.seen
-            c, _, _ = ties.evaluate(self.model.tied_motion(nodal), eta, multipliers, self._added)
-            k = int(np.argmax(np.abs(c), axis=0)) if len(c) else 0
-            found = (float(np.abs(c).max(initial=0.0)), self._added[k] if len(c) else 0)
-        return comm.bcast(found, root=comm.size - 1)

@@ -8,12 +8,15 @@ class Stepper(Protocol):
 
     Attributes:
         order: of the error in the step h.
+        forms: the name of the discretisation that its models must have; problem_class: what it solves, a `StepProblem`.
         adapts: whether `error` and `undo` are known.
         work, dissipated: dimensionless, since `begin`: what loads and supports have done, and what damping has taken.
     """
 
     order: int
     adapts: bool
+    forms: str
+    problem_class: type
     work: float
     dissipated: float
 

@@ -28,14 +28,18 @@ class StepProblem:
         self.A = numbering.matrix(model.cell_dofs, tied[tied >= 0])
         self.x, self.b, self._known, self._loads, self._momenta, self._vector = (numbering.vector() for _ in range(6))
         self._local = np.zeros(len(numbering.rows))
-        ends = (model.state, model.start, model.velocity)
-        self._state, self._start, self._velocity = (function.x.array for function in ends)
+        ends = self._ends()
+        self._state, self._start = model.state.x.array, model.start.x.array
         forms = model.forms
         self._residual, self._tangent, self._momentum = (
             Packed(form, ends) for form in (forms.residual, forms.tangent, forms.momentum)
         )
         self._dead, self._live = (None if form is None else Packed(form, ends) for form in (forms.dead, forms.live))
         self.load_factor, self.fresh = 1.0, True
+
+    def _ends(self):
+        """The Functions that change from step to step."""
+        return self.model.state, self.model.start, self.model.velocity
 
     def load(self, scene, layout, load_factor=1.0):
         """Take the numbers of a scene; the state becomes its reference configuration, at rest, at the time 0."""
@@ -68,7 +72,7 @@ class StepProblem:
         self._start[:] = self._state
         if model.moving_loads:
             model.loads_at(t + h / 2)
-            for form in (self._residual, self._tangent, self._dead):
+            for form in (self._residual, self._tangent, self._dead, self._live):
                 if form:
                     form.refresh()
             self._assemble(self._dead, self._loads)

@@ -16,6 +16,7 @@ class TripleJump:
     """See `protocol.Stepper`."""
 
     order, adapts = 4, False
+    forms, problem_class = Momentum.forms, Momentum.problem_class
 
     def __init__(self, problem):
         self.problem, self._inner = problem, Momentum(problem)
