@@ -62,6 +62,16 @@ def test_the_first_four_frequencies_of_a_cantilever():
     np.testing.assert_allclose(2 * math.pi * modes.frequencies[soft], exact, rtol=1e-6)
 
 
+@pytest.mark.parametrize("degree", [1, 2, 3])
+def test_frequencies_converge_with_twice_the_degree(degree):
+    section = cf.Stiffness((1e3, 1e3), 1e3, (1.0, 3.0), 1.0, mass=1.0, inertia=(1e-2, 1e-2, 2e-2))
+    rod = cf.Rod(cf.Arc((0, 0, 0), (1, 0, 0), 1.5), section)
+    scene = cf.Scene([rod], [cf.Clamp(rod.start)])
+    exact = cf.modes(scene, 3, elements=32).squares
+    off = [np.abs(cf.modes(scene, 3, elements=n, degree=degree).squares / exact - 1).max() for n in (4, 8)]
+    assert np.log2(off[0] / off[1]) == pytest.approx(2 * degree, abs=0.4), off
+
+
 def test_a_free_rod_has_six_motions_for_nothing():
     section = cf.Stiffness((1e4, 1e4), 1e4, (1.0, 2.0), 1.0, mass=1.0, inertia=(1e-3, 1e-3, 2e-3))
     rod = cf.Rod(LINE, section)
