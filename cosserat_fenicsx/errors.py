@@ -36,7 +36,7 @@ class Interrupted(KeyboardInterrupt):
     """
 
     def __init__(self, path):
-        super().__init__(f"interrupted; {len(path)} {path.counted} done so far are kept")
+        super().__init__(f"interrupted; {len(path)} {path.axis}(s) done so far are kept")
         self.path = path
 
 

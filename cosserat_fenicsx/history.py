@@ -41,8 +41,8 @@ class History(Path):
         linear_momentum: (n, 3) kg m/s; angular_momentum: (n, 3) kg m^2/s about the inertial origin, inertial.
     """
 
-    #: how a person calls the points
-    counted = "time(s)"
+    axis = "time"
+    more_fields = {"velocity": "velocity", "angular_velocity": "angular_velocity"}  # noqa: RUF012
     load_factors = negative_modes = stable = None  # of a path alone
 
     @classmethod
@@ -89,6 +89,31 @@ class History(Path):
         if not material:
             return angular
         return np.einsum("nij,ni->nj", directors(self.rotation(station)) @ station.rod.curve.frame(station.s), angular)
+
+    @property
+    def along_axis(self):
+        """(n,) s."""
+        return self.times
+
+    def label(self, k):
+        """What a picture writes beside time k."""
+        return f"{self.times[k]:.3g} s"
+
+    def fields(self, k, rod):
+        """As of a `Path`, at time k; with velocity (m/s) and angular_velocity (rad/s), inertial."""
+        rates = self._records[k].rates[self._rows(rod)[1]] / self._time_unit
+        velocity = rates[:, :3] * self.scales.length
+        return {**super().fields(k, rod), "velocity": velocity, "angular_velocity": rates[:, 3:]}
+
+    def plot_energy(self, file=None):
+        """Chart of the energies over time.
+
+        Args:
+            file: a .png or .pdf; None returns matplotlib's Figure.
+        """
+        from cosserat_fenicsx import energy_chart
+
+        return energy_chart.draw(self, file)
 
     def append(self, record):
         """Add a saved state."""

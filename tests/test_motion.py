@@ -152,3 +152,22 @@ def test_velocities_along_a_rod():
     history = cf.simulate(cf.Scene([rod], velocities=[about]), 0.01, dt=0.01)
     np.testing.assert_allclose(history.velocity(rod.end)[0], [-14, -2, 0], atol=1e-12)
     assert history.kinetic[0] > 0 and SPAGHETTI.mass == 1
+
+
+def test_files_and_pictures(tmp_path):
+    import meshio
+
+    rod, scene = flying_in_space()
+    history = cf.simulate(scene, 5, dt=0.1, save_every=1, elements=4)
+    history.write(tmp_path / "flight.xdmf")
+    with meshio.xdmf.TimeSeriesReader(tmp_path / "flight.xdmf") as reader:
+        reader.read_points_cells()
+        times, data = zip(*((t, data) for t, data, _ in map(reader.read_data, range(reader.num_steps))), strict=True)
+    np.testing.assert_allclose(times, [0, 1, 2, 3, 4, 5])
+    np.testing.assert_allclose(data[-1]["velocity"][0], history.velocity(rod.start)[-1], rtol=1e-12)
+    np.testing.assert_allclose(data[-1]["angular_velocity"][-1], history.angular_velocity(rod.end)[-1], rtol=1e-12)
+    history.plot(tmp_path / "flight.png")
+    history.plot_energy(tmp_path / "energy.png")
+    assert (tmp_path / "flight.png").stat().st_size > 10000 and (tmp_path / "energy.png").stat().st_size > 10000
+    with pytest.raises(cf.SceneError, match="expected a name that ends in"):
+        history.plot_energy(tmp_path / "energy.xyz")
