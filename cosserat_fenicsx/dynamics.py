@@ -14,16 +14,21 @@ from cosserat_fenicsx.history import History, Instant, Ledger
 from cosserat_fenicsx.interrupts import obey
 from cosserat_fenicsx.models.conserving import ConservingSpatial
 from cosserat_fenicsx.models.moving import MovingSpatial
+from cosserat_fenicsx.models.moving_planar import MovingPlanar
 from cosserat_fenicsx.models.rodmesh import Layout
 from cosserat_fenicsx.models.shape import Shape
 from cosserat_fenicsx.pace import Adaptive, Fixed
 from cosserat_fenicsx.progress import Progress
 from cosserat_fenicsx.scene import Scene
 from cosserat_fenicsx.signals import signals_of
-from cosserat_fenicsx.start import put_start
+from cosserat_fenicsx.start import put_start, starts_in
 from cosserat_fenicsx.steppers import SCHEMES
 
-_MODELS = {"momentum": MovingSpatial, "energy": ConservingSpatial}
+_MODELS = {
+    ("momentum", "spatial"): MovingSpatial,
+    ("momentum", "planar"): MovingPlanar,
+    ("energy", "spatial"): ConservingSpatial,
+}
 #: Elements a rod and degree where none are asked for.
 ELEMENTS, DEGREE = 8, 3
 _TOL = 1e-3
@@ -37,6 +42,7 @@ def simulate(
     *,
     tol=None,
     dt=None,
+    model="auto",
     scheme="momentum",
     save_every=None,
     start=None,
@@ -58,6 +64,7 @@ def simulate(
             and of rotations (rad), as far as the error of single steps tells; steps adapt to it. Default 1e-3, unless `dt`
             is given. The mesh does not adapt: compare with more `elements`.
         dt: fixed step, s; shorter where it would step over a jump or a saved time. A step that fails is halved.
+        model: "spatial"; "planar" for a scene that moves in a plane; or "auto", the cheaper one that will do.
         scheme: "momentum" (exact linear and angular momentum, order 2); "triple-jump" (three steps of it, one back in time: order
             4, for smooth motions without damping, fixed dt).
         save_every: s between saved states, landed on exactly; None saves every step.
@@ -86,10 +93,12 @@ def simulate(
     number("simulate", "load_factor", load_factor, "a finite number", math.isfinite)
     if isinstance(elements, bool) or not isinstance(elements, numbers.Integral) or elements < 1:
         refuse("simulate", "elements", elements, "a whole number above zero")
-    problem, stepper = _solvers(scene, Layout.of(scene, elements), degree, scheme, load_factor, comm)
+    scene = scene.over(duration)
+    model, why = _choice(scene, model, scheme, start)
+    problem, stepper = _solvers(scene, Layout.of(scene, elements), degree, scheme, load_factor, comm, model)
     put_start(problem.model, start)
     problem.begin()
-    run = _Run(problem, stepper, pace, scheme)
+    run = _Run(problem, stepper, pace, scheme, why)
     with Progress([duration], progress, comm, "t (s) =") as bar:
         bar.start(f"{problem.model.name}, {problem.model.unknowns} unknowns")
         try:
@@ -102,9 +111,9 @@ def simulate(
 class _Run:
     """The motion of a problem, booked and saved."""
 
-    def __init__(self, problem, stepper, pace, scheme):
+    def __init__(self, problem, stepper, pace, scheme, why):
         self.problem, self.model, self._stepper, self._pace = problem, problem.model, stepper, pace
-        self.history = History.of(self.model, scheme)
+        self.history = History.of(self.model, scheme, [why])
         self._steps = self._iterations = 0
 
     def over(self, marks, save_all, bar):
@@ -164,9 +173,28 @@ class _Run:
                                     steps=self._steps, ledger=ledger))  # fmt: skip
 
 
-def _solvers(scene, layout, degree, scheme, load_factor, comm):
+def _choice(scene, model, scheme, start):
+    """The model's name, and why it is that one."""
+    flat = ("momentum" if scheme not in SCHEMES else SCHEMES[scheme].forms, "planar") in _MODELS
+    if model not in ("auto", "planar", "spatial"):
+        raise SceneError(f"model = {model!r}: {nearest(model, ('auto', 'planar', 'spatial'))}")
+    if model == "spatial":
+        return model, "the spatial model was asked for"
+    plane, reason = scene.flatness
+    if plane is not None and not starts_in(scene, plane, start):
+        plane, reason = None, "the start leaves the plane of the rods"
+    if plane is not None and not flat:
+        plane, reason = None, f"the scheme '{scheme}' knows space alone"
+    if plane is not None:
+        return "planar", f"everything keeps to {plane.words}"
+    if model == "planar":
+        raise SceneError(f"model = 'planar': {reason}; expected 'spatial' or 'auto'")
+    return "spatial", reason
+
+
+def _solvers(scene, layout, degree, scheme, load_factor, comm, model):
     """The loaded problem and stepper of a scene on a mesh."""
-    shape = Shape.of(scene, layout, formulation="displacement", degree=degree)
+    shape = Shape.of(scene, layout, formulation="displacement", degree=degree, model=model)
     if comm in (MPI.COMM_WORLD, MPI.COMM_SELF):
         problem, stepper = _kept(comm == MPI.COMM_SELF, shape, scheme)
     else:  # a user's communicator may be freed, and its handle given to another
@@ -177,7 +205,7 @@ def _solvers(scene, layout, degree, scheme, load_factor, comm):
 
 def _make(comm, shape, scheme):
     stepper = SCHEMES[scheme]
-    problem = stepper.problem_class(_MODELS[stepper.forms](comm, shape))
+    problem = stepper.problem_class(_MODELS[stepper.forms, shape.model](comm, shape))
     return problem, stepper(problem)
 
 

@@ -1,5 +1,6 @@
 """A scene: rods, what joins and holds them and what acts on them. Knows no solver and no mesh."""
 
+import copy
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -38,6 +39,9 @@ class Scene:
     joints: tuple = ()
     title: str = ""
     velocities: tuple = ()
+
+    #: s: for how long what depends on time is looked at beforehand
+    horizon = 1.0
 
     def __post_init__(self):
         for field in ("rods", "supports", "loads", "joints", "velocities"):
@@ -111,6 +115,13 @@ class Scene:
         """(3,) m: where the structure that a rod belongs to starts. Solvers count positions from there, so that digits
         are not lost on where a structure stands."""
         return self._leaders[rod].curve.position(0.0)
+
+    def over(self, duration):
+        """The same scene, looked at beforehand for so long (s)."""
+        scene = copy.copy(self)
+        scene.__dict__.pop("flatness", None)
+        object.__setattr__(scene, "horizon", duration)
+        return scene
 
     @cached_property
     def flatness(self):

@@ -5,6 +5,7 @@ with `jumps` where it is not smooth: steps in time land on these.
 """
 
 import dataclasses
+import itertools
 import math
 from dataclasses import dataclass
 
@@ -241,3 +242,15 @@ def at(item, t):
     """A load or a support as it is at the time t (s); itself where nothing depends on time."""
     now = {name: signal(t) for name, signal in signals_of(item).items()}
     return dataclasses.replace(item, **now, jumps=()) if now else item
+
+
+def sample_times(item, until):
+    """Times (s) up to `until` that stand for all where a load or a support depends on time: its jumps, between them, and
+    spread over orders of magnitude; the time 0 where it does not."""
+    signals = signals_of(item)
+    if not signals:
+        return [0.0]
+    jumps = {t for signal in signals.values() for t in signal.jumps if 0 < t < until}
+    marks = [0.0, *sorted(jumps), until]
+    between = [(a + b) / 2 for a, b in itertools.pairwise(marks)]
+    return [*marks, *between, *(until * np.geomspace(1e-4, 1, 30)[:-1]).tolist()]

@@ -9,6 +9,8 @@ from cosserat_fenicsx.results import Path
 
 # Positions (lengths) and turns (rad) of a start that supports do not hold are refused above this; velocities relative to the largest.
 _APART = 1e-6
+# What leaves a plane by less keeps to it.
+_FLAT = 1e-10
 
 
 def put_start(model, start):
@@ -36,6 +38,23 @@ def put_start(model, start):
     linear, angular = _velocities(model, rq)
     _check_velocities(model, rq, np.concatenate([linear, angular], axis=1))
     model.set_velocity(linear, angular)
+
+
+def starts_in(scene, plane, start):
+    """Whether velocities and the static point of a start keep to a plane."""
+    e1, e2, normal = np.array(plane.axes)
+    for given in scene.velocities:
+        s = np.linspace(0, given.rod.length, 33)
+        linear, angular = given.at(s, given.rod.curve.position(s))
+        off = np.abs(linear @ normal).max(), np.abs(angular @ e1).max(), np.abs(angular @ e2).max()
+        if max(off) > _FLAT * max(np.abs(linear).max(), np.abs(angular).max()):
+            return False
+    if start is None:
+        return True
+    path, k = _point(start)
+    rods = [rod for rod in scene.rods if rod in path.scene.rods]
+    moved = np.concatenate([path.motion(rod, np.linspace(0, 1, 33), [path[k]])[0] for rod in rods])
+    return max(np.abs(moved[:, :3] @ normal).max(), np.abs(moved[:, 4:] @ e1).max(), np.abs(moved[:, 4:] @ e2).max()) < _FLAT
 
 
 def _point(start):

@@ -10,7 +10,7 @@ from cosserat_fenicsx import compat
 from cosserat_fenicsx.damping import Damping
 from cosserat_fenicsx.models.connections import ties_of
 from cosserat_fenicsx.models.moving_forms import compile_spatial
-from cosserat_fenicsx.models.rod_data import check_inertia, gauss_function, nodal_inertia
+from cosserat_fenicsx.models.rod_data import check_inertia, gauss_function, nodal_inertia, rod_data
 from cosserat_fenicsx.models.spatial import SpatialModel
 
 
@@ -72,18 +72,17 @@ class Moving:
         """Take the viscosity of the rods."""
         scene, layout, scales = self.scene, self.layout, self.scales
         damped = [rod.damping or Damping() for rod in scene.rods]
-        Kt, Jt = [], []
-        for rod, damping, x in zip(scene.rods, damped, layout.inside(self.rule.gauss), strict=True):
-            K, J = damping.viscosity(rod.stiffness_at(x * rod.length))
-            Kt.append(K / (scales.force * self.time))
-            Jt.append(J / (scales.moment * scales.length * self.time))
-        for function, values in ((self.Kt, Kt), (self.Jt, Jt)):
-            self.rods.fill(function, self._in_order(np.concatenate(values)))
+        given = [
+            damping.viscosity(rod.stiffness_at(x * rod.length))
+            for rod, damping, x in zip(scene.rods, damped, layout.inside(self.rule.gauss), strict=True)
+        ]
+        Kt, Jt = (np.concatenate(values) for values in zip(*given, strict=True))
+        bending = scales.moment * scales.length
+        data = rod_data(scene, layout, scales, self.rule, self.reference)
+        data = self._section_data(data._replace(K=Kt / (scales.force * self.time), J=Jt / (bending * self.time)))
+        self.rods.fill(self.Kt, data.K)
+        self.rods.fill(self.Jt, data.J)
         self.damped = damped != [Damping()] * len(damped)
-
-    def _in_order(self, values):
-        """Values (elements, points, 3) along or about d_1, d_2, d_3, in the order of the rung's sections."""
-        return values
 
     def _fill_nodes(self, function, values):
         """Values (elements, p + 1, k) at the nodes of every element, in the scene's order, into a Function."""
