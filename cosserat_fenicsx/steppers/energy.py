@@ -34,14 +34,13 @@ class TurnedStepProblem(StepProblem):
         self._columns = np.concatenate([columns, first + np.arange(7 * nodes, size)]).astype(PETSc.IntType)
         self._turn = PETSc.Mat().createAIJ(((size, numbering.total),) * 2, nnz=4, comm=numbering.comm)
         self._fill(self._turn, np.zeros((nodes, 4, 4)), 1.0)
-        self._tangent.add_to_matrix(self._raw)
+        Packed(forms.tangent, ()).add_to_matrix(self._raw)
         if self.ties:
             self.ties.make_room(self._raw)
         self._raw.assemble()
         self.A = self._turn.matMult(self._raw)
         self._live_tangent = None
         if forms.live_tangent is not None:
-            self._live_tangent = Packed(forms.live_tangent, (model.state, model.start, model.velocity))
             self._live_matrix = numbering.matrix(model.cell_dofs, np.empty(0, dtype=np.int64))
 
     def _ends(self):
@@ -54,10 +53,11 @@ class TurnedStepProblem(StepProblem):
         matrix.setValuesCSR(self._rows, self._columns, np.concatenate([values, rest]), mode)
         matrix.assemble()
 
-    def _refresh(self):
-        super()._refresh()
-        if self._live_tangent:
-            self._live_tangent.refresh()
+    def _pack(self):
+        super()._pack()
+        if self.model.forms.live_tangent is not None:
+            moving = (*self._ends(), *self.model.moving_loads)
+            self._live_tangent = Packed(self.model.forms.live_tangent, moving)
 
     def _of_nodes(self, x):
         """(nodes, 4) q of the free nodes of this rank."""
@@ -69,8 +69,6 @@ class TurnedStepProblem(StepProblem):
         super().aim(t, h)
         self._known.set(0.0)
         self._known.axpy(self.load_factor, self._loads)
-        if self._live_tangent and self.model.moving_loads:
-            self._live_tangent.refresh()
 
     def function(self, snes, x, b):
         """See `StepProblem`."""

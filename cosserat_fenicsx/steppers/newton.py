@@ -15,8 +15,9 @@ from cosserat_fenicsx.snes import Solved
 #: over the unit of time, for velocities, and with them momenta, are off by so much over h. Rounding may leave more: where
 #: increments below the second number shrink no more, that is the end.
 INCREMENT, ROUNDING = 1e-12, 1e-10
-# A kept tangent is made anew where increments shrink by less than this; it is not kept beyond so many iterations a step.
-_SLOW, _MANY = 0.05, 4
+# A kept tangent is made anew where increments shrink by less than the first number, and after a step of more iterations than
+# the second; the larger the system, the more iterations a tangent costs.
+_SMALL_SYSTEM, _LARGE_SYSTEM, _LARGE = (0.05, 4), (0.3, 8), 400
 _MOST, _HUGE = 15, 10.0
 _EXTERNAL = 76  # PETSc's code for an error in an external package: KLU met a singular tangent
 _Reason = PETSc.SNES.ConvergedReason
@@ -40,7 +41,9 @@ class StepNewton:
         numbering = problem.numbering
         self._motions = numbering.nodes * numbering.block
         self._comm = problem.model.comm
-        self._root = math.sqrt(self._comm.allreduce(self._motions))
+        motions = self._comm.allreduce(self._motions)
+        self._root = math.sqrt(motions)
+        self._slow, self._many = _LARGE_SYSTEM if motions > _LARGE else _SMALL_SYSTEM
         self.snes = snes = PETSc.SNES().create(self._comm)
         snes.setType("newtonls")
         snes.setFunction(problem.function, problem.b)
@@ -86,7 +89,7 @@ class StepNewton:
             self.snes.getKSP().setPC(pc)
             reason = _Reason.DIVERGED_LINEAR_SOLVE
         problem.set_state(problem.x)
-        if reason <= 0 or len(self._steps) > _MANY:
+        if reason <= 0 or len(self._steps) > self._many:
             problem.fresh = True
         return Solved(reason > 0, len(self._steps), _WORDS.get(reason, "converged"))
 
@@ -110,5 +113,5 @@ class StepNewton:
             return _Reason.CONVERGED_SNORM_RELATIVE
         if iteration >= _MOST:
             return _Reason.DIVERGED_MAX_IT
-        self.problem.fresh = rate > _SLOW and iteration > 1
+        self.problem.fresh = rate > self._slow and iteration > 1
         return _Reason.CONVERGED_ITERATING

@@ -28,13 +28,7 @@ class StepProblem:
         self.A = numbering.matrix(model.cell_dofs, tied[tied >= 0])
         self.x, self.b, self._known, self._loads, self._momenta, self._vector = (numbering.vector() for _ in range(6))
         self._local = np.zeros(len(numbering.rows))
-        ends = self._ends()
         self._state, self._start = model.state.x.array, model.start.x.array
-        forms = model.forms
-        self._residual, self._tangent, self._momentum = (
-            Packed(form, ends) for form in (forms.residual, forms.tangent, forms.momentum)
-        )
-        self._dead, self._live = (None if form is None else Packed(form, ends) for form in (forms.dead, forms.live))
         self.load_factor, self.fresh = 1.0, True
 
     def _ends(self):
@@ -46,24 +40,30 @@ class StepProblem:
         model = self.model
         model.load(scene, layout)
         self.load_factor = model.load_factor.value = load_factor
-        self._refresh()
+        self._pack()
         self._assemble(self._dead, self._loads)
+        self._begun = False  # reactions of another scene are no guess
         self.begin()
 
-    def _refresh(self):
-        for form in (self._residual, self._tangent, self._momentum, self._dead, self._live):
-            if form:
-                form.refresh()
+    def _pack(self):
+        """Take the numbers of a scene into all forms; what changes in time is looked up anew at every assembly."""
+        forms, moving = self.model.forms, tuple(self.model.moving_loads)
+        self._residual, self._tangent, self._live = (
+            None if form is None else Packed(form, (*self._ends(), *moving))
+            for form in (forms.residual, forms.tangent, forms.live)
+        )
+        self._momentum = Packed(forms.momentum, self._ends())
+        self._dead = None if forms.dead is None else Packed(forms.dead, moving)
 
     def begin(self):
         """Take the model's state and velocity as the start of what follows."""
-        multipliers = self.ties.everywhere() if self.ties and self.ties.seen else None
+        multipliers = self.ties.everywhere() if self.ties and self._begun else None
         self.numbering.from_local(self._state, self.x)
         if multipliers is not None:
             self.ties.put(self.x, multipliers)
         self.set_state(self.x)
         self._start[:] = self._state
-        self.fresh = True
+        self.fresh = self._begun = True
 
     def aim(self, t, h):
         """The next step goes from the time t (s), where the state is, to t + h."""
@@ -72,9 +72,6 @@ class StepProblem:
         self._start[:] = self._state
         if model.moving_loads:
             model.loads_at(t + h / 2)
-            for form in (self._residual, self._tangent, self._dead, self._live):
-                if form:
-                    form.refresh()
             self._assemble(self._dead, self._loads)
         self._assemble(self._momentum, self._momenta)
         self._known.set(0.0)
