@@ -12,8 +12,8 @@ from cosserat_fenicsx.checks import number, refuse, store
 class Damping:
     """Damping of a rod.
 
-    Kelvin-Voigt: to n and m are added Kt v_t and Jt u_t, the rates of the material strains, eqs. (2)-(3). A mode of a beam
-    with the angular frequency omega decays as exp(-time omega^2 t/2). Drag: every section feels the force and the
+    Kelvin-Voigt: to n and m are added Kt v_t and Jt u_t, the rates of the material strains, eqs. (2)-(3). A mode of a
+    beam with the angular frequency omega decays as exp(-time omega^2 t/2). Drag: every section feels the force and the
     moment -drag times its momentum and its angular momentum; modes decay as exp(-drag t/2).
 
     Args:
@@ -44,7 +44,7 @@ class Damping:
 
     @classmethod
     def ratio(cls, ratio, frequencies):
-        """The damping with the same ratio to the critical one at two frequencies: ratio = drag/(2 omega) + time omega/2.
+        """The damping with the same ratio to the critical one at two frequencies: drag/(2 omega) + time omega/2.
 
         Args:
             ratio: in [0, 1).

@@ -3,6 +3,7 @@
 import cosserat_fenicsx.compat  # noqa: F401, I001  first: it says in words what of dolfinx is missing
 
 import functools
+import itertools
 import math
 import numbers
 
@@ -54,19 +55,20 @@ def simulate(
 ):
     """Motion of a scene from the time 0 on.
 
-    Loads and prescribed motions are those of the scene at every time (`signals`), times `load_factor`; the velocities at the
-    start are the scene's. A scene without supports flies freely.
+    Loads and prescribed motions are those of the scene at every time (`signals`), times `load_factor`; the velocities
+    at the start are the scene's. A scene without supports flies freely.
 
     Args:
         scene: a `Scene`; every rod needs a mass and inertia.
         duration: s.
-        tol: error that the steps in time may make over the whole duration, of the positions over the longest rod's length
-            and of rotations (rad), as far as the error of single steps tells; steps adapt to it. Default 1e-3, unless `dt`
-            is given. The mesh does not adapt: compare with more `elements`.
+        tol: what the errors of single steps may add up to over the whole duration, of positions over the longest rod's
+            length and of a tenth of rotations (rad); steps adapt to it. Default 1e-3, unless `dt` is given. The mesh
+            does not adapt: compare with more `elements`.
         dt: fixed step, s; shorter where it would step over a jump or a saved time. A step that fails is halved.
         model: "spatial"; "planar" for a scene that moves in a plane; or "auto", the cheaper one that will do.
-        scheme: "momentum" (exact linear and angular momentum, order 2); "triple-jump" (three steps of it, one back in time: order
-            4, for smooth motions without damping, fixed dt).
+        scheme: "momentum" (exact linear and angular momentum, order 2); "triple-jump" (three steps of it, one back in
+            time: order 4, for smooth motions without damping, fixed dt); "energy" (exact energy and linear momentum,
+            order 2, in space alone).
         save_every: s between saved states, landed on exactly; None saves every step.
         start: None for the reference, a `Path` for its last equilibrium, or (Path, k); rods must be the same objects.
         load_factor: multiplies all loads and prescribed motions, as in `solve`.
@@ -120,7 +122,7 @@ class _Run:
         """Go over the marks (time, whether something jumps there, whether it is saved), the first of them the start."""
         self._stepper.begin()
         self._save(0.0)
-        for (t, jump, _), (end, _, saved) in zip(marks[:-1], marks[1:], strict=True):
+        for (t, jump, _), (end, _, saved) in itertools.pairwise(marks):
             if jump:
                 self._stepper.jump()
                 self._pace.jump()

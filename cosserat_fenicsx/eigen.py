@@ -58,8 +58,8 @@ def largest_of_pencil(A, B, count):
 def lowest_of_constrained(K, M, held, count, shift=-1.0):
     """Eigenvalues of K x = lambda M x with held x = 0, next to `shift`; each rank solves all of it.
 
-    With M = L L^T in blocks these are those of L^T A L, A the part of the inverse of [[K - shift M, held^T], [held, 0]] that
-    belongs to x: 1/(lambda - shift).
+    With M = L L^T in blocks these are those of L^T A L, A the part of the inverse of [[K - shift M, held^T],
+    [held, 0]] that belongs to x: 1/(lambda - shift).
 
     Args:
         K: symmetric, sparse, of scipy; M: symmetric and positive definite, of diagonal blocks (scipy's bsr_matrix).
@@ -72,7 +72,9 @@ def lowest_of_constrained(K, M, held, count, shift=-1.0):
     L = M.copy()
     L.data = np.linalg.cholesky(M.data)
     held = sparse.csr_matrix(held)
-    factors = splu(sparse.bmat([[K - shift * M, held.T], [held, None]] if equations else [[K - shift * M]], format="csc"))
+    factors = splu(
+        sparse.bmat([[K - shift * M, held.T], [held, None]] if equations else [[K - shift * M]], format="csc")
+    )
     inverse = PETSc.Mat().createPython([size, size], _Congruent(factors, L, size + equations), comm=PETSc.COMM_SELF)
     inverse.setUp()
     solver = SLEPc.EPS().create(PETSc.COMM_SELF)

@@ -19,8 +19,8 @@ class NotConverged(CosseratError, RuntimeError):
     """A solver could not go on.
 
     Attributes:
-        path: everything up to the last converged point (a `Path` or a `History`, possibly empty), or None where nothing was
-            solved.
+        path: everything up to the last converged point (a `Path` or a `History`, possibly empty), or None where
+            nothing was solved.
     """
 
     def __init__(self, message, path=None):

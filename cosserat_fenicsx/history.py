@@ -15,8 +15,8 @@ Ledger = namedtuple("Ledger", "kinetic strain work dissipated linear_momentum an
 
 @dataclass(frozen=True)
 class Instant(Record):
-    """A `Record` at a time (s), with velocities and angular velocities of the nodes (N, 6), dimensionless, inertial, the
-    steps taken so far and the `Ledger`."""
+    """A `Record` at a time (s), with velocities and angular velocities of the nodes (N, 6), dimensionless, inertial,
+    the steps taken so far and the `Ledger`."""
 
     time: float = 0.0
     rates: np.ndarray = None

@@ -46,8 +46,8 @@ class InitialVelocity:
         return not callable(self.linear) and not callable(self.angular)
 
     def at(self, s, position):
-        """Velocities (n, 3) m/s and angular velocities (n, 3) rad/s, inertial, at arc lengths s (n,), where the rod lies at
-        `position` (n, 3) m.
+        """Velocities (n, 3) m/s and angular velocities (n, 3) rad/s, inertial, at arc lengths s (n,), where the rod
+        lies at `position` (n, 3) m.
 
         Raises:
             SceneError: a function that gives no three finite numbers; says at which arc length.

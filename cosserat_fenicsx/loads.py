@@ -1,7 +1,7 @@
 """What acts on a rod. All loads are multiplied by the load factor.
 
-Force and moment of a load are vectors, or functions of time (`signals`) with `jumps` where these are not smooth; vectors and
-densities are then asked of what `signals.at` makes of it.
+Force and moment of a load are vectors, or functions of time (`signals`) with `jumps` where these are not smooth;
+vectors and densities are then asked of what `signals.at` makes of it.
 
 A load says where it acts (`station`, or None for a line load), which function of `forms.loads` is its virtual work, and
 the vectors that function takes, each with its unit. A point load gives them once (`vectors(rod)`); a line load says

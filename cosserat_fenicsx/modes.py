@@ -36,8 +36,9 @@ class Modes:
         scene: the scene.
         squares: (n,) omega^2, rad^2/s^2, ascending; below zero the state is unstable; zero for free rigid motions.
         error: (n,) estimated relative error of the squares; NaN where the mesh was given.
-        shapes: (n, N, 6) displacements (m) and rotations (rad), inertial, of all nodes of all rods in the scene's order; the
-            largest displacement has length 1, or the largest turn times the longest rod's length, where nothing is displaced.
+        shapes: (n, N, 6) displacements (m) and rotations (rad), inertial, of all nodes of all rods in the scene's
+            order; the largest displacement has length 1, or the largest turn times the longest rod's length, where
+            nothing is displaced.
         negative_modes: negative squares of the second variation at that state, as `Path.negative_modes`.
         elements: of each rod; degree: of the elements.
     """
@@ -77,8 +78,8 @@ class Modes:
 def modes(scene, count=1, *, load_factor=0.0, tol=1e-6, elements=None, degree=4, comm=None):
     """Natural frequencies and shapes of small undamped vibrations about a static state.
 
-    Of the second variation in (r, theta) and the inertia of the sections: K x = omega^2 M x, subject to what supports and
-    joints hold. Where moments or follower loads have no potential the symmetric part of K counts, which does not see
+    Of the second variation in (r, theta) and the inertia of the sections: K x = omega^2 M x, subject to what supports
+    and joints hold. Where moments or follower loads have no potential the symmetric part of K counts, which does not see
     flutter.
 
     Args:
@@ -169,8 +170,8 @@ def _shape(vector, rows):
 
 
 def _stiffness(problem):
-    """K (sparse), the numbers of all nodes in it (N, 6), -1 where clamped, and the gradients of what supports and joints
-    hold, (equations, size)."""
+    """K (sparse), the numbers of all nodes in it (N, 6), -1 where clamped, and the gradients of what supports and
+    joints hold, (equations, size)."""
     model = problem.model
     (variation,) = model.second_variations
     tied = variation.tied

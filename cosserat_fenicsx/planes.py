@@ -91,7 +91,9 @@ def _find(scene):
     acting = [_vectors(scene, i, load) for i, load in enumerate(scene.loads)]
     normal = _normal_of(drawn)
     if normal is None:
-        normal = _normal_of_a_line(drawn[0], [*acting, *(_motions(support, scene.horizon) for support in scene.supports)], scene)
+        normal = _normal_of_a_line(
+            drawn[0], [*acting, *(_motions(support, scene.horizon) for support in scene.supports)], scene
+        )
     normal = normal * np.sign(normal[np.argmax(np.abs(normal))])
     if np.abs(drawn @ normal).max() > _SLANT:
         raise _Leaves("the rods do not lie in one plane")
@@ -157,8 +159,8 @@ def _normal_of(directions):
 
 
 def _normal_of_a_line(tangent, acting, scene):
-    """Where all rods are along one line the first load or prescribed motion that leaves it tells the normal, or else the
-    section, which bends where it is weakest."""
+    """Where all rods are along one line the first load or prescribed motion that leaves it tells the normal, or else
+    the section, which bends where it is weakest."""
     for inside, across in acting:
         for force in _units(inside):
             normal = np.cross(tangent, force)

@@ -80,8 +80,8 @@ class Rod:
             side: "left" or "right": just before or just after s, where the section jumps there.
 
         Returns:
-            `Stiffnesses`: K (..., 3) = (GA1, GA2, EA), N; J (..., 3) = (EI1, EI2, GJ), N m^2; mass (...), kg/m, and inertia
-            (..., 3), kg m, about d_1, d_2, d_3, or None where they are not known everywhere.
+            `Stiffnesses`: K (..., 3) = (GA1, GA2, EA), N; J (..., 3) = (EI1, EI2, GJ), N m^2; mass (...), kg/m, and
+            inertia (..., 3), kg m, about d_1, d_2, d_3, or None where they are not known everywhere.
 
         Raises:
             SceneError: a function of s that gives no section there.

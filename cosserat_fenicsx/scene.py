@@ -30,7 +30,8 @@ class Scene:
         title: for tables and pictures.
 
     Raises:
-        SceneError: an empty or inconsistent scene, or one that is held twice. (A mechanism may move: statics refuses it.)
+        SceneError: an empty or inconsistent scene, or one that is held twice. (A mechanism may move: statics refuses
+            it.)
     """
 
     rods: tuple

@@ -245,8 +245,8 @@ def at(item, t):
 
 
 def sample_times(item, until):
-    """Times (s) up to `until` that stand for all where a load or a support depends on time: its jumps, between them, and
-    spread over orders of magnitude; the time 0 where it does not."""
+    """Times (s) up to `until` that stand for all where a load or a support depends on time: its jumps, between them,
+    and spread over orders of magnitude; the time 0 where it does not."""
     signals = signals_of(item)
     if not signals:
         return [0.0]

@@ -7,7 +7,8 @@ from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.models.connections import ties_of
 from cosserat_fenicsx.results import Path
 
-# Positions (lengths) and turns (rad) of a start that supports do not hold are refused above this; velocities relative to the largest.
+# Positions (lengths) and turns (rad) of a start that supports do not hold are refused above this; velocities relative
+# to the largest.
 _APART = 1e-6
 # What leaves a plane by less keeps to it.
 _FLAT = 1e-10
@@ -54,7 +55,10 @@ def starts_in(scene, plane, start):
     path, k = _point(start)
     rods = [rod for rod in scene.rods if rod in path.scene.rods]
     moved = np.concatenate([path.motion(rod, np.linspace(0, 1, 33), [path[k]])[0] for rod in rods])
-    return max(np.abs(moved[:, :3] @ normal).max(), np.abs(moved[:, 4:] @ e1).max(), np.abs(moved[:, 4:] @ e2).max()) < _FLAT
+    return (
+        max(np.abs(moved[:, :3] @ normal).max(), np.abs(moved[:, 4:] @ e1).max(), np.abs(moved[:, 4:] @ e2).max())
+        < _FLAT
+    )
 
 
 def _point(start):

@@ -57,8 +57,8 @@ def _key(station):
 
 
 def check_held_once(scene):
-    """Refuse a scene that something holds twice. The rods between stations are elastic: what acts on one station must not
-    be asked for twice.
+    """Refuse a scene that something holds twice. The rods between stations are elastic: what acts on one station must
+    not be asked for twice.
 
     Raises:
         SceneError: naming the supports and joints at fault.

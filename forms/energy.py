@@ -1,10 +1,10 @@
 """A step in time that conserves energy: rates of quadratic directors, tested with changes of q.
 
 The directors R(q) of eq. (6) are homogeneous and quadratic in q, so that R(q_1) - R(q_0) is the derivative of R at the
-average q_m in the direction q_1 - q_0, exactly. Strains that are products of R, r', q and q' as they stand change over a
-step by what their averages resist, and rotational energy is that of the rates W of R, E = tr(I_R)/2 - I_R, by the
-trapezoidal rule. Tested with (r_1 - r_0, q_1 - q_0) the step is the balance of energy, to the last digit. |q| = 1 is held at
-the nodes, where tests are perpendicular to q_m: so it does no work.
+average q_m in the direction q_1 - q_0, exactly. Strains that are products of R, r', q and q' as they stand change over
+a step by what their averages resist, and rotational energy is that of the rates W of R, E = tr(I_R)/2 - I_R, by the
+trapezoidal rule. Tested with (r_1 - r_0, q_1 - q_0) the step is the balance of energy, to the last digit. |q| = 1 is
+held at the nodes, where tests are perpendicular to q_m: so it does no work.
 """
 
 from collections import namedtuple

@@ -4,8 +4,8 @@ q turns the reference frame; what it turns is therefore written with reference c
 rest: the angular velocity Om = 2 vec(conj(q) q_t) and the inertia of a section, I_R = R_R diag(Jrho) R_R^T.
 
 A step goes from `before` to `after` in the time h, with the trapezoidal rule for the velocities of the nodes,
-r_t1 = 2 (r_1 - r_0)/h - r_t0 and the same for q. Stress is that of the averaged strains on the directors of the averaged
-configuration, `middle`. Tested with a x r_m and a constant a the step then gives the exact balances of linear and
+r_t1 = 2 (r_1 - r_0)/h - r_t0 and the same for q. Stress is that of the averaged strains on the directors of the
+averaged configuration, `middle`. Tested with a x r_m and a constant a the step then gives the exact balances of linear and
 angular momentum, since the sum over the step of r_m x (r_t1 - r_t0) is that of (r x r_t)_1 - (r x r_t)_0, whatever the
 directors do.
 """
@@ -79,4 +79,6 @@ def viscous_loss(before, after, section, viscosity, h):
 def contact(motion, section, viscosity, rate):
     """(n, m), eqs. (2)-(3) with their viscous terms, inertial; `rate(a)` is the time derivative of an expression."""
     T, e, u = frame(motion, section), stretch_and_shear(motion, section), bending_and_torsion(motion, section)
-    return T * (scaled(section.K, e) + scaled(viscosity.Kt, rate(e))), T * (scaled(section.J, u) + scaled(viscosity.Jt, rate(u)))
+    return T * (scaled(section.K, e) + scaled(viscosity.Kt, rate(e))), T * (
+        scaled(section.J, u) + scaled(viscosity.Jt, rate(u))
+    )

@@ -52,7 +52,9 @@ def test_modes_decay_as_theory_says(mode):
     time, drag = 0.02 / omega, 0.02 * omega
     assert decay(mode, cf.Damping(time=time)) == pytest.approx(time * omega**2 / 2, rel=1e-2)
     assert decay(mode, cf.Damping(drag=drag)) == pytest.approx(drag / 2, rel=1e-2)
-    assert decay(mode, cf.Damping.ratio(0.01, (omega / 2 / math.pi, omega / math.pi))) == pytest.approx(0.01 * omega, rel=1e-2)
+    assert decay(mode, cf.Damping.ratio(0.01, (omega / 2 / math.pi, omega / math.pi))) == pytest.approx(
+        0.01 * omega, rel=1e-2
+    )
 
 
 def test_a_section_may_have_its_own_viscosity():

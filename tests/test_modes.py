@@ -85,7 +85,7 @@ def test_a_compressed_column_loses_its_frequency():
     section = cf.Stiffness((1e6, 1e6), 1e6, (1.0, 50.0), 10.0, mass=1.0, inertia=(1e-6, 1e-4, 1e-4))
     rod = cf.Rod(LINE, section)
     supports = [cf.Hinge(rod.start, (0, 0, 1)), cf.Roller(rod.end, (0, 1, 0))]
-    scene = cf.Scene([rod], supports, [cf.Force(rod.end, (-math.pi**2, 0, 0))])
+    scene = cf.Scene([rod], supports, [cf.Force(rod.end, (-(math.pi**2), 0, 0))])
     for eta in (0.0, 0.5, 1.3):
         modes = cf.modes(scene, 2, load_factor=eta)
         assert modes.squares[0] / math.pi**4 == pytest.approx(1 - eta, abs=3e-5)

@@ -62,7 +62,9 @@ def test_a_driven_root_and_a_static_start():
 def test_the_choice_of_the_model():
     _, scene = flying_in_space()
     assert cf.simulate(scene, 0.1, dt=0.1).model == "spatial"
-    with pytest.raises(cf.SceneError, match=r"model = 'planar': load 2 \(Moment at spaghetti.start\) does not turn in the plane"):
+    with pytest.raises(
+        cf.SceneError, match=r"model = 'planar': load 2 \(Moment at spaghetti.start\) does not turn in the plane"
+    ):
         cf.simulate(scene, 0.1, dt=0.1, model="planar")
     rod, flat = flying_in_a_plane()
     assert cf.simulate(flat, 0.1, dt=0.1, scheme="energy").model == "spatial"

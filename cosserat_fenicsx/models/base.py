@@ -192,8 +192,8 @@ class RodModel:
 
     @property
     def rows_of_nodes(self):
-        """(N, block) numbers of all nodes in the second variation (of a rung with one part), the scene's order, on all ranks;
-        -1 where clamped."""
+        """(N, block) numbers of all nodes in the second variation (of a rung with one part), the scene's order, on all
+        ranks; -1 where clamped."""
         (part,) = self._variations
         dofs = np.arange(part.numbering.block * len(self._slots)).reshape(len(self._slots), -1)
         rows = np.empty((self._gather_nodes.total, part.numbering.block), dtype=np.int64)

@@ -26,8 +26,8 @@ class MotionForms(CompiledForms):
     Attributes:
         residual: without the dead loads, and without the momenta at the start of the step, over h.
         momentum: momenta of the state and its velocity, tested.
-        live: virtual work of the live loads half way, per unit of load factor; or None. live_tangent: its derivative, where
-            it is no part of the tangent.
+        live: virtual work of the live loads half way, per unit of load factor; or None. live_tangent: its derivative,
+            where it is no part of the tangent.
         kinetic, strain: energies of the state; dissipated: what damping takes in the step.
     """
 

@@ -5,7 +5,7 @@ import ufl
 
 from cosserat_fenicsx import compat
 from cosserat_fenicsx.errors import SceneError
-from cosserat_fenicsx.forms import equilibrium, inertia
+from cosserat_fenicsx.forms import inertia
 from cosserat_fenicsx.forms import planar as eq
 from cosserat_fenicsx.models.compiled import derivative_in, load_work, measures, with_live_loads
 from cosserat_fenicsx.models.moving import Moving
@@ -61,7 +61,9 @@ class MovingPlanar(Moving, PlanarModel):
             given = vectors.x.array.reshape(-1, 3)
             off = given[:, :2] if "moment" in work.__name__ else given[:, 2]
             if np.abs(off).max(initial=0.0) > _OFF * np.abs(given).max(initial=0.0):
-                raise SceneError(f"a {work.__name__.replace('_', ' ')} leaves the plane at t = {t:g} s: expected model = 'spatial'")
+                raise SceneError(
+                    f"a {work.__name__.replace('_', ' ')} leaves the plane at t = {t:g} s: expected model = 'spatial'"
+                )
 
     def rates(self):
         """See `Moving`."""

@@ -1,8 +1,8 @@
 """Exact energy, and linear momentum; angular momentum to the second order (forms/energy.py).
 
-The form is tested with changes of (r, q). At every node those of q are made of a rotation phi, delta q = phi q_m/2, which is
-perpendicular to q_m: so |q| = 1, the fourth equation of the node, needs no multiplier, and loads and supports act as in
-the other schemes.
+The form is tested with changes of (r, q). At every node those of q are made of a rotation phi, delta q = phi q_m/2,
+which is perpendicular to q_m: so |q| = 1, the fourth equation of the node, needs no multiplier, and loads and supports
+act as in the other schemes.
 """
 
 import numpy as np

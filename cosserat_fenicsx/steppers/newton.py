@@ -11,12 +11,12 @@ from petsc4py import PETSc
 from cosserat_fenicsx import linear
 from cosserat_fenicsx.snes import Solved
 
-#: Newton stops when what remains after an increment, by its contraction, is below this (root mean square, units L, 1) times h
-#: over the unit of time, for velocities, and with them momenta, are off by so much over h. Rounding may leave more: where
-#: increments below the second number shrink no more, that is the end.
+#: Newton stops when what remains after an increment, by its contraction, is below this (root mean square, units L, 1)
+#: times h over the unit of time, for velocities, and with them momenta, are off by so much over h. Rounding may leave
+#: more: where increments below the second number shrink no more, that is the end.
 INCREMENT, ROUNDING = 1e-12, 1e-10
-# A kept tangent is made anew where increments shrink by less than the first number, and after a step of more iterations than
-# the second; the larger the system, the more iterations a tangent costs.
+# A kept tangent is made anew where increments shrink by less than the first number, and after a step of more
+# iterations than the second; the larger the system, the more iterations a tangent costs.
 _SMALL_SYSTEM, _LARGE_SYSTEM, _LARGE = (0.05, 4), (0.3, 8), 400
 _MOST, _HUGE = 15, 10.0
 _EXTERNAL = 76  # PETSc's code for an error in an external package: KLU met a singular tangent

@@ -30,8 +30,8 @@ class Stepper(Protocol):
         """Go from the time t to t + h, s.
 
         Returns:
-            `Solved`. The problem's x and the model's state and velocity are those of t + h; where it has not converged, all is
-            as it was at t.
+            `Solved`. The problem's x and the model's state and velocity are those of t + h; where it has not
+            converged, all is as it was at t.
         """
 
     def error(self):

@@ -1,8 +1,8 @@
 """Fourth order by three steps of the default scheme, one of them back in time.
 
 A symmetric scheme of order 2 gains two orders by steps gamma h, (1 - 2 gamma) h, gamma h with gamma = 1/(2 - 2^(1/3))
-(Yoshida, Phys. Lett. A 150 (1990) 262, doi:10.1016/0375-9601(90)90092-3). Momenta stay exact. Loads are asked for half way
-in each of the three, inside the step; prescribed motions also a third of a step beyond both ends.
+(Yoshida, Phys. Lett. A 150 (1990) 262, doi:10.1016/0375-9601(90)90092-3). Momenta stay exact. Loads are asked for half
+way in each of the three, inside the step; prescribed motions also a third of a step beyond both ends.
 """
 
 from cosserat_fenicsx.errors import SceneError
@@ -31,7 +31,9 @@ class TripleJump:
             SceneError: a rod with damping, which would grow without bound back in time.
         """
         if self.problem.model.damped:
-            raise SceneError("scheme = 'triple-jump' steps back in time: expected rods without damping, or another scheme")
+            raise SceneError(
+                "scheme = 'triple-jump' steps back in time: expected rods without damping, or another scheme"
+            )
         self._inner.begin()
 
     def jump(self):
