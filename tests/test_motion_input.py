@@ -126,8 +126,17 @@ def test_a_moving_scene_in_toml(tmp_path):
         [[rods]]
         name = "rod"
         curve = { type = "Line", start = [0, 0, 0], end = [2, 0, 0] }
-        section = { type = "Stiffness", shear = [1e5, 1e5], axial = 1e5, bending = [1e3, 1e3], torsion = 1e3, mass =
-        2.0, inertia = [0.1, 0.1, 0.2] } [[loads]]
+        [rods.section]
+        type = "Stiffness"
+        shear = [1e5, 1e5]
+        axial = 1e5
+        bending = [1e3, 1e3]
+        torsion = 1e3
+        mass = 2.0
+        inertia = [0.1, 0.1, 0.2]
+        [rods.damping]
+        time = 1e-3
+        [[loads]]
         type = "Force"
         station = "rod.end"
         force = { type = "Ramp", value = [0, 0, 4], end = 0.5 }
