@@ -126,37 +126,43 @@ class _Run:
             if jump:
                 self._stepper.jump()
                 self._pace.jump()
-            nothing = 1e-9 * (end - t)
+            nothing, first, count, h = 1e-9 * (end - t), t, 0, 0.0
             while t < end:
                 obey()
-                t += self._advance(t, self._pace.length(end - t))
+                wanted = self._pace.length(end - t)
+                if abs(wanted - h) > 1e-9 * wanted:  # equal steps are counted, so that times do not gather rounding
+                    first, count, h = t, 0, wanted
+                if not self._advance(t, h):
+                    continue
+                count += 1
+                t = first + count * h
                 t = end if end - t <= nothing else t
                 bar.reached(t)
                 if save_all or (saved and t == end):
                     self._save(t)
 
     def _advance(self, t, h, halvings=0):
-        """Step from t by h, in shorter steps where that fails; how far it came, 0 where a shorter step is to be tried."""
+        """Step from t by h, in shorter steps where that fails; False where a shorter step is to be tried."""
         solved = self._stepper.step(t, h)
         self._iterations += solved.iterations
         if solved.converged:
             if not halvings and not self._pace.accepts(self._stepper, h):
                 self._stepper.undo()
-                return 0.0
+                return False
             self._steps += 1
-            return h
+            return True
         if halvings == _HALVINGS:
             if self.history[-1].time < t:
                 self._save(t)
             raise NotConverged(
-                f"the motion was lost at t = {t:.6g} s, where a step of {h:.3g} s still fails: {solved.reason}. Try a smaller dt or tol, "
-                "more elements, or damping.",
+                f"the motion was lost at t = {t:.6g} s, where a step of {h:.3g} s still fails: {solved.reason}. "
+                "Try a smaller dt or tol, more elements, or damping.",
                 self.history,
             )
         self._advance(t, h / 2, halvings + 1)
         self._advance(t + h / 2, h / 2, halvings + 1)
         self._pace.failed(h)
-        return h
+        return True
 
     def _save(self, t):
         model, problem, stepper = self.model, self.problem, self._stepper

@@ -55,6 +55,7 @@ def test_adaptive_steps_keep_their_promise():
     for station, expected in ((rod.start, [40.6910, 0.1578, -3.0316]), (rod.end, [40.4784, 8.5541, 1.6810])):
         assert np.linalg.norm(history.position(station)[-1] - expected) < 1e-3 * rod.length
     assert {2.5, 5.0} <= set(history.times) and np.diff(history.times).max() > 5 * np.diff(history.times).min()
+    assert np.diff(history.times).min() > 0 and len(history) == history.steps[-1] + 1
 
 
 def test_a_step_that_fails_is_halved():
