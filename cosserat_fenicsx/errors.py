@@ -19,7 +19,8 @@ class NotConverged(CosseratError, RuntimeError):
     """A solver could not go on.
 
     Attributes:
-        path: everything up to the last converged point (a `Path`, possibly empty), or None where nothing was solved.
+        path: everything up to the last converged point (a `Path` or a `History`, possibly empty), or None where
+            nothing was solved.
     """
 
     def __init__(self, message, path=None):
@@ -35,7 +36,7 @@ class Interrupted(KeyboardInterrupt):
     """
 
     def __init__(self, path):
-        super().__init__(f"interrupted; {len(path)} load factor(s) done so far are kept")
+        super().__init__(f"interrupted; {len(path)} {path.axis}(s) done so far are kept")
         self.path = path
 
 

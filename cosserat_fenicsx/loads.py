@@ -1,5 +1,8 @@
 """What acts on a rod. All loads are multiplied by the load factor.
 
+Force and moment of a load are vectors, or functions of time (`signals`) with `jumps` where these are not smooth;
+vectors and densities are then asked of what `signals.at` makes of it.
+
 A load says where it acts (`station`, or None for a line load), which function of `forms.loads` is its virtual work, and
 the vectors that function takes, each with its unit. A point load gives them once (`vectors(rod)`); a line load says
 which rods it acts on (`acts_on`) and gives a density along them (`density(rod, s)`, shape (n, 3)) of one `unit`. Nothing else in
@@ -12,6 +15,7 @@ import numpy as np
 
 from cosserat_fenicsx.checks import instance, refuse, store, vector
 from cosserat_fenicsx.rod import Rod, Station
+from cosserat_fenicsx.signals import vector_or_signal
 
 
 @dataclass(frozen=True)
@@ -23,17 +27,18 @@ class Force:
         force: N, inertial; it keeps its direction.
 
     Raises:
-        SceneError: not a station, or not three finite numbers.
+        SceneError: not a station, or not three finite numbers nor a function of time.
     """
 
     station: Station
-    force: tuple
+    force: object
+    jumps: tuple = ()
 
     work = "force"
 
     def __post_init__(self):
         _check_station(self)
-        store(self, force=vector(self, "force", self.force, "N"))
+        store(self, force=vector_or_signal(self, "force", self.force, "N", self.jumps))
 
     def vectors(self, rod):
         """The vectors of the virtual work, with their units."""
@@ -49,17 +54,18 @@ class Moment:
         moment: N m, inertial; it keeps its direction.
 
     Raises:
-        SceneError: not a station, or not three finite numbers.
+        SceneError: not a station, or not three finite numbers nor a function of time.
     """
 
     station: Station
-    moment: tuple
+    moment: object
+    jumps: tuple = ()
 
     work = "moment"
 
     def __post_init__(self):
         _check_station(self)
-        store(self, moment=vector(self, "moment", self.moment, "N m"))
+        store(self, moment=vector_or_signal(self, "moment", self.moment, "N m", self.jumps))
 
     def vectors(self, rod):
         """The vectors of the virtual work, with their units."""
@@ -80,14 +86,15 @@ class EccentricForce:
     """
 
     station: Station
-    force: tuple
+    force: object
     offset: tuple
+    jumps: tuple = ()
 
     work = "eccentric_force"
 
     def __post_init__(self):
         _check_station(self)
-        store(self, force=vector(self, "force", self.force, "N"))
+        store(self, force=vector_or_signal(self, "force", self.force, "N", self.jumps))
         store(self, offset=vector(self, "offset", self.offset, "m", size=2))
 
     def vectors(self, rod):
@@ -105,17 +112,18 @@ class FollowerForce:
         force: N, material: along d_1, d_2, d_3 of the moving section.
 
     Raises:
-        SceneError: not a station, or not three finite numbers.
+        SceneError: not a station, or not three finite numbers nor a function of time.
     """
 
     station: Station
-    force: tuple
+    force: object
+    jumps: tuple = ()
 
     work, follows = "follower_force", True
 
     def __post_init__(self):
         _check_station(self)
-        store(self, force=vector(self, "force", self.force, "N"))
+        store(self, force=vector_or_signal(self, "force", self.force, "N", self.jumps))
 
     def vectors(self, rod):
         """The vectors of the virtual work, with their units."""
@@ -131,17 +139,18 @@ class FollowerMoment:
         moment: N m, material: about d_1, d_2, d_3 of the moving section.
 
     Raises:
-        SceneError: not a station, or not three finite numbers.
+        SceneError: not a station, or not three finite numbers nor a function of time.
     """
 
     station: Station
-    moment: tuple
+    moment: object
+    jumps: tuple = ()
 
     work, follows = "follower_moment", True
 
     def __post_init__(self):
         _check_station(self)
-        store(self, moment=vector(self, "moment", self.moment, "N m"))
+        store(self, moment=vector_or_signal(self, "moment", self.moment, "N m", self.jumps))
 
     def vectors(self, rod):
         """The vectors of the virtual work, with their units."""
@@ -191,18 +200,19 @@ class LineForce:
         force: N/m, inertial.
 
     Raises:
-        SceneError: not a rod, or not three finite numbers.
+        SceneError: not a rod, or not three finite numbers nor a function of time.
     """
 
     rod: Rod
-    force: tuple
+    force: object
+    jumps: tuple = ()
 
     work, unit = "line_force", "force per length"
     station = None
 
     def __post_init__(self):
         instance(self, "rod", self.rod, Rod, "a Rod")
-        store(self, force=vector(self, "force", self.force, "N/m"))
+        store(self, force=vector_or_signal(self, "force", self.force, "N/m", self.jumps))
 
     def check_rod(self, rod):
         """Any rod will do."""
@@ -225,18 +235,19 @@ class LineMoment:
         moment: N m/m, inertial.
 
     Raises:
-        SceneError: not a rod, or not three finite numbers.
+        SceneError: not a rod, or not three finite numbers nor a function of time.
     """
 
     rod: Rod
-    moment: tuple
+    moment: object
+    jumps: tuple = ()
 
     work, unit = "line_moment", "force"
     station = None
 
     def __post_init__(self):
         instance(self, "rod", self.rod, Rod, "a Rod")
-        store(self, moment=vector(self, "moment", self.moment, "N m/m"))
+        store(self, moment=vector_or_signal(self, "moment", self.moment, "N m/m", self.jumps))
 
     def check_rod(self, rod):
         """Any rod will do."""

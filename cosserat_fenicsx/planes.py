@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from cosserat_fenicsx.curves import Line
+from cosserat_fenicsx.signals import at, sample_times
 from cosserat_fenicsx.statical import rows_of
 from cosserat_fenicsx.ties import PositionTie, TurnTie
 
@@ -90,7 +91,9 @@ def _find(scene):
     acting = [_vectors(scene, i, load) for i, load in enumerate(scene.loads)]
     normal = _normal_of(drawn)
     if normal is None:
-        normal = _normal_of_a_line(drawn[0], acting, scene)
+        normal = _normal_of_a_line(
+            drawn[0], [*acting, *(_motions(support, scene.horizon) for support in scene.supports)], scene
+        )
     normal = normal * np.sign(normal[np.argmax(np.abs(normal))])
     if np.abs(drawn @ normal).max() > _SLANT:
         raise _Leaves("the rods do not lie in one plane")
@@ -128,15 +131,25 @@ def _vectors(scene, i, load):
     """Vectors that a load asks to be in the plane, and across it."""
     if load.work not in _WORKS:
         raise _Leaves(f"load {i + 1} ({_words(load)}) is of a kind that only the spatial model knows")
-    if load.station is not None:
-        given = [(np.asarray(v), unit) for v, unit in load.vectors(load.station.rod)]
-    else:
-        given = []
+    given = []
+    for now in (at(load, t) for t in sample_times(load, scene.horizon)):
+        if now.station is not None:
+            given += [(np.asarray(v), unit) for v, unit in now.vectors(now.station.rod)]
+            continue
         for rod in scene.rods:
-            if load.acts_on(rod):
+            if now.acts_on(rod):
                 s = np.linspace(0, rod.length, _SAMPLES)
-                given += [(v, "moment" if load.unit == "force" else "force") for v in load.density(rod, s)]
+                given += [(v, "moment" if now.unit == "force" else "force") for v in now.density(rod, s)]
     return [v for v, unit in given if unit != "moment"], [v for v, unit in given if unit == "moment"]
+
+
+def _motions(holder, until):
+    """Displacements and rotation vectors that a support or a joint prescribes, at times that stand for all."""
+    moved, turned = [], []
+    for ties in (at(holder, t).ties() for t in sample_times(holder, until)):
+        moved.append(sum((np.multiply(t.rate, t.direction) for t in ties if isinstance(t, PositionTie)), np.zeros(3)))
+        turned += [np.array(t.rotation) for t in ties if isinstance(t, TurnTie)]
+    return moved, turned
 
 
 def _normal_of(directions):
@@ -146,8 +159,8 @@ def _normal_of(directions):
 
 
 def _normal_of_a_line(tangent, acting, scene):
-    """Where all rods are along one line the first load that leaves it tells the normal, or else the section, which
-    bends where it is weakest."""
+    """Where all rods are along one line the first load or prescribed motion that leaves it tells the normal, or else
+    the section, which bends where it is weakest."""
     for inside, across in acting:
         for force in _units(inside):
             normal = np.cross(tangent, force)
@@ -184,12 +197,9 @@ def _check_supports(scene, plane):
             rows = [rows_of(tie)[0][1] for tie in ties]
             parts = [np.array(x) for x in zip(*(plane.parts(row) for row in rows), strict=True)]
             apart = sum(np.linalg.matrix_rank(x, tol=_APART) for x in parts)
-            moved = [np.multiply(t.rate, t.direction) if isinstance(t, PositionTie) else () for t in ties]
-            moved = sum((v for v in moved if len(v)), np.zeros(3))
-            turned = [np.array(t.rotation) for t in ties if isinstance(t, TurnTie)]
+            moved, turned = _motions(holder, scene.horizon)
             normal = np.array(plane.axes[2])
-            out = [abs(v @ normal) for v in _units([moved])]
-            out += [np.linalg.norm(np.cross(v, normal)) for v in _units(turned)]
+            out = [*np.abs(_units(moved) @ normal), *(np.linalg.norm(np.cross(v, normal)) for v in _units(turned))]
             if apart > np.linalg.matrix_rank(np.array(rows), tol=_APART) or max(out, default=0.0) > _SLANT:
                 where = getattr(holder, "station", None) or f"{holder.first} with {holder.second}"
                 name = type(holder).__name__

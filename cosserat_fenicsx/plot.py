@@ -108,7 +108,7 @@ def _draw(path, points, magnify):
 def _note(path, shown, thicker, magnify):
     """The title: what is shown, and what is not to scale."""
     which = (
-        "shapes by load factor" if len(shown) == len(path) else f"shapes at {len(shown)} of {len(path)} load factors"
+        f"shapes by {path.axis}" if len(shown) == len(path) else f"shapes at {len(shown)} of {len(path)} {path.axis}s"
     )
     parts = [f"{path.scene.title or 'Deformed rods'}: {which}"]
     if magnify != 1:
@@ -241,7 +241,7 @@ def _label(plotter, path, shown, bodies, size):
         if any(np.linalg.norm(at - other) < 0.03 * size for other in placed):
             continue
         placed.append(at)
-        text = f"{path.load_factors[k]:.3g}" + ("" if path.stable[k] else " (unstable)")
+        text = path.label(k)
         plotter.add_point_labels(
             [at], [text], font_size=20, text_color="black", shape=None, show_points=False, always_visible=True, bold=False,
             justification_horizontal="center", justification_vertical="center",

@@ -10,11 +10,13 @@ from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.materials import Material
 from cosserat_fenicsx.sections import SECTIONS, Stiffness
 
-#: K (..., 3) = (GA1, GA2, EA), N; J (..., 3) = (EI1, EI2, GJ), N m^2; mass (...) = rho A, kg/m, or None where unknown.
-Stiffnesses = namedtuple("Stiffnesses", "K J mass")
+#: K (..., 3) = (GA1, GA2, EA), N; J (..., 3) = (EI1, EI2, GJ), N m^2; mass (...) = rho A, kg/m, and inertia (..., 3) =
+#: (Jrho_1, Jrho_2, Jrho_3), kg m, or None where unknown.
+Stiffnesses = namedtuple("Stiffnesses", "K J mass inertia")
 
 _SAMPLES = 33
-_UNKNOWN = [np.nan] * 7  # what a function gives
+_NUMBERS = 10  # of a section
+_UNKNOWN = [np.nan] * _NUMBERS  # what a function gives
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,8 +111,8 @@ class Profile:
         """`Stiffnesses` at arc lengths s (...)."""
         s = np.asarray(s, dtype=float)
         if self.constant:
-            return _split(np.broadcast_to(self._fixed[0], (*s.shape, 7)))
-        return _split(self._rows(s.ravel(), self._index(s, side).ravel()).reshape(*s.shape, 7))
+            return _split(np.broadcast_to(self._fixed[0], (*s.shape, _NUMBERS)))
+        return _split(self._rows(s.ravel(), self._index(s, side).ravel()).reshape(*s.shape, _NUMBERS))
 
     def _index(self, s, side):
         if side not in ("left", "right"):
@@ -147,9 +149,10 @@ def _is_law(section):
 
 
 def _row(k):
-    return [*k.shear, k.axial, *k.bending, k.torsion, np.nan if k.mass is None else k.mass]
+    mass, inertia = (np.nan if k.mass is None else k.mass), (k.inertia or [np.nan] * 3)
+    return [*k.shear, k.axial, *k.bending, k.torsion, mass, *inertia]
 
 
 def _split(rows):
-    mass = rows[..., 6]
-    return Stiffnesses(rows[..., :3], rows[..., 3:6], None if np.isnan(mass).any() else mass)
+    mass, inertia = (None if np.isnan(x).any() else x for x in (rows[..., 6], rows[..., 7:]))
+    return Stiffnesses(rows[..., :3], rows[..., 3:6], mass, inertia)

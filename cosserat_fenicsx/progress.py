@@ -14,9 +14,11 @@ class Progress:
         targets: the requested load factors.
         wanted: True, False, or None for where a person is likely to wait.
         comm: MPI communicator; only rank 0 shows anything.
+        quantity: what is followed, in words.
     """
 
-    def __init__(self, targets, wanted, comm):
+    def __init__(self, targets, wanted, comm, quantity="load factor"):
+        self._quantity = quantity
         self._show = comm.rank == 0 and wanted is not False
         self._now = wanted is True
         self._terminal = sys.stderr.isatty()
@@ -36,8 +38,12 @@ class Progress:
 
     def at(self, point):
         """The run has come to a point."""
-        self._done += abs(point.load_factor - self._eta)
-        self._eta = point.load_factor
+        self.reached(point.load_factor)
+
+    def reached(self, eta):
+        """The run has come to a load factor, or a time."""
+        self._done += abs(eta - self._eta)
+        self._eta = eta
         now = time.monotonic()
         if not self._show or (now - self._began < _PATIENCE and not self._now):
             return
@@ -45,7 +51,9 @@ class Progress:
             self._draw()
         elif now - self._last >= _LINE_EVERY or (self._now and self._last == self._began):
             self._last = now
-            print(f"{self._what}: load factor {self._eta:.6g}, {100 * self._done / self._way:.0f} %", file=sys.stderr)
+            print(
+                f"{self._what}: {self._quantity} {self._eta:.6g}, {100 * self._done / self._way:.0f} %", file=sys.stderr
+            )
 
     def _draw(self):
         if self._bar is None:
@@ -56,7 +64,7 @@ class Progress:
             self._bar.start()
             self._task = self._bar.add_task(self._what, total=1.0)
         self._bar.update(self._task, completed=min(self._done / self._way, 1.0),
-                         description=f"{self._what}, load factor {self._eta:.4g}")  # fmt: skip
+                         description=f"{self._what}, {self._quantity} {self._eta:.4g}")  # fmt: skip
 
     def __exit__(self, *exception):
         if self._bar is not None:

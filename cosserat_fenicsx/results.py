@@ -33,6 +33,9 @@ class Path:
     Station queries return one row a point, in inertial components unless they say material.
     """
 
+    #: what tells the points apart, in words; fields that files hold beside those of `xdmf.FIELDS`
+    axis, more_fields = "load factor", {}
+
     def __init__(self, scene, layout, scales, rule, *, comm, rounding, model, formulation, degree, unknowns, why,
                  expand):  # fmt: skip
         self.scene, self.layout, self.scales, self.rule, self.comm = scene, layout, scales, rule, comm
@@ -120,6 +123,15 @@ class Path:
     iterations = property(lambda self: self._array("iterations").astype(int))
     negative_modes = property(lambda self: self._array("negative_modes").astype(int))
     stable = property(lambda self: self.negative_modes == 0)
+
+    @property
+    def along_axis(self):
+        """(n,) what tells the points apart."""
+        return self.load_factors
+
+    def label(self, k):
+        """What a picture writes beside point k."""
+        return f"{self.load_factors[k]:.3g}" + ("" if self.stable[k] else " (unstable)")
 
     @property
     def error(self):

@@ -8,6 +8,7 @@ import numpy as np
 
 from cosserat_fenicsx.checks import instance, number, store
 from cosserat_fenicsx.curves import CURVES
+from cosserat_fenicsx.damping import Damping
 from cosserat_fenicsx.materials import Material
 from cosserat_fenicsx.profiles import Profile
 from cosserat_fenicsx.quadrature import gauss
@@ -27,6 +28,7 @@ class Rod:
             smooth in s, which may also stand in a piece.
         material: a `Material`; not needed with `Stiffness`.
         name: how messages, files and scene files call it.
+        damping: a `Damping`, for motions; None for none.
 
     Attributes:
         stiffness: the `Stiffness` at s = 0, which is that of the whole rod where `profile.constant`.
@@ -40,6 +42,7 @@ class Rod:
     section: object
     material: Material | None = None
     name: str | None = None
+    damping: Damping | None = None
     stiffness: Stiffness = field(init=False, repr=False)
     profile: Profile = field(init=False, repr=False)
 
@@ -50,6 +53,8 @@ class Rod:
         instance(self, "curve", self.curve, CURVES, "a curve such as Line(start, end)")
         if self.material is not None:
             instance(self, "material", self.material, Material, "a Material")
+        if self.damping is not None:
+            instance(self, "damping", self.damping, Damping, "a Damping")
         store(self, profile=Profile(self, self.section, self.material))
         store(self, stiffness=self.profile.start)
 
@@ -80,8 +85,8 @@ class Rod:
             side: "left" or "right": just before or just after s, where the section jumps there.
 
         Returns:
-            `Stiffnesses`: K (..., 3) = (GA1, GA2, EA), N; J (..., 3) = (EI1, EI2, GJ), N m^2; mass (...), kg/m, or None
-            where it is not known everywhere.
+            `Stiffnesses`: K (..., 3) = (GA1, GA2, EA), N; J (..., 3) = (EI1, EI2, GJ), N m^2; mass (...), kg/m, and
+            inertia (..., 3), kg m, about d_1, d_2, d_3, or None where they are not known everywhere.
 
         Raises:
             SceneError: a function of s that gives no section there.

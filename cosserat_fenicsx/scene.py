@@ -1,15 +1,18 @@
 """A scene: rods, what joins and holds them and what acts on them. Knows no solver and no mesh."""
 
+import copy
 from dataclasses import dataclass
 from functools import cached_property
 
 from cosserat_fenicsx.checks import instance
 from cosserat_fenicsx.errors import SceneError
+from cosserat_fenicsx.initial import InitialVelocity
 from cosserat_fenicsx.joints import Joint
 from cosserat_fenicsx.loads import LOADS
 from cosserat_fenicsx.planes import find_plane
 from cosserat_fenicsx.rod import Rod
-from cosserat_fenicsx.statical import check_held
+from cosserat_fenicsx.signals import signals_of
+from cosserat_fenicsx.statical import check_held_once
 from cosserat_fenicsx.supports import SUPPORTS
 
 
@@ -23,20 +26,26 @@ class Scene:
         loads: `Force`, `Moment`, `EccentricForce`, `FollowerForce`, `FollowerMoment`, `LineForce`, `LineMoment`,
             `Weight`; all are multiplied by the load factor.
         joints: `Joint`s between stations that touch; rods without one stand by themselves.
+        velocities: `InitialVelocity`s, at most one a rod; rods without one start at rest. For motions alone.
         title: for tables and pictures.
 
     Raises:
-        SceneError: an empty or inconsistent scene, one that is held twice, or a mechanism.
+        SceneError: an empty or inconsistent scene, or one that is held twice. (A mechanism may move: statics refuses
+            it.)
     """
 
     rods: tuple
-    supports: tuple
+    supports: tuple = ()
     loads: tuple = ()
     joints: tuple = ()
     title: str = ""
+    velocities: tuple = ()
+
+    #: s: for how long what depends on time is looked at beforehand
+    horizon = 1.0
 
     def __post_init__(self):
-        for field in ("rods", "supports", "loads", "joints"):
+        for field in ("rods", "supports", "loads", "joints", "velocities"):
             value = getattr(self, field)
             if not isinstance(value, list | tuple):
                 raise SceneError(f"Scene.{field} = {value!r}: expected a list")
@@ -58,7 +67,14 @@ class Scene:
                 self._check_rod(f"joints[{i}]", end, end.rod)
         for i, load in enumerate(self.loads):
             self._check_load(f"loads[{i}]", load)
-        check_held(self)
+        for i, velocity in enumerate(self.velocities):
+            instance("Scene", f"velocities[{i}]", velocity, InitialVelocity, "an InitialVelocity(rod)")
+            self._check_rod(f"velocities[{i}]", velocity.rod, velocity.rod)
+            if velocity.rod in [other.rod for other in self.velocities[:i]]:
+                raise SceneError(
+                    f"Scene.velocities[{i}] is the second of rod '{velocity.rod.name}': expected one a rod"
+                )
+        check_held_once(self)
         object.__setattr__(self, "_leaders", self._find_leaders())
 
     def _check_load(self, field, load):
@@ -103,6 +119,13 @@ class Scene:
         are not lost on where a structure stands."""
         return self._leaders[rod].curve.position(0.0)
 
+    def over(self, duration):
+        """The same scene, looked at beforehand for so long (s)."""
+        scene = copy.copy(self)
+        scene.__dict__.pop("flatness", None)
+        object.__setattr__(scene, "horizon", duration)
+        return scene
+
     @cached_property
     def flatness(self):
         """(the `Plane` that everything keeps to, "") or (None, what leaves it, in words)."""
@@ -112,6 +135,11 @@ class Scene:
     def plane(self):
         """The `Plane` that everything keeps to, or None."""
         return self.flatness[0]
+
+    @property
+    def moving(self):
+        """Its loads and supports that depend on time."""
+        return [item for item in (*self.loads, *self.supports) if signals_of(item)]
 
     def line_loads(self, rod):
         """The loads that act along a rod."""

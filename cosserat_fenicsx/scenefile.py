@@ -17,6 +17,12 @@ type = "Force"
 station = "column.end"
 force = [0, 0, -1e5]
 
+# in a motion: force = { type = "Triangle", value = [0, 0, 50], peak = 1.0, end = 2.0 }, or Step, Ramp, Sine, Table
+
+[[velocities]]                    # optional, where a motion starts
+rod = "column"
+angular = [0, 0, 6.28]
+
 [[joints]]                        # optional, between rods that touch
 first = "column.end"
 second = "beam.start"
@@ -31,13 +37,16 @@ import tomllib
 from pathlib import Path
 
 from cosserat_fenicsx.curves import CURVES
+from cosserat_fenicsx.damping import Damping
 from cosserat_fenicsx.errors import SceneError, nearest
+from cosserat_fenicsx.initial import InitialVelocity
 from cosserat_fenicsx.joints import Joint
 from cosserat_fenicsx.loads import LOADS
 from cosserat_fenicsx.materials import Material
 from cosserat_fenicsx.rod import Rod, Station
 from cosserat_fenicsx.scene import Scene
 from cosserat_fenicsx.sections import SECTIONS
+from cosserat_fenicsx.signals import SIGNALS
 from cosserat_fenicsx.supports import SUPPORTS
 
 #: What [solve] may hold: the arguments of `solve` that are plain values, with their TOML types.
@@ -81,7 +90,9 @@ def read_scene(file):
 
 
 def _scene(tables, folder):
-    _known_keys("the file", tables, {"title", "materials", "rods", "supports", "joints", "loads", "solve"})
+    _known_keys(
+        "the file", tables, {"title", "materials", "rods", "supports", "joints", "loads", "velocities", "solve"}
+    )
     materials = {
         name: _build(f"materials.{name}", table, (Material,), {})
         for name, table in _table("materials", tables.get("materials", {})).items()
@@ -91,6 +102,9 @@ def _scene(tables, folder):
     supports = [_build(f"supports[{i}]", entry, SUPPORTS, stations) for i, entry in _entries("supports", tables)]
     loads = [_build(f"loads[{i}]", entry, LOADS, stations) for i, entry in _entries("loads", tables)]
     joints = [_build(f"joints[{i}]", entry, (Joint,), stations) for i, entry in _entries("joints", tables)]
+    velocities = [
+        _build(f"velocities[{i}]", entry, (InitialVelocity,), stations) for i, entry in _entries("velocities", tables)
+    ]
     title = tables.get("title", "")
     if not isinstance(title, str):
         raise SceneError(f"title = {title!r}: expected a string")
@@ -100,11 +114,11 @@ def _scene(tables, folder):
         if not isinstance(value, SOLVE_KEYS[key]) or isinstance(value, bool):
             names = " or ".join(kind.__name__ for kind in SOLVE_KEYS[key])
             raise SceneError(f"[solve].{key} = {value!r}: expected {names}")
-    return Scene(rods, supports, loads, joints, title=title), settings
+    return Scene(rods, supports, loads, joints, title, velocities), settings
 
 
 def _rod(where, entry, materials, folder):
-    _known_keys(where, entry, {"name", "curve", "section", "material"})
+    _known_keys(where, entry, {"name", "curve", "section", "material", "damping"})
     for key in ("curve", "section"):
         if key not in entry:
             raise SceneError(f"{where}: '{key}' is missing: expected a table with a type")
@@ -119,8 +133,11 @@ def _rod(where, entry, materials, folder):
         material = _build(f"{where}.material", material, (Material,), {})
     curve = _build(f"{where}.curve", entry["curve"], CURVES, {}, folder)
     section = _section(f"{where}.section", entry["section"])
+    more = {"name": entry["name"]} if "name" in entry else {}
+    if "damping" in entry:
+        more["damping"] = _build(f"{where}.damping", entry["damping"], (Damping,), {})
     try:
-        return Rod(curve, section, material, **({"name": entry["name"]} if "name" in entry else {}))
+        return Rod(curve, section, material, **more)
     except SceneError as problem:
         raise SceneError(f"{where}: {problem}") from None
 
@@ -161,6 +178,8 @@ def _build(where, entry, classes, rods, folder=None):
             entry[name] = _station(f"{where}.{name}", entry[name], rods)
         elif arguments[name].annotation is Rod:
             entry[name] = _known_rod(f"{where}.{name}", entry[name], rods)
+        elif isinstance(entry[name], dict):
+            entry[name] = _build(f"{where}.{name}", entry[name], SIGNALS, {})
     try:
         return kind(**entry)
     except SceneError as problem:

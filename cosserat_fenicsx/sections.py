@@ -23,6 +23,8 @@ class Stiffness:
         bending: (EI1, EI2), about d_1 and about d_2, N m^2; finite.
         torsion: GJ, N m^2; finite.
         mass: rho A, kg/m, where a load or a motion asks for mass.
+        inertia: (Jrho_1, Jrho_2, Jrho_3), about d_1, d_2 and the tangent d_3, kg m, where a motion asks for them:
+            (rho I_1, rho I_2, rho (I_1 + I_2)) where the density rho is the same all over the section.
         outline: corners (x1, x2) along d_1 and d_2 of what a picture draws, m; None lets the picture choose.
 
     Raises:
@@ -35,17 +37,17 @@ class Stiffness:
     torsion: float
     mass: float | None = None
     outline: tuple | None = None
+    inertia: tuple | None = None
 
     def __post_init__(self):
         for field, unit, check in (("shear", "N", stiffness), ("bending", "N m^2", positive)):
-            values = getattr(self, field)
-            if not isinstance(values, tuple | list) or len(values) != 2:
-                refuse(self, field, values, f"two numbers, about or along d_1 and d_2 ({unit})")
-            store(self, **{field: tuple(check(self, field, value, unit) for value in values)})
+            _check_numbers(self, field, f"two numbers, about or along d_1 and d_2 ({unit})", unit, check, 2)
         store(self, axial=stiffness(self, "axial", self.axial, "N"))
         store(self, torsion=positive(self, "torsion", self.torsion, "N m^2"))
         if self.mass is not None:
             store(self, mass=positive(self, "mass", self.mass, "kg/m"))
+        if self.inertia is not None:
+            _check_numbers(self, "inertia", "three numbers, about d_1, d_2 and d_3 (kg m)", "kg m", positive, 3)
         if self.outline is not None:
             store(self, outline=_corners(self, self.outline))
 
@@ -140,6 +142,13 @@ class Rectangle:
         return _isotropic(material, b * h, (b * h**3 / 12, h * b**3 / 12), _rectangle_torsion(b, h), k, corners)
 
 
+def _check_numbers(section, field, expected, unit, check, size):
+    values = getattr(section, field)
+    if not isinstance(values, tuple | list) or len(values) != size:
+        refuse(section, field, values, expected)
+    store(section, **{field: tuple(check(section, field, value, unit) for value in values)})
+
+
 def _check_lengths(section, *fields):
     for field in fields:
         store(section, **{field: positive(section, field, getattr(section, field), "m")})
@@ -167,14 +176,15 @@ def _circle(radius, corners=24):
 
 
 def _isotropic(material, A, I, J, k, outline):
-    mass = None if material.density is None else material.density * A
+    rho = material.density
     return Stiffness(
         shear=(k * material.G * A, k * material.G * A),
         axial=material.E * A,
         bending=(material.E * I[0], material.E * I[1]),
         torsion=material.G * J,
-        mass=mass,
+        mass=None if rho is None else rho * A,
         outline=outline,
+        inertia=None if rho is None else (rho * I[0], rho * I[1], rho * (I[0] + I[1])),
     )
 
 

@@ -8,16 +8,6 @@ from cosserat_fenicsx.ties import PositionTie, TurnTie
 _SMALL = 1e-9
 
 
-def check_held(scene):
-    """Refuse a scene that something holds twice, or that is a mechanism.
-
-    Raises:
-        SceneError: naming the supports and joints at fault, or the motion that is free.
-    """
-    _held_once(scene)
-    _no_mechanism(scene)
-
-
 def rows_of(tie):
     """What a tie holds of a and of b, as rows over (displacement, small rotation)."""
     if isinstance(tie, PositionTie):
@@ -66,8 +56,13 @@ def _key(station):
     return station.rod, round(station.s / station.rod.length, 9)
 
 
-def _held_once(scene):
-    """The rods between stations are elastic: what acts on one station must not be asked for twice."""
+def check_held_once(scene):
+    """Refuse a scene that something holds twice. The rods between stations are elastic: what acts on one station must
+    not be asked for twice.
+
+    Raises:
+        SceneError: naming the supports and joints at fault.
+    """
     stations, holders, rows = [], [], []
     for holder, parts in _all_rows(scene):
         row = {}
@@ -101,8 +96,12 @@ def _name(scene, holder):
     return f"joints[{scene.joints.index(holder)}] ({holder.first} with {holder.second})"
 
 
-def _no_mechanism(scene):
-    """Rigid motions of the rods that no support and no joint resists."""
+def check_no_mechanism(scene):
+    """Refuse a scene with rigid motions of the rods that no support and no joint resists.
+
+    Raises:
+        SceneError: naming the motion that is free.
+    """
     size = max(rod.length for rod in scene.rods)
     starts = [rod.curve.position(0.0) for rod in scene.rods]
     rows = []

@@ -27,6 +27,7 @@ from cosserat_fenicsx.refinement import refine
 from cosserat_fenicsx.scene import Scene
 from cosserat_fenicsx.snes import Newton
 from cosserat_fenicsx.stability import NegativeModes
+from cosserat_fenicsx.statical import check_no_mechanism
 from cosserat_fenicsx.supports import Prescribed
 from cosserat_fenicsx.tracing import Promoted, Tracing
 
@@ -293,6 +294,11 @@ def check_arguments(scene, tol, elements):
         raise SceneError(
             "Scene.loads is empty: expected at least one load, such as Force(rod.end, (0, 0, -1)), or a Prescribed motion"
         )
+    for item in scene.moving:
+        raise SceneError(
+            f"Scene: the {type(item).__name__} depends on time, and statics knows none: expected a vector, or `simulate`"
+        )
+    check_no_mechanism(scene)
     if isinstance(tol, bool) or not isinstance(tol, numbers.Real) or not 1e-12 <= tol < 1:
         raise SceneError(f"tol = {tol!r}: expected a number from 1e-12 to below 1")
     if elements is not None and (

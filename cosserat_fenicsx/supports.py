@@ -7,8 +7,9 @@ the package knows a support by name.
 from dataclasses import dataclass
 
 from cosserat_fenicsx import ties
-from cosserat_fenicsx.checks import direction, instance, refuse, store, vector
+from cosserat_fenicsx.checks import direction, instance, refuse, store
 from cosserat_fenicsx.rod import Station
+from cosserat_fenicsx.signals import at, vector_or_signal
 
 _A_STATION = "a station such as rod.start"
 
@@ -109,6 +110,8 @@ class Roller:
 class Prescribed:
     """A station is moved, in proportion to the load factor; what is None stays free.
 
+    Both motions may be functions of time (`signals`), with `jumps` where these are not smooth.
+
     Args:
         station: where.
         displacement: at load factor 1, m, inertial.
@@ -119,8 +122,9 @@ class Prescribed:
     """
 
     station: Station
-    displacement: tuple | None = None
-    rotation: tuple | None = None
+    displacement: object = None
+    rotation: object = None
+    jumps: tuple = ()
 
     clamps = False
 
@@ -128,15 +132,18 @@ class Prescribed:
         instance(self, "station", self.station, Station, _A_STATION)
         if self.displacement is None and self.rotation is None:
             refuse(self, "displacement", None, "a displacement (m) or a rotation (rad), or both")
-        if self.displacement is not None:
-            store(self, displacement=vector(self, "displacement", self.displacement, "m"))
-        if self.rotation is not None:
-            store(self, rotation=vector(self, "rotation", self.rotation, "rad"))
+        given = [("displacement", self.displacement, "m"), ("rotation", self.rotation, "rad")]
+        moving = any(callable(value) for _, value, _ in given)
+        for field, value, unit in given:
+            if value is not None:
+                jumps = () if moving and not callable(value) else self.jumps
+                store(self, **{field: vector_or_signal(self, field, value, unit, jumps)})
 
     def ties(self):
-        """The equations that hold."""
-        moved = () if self.displacement is None else ties.same_place(self.station, None, self.displacement)
-        return moved if self.rotation is None else (*moved, *ties.turned(self.station, self.rotation))
+        """The equations that hold; at the time 0 where the motion depends on time."""
+        now = at(self, 0.0)
+        moved = () if now.displacement is None else ties.same_place(self.station, None, now.displacement)
+        return moved if now.rotation is None else (*moved, *ties.turned(self.station, now.rotation))
 
 
 #: Supports by the words of the scene file.

@@ -65,6 +65,14 @@ class TieRows:
         comm = self.numbering.comm
         return comm.bcast(self.seen[1] if self._here else None, root=comm.size - 1)
 
+    def gradients(self):
+        """(ties, tied nodes, 6) of all equations where the nodes are, over (displacement, rotation), on all ranks."""
+        comm, found = self.numbering.comm, None
+        if self._here:
+            nodal, multipliers = self.seen
+            _, found, _ = self.model.ties.evaluate(self.model.tied_motion(nodal), 0.0, multipliers)
+        return comm.bcast(found, root=comm.size - 1)
+
     def add_residual(self, b, eta):
         """Add reactions to the rows of the nodes, and the equations in rows of their own."""
         if self._here:
@@ -80,23 +88,25 @@ class TieRows:
         """Add the derivative of `add_residual`."""
         if not self._here:
             return
-        _, gradient, change = self._evaluate(eta)
-        trial, test = self.model.tie_maps(self.seen[0])
+        of_nodes, reactions, equations = self._derivatives(eta)
         nodes = self.rows.ravel()
-        size = len(nodes)
-        count = len(self.rows)
-        turned = (test @ change.reshape(count, 6, -1)).reshape(size, count, 6)
-        of_nodes = (turned.swapaxes(0, 1) @ trial).swapaxes(0, 1).reshape(size, size)
-        A.setValues(nodes, nodes, np.ascontiguousarray(of_nodes), _ADD)
-        by_node = gradient.swapaxes(0, 1)  # (tied nodes, ties, 6)
-        reactions = (test @ by_node.swapaxes(1, 2)).reshape(size, -1)
-        equations = (by_node @ trial).swapaxes(0, 1).reshape(-1, size)
         # in C's order: petsc4py takes the numbers as they lie in memory
+        A.setValues(nodes, nodes, np.ascontiguousarray(of_nodes), _ADD)
         A.setValues(nodes, self._multipliers, np.ascontiguousarray(reactions), _ADD)
         A.setValues(self._multipliers, nodes, np.ascontiguousarray(equations), _ADD)
         for rows, value in ((self._multipliers, 0.0), (self._idle, 1.0)):
             for i in rows:
                 A.setValue(i, i, value, _ADD)
+
+    def _derivatives(self, eta):
+        """Of the reactions by the nodes and by the multipliers, and of the equations by the nodes, as matrices."""
+        _, gradient, change = self._evaluate(eta)
+        trial, test = self.model.tie_maps(self.seen[0])
+        return (
+            reactions_by_nodes(test, change, trial),
+            reactions_by_multipliers(test, gradient),
+            by_nodes(gradient, trial),
+        )
 
     def add_second_variation(self, K, rows, axes, eta, *, held=True):
         """Add what the equations mean for stability: held motions become stiff, reactions turn with the nodes.
@@ -118,3 +128,20 @@ class TieRows:
         nodes = rows.ravel().astype(PETSc.IntType)
         held_by = _HELD * held * gradient.T @ (local[:, None] * gradient)
         K.setValues(nodes, nodes, np.ascontiguousarray(held_by + 0.5 * (change + change.T)), _ADD)
+
+
+def reactions_by_nodes(test, change, trial):
+    """The reactions' derivatives, (tied nodes, 6, tied nodes, 6), in rows and columns of the nodes; see `RodModel.tie_maps`."""
+    count, size = len(change), len(change) * test.shape[1]
+    turned = (test @ change.reshape(count, 6, -1)).reshape(size, count, 6)
+    return (turned.swapaxes(0, 1) @ trial).swapaxes(0, 1).reshape(size, -1)
+
+
+def reactions_by_multipliers(test, gradient):
+    """Gradients (ties, tied nodes, 6) as columns on the rows of the nodes."""
+    return (test @ gradient.transpose(1, 2, 0)).reshape(-1, len(gradient))
+
+
+def by_nodes(gradient, trial):
+    """Gradients (ties, tied nodes, 6) as rows on the columns of the nodes."""
+    return (gradient.swapaxes(0, 1) @ trial).swapaxes(0, 1).reshape(len(gradient), -1)

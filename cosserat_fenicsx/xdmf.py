@@ -89,7 +89,7 @@ def _write_series(path, file):
                 Format="HDF",
             ).text = f"{numbers.name}:/{name}"
 
-        for k, eta in enumerate(path.load_factors):
+        for k, eta in enumerate(path.along_axis):
             points, cells, data = mesh_of(path, k)
             grid = xml.SubElement(series, "Grid", Name=f"point {k}", GridType="Uniform")
             xml.SubElement(grid, "Time", Value=repr(float(eta)))
@@ -120,13 +120,14 @@ def mesh_of(path, k):
     Returns:
         points (n, 3) m; cells as meshio takes them; dict of arrays (n, ...).
     """
-    points, lines, data, first = [], [], {name: [] for name in FIELDS}, 0
+    names = {**FIELDS, **path.more_fields}
+    points, lines, data, first = [], [], {name: [] for name in names}, 0
     for rod in path.scene.rods:
         fields = path.fields(k, rod)
         n = len(fields["s"])
         points.append(fields["position"])
         lines.append(first + np.column_stack([np.arange(n - 1), np.arange(1, n)]))
-        for name, field in FIELDS.items():
+        for name, field in names.items():
             data[name].append(fields[field])
         first += n
     joined = {name: np.concatenate(values) for name, values in data.items()}

@@ -15,6 +15,11 @@ OTHER = cf.Rod(LINE, cf.Circle(0.1), STEEL, name="other")
 CLAMP = cf.Clamp(ROD.start)
 nan, inf = math.nan, math.inf
 
+
+def solved(scene):
+    return cf.solve(cf.Scene(scene.rods, scene.supports, [cf.Force(ROD.end, (0, 0, 1))], scene.joints), [1.0])
+
+
 REFUSED = {
     "zero diameter": (lambda: cf.Circle(0.0), "Circle.diameter = 0.0: expected a positive number (m)"),
     "negative diameter": (lambda: cf.Circle(-0.2), "Circle.diameter = -0.2"),
@@ -47,8 +52,8 @@ REFUSED = {
     "no rods": (lambda: cf.Scene([], [CLAMP]), "Scene.rods is empty"),
     "a rod, not a list": (lambda: cf.Scene(ROD, [CLAMP]), "expected a list"),
     "same name twice": (lambda: cf.Scene([ROD, cf.Rod(LINE, cf.Circle(1), STEEL, name="rod")], [CLAMP]), "named 'rod'"),
-    "nothing supported": (lambda: cf.Scene([ROD], []), "nothing holds rod 'rod', it is free to move"),
-    "one of two supported": (lambda: cf.Scene([ROD, OTHER], [CLAMP]), "nothing holds rod 'other'"),
+    "nothing supported": (lambda: solved(cf.Scene([ROD], [])), "nothing holds rod 'rod', it is free to move"),
+    "one of two supported": (lambda: solved(cf.Scene([ROD, OTHER], [CLAMP])), "nothing holds rod 'other'"),
     "no support at all": (lambda: cf.Scene([ROD], [ROD.start]), "Scene.supports[0]"),
     "support elsewhere": (lambda: cf.Scene([ROD], [cf.Clamp(OTHER.start)]), "a rod that is not in the scene"),
     "load elsewhere": (

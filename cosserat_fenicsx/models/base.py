@@ -197,6 +197,17 @@ class RodModel:
         clamped."""
         return self._rows_of_tied(self.numbering, self._nodal)
 
+    @property
+    def rows_of_nodes(self):
+        """(N, block) numbers of all nodes in the second variation (of a rung with one part), the scene's order, on all
+        ranks; -1 where clamped."""
+        (part,) = self._variations
+        dofs = np.arange(part.numbering.block * len(self._slots)).reshape(len(self._slots), -1)
+        rows = np.empty((self._gather_nodes.total, part.numbering.block), dtype=np.int64)
+        for slots, numbers in self.comm.allgather((self._slots, part.numbering.rows[dofs])):
+            rows[slots] = numbers
+        return rows
+
     def _rows_of_tied(self, numbering, dofs):
         here = {int(s): numbering.rows[dofs[i]] for i, s in enumerate(self._slots) if s in self.tied_slots}
         everywhere = {}

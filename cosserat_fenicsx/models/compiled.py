@@ -75,10 +75,15 @@ def _unless_none(make, a):
 def measures(model):
     """The `Measures` of a model."""
     nodes = model.nodes
-    weights = np.linalg.solve(np.vander(nodes, increasing=True).T, 1 / np.arange(1, len(nodes) + 1))
+    weights = lobatto_weights(nodes)
     gauss = ufl.dx(domain=model.mesh, metadata={"quadrature_degree": 2 * model.shape.points - 1})
     ends = np.array([0.0, 1.0]), np.array([0.5, 0.5])
     return Measures(gauss, _rule(model.mesh, nodes, weights), _rule(model.mesh, *ends))
+
+
+def lobatto_weights(nodes):
+    """Weights of the rule on [0, 1] that has the nodes (n,) as points."""
+    return np.linalg.solve(np.vander(nodes, increasing=True).T, 1 / np.arange(1, len(nodes) + 1))
 
 
 def _rule(mesh, points, weights):

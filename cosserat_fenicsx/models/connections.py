@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 from cosserat_fenicsx.planes import independent_in
+from cosserat_fenicsx.signals import at
 
 
 @dataclass(frozen=True)
@@ -51,7 +52,7 @@ class Connections:
         return tuple(dict.fromkeys(x for _, a, b in self.ties for x in (a, b) if x is not None))
 
 
-def ties_of(scene):
-    """All scalar equations of supports and joints that are not held node by node."""
+def ties_of(scene, t=0.0):
+    """All scalar equations of supports and joints that are not held node by node, at a time (s)."""
     held = [*scene.supports, *(joint for joint in scene.joints if not joint.rigid)]
-    return [tie for item in held for tie in item.ties()]
+    return [tie for item in held for tie in at(item, t).ties()]

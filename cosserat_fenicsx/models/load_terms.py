@@ -6,6 +6,7 @@ from dolfinx import fem
 from cosserat_fenicsx import compat
 from cosserat_fenicsx.models.rod_data import gauss_function
 from cosserat_fenicsx.models.shape import place_loads
+from cosserat_fenicsx.signals import at, signals_of
 
 
 class LoadTerms:
@@ -30,18 +31,44 @@ class LoadTerms:
         return fem.Function(compat.function_space(mesh, compat.lagrange(mesh, 1, 3, discontinuous=True)))
 
     def fill(self, scene, layout, scales, rule, axes):
-        """Put a scene's loads into the Functions, as components along `axes` (3, 3)."""
-        sizes = layout.sizes(scene) / scales.length
-        for (_, members), (_, place, functions) in zip(place_loads(scene, layout), self.terms, strict=True):
-            if place == "line":
-                self._rods.fill(functions[0], _densities(members, scene, layout, scales, rule) @ axes.T)
-                continue
-            for function in functions:
-                function.x.array[:] = 0
-            for load, (rod, vertex) in members:
-                vectors = load.vectors(scene.rods[rod])
-                for function, (value, unit) in zip(functions, vectors, strict=True):
-                    self._at_end(function, rod, vertex, axes @ np.asarray(value) / scales.of_unit(unit), unit, sizes)
+        """Put a scene's loads into the Functions, as components along `axes` (3, 3); as at time 0 where they depend on it."""
+        self._scene, self._layout, self._scales, self._rule, self._axes = scene, layout, scales, rule, axes
+        self._sizes = layout.sizes(scene) / scales.length
+        self._placed = [
+            (functions, place, members)
+            for (_, members), (_, place, functions) in zip(place_loads(scene, layout), self.terms, strict=True)
+        ]
+        for functions, place, members in self._placed:
+            if place == "point":
+                for function in functions:
+                    function.x.array[:] = 0
+            self._fill_term(functions, place, members, 0.0)
+        self._moving = []  # the same for what depends on time: of a line load all that share its term
+        for functions, place, members in self._placed:
+            moving = [(load, where) for load, where in members if signals_of(load)]
+            if moving:
+                self._moving.append((functions, place, members if place == "line" else moving))
+
+    def at(self, t):
+        """Put the loads at the time t (s) into the Functions."""
+        for functions, place, members in self._moving:
+            self._fill_term(functions, place, members, t)
+
+    @property
+    def moving(self):
+        """The Functions that depend on time."""
+        return [function for functions, _, _ in self._moving for function in functions]
+
+    def _fill_term(self, functions, place, members, t):
+        if place == "line":
+            densities = _densities(members, self._scene, self._layout, self._scales, self._rule, t)
+            self._rods.fill(functions[0], densities @ self._axes.T)
+            return
+        for load, (rod, vertex) in members:
+            vectors = at(load, t).vectors(self._scene.rods[rod])
+            for function, (value, unit) in zip(functions, vectors, strict=True):
+                scaled = self._axes @ np.asarray(value) / self._scales.of_unit(unit)
+                self._at_end(function, rod, vertex, scaled, unit, self._sizes)
 
     def _at_end(self, function, rod, vertex, value, unit, sizes):
         """Put a point value on the one element that answers for an element end."""
@@ -56,12 +83,12 @@ class LoadTerms:
         function.x.array.reshape(-1, 3)[dof] = density
 
 
-def _densities(members, scene, layout, scales, rule):
-    """(elements, points, 3) of a line load's term, dimensionless, inertial."""
+def _densities(members, scene, layout, scales, rule, t):
+    """(elements, points, 3) of a line load's term at the time t (s), dimensionless, inertial."""
     inside = layout.inside(rule.gauss)
     parts = [np.zeros((*x.shape, 3)) for x in inside]
     for load, (rod, _) in members:
         s = inside[rod].ravel() * scene.rods[rod].length
-        density = load.density(scene.rods[rod], s) / scales.of_unit(load.unit)
+        density = at(load, t).density(scene.rods[rod], s) / scales.of_unit(load.unit)
         parts[rod] += density.reshape(parts[rod].shape)
     return np.concatenate(parts)

@@ -6,6 +6,7 @@ import numpy as np
 from dolfinx import fem
 
 from cosserat_fenicsx import compat
+from cosserat_fenicsx.checks import refuse
 
 # EA and GA are bounded where only the sign of the second variation is asked for: more would drown the bending of slender
 # rods and the weak modes of thin blades in rounding. In EI/L^2 of each rod, by variant: what bends in n half waves has its critical
@@ -74,3 +75,30 @@ def fill_fields(fields, rods, data, stiff):
     values = RodFields(finite, 1 / data.K, stiff, data.J, data.R_R, data.v_R)
     for function, array in zip(fields, values, strict=True):
         rods.fill(function, array)
+
+
+def check_inertia(scene):
+    """Refuse a rod that cannot move.
+
+    Raises:
+        SceneError: a rod without mass or inertia.
+    """
+    for rod in scene.rods:
+        low = rod.profile.range[0]
+        for field, value in (("mass", low.mass), ("inertia", low.inertia)):
+            if value is None:
+                owner, name = ("Stiffness", field) if rod.material is None else ("Material", "density")
+                refuse(f"Rod '{rod.name}': {owner}", name, None, "a value, which a motion needs")
+
+
+def nodal_inertia(scene, layout, nodes):
+    """At the nodes of every element, in the scene's order: mass (elements, p + 1), kg/m, Jrho about d_1, d_2, d_3
+    (elements, p + 1, 3), kg m, and frames at rest (elements, p + 1, 3, 3); on a jump each element has its own side."""
+    parts = []
+    for rod, x in zip(scene.rods, layout.inside(nodes), strict=True):
+        s = x * rod.length
+        after, before = rod.stiffness_at(s, "right"), rod.stiffness_at(s, "left")
+        first = np.arange(s.shape[1]) == 0
+        mass, J = np.where(first, after.mass, before.mass), np.where(first[:, None], after.inertia, before.inertia)
+        parts.append((mass, J, rod.curve.frame(s.ravel()).reshape(*s.shape, 3, 3)))
+    return tuple(np.concatenate(part) for part in zip(*parts, strict=True))

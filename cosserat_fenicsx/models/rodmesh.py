@@ -136,14 +136,14 @@ class Gather:
     """Collects values of owned entities from all ranks on every rank, in the scene's order."""
 
     def __init__(self, comm, slots, total):
-        self._comm, self._total = comm, total
+        self._comm, self.total = comm, total
         self._slots = np.concatenate(comm.allgather(slots)) if comm.size > 1 else slots
         self._counts = np.array(comm.allgather(len(slots)))
 
     def __call__(self, values):
         """`values (owned, k)` -> (total, k)."""
         values = np.ascontiguousarray(values)
-        result = np.empty((self._total, values.shape[1]))
+        result = np.empty((self.total, values.shape[1]))
         if self._comm.size > 1:
             everything = np.empty((self._counts.sum(), values.shape[1]))
             sizes = self._counts * values.shape[1]

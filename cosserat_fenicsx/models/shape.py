@@ -8,6 +8,7 @@ import numpy as np
 from cosserat_fenicsx.errors import SceneError, nearest
 from cosserat_fenicsx.forms import loads as virtual_work
 from cosserat_fenicsx.models.connections import Connections
+from cosserat_fenicsx.signals import at
 
 #: Unknowns of a node, and numbers of a contact force, by the model's name and whether it is that of a plane.
 _SIZES = {
@@ -112,7 +113,7 @@ def place_loads(scene, layout):
         work = getattr(virtual_work, load.work) if isinstance(load.work, str) else load.work
         if load.station is not None:
             places, place = [layout.vertex(scene, load.station)], "point"
-            vectors = len(load.vectors(load.station.rod))
+            vectors = len(at(load, 0.0).vectors(load.station.rod))
         else:
             places = [(rod, None) for rod, which in enumerate(scene.rods) if load.acts_on(which)]
             place, vectors = "line", 1

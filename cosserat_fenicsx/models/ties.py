@@ -42,16 +42,21 @@ class Ties:
             constant[at[far], b[far], :3] -= n[far]
         return kinds, constant
 
-    def evaluate(self, rq, eta, multipliers, which):
+    def with_numbers_of(self, ties):
+        """The same equations with other numbers, those of motions at another time."""
+        return Ties(ties, self._nodes, self._reference, self._length)
+
+    def evaluate(self, rq, eta, multipliers, which=None):
         """Values and derivatives at (r, q) (tied nodes, 7) and a load factor.
 
         Args:
-            which: tuple of indices of those that are asked for; multipliers: theirs.
+            which: tuple of indices of those that are asked for, None for all; multipliers: theirs.
 
         Returns:
             c (ties,); gradients (ties, tied nodes, 6) over (displacement, rotation), which are also the reactions per
             unit of multiplier; tangent of the reactions (tied nodes, 6, tied nodes, 6).
         """
+        which = tuple(range(len(self._ties))) if which is None else which
         kinds, constant = self._kinds(which)
         count, gradient = len(rq), constant.copy()
         c, tangent = np.zeros(len(which)), np.zeros((count, 6, count, 6))

@@ -1,0 +1,68 @@
+"""A chart of what became of the energy of a motion, by matplotlib."""
+
+from pathlib import Path
+
+import numpy as np
+
+from cosserat_fenicsx.errors import SceneError
+from cosserat_fenicsx.ranks import on_first
+
+_CURVES = (
+    ("kinetic", "kinetic", "tab:blue", "-"),
+    ("strain", "strain", "tab:orange", "-"),
+    ("energy", "kinetic + strain", "black", "-"),
+    ("work", "work of loads and supports", "tab:green", "--"),
+    ("dissipated", "dissipated", "tab:red", "--"),
+)
+
+
+def draw(history, file=None):
+    """Energies of a `History` over time above, and below what its ledger fails to account for.
+
+    Args:
+        history: at least two times.
+        file: .png, .pdf or what else matplotlib writes (rank 0 writes); None returns the Figure.
+
+    Raises:
+        SceneError: fewer than two times, an ending that is not known, or matplotlib is missing.
+        OSError: the file cannot be written.
+    """
+    if len(history) < 2:
+        raise SceneError("the history has no two times to draw energies between")
+    if file is None:
+        return _figure(history)
+    on_first(history.comm, lambda: _save(history, Path(file)))
+    return None
+
+
+def _save(history, file):
+    figure = _figure(history)
+    known = figure.canvas.get_supported_filetypes()
+    if file.suffix.removeprefix(".") not in known:
+        raise SceneError(f"{file}: expected a name that ends in .{', .'.join(sorted(known))}")
+    file.parent.mkdir(parents=True, exist_ok=True)
+    figure.savefig(file, dpi=150)
+
+
+def _figure(history):
+    try:
+        from matplotlib.backends.backend_agg import FigureCanvasAgg
+        from matplotlib.figure import Figure
+    except ImportError:
+        raise SceneError("charts need matplotlib: pip install matplotlib") from None
+    figure = Figure(figsize=(9, 6), layout="constrained")
+    FigureCanvasAgg(figure)
+    above, below = figure.subplots(2, 1, sharex=True, height_ratios=(3, 1))
+    for name, label, colour, style in _CURVES:
+        values = getattr(history, name)
+        if np.abs(values).max() > 0:
+            above.plot(history.times, values, style, color=colour, label=label)
+    above.set_ylabel("energy (J)")
+    above.set_title(f"{history.scene.title or 'Motion'}: energy, scheme {history.scheme}")
+    above.legend(loc="best", frameon=False)
+    below.plot(history.times, history.balance, color="black")
+    below.set_ylabel("not accounted\nfor (J)")
+    below.set_xlabel("time (s)")
+    for axes in (above, below):
+        axes.grid(alpha=0.3)
+    return figure

@@ -1,0 +1,133 @@
+"""A motion as arrays with named fields, in SI units. Knows no solver; files and pictures are made by other rooms."""
+
+from collections import namedtuple
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from cosserat_fenicsx.quaternions import directors
+from cosserat_fenicsx.records import Record
+from cosserat_fenicsx.results import Path
+
+#: Energies so far, J, and momenta, kg m/s and kg m^2/s, inertial, the latter about the inertial origin.
+Ledger = namedtuple("Ledger", "kinetic strain work dissipated linear_momentum angular_momentum")
+
+
+@dataclass(frozen=True)
+class Instant(Record):
+    """A `Record` at a time (s), with velocities and angular velocities of the nodes (N, 6), dimensionless, inertial,
+    the steps taken so far and the `Ledger`."""
+
+    time: float = 0.0
+    rates: np.ndarray = None
+    steps: int = 0
+    ledger: Ledger = None
+
+
+class History(Path):
+    """A motion: its states at the saved times, and what became of energy and momenta.
+
+    All station queries of a `Path` (`position`, `displacement`, `rotation`, `force`, `moment`, `centreline`, `fields`,
+    ...) give one row a time. Contact force and moment include what damping adds.
+
+    Attributes:
+        times: (n,) s.
+        scheme: the scheme's name.
+        steps: (n,) steps taken up to there, iterations: (n,) Newton iterations since the time before.
+        kinetic, strain: (n,) energies, J.
+        work: (n,) J, what loads and prescribed motions have done since the start.
+        dissipated: (n,) J, what damping has taken since the start.
+        balance: (n,) J, kinetic + strain - work + dissipated, over its value at the start; zero for an exact solution.
+        linear_momentum: (n, 3) kg m/s; angular_momentum: (n, 3) kg m^2/s about the inertial origin, inertial.
+    """
+
+    axis = "time"
+    more_fields = {"velocity": "velocity", "angular_velocity": "angular_velocity"}  # noqa: RUF012
+    load_factors = negative_modes = stable = None  # of a path alone
+
+    @classmethod
+    def of(cls, model, scheme, why=()):
+        """An empty history for the scene that a moving model was loaded with."""
+        history = super().of(model, "displacement", why)
+        history.scheme, history._time_unit = scheme, model.time
+        return history
+
+    def __repr__(self):
+        reach = f"t = {self.times[0]:g} .. {self.times[-1]:g} s" if len(self) else "empty"
+        return f"<History: {len(self)} times, {reach}, {self.model}, {self.unknowns} unknowns, scheme {self.scheme}>"
+
+    times = property(lambda self: self._array("time"))
+    steps = property(lambda self: self._array("steps"))
+    kinetic = property(lambda self: self._booked("kinetic"))
+    strain = property(lambda self: self._booked("strain"))
+    work = property(lambda self: self._booked("work"))
+    dissipated = property(lambda self: self._booked("dissipated"))
+    linear_momentum = property(lambda self: self._booked("linear_momentum"))
+    angular_momentum = property(lambda self: self._booked("angular_momentum"))
+
+    def _booked(self, name):
+        return np.array([getattr(ledger, name) for ledger in (x.ledger for x in self._records)])
+
+    @property
+    def energy(self):
+        """(n,) kinetic + strain, J."""
+        return self.kinetic + self.strain
+
+    @property
+    def balance(self):
+        """(n,) J, see the class."""
+        total = self.energy - self.work + self.dissipated
+        return total - total[:1]
+
+    def velocity(self, station):
+        """(n, 3) m/s, inertial."""
+        return self._at(station, self._all_rates[:, :, :3]) * (self.scales.length / self._time_unit)
+
+    def angular_velocity(self, station, *, material=False):
+        """(n, 3) rad/s, inertial; or along d_1, d_2, d_3 of the moving section."""
+        angular = self._at(station, self._all_rates[:, :, 3:]) / self._time_unit
+        if not material:
+            return angular
+        return np.einsum("nij,ni->nj", directors(self.rotation(station)) @ station.rod.curve.frame(station.s), angular)
+
+    @property
+    def along_axis(self):
+        """(n,) s."""
+        return self.times
+
+    def label(self, k):
+        """What a picture writes beside time k."""
+        return f"{self.times[k]:.3g} s"
+
+    def fields(self, k, rod):
+        """As of a `Path`, at time k; with velocity (m/s) and angular_velocity (rad/s), inertial."""
+        rates = self._records[k].rates[self._rows(rod)[1]] / self._time_unit
+        velocity = rates[:, :3] * self.scales.length
+        return {**super().fields(k, rod), "velocity": velocity, "angular_velocity": rates[:, 3:]}
+
+    def plot_energy(self, file=None):
+        """Chart of the energies over time.
+
+        Args:
+            file: a .png or .pdf; None returns matplotlib's Figure.
+        """
+        from cosserat_fenicsx import energy_chart
+
+        return energy_chart.draw(self, file)
+
+    def append(self, record):
+        """Add a saved state."""
+        super().append(record)
+        self.__dict__.pop("_all_rates", None)
+
+    @cached_property
+    def _all_rates(self):
+        return np.array([record.rates for record in self._records]).reshape(len(self), -1, 6)
+
+    @cached_property
+    def _contact(self):
+        """(points, elements, nodes of one, 6) n and m, dimensionless, by the polynomials through the Gauss points."""
+        along = self.rule.between_gauss(self.rule.nodes)
+        fields = np.array([record.gauss_fields[..., :6] for record in self._records])
+        return np.einsum("jg,kcgi->kcji", along, fields)

@@ -1,0 +1,60 @@
+"""The forms of `forms/energy.py` on a model's mesh, compiled."""
+
+import ufl
+
+from cosserat_fenicsx import compat
+from cosserat_fenicsx.forms import energy, inertia
+from cosserat_fenicsx.forms import spatial as eq
+from cosserat_fenicsx.forms.rotation import rotation_matrix
+from cosserat_fenicsx.models.compiled import derivative_in, load_work, measures
+from cosserat_fenicsx.models.moving_forms import SpatialData, compile_motion, parts_of
+
+
+def compile_conserving(model):
+    """The `MotionForms` of a moving spatial model by which energy is exact.
+
+    The residual is tested with changes of (r, q), all terms of the step in it but loads; it knows no |q| = 1.
+    """
+    dx, data = measures(model), SpatialData.of(model)
+    named = compat.alias if model.shape.degree == 1 else (lambda function: function)
+    U, U0, V, W = model.state, model.start, model.velocity, model.turning
+    nodal, nodal0, rates, turning = named(U), named(U0), named(V), named(W)
+    h, section, viscosity, body = model.h, data.section, data.viscosity, data.body
+
+    def along(w):
+        return ufl.grad(w)[:, 0]
+
+    def line(w):
+        (_, q), (r_s, q_s) = parts_of(w), parts_of(along(w))
+        return energy.Line(r_s, q, q_s)
+
+    before, after = line(U0), line(U)
+    phi, trial = ufl.TestFunction(model.space), ufl.TrialFunction(model.space)
+    test = energy.Tests(*parts_of(phi), *parts_of(along(phi)))
+    derivative = derivative_in(trial, *dict.fromkeys((U, nodal)))
+
+    (r0, q0), (r1, q1), (r_t, _) = parts_of(nodal0), parts_of(nodal), parts_of(rates)
+    spin = ufl.as_matrix([[turning[3 * i + j] for j in range(3)] for i in range(3)])
+    moved, turned = (r1 - r0) / h, (energy.directors(q1) - energy.directors(q0)) / h
+    half = (q0 + q1) / 2
+    residual = energy.rate_work(2 * (moved - r_t) / h, 2 * (turned - spin) / h, half, body, test) * dx.nodes
+    residual += model.drag[0] * energy.rate_work(moved, turned, half, body, test) * dx.nodes
+    residual += energy.stress_work(before, after, section, viscosity, h, test) * dx.gauss
+
+    loads = load_work(model, dx, eq.tests_of(phi, along(phi)), rotation_matrix(half), {U, nodal})
+    live = sum(term for term, _, _ in loads.live) if loads.live else None
+    state = eq.state_of(U, along(U), U)
+    n, m = inertia.contact(state, section, viscosity, lambda a: ufl.derivative(a, U, V))
+    kappa = energy.angular_momentum(q1, spin, body)
+    lost = energy.viscous_loss(before, after, section, viscosity, h) * dx.gauss
+    lost += 2 * h * model.drag[0] * energy.kinetic_energy(moved, turned, body) * dx.nodes
+    others = {
+        "momentum": inertia.momentum(r_t, kappa, body, eq.tests_of(phi, along(phi))) * dx.nodes,
+        "live": live,
+        "live_tangent": None if live is None else derivative(live),
+        "kinetic": energy.kinetic_energy(r_t, spin, body) * dx.nodes,
+        "strain": energy.strain_energy(after, section) * dx.gauss,
+        "dissipated": lost,
+    }
+    fields = ufl.as_vector([*n, *m, *state.r_s])
+    return compile_motion(model, residual, derivative(residual), loads.dead, fields, others)

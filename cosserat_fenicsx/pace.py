@@ -1,0 +1,70 @@
+"""How long the steps in time are."""
+
+import math
+
+
+class Fixed:
+    """Steps of one length, shorter where they have to land on a time.
+
+    Args:
+        dt: s.
+    """
+
+    def __init__(self, dt):
+        self._dt = dt
+
+    def length(self, left):
+        """The next step where so much is left to the next time to land on, s."""
+        return left / max(1, math.ceil(left / self._dt - 1e-9))
+
+    def accepts(self, stepper, h):
+        """Whether a stepper's last step, of length h, stands."""
+        return True
+
+    def failed(self, h):
+        """A step of length h failed, and was taken in shorter ones."""
+
+    def jump(self):
+        """Something jumps here."""
+
+
+class Adaptive:
+    """Steps whose local errors add up to `tol` over the duration.
+
+    They change by factors of two alone, and seldom: each change costs a tangent.
+
+    Args:
+        tol: see `simulate`; duration: s.
+    """
+
+    #: the first step after the start or a jump, over the one that would do, and over the duration
+    _FIRST, _SHORTEST = 1 / 8, 1e-4
+    #: an error above the first share of what is allowed halves the steps to come, below the second it doubles them
+    _LARGE, _SMALL = 0.9, 0.15
+
+    def __init__(self, tol, duration):
+        self._rate, self._dt, self._longest = tol / duration, duration * self._SHORTEST, duration / 20
+
+    def length(self, left):
+        """See `Fixed`."""
+        return left / max(1, math.ceil(left / self._dt - 1e-9))
+
+    def accepts(self, stepper, h):
+        """See `Fixed`."""
+        error = stepper.error()
+        if error is None:
+            return True
+        allowed = self._rate * h
+        if error > self._LARGE * allowed:
+            self._dt = min(self._dt, h / 2 if error < 8 * allowed else h / 4)
+        elif error < self._SMALL * allowed and h > 0.6 * self._dt:
+            self._dt = min(2 * self._dt, self._longest)
+        return error <= 2 * allowed
+
+    def failed(self, h):
+        """See `Fixed`."""
+        self._dt = h / 2
+
+    def jump(self):
+        """See `Fixed`."""
+        self._dt *= self._FIRST

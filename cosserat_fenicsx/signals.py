@@ -1,0 +1,256 @@
+"""Vectors that depend on time: any function of t, and the usual ones by name.
+
+A load or a prescribed motion takes a vector, one of the classes below, or a function of time (s) that gives a vector,
+with `jumps` where it is not smooth: steps in time land on these.
+"""
+
+import dataclasses
+import itertools
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from cosserat_fenicsx.checks import number, refuse, vector
+from cosserat_fenicsx.errors import SceneError
+
+
+@dataclass(frozen=True)
+class Step:
+    """`value` from `start` on, and up to `end`; zero otherwise. Times in s.
+
+    Raises:
+        SceneError: numbers that are not finite, or an end that is not after the start.
+    """
+
+    value: tuple
+    start: float = 0.0
+    end: float | None = None
+
+    def __post_init__(self):
+        _check(self, "start", *(() if self.end is None else ("end",)))
+
+    @property
+    def jumps(self):
+        """Where it is not smooth, s."""
+        return (self.start,) if self.end is None else (self.start, self.end)
+
+    def __call__(self, t):
+        """The vector at t."""
+        return _times(self.start <= t and (self.end is None or t < self.end), self.value)
+
+
+@dataclass(frozen=True)
+class Ramp:
+    """Zero up to `start`, in proportion to time from there, `value` from `end` on. Times in s.
+
+    Raises:
+        SceneError: numbers that are not finite, or an end that is not after the start.
+    """
+
+    value: tuple
+    start: float = 0.0
+    end: float = 1.0
+
+    def __post_init__(self):
+        _check(self, "start", "end")
+
+    @property
+    def jumps(self):
+        """Where it is not smooth, s."""
+        return self.start, self.end
+
+    def __call__(self, t):
+        """The vector at t."""
+        return _times(min(max((t - self.start) / (self.end - self.start), 0.0), 1.0), self.value)
+
+
+@dataclass(frozen=True)
+class Triangle:
+    """From zero at `start` to `value` at `peak` and back to zero at `end`, straight; zero otherwise. Times in s.
+
+    Raises:
+        SceneError: numbers that are not finite, or times that do not ascend.
+    """
+
+    value: tuple
+    start: float = 0.0
+    peak: float = 1.0
+    end: float = 2.0
+
+    def __post_init__(self):
+        _check(self, "start", "peak", "end")
+
+    @property
+    def jumps(self):
+        """Where it is not smooth, s."""
+        return self.start, self.peak, self.end
+
+    def __call__(self, t):
+        """The vector at t."""
+        up, down = (t - self.start) / (self.peak - self.start), (self.end - t) / (self.end - self.peak)
+        return _times(max(min(up, down), 0.0), self.value)
+
+
+@dataclass(frozen=True)
+class Sine:
+    """`value` times sin(2 pi frequency (t - start) + phase) from `start` on, and up to `end`; zero otherwise.
+
+    Args:
+        value: amplitude; frequency: Hz; phase: rad; start, end: s.
+
+    Raises:
+        SceneError: numbers that are not finite, or an end that is not after the start.
+    """
+
+    value: tuple
+    frequency: float
+    phase: float = 0.0
+    start: float = 0.0
+    end: float | None = None
+
+    def __post_init__(self):
+        for field in ("frequency", "phase"):
+            number(self, field, getattr(self, field), "a finite number", math.isfinite)
+        _check(self, "start", *(() if self.end is None else ("end",)))
+
+    @property
+    def jumps(self):
+        """Where it is not smooth, s."""
+        return (self.start,) if self.end is None else (self.start, self.end)
+
+    def __call__(self, t):
+        """The vector at t."""
+        on = self.start <= t and (self.end is None or t < self.end)
+        return _times(on and math.sin(2 * math.pi * self.frequency * (t - self.start) + self.phase), self.value)
+
+
+@dataclass(frozen=True)
+class Table:
+    """Straight between the rows of a table; the first and the last value hold before and after it.
+
+    Args:
+        times: (n,) ascending, s; values: (n, 3).
+
+    Raises:
+        SceneError: times that do not ascend, or not one value for each.
+    """
+
+    times: tuple
+    values: tuple
+
+    def __post_init__(self):
+        times = self._array("times", 1)
+        if not (np.diff(times) > 0).all():
+            refuse(self, "times", self.times, "ascending times (s)")
+        if len(self._array("values", 2)) != len(times):
+            refuse(self, "values", self.values, f"one vector for each of the {len(times)} times")
+
+    def _array(self, field, dimensions):
+        try:
+            array = np.asarray(getattr(self, field), dtype=float)
+        except (ValueError, TypeError):
+            array = np.empty(0)
+        if array.ndim != dimensions or len(array) == 0 or not np.isfinite(array).all():
+            refuse(self, field, getattr(self, field), "finite numbers, one row a time")
+        return array
+
+    @property
+    def jumps(self):
+        """Where it is not smooth, s."""
+        return tuple(float(t) for t in self.times)
+
+    def __call__(self, t):
+        """The vector at t."""
+        return tuple(float(np.interp(t, self.times, column)) for column in np.transpose(self.values))
+
+
+def _check(signal, *times):
+    values = [number(signal, field, getattr(signal, field), "a time (s)", math.isfinite) for field in times]
+    for field, before, after in zip(times[1:], values[:-1], values[1:], strict=True):
+        if after <= before:
+            refuse(signal, field, after, f"a time after {before:g} s")
+
+
+def _times(factor, value):
+    return tuple(float(factor) * x for x in value)
+
+
+#: Functions of time by the words of the scene file.
+SIGNALS = (Step, Ramp, Triangle, Sine, Table)
+
+
+@dataclass(frozen=True)
+class Signal:
+    """A checked function of time in a field of a load or a support.
+
+    Args:
+        owner: the name of its class; field, unit: for the words of refusals.
+        function: of t (s), gives `size` numbers.
+        jumps: times where it is not smooth, s.
+    """
+
+    owner: str
+    field: str
+    unit: str
+    function: object
+    jumps: tuple
+    size: int = 3
+
+    def __call__(self, t):
+        """The vector at t, s.
+
+        Raises:
+            SceneError: not so many finite numbers; says at which time.
+        """
+        try:
+            return vector(self.owner, self.field, self.function(t), self.unit, self.size)
+        except SceneError as problem:
+            raise SceneError(f"{problem}, at the time t = {t:g} s") from None
+
+
+def vector_or_signal(owner, field, value, unit, jumps=()):
+    """A tuple of three finite numbers, or a `Signal` of three where `value` is a function of time.
+
+    Raises:
+        SceneError: neither of the two, or jumps that are no times.
+    """
+    if not callable(value):
+        if len(jumps):
+            refuse(owner, "jumps", jumps, f"none, since {field} does not depend on time")
+        return vector(owner, field, value, unit)
+    signal = Signal(type(owner).__name__, field, unit, value, _times_of(owner, value, jumps))
+    signal(0.0)
+    return signal
+
+
+def _times_of(owner, value, jumps):
+    known = getattr(value, "jumps", ())
+    if not isinstance(jumps, tuple | list):
+        refuse(owner, "jumps", jumps, "a list of times (s)")
+    for t in jumps:
+        number(owner, "jumps", t, "finite times (s)", math.isfinite)
+    return tuple(sorted({float(t) for t in (*known, *jumps)}))
+
+
+def signals_of(item):
+    """{field: `Signal`} of a load or a support."""
+    return {name: value for name, value in vars(item).items() if isinstance(value, Signal)}
+
+
+def at(item, t):
+    """A load or a support as it is at the time t (s); itself where nothing depends on time."""
+    now = {name: signal(t) for name, signal in signals_of(item).items()}
+    return dataclasses.replace(item, **now, jumps=()) if now else item
+
+
+def sample_times(item, until):
+    """Times (s) up to `until` that stand for all where a load or a support depends on time: its jumps, between them,
+    and spread over orders of magnitude; the time 0 where it does not."""
+    signals = signals_of(item)
+    if not signals:
+        return [0.0]
+    jumps = {t for signal in signals.values() for t in signal.jumps if 0 < t < until}
+    marks = [0.0, *sorted(jumps), until]
+    between = [(a + b) / 2 for a, b in itertools.pairwise(marks)]
+    return [*marks, *between, *(until * np.geomspace(1e-4, 1, 30)[:-1]).tolist()]

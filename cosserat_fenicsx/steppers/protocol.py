@@ -1,0 +1,42 @@
+"""What `dynamics` asks of a scheme."""
+
+from typing import Protocol
+
+
+class Stepper(Protocol):
+    """A scheme at work on a `StepProblem`; made once for a shape, used for every scene of it.
+
+    Attributes:
+        order: of the error in the step h.
+        forms: the name of the discretisation that its models must have; problem_class: what it solves, a `StepProblem`.
+        adapts: whether `error` and `undo` are known.
+        work, dissipated: dimensionless, since `begin`: what loads and supports have done, and what damping has taken.
+    """
+
+    order: int
+    adapts: bool
+    forms: str
+    problem_class: type
+    work: float
+    dissipated: float
+
+    def begin(self):
+        """A motion starts where the problem's model is."""
+
+    def jump(self):
+        """Something jumps here: what was before does not foretell what comes."""
+
+    def step(self, t, h):
+        """Go from the time t to t + h, s.
+
+        Returns:
+            `Solved`. The problem's x and the model's state and velocity are those of t + h; where it has not
+            converged, all is as it was at t.
+        """
+
+    def error(self):
+        """Estimated local error of the last step, of positions (lengths) and rotations (rad); None where too few steps
+        are known since the start or a jump."""
+
+    def undo(self):
+        """Take the last step back."""

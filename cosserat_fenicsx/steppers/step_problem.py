@@ -1,0 +1,152 @@
+"""One step of a moving model as PETSc wants it: residual and tangent in the solver's unknowns."""
+
+import numpy as np
+from dolfinx import fem
+
+from cosserat_fenicsx.packed import Packed
+from cosserat_fenicsx.steppers.moving_ties import MovingTies
+
+
+class StepProblem:
+    """The equations of a step, whatever the scheme that made the model's forms.
+
+    Args:
+        model: see `models.moving.Moving` for the protocol.
+
+    Attributes:
+        x, b, A: unknowns at the end of the step, residual, tangent; the model's state follows x.
+        fresh: whether the tangent is made anew when it is next asked for, or the one at hand serves on.
+        h: the length of the step, dimensionless.
+        load_factor: what all loads and prescribed motions are multiplied by.
+    """
+
+    def __init__(self, model):
+        self.model, self.numbering = model, model.numbering
+        numbering = self.numbering
+        self.ties = MovingTies(model, numbering) if model.shape.connections.ties else None
+        tied = self.ties.rows if self.ties else np.empty(0, dtype=np.int64)
+        self.A = numbering.matrix(model.cell_dofs, tied[tied >= 0])
+        self.x, self.b, self._known, self._loads, self._momenta, self._vector = (numbering.vector() for _ in range(6))
+        self._local = np.zeros(len(numbering.rows))
+        self._state, self._start = model.state.x.array, model.start.x.array
+        self.load_factor, self.fresh = 1.0, True
+
+    def _ends(self):
+        """The Functions that change from step to step."""
+        return self.model.state, self.model.start, self.model.velocity
+
+    def load(self, scene, layout, load_factor=1.0):
+        """Take the numbers of a scene; the state becomes its reference configuration, at rest, at the time 0."""
+        model = self.model
+        model.load(scene, layout)
+        self.load_factor = model.load_factor.value = load_factor
+        self._pack()
+        self._assemble(self._dead, self._loads)
+        self._begun = False  # reactions of another scene are no guess
+        self.begin()
+
+    def _pack(self):
+        """Take the numbers of a scene into all forms; what changes in time is looked up anew at every assembly."""
+        forms, moving = self.model.forms, tuple(self.model.moving_loads)
+        self._residual, self._tangent, self._live = (
+            None if form is None else Packed(form, (*self._ends(), *moving))
+            for form in (forms.residual, forms.tangent, forms.live)
+        )
+        self._momentum = Packed(forms.momentum, self._ends())
+        self._dead = None if forms.dead is None else Packed(forms.dead, moving)
+
+    def begin(self):
+        """Take the model's state and velocity as the start of what follows."""
+        multipliers = self.ties.everywhere() if self.ties and self._begun else None
+        self.numbering.from_local(self._state, self.x)
+        if multipliers is not None:
+            self.ties.put(self.x, multipliers)
+        self.set_state(self.x)
+        self._start[:] = self._state
+        self.fresh = self._begun = True
+
+    def aim(self, t, h):
+        """The next step goes from the time t (s), where the state is, to t + h."""
+        model = self.model
+        self.h = model.h.value = h / model.time
+        self._start[:] = self._state
+        if model.moving_loads:
+            model.loads_at(t + h / 2)
+            self._assemble(self._dead, self._loads)
+        self._assemble(self._momentum, self._momenta)
+        self._known.set(0.0)
+        self._known.axpy(model.time / h, self._momenta)
+        self._known.axpy(self.load_factor, self._loads)
+        if self.ties:
+            self.ties.begin(model.ties_at(t + h))
+
+    def _assemble(self, form, vector):
+        self._local[:] = 0.0
+        if form:
+            form.add_to_vector(self._local)
+        self.numbering.add_up(self._local, vector)
+
+    def set_state(self, x):
+        """Put a vector of unknowns into the model's state, ghosts too."""
+        self.numbering.to_local(x, self._state)
+        if self.ties:
+            self.ties.see(x)
+
+    def guess(self, values):
+        """Start Newton from local numbers of the state; reactions stay what they were."""
+        multipliers = self.ties.everywhere() if self.ties else None
+        self.numbering.from_local(values, self.x)
+        if self.ties:
+            self.ties.put(self.x, multipliers)
+
+    def function(self, snes, x, b):
+        """Residual at x for SNES."""
+        self.set_state(x)
+        self._assemble(self._residual, b)
+        b.axpy(-1.0, self._known)
+        if self.ties:
+            self.ties.add_residual(b, self.load_factor)
+
+    def jacobian(self, snes, x, A, P):
+        """Tangent at the state that `function` was last called with; kept where it is not to be fresh."""
+        if not self.fresh:
+            return
+        self.fresh = False
+        P.zeroEntries()
+        self._tangent.add_to_matrix(P)
+        if self.ties:
+            self.ties.add_tangent(P, self.load_factor)
+        P.assemble()
+
+    def work(self):
+        """What loads and supports did in the step from `start` to the state, dimensionless, over all ranks."""
+        model, eta = self.model, self.load_factor
+        self.numbering.from_local(model.passed(), self._vector)
+        done = eta * self._loads.dot(self._vector)
+        if self._live:
+            self._assemble(self._live, self._known)
+            done += eta * self._known.dot(self._vector)
+        if self.ties:
+            done += model.comm.allreduce(self.ties.work(eta))
+        return done
+
+    def momenta(self):
+        """Linear and angular momentum of the state, see `Moving.momenta`."""
+        self._local[:] = 0.0
+        self._momentum.add_to_vector(self._local)
+        return self.model.momenta(self._local)
+
+    def dissipated(self):
+        """What damping took in the step from `start` to the state, dimensionless, over all ranks; zero without damping."""
+        return self._scalar(self.model.forms.dissipated) if self.model.damped else 0.0
+
+    def energies(self):
+        """Kinetic and strain energy of the state, dimensionless, over all ranks."""
+        return tuple(self._scalar(form) for form in (self.model.forms.kinetic, self.model.forms.strain))
+
+    def _scalar(self, form):
+        return self.model.comm.allreduce(fem.assemble_scalar(form))
+
+    def multipliers(self):
+        """Reactions of the added equations, on all ranks."""
+        return self.ties.everywhere() if self.ties else np.empty(0)

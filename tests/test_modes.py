@@ -1,0 +1,119 @@
+"""Natural frequencies against Timoshenko's and Euler's beams, about loaded states, of free rods; and long vibrations."""
+
+import math
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+
+import cosserat_fenicsx as cf
+
+LINE = cf.Line((0, 0, 0), (1, 0, 0), d1=(0, 0, 1))
+
+
+def beta(modes, rod, L=1.0):
+    """sqrt of omega over sqrt(EI/(rho A L^4)), EI about d_1."""
+    return (modes.squares * rod.stiffness.mass * L**4 / rod.stiffness.bending[0]) ** 0.25
+
+
+@pytest.mark.parametrize(
+    ("slender", "expected"),
+    [(0.1, (3.11568, 6.09066, 8.84052)), (0.01, (3.14133, 6.28106, 9.41761, 12.54941, 15.67492))],
+)
+def test_a_simply_supported_timoshenko_beam(slender, expected):
+    """Height over length `slender`, nu = 0.3, shear factor 5/6; bending in the x-y plane is held by hinge and roller."""
+    rod = cf.Rod(LINE, cf.Rectangle(5 * slender, slender, shear_factor=5 / 6), cf.Material(1e6, 0.3, 1.0))
+    scene = cf.Scene([rod], [cf.Hinge(rod.start, (0, 0, 1)), cf.Roller(rod.end, (0, 1, 0))])
+    modes = cf.modes(scene, 9)
+    flat = [k for k in range(9) if np.abs(modes.mode(k)[:, 1]).max() > 0.99]
+    np.testing.assert_allclose(beta(modes, rod)[flat][: len(expected)], expected, atol=6e-6)
+    assert modes.error.max() <= 1e-6 and modes.negative_modes == 0
+
+
+def timoshenko_cantilever(EI, GA, mass, J, guess):
+    """omega next to a guess: the strong form's determinant, built from the exponents of its solutions."""
+
+    def determinant(omega):
+        a, b = mass * omega**2 / GA, J * omega**2 / EI
+        mean, root = (a + b) / 2, math.sqrt(((a - b) / 2) ** 2 + mass * omega**2 / EI)
+        p, q = math.sqrt(root - mean), math.sqrt(root + mean)
+        # w = cosh(p s), sinh(p s), cos(q s), sin(q s); theta = (w'' + a w)/w' of each
+        up, down = (p**2 + a) / p, (q**2 - a) / q
+        cp, sp, cq, sq = math.cosh(p), math.sinh(p), math.cos(q), math.sin(q)
+        rows = [
+            [1, 0, 1, 0],
+            [0, up, 0, down],
+            [up * p * cp, up * p * sp, -down * q * cq, -down * q * sq],
+            [p * sp - up * sp, p * cp - up * cp, -q * sq + down * sq, q * cq - down * cq],
+        ]
+        return np.linalg.det(rows)
+
+    return brentq(determinant, 0.97 * guess, 1.03 * guess, xtol=1e-13 * guess, rtol=1e-14)
+
+
+def test_the_first_four_frequencies_of_a_cantilever():
+    EI, GA, mass, J = 2.0, 3e4, 1.5, 1e-4
+    section = cf.Stiffness((GA, GA), 1e5, (EI, 50.0), 1e2, mass=mass, inertia=(J, 1e-2, 1e-2))
+    rod = cf.Rod(LINE, section)
+    modes = cf.modes(cf.Scene([rod], [cf.Clamp(rod.start)]), 8)
+    soft = [k for k in range(8) if np.abs(modes.mode(k)[-1, 1]) > 0.99][:4]
+    euler = np.array([1.8751041, 4.6940911, 7.8547574, 10.9955407]) ** 2 * math.sqrt(EI / mass)
+    exact = [timoshenko_cantilever(EI, GA, mass, J, guess) for guess in euler]
+    np.testing.assert_allclose(2 * math.pi * modes.frequencies[soft], exact, rtol=1e-6)
+
+
+@pytest.mark.parametrize("degree", [1, 2, 3])
+def test_frequencies_converge_with_twice_the_degree(degree):
+    section = cf.Stiffness((1e3, 1e3), 1e3, (1.0, 3.0), 1.0, mass=1.0, inertia=(1e-2, 1e-2, 2e-2))
+    rod = cf.Rod(cf.Arc((0, 0, 0), (1, 0, 0), 1.5), section)
+    scene = cf.Scene([rod], [cf.Clamp(rod.start)])
+    exact = cf.modes(scene, 3, elements=32).squares
+    off = [np.abs(cf.modes(scene, 3, elements=n, degree=degree).squares / exact - 1).max() for n in (4, 8)]
+    assert np.log2(off[0] / off[1]) == pytest.approx(2 * degree, abs=0.4), off
+
+
+def test_a_free_rod_has_six_motions_for_nothing():
+    section = cf.Stiffness((1e4, 1e4), 1e4, (1.0, 2.0), 1.0, mass=1.0, inertia=(1e-3, 1e-3, 2e-3))
+    rod = cf.Rod(LINE, section)
+    modes = cf.modes(cf.Scene([rod]), 8)
+    assert modes.squares[:6].tolist() == [0.0] * 6
+    assert beta(modes, rod)[6] == pytest.approx(4.7300407, rel=2e-2) and modes.squares[7] > modes.squares[6]
+
+
+def test_a_compressed_column_loses_its_frequency():
+    """Pinned at both ends, omega^2 = omega_0^2 (1 - P/P_cr); beyond P_cr it is unstable, as `negative_modes` says."""
+    section = cf.Stiffness((1e6, 1e6), 1e6, (1.0, 50.0), 10.0, mass=1.0, inertia=(1e-6, 1e-4, 1e-4))
+    rod = cf.Rod(LINE, section)
+    supports = [cf.Hinge(rod.start, (0, 0, 1)), cf.Roller(rod.end, (0, 1, 0))]
+    scene = cf.Scene([rod], supports, [cf.Force(rod.end, (-(math.pi**2), 0, 0))])
+    for eta in (0.0, 0.5, 1.3):
+        modes = cf.modes(scene, 2, load_factor=eta)
+        assert modes.squares[0] / math.pi**4 == pytest.approx(1 - eta, abs=3e-5)
+        assert modes.negative_modes == int(eta > 1) == np.count_nonzero(modes.squares < 0)
+        path = cf.solve(scene, [eta], model="spatial", elements=4, control="load")
+        assert path.negative_modes[-1] == modes.negative_modes
+    assert modes.growth[0] == pytest.approx(math.pi**2 * math.sqrt(0.3), rel=1e-3) and modes.frequencies[0] == 0
+
+
+@pytest.mark.serial
+def test_a_vibration_keeps_its_amplitude_over_a_thousand_periods():
+    """And its period is that of the mode, to the phase error (omega h)^2/12 of the rule."""
+    section = cf.Stiffness((1e4, 1e4), 1e4, (1.0, 3.0), 1.0, mass=1.0, inertia=(1e-3, 1e-3, 2e-3))
+    rod = cf.Rod(LINE, section)
+    clamps = [cf.Clamp(rod.start)]
+    modes = cf.modes(cf.Scene([rod], clamps), 1, elements=2, degree=2)
+    s, period = np.linspace(0, 1, 5), 1 / modes.frequencies[0]
+    speed = 1e-5 / period
+
+    def along(values):
+        return lambda x: [speed * np.interp(x, s, values[:, i]) for i in range(3)]
+
+    given = cf.InitialVelocity(rod, along(modes.mode(0)), along(modes.turns(0)))
+    scene = cf.Scene([rod], clamps, velocities=[given])
+    history = cf.simulate(scene, 1000 * period, dt=period / 12, elements=2, degree=2, save_every=10 * period)
+    assert history.steps[-1] == 12000
+    assert np.ptp(np.sqrt(history.energy)) < 1e-6 * np.sqrt(history.energy[0])
+    first = cf.simulate(scene, 4 * period, dt=period / 200, elements=2, degree=2)
+    x = first.displacement(rod.end) @ np.sign(first.displacement(rod.end)[50])
+    turns = np.flatnonzero((x[:-1] < 0) & (x[1:] >= 0))
+    assert first.times[turns[-1]] == pytest.approx(len(turns) * period, rel=5e-3)

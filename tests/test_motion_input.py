@@ -1,0 +1,153 @@
+"""Motions: bad input is refused in words; functions of time by name."""
+
+import math
+
+import numpy as np
+import pytest
+
+import cosserat_fenicsx as cf
+
+pytestmark = pytest.mark.serial
+SECTION = cf.Stiffness((1e5, 1e5), 1e5, (1e3, 1e3), 1e3, mass=2.0, inertia=(0.1, 0.1, 0.2))
+ROD = cf.Rod(cf.Line((0, 0, 0), (2, 0, 0)), SECTION, name="rod")
+FREE = cf.Scene([ROD])
+LATE_NAN = cf.Scene([ROD], loads=[cf.Force(ROD.end, lambda t: (0, 0, 1 if t < 0.05 else math.nan))])
+
+
+def sections(**more):
+    return cf.Stiffness(
+        **{**dict(shear=(1, 1), axial=1, bending=(1, 1), torsion=1, mass=1.0, inertia=(1, 1, 1)), **more}
+    )
+
+
+def moving(*velocities, supports=(), joints=(), rods=(ROD,)):
+    return cf.simulate(cf.Scene(rods, supports, joints=joints, velocities=velocities), 0.1, dt=0.1)
+
+
+OTHER = cf.Rod(cf.Line((2, 0, 0), (3, 0, 0)), SECTION, name="other")
+REFUSED = {
+    "negative mass": (lambda: sections(mass=-1.0), "Stiffness.mass = -1.0: expected a positive number (kg/m)"),
+    "negative inertia": (lambda: sections(inertia=(1, -1, 1)), "Stiffness.inertia = -1"),
+    "two inertias": (lambda: sections(inertia=(1, 1)), "Stiffness.inertia = (1, 1): expected three numbers"),
+    "no scene": (lambda: cf.simulate(ROD, 1.0), "simulate.scene = "),
+    "duration": (lambda: cf.simulate(FREE, 0.0), "simulate.duration = 0.0: expected a positive number (s)"),
+    "NaN duration": (lambda: cf.simulate(FREE, math.nan), "simulate.duration = nan"),
+    "dt": (lambda: cf.simulate(FREE, 1.0, dt=-0.1), "simulate.dt = -0.1: expected a positive number (s)"),
+    "tol": (lambda: cf.simulate(FREE, 1.0, tol=2), "simulate.tol = 2"),
+    "dt and tol": (lambda: cf.simulate(FREE, 1.0, dt=0.1, tol=1e-3), "expected one of them"),
+    "save_every": (lambda: cf.simulate(FREE, 1.0, save_every=0), "simulate.save_every = 0"),
+    "scheme": (lambda: cf.simulate(FREE, 1.0, scheme="momentun"), "scheme = 'momentun': did you mean 'momentum'?"),
+    "elements": (lambda: cf.simulate(FREE, 1.0, elements=0), "simulate.elements = 0"),
+    "start": (lambda: cf.simulate(FREE, 1.0, start=3), "simulate.start = 3: expected a Path"),
+    "no mass": (lambda: moving(rods=[cf.Rod(ROD.curve, sections(mass=None), name="a")]), "'a': Stiffness.mass = None"),
+    "no inertia": (lambda: moving(rods=[cf.Rod(ROD.curve, sections(inertia=None), name="a")]), "Stiffness.inertia = None"),
+    "no density": (lambda: moving(rods=[cf.Rod(ROD.curve, cf.Circle(0.1), cf.Material(1e9), name="a")]), "Material.density"),
+    "late NaN": (lambda: cf.simulate(LATE_NAN, 1.0, dt=0.02, model="spatial"), "numbers (N), at the time t = 0.05 s"),
+    "two numbers": (lambda: cf.Moment(ROD.end, lambda t: (1, 2)), "Moment.moment = (1, 2): expected 3 finite numbers (N m), at the time t = 0 s"),
+    "jumps of a vector": (lambda: cf.Force(ROD.end, (1, 2, 3), jumps=(1,)), "Force.jumps = (1,): expected none"),
+    "jumps": (lambda: cf.Force(ROD.end, cf.Step((1, 2, 3)), jumps=("a",)), "Force.jumps = 'a'"),
+    "ramp": (lambda: cf.Ramp((1, 0, 0), 2.0, 1.0), "Ramp.end = 1.0: expected a time after 2 s"),
+    "triangle": (lambda: cf.Triangle((1, 0, 0), 0, 3, 2), "Triangle.end = 2"),
+    "sine": (lambda: cf.Sine((1, 0, 0), math.nan), "Sine.frequency = nan"),
+    "table": (lambda: cf.Table((0, 0), ((0, 0, 0), (1, 1, 1))), "Table.times = (0, 0): expected ascending"),
+    "table rows": (lambda: cf.Table((0, 1), ((0, 0, 0),)), "Table.values"),
+    "against a clamp": (lambda: moving(cf.InitialVelocity(ROD, (1, 0, 0)), supports=[cf.Clamp(ROD.start)]), "goes against supports[0] (Clamp"),
+    "against a pin": (lambda: moving(cf.InitialVelocity(ROD, (1, 0, 0)), supports=[cf.Pin(ROD.end)]), "goes against supports[0] (Pin"),
+    "against a joint": (lambda: moving(cf.InitialVelocity(ROD, (1, 0, 0)), rods=[ROD, OTHER], joints=[cf.Joint(ROD.end, OTHER.start)]), "joints[0]"),
+    "two velocities": (lambda: moving(cf.InitialVelocity(ROD), cf.InitialVelocity(ROD)), "the second of rod 'rod'"),
+    "a velocity elsewhere": (lambda: moving(cf.InitialVelocity(OTHER)), "Scene.velocities[0] acts at"),
+    "velocity of NaN": (lambda: moving(cf.InitialVelocity(ROD, lambda s: (0, 0, 1 / s if s else math.nan))), "at s = 0 m"),
+    "about with a function": (lambda: cf.InitialVelocity(ROD, lambda s: (0, 0, 0), about=(0, 0, 0)), "InitialVelocity.about"),
+    "a support that jumps": (lambda: cf.simulate(cf.Scene([ROD], [cf.Prescribed(ROD.end, (0, 0, 1))]), 1.0), "does not hold at the time 0"),
+    "statics in time": (lambda: cf.solve(LATE_NAN, [1.0]), "the Force depends on time, and statics knows none"),
+    "infinite stiffness": (lambda: moving(rods=[cf.Rod(ROD.curve, sections(axial=math.inf), name="a")]), "cannot take an infinite stiffness"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", REFUSED)
+def test_refused(case):
+    make, words = REFUSED[case]
+    with pytest.raises(cf.SceneError) as refusal:
+        make()
+    assert words in str(refusal.value)
+
+
+def test_functions_of_time():
+    v = (2.0, 0, -4.0)
+    cases = {
+        cf.Step(v, 1.0, 2.0): ({0.9: 0, 1.0: 1, 1.9: 1, 2.0: 0}, (1, 2)),
+        cf.Step(v): ({-1: 0, 0: 1, 99: 1}, (0,)),
+        cf.Ramp(v, 1, 3): ({1: 0, 2: 0.5, 3: 1, 4: 1}, (1, 3)),
+        cf.Triangle(v, 0, 1, 3): ({0.5: 0.5, 1: 1, 2: 0.5, 3: 0, 4: 0, -1: 0}, (0, 1, 3)),
+        cf.Sine(v, 0.25, start=1): ({0: 0, 1: 0, 2: 1, 4: -1}, (1,)),
+        cf.Table((0, 2), ((0, 0, 0), v)): ({-1: 0, 1: 0.5, 3: 1}, (0, 2)),
+    }
+    for signal, (values, jumps) in cases.items():
+        for t, factor in values.items():
+            np.testing.assert_allclose(signal(t), np.multiply(factor, v), atol=1e-12)
+        assert signal.jumps == jumps
+
+
+def test_steps_land_on_jumps_and_on_saved_times():
+    load = cf.Force(ROD.end, lambda t: (0, 0, 1.0 if t < 0.37 else 0.0), jumps=(0.37,))
+    scene = cf.Scene([ROD], loads=[load])
+    history = cf.simulate(scene, 1.0, dt=0.1, elements=2, degree=2)
+    assert 0.37 in history.times and history.times[-1] == 1.0 and np.diff(history.times).max() < 0.1 + 1e-12
+    np.testing.assert_allclose(history.linear_momentum[-1], [0, 0, 0.37], atol=1e-12)
+    saved = cf.simulate(scene, 1.0, dt=0.1, save_every=0.3, elements=2, degree=2)
+    np.testing.assert_allclose(saved.times, [0, 0.3, 0.6, 0.9, 1.0])
+    line = cf.Scene([ROD], loads=[cf.LineForce(ROD, cf.Ramp((0, 3, 0), 0, 1))])
+    pushed = cf.simulate(line, 2.0, dt=0.1, elements=2, degree=2)
+    np.testing.assert_allclose(pushed.linear_momentum[-1], [0, 3 * 2 * 1.5, 0], atol=1e-10)
+    assert repr(pushed).startswith("<History: 21 times, t = 0 .. 2 s, planar, 15 unknowns")
+
+
+def test_a_motion_that_is_lost_keeps_what_it_had(monkeypatch):
+    from cosserat_fenicsx import dynamics
+    from cosserat_fenicsx.snes import Solved
+    from cosserat_fenicsx.steppers.momentum import Momentum
+
+    whole = Momentum.step
+
+    def step(self, t, h):
+        return whole(self, t, h) if t < 0.45 else Solved(False, 1, "Newton's iterations ran out")
+
+    monkeypatch.setattr(Momentum, "step", step)
+    monkeypatch.setattr(dynamics, "_HALVINGS", 2)
+    with pytest.raises(cf.NotConverged, match="lost at t = 0.5 s, where a step of 0.025 s still fails") as lost:
+        cf.simulate(FREE, 1.0, dt=0.1)
+    np.testing.assert_allclose(lost.value.path.times, [0, 0.1, 0.2, 0.3, 0.4, 0.5])
+
+
+def test_a_moving_scene_in_toml(tmp_path):
+    file = tmp_path / "flight.toml"
+    file.write_text(
+        """
+        [[rods]]
+        name = "rod"
+        curve = { type = "Line", start = [0, 0, 0], end = [2, 0, 0] }
+        [rods.section]
+        type = "Stiffness"
+        shear = [1e5, 1e5]
+        axial = 1e5
+        bending = [1e3, 1e3]
+        torsion = 1e3
+        mass = 2.0
+        inertia = [0.1, 0.1, 0.2]
+        [rods.damping]
+        time = 1e-3
+        [[loads]]
+        type = "Force"
+        station = "rod.end"
+        force = { type = "Ramp", value = [0, 0, 4], end = 0.5 }
+        [[velocities]]
+        rod = "rod"
+        linear = [1, 0, 0]
+        """
+    )
+    scene, _ = cf.read_scene(file)
+    history = cf.simulate(scene, 1.0, dt=0.1, elements=2, degree=2)
+    np.testing.assert_allclose(history.linear_momentum[-1], [4, 0, 3], atol=1e-11)
+    file.write_text(file.read_text().replace('"Ramp"', '"Rampe"'))
+    with pytest.raises(cf.SceneError, match=r"loads\[0\].force.type = 'Rampe': did you mean 'Ramp'"):
+        cf.read_scene(file)
