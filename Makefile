@@ -17,12 +17,13 @@ export VTK_DEFAULT_OPENGL_WINDOW = vtkEGLRenderWindow
 # A numpy in the user's own site directory would hide the distribution's.
 export PYTHONNOUSERSITE = 1
 
-.PHONY: help setup packages demo test tables random clean
+.PHONY: help setup packages demo test tables figure3 random clean
 
 help:
 	@echo "make demo    solve the eccentric cantilever of the paper on two processes; writes out/"
 	@echo "make test    all tests on one, two and four processes"
 	@echo "make tables  the README's tables of accuracy and cost, measured anew and put into it"
+	@echo "make figure3 every curve of the paper's Figure 3, and what was found; writes out/ (about 4 minutes)"
 	@echo "make random  200 random scenes against the strong form, at three tolerances (about 5 minutes)"
 	@echo "make setup   only what all of these need first: the Debian packages and the environment .venv"
 	@echo "make clean   remove .venv, out and whatever else was built here"
@@ -43,6 +44,10 @@ tables: setup
 	$(PYTHON) demos/choice.py
 	$(PYTHON) demos/scaling.py
 	$(PYTHON) demos/readme_tables.py
+
+# What an interrupted run has finished is kept: the same command goes on from there.
+figure3: setup
+	$(PYTHON) demos/figure3.py
 
 random: setup
 	$(PYTHON) tests/random_comparison.py 200

@@ -87,6 +87,11 @@ if _VERSION < (0, 8):
         coordinates = ufl.VectorElement("Lagrange", cell, 1, variant="equispaced")
         return dolfinx_mesh.create_mesh(comm, cells, x, ufl.Mesh(coordinates))
 
+    def create_solid_mesh(comm, cells, x):
+        """A mesh of second-order hexahedra from `cells (n, 27)`, in basix' order of nodes, and `x (m, 3)`."""
+        coordinates = ufl.VectorElement("Lagrange", ufl.hexahedron, 2, variant="equispaced")
+        return dolfinx_mesh.create_mesh(comm, cells, x, ufl.Mesh(coordinates))
+
     def evaluate(expression, mesh, cells):
         """Values of a compiled expression in `cells`, shape (cells, points * components)."""
         return expression.eval(cells)
@@ -119,6 +124,13 @@ else:
     def create_interval_mesh(comm, cells, x):
         """A mesh of intervals on a line from `cells (n, 2)` and `x (m, 1)`, given on rank 0 alone."""
         coordinates = basix.ufl.element("Lagrange", "interval", 1, shape=(1,))
+        if _VERSION < (0, 10):
+            return dolfinx_mesh.create_mesh(comm, cells, x, coordinates)
+        return dolfinx_mesh.create_mesh(comm, cells, coordinates, x)
+
+    def create_solid_mesh(comm, cells, x):
+        """A mesh of second-order hexahedra from `cells (n, 27)`, in basix' order of nodes, and `x (m, 3)`."""
+        coordinates = basix.ufl.element("Lagrange", "hexahedron", 2, shape=(3,))
         if _VERSION < (0, 10):
             return dolfinx_mesh.create_mesh(comm, cells, x, coordinates)
         return dolfinx_mesh.create_mesh(comm, cells, coordinates, x)

@@ -1,0 +1,117 @@
+"""The chart of Figure 3: the whole path, the part below eta = 1 where the models part, and by how much they do."""
+
+from pathlib import Path
+
+import numpy as np
+
+from comparison.column import Column
+from comparison.curves import MANY, exact
+from cosserat_fenicsx import analytic
+
+_GREEN = {"1": "#98d594", "2": "#4daf4a", str(MANY): "#1b7837"}
+_ETA = r"load factor $\eta = F/P_{cr}$ (-)"
+
+
+def draw(data, file):
+    """Draw the curves of figure3.json into `file`."""
+    from matplotlib.figure import Figure
+
+    curves = data["curves"]
+    figure = Figure(figsize=(13, 8.5), layout="constrained")
+    panels = figure.subplot_mosaic([["whole", "near"], ["whole", "apart"]])
+    whole, near, apart = panels["whole"], panels["near"], panels["apart"]
+    for axes in (whole, near):
+        _curves(axes, curves)
+        axes.set(xlabel=_ETA, ylabel=r"transverse displacement of the tip $\delta$ (m)")
+    whole.set(xlim=(0, 2), ylim=(0, 18), title="The whole path, to twice the critical load")
+    near.set(xlim=(0, 1), ylim=(0, 2.5), title="Below the critical load, where the models part")
+    _differences(apart, curves)
+    for axes in panels.values():
+        axes.grid(alpha=0.3)
+        axes.axvline(1.0, color="tab:red", lw=0.8, alpha=0.5)
+    whole.text(0.94, 17.1, "pole of eq. (8)", ha="right", color="tab:red", fontsize=9)
+    whole.plot([0, 1, 1], [2.5, 2.5, 0], color="grey", lw=0.8)
+    whole.text(0.03, 2.7, "enlarged on the right", color="grey", fontsize=9)
+    _limit_points(near, curves["mcre"]["elements"])
+    figure.suptitle(
+        "Eccentrically compressed column: steel, 20 m, diameter 0.2 m, eccentricity e = L/100, clamped below, free above"
+    )
+    figure.legend(*whole.get_legend_handles_labels(), loc="outside lower center", ncols=3, frameon=False, fontsize=9)
+    Path(file).parent.mkdir(parents=True, exist_ok=True)
+    figure.savefig(file, dpi=110)
+
+
+def _curves(axes, curves):
+    """delta of every model."""
+    below = np.linspace(0, 0.9999, 2000)
+    beam, eq_8 = curves["corotational"], analytic.secant_delta(below, Column().eccentricity)
+    axes.plot(*_from_zero(curves["mixed"]), color="tab:blue", lw=2, label="Cosserat rod, mixed: constant moment F e")
+    axes.plot(curves["displacement"]["eta"][::2], curves["displacement"]["delta"][::2], "o", mfc="none", mec="tab:blue", ms=8,
+              label="Cosserat rod, eq. (1), displacement: constant moment")  # fmt: skip
+    axes.plot(
+        beam["eta"],
+        beam["delta"],
+        "kx",
+        ms=6,
+        label=f"co-rotational beam, {beam['elements']} elements: constant moment",
+    )
+    axes.plot(*_from_zero(curves["arm"]), color="tab:orange", lw=2, label="Cosserat rod, mixed: force on a turning arm")
+    axes.plot(curves["solid"]["eta"], curves["solid"]["delta"], "s", mfc="none", mec="tab:orange", ms=6,
+              label="3D elasticity: eccentric dead traction, a turning arm")  # fmt: skip
+    axes.plot(below, eq_8, color="tab:red", ls="--", label="secant formula, eq. (8), up to its pole")
+    for name, colour in _GREEN.items():
+        top, eta, delta, turn = _branch(curves, name)
+        words = f"MCRE, a reconstruction: {_elements(name)}; star: limit point"
+        axes.plot(eta[: turn + 1], delta[: turn + 1], color=colour, lw=2, label=words)
+        axes.plot(eta[turn:], delta[turn:], color=colour, lw=1.2, ls=":")
+        axes.plot(top["eta"], top["delta"], "*", color=colour, mec="black", ms=12, zorder=5)
+
+
+def _differences(axes, curves):
+    """How far every model is from the exact rod under the same load, in percent."""
+    below = np.linspace(0.02, 0.999, 400)
+    eq_8, beam = analytic.secant_delta(below, Column().eccentricity), curves["corotational"]
+    axes.semilogy(below, _percent(eq_8, exact(below)), color="tab:red", ls="--")
+    axes.semilogy(beam["eta"], _percent(beam["delta"], exact(beam["eta"])), "kx", ms=6)
+    solid, clamped = curves["solid"], curves["solid_clamped"]
+    axes.semilogy(
+        solid["eta"], _percent(solid["delta"], exact(solid["eta"], arm=True)), "s", mfc="none", mec="tab:orange", ms=6
+    )
+    axes.semilogy(clamped["eta"], _percent(clamped["delta"], exact(clamped["eta"], arm=True)), "D", color="tab:orange", ms=6,
+                  label="3D elasticity with the foot's face fixed altogether")  # fmt: skip
+    for name, colour in _GREEN.items():
+        _, eta, delta, turn = _branch(curves, name)
+        axes.semilogy(eta[1 : turn + 1], _percent(delta[1 : turn + 1], exact(eta[1 : turn + 1])), color=colour, lw=2)
+    rods = 100 * max(curves[name]["error"] for name in ("mixed", "displacement", "arm"))
+    axes.set(xlim=(0, 2), ylim=(1e-4, 100), xlabel=_ETA, ylabel=r"|difference| of $\delta$ (%)")
+    axes.set_title(
+        f"Difference from the exact rod under the same load\n(the Cosserat rod here: {rods:.0e} %, below the chart)"
+    )
+    axes.legend(fontsize=9, loc="upper right")
+
+
+def _branch(curves, name):
+    """(limit point, eta, delta, index of the limit point in them) of the MCRE's branch."""
+    found = curves["mcre"]["elements"][name]
+    top, turn = found["limit_point"], found["negative_modes"].index(1)
+    return top, np.insert(found["eta"], turn, top["eta"]), np.insert(found["delta"], turn, top["delta"]), turn
+
+
+def _percent(delta, truth):
+    return 100 * np.abs(np.asarray(delta) / truth - 1)
+
+
+def _from_zero(curve):
+    return [0.0, *curve["eta"]], [0.0, *curve["delta"]]
+
+
+def _elements(name):
+    return "1 element" if name == "1" else f"{name} elements"
+
+
+def _limit_points(axes, found):
+    """Numbers at the stars."""
+    for name, place in (("1", (0.03, 0.72)), ("2", (0.17, 1.15)), (str(MANY), (0.33, 1.6))):
+        top = found[name]["limit_point"]
+        words = f"limit point, {_elements(name)}:\n" rf"$\eta$ = {top['eta']:.3f}, $\delta$ = {top['delta']:.2f} m"
+        axes.annotate(words, (top["eta"], top["delta"]), place, fontsize=9, arrowprops={"arrowstyle": "->", "lw": 0.8})

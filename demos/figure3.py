@@ -1,0 +1,159 @@
+"""Figure 3 of the paper, whole: delta against eta from 0 to 2 for every model of the eccentrically compressed column.
+
+    python demos/figure3.py            about four minutes; leaves in out/: figure3.png, figure3.md, figure3.json
+    python demos/figure3.py --quick    coarse meshes, for a look or a test
+    python demos/figure3.py --fresh    from the start, whatever an earlier run has left
+
+A run that is broken off keeps every curve and every point of the solid that it has, in figure3.json and figure3-*.npz; the same command
+goes on from there.
+"""
+
+import argparse
+import json
+import os
+import sys
+from dataclasses import asdict
+from pathlib import Path
+
+import machine
+import numpy as np
+from comparison import curves, picture, verdicts
+from comparison.follow import Point
+from mpi4py import MPI
+
+
+class Store:
+    """The file of the curves: written whole after every curve and every point of the solid.
+
+    Args:
+        folder: where figure3.json is, or will be.
+        settings: a file of other settings, of other releases or of a finished run is not continued.
+        fresh: continue none.
+    """
+
+    def __init__(self, folder, settings, fresh=False):
+        self.folder = Path(folder)
+        self.folder.mkdir(parents=True, exist_ok=True)
+        self.file = self.folder / "figure3.json"
+        self.data = {"complete": False, "machine": machine.record(), "settings": _plain(asdict(settings)), "curves": {}}
+        before = self._before() if not fresh else None
+        if before:
+            self.data["curves"] = before["curves"]
+            done = [name for name, curve in before["curves"].items() if curve["complete"]]
+            print(f"goes on from {self.file}: {', '.join(done) or 'a part of the first curve'} kept", file=sys.stderr)
+        else:
+            for name in self.folder.glob("figure3-*.npz"):
+                name.unlink()
+
+    def _before(self):
+        """What a run that was broken off has left, if this one can continue it."""
+        try:
+            before = json.loads(self.file.read_text(encoding="utf-8"))
+            same = before["settings"] == self.data["settings"] and not before["complete"]
+            here, there = self.data["machine"], before["machine"]
+            return before if same and all(here[k] == there[k] for k in here if k not in ("date", "cores")) else None
+        except (OSError, ValueError, KeyError):
+            return None
+
+    def curve(self, name, compute, words):
+        """The curve `name`: kept from before, or computed, timed and kept."""
+        kept = self.data["curves"].get(name)
+        if not (kept and kept["complete"]):
+            self.put(name, curves.timed(words, compute), complete=True)
+        return self.data["curves"][name]
+
+    def put(self, name, curve, complete=False):
+        """Keep a curve, or what there is of it."""
+        self.data["curves"][name] = {**curve, "complete": complete}
+        self.save()
+
+    def save(self):
+        """Write the file; a process that is killed leaves the old one or the new one."""
+        new = self.file.with_suffix(".new")
+        new.write_text(json.dumps(self.data, indent=1) + "\n", encoding="utf-8")
+        os.replace(new, self.file)
+
+    def part_of(self, name):
+        """The unfinished curve `name` and the last points of its path: (dict, list of Point), (None, []) where there is none."""
+        kept, states = self.data["curves"].get(name), self._states(name)
+        if kept is None or not states.exists():
+            return None, []
+        with np.load(states) as arrays:
+            points = [Point(float(eta), x) for eta, x in zip(arrays["eta"], arrays["x"], strict=True)]
+        if points[-1].eta != kept["eta"][-1]:
+            return None, []
+        return {key: value for key, value in kept.items() if key != "complete"}, points
+
+    def keep_part(self, name, curve, points):
+        """Keep an unfinished curve and the last points of its path."""
+        new = self._states(name).with_suffix(".new.npz")
+        np.savez(new, eta=[p.eta for p in points], x=[p.x for p in points])
+        os.replace(new, self._states(name))
+        self.put(name, curve)
+
+    def _states(self, name):
+        return self.folder / f"figure3-{name}.npz"
+
+    def finish(self):
+        """All curves are there: the next run starts anew."""
+        self.data["complete"] = True
+        self.save()
+        for name in self.folder.glob("figure3-*.npz"):
+            name.unlink()
+
+
+def _plain(settings):
+    """As JSON gives it back."""
+    return json.loads(json.dumps(settings))
+
+
+def compute(store, settings):
+    """All curves, the quick ones first."""
+    store.curve("mixed", lambda: curves.rod(settings, "mixed"), "Cosserat rod, mixed")
+    store.curve("displacement", lambda: curves.rod(settings, "displacement"), "Cosserat rod, displacement")
+    store.curve("arm", lambda: curves.rod(settings, "mixed", arm=True), "Cosserat rod, force on a turning arm")
+    store.curve("corotational", lambda: curves.beam(settings), "co-rotational beam")
+    store.curve("mcre", lambda: curves.truncated(settings), "MCRE, a reconstruction")
+    for name, clamp, words in (
+        ("solid_clamped", "face", "3D elasticity, foot fixed altogether"),
+        ("solid", "plane", "3D elasticity"),
+    ):
+
+        def solid(name=name, clamp=clamp):
+            so_far, points = store.part_of(name)
+            return curves.solid(settings, lambda curve, last: store.keep_part(name, curve, last), clamp, points, so_far)
+
+        store.curve(name, solid, words)
+    store.finish()
+    return store.data
+
+
+def main(out="out", quick=False, fresh=False):
+    """Compute, write and draw.
+
+    Returns:
+        The dict that figure3.json holds.
+    """
+    if MPI.COMM_WORLD.size > 1:
+        sys.exit("figure3.py: expected one process, not several: the curves follow each other")
+    settings = curves.QUICK if quick else curves.FULL
+    data = compute(Store(out, settings, fresh), settings)
+    out = Path(out)
+    table = verdicts.table(data)
+    (out / "figure3.md").write_text(table + "\n", encoding="utf-8")
+    picture.draw(data, out / "figure3.png")
+    print(table)
+    print(f"\nwritten to {out}/: figure3.png, figure3.md, figure3.json", file=sys.stderr)
+    return data
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--quick", action="store_true", help="coarse meshes")
+    parser.add_argument("--fresh", action="store_true", help="continue no earlier run")
+    parser.add_argument("-o", "--out", default="out", help="folder for what is written (default: out)")
+    try:
+        main(**vars(parser.parse_args()))
+    except KeyboardInterrupt:
+        print("\nbroken off; what is done is kept, and the same command goes on from there", file=sys.stderr)
+        sys.exit(130)
