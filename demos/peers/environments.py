@@ -1,0 +1,125 @@
+"""An environment of its own for every peer, made once under the user's cache folder, with releases pinned."""
+
+import hashlib
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+HERE = Path(__file__).resolve().parent
+ROOT = HERE.parents[1]
+#: What pip installs; CalculiX comes from Debian.
+PINNED = {
+    "Exudyn": ("exudyn==1.13.6", "numpy==2.4.6"),
+    "OpenSeesPy": ("openseespy==3.7.1.2",),
+    "PyElastica": ("pyelastica==1.0.0", "numba==0.68.1", "numpy==2.4.6"),
+}
+SCRIPTS = {
+    "cosserat_fenicsx": "own_rod.py",
+    "Exudyn": "exudyn_rod.py",
+    "OpenSeesPy": "opensees_rod.py",
+    "PyElastica": "elastica_rod.py",
+    "CalculiX": "calculix_rod.py",
+}
+OWN = "cosserat_fenicsx"
+
+
+class Missing(Exception):
+    """A peer that is not there; says why."""
+
+
+def cache():
+    """Where the environments are."""
+    given = os.environ.get("XDG_CACHE_HOME")
+    return (Path(given) if given else Path.home() / ".cache") / "cosserat_fenicsx" / "peers"
+
+
+def command(peer, install=True):
+    """The command that starts a peer's process, its environment made first where it is missing.
+
+    Args:
+        peer: a key of SCRIPTS.
+        install: whether to go to the network for it.
+
+    Raises:
+        Missing: the peer is not there and cannot be installed.
+    """
+    script = str(HERE / SCRIPTS[peer])
+    if peer == OWN:
+        return [sys.executable, script]
+    if peer == "CalculiX":
+        return [sys.executable, script, str(_calculix(install))]
+    folder = cache() / f"{peer}-{_short(PINNED[peer])}"
+    if not (folder / "ready").exists():
+        _only_if(install, peer)
+        base = "/usr/bin/python3" if Path("/usr/bin/python3").exists() else sys.executable
+        _run(base, "-m", "venv", "--clear", folder)
+        _run(folder / "bin" / "python", "-m", "pip", "install", "--disable-pip-version-check", *PINNED[peer])
+        (folder / "ready").touch()
+    return [str(folder / "bin" / "python"), script]
+
+
+def surroundings(peer):
+    """Environment variables of a peer's process: one thread, and nobody else's packages."""
+    given = {k: v for k, v in os.environ.items() if not k.startswith("PYTHON")}
+    given |= {f"{name}_NUM_THREADS": "1" for name in ("OMP", "OPENBLAS", "MKL", "NUMBA")}
+    if peer == OWN:
+        given["PYTHONPATH"] = str(ROOT)
+    if peer == "CalculiX":
+        libraries = {str(file.parent) for file in (cache() / "CalculiX").rglob("*.so.*")}
+        given["LD_LIBRARY_PATH"] = ":".join([*sorted(libraries), os.environ.get("LD_LIBRARY_PATH", "")])
+    return {**given, "PYTHONNOUSERSITE": "1", "MPLBACKEND": "Agg"}
+
+
+def fingerprint(peer):
+    """Hash of what a peer's samples depend on here: its script and, for this package, the package."""
+    files = [HERE / SCRIPTS[peer], HERE / "speak.py", HERE / "problems.py"]
+    if peer == OWN:
+        files += sorted([*(ROOT / "cosserat_fenicsx").rglob("*.py"), *(ROOT / "forms").rglob("*.py")])
+    return _short(file.read_text(encoding="utf-8") for file in files)
+
+
+def _calculix(install):
+    """The program: Debian's, unpacked into the cache with the libraries that are not installed; no root needed."""
+    folder = cache() / "CalculiX"
+    program = folder / "usr" / "bin" / "ccx"
+    if (folder / "ready").exists():
+        return program if program.exists() else Path(shutil.which("ccx") or program)
+    _only_if(install, "CalculiX")
+    if shutil.which("apt-get") is None:
+        raise Missing("no apt-get here: install CalculiX by hand, as `ccx`")
+    shutil.rmtree(folder, ignore_errors=True)
+    folder.mkdir(parents=True)
+    wanted = _run("apt-get", "install", "--simulate", "--no-install-recommends", "calculix-ccx")
+    packages = re.findall(r"^Inst (\S+)", wanted, re.M)
+    if packages:
+        _run("apt-get", "download", *packages, cwd=folder)
+        for archive in folder.glob("*.deb"):
+            _run("dpkg-deb", "--extract", archive, folder)
+    elif shutil.which("ccx") is None:
+        raise Missing("apt-get names nothing to install, and there is no ccx")
+    (folder / "ready").touch()
+    return program if packages else Path(shutil.which("ccx"))
+
+
+def _only_if(install, peer):
+    if not install:
+        raise Missing(f"{peer} is not installed yet: `make work-precision` installs it")
+
+
+def _run(*words, cwd=None):
+    told = dict(stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, cwd=cwd)
+    try:
+        done = subprocess.run([str(word) for word in words], timeout=600, **told)
+    except (OSError, subprocess.TimeoutExpired) as error:
+        raise Missing(f"{words[0]}: {error}") from None
+    if done.returncode:
+        last = [line for line in done.stdout.splitlines() if line.strip()][-1:] or ["no message"]
+        raise Missing(f"{' '.join(map(str, words[:4]))} ... failed: {last[0][:200]}")
+    return done.stdout
+
+
+def _short(words):
+    return hashlib.sha256("\n".join(words).encode()).hexdigest()[:10]

@@ -1,0 +1,125 @@
+"""Exudyn: geometrically exact and ANCF rods under its static Newton solver; see `speak` for what comes and goes.
+
+The sample is one call of SolveStatic from the unloaded state over all load factors; the model is built and assembled
+before it. Where a step fails the solver halves it by itself. The tolerance is on the increments (residualMode 1): a
+tolerance on the residual is either too coarse or below its rounding.
+"""
+
+import math
+
+import exudyn as exu
+import numpy as np
+from exudyn import itemInterface as item
+from speak import Stopped, serve
+
+DISPLACEMENT = exu.OutputVariableType.Displacement
+#: Nodes of an element, rotation of a node; and of ANCF's cable the slopes.
+NODES = {"planar 3-node": 3, "planar 2-node": 2, "planar ANCF cable": 2, "spatial 2-node": 2, "spatial 2-node EP": 2}
+
+
+def prepare(problem, configuration):
+    container = exu.SystemContainer()
+    mbs = container.AddSystem()
+    element, tip = configuration["element"], _rod(mbs, problem, configuration)
+    factors = [0.0, *problem["load_factors"]]
+    last = len(factors) - 1
+
+    def loaded(mbs, time, vector):  # a unit of time is a load factor; the solver may stop in between
+        i = min(int(time + 1e-9), last - 1)
+        factor = factors[i] + (time - i) * (factors[i + 1] - factors[i])
+        return [factor * vector[0], factor * vector[1], factor * vector[2]]
+
+    point = mbs.AddMarker(item.MarkerNodePosition(nodeNumber=tip))
+    mbs.AddLoad(item.LoadForceVector(markerNumber=point, loadVector=problem["force"], loadVectorUserFunction=loaded))
+    if any(problem["moment"]):
+        section = mbs.AddMarker(item.MarkerNodeRigid(nodeNumber=tip))
+        moment = dict(loadVector=problem["moment"], loadVectorUserFunction=loaded)
+        mbs.AddLoad(item.LoadTorqueVector(markerNumber=section, **moment))
+    sensor = mbs.AddSensor(item.SensorNode(nodeNumber=tip, storeInternal=True, outputVariableType=DISPLACEMENT))
+    mbs.Assemble()
+    settings = _settings(configuration, last, configuration["elements"] * NODES[element] > 16)
+
+    def solve():
+        if not mbs.SolveStatic(settings, showHints=False, showCausingItems=False):
+            raise Stopped("SolveStatic failed")
+        rows = mbs.GetSensorStoredData(sensor)
+        at = np.searchsorted(rows[:, 0], np.arange(1, last + 1) - 1e-6)
+        if at[-1] >= len(rows):
+            raise Stopped(f"stopped at step {rows[-1, 0]:g} of {last}")
+        return rows[at, 1:4].tolist()
+
+    solve.keep = container
+    return solve
+
+
+def _settings(configuration, steps, sparse):
+    settings = exu.SimulationSettings()
+    static = settings.staticSolver
+    static.numberOfLoadSteps = steps * configuration.get("substeps", 1)
+    static.loadStepDuration = steps
+    static.newton.residualMode = 1
+    static.newton.relativeTolerance = configuration["tol"]
+    static.newton.absoluteTolerance = configuration["tol"]
+    static.newton.useModifiedNewton = configuration.get("modified", False)
+    static.computeLoadsJacobian = configuration.get("load_jacobian", False)
+    static.verboseMode = 0
+    settings.solution.file.write = False
+    settings.solution.sensors.writePeriod = 1e-9
+    settings.linearSolver.solverType = exu.LinearSolverType.EigenSparse if sparse else exu.LinearSolverType.EXUdense
+    return settings
+
+
+def _rod(mbs, problem, configuration):
+    """Nodes, elements and the clamp; returns the tip's node."""
+    element, n = configuration["element"], configuration["elements"]
+    per = NODES[element] - 1
+    L, R = problem["length"], problem["radius"]
+    nodes = []
+    for i in range(per * n + 1):
+        s = L * i / (per * n)
+        angle = s / R if R else 0.0
+        place = [R * math.sin(angle), R * (1 - math.cos(angle))] if R else [s, 0.0]
+        nodes.append(mbs.AddNode(_node(element, place, angle)))
+    stiff = dict(bendingStiffness=problem["EI"], axialStiffness=problem["EA"])
+    if element.startswith("spatial"):
+        section = exu.BeamSection()
+        section.stiffnessMatrix = np.diag(
+            [problem["EA"], problem["GA"], problem["GA"], problem["GJ"], problem["EI"], problem["EI"]]
+        )
+        section.massPerLength, section.inertia = 1.0, np.eye(3)
+    for i in range(n):
+        ends = nodes[per * i : per * i + per + 1]
+        if element.startswith("spatial"):
+            mbs.AddObject(item.ObjectBeamGeometricallyExact(nodeNumbers=ends, length=L / n, sectionData=section))
+        elif element == "planar ANCF cable":
+            mbs.AddObject(item.ObjectANCFCable2D(nodeNumbers=ends, length=L / n, massPerLength=1.0, **stiff))
+        else:
+            mbs.AddObject(
+                item.ObjectBeamGeometricallyExact2D(
+                    nodeNumbers=ends, length=L / n, massPerLength=1.0, crossSectionInertia=1.0,
+                    shearStiffness=problem["GA"], **stiff,
+                )
+            )  # fmt: skip
+    held = {"planar ANCF cable": (0, 1, 3), "spatial 2-node": range(6), "spatial 2-node EP": (0, 1, 2, 4, 5, 6)}
+    ground = mbs.AddMarker(item.MarkerNodeCoordinate(nodeNumber=mbs.AddNode(item.NodePointGround()), coordinate=0))
+    for coordinate in held.get(element, range(3)):
+        clamp = mbs.AddMarker(item.MarkerNodeCoordinate(nodeNumber=nodes[0], coordinate=coordinate))
+        mbs.AddObject(item.ObjectConnectorCoordinate(markerNumbers=[ground, clamp]))
+    return nodes[-1]
+
+
+def _node(element, place, angle):
+    if element == "planar ANCF cable":
+        return item.NodePoint2DSlope1(referenceCoordinates=[*place, math.cos(angle), math.sin(angle)])
+    if element == "spatial 2-node":
+        return item.NodeRigidBodyRotVecLG(referenceCoordinates=[*place, 0.0, 0.0, 0.0, angle])
+    if element == "spatial 2-node EP":
+        return item.NodeRigidBodyEP(
+            referenceCoordinates=[*place, 0.0, math.cos(angle / 2), 0.0, 0.0, math.sin(angle / 2)]
+        )
+    return item.NodeRigidBody2D(referenceCoordinates=[*place, angle])
+
+
+if __name__ == "__main__":
+    exu.config.suppressWarnings = True
+    serve(prepare, {"exudyn": exu.GetVersionString().split()[0]})

@@ -1,0 +1,80 @@
+"""What a person waits: whole processes from the start to the answer, with warm and with empty caches."""
+
+import json
+import os
+import statistics
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from pathlib import Path
+
+from peers.environments import OWN, ROOT, surroundings
+from peers.problems import problems
+from work_precision_table import answered, called, cheapest, median
+
+SCENE = ROOT / "demos" / "eccentric_cantilever.toml"
+RUNS = {"warm": 5, "cold": 3}
+LIMIT = 60.0  # s
+
+
+def waits(started, rows):
+    """[{who, what, caches, processor, wall, failed}], s.
+
+    Here `cosserat run` on the paper's cantilever, to the printed table. For a peer its process, which imports, builds
+    and solves the sweep (or the single answer, where it has none of the sweep) at an error below 1e-5, or as well as it
+    can. Cold: with the folders empty where compiled forms (here) or functions (numba's) are kept; the others compile
+    nothing and have no cold start of their own.
+    """
+    found = []
+    for name, peer in started.items():
+        words, told, what = _job(name, peer, rows)
+        if words is None:
+            continue
+        for caches in ("warm", "cold") if name in (OWN, "PyElastica") else ("warm",):
+            measured = {"who": "cosserat run" if name == OWN else name, "what": what, "caches": caches}
+            found.append({**measured, **_times(words, told, surroundings(name), caches)})
+            print(f"whole process, {name}, {caches}: {statistics.median(found[-1]['wall'] or [0]):.2f} s", flush=True)
+    return found
+
+
+def _job(name, peer, rows):
+    """Command, input and description of the whole process of a peer."""
+    if name == OWN:
+        return [sys.executable, "-m", "cosserat_fenicsx", "run", str(SCENE)], "", f"demos/{SCENE.name}, default tol"
+    for problem in ("sweep", "single"):
+        mine = [row for row in answered(rows, problem) if row["peer"] == name]
+        if mine:
+            best = cheapest(mine, 1e-5) or min(mine, key=lambda row: (row["error"], median(row)))
+            request = {"problem": problems()[problem], "configuration": best["configuration"], "warm": 0, "samples": 1}
+            return peer.words, json.dumps(request) + "\n", f"{problem}: {called(best)}, error {best['error']:.0e}"
+    return None, None, None
+
+
+def _times(words, told, surrounding, caches):
+    """Processor and wall-clock time of the runs of a command."""
+    processor, wall = [], []
+    with tempfile.TemporaryDirectory() as folder:
+        for run in range(RUNS[caches] + (caches == "warm")):  # the first warm one fills the caches
+            empty = {}
+            if caches == "cold":
+                place = Path(folder, str(run))
+                place.mkdir()
+                empty = {"XDG_CACHE_HOME": str(place), "NUMBA_CACHE_DIR": str(place)}
+            began = time.perf_counter()
+            pipes = dict(stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, cwd=folder)
+            process = subprocess.Popen(words, env={**surrounding, **empty}, **pipes)
+            watch = threading.Timer(LIMIT, process.kill)
+            watch.start()
+            process.stdin.write(told.encode())
+            process.stdin.close()
+            _, status, used = os.wait4(process.pid, 0)
+            watch.cancel()
+            process.returncode = os.waitstatus_to_exitcode(status)
+            if process.returncode:
+                return {"processor": [], "wall": [], "failed": f"exit code {process.returncode}"}
+            if caches == "cold" or run:
+                wall.append(time.perf_counter() - began)
+                processor.append(used.ru_utime + used.ru_stime)
+    return {"processor": processor, "wall": wall, "failed": None}

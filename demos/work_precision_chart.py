@@ -1,0 +1,118 @@
+"""The charts of speed against accuracy: one a problem, and one of what a person waits."""
+
+import statistics
+from pathlib import Path
+
+import matplotlib
+
+matplotlib.use("Agg")
+
+import matplotlib.pyplot as plt
+import numpy as np
+from peers.environments import OWN
+from peers.problems import TITLES
+from work_precision_table import answered, median
+
+#: (problem, file, subtitle, own rows shown, None: all; peers' rows shown).
+_VIEWS = (
+    ("sweep", "sweep", "every model that the plane problem allows", None),
+    ("sweep", "sweep_spatial", "forced into space (model \"spatial\")", True),
+    ("single", "single", "every model that the plane problem allows", None),
+    ("bend", "bend", "a problem in space", None),
+    ("roll-up 1", "roll_up_1", "every model that the plane problem allows", None),
+    ("roll-up 2", "roll_up_2", "every model that the plane problem allows", None),
+    ("roll-up 4", "roll_up_4", "every model that the plane problem allows", None),
+)  # fmt: skip
+_OURS = {"determinate": "#08519c", "planar": "#3182bd", "spatial": "#31a354", "auto": "black"}
+_THEIRS = {"Exudyn": "#d95f02", "OpenSeesPy": "#b2182b", "PyElastica": "#7570b3", "CalculiX": "#8c6d31"}
+_MARKS = "osD^vP"
+_ROUND_OFF = 1e-14  # errors below are shown here
+
+
+def draw(found, rows, out, stem):
+    """Draw all charts that have points; returns the names of the files."""
+    names = []
+    for problem, file, subtitle, spatial in _VIEWS:
+        here = [r for r in answered(rows, problem) if not (r["peer"] == OWN and spatial and not r["spatial"])]
+        if here:
+            names.append(f"{stem}_{file}.png")
+            _chart(here, f"{TITLES[problem]}\n{subtitle}", problem, Path(out) / names[-1])
+    if any(row["wall"] for row in found.waits):
+        names.append(f"{stem}_waiting.png")
+        _bars(found.waits, Path(out) / names[-1])
+    return names
+
+
+def frontier(rows):
+    """Rows that no other beats in both error and time, the most accurate first."""
+    best = []
+    for row in sorted(rows, key=lambda row: (median(row), row["error"])):
+        if not best or row["error"] < best[-1]["error"]:
+            best.append(row)
+    return best[::-1]
+
+
+def _groups(rows):
+    """{label: (colour, marker, line style, rows)}, this package first; an own rung is one line, whatever formulation."""
+    groups = {}
+    for row in rows:
+        ours = row["peer"] == OWN
+        model = row["configuration"].get("model")
+        label = f"cosserat_fenicsx, {'auto (its own choice)' if model == 'auto' else model}" if ours else f"{row['peer']}: {row['kind']}"
+        groups.setdefault((not ours, label), []).append(row)
+    counted, found = {}, {}
+    for (theirs, label), members in sorted(groups.items()):
+        peer = members[0]["peer"]
+        number = counted[peer] = counted.get(peer, -1) + 1
+        colour = _THEIRS[peer] if theirs else _OURS[members[0]["configuration"]["model"]]
+        style = "--" if theirs and members[0]["spatial"] else "-"
+        found[label] = colour, _MARKS[number % len(_MARKS)] if theirs else "o", style, members
+    return found
+
+
+def _chart(rows, title, problem, file):
+    figure, axes = plt.subplots(figsize=(9.5, 6.5), layout="constrained")
+    for label, (colour, marker, style, members) in _groups(rows).items():
+        ours = label.startswith("cosserat")
+        x, y = _points(members)
+        axes.plot(x, y, marker, color=colour, ms=3, alpha=0.25, mew=0)
+        x, y = _points(frontier(members))
+        axes.plot(x, y, style, marker=marker, color=colour, ms=6 if ours else 5, lw=2.6 if ours else 1.3, label=label)
+    axes.set_xscale("log")
+    axes.set_yscale("log")
+    axes.set_xlim(0.4 * min(max(r["error"], _ROUND_OFF) for r in rows), 2.0)
+    measured = r"of the tip displacement $\delta$" if problem in ("sweep", "single") else "of the tip's position, over its displacement"
+    most = ", largest over the load factors" if problem == "sweep" else ""
+    axes.set_xlabel(f"relative error {measured}{most} (-)")
+    axes.set_ylabel("processor time of one warm answer, one thread (s)")
+    axes.set_title(title)
+    axes.grid(which="major", alpha=0.4)
+    axes.annotate("better: faster,\nmore accurate", (0.015, 0.02), (0.09, 0.10), xycoords="axes fraction", textcoords="axes fraction",
+                  fontsize=10, arrowprops={"arrowstyle": "->"})  # fmt: skip
+    axes.text(0.99, 0.01, "small dots: every mesh, degree and formulation measured; lines: the best of each", fontsize=8,
+              transform=axes.transAxes, ha="right", color="0.3")  # fmt: skip
+    figure.legend(*axes.get_legend_handles_labels(), loc="outside lower center", ncols=3, fontsize=8.5, frameon=False)
+    figure.savefig(file, dpi=130)
+    plt.close(figure)
+
+
+def _points(rows):
+    return [max(row["error"], _ROUND_OFF) for row in rows], [median(row) for row in rows]
+
+
+def _bars(waits, file):
+    shown = [row for row in waits if row["wall"]]
+    figure, axes = plt.subplots(figsize=(9.5, 0.75 * len(shown) + 1.8), layout="constrained")
+    for i, row in enumerate(shown):
+        seconds = statistics.median(row["wall"])
+        axes.barh(i, seconds, color=_THEIRS.get(row["who"], "#3182bd"), alpha=0.9 if row["caches"] == "warm" else 0.45)
+        axes.text(seconds, i, f"  {seconds:.2f} s", va="center", fontsize=9)
+    names = [f"{row['who']}, {row['caches']}\n{row['what']}" for row in shown]
+    axes.set_yticks(np.arange(len(shown)), names, fontsize=8)
+    axes.invert_yaxis()
+    axes.margins(x=0.15)
+    axes.set_xlabel("wall clock from the start of the process to its end (s), median")
+    axes.set_title("What a person waits for an answer: eccentric cantilever, whole processes")
+    axes.grid(axis="x", alpha=0.4)
+    figure.savefig(file, dpi=130)
+    plt.close(figure)
