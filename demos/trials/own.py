@@ -38,6 +38,11 @@ class Own:
         return (0.8, -0.6, 0.88) if self.spatial else (0.0, 0.0, 1.2)
 
     @property
+    def tol(self):
+        """What it is asked for."""
+        return self.options.get("tol", 1e-6)
+
+    @property
     def default(self):
         """Whether it is `solve` without a word."""
         return not self.options
@@ -106,12 +111,10 @@ class Own:
             if self.options.get("model") == "determinate" or self.default:
                 raise NotForIt("it takes as many Gauss points as the degree")
             degree = 4 if self.options.get("formulation", "mixed") == "mixed" else 2
-            points = {"gauss_points": degree + 1, "tol": 1e-4, "degree": degree}
-            if self.options.get("formulation") == "multiplier":
-                points["tol"] = 1e-3
+            points = {"gauss_points": degree + 1, "tol": max(1e-4, self.tol), "degree": degree}
             return problem, self.solve(problem, **points), None, ""
         if key == "line_search":
-            answer = self.solve(problem, jump=True)
+            answer = self.solve(problem, **({} if self.default else {"steps": cf.StepControl(adaptive=False)}))
             return problem, answer, answer.iterations, "Newton iterations"
         return problem, self.solve(problem), None, ""
 
@@ -126,7 +129,9 @@ def _with_loads(problem, force, moment):
 def _refusal(refused):
     """Not for it where a model does not fit; else it has stopped, before the first step."""
     words = str(refused)
-    return NotForIt(words.split(": ", 1)[1].split("; expected")[0]) if "is not possible" in words else Stopped(words, 0.0)
+    if "is not possible" in words or "clamps and rigid joints alone" in words:
+        return NotForIt(words.split(": ", 1)[-1].split("; expected")[0])
+    return Stopped(words, 0.0)
 
 
 def _stopped_at(words, recorded):
@@ -143,6 +148,6 @@ OWN = (
     Own("mixed", "rung spatial,\nmixed", 'model="spatial", formulation="mixed"', {"model": "spatial"}),
     Own("displacement", "rung spatial,\ndisplacement", 'model="spatial", formulation="displacement", tol=1e-4',
         {"model": "spatial", "formulation": "displacement", "tol": 1e-4}),
-    Own("multiplier", "rung spatial,\nmultiplier", 'model="spatial", formulation="multiplier", tol=1e-3',
-        {"model": "spatial", "formulation": "multiplier", "tol": 1e-3}),
+    Own("multiplier", "rung spatial,\nmultiplier", 'model="spatial", formulation="multiplier", tol=1e-2',
+        {"model": "spatial", "formulation": "multiplier", "tol": 1e-2}),
 )  # fmt: skip

@@ -81,14 +81,9 @@ def twisted(steps=20):
     return {**found, "load_factors": [(k + 1) / steps for k in range(steps)]}
 
 
-def bend(steps):
-    """The 45-degree bend (Bathe & Bolourchi 1979) under a force of 600 across its plane, in equal steps."""
-    return {**peers_problems()["bend"], "load_factors": [(k + 1) / steps for k in range(steps)]}
-
-
 def pushed_and_turned(plane, history=None):
     """A straight rod under a force and a moment, in a plane or out of all; (force factor, moment factor) in stages."""
-    force, moment = ((-1.0, 1.5, 0.0), (0, 0, -1.0)) if plane else ((-0.8, 0.7, 1.0), (0.3, 0.5, -0.4))
+    force, moment = ((-0.4, 0.6, 0.0), (0, 0, -0.4)) if plane else ((-1.2, 1.4, 2.0), (0.6, 1.0, -0.8))
     found = _numbers(1.0, None, EA=3e3, GA=1e3, EI=1.0, GJ=0.8, force=force, moment=moment)
     return {**found, "load_factors": [(k + 1) / 10 for k in range(10)], **({"history": history} if history else {})}
 
