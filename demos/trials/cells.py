@@ -1,5 +1,6 @@
 """A cell of the map: one number of one method on one trial, and what became of it."""
 
+import re
 from dataclasses import asdict, dataclass
 
 import numpy as np
@@ -75,12 +76,17 @@ class Stopped(Exception):
     Args:
         words: its own.
         reached: the last load factor that it has an answer for; nan where nobody knows.
-        answer: what there is up to there.
     """
 
     def __init__(self, words, reached=np.nan):
         super().__init__(" ".join(str(words).split()))
         self.reached = reached
+
+
+def load_factor_in(words):
+    """The load factor that a path's last words name; nan where they name none."""
+    found = re.search(r"(?:beyond|at) the load factor ([-+.e\d]*\d)", str(words))
+    return float(found[1]) if found else np.nan
 
 
 class NotForIt(Exception):

@@ -10,7 +10,7 @@ from comparison import follow as path
 from comparison.chain import Chain
 
 from trials import problems
-from trials.cells import Answer, NotForIt, Stopped
+from trials.cells import Answer, NotForIt, Stopped, load_factor_in
 
 ELEMENTS = 64
 #: For stiffnesses that a method cannot take as infinite, in EI/L^2.
@@ -87,9 +87,26 @@ class LoadedChain(Chain):
             band[5 - 1, -1] -= eta * fx
         return band
 
+    def negative_modes(self, x, eta):
+        """Negative eigenvalues of the tangent; where a load follows, real ones of an unsymmetric tangent."""
+        if not self.follows:
+            return super().negative_modes(x, eta)
+        found = np.linalg.eigvals(dense(self._tangent(x, eta)))
+        return int(((found.real < 0) & (np.abs(found.imag) < 1e-9 * np.abs(found.real))).sum())
+
     def tip_moved(self, x):
         """(3,) m, displacement of the tip."""
         return np.array([*x[-3:-1], 0.0]) * self.column.length
+
+
+def dense(band):
+    """The matrix of scipy's general band of half width 5."""
+    n = band.shape[1]
+    i, j = np.indices((n, n))
+    inside = np.abs(i - j) <= 5
+    K = np.zeros((n, n))
+    K[inside] = band[(5 + i - j)[inside], j[inside]]
+    return K
 
 
 class Guided:
@@ -111,12 +128,7 @@ class Guided:
         return self.chain.load(self.whole(x))[self._kept]
 
     def _matrix(self, x, eta):
-        band, n = self.chain._tangent(self.whole(x), eta), self.chain.size
-        i, j = np.indices((n, n))
-        inside = np.abs(i - j) <= 5
-        K = np.zeros((n, n))
-        K[inside] = band[(5 + i - j)[inside], j[inside]]
-        return K[np.ix_(self._kept, self._kept)]
+        return dense(self.chain._tangent(self.whole(x), eta))[np.ix_(self._kept, self._kept)]
 
     def linearise(self, x, eta, before):
         return partial(np.linalg.solve, self._matrix(x, eta))
@@ -141,7 +153,7 @@ class ChainMethod:
         """An `Answer` under load control."""
         if not problems.in_a_plane(problem):
             raise NotForIt("it knows a plane alone")
-        chain = LoadedChain(problem, 8 if problem.get("coarse") else ELEMENTS, self.law_of)
+        chain = LoadedChain(problem, _elements(problem), self.law_of)
         if "history" in problem:
             return self._in_stages(chain, problem["history"])
         model = Guided(chain) if problem.get("guided") else chain
@@ -151,8 +163,7 @@ class ChainMethod:
         except path.Stopped as why:
             stopped = str(why)
         if stopped:
-            words = stopped.split("load factor ")[-1].split(":")[0] if "beyond" in stopped else "nan"
-            raise Stopped(stopped, 0.0 if jump else float(words))
+            raise Stopped(stopped, 0.0 if jump else load_factor_in(stopped))
         if "turn" in problem:
             return self._turned(chain, points[-1], problem["turn"][2])
         x = [point.x if model is chain else model.whole(point.x) for point in points]
@@ -198,11 +209,16 @@ class ChainMethod:
         try:
             (point,) = path.follow(chain, problem["load_factors"])
         except path.Stopped as why:
-            raise Stopped(why, np.nan) from None
+            raise Stopped(why, load_factor_in(why)) from None
         further = point.x - chain.linearise(point.x, point.eta, point.x)(chain.residual(point.x, point.eta))
         ratio = problems.column_truth(problem)[0, 1] / chain.tip_moved(further)[1]
         tip = ratio * chain.tip_moved(point.x)[None]
         return problem, Answer(tip, note="against one more iteration on the same mesh"), None, ""
+
+
+def _elements(problem):
+    """Few where locking is looked for, and where unsymmetric eigenvalues are."""
+    return 8 if problem.get("coarse") else 16 if problem.get("follower") else ELEMENTS
 
 
 def _beam(length, axial, shear):

@@ -1,6 +1,5 @@
 """This package: the default, the rungs and the formulations, through its public face."""
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,7 +8,7 @@ from scipy.spatial.transform import Rotation
 import cosserat_fenicsx as cf
 from cosserat_fenicsx import statics
 from trials import problems
-from trials.cells import Answer, NotForIt, Stopped
+from trials.cells import Answer, NotForIt, Stopped, load_factor_in
 
 _IN_ONE_STEP = {"steps": cf.StepControl(adaptive=False), "elements": 8}
 
@@ -54,6 +53,8 @@ class Own:
             options |= _IN_ONE_STEP
         if problem.get("coarse") and not self.default:
             options |= {"elements": 4, "degree": 2}
+        if "mesh" in problem and not self.default:
+            options |= {"elements": problem["mesh"] * (1 if self.options.get("formulation", "mixed") == "mixed" else 4)}
         if problem.get("guided") and not self.default:
             options |= {"control": "load"}
         try:
@@ -67,9 +68,7 @@ class Own:
         except cf.SceneError as refused:
             raise _refusal(refused) from None
         except cf.NotConverged as failure:
-            path = failure.path
-            reached = float(path.load_factors[-1]) if path is not None and len(path) else 0.0
-            raise Stopped(failure, _stopped_at(str(failure), reached)) from None
+            raise Stopped(failure, _reached(failure)) from None
         return self._answer(path, rod, whole)
 
     def _answer(self, path, rod, whole):
@@ -134,11 +133,10 @@ def _refusal(refused):
     return Stopped(words, 0.0)
 
 
-def _stopped_at(words, recorded):
-    """The load factor that the message names, which may be beyond the last recorded point."""
-    if "beyond the load factor " in words:
-        return float(words.split("beyond the load factor ")[1].split()[0])
-    return recorded if math.isfinite(recorded) else 0.0
+def _reached(failure):
+    """The load factor that the message names, which may be beyond the last recorded point; else that one's."""
+    named, path = load_factor_in(failure), failure.path
+    return float(path.load_factors[-1]) if np.isnan(named) and path is not None and len(path) else named
 
 
 OWN = (

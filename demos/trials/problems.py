@@ -7,6 +7,7 @@ times the `load_factors`. More than the peers' problems may have:
     turn      rotation vector, rad: the clamp is turned by it, and the loads with it
     follower  the force turns with the tip's section
     coarse    few elements, to see what locks
+    mesh      elements for the quick map, where a method of this package is not the default
 """
 
 import math
@@ -92,9 +93,9 @@ def thin_arc():
     """A quarter of a circle, a thousand times longer than it is thick, bent open by a force in its plane."""
     radius, thickness = 2 / math.pi, 1e-3
     EA = 12 / thickness**2
-    return _numbers(
-        1.0, radius, EA=EA, GA=EA / 3.12, EI=1.0, GJ=0.8, force=(0.0, -2.0, 0.0), moment=(0, 0, 0), size=thickness
-    )
+    loads = {"force": (0.0, -2.0, 0.0), "moment": (0, 0, 0)}
+    found = _numbers(1.0, radius, EA=EA, GA=EA / 3.12, EI=1.0, GJ=0.8, size=thickness, **loads)
+    return {**found, "load_factors": [(k + 1) / 10 for k in range(10)]}
 
 
 def arch(upto):
