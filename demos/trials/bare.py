@@ -39,7 +39,7 @@ class Loop:
 
     def __init__(self, problem, *, held=_CLAMPED, line_search="basic", solver="klu", relative=None, in_si=False,
                  formulation="displacement", degree=2, points=None, elements=8, predict=False, weak=False):  # fmt: skip
-        rod, scene = problems.scene_of(problem)
+        _, scene = problems.scene_of(problem)
         layout = Layout.of(scene, elements)
         loaded, _, _ = statics.solvers_of(scene, layout, formulation=formulation, degree=degree, points=points)
         self.problem, self.model = problem, loaded.model

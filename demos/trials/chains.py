@@ -181,7 +181,9 @@ class ChainMethod:
             chain.base[2] = base + angle / parts
             found, _ = path.newton(chain, x, point.eta)
             if found is None:
-                raise Stopped(f"Newton's method does not converge when all is turned by {chain.base[2]:.3g} rad", np.nan)
+                raise Stopped(
+                    f"Newton's method does not converge when all is turned by {chain.base[2]:.3g} rad", np.nan
+                )
             x = found
         negative = chain.negative_modes(x, point.eta)
         return Answer(chain.tip_moved(x)[None], f"unstable, {negative} negative modes" if negative else "")
@@ -194,7 +196,10 @@ class ChainMethod:
                 chain.force = whole * factors[[0, 0, 1]]
                 found, _ = path.newton(chain, x, 1.0)
                 if found is None:
-                    raise Stopped(f"Newton's method does not converge at force {factors[0]:g}, moment {factors[1]:g}", min(factors))
+                    raise Stopped(
+                        f"Newton's method does not converge at force {factors[0]:g}, moment {factors[1]:g}",
+                        min(factors),
+                    )
                 x = found
             before = stage
         negative = chain.negative_modes(x, 1.0)

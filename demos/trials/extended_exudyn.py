@@ -5,11 +5,11 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "peers"))
 
-import exudyn as exu  # noqa: E402
-import numpy as np  # noqa: E402
-from exudyn import itemInterface as item  # noqa: E402
-from exudyn_rod import DISPLACEMENT, NODES, _rod, _settings  # noqa: E402
-from speak import Stopped, serve  # noqa: E402
+import exudyn as exu
+import numpy as np
+from exudyn import itemInterface as item
+from exudyn_rod import DISPLACEMENT, NODES, _rod, _settings
+from speak import Stopped, serve
 
 
 def prepare(problem, configuration):
@@ -53,7 +53,9 @@ def _solve(problem, configuration):
     done = mbs.SolveStatic(settings, showHints=False, showCausingItems=False)
     rows = mbs.GetSensorStoredData(sensor)
     if not done:
-        raise Stopped(f"SolveStatic failed beyond the load factor {_factor(stages, rows[-1, 0] if len(rows) else 0.0):.6g}")
+        raise Stopped(
+            f"SolveStatic failed beyond the load factor {_factor(stages, rows[-1, 0] if len(rows) else 0.0):.6g}"
+        )
     at = np.searchsorted(rows[:, 0], np.arange(1, last + 1) - 1e-6)
     if at[-1] >= len(rows):
         raise Stopped(f"it stopped beyond the load factor {_factor(stages, rows[-1, 0]):.6g}")

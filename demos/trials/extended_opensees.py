@@ -5,9 +5,9 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "peers"))
 
-import openseespy.opensees as ops  # noqa: E402
-from opensees_rod import _analyse, _build  # noqa: E402
-from speak import Stopped, serve  # noqa: E402
+import openseespy.opensees as ops
+from opensees_rod import _analyse, _build
+from speak import Stopped, serve
 
 
 def prepare(problem, configuration):

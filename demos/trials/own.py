@@ -54,7 +54,7 @@ class Own:
         if problem.get("coarse") and not self.default:
             options |= {"elements": 4, "degree": 2}
         if "mesh" in problem and not self.default:
-            options |= {"elements": problem["mesh"] * (1 if self.options.get("formulation", "mixed") == "mixed" else 4)}
+            options |= {"elements": problem["mesh"] * (1 if self.options.get("formulation", "mixed") == "mixed" else 2)}
         if problem.get("guided") and not self.default:
             options |= {"control": "load"}
         try:
@@ -84,7 +84,7 @@ class Own:
     def _in_stages(self, problem):
         """Force and moment each by factors of their own: Newton from state to state, on the solvers that `solve` uses."""
         degree = statics.default_degree(self.options.get("formulation", "mixed"))
-        rod, scene = problems.scene_of(problem)
+        _, scene = problems.scene_of(problem)
         plain = cf.solve(scene, [0.0], elements=6, progress=False, **self.options)
         options = {"formulation": plain.formulation, "degree": degree, "model": plain.model}
         state = None

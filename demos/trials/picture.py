@@ -9,7 +9,14 @@ from trials.cells import MISSING, NOT, RIGHT, SAID, SILENT, STOPPED, Cell
 from trials.table import MARKS
 
 #: Light to dark in the order of harm, so that a print without colour reads the same.
-_COLOURS = {RIGHT: "#d4efc5", SAID: "#fbe08c", STOPPED: "#9fc1e6", SILENT: "#a3122a", NOT: "#f6f6f6", MISSING: "#ffffff"}
+_COLOURS = {
+    RIGHT: "#d4efc5",
+    SAID: "#fbe08c",
+    STOPPED: "#9fc1e6",
+    SILENT: "#a3122a",
+    NOT: "#f6f6f6",
+    MISSING: "#ffffff",
+}
 _WORDS = {
     RIGHT: "right",
     SAID: "wrong and said so",
@@ -18,11 +25,7 @@ _WORDS = {
     NOT: "does not apply",
     MISSING: "not installed",
 }
-_GROUPS = (
-    ("this package", ("default", "multiplier")),
-    ("written for comparison", ("bare", "secant")),
-    ("other programs", ("Exudyn", "CalculiX")),
-)
+_GROUPS = ("this package", "written for comparison", "other programs")
 
 
 def draw(data, file):
@@ -45,9 +48,11 @@ def draw(data, file):
     axes.tick_params(length=0)
     for side in axes.spines.values():
         side.set_visible(False)
-    _groups(axes, [method.key for method in columns])
+    _groups(axes, columns)
     _legend(figure, data)
-    figure.suptitle("Where methods fail: what is tried (rows) with which method (columns), and what becomes of it", fontsize=13)
+    figure.suptitle(
+        "Where methods fail: what is tried (rows) with which method (columns), and what becomes of it", fontsize=13
+    )
     Path(file).parent.mkdir(parents=True, exist_ok=True)
     figure.savefig(file, dpi=110)
 
@@ -69,22 +74,18 @@ def _cell(axes, i, j, cell):
               fontweight="bold" if cell.verdict == SILENT else "normal")  # fmt: skip
 
 
-def _groups(axes, keys):
+def _groups(axes, columns):
     """Who the columns belong to, above their heads."""
-    for words, (first, last) in _GROUPS:
-        members = [keys.index(key) for key in keys if _between(key, first, last)]
+    kinds = [0 if method.own else 2 if hasattr(method, "end") else 1 for method in columns]
+    for kind, words in enumerate(_GROUPS):
+        members = [i for i, each in enumerate(kinds) if each == kind]
         if not members:
             continue
         low, high = min(members) - 0.45, max(members) + 0.45
-        axes.plot([low, high], [1.068, 1.068], transform=axes.get_xaxis_transform(), color="black", lw=1, clip_on=False)
-        axes.text((low + high) / 2, 1.075, words, transform=axes.get_xaxis_transform(), ha="center", fontsize=10)
+        axes.plot([low, high], [1.052, 1.052], transform=axes.get_xaxis_transform(), color="black", lw=1, clip_on=False)
+        axes.text((low + high) / 2, 1.058, words, transform=axes.get_xaxis_transform(), ha="center", fontsize=10)
         if min(members):
             axes.axvline(min(members) - 0.5, color="black", lw=1)
-
-
-def _between(key, first, last):
-    order = [method.key for method in methods.METHODS]
-    return order.index(first) <= order.index(key) <= order.index(last)
 
 
 def _legend(figure, data):

@@ -58,14 +58,20 @@ def in_other_units(problem, length=1e3, force=1e-6):
 def column_truth(problem):
     """Displacements of the column's tip, (n, 3) m, by the quadrature of `analytic.reissner`."""
     stiff = {"bending": problem["EI"], "axial": problem["EA"], "shear": problem["GA"]}
-    tip = analytic.reissner(np.array(problem["load_factors"]), ECCENTRICITY * problem["length"], problem["length"], **stiff)
+    tip = analytic.reissner(
+        np.array(problem["load_factors"]), ECCENTRICITY * problem["length"], problem["length"], **stiff
+    )
     return np.column_stack([-tip.shortening, tip.delta, 0 * tip.delta])
 
 
 def roll_up(turns, steps):
     """A straight rod and an end moment that rolls it up, in equal steps."""
     base = peers_problems()["roll-up 1"]
-    return {**base, "moment": [0, 0, turns * base["moment"][2]], "load_factors": [(k + 1) / steps for k in range(steps)]}
+    return {
+        **base,
+        "moment": [0, 0, turns * base["moment"][2]],
+        "load_factors": [(k + 1) / steps for k in range(steps)],
+    }
 
 
 def roll_up_truth(problem):
@@ -78,7 +84,9 @@ def roll_up_truth(problem):
 def twisted(steps=20):
     """A rod of small torsional stiffness whose tip is twisted by 1.25 turns while a force bends it."""
     EI = 1.0
-    found = _numbers(1.0, None, EA=1e4, GA=5e3, EI=EI, GJ=0.1 * EI, force=(0.3, 1.0, 0.0), moment=(0.1 * 2.5 * math.pi, 0, 0))
+    found = _numbers(
+        1.0, None, EA=1e4, GA=5e3, EI=EI, GJ=0.1 * EI, force=(0.3, 1.0, 0.0), moment=(0.1 * 2.5 * math.pi, 0, 0)
+    )
     return {**found, "load_factors": [(k + 1) / steps for k in range(steps)]}
 
 
@@ -189,7 +197,7 @@ def arch_limit():
         moment, H, V = start
 
         def slope(_, y):
-            x, z, theta, m = y
+            _, _, theta, m = y
             c, s = math.cos(theta), math.sin(theta)
             stretch, shear = 1 + (H * c + V * s) / EA, (V * c - H * s) / GA
             r_x, r_y = stretch * c - shear * s, stretch * s + shear * c
@@ -198,7 +206,9 @@ def arch_limit():
         return solve_ivp(slope, (0, L), (0, 0, 0, moment), method="DOP853", rtol=1e-11, atol=1e-12).y[:, -1]
 
     def force(down, start):
-        found, _, ok, _ = fsolve(lambda p: end(p)[:3] - [foot[0], foot[1] - down, L / R], start, full_output=True, xtol=1e-12)
+        found, _, ok, _ = fsolve(
+            lambda p: end(p)[:3] - [foot[0], foot[1] - down, L / R], start, full_output=True, xtol=1e-12
+        )
         if ok != 1:
             raise RuntimeError(f"the arch was not shot at {down}")
         return found

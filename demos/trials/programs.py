@@ -79,7 +79,9 @@ class Program:
             configuration["substeps"] = configuration["substeps"] if few and not jump else 1
         reply = self.process().ask(problem, configuration, warm=0, samples=1, limit=LIMIT)
         told = reply.get("versions", {})
-        self.versions = next((release for name, release in told.items() if name not in ("python", "numpy")), self.versions)
+        self.versions = next(
+            (release for name, release in told.items() if name not in ("python", "numpy")), self.versions
+        )
         if "failed" in reply:
             raise Stopped(reply["failed"], load_factor_in(reply["failed"]))
         tip = np.array(reply["tip"], dtype=float)
@@ -96,7 +98,12 @@ class Program:
         answer = self.solve(problem, residual=1e-6)
         best = self.solve(problem)
         ratio = problems.column_truth(problem)[:, 1] / best.tip[:, 1]
-        return problem, Answer(answer.tip * [[1, r, 1] for r in ratio], "", "against the same mesh, stopped on the increment"), None, ""
+        return (
+            problem,
+            Answer(answer.tip * [[1, r, 1] for r in ratio], "", "against the same mesh, stopped on the increment"),
+            None,
+            "",
+        )
 
 
 def _as_it_takes(problem, free):

@@ -7,9 +7,11 @@ The forms are those of this package (forms/equilibrium.py) on another motion. Un
 
 from dataclasses import dataclass
 
+import basix
 import numpy as np
 import ufl
 from cosserat_fenicsx.forms import equilibrium
+from cosserat_fenicsx.forms.spatial import rotation_tests_of
 from dolfinx import fem
 from dolfinx.fem import petsc as fem_petsc
 from mpi4py import MPI
@@ -18,7 +20,6 @@ from scipy.sparse.linalg import splu
 from scipy.spatial.transform import Rotation
 
 from cosserat_fenicsx import compat
-from cosserat_fenicsx.forms.spatial import rotation_tests_of
 from cosserat_fenicsx.models.rod_data import gauss_function
 from trials import problems
 from trials.cells import Answer, NotForIt, Stopped
@@ -58,7 +59,7 @@ class Rod:
         def matrix(f):
             return ufl.as_matrix([[f[3 * i + j] for j in range(3)] for i in range(3)])
 
-        u, theta = (ufl.as_vector([U[i + k] for i in range(3)]) for k in (0, 3))
+        theta = ufl.as_vector([U[3], U[4], U[5]])
         u_s, theta_s = (ufl.as_vector([U[i + k].dx(0) for i in range(3)]) for k in (0, 3))
         E, H = rotation_of(theta)
         reference = matrix(R_R)
@@ -88,8 +89,6 @@ class Rod:
 
     @staticmethod
     def _quadrature(degree):
-        import basix
-
         return basix.make_quadrature(basix.CellType.interval, 2 * degree - 1)[0]
 
     @staticmethod

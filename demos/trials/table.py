@@ -47,7 +47,9 @@ def unit(data, trial):
     """The unit of a trial's numbers, as its cells have it."""
     units = {cell["unit"] for key, cell in data["cells"].items() if key.startswith(f"{trial.key}/")}
     words = sorted(units - {"", "load factor reached"}) or ["load factor reached"]
-    return " or ".join(words) + ("; where it stopped, the load factor reached" if words[0] != "limit load" else ", reached or reported")
+    return " or ".join(words) + (
+        "; where it stopped, the load factor reached" if words[0] != "limit load" else ", reached or reported"
+    )
 
 
 def _cell(plain):
