@@ -41,7 +41,7 @@ def _solve(problem, configuration):
         )
     if problem.get("guided"):
         ground = mbs.AddMarker(item.MarkerNodeCoordinate(nodeNumber=mbs.AddNode(item.NodePointGround()), coordinate=0))
-        for coordinate in (0, 2):
+        for coordinate in (0, 2, 4, 5, 6) if element.endswith("EP") else (0, 2):
             held = mbs.AddMarker(item.MarkerNodeCoordinate(nodeNumber=tip, coordinate=coordinate))
             mbs.AddObject(item.ObjectConnectorCoordinate(markerNumbers=[ground, held]))
     sensor = mbs.AddSensor(item.SensorNode(nodeNumber=tip, storeInternal=True, outputVariableType=DISPLACEMENT))

@@ -31,11 +31,16 @@ def _solve(problem, configuration):
         ops.timeSeries("Path", tag, "-time", *times, "-values", *values)
         ops.pattern("Plain", tag, tag)
         ops.load(tip, *(vector if ops.getNDM()[0] == 3 else (vector[0], vector[1], vector[5])))
-    steps = configuration.get("substeps", 1)
-    ops.integrator("LoadControl", 1.0 / steps)
-    for k in range(len(history) * steps):
-        if ops.analyze(1) != 0:
-            raise Stopped(f"no convergence in stage {k / steps:g} of {len(history)}")
+    step, reached = 1.0 / configuration.get("substeps", 1), 0.0
+    while reached < len(history) - 1e-12:
+        step = min(step, len(history) - reached)
+        ops.integrator("LoadControl", step)
+        if ops.analyze(1) == 0:
+            reached += step
+        elif step > 1e-3:
+            step /= 2  # the failed step was taken back
+        else:
+            raise Stopped(f"no convergence in stage {reached:.4g} of {len(history)}")
     u = ops.nodeDisp(tip)
     return [(u[0], u[1], u[2] if ops.getNDM()[0] == 3 else 0.0)]
 
