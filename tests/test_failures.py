@@ -12,7 +12,7 @@ sys.path.append(str(Path(__file__).parent.parent / "demos"))
 from trials import catalogue, cells, chains, methods, own, secant
 from trials.rotation_vector import RotationVector
 
-#: What is not right, by trial and method: verdicts that are allowed. A jump is the user's own wish and may end anywhere, if it is said.
+#: What is not right, by trial and method: verdicts that are allowed. A jump may end anywhere, if it is said.
 _SAID = {cells.SAID, cells.STOPPED}
 _JUMPS = {(trial, method.key): _SAID for trial in ("jump_1.1", "jump_1.5", "jump_4") for method in own.OWN[1:]}
 ALLOWED = {
@@ -31,7 +31,10 @@ ALLOWED = {
 
 
 @pytest.mark.parametrize("method", own.OWN, ids=lambda method: method.key)
-@pytest.mark.parametrize("trial", catalogue.QUICK, ids=lambda trial: trial.key)
+@pytest.mark.parametrize(
+    "trial",
+    [pytest.param(t, id=t.key, marks=[pytest.mark.slow] if t.key == "ten" else []) for t in catalogue.QUICK],
+)
 def test_own_cell(trial, method):
     cell = methods.cell(trial, method)
     assert cell.verdict in ALLOWED.get((trial.key, method.key), {cells.RIGHT}), cell
@@ -44,7 +47,7 @@ def test_own_cell(trial, method):
 
 
 def test_what_is_written_for_comparison_fails_as_it_is_known_to():
-    """Path dependence of rotation vectors, truncated rotations, bare loops: if these became right, the map would say nothing."""
+    """Rotation vectors, truncated rotations, bare loops: if these became right, the map would say nothing."""
     vector, (beam, mcre), bare = RotationVector(), chains.CHAINS, methods.BY_KEY["bare"]
     of = catalogue.BY_KEY
     path = methods.cell(of["order"], vector)
@@ -62,7 +65,7 @@ def test_the_command_is_broken_off_and_goes_on(tmp_path, monkeypatch, capsys):
     """The quick map of a few methods; programs that are not installed are cells that say so."""
     import failures
 
-    few = [methods.BY_KEY[key] for key in ("determinate", "rotation_vector", "corotational", "secant")]
+    few = [methods.BY_KEY[key] for key in ("determinate", "rotation_vector", "secant")]
     monkeypatch.setattr(methods, "METHODS", few)
     whole, asked = methods.cell, []
 
