@@ -47,6 +47,8 @@ def _solve(problem, configuration):
     sensor = mbs.AddSensor(item.SensorNode(nodeNumber=tip, storeInternal=True, outputVariableType=DISPLACEMENT))
     mbs.Assemble()
     settings = _settings(configuration, last, configuration["elements"] * NODES[element] > 16)
+    # a dead moment on a node's rotation parameters is a load that depends on them
+    settings.staticSolver.computeLoadsJacobian = configuration.get("load_jacobian", False)
     if "residual" in configuration:  # its own default test
         newton = settings.staticSolver.newton
         newton.residualMode, newton.relativeTolerance, newton.absoluteTolerance = 0, configuration["residual"], 1e-12
