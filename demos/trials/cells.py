@@ -84,8 +84,8 @@ class Stopped(Exception):
 
 
 def load_factor_in(words):
-    """The load factor that a path's last words name; nan where they name none."""
-    found = re.search(r"(?:beyond|at) the load factor ([-+.e\d]*\d)", str(words))
+    """The load factor that was reached by a path's last words; nan where they name none."""
+    found = re.search(r"beyond the load factor ([-+.e\d]*\d)", str(words))
     return float(found[1]) if found else np.nan
 
 
@@ -102,6 +102,6 @@ def judged(error, limit, answer, unit, note=""):
     if error <= limit:
         verdict = RIGHT
     else:
-        verdict = SAID if answer.said or not np.isfinite(answer.tip[-1]).any() else SILENT
+        verdict = SAID if answer.said else SILENT
     words = "; ".join(w for w in (note, answer.note, answer.said) if w)
     return Cell(verdict, float(error), unit, words)
