@@ -17,7 +17,7 @@ export VTK_DEFAULT_OPENGL_WINDOW = vtkEGLRenderWindow
 # A numpy in the user's own site directory would hide the distribution's.
 export PYTHONNOUSERSITE = 1
 
-.PHONY: help setup packages demo test tables figure3 work-precision random clean
+.PHONY: help setup packages demo test tables figure3 work-precision failures random clean
 
 help:
 	@echo "make demo    solve the eccentric cantilever of the paper on two processes; writes out/"
@@ -25,6 +25,7 @@ help:
 	@echo "make tables  the README's tables of accuracy and cost, measured anew and put into it"
 	@echo "make figure3 every curve of the paper's Figure 3, and what was found; writes out/ (about 4 minutes)"
 	@echo "make work-precision  speed against accuracy, beside Exudyn, OpenSeesPy, PyElastica and CalculiX (half an hour at most)"
+	@echo "make failures where methods fail: a map of methods against trials; writes out/ (at most a quarter of an hour)"
 	@echo "make random  200 random scenes against the strong form, at three tolerances (about 5 minutes)"
 	@echo "make setup   only what all of these need first: the Debian packages and the environment .venv"
 	@echo "make clean   remove .venv, out and whatever else was built here"
@@ -49,6 +50,10 @@ tables: setup
 # What an interrupted run has finished is kept: the same command goes on from there.
 figure3: setup
 	$(PYTHON) demos/figure3.py
+
+# The same; other programs take part where `make work-precision` has installed them.
+failures: setup
+	$(PYTHON) demos/failures.py
 
 random: setup
 	$(PYTHON) tests/random_comparison.py 200

@@ -1,0 +1,136 @@
+"""Where methods fail: a map of methods against trials, each cell a number and a verdict (`make failures`).
+
+    python demos/failures.py            at most a quarter of an hour; leaves in out/: failures.json, failures.md, failures.png
+    python demos/failures.py --quick    this package and what is written for comparison, on fewer steps; at most a minute
+    python demos/failures.py --fresh    from the start, whatever an earlier run has left
+
+A run that is broken off keeps its cells; the same command goes on from them. Programs that are not installed are shown as such:
+`make work-precision` installs them.
+"""
+
+import argparse
+import hashlib
+import json
+import os
+import sys
+from pathlib import Path
+
+import machine
+from mpi4py import MPI
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+from trials import catalogue, methods, picture, programs, table
+from trials.cells import MISSING, SILENT, Cell
+
+ROOT = Path(__file__).resolve().parents[1]
+
+
+class Store:
+    """The file of the cells, whole after every cell.
+
+    Args:
+        file: out/failures.json.
+        quick: whether it is the quick map.
+        fresh: begin anew, whatever is there.
+    """
+
+    def __init__(self, file, quick, fresh):
+        self.file = file
+        file.parent.mkdir(parents=True, exist_ok=True)
+        self.data = {"complete": False, "quick": quick, "machine": machine.record(), "sources": _fingerprint(), "seed": None,
+                     "programs": {}, "methods": [], "trials": [], "cells": {}}  # fmt: skip
+        before = None if fresh else self._before()
+        if before:
+            kept = {key: cell for key, cell in before["cells"].items() if cell["verdict"] != MISSING}
+            self.data |= {"cells": kept, "programs": before["programs"]}
+            print(f"goes on from {file}: {len(kept)} cells kept", file=sys.stderr)
+
+    def _before(self):
+        """What a run that was broken off has left, if this one can continue it."""
+        try:
+            before = json.loads(self.file.read_text(encoding="utf-8"))
+            same = all(before[key] == self.data[key] for key in ("quick", "sources")) and not before["complete"]
+            here, there = self.data["machine"], before["machine"]
+            return before if same and all(here[k] == there[k] for k in here if k not in ("date", "cores")) else None
+        except (OSError, ValueError, KeyError):
+            return None
+
+    def save(self):
+        """Write the file; a process that is killed leaves the old one or the new one."""
+        new = self.file.with_suffix(".new")
+        new.write_text(json.dumps(self.data, indent=1) + "\n", encoding="utf-8")
+        os.replace(new, self.file)
+
+
+def _fingerprint():
+    """Of all that the cells depend on here."""
+    files = sorted([*ROOT.glob("cosserat_fenicsx/**/*.py"), *ROOT.glob("forms/*.py"), *ROOT.glob("demos/trials/*.py"),
+                    *ROOT.glob("demos/comparison/*.py"), *ROOT.glob("demos/peers/*.py")])  # fmt: skip
+    drawn = {ROOT / "demos" / "trials" / name for name in ("table.py", "picture.py")}
+    return hashlib.sha256(b"".join(file.read_bytes() for file in files if file not in drawn)).hexdigest()[:16]
+
+
+def compute(store, columns, rows):
+    """All cells that are not there yet."""
+    data = store.data
+    data["methods"], data["trials"] = [method.key for method in columns], [trial.key for trial in rows]
+    todo = [(trial, method) for method in columns for trial in rows if f"{trial.key}/{method.key}" not in data["cells"]]
+    words = TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn()
+    console = Console(stderr=True)
+    with Progress(*words, console=console) as bar:
+        task = bar.add_task("failures", total=len(todo))
+        for trial, method in todo:
+            name = method.title.replace("\n", " ")
+            bar.update(task, description=f"{name}: {trial.title.splitlines()[0]}")
+            cell = methods.cell(trial, method)
+            data["cells"][f"{trial.key}/{method.key}"] = cell.plain()
+            if getattr(method, "versions", None):
+                data["programs"][method.key] = method.versions
+            store.save()
+            bar.advance(task)
+            if not console.is_terminal and trial is rows[-1]:
+                print(f"{name}: done", file=sys.stderr, flush=True)
+    data["complete"] = True
+    store.save()
+
+
+def main(out="out", quick=False, fresh=False):
+    """Compute, write and draw.
+
+    Returns:
+        The dict that failures.json holds.
+    """
+    if MPI.COMM_WORLD.size > 1:
+        sys.exit("failures.py: expected one process, not several: the cells follow each other")
+    stem = "failures_quick" if quick else "failures"
+    columns = [method for method in methods.METHODS if not quick or method not in programs.PROGRAMS]
+    rows = catalogue.QUICK if quick else catalogue.TRIALS
+    out = Path(out)
+    store = Store(out / f"{stem}.json", quick, fresh)
+    try:
+        compute(store, columns, rows)
+    finally:
+        for program in programs.PROGRAMS:
+            program.end()
+    words = table.text(store.data)
+    (out / f"{stem}.md").write_text(words + "\n", encoding="utf-8")
+    picture.draw(store.data, out / f"{stem}.png")
+    print(words)
+    silent = [key for key, cell in store.data["cells"].items() if Cell.of(cell).verdict == SILENT]
+    print(
+        f"\n{len(store.data['cells'])} cells, {len(silent)} silently wrong; written to {out}/: {stem}.png, {stem}.md, {stem}.json",
+        file=sys.stderr,
+    )
+    return store.data
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--quick", action="store_true", help="without other programs, fewer steps; at most a minute")
+    parser.add_argument("--fresh", action="store_true", help="continue no earlier run")
+    parser.add_argument("-o", "--out", default="out", help="folder for what is written (default: out)")
+    try:
+        main(**vars(parser.parse_args()))
+    except KeyboardInterrupt:
+        print("\nbroken off; what is done is kept, and the same command goes on from there", file=sys.stderr)
+        sys.exit(130)

@@ -1,0 +1,278 @@
+"""The trials: what is tried, what right means, and how a method's answers become a cell."""
+
+import itertools
+from dataclasses import dataclass, replace
+from functools import cache, partial
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from trials import problems
+from trials.cells import RIGHT, SAID, SILENT, STOPPED, Cell, NotForIt, Stopped, judged
+
+_RELATIVE = "relative error"
+_OF_LENGTH = "error / length"
+#: Beck's column (Beck, Z. angew. Math. Phys. 3 (1952) 225), EI/L^2.
+_FLUTTER = 20.05095
+
+
+@dataclass(frozen=True)
+class Trial:
+    """A row of the map.
+
+    Attributes:
+        key, title: its name, in short and for the reader.
+        tried: what is tried and what right means, a sentence or two.
+        run: from a method to a `Cell`; raises what the method raises.
+    """
+
+    key: str
+    title: str
+    tried: str
+    run: object
+
+
+def _column(etas, judged_from, limit=1e-2, jump=False, **more):
+    """delta of the column, judged from a load factor on."""
+
+    def run(method):
+        problem = problems.column(etas, **more)
+        answer = method.solve(problem, jump=jump)
+        late = np.array(etas) >= judged_from
+        return judged(_delta_error(problem, answer)[late[-len(answer.tip) :]].max(), limit, answer, _RELATIVE)
+
+    return run
+
+
+def _delta_error(problem, answer):
+    """At the load factors that there are answers for: all of them, or the last."""
+    error = np.abs(answer.tip[:, 1] / problems.column_truth(problem)[-len(answer.tip) :, 1] - 1)
+    return np.where(np.isnan(error), np.inf, error)
+
+
+def _tips(answer, truth, problem):
+    """Largest distance of the tips from the truth, in lengths."""
+    both = min(len(answer.tip), len(truth))
+    error = np.linalg.norm(answer.tip[-both:] - truth[-both:], axis=1) / problem["length"]
+    return float(np.where(np.isnan(error), np.inf, error).max())
+
+
+def _rolled(turns, steps, limit, **more):
+    def run(method):
+        problem = {**problems.roll_up(turns, steps), **more}
+        answer = method.solve(problem)
+        return judged(_tips(answer, problems.roll_up_truth(problem), problem), limit, answer, _OF_LENGTH)
+
+    return run
+
+
+def _twisted(method):
+    problem = problems.twisted()
+    answer = method.solve(problem)
+    return judged(_tips(answer, _twist_truth(), problem), 1e-2, answer, _OF_LENGTH)
+
+
+@cache
+def _twist_truth():
+    return problems.shot(problems.twisted())
+
+
+def _limit_point(method):
+    top = problems.arch_limit()
+    unit = "limit load"
+    try:
+        answer = method.solve(problems.arch(1.3 * top))
+    except Stopped as stop:
+        return Cell(STOPPED, stop.reached / top, unit, f"the limit load is {top:.6g}; {stop}")
+    if answer.events:
+        value = answer.events[0] / top
+        return Cell(RIGHT if abs(value - 1) < 1e-2 else SAID, value, unit, "reported, and followed by arc length")
+    if answer.said:
+        return Cell(SAID, 1.3, unit, answer.said)
+    return Cell(SILENT, 1.3, unit, "went on beyond the limit load to another part of the path without a word")
+
+
+def _steps(method):
+    """How much the end depends on the number of steps."""
+    if method.spatial:
+        make, ways = problems.twisted, (8, 10, 160)
+    else:
+        make, ways = (lambda n: problems.column([0.5 * (k + 1) / n for k in range(n)])), (8, 10, 160)
+    tips, said = [], ""
+    for n in ways:
+        try:
+            answer = method.solve(make(n))
+        except Stopped as stop:
+            raise Stopped(f"{stop} ({n} steps)", stop.reached) from None
+        tips.append(answer.tip[-1])
+        said = said or answer.said
+    spread = max(np.linalg.norm(a - b) for a, b in itertools.combinations(tips, 2)) / make(1)["length"]
+    note = "the twisted rod" if method.spatial else "the column"
+    return judged(spread, 1e-6, answer, "difference / length", note)
+
+
+def _order(method):
+    """How much the end depends on the order of the loads."""
+    ways = {
+        "together": [(k / 10, k / 10) for k in range(1, 11)],
+        "force first": [*((k / 5, 0) for k in range(1, 6)), *((1, k / 5) for k in range(1, 6))],
+        "moment first": [*((0, k / 5) for k in range(1, 6)), *((k / 5, 1) for k in range(1, 6))],
+    }
+    tips = {}
+    for name, history in ways.items():
+        problem = problems.pushed_and_turned(not method.spatial, history)
+        answer = method.solve(problem)
+        tips[name] = answer.tip[-1]
+    spread = max(np.linalg.norm(a - b) for a, b in itertools.combinations(tips.values(), 2)) / problem["length"]
+    return judged(spread, 1e-6, answer, "difference / length")
+
+
+def _objective(method):
+    """A loaded rod, and the same with its clamp and its loads turned."""
+    problem = problems.pushed_and_turned(not method.spatial)
+    turn = method.turn
+    plain = method.solve(problem).tip[-1]
+    answer = method.solve({**problem, "turn": turn})
+    start = np.array([problem["length"], 0, 0])
+    turned = Rotation.from_rotvec(turn).apply(start + plain)
+    angle = f"turned by {np.linalg.norm(turn):.3g} rad"
+    return judged(np.linalg.norm(start + answer.tip[-1] - turned) / problem["length"], 1e-6, answer,
+                  "difference / length", angle)  # fmt: skip
+
+
+def _locking(method):
+    """Few elements on a straight rod and on an arc, a thousand times longer than thick."""
+    straight = {**problems.column([0.5], 1e3), "coarse": True}
+    answer = method.solve(straight)
+    errors, notes = [_delta_error(straight, answer).max()], []
+    arc = {**problems.thin_arc(), "coarse": True}
+    try:
+        answer = method.solve(arc)
+        errors.append(float(np.linalg.norm(answer.tip[-1] - _arc_truth()[0]) / np.linalg.norm(_arc_truth())))
+    except NotForIt as missing:
+        notes.append(f"the straight rod alone: {missing}")
+    return judged(max(errors), 0.1, answer, _RELATIVE, "; ".join(notes))
+
+
+@cache
+def _arc_truth():
+    return problems.shot(problems.thin_arc())
+
+
+def _slender(method, upto=4):
+    errors, notes = [], []
+    for slenderness in (1e2, 1e3, 1e4, 1e5)[:upto]:
+        problem = problems.column([0.5, 0.9], slenderness)
+        try:
+            answer = method.solve(problem)
+        except Stopped as stop:
+            raise Stopped(f"at L/d = {slenderness:.0e}: {stop}", stop.reached) from None
+        errors.append(_delta_error(problem, answer).max())
+        if errors[-1] > 1e-2 and not answer.said:
+            break
+    notes.append("errors " + ", ".join(f"{e:.1g}" for e in errors) + " at L/d = 1e2, 1e3, ...")
+    return judged(max(errors), 1e-2, answer, _RELATIVE, "; ".join(notes))
+
+
+def _units(method):
+    here = problems.column([0.3, 0.5])
+    there = problems.in_other_units(here)
+    a, b = method.solve(here), method.solve(there)
+    difference = float(np.abs(b.tip[:, 1] / 1e3 / a.tip[:, 1] - 1).max())
+    return judged(difference, 1e-6, b, "relative difference")
+
+
+def _numerics(key, limit=1e-4):
+    """What concerns loops on PETSc: the method knows what the trial is to it."""
+
+    def run(method):
+        problem, answer, value, unit = method.numerics(key)
+        error = float(_delta_error(problem, answer).max())
+        cell = judged(error, max(limit, getattr(method, "tol", 0.0)), answer, _RELATIVE)
+        return cell if value is None else Cell(cell.verdict, value, unit, f"error {error:.1e}; {cell.note}".strip("; "))
+
+    return run
+
+
+def _flutter(method):
+    problem = problems.beck()
+    answer = method.solve(problem)
+    value = problem["load_factors"][-1] / _FLUTTER
+    if "flutter" in answer.said:
+        return Cell(SAID, value, "flutter load", answer.said)
+    return Cell(SILENT, value, "flutter load", "called an equilibrium like any other; nothing is said of flutter")
+
+
+_JUMP = (
+    "The whole load at once, in one Newton solution from the straight rod; the default is asked for that load factor alone and steps as it "
+    "likes. Right: the stable equilibrium that a growing load leads to, delta within 1 %."
+)
+TRIALS = (
+    Trial("truncated", "truncated rotations\n(column, eta = 0.6)",
+          "The paper's column at 0.6 of its critical load, where the tip turns by 0.03 rad: rotations that are truncated already show. Right: delta "
+          "within 1 % of the exact rod.", _column([0.2, 0.4, 0.6], 0.6)),
+    Trial("pole", "eq. (8) at its pole\n(column, eta = 0.95 and 1)",
+          "The column close to and at its critical load, where the secant formula of second order has a pole and the rod has none: delta = 3.89 m and "
+          "6.70 m. Right: delta within 1 % at both.", _column([0.5, 0.8, 0.9, 0.95, 1.0], 0.95)),
+    Trial("jump_1.1", "one jump to eta = 1.1", _JUMP, _column([1.1], 0, jump=True)),
+    Trial("jump_1.5", "one jump to eta = 1.5", _JUMP, _column([1.5], 0, jump=True)),
+    Trial("jump_4", "one jump to eta = 4", _JUMP, _column([4.0], 0, jump=True)),
+    Trial("limit", "limit point under load control\n(shallow clamped arch)",
+          "A shallow clamped arch is loaded to 1.3 times its limit load in 13 steps of the load. Right: the limit point is reported, its load "
+          "within 1 %; a method that stops there and says so has stopped; one that snaps through without a word is silently wrong.", _limit_point),
+    Trial("roll", "roll-up past one turn\n(2 turns, 16 steps)",
+          "An end moment of 2 * 2 pi EI/L in 16 steps closes two circles. Right: the tip within 1 % of the length at every step.", _rolled(2, 16, 1e-2)),
+    Trial("ten", "ten turns\n(80 steps)",
+          "The same with ten turns in 80 steps. Right: the tip within 1 % of the length at every step.", _rolled(10, 80, 1e-2)),
+    Trial("through", "rotation through 2 pi\n(twist of 1.25 turns)",
+          "A rod of small torsional stiffness, twisted by 1.25 turns by a tip moment while a force bends it, in 20 steps. Right: the tip within 1 % "
+          "of the length.", _twisted),
+    Trial("steps", "path dependence\n(8, 10 and 160 steps)",
+          "The rod twisted by 1.25 turns and bent (for methods in a plane: the column at eta = 0.5) in 8, 10 and 160 equal steps. Right: one "
+          "and the same tip to 1e-6 of the length.", _steps),
+    Trial("order", "path dependence\n(force then moment)",
+          "A force and a moment on the tip, in space where the method knows it: together, the force first, the moment first. Right: one and the same "
+          "tip to 1e-6 of the length.", _order),
+    Trial("objectivity", "objectivity\n(all turned)",
+          "A loaded rod, and the same with its clamp turned and its loads turned with it: by 1.33 rad about an odd axis, 1.2 rad in a plane, 0.7 rad about "
+          "the rod's own axis for programs whose runner clamps the rod along x. Right: the answer turns with them, to 1e-6 of the length.", _objective),
+    Trial("locking", "shear and membrane locking\n(L/d = 1000, few elements)",
+          "Two thin rods, a straight one in compression at eta = 0.5 and a quarter of a circle bent in its plane, with few elements: 4 of second order, 8 "
+          "of first. Right: within 10 %, what few elements may cost; locking costs ten times more.", _locking),
+    Trial("slender", "slenderness to 1e5\n(column, eta = 0.9)",
+          "The column with L/d = 1e2, 1e3, 1e4, 1e5, at eta = 0.5 and 0.9. Right: delta within 1 % for all.", _slender),
+    Trial("inextensible", "inextensible limit\n(EA = GA = infinity)",
+          "The column with infinite EA and GA, eta = 0.9; where a method needs a number, 1e10 EI/L^2. Right: delta within 1 % of the elastica.",
+          _column([0.3, 0.6, 0.9], 0.9, infinite=True)),
+    Trial("units", "unit systems\n(N m and MN mm)",
+          "The same column in N and m and in MN and mm. Right: the same delta to 1e-6.", _units),
+    Trial("residual", "false convergence of\nresidual norms (L/d = 1000)",
+          "The column at eta = 0.9, L/d = 1000. This package and Figure 3's beams by their defaults, which look at the increment; the bare loop and the "
+          "programs stop on the norm of the residual in N and N m alone, as many codes do. Right: delta within 1e-4 of what the same mesh converges to.",
+          _numerics("residual")),
+    Trial("line_search", "PETSc's default line search\n(column, eta = 0.9)",
+          "The column at eta = 0.9 from the straight rod in one Newton solution; the bare loop has PETSc's default line search, `bt`. The number is Newton "
+          "iterations. Right: delta within 1e-4.", _numerics("line_search")),
+    Trial("clamp", "a clamp that fixes three of\nfour quaternion components",
+          "The column at eta = 0.9; the bare loop fixes (q_b, q_c, q_d) at the clamp and leaves q_a to |q| = 1. Right: delta within 1e-4.", _numerics("clamp")),
+    Trial("lu", "LU without pivoting\n(inextensible column)",
+          "The inextensible column at eta = 0.9, whose contact force is a field of unknowns: a saddle point; the bare loop factors it with PETSc's own LU, "
+          "which does not pivot. Right: delta within 1e-4.", _numerics("lu")),
+    Trial("quadrature", "more Gauss points than the\ndegree (column, eta = 0.9)",
+          "The column at eta = 0.9 with p + 1 Gauss points an element of degree p: 4 elements of degree 2 in the bare loop, which locks; this package "
+          "is asked for tol = 1e-4 and refines. Right: delta within 1e-3.", _numerics("quadrature", 1e-3)),
+    Trial("flutter", "follower load\n(Beck's column to 25 EI/L^2)",
+          "A compressive force that turns with the tip, to 25 EI/L^2: the column flutters from 20.05 on, and statics has no way to see it. Right: to "
+          "say so; the static answer is then wrong and said so.", _flutter),
+)  # fmt: skip
+BY_KEY = {trial.key: trial for trial in TRIALS}
+
+
+def _quick(trial):
+    """The same trial with less to do, for a minute's run and for tests."""
+    less = {"ten": _rolled(10, 20, 1e-2, mesh=40), "slender": partial(_slender, upto=3)}
+    return replace(trial, run=less[trial.key]) if trial.key in less else trial
+
+
+#: The trials of the quick map.
+QUICK = tuple(_quick(trial) for trial in TRIALS)

@@ -1,0 +1,74 @@
+"""Exudyn's runner of `demos/peers` with a history of loads, a held tip, and a test on the residual; see `peers.speak`."""
+
+import sys
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "peers"))
+
+import exudyn as exu
+import numpy as np
+from exudyn import itemInterface as item
+from exudyn_rod import DISPLACEMENT, NODES, _rod, _settings
+from speak import Stopped, serve
+
+
+def prepare(problem, configuration):
+    return lambda: _solve(problem, configuration)
+
+
+def _solve(problem, configuration):
+    container = exu.SystemContainer()
+    mbs = container.AddSystem()
+    element, tip = configuration["element"], _rod(mbs, problem, configuration)
+    stages = problem.get("history") or [(factor, factor) for factor in problem["load_factors"]]
+    stages = [(0.0, 0.0), *stages]
+    last = len(stages) - 1
+
+    def loaded(column):
+        def vector(mbs, time, whole):  # a unit of time is a stage; the solver may stop in between
+            i = min(int(time + 1e-9), last - 1)
+            factor = stages[i][column] + (time - i) * (stages[i + 1][column] - stages[i][column])
+            return [factor * x for x in whole]
+
+        return vector
+
+    point = mbs.AddMarker(item.MarkerNodePosition(nodeNumber=tip))
+    mbs.AddLoad(item.LoadForceVector(markerNumber=point, loadVector=problem["force"], loadVectorUserFunction=loaded(0)))
+    if any(problem["moment"]):
+        section = mbs.AddMarker(item.MarkerNodeRigid(nodeNumber=tip))
+        mbs.AddLoad(
+            item.LoadTorqueVector(markerNumber=section, loadVector=problem["moment"], loadVectorUserFunction=loaded(1))
+        )
+    if problem.get("guided"):
+        ground = mbs.AddMarker(item.MarkerNodeCoordinate(nodeNumber=mbs.AddNode(item.NodePointGround()), coordinate=0))
+        for coordinate in (0, 2, 4, 5, 6) if element.endswith("EP") else (0, 2):
+            held = mbs.AddMarker(item.MarkerNodeCoordinate(nodeNumber=tip, coordinate=coordinate))
+            mbs.AddObject(item.ObjectConnectorCoordinate(markerNumbers=[ground, held]))
+    sensor = mbs.AddSensor(item.SensorNode(nodeNumber=tip, storeInternal=True, outputVariableType=DISPLACEMENT))
+    mbs.Assemble()
+    settings = _settings(configuration, last, configuration["elements"] * NODES[element] > 16)
+    # a dead moment on a node's rotation parameters is a load that depends on them
+    settings.staticSolver.computeLoadsJacobian = configuration.get("load_jacobian", False)
+    if "residual" in configuration:  # its own default test
+        newton = settings.staticSolver.newton
+        newton.residualMode, newton.relativeTolerance, newton.absoluteTolerance = 0, configuration["residual"], 1e-12
+    done = mbs.SolveStatic(settings, showHints=False, showCausingItems=False)
+    rows = mbs.GetSensorStoredData(sensor)
+    if not done:
+        raise Stopped(
+            f"SolveStatic failed beyond the load factor {_factor(stages, rows[-1, 0] if len(rows) else 0.0):.6g}"
+        )
+    at = np.searchsorted(rows[:, 0], np.arange(1, last + 1) - 1e-6)
+    if at[-1] >= len(rows):
+        raise Stopped(f"it stopped beyond the load factor {_factor(stages, rows[-1, 0]):.6g}")
+    return rows[at, 1:4].tolist()
+
+
+def _factor(stages, time):
+    """The force's factor at a time."""
+    return float(np.interp(time, np.arange(len(stages)), [stage[0] for stage in stages]))
+
+
+if __name__ == "__main__":
+    exu.config.suppressWarnings = True
+    serve(prepare, {"exudyn": exu.GetVersionString().split()[0]})

@@ -1,0 +1,49 @@
+"""OpenSeesPy's runner of `demos/peers` with a history of loads, a held tip, and a test on the residual; see `peers.speak`."""
+
+import sys
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "peers"))
+
+import openseespy.opensees as ops
+from opensees_rod import _analyse, _build
+from speak import Stopped, serve
+
+
+def prepare(problem, configuration):
+    return lambda: _solve(problem, configuration)
+
+
+def _solve(problem, configuration):
+    history = problem.get("history")
+    tip = _build({**problem, "force": [0.0] * 3, "moment": [0.0] * 3} if history else problem, configuration)
+    if problem.get("guided"):
+        ops.fix(tip, 1, 0, 1)
+    if "residual" in configuration:  # of the largest load
+        size = max(map(abs, [*problem["force"], *problem["moment"]])) * max(problem["load_factors"])
+        ops.test("NormUnbalance", configuration["residual"] * size, 12, 0)
+    if not history:
+        return _analyse(problem, configuration.get("substeps", 1), tip)
+    times = [float(k) for k in range(len(history) + 1)]
+    zero = [0.0] * 3
+    for tag, vector, column in ((2, [*problem["force"], *zero], 0), (3, [*zero, *problem["moment"]], 1)):
+        values = [0.0, *(stage[column] for stage in history)]
+        ops.timeSeries("Path", tag, "-time", *times, "-values", *values)
+        ops.pattern("Plain", tag, tag)
+        ops.load(tip, *(vector if ops.getNDM()[0] == 3 else (vector[0], vector[1], vector[5])))
+    step, reached = 1.0 / configuration.get("substeps", 1), 0.0
+    while reached < len(history) - 1e-12:
+        step = min(step, len(history) - reached)
+        ops.integrator("LoadControl", step)
+        if ops.analyze(1) == 0:
+            reached += step
+        elif step > 1e-3:
+            step /= 2  # the failed step was taken back
+        else:
+            raise Stopped(f"no convergence in stage {reached:.4g} of {len(history)}")
+    u = ops.nodeDisp(tip)
+    return [(u[0], u[1], u[2] if ops.getNDM()[0] == 3 else 0.0)]
+
+
+if __name__ == "__main__":
+    serve(prepare, {"openseespy": ops.version()})

@@ -1,0 +1,151 @@
+"""This package: the default, the rungs and the formulations, through its public face."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+import cosserat_fenicsx as cf
+from cosserat_fenicsx import statics
+from trials import problems
+from trials.cells import Answer, NotForIt, Stopped, load_factor_in
+
+_IN_ONE_STEP = {"steps": cf.StepControl(adaptive=False), "elements": 8}
+
+
+@dataclass(frozen=True)
+class Own:
+    """A column of this package.
+
+    Attributes:
+        key, title, what: its name, its head and what it is, for the reader.
+        options: of `cosserat_fenicsx.solve`.
+        spatial: whether it takes rods that leave a plane.
+        own: that it is this package's.
+        turn: rotation vector of the trial of objectivity.
+    """
+
+    key: str
+    title: str
+    what: str
+    options: dict
+    spatial: bool = True
+    own: bool = True
+
+    @property
+    def turn(self):
+        return (0.8, -0.6, 0.88) if self.spatial else (0.0, 0.0, 1.2)
+
+    @property
+    def tol(self):
+        """What it is asked for."""
+        return self.options.get("tol", 1e-6)
+
+    @property
+    def default(self):
+        """Whether it is `solve` without a word."""
+        return not self.options
+
+    def solve(self, problem, jump=False, **more):
+        """An `Answer`; see `methods`."""
+        options = {**self.options, **more}
+        if jump and not self.default:
+            options |= _IN_ONE_STEP
+        if problem.get("coarse") and not self.default:
+            options |= {"elements": 4, "degree": 2}
+        if "mesh" in problem and not self.default:
+            options |= {"elements": problem["mesh"] * (1 if self.options.get("formulation", "mixed") == "mixed" else 2)}
+        if problem.get("guided") and not self.default:
+            options |= {"control": "load"}
+        try:
+            if "history" in problem:
+                return self._in_stages(problem)
+            whole = None
+            if "turn" in problem and self.options.get("model") == "determinate":  # it has clamps alone
+                whole = Rotation.from_rotvec(problem["turn"]).as_matrix()
+            rod, scene = problems.scene_of(problem, whole)
+            path = cf.solve(scene, problem["load_factors"], progress=False, **options)
+        except cf.SceneError as refused:
+            raise _refusal(refused) from None
+        except cf.NotConverged as failure:
+            raise Stopped(failure, _reached(failure)) from None
+        return self._answer(path, rod, whole)
+
+    def _answer(self, path, rod, whole):
+        said = [] if path.stable.all() else [f"unstable, {max(path.negative_modes)} negative modes"]
+        said += [why for why in path.why if "flutter" in why]
+        tip = path.displacement(rod.end)
+        if whole is not None:
+            tip = path.position(rod.end) - [rod.length, 0, 0]
+        events = tuple(event.load_factor for event in path.events if event.kind == "limit")
+        note = f"{path.model}, {path.formulation}, degree {path.degree}, {sum(path.elements)} elements"
+        return Answer(tip, "; ".join(said), note, events, int(path.iterations.sum()))
+
+    def _in_stages(self, problem):
+        """Force and moment each by factors of their own: Newton from state to state, on the solvers that `solve` uses."""
+        degree = statics.default_degree(self.options.get("formulation", "mixed"))
+        _, scene = problems.scene_of(problem)
+        plain = cf.solve(scene, [0.0], elements=6, progress=False, **self.options)
+        options = {"formulation": plain.formulation, "degree": degree, "model": plain.model}
+        state = None
+        for force, moment in problem["history"]:
+            scaled = _with_loads(problem, force, moment)
+            solver, newton, _ = statics.solvers_of(problems.scene_of(scaled)[1], plain.layout, **options)
+            if state is not None:
+                solver.put(state)
+            solver.set_load_factor(1.0)
+            newton.allow(30)
+            solved = newton.solve()
+            if not solved.converged:
+                raise Stopped(f"{solved.reason} at force {force:g}, moment {moment:g}", min(force, moment))
+            state = solver.numbers()
+        rq, _ = solver.model.expansion()(np.ones(1), *(None if a is None else a[None] for a in solver.model.snapshot()))
+        tip = (rq[0, -1, :3] - solver.model.reference[-1]) * solver.model.scales.length
+        return Answer(tip[None], "", f"{plain.model}, {plain.formulation}, degree {degree}, 6 elements")
+
+    def numerics(self, key):
+        """(problem, answer, number, unit) of a trial about loops; number None for the error itself."""
+        problem = problems.column([0.9], 1e3 if key == "residual" else 1e2, infinite=key == "lu")
+        if key == "quadrature":
+            if self.options.get("model") == "determinate" or self.default:
+                raise NotForIt("it takes as many Gauss points as the degree")
+            degree = 4 if self.options.get("formulation", "mixed") == "mixed" else 2
+            points = {"gauss_points": degree + 1, "tol": max(1e-4, self.tol), "degree": degree}
+            return problem, self.solve(problem, **points), None, ""
+        if key == "line_search":
+            answer = self.solve(problem, **({} if self.default else {"steps": cf.StepControl(adaptive=False)}))
+            return problem, answer, answer.iterations, "Newton iterations"
+        return problem, self.solve(problem), None, ""
+
+
+def _with_loads(problem, force, moment):
+    """The problem at factors of its loads; a load stays in the scene where its factor is zero."""
+    tiny = 1e-30
+    return {**problem, "force": [x * (force or tiny) for x in problem["force"]],
+            "moment": [x * (moment or tiny) for x in problem["moment"]]}  # fmt: skip
+
+
+def _refusal(refused):
+    """Not for it where a model does not fit; else it has stopped, before the first step."""
+    words = str(refused)
+    if "is not possible" in words or "clamps and rigid joints alone" in words:
+        return NotForIt(words.split(": ", 1)[-1].split("; expected")[0])
+    return Stopped(words, 0.0)
+
+
+def _reached(failure):
+    """The load factor that the message names, which may be beyond the last recorded point; else that one's."""
+    named, path = load_factor_in(failure), failure.path
+    return float(path.load_factors[-1]) if np.isnan(named) and path is not None and len(path) else named
+
+
+OWN = (
+    Own("default", "default\ncf.solve", "`cosserat_fenicsx.solve(scene, load_factors)`, no options: it chooses model, degree and mesh", {}),
+    Own("determinate", "rung\ndeterminate", 'model="determinate"', {"model": "determinate"}),
+    Own("planar", "rung\nplanar", 'model="planar"', {"model": "planar"}, spatial=False),
+    Own("mixed", "rung spatial,\nmixed", 'model="spatial", formulation="mixed"', {"model": "spatial"}),
+    Own("displacement", "rung spatial,\ndisplacement", 'model="spatial", formulation="displacement", tol=1e-4',
+        {"model": "spatial", "formulation": "displacement", "tol": 1e-4}),
+    Own("multiplier", "rung spatial,\nmultiplier", 'model="spatial", formulation="multiplier", tol=1e-2',
+        {"model": "spatial", "formulation": "multiplier", "tol": 1e-2}),
+)  # fmt: skip

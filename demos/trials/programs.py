@@ -1,0 +1,140 @@
+"""The peers of `demos/peers`, each in a process of its own; where its environment is missing its cells say so.
+
+What their runners there do not know (histories of loads, held tips, tests on residuals) is in `extended_*.py`, which use them.
+"""
+
+import math
+from pathlib import Path
+
+import numpy as np
+from peers.environments import Missing
+from peers.process import Peer
+from scipy.spatial.transform import Rotation
+
+from trials import problems
+from trials.cells import Answer, NotForIt, NotInstalled, Stopped, load_factor_in
+from trials.chains import NEXT_TO_INFINITE
+
+LIMIT = 16.0  # s of one answer
+_EXTENDED = {"Exudyn": "extended_exudyn.py", "OpenSeesPy": "extended_opensees.py"}
+
+
+class Program:
+    """A column of the map; see `methods`. Its process starts at the first question.
+
+    Args:
+        key: the peer's name.
+        planar, spatial: its configurations for rods in a plane and for others; with few elements: `coarse`.
+        can: what its runner knows: "history", "guided", "residual"; "free" where stiffnesses need not be those of a rectangle; "relaxes"
+            where it answers at the last load factor alone; "arcs in space" where its planar element is straight.
+        what: for the legend.
+    """
+
+    own, spatial, turn = False, True, (0.7, 0.0, 0.0)
+
+    def __init__(self, key, planar, spatial, coarse, can=(), what=""):
+        self.key, self.title = key, f"{key}"
+        self._planar, self._spatial, self._coarse, self._can = planar, spatial, coarse, can
+        self.what = f"{what}; {LIMIT:g} s for an answer"
+        self._peer, self.versions = None, ""
+
+    def process(self):
+        """Its process.
+
+        Raises:
+            NotInstalled: its environment is not there.
+        """
+        if self._peer is None:
+            try:
+                self._peer = Peer(self.key, install=False)
+            except Missing as why:
+                raise NotInstalled(str(why)) from None
+            if self.key in _EXTENDED:
+                python = self._peer.words[0]
+                self._peer.words = [python, str(Path(__file__).with_name(_EXTENDED[self.key]))]
+        return self._peer
+
+    def end(self):
+        """End its process."""
+        if self._peer is not None:
+            self._peer.end()
+            self._peer = None
+
+    def solve(self, problem, jump=False, **more):
+        """An `Answer`."""
+        for need in {"history", "guided", "follower"} & set(problem):
+            if need not in self._can:
+                raise NotForIt({"history": "its runner loads in proportion", "guided": "its runner clamps one end alone",
+                                "follower": "its runner has dead loads"}[need])  # fmt: skip
+        plain = "turn" not in problem
+        problem = _as_it_takes(problem, "free" in self._can)
+        curved = problem["radius"] and "arcs in space" in self._can
+        plane = problems.in_a_plane(problem) and plain and not curved
+        configuration = {**(self._planar if plane else self._spatial), **more}
+        if problem.pop("coarse", False):
+            configuration["elements"] = self._coarse
+        if "relaxes" in self._can:  # its path is a motion: what lies before the whole load is none of it
+            problem["load_factors"] = problem["load_factors"][-1:]
+        if "substeps" in configuration:
+            few = len(problem["load_factors"]) < 8 or "history" in problem
+            configuration["substeps"] = configuration["substeps"] if few and not jump else 1
+        reply = self.process().ask(problem, configuration, warm=0, samples=1, limit=LIMIT)
+        told = reply.get("versions", {})
+        self.versions = next(
+            (release for name, release in told.items() if name not in ("python", "numpy")), self.versions
+        )
+        if "failed" in reply:
+            raise Stopped(reply["failed"], load_factor_in(reply["failed"]))
+        tip = np.array(reply["tip"], dtype=float)
+        elements = f"{configuration['element']}, {configuration['elements']} elements"
+        return Answer(tip, "", elements)
+
+    def numerics(self, key):
+        """(problem, answer, number, unit)."""
+        if key != "residual":
+            raise NotForIt("a matter of loops on PETSc")
+        if "residual" not in self._can:
+            raise NotForIt("its runner's test is its own")
+        problem = problems.column([0.3, 0.6, 0.9], 1e3)
+        answer = self.solve(problem, residual=1e-6)
+        best = self.solve(problem)
+        ratio = problems.column_truth(problem)[:, 1] / best.tip[:, 1]
+        return (
+            problem,
+            Answer(answer.tip * [[1, r, 1] for r in ratio], "", "against the same mesh, stopped on the increment"),
+            None,
+            "",
+        )
+
+
+def _as_it_takes(problem, free):
+    """Numbers that a program can read."""
+    found = {**problem}
+    for key in ("EA", "GA"):
+        if math.isinf(found[key]):
+            if not free:
+                raise NotForIt("stiffness comes from its solid section")
+            found[key] = NEXT_TO_INFINITE * found["EI"] / found["length"] ** 2
+    if not free and found["GJ"] < 0.5 * found["EI"]:
+        raise NotForIt("stiffness comes from its solid section")
+    turn = found.pop("turn", None)
+    if turn is not None:
+        Q = Rotation.from_rotvec(turn).as_matrix()
+        found |= {key: (Q @ found[key]).tolist() for key in ("force", "moment")}
+    return found
+
+
+PROGRAMS = (
+    Program("Exudyn", {"element": "planar 3-node", "elements": 32, "tol": 1e-8, "substeps": 4},
+            {"element": "spatial 2-node EP", "elements": 32, "tol": 1e-8, "substeps": 4, "load_jacobian": True}, 8,
+            ("free", "history", "guided", "residual", "arcs in space"),
+            "Exudyn 1.13.6, geometrically exact rods: 3-node in a plane, 2-node with Euler parameters in space"),
+    Program("OpenSeesPy", {"element": "planar CBDI", "elements": 48, "tol": 1e-6, "substeps": 4, "inner": 1e-16},
+            {"element": "spatial CBDI", "elements": 48, "tol": 1e-8, "substeps": 4, "inner": 1e-16}, 8,
+            ("free", "history", "guided", "residual"),
+            "OpenSeesPy 3.7.1.2, force-based frames with curvature-based displacements, co-rotational"),
+    Program("PyElastica", {"element": "spatial rod", "elements": 12, "tol": 1e-6}, {"element": "spatial rod", "elements": 12, "tol": 1e-6}, 8,
+            ("free", "relaxes"), "PyElastica 1.0.0, an explicit dynamic rod under the whole load, damped until it rests; 12 elements, which is what the time allows and 1 % of error"),
+    Program("CalculiX", {"element": "spatial B32R", "elements": 32, "tol": 1e-5}, {"element": "spatial B32R", "elements": 32, "tol": 1e-5}, 8,
+            (), "CalculiX 2.20, quadratic beams that become solids (B32R)"),
+)  # fmt: skip
