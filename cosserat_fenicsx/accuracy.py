@@ -8,6 +8,8 @@ import numpy as np
 _ROUNDING = 1e-14
 # Differences between element ends over those at the ends.
 _AHEAD, _FAR_AHEAD = 4, 30
+# Least share of the difference of two meshes over the error that is left, where elements lock.
+_LOCKED = 0.05
 # A point whose leading coefficients are smaller than this times another's says something else of the error.
 _SMOOTHER = 0.1
 # Points that are displaced by less than this times the most displaced one say nothing.
@@ -31,12 +33,15 @@ def estimate_error(fine, coarse, before=None):
     """
     difference, at_ends = _apart(fine, coarse)
     relative, p = np.maximum(difference - _ROUNDING, 0.0) / _sizes(fine).largest, fine.degree
-    if before is None:
+    seen = np.inf if before is None else before / np.maximum(relative, 1e-300)
+    if fine.formulation == "multiplier":  # it locks: what is left may be many times what one more halving brings
+        gain = np.clip(seen - 1, _LOCKED, 1) if before is not None else _LOCKED
+    elif before is None:
         ahead, far = difference > _AHEAD * at_ends, difference > _FAR_AHEAD * at_ends
         uniform = all(rod.uniform for rod in fine.scene.rods)
         gain = np.where(far & uniform, 2.0 ** (p - 1), np.where(ahead, max(1.0, 2.0 ** (p - 3)), 1.0))
     else:
-        gain = np.clip((before / np.maximum(relative, 1e-300) - 1) / 4, 1, 2 ** max(p - 1, 0))
+        gain = np.clip((seen - 1) / 4, 1, 2 ** max(p - 1, 0))
     fine.set_error(relative / gain)
     return relative
 

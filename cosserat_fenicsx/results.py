@@ -54,7 +54,7 @@ class Path:
             model.scales,
             model.rule,
             comm=model.comm,
-            rounding=0.0 if model.carries_force else model.round_off / 10,
+            rounding=0.0 if model.carries_force else model.round_off / (10 if formulation == "displacement" else 1),
             model=model.name,
             formulation=formulation,
             degree=model.shape.degree,

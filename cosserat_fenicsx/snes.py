@@ -256,7 +256,7 @@ class BorderedNewton(Newton):
                 raise
             self._start_over()
             return False
-        return self._ksp.getConvergedReason() >= 0
+        return self._ksp.getConvergedReason() >= 0 and math.isfinite(motion.norm())  # the factors by blocks do not say
 
     def slope_here(self, neutral=None):
         """(owned numbers,) dx/d eta at the problem's x and load factor, without the neutral motion.

@@ -21,8 +21,7 @@ ALLOWED = {
     **{("limit", key): {cells.STOPPED} for key in ("planar", "mixed", "displacement")},
     **{(trial, key): {cells.STOPPED} for trial in ("inextensible", "lu") for key in ("displacement", "multiplier")},
     ("locking", "multiplier"): {cells.SAID},
-    # it locks, and its estimate is then of little worth (README, Formulations)
-    ("slender", "multiplier"): {cells.STOPPED, cells.SILENT},
+    ("slender", "multiplier"): {cells.STOPPED},
     **{(trial, "determinate"): {cells.NOT} for trial in ("limit", "quadrature", "flutter")},
     ("through", "planar"): {cells.NOT},
     ("quadrature", "default"): {cells.NOT},
