@@ -60,7 +60,7 @@ def _settings(configuration, steps, sparse):
     static.newton.residualMode = 1
     static.newton.relativeTolerance = configuration["tol"]
     static.newton.absoluteTolerance = configuration["tol"]
-    static.computeLoadsJacobian = False  # dead loads
+    static.computeLoadsJacobian = configuration["element"].startswith("spatial")  # dead moments need it there
     static.verboseMode = 0
     settings.solution.file.write = False
     settings.solution.sensors.writePeriod = 1e-9
