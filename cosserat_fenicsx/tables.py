@@ -8,6 +8,9 @@ from rich.table import Table
 
 from cosserat_fenicsx.ranks import on_first
 
+# A named station is shown if it moves by this share of what moves most.
+_WORTH_TELLING = 0.2
+
 
 def path_table(path):
     """Text: load factor, motion of the station that moves most, stability, work and estimated error at every point."""
@@ -39,9 +42,19 @@ def path_table(path):
 
 
 def _busiest(path):
-    """The end of a rod, or the station of a load or support, that moves most."""
-    named = [station for rod in path.scene.rods for station in (rod.end, *path.scene.stations(rod))]
-    return max(named, key=lambda station: round(np.linalg.norm(path.displacement(station), axis=1).max(), 12))
+    """The end of a rod, or the station of a load or support, that moves most; another place where these hardly move."""
+
+    def moves(station):
+        return round(float(np.linalg.norm(path.displacement(station), axis=1).max()), 12)
+
+    named = max((station for rod in path.scene.rods for station in (rod.end, *path.scene.stations(rod))), key=moves)
+    inside = []
+    for i, rod in enumerate(path.scene.rods):
+        x = path.layout.node_s(path.rule.nodes)[i]
+        moved = np.linalg.norm(path.motion(rod, x)[:, :, :3], axis=2).max(axis=0)
+        inside.append(rod.at(x[np.argmax(moved)] * rod.length))
+    other = max(inside, key=moves)
+    return named if moves(named) >= _WORTH_TELLING * moves(other) else other
 
 
 def buckling_table(found):
@@ -85,11 +98,13 @@ def as_text(table):
 
 def write_csv(path, file):
     """Load factors, stability, work, error; displacement (m), quaternion, contact force n (N) and moment m (N m) at both
-    ends of every rod. n and m are what the part beyond exerts: the reaction of a support at the start is their opposite."""
+    ends of every rod, where loads and supports act, and at the station of the table. n and m are what the part beyond exerts: the reaction of a support at the start is their opposite."""
     names = ["load_factor", "negative_modes", "iterations", "estimated_error"]
     columns = [path.load_factors, path.negative_modes, path.iterations, path.error]
+    busiest = _busiest(path)
     for rod in path.scene.rods:
-        for station in (rod.start, rod.end):
+        stations = [rod.start, *path.scene.stations(rod), rod.end, *([busiest] if busiest.rod is rod else [])]
+        for station in {station.s: station for station in sorted(stations, key=lambda station: station.s)}.values():
             for quantity, name, axes in (("displacement", "displacement (m)", "xyz"), ("rotation", "quaternion", "abcd"),
                                          ("force", "contact force (N)", "xyz"), ("moment", "contact moment (N m)", "xyz")):  # fmt: skip
                 values = getattr(path, quantity)(station)
