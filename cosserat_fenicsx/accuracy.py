@@ -31,8 +31,9 @@ def estimate_error(fine, coarse, before=None):
     Returns:
         (n,) the differences relative to the largest displacements, to be the `before` of the next halving.
     """
-    difference, at_ends = _apart(fine, coarse)
-    relative, p = np.maximum(difference - _ROUNDING, 0.0) / _sizes(fine).largest, fine.degree
+    sizes, p = _sizes(fine), fine.degree
+    difference, at_ends = _apart(fine, coarse, sizes.turning)
+    relative = np.maximum(difference - _ROUNDING, 0.0) / sizes.largest
     seen = np.inf if before is None else before / np.maximum(relative, 1e-300)
     if fine.formulation == "multiplier":  # it locks: what is left may be many times what one more halving brings
         gain = np.clip(seen - 1, _LOCKED, 1) if before is not None else _LOCKED
@@ -76,7 +77,8 @@ def spread_error(path, few, which, coarse):
         few: some points of the path, with their errors; which: their indices.
         coarse: the whole path on a coarser mesh.
     """
-    sizes, apart = _sizes(path).largest, np.maximum(_apart(path, coarse)[0] - _ROUNDING, 0.0)
+    sizes, _, turning = _sizes(path)
+    apart = np.maximum(_apart(path, coarse, turning)[0] - _ROUNDING, 0.0)
     known, errors = apart[which], few.error * sizes[which]
     told = (known > 100 * _ROUNDING) & (errors > 0)
     error = apart.copy()
@@ -90,10 +92,10 @@ def spread_error(path, few, which, coarse):
     path.set_error(error)
 
 
-def _apart(fine, coarse):
+def _apart(fine, coarse, turning):
     """Largest distances of the positions on two meshes, at all places and at element ends alone: (points,) both, lengths. Where
-    sections turn more than they move, positions are those off the axis too, at the radius of gyration."""
-    difference, at_ends, turning = np.zeros(len(fine)), np.zeros(len(fine)), _sizes(fine).turning
+    sections turn more than they move (`_Sizes.turning`), positions are those off the axis too, at the radius of gyration."""
+    difference, at_ends = np.zeros(len(fine)), np.zeros(len(fine))
     for i, rod in enumerate(fine.scene.rods):
         nodes = coarse.layout.node_s(coarse.rule.nodes)[i]
         x = np.sort(np.concatenate([nodes, (nodes[:-1] + nodes[1:]) / 2]))

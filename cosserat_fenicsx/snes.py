@@ -17,9 +17,17 @@ from cosserat_fenicsx.errors import NotConverged
 #: Newton stops when the error that remains after a step, by its contraction, is below this (root mean square, units L, 1).
 INCREMENT = 1e-11
 _HUGE = 1e3
-# PETSc's code for an error in an external package: KLU met a singular tangent.
-_EXTERNAL = 76
+#: PETSc's code for an error in an external package: KLU met a singular tangent.
+EXTERNAL = 76
 _Reason = PETSc.SNES.ConvergedReason
+#: Why SNES stopped.
+WORDS = {
+    _Reason.CONVERGED_SNORM_RELATIVE: "converged",
+    _Reason.DIVERGED_MAX_IT: "Newton's iterations ran out",
+    _Reason.DIVERGED_DTOL: "Newton's steps grew without bound",
+    _Reason.DIVERGED_FNORM_NAN: "the residual is not a number",
+    _Reason.DIVERGED_LINEAR_SOLVE: "the tangent is singular",
+}
 
 
 @dataclass(frozen=True)
@@ -29,6 +37,15 @@ class Solved:
     converged: bool
     iterations: int
     reason: str
+
+
+def take_full_steps(snes):
+    """Newton's steps as they are: the line search `basic`, which petsc4py 3.18 cannot reach but by an option."""
+    option, options = f"cosserat_{id(snes):x}_snes_linesearch_type", PETSc.Options()
+    snes.setOptionsPrefix(option.removesuffix("snes_linesearch_type"))
+    options[option] = "basic"
+    snes.setFromOptions()
+    options.delValue(option)
 
 
 class Newton:
@@ -55,12 +72,7 @@ class Newton:
             snes.setUpdate(self._carry)
         snes.setConvergenceTest(self._test)
         self._prepare(snes.getKSP())
-        # petsc4py 3.18 cannot reach the line search but by an option.
-        option, options = f"cosserat_{id(self):x}_snes_linesearch_type", PETSc.Options()
-        snes.setOptionsPrefix(option.removesuffix("snes_linesearch_type"))
-        options[option] = "basic"
-        snes.setFromOptions()
-        options.delValue(option)
+        take_full_steps(snes)
 
     def _start_over(self):
         """A new PC after an error in the middle of a solution: PETSc counts those it has begun and not ended, up to two."""
@@ -101,13 +113,13 @@ class Newton:
             self.snes.solve(None, problem.x)
             reason = self.snes.getConvergedReason()
         except PETSc.Error as problem_of_petsc:
-            if problem_of_petsc.ierr != _EXTERNAL:
+            if problem_of_petsc.ierr != EXTERNAL:
                 raise
             self._start_over()
             reason = _Reason.DIVERGED_LINEAR_SOLVE
         if reason > 0:  # the residual was asked for at x last: the state is there
             self._advance()
-        return Solved(reason > 0, len(self._steps), _WORDS.get(reason, f"PETSc's reason {reason}"))
+        return Solved(reason > 0, len(self._steps), WORDS.get(reason, f"PETSc's reason {reason}"))
 
     def _carry(self, snes, iteration):
         if iteration > 0:
@@ -252,7 +264,7 @@ class BorderedNewton(Newton):
         try:
             self._ksp.solve(force, motion)
         except PETSc.Error as found:  # KLU says it so, MUMPS by the reason
-            if found.ierr != _EXTERNAL:
+            if found.ierr != EXTERNAL:
                 raise
             self._start_over()
             return False
@@ -274,12 +286,3 @@ class BorderedNewton(Newton):
         if neutral is not None:
             self._leave_out_neutral(self._slope)
         return self.slope
-
-
-_WORDS = {
-    _Reason.CONVERGED_SNORM_RELATIVE: "converged",
-    _Reason.DIVERGED_MAX_IT: "Newton's iterations ran out",
-    _Reason.DIVERGED_DTOL: "Newton's steps grew without bound",
-    _Reason.DIVERGED_FNORM_NAN: "the residual is not a number",
-    _Reason.DIVERGED_LINEAR_SOLVE: "the tangent is singular",
-}

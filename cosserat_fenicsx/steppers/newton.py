@@ -9,7 +9,7 @@ import math
 from petsc4py import PETSc
 
 from cosserat_fenicsx import linear
-from cosserat_fenicsx.snes import Solved
+from cosserat_fenicsx.snes import EXTERNAL, WORDS, Solved, take_full_steps
 
 #: Newton stops when what remains after an increment, by its contraction, is below this (root mean square, units L, 1)
 #: times h over the unit of time, for velocities, and with them momenta, are off by so much over h. Rounding may leave
@@ -19,14 +19,7 @@ INCREMENT, ROUNDING = 1e-12, 1e-10
 # iterations than the second; the larger the system, the more iterations a tangent costs.
 _SMALL_SYSTEM, _LARGE_SYSTEM, _LARGE = (0.05, 4), (0.3, 8), 400
 _MOST, _HUGE = 15, 10.0
-_EXTERNAL = 76  # PETSc's code for an error in an external package: KLU met a singular tangent
 _Reason = PETSc.SNES.ConvergedReason
-_WORDS = {
-    _Reason.DIVERGED_MAX_IT: "Newton's iterations ran out",
-    _Reason.DIVERGED_DTOL: "Newton's steps grew without bound",
-    _Reason.DIVERGED_FNORM_NAN: "the residual is not a number",
-    _Reason.DIVERGED_LINEAR_SOLVE: "the tangent is singular",
-}
 
 
 class StepNewton:
@@ -53,12 +46,7 @@ class StepNewton:
         ksp = snes.getKSP()
         ksp.setType("preonly")
         linear.factor_tangent(ksp.getPC(), problem.A)
-        # petsc4py 3.18 cannot reach the line search but by an option.
-        option, options = f"cosserat_{id(self):x}_snes_linesearch_type", PETSc.Options()
-        snes.setOptionsPrefix(option.removesuffix("snes_linesearch_type"))
-        options[option] = "basic"
-        snes.setFromOptions()
-        options.delValue(option)
+        take_full_steps(snes)
 
     def solve(self, guess):
         """Newton from local numbers of the state, with the tangent at hand, and with a fresh one where that fails.
@@ -81,7 +69,7 @@ class StepNewton:
             self.snes.solve(None, problem.x)
             reason = self.snes.getConvergedReason()
         except PETSc.Error as found:
-            if found.ierr != _EXTERNAL:
+            if found.ierr != EXTERNAL:
                 raise
             pc = PETSc.PC().create(problem.A.comm)  # PETSc counts solutions begun and not ended, up to two
             pc.setOperators(problem.A)
@@ -91,7 +79,7 @@ class StepNewton:
         problem.set_state(problem.x)
         if reason <= 0 or len(self._steps) > self._many:
             problem.fresh = True
-        return Solved(reason > 0, len(self._steps), _WORDS.get(reason, "converged"))
+        return Solved(reason > 0, len(self._steps), WORDS.get(reason, "converged"))
 
     def _test(self, snes, iteration, norms):
         if not math.isfinite(norms[2]):
