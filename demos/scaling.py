@@ -47,8 +47,8 @@ def measure(elements):
 
 
 def exponent(x, y):
-    """Of y = c x^exponent between the first and the last of some points."""
-    return float(np.log(y[-1] / y[0]) / np.log(x[-1] / x[0]))
+    """Of y = c x^exponent between the first and the last of some points; nan where y has not grown from 0."""
+    return float(np.log(y[-1] / y[0]) / np.log(x[-1] / x[0])) if min(y[0], y[-1]) > 0 else float("nan")
 
 
 def main(sizes=SIZES, out="out"):

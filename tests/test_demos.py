@@ -69,7 +69,7 @@ def test_choice_quick(tmp_path):
     found = choice.main(runs=1, out=tmp_path, scenes=choice.SCENES[:1], counts=(2, 4, 8))
     (rows, ratio) = found["eccentric_cantilever"]
     (_, model, *_, error, estimate), (_, by_hand, *_, picked, _) = rows
-    assert (model, by_hand) == ("determinate", "determinate") and ratio > 0
+    assert model == "determinate" and by_hand in ("determinate", "planar") and ratio > 0  # the clock picks by hand
     assert error <= estimate <= 1e-6 and picked <= 1e-6
 
 
