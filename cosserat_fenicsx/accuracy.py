@@ -29,11 +29,11 @@ def estimate_error(fine, coarse, before=None):
     residual's rounding.
 
     Returns:
-        (n,) the differences relative to the largest displacements, to be the `before` of the next halving.
+        (n,) the differences relative to the largest displacements, to be the `before` of the next halving; and the order of the
+        error in h that this counts on, 1 to p.
     """
-    sizes, p = _sizes(fine), fine.degree
-    difference, at_ends = _apart(fine, coarse, sizes.turning)
-    relative = np.maximum(difference - _ROUNDING, 0.0) / sizes.largest
+    p = fine.degree
+    relative, difference, at_ends = _differences(fine, coarse)
     seen = np.inf if before is None else before / np.maximum(relative, 1e-300)
     if fine.formulation == "multiplier":  # it locks: what is left may be many times what one more halving brings
         gain = np.clip(seen - 1, _LOCKED, 1) if before is not None else _LOCKED
@@ -44,7 +44,40 @@ def estimate_error(fine, coarse, before=None):
     else:
         gain = np.clip((seen - 1) / 4, 1, 2 ** max(p - 1, 0))
     fine.set_error(relative / gain)
+    return relative, float(np.clip(1 + np.log2(np.min(gain)), 1, p))
+
+
+def carry_error(fine, coarse, factor, order, before=None):
+    """Set the error of a path from that of the same points on a mesh of elements less than twice as long.
+
+    It is the coarser mesh's times what is left of it at the order that was counted on there, but one to two times what the
+    difference of the two says at the order that is seen in the differences, less one: the coarser mesh's may be overrated.
+
+    Args:
+        factor: elements over those of the coarser mesh.
+        order: of the error in h, as `estimate_error` of the coarser mesh counted on.
+        before: the relative differences by which that was halved to, where it was.
+
+    Returns:
+        (n,) the differences relative to the largest displacements.
+    """
+    relative, *_ = _differences(fine, coarse)
+    seen = (
+        order
+        if before is None
+        else np.clip(np.log2(np.maximum(before, 1e-300) / np.maximum(relative, 1e-300)) - 1, order, fine.degree)
+    )
+    left = factor**-seen
+    told = relative * left / (1 - left)
+    fine.set_error(np.clip(coarse.error * factor**-order, told, 2 * told))
     return relative
+
+
+def _differences(fine, coarse):
+    """`_apart` over the largest displacements, and as it is."""
+    sizes = _sizes(fine)
+    difference, at_ends = _apart(fine, coarse, sizes.turning)
+    return np.maximum(difference - _ROUNDING, 0.0) / sizes.largest, difference, at_ends
 
 
 def hardest(path, most=3):

@@ -24,6 +24,7 @@ class Follower:
         control: "auto", "load" or "arc".
         branch: 1 or -1 to leave the path at the first bifurcation; 0 to stay on it.
         on_event: called with every `Crossing`.
+        from_rest: see `Track`.
 
     Attributes:
         track: the `Track`.
@@ -32,9 +33,9 @@ class Follower:
         used: "arc" once arc length was used, else "load".
     """
 
-    def __init__(self, problem, newton, stability, steps, *, control="auto", branch=0, on_event=None):
+    def __init__(self, problem, newton, stability, steps, *, control="auto", branch=0, on_event=None, from_rest=True):
         most = steps.max_iterations or (10 if problem.model.carries_force else 30)
-        self.track = Track(problem, newton, stability, most)
+        self.track = Track(problem, newton, stability, most, from_rest=from_rest)
         self._steps, self._control, self._branch, self._on_event = steps, control, branch, on_event
         self._sign = branch
         self.locator = Locator(self.track)

@@ -98,7 +98,7 @@ def buckling(scene, count=1, *, load_factor=0.0, tol=1e-5, elements=None, degree
             best = reached
         if elements or best <= tol:
             return Buckling(scene, load_factors, modes, error, layout.counts, degree)
-        coarse, layout = load_factors, layout.split(2)
+        coarse, layout = load_factors, layout.finer(scene, 2)
 
 
 def _critical(scene, layout, count, load_factor, degree, comm):

@@ -124,7 +124,7 @@ def modes(scene, count=1, *, load_factor=0.0, tol=1e-6, elements=None, degree=4,
             best = reached
         if elements or best <= tol:
             return Modes(scene, squares, error, shapes, negative, layout.counts, degree)
-        coarse, layout = squares, layout.split(2)
+        coarse, layout = squares, layout.finer(scene, 2)
 
 
 def _on_mesh(scene, layout, count, load_factor, degree, comm):

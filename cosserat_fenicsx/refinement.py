@@ -7,21 +7,25 @@ import math
 
 import numpy as np
 
-from cosserat_fenicsx.accuracy import estimate_error, hardest, spread_error
+from cosserat_fenicsx.accuracy import carry_error, estimate_error, hardest, spread_error
 from cosserat_fenicsx.errors import Interrupted, NotConverged
 
 _MOST_ELEMENTS = 1024
 # Two meshes that agree to this, relative to the largest displacement, are on one branch: the finer may start from the coarser.
 _RESOLVED = 1e-2
+# Meshes differ by multiples of this factor, so that scenes share compiled ones; the last is aimed at this share of what is allowed.
+_QUARTERS, _AIM = 4, 0.8
+# Fewer unknowns than this at all points together cost less than another loading of the mesh.
+_CHEAP = 800
 
 
-def refine(trace, correct, layout, tol, degree):
+def refine(trace, correct, scene, layout, tol, degree):
     """A path whose estimated error is at most `tol`.
 
     Args:
         trace: (layout, path or None) -> path, stepping from the unloaded state, over the points of the path that is given.
         correct: (layout, path) -> the points of the path on this mesh, starting from them; None where that will not do.
-        layout: the first mesh.
+        scene: what lies on the meshes; layout: the first mesh.
         tol: relative to the largest displacement.
         degree: for the words of a refusal.
 
@@ -34,7 +38,7 @@ def refine(trace, correct, layout, tol, degree):
             found = search.on(layout)
             if found is not None:
                 return found
-            layout = layout.split(2)
+            layout = layout.finer(scene, search.factor())
     except Interrupted as stop:  # what is complete on a coarser mesh is worth more than a part on a finer one
         raise Interrupted(stop.path if search.whole is None else search.whole) from None
 
@@ -51,6 +55,10 @@ class _Search:
         self.whole = self._few = self._which = None  # `_few`: points that are looked at, on the last mesh
         self._apart, self._apart_of_whole = None, None  # their differences to the mesh before, and of all points
         self._level, self._level_of_whole = -1, -2
+        self._order, self._factor = (
+            1.0,
+            2.0,
+        )  # of the error in h that is counted on; elements over those of the mesh before
         self._failed, self._best = False, math.inf
 
     def on(self, layout):
@@ -75,23 +83,43 @@ class _Search:
                 raise NotConverged(_not_accurate(self._tol, min(reached, self._best), elements, self._degree), found)
             self._best = min(self._best, reached)
         if found is self.whole:
-            self._few, self._which = hardest(found)
+            if len(found) * found.unknowns <= _CHEAP:
+                self._few, self._which = found, np.arange(len(found))
+            else:
+                self._few, self._which = hardest(found)
             self._apart = None if self._apart_of_whole is None else self._apart_of_whole[self._which]
         return None
+
+    def factor(self):
+        """How many times as many elements the next mesh has: two, or fewer where these will do, by the order that was counted on."""
+        if self._factor < 2:
+            self._apart = self._apart_of_whole = None  # of halvings alone
+        self._factor = 2.0
+        if self._few is not None and np.isfinite(self._few.error).all() and self._few.error.max() > self._tol:
+            needed = (self._few.error.max() / (_AIM * self._tol)) ** (1 / self._order)
+            self._factor = min(2.0, math.ceil(_QUARTERS * needed) / _QUARTERS)
+        return self._factor
 
     def _found_on(self, layout):
         """The points that are looked at, or all, on a mesh, with their errors where these are known."""
         few = None if self._few is None else self._correct(layout, self._few)
-        apart = None if few is None else estimate_error(few, self._few, self._apart)
+        apart = None if few is None else self._judge(few, self._few, self._apart)
         if few is None or apart.max() > _RESOLVED:
             whole, apart = self._trace(layout, self.whole), None
             if self._level == self._level_of_whole + 1:
-                apart = estimate_error(whole, self.whole, self._apart_of_whole)
+                apart = self._judge(whole, self.whole, self._apart_of_whole)
             return self._keep(whole, apart)
         if len(few) == len(self.whole):
             return self._keep(few, apart)
         self._few, self._apart = few, apart
         return self._all_points(layout, few) if few.error.max() <= self._tol else few
+
+    def _judge(self, fine, coarse, before):
+        """Set the errors of points on a mesh from those on the mesh before; how far these are apart."""
+        if self._factor < 2:
+            return carry_error(fine, coarse, self._factor, self._order, before)
+        apart, self._order = estimate_error(fine, coarse, before)
+        return apart
 
     def _keep(self, whole, apart):
         self.whole, self._apart_of_whole, self._level_of_whole = whole, apart, self._level

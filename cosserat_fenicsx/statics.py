@@ -118,10 +118,10 @@ def solve(
         follow["steps"] = replace(steps, largest=min(steps.largest or math.inf, _LARGEST_TURN / _turn(scene)))
 
     def take(choice, bar):
-        strayed = []
+        strayed, last = [], [None, None]  # `last`: a layout and the solvers loaded with it
 
-        def tracing(layout):
-            solvers = solvers_of(
+        def solvers(layout):
+            return solvers_of(
                 scene,
                 layout,
                 formulation=formulation,
@@ -130,7 +130,9 @@ def solve(
                 comm=comm,
                 model=choice.model,
             )
-            return Tracing(solvers, formulation, follow, choice, bar)
+
+        def tracing(layout):
+            return Tracing(solvers(layout), formulation, follow, choice, bar)
 
         def trace(layout, like=None):
             """`like`: a path whose points are found again, where the solver chose them."""
@@ -147,11 +149,13 @@ def solve(
         def correct(layout, coarse):
             if coarse.events or coarse.control == "arc" or until or not steps.adaptive:
                 return None
-            return tracing(layout).corrected(coarse)
+            if last[0] is not layout:
+                last[:] = layout, solvers(layout)
+            return Tracing(last[1], formulation, follow, choice, bar, from_rest=False).corrected(coarse)
 
         if elements is not None:
             return trace(Layout.of(scene, elements))
-        return refine(trace, correct, first_layout(scene, degree), tol, degree)
+        return refine(trace, correct, scene, first_layout(scene, degree), tol, degree)
 
     with Progress(targets, progress, comm) as bar:
         try:
@@ -167,7 +171,7 @@ def first_layout(scene, degree):
     while max(layout.counts) < _FINEST_FIRST and not all(
         _sees(rod, breaks, degree) for rod, breaks in zip(scene.rods, layout.breaks, strict=True)
     ):
-        layout = layout.split(2)
+        layout = layout.finer(scene, 2)
     return layout
 
 

@@ -44,18 +44,19 @@ class Tracing:
         follow: arguments of `Follower`.
         choice: the `Choice` of the model.
         bar: a `Progress`.
+        from_rest: whether the path may be followed from the unloaded state, or is only `corrected`.
     """
 
-    def __init__(self, solvers, formulation, follow, choice, bar):
+    def __init__(self, solvers, formulation, follow, choice, bar, *, from_rest=True):
         self.problem, _, self.stability = solvers
         self.model, self._options, self._choice, self._bar = self.problem.model, follow, choice, bar
         self.path = Path.of(
             self.model, formulation, [*choice.why, force_in_words(self.model.shape.variant, formulation)]
         )
         if choice.model == "spatial":
-            self._follower = Follower(*solvers, on_event=self._meet, **follow)
+            self._follower = Follower(*solvers, on_event=self._meet, from_rest=from_rest, **follow)
         else:  # in a plane load control alone, and no events: what asks for more is promoted
-            self._follower = Follower(*solvers, **{**follow, "control": "load"})
+            self._follower = Follower(*solvers, from_rest=from_rest, **{**follow, "control": "load"})
         self.track = self._follower.track
         self._counted, self._until = 0, None
         bar.start(f"{self.path.model}, {self.model.unknowns} unknowns")
@@ -134,7 +135,8 @@ class Tracing:
         where = "Try"
         if here and self._options["control"] == "load":
             where = "There may be a limit point, which load control cannot pass (control='auto' can); otherwise try"
-        return f"{where} load factors in between, more elements, or the formulation 'mixed'."
+        other = "a larger tol" if self.path.formulation == "mixed" else "the formulation 'mixed'"
+        return f"{where} load factors in between, more elements, or {other}."
 
     def corrected(self, coarse):
         """The points of a path on a coarser mesh, each by Newton's method from the coarse one; None where one strays.

@@ -39,12 +39,13 @@ class Point:
 
 
 class Track:
-    """The state of a loaded problem on its path, from the unloaded state on.
+    """The state of a loaded problem on its path.
 
     Args:
         problem: a loaded `Problem`.
         newton, stability: the problem's solvers, made once for its shape.
         max_iterations: Newton iterations allowed in a step.
+        from_rest: whether the path begins at the unloaded state, where the problem is.
 
     Attributes:
         history: the last points, at most three.
@@ -53,12 +54,12 @@ class Track:
         neutral: owned numbers of a motion that changes nothing (a buckled round column turns about its axis), or None.
     """
 
-    def __init__(self, problem, newton: Newton, stability: NegativeModes, max_iterations):
+    def __init__(self, problem, newton: Newton, stability: NegativeModes, max_iterations, *, from_rest=True):
         self.problem, self.model = problem, problem.model
         self.newton, self.stability, self.max_iterations = newton, stability, max_iterations
         self.iterations, self.failure, self.neutral = 0, "", None
-        self.origin = Point(0.0, self.problem.numbers(), stability.count(), 0)
-        self.history = [self.origin]
+        self.origin = Point(0.0, self.problem.numbers(), stability.count(), 0) if from_rest else None
+        self.history = [self.origin] if from_rest else []
 
     @property
     def here(self):

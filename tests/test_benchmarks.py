@@ -125,9 +125,11 @@ def test_order_of_loads_does_not_matter():
         np.testing.assert_allclose(rq, together[0].rq, atol=1e-12)
 
 
-@pytest.mark.parametrize("drawn", random_scenes.scenes(10, first=20), ids=lambda drawn: str(drawn.seed))
+@pytest.mark.parametrize(
+    "drawn", [*random_scenes.scenes(10, first=20), random_scenes.draw(5097)], ids=lambda drawn: str(drawn.seed)
+)
 def test_random_scenes(drawn):
-    """`make random` does 200 of them."""
+    """`make random` does 200 of them; the tangent of the last is inexact for its soft motions, by rounding."""
     verdict, rows = random_comparison.compare(drawn)
     assert verdict.startswith("connected")
     for tol, said, error, estimate, _ in rows:

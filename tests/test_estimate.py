@@ -23,7 +23,7 @@ def positions(path):
     return np.concatenate([path.motion(rod, _PLACES)[:, :, :3] for rod in path.scene.rods], axis=1)
 
 
-@pytest.mark.parametrize("tol", [1e-4, 1e-6, 1e-8])
+@pytest.mark.parametrize("tol", [1e-4, 1e-5, 1e-6, 1e-8])
 @pytest.mark.parametrize(
     ("scene", "etas"),
     [

@@ -24,8 +24,21 @@ class Layout:
     @classmethod
     def of(cls, scene, elements):
         """`elements` per rod, more only where supports, loads, joints and kinks ask for an element end of their own."""
+        return cls._of_pieces(scene, lambda rod, ends: np.maximum(1, np.round(elements * np.diff(ends)).astype(int)))
+
+    def finer(self, scene, factor):
+        """The layout with `factor` times as many elements, rounded up between any two ends that something asks for."""
+
+        def counts(rod, ends):
+            return np.ceil(factor * np.diff(np.searchsorted(self.breaks[rod], ends)) - 1e-9).astype(int)
+
+        return self._of_pieces(scene, counts)
+
+    @classmethod
+    def _of_pieces(cls, scene, counts):
+        """`counts`: from a rod's index and the ends that something asks for to the equal elements between these."""
         breaks = []
-        for rod in scene.rods:
+        for i, rod in enumerate(scene.rods):
             stations = {station.s / rod.length for station in scene.stations(rod)}
             stations |= {s / rod.length for s in rod.breaks}
             ends = [0.0]
@@ -33,19 +46,9 @@ class Layout:
                 if x - ends[-1] > 1e-9:
                     ends.append(x)
             ends[-1] = 1.0
-            pieces = [
-                np.linspace(a, b, max(1, round(elements * (b - a))) + 1)[:-1]
-                for a, b in zip(ends[:-1], ends[1:], strict=True)
-            ]
-            breaks.append(np.append(np.concatenate(pieces), 1.0))
+            pieces = zip(ends[:-1], ends[1:], counts(i, ends), strict=True)
+            breaks.append(np.append(np.concatenate([np.linspace(a, b, n + 1)[:-1] for a, b, n in pieces]), 1.0))
         return cls(tuple(breaks))
-
-    def split(self, pieces):
-        """The layout with every element cut into equal pieces."""
-        parts = np.arange(pieces) / pieces
-        return Layout(tuple(
-            np.append((b[:-1, None] + np.diff(b)[:, None] * parts).ravel(), 1.0) for b in self.breaks
-        ))  # fmt: skip
 
     @property
     def counts(self):
