@@ -1,5 +1,7 @@
 """Whether a scene's supports and joints hold it: once each, and altogether. Small motions of the reference alone."""
 
+import functools
+
 import numpy as np
 
 from cosserat_fenicsx.errors import SceneError
@@ -96,6 +98,7 @@ def _name(scene, holder):
     return f"joints[{scene.joints.index(holder)}] ({holder.first} with {holder.second})"
 
 
+@functools.lru_cache(maxsize=32)  # scenes do not change, and are solved again and again
 def check_no_mechanism(scene):
     """Refuse a scene with rigid motions of the rods that no support and no joint resists.
 

@@ -224,8 +224,8 @@ def solvers_of(scene, layout, *, formulation="mixed", degree=4, points=None, com
         problem, newton, stability = _kept_solvers(comm == MPI.COMM_SELF, shape)
     else:  # a user's communicator may be freed, and its handle given to another
         problem, newton, stability = _make_solvers(comm, shape)
-    problem.load(scene, layout)
-    stability.load()
+    if problem.load(scene, layout):
+        stability.load()
     return problem, newton, stability
 
 

@@ -154,3 +154,15 @@ def test_a_weak_spot_between_the_points_of_a_coarse_mesh_is_seen(place):
     x = np.linspace(0, 1, 301)
     error = np.linalg.norm(path.sample(0, rod, x)[0] - fine.sample(0, rod, x)[0], axis=1).max()
     assert error / fine.largest_displacement()[0] <= path.error[0] <= 1e-3
+
+
+def test_a_scene_is_solved_again_as_it_is_now():
+    """Numbers that cannot have changed are not taken anew; what a function says is asked again."""
+    diameter = [0.02]
+    tips = []
+    for section in (cf.Circle(0.02), lambda s: cf.Circle(diameter[0])):
+        rod = cf.Rod(LINE, section, STEEL)
+        scene = cf.Scene([rod], [cf.Clamp(rod.start)], [cf.Force(rod.end, (10.0, 0, 0))])
+        for diameter[0] in (0.02, 0.03):
+            tips.append(cf.solve(scene, [1.0], elements=4).displacement(rod.end)[0, 0])
+    assert tips[0] == tips[1] and tips[2] == pytest.approx(tips[0]) and tips[3] < 0.3 * tips[2]

@@ -234,14 +234,19 @@ class RodModel:
         fill_fields(self.data, rods, self.section, stiff)
         self.round_off = self._round_off(sizes)
         self._loads.fill(scene, layout, scales, self.rule, self.axes)
-        at_rest, x = self._at_rest(), self.state.x.array
-        x[:] = 0
-        x[self._nodal] = at_rest[self._slots]
-        for function in self.carried:
-            function.x.array[:] = 0
-        self.tied_at_rest = at_rest[self.tied_slots]
+        self._rest = self._at_rest()
+        self.rest()
+        self.tied_at_rest = self._rest[self.tied_slots]
         self._tie()
         self._local_stiffness(stiff, sizes)
+
+    def rest(self):
+        """The state becomes the reference configuration of the scene."""
+        x = self.state.x.array
+        x[:] = 0
+        x[self._nodal] = self._rest[self._slots]
+        for function in self.carried:
+            function.x.array[:] = 0
 
     def _local_stiffness(self, stiff, sizes):
         """What one element resists a displacement and a rotation of each tied node with, (tied nodes, 6)."""
