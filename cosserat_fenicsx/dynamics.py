@@ -20,10 +20,12 @@ from cosserat_fenicsx.models.rodmesh import Layout
 from cosserat_fenicsx.models.shape import Shape
 from cosserat_fenicsx.pace import Adaptive, Fixed
 from cosserat_fenicsx.progress import Progress
+from cosserat_fenicsx.runfolder import RunFolder
 from cosserat_fenicsx.scene import Scene
 from cosserat_fenicsx.signals import signals_of
 from cosserat_fenicsx.start import put_start, starts_in
 from cosserat_fenicsx.steppers import SCHEMES
+from cosserat_fenicsx.stored_history import StoredHistory
 
 _MODELS = {
     ("momentum", "spatial"): MovingSpatial,
@@ -50,6 +52,7 @@ def simulate(
     load_factor=1.0,
     elements=ELEMENTS,
     degree=DEGREE,
+    folder=None,
     progress=None,
     comm=None,
 ):
@@ -74,6 +77,9 @@ def simulate(
         load_factor: multiplies all loads and prescribed motions, as in `solve`.
         elements: elements per rod.
         degree: 1 to 4, of r and q.
+        folder: where the motion is written as it goes, for long runs: the History reads its states from there as they are
+            asked for, and none stays in memory. Whatever ends the run, `resume(folder)` continues it to the same digits.
+            A folder that does not hold a motion yet, which all ranks must see; None keeps the states in memory.
         progress: True, False, or None for a bar on long runs in a terminal.
         comm: MPI communicator; default all ranks. Every rank calls, every rank gets the same History.
 
@@ -84,62 +90,115 @@ def simulate(
         SceneError: an argument outside its range, a rod without inertia, or a start that supports contradict.
         NotConverged: a step fails however short it is; `.path` holds the History up to there.
         Interrupted: Ctrl-C; `.path` holds the History up to there.
+        NotStored: the folder cannot be written any more, such as on a full disk; `.path` holds the History up to there.
     """
     comm = comm or MPI.COMM_WORLD
     instance("simulate", "scene", scene, Scene, "a Scene")
-    duration = _positive("duration", duration)
+    duration = positive_time("duration", duration)
     if scheme not in SCHEMES:
         raise SceneError(f"scheme = {scheme!r}: {nearest(scheme, SCHEMES)}")
-    pace = _pace(duration, tol, dt, scheme)
-    save_every = None if save_every is None else _positive("save_every", save_every)
+    pace = pace_of(duration, tol, dt, scheme)
+    save_every = None if save_every is None else positive_time("save_every", save_every)
     number("simulate", "load_factor", load_factor, "a finite number", math.isfinite)
     if isinstance(elements, bool) or not isinstance(elements, numbers.Integral) or elements < 1:
         refuse("simulate", "elements", elements, "a whole number above zero")
-    scene = scene.over(duration)
-    model, why = _choice(scene, model, scheme, start)
-    problem, stepper = _solvers(scene, Layout.of(scene, elements), degree, scheme, load_factor, comm, model)
+    looked_at = scene.over(duration)
+    model, why = _choice(looked_at, model, scheme, start)
+    problem, stepper = solvers(looked_at, Layout.of(scene, elements), degree, scheme, load_factor, comm, model)
     put_start(problem.model, start)
     problem.begin()
-    run = _Run(problem, stepper, pace, scheme, why)
-    with Progress([duration], progress, comm, "t (s) =") as bar:
-        bar.start(f"{problem.model.name}, {problem.model.unknowns} unknowns")
-        try:
-            run.over(_marks(scene, duration, save_every), save_every is None, bar)
-        except KeyboardInterrupt:
-            raise Interrupted(run.history) from None
-    return run.history
+    stepper.begin()
+    history = (History if folder is None else StoredHistory).of(problem.model, scheme, [why])
+    if folder is not None:
+        asked = dict(duration=duration, tol=tol, dt=dt, scheme=scheme, save_every=save_every, load_factor=load_factor,
+                     elements=elements, degree=degree)  # fmt: skip
+        folder = RunFolder(folder, comm).make(scene, asked, history)
+    run = Run(problem, stepper, pace, history, folder)
+    return run.over(marks_of(scene, duration, save_every), save_every is None, progress)
 
 
-class _Run:
-    """The motion of a problem, booked and saved."""
+class Run:
+    """The motion of a problem, booked and saved.
 
-    def __init__(self, problem, stepper, pace, scheme, why):
+    Args:
+        problem, stepper, pace: what computes it.
+        history: what takes its states; folder: the `RunFolder` where the history and what it goes on from lie, or None.
+    """
+
+    def __init__(self, problem, stepper, pace, history, folder):
         self.problem, self.model, self._stepper, self._pace = problem, problem.model, stepper, pace
-        self.history = History.of(self.model, scheme, [why])
-        self._steps = self._iterations = 0
+        self.history, self._folder = history, folder
+        self._t = self._first = self._h = 0.0
+        self._count = self._steps = self._iterations = self._saved = 0
 
-    def over(self, marks, save_all, bar):
-        """Go over the marks (time, whether something jumps there, whether it is saved), the first of them the start."""
-        self._stepper.begin()
-        self._save(0.0)
-        for (t, jump, _), (end, _, saved) in itertools.pairwise(marks):
+    def memory(self):
+        """All that the motion goes on from between two steps, see `Stepper.memory`."""
+        names = ("_t", "_first", "_h", "_count", "_steps", "_iterations", "_saved")
+        counts = {name.removeprefix("_"): getattr(self, name) for name in names}
+        return {**counts, "pace": self._pace.memory(), "stepper": self._stepper.memory(), "nodes": self.model.slots}
+
+    def recall(self, memory):
+        """Take back what `memory` gave."""
+        for name in ("t", "first", "h", "count", "steps", "iterations", "saved"):
+            setattr(self, f"_{name}", memory[name])
+        self._pace.recall(memory.get("pace", {}))
+        self._stepper.recall(memory["stepper"])
+
+    def over(self, marks, save_all, progress):
+        """Go over the marks (time, whether something jumps there, whether it is saved), the first of them the start, from
+        where the motion is.
+
+        Returns:
+            the history.
+        """
+        comm, model = self.model.comm, self.model
+        try:
+            with Progress([marks[-1][0]], progress, comm, "t (s) =") as bar:
+                bar.start(f"{model.name}, {model.unknowns} unknowns")
+                bar.reached(self._t)
+                self._keep()
+                if not self._saved:
+                    self._save(self._t)
+                for mark, after in itertools.pairwise(marks):
+                    self._between(mark, after, save_all, bar)
+                self._keep()
+        except KeyboardInterrupt:
+            raise Interrupted(self.history) from None
+        finally:
+            if self._folder:
+                self._folder.release()
+        return self.history
+
+    def _between(self, mark, after, save_all, bar):
+        (begin, jump, _), (end, _, saved) = mark, after
+        if end <= self._t:  # a motion that is continued has been there
+            return
+        if self._t <= begin:
             if jump:
                 self._stepper.jump()
                 self._pace.jump()
-            nothing, first, count, h = 1e-9 * (end - t), t, 0, 0.0
-            while t < end:
-                obey()
-                wanted = self._pace.length(end - t)
-                if abs(wanted - h) > 1e-9 * wanted:  # equal steps are counted, so that times do not gather rounding
-                    first, count, h = t, 0, wanted
-                if not self._advance(t, h):
-                    continue
-                count += 1
-                t = first + count * h
-                t = end if end - t <= nothing else t
-                bar.reached(t)
-                if save_all or (saved and t == end):
-                    self._save(t)
+            self._t = self._first = begin
+            self._count, self._h = 0, 0.0
+        nothing = 1e-9 * (end - begin)
+        while self._t < end:
+            obey()
+            wanted = self._pace.length(end - self._t)
+            if abs(wanted - self._h) > 1e-9 * wanted:  # equal steps are counted, so that times do not gather rounding
+                self._first, self._count, self._h = self._t, 0, wanted
+            if not self._advance(self._t, self._h):
+                continue
+            self._count += 1
+            t = self._first + self._count * self._h
+            self._t = end if end - t <= nothing else t
+            bar.reached(self._t)
+            if save_all or (saved and self._t == end):
+                self._save(self._t)
+            if self._folder and self._folder.due:
+                self._keep()
+
+    def _keep(self):
+        if self._folder:
+            self._folder.keep(self.memory(), self.history)
 
     def _advance(self, t, h, halvings=0):
         """Step from t by h, in shorter steps where that fails; False where a shorter step is to be tried."""
@@ -177,6 +236,7 @@ class _Run:
         )
         rates = model.rates()(nodal, model.snapshot_of_rates())
         iterations, self._iterations = self._iterations, 0
+        self._saved += 1
         self.history.append(Instant(problem.load_factor, nodal, gauss, 0, iterations, problem.multipliers(), time=t, rates=rates,
                                     steps=self._steps, ledger=ledger))  # fmt: skip
 
@@ -200,7 +260,7 @@ def _choice(scene, model, scheme, start):
     return "spatial", reason
 
 
-def _solvers(scene, layout, degree, scheme, load_factor, comm, model):
+def solvers(scene, layout, degree, scheme, load_factor, comm, model):
     """The loaded problem and stepper of a scene on a mesh."""
     shape = Shape.of(scene, layout, formulation="displacement", degree=degree, model=model)
     if comm in (MPI.COMM_WORLD, MPI.COMM_SELF):
@@ -223,14 +283,14 @@ def _kept(alone, shape, scheme):
     return _make(MPI.COMM_SELF if alone else MPI.COMM_WORLD, shape, scheme)
 
 
-def _pace(duration, tol, dt, scheme):
+def pace_of(duration, tol, dt, scheme):
     """What chooses the steps."""
     if dt is not None:
         if tol is not None:
             raise SceneError(
                 f"simulate: dt = {dt!r} and tol = {tol!r}: expected one of them, a fixed or an adaptive step"
             )
-        return Fixed(min(_positive("dt", dt), duration))
+        return Fixed(min(positive_time("dt", dt), duration))
     if not SCHEMES[scheme].adapts:
         raise SceneError(f"scheme = '{scheme}' knows no error of its steps: expected dt, a fixed step (s)")
     tol = _TOL if tol is None else tol
@@ -239,19 +299,19 @@ def _pace(duration, tol, dt, scheme):
     )
 
 
-def _positive(name, value):
-    return number("simulate", name, value, "a positive number (s)", lambda x: 0 < x < math.inf)
+def positive_time(name, value, owner="simulate"):
+    return number(owner, name, value, "a positive number (s)", lambda x: 0 < x < math.inf)
 
 
-def _marks(scene, duration, save_every):
-    """[(time, whether something jumps there, whether it is saved)], the first at 0, the last the end."""
+def marks_of(scene, duration, save_every, ends=()):
+    """[(time, whether something jumps there, whether it is saved)], the first at 0, the last the end; `ends` are earlier ones."""
     jumps = {
         t for item in scene.moving for signal in signals_of(item).values() for t in signal.jumps if 0 < t < duration
     }
-    saved = set()
+    saved = set(ends)
     if save_every is not None:
         count = math.ceil(duration / save_every - 1e-9)
-        saved = {k * save_every for k in range(1, count)}
+        saved |= {k * save_every for k in range(1, count)}
     marks = [(0.0, False, True)]
     for t in sorted(jumps | saved):
         if t - marks[-1][0] > 1e-9 * duration:
