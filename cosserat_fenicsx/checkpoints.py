@@ -3,6 +3,7 @@
 What a solver has to remember is a dict of arrays, numbers and such dicts.
 """
 
+import io
 import os
 import zipfile
 import zlib
@@ -19,9 +20,11 @@ def write(file, memory):
     """
     file = Path(file)
     fresh = file.with_name(file.name + ".new")
+    data = io.BytesIO()  # a disk that is full must not end the writing of an archive half way
+    np.savez(data, **dict(_flat(memory)))
     try:
         with open(fresh, "wb") as stream:
-            np.savez(stream, **dict(_flat(memory)))
+            stream.write(data.getbuffer())
             stream.flush()
             os.fsync(stream.fileno())
         os.replace(fresh, file)

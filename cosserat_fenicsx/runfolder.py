@@ -64,7 +64,7 @@ class RunFolder:
 
     def _make(self, scene, head):
         place = self.place
-        if (place / _HEAD).exists():
+        if (place / _HEAD).exists() and (place / _START).exists():  # else its process was killed before the first step
             raise SceneError(
                 f"simulate.folder = {str(place)!r}: it holds a motion already: expected another name, or that it is removed "
                 f"first; cosserat_fenicsx.resume({str(place)!r}) goes on with it"
