@@ -88,7 +88,9 @@ class InstantFile:
         looked at."""
         if self._rows is None or len(self._rows) != self._count:
             shape = (self._count,)
-            self._rows = np.memmap(self.file, self._dtype, "r", self._first, shape) if self._count else np.empty(0, self._dtype)
+            self._rows = (
+                np.memmap(self.file, self._dtype, "r", self._first, shape) if self._count else np.empty(0, self._dtype)
+            )
         return self._rows
 
     def __getitem__(self, k):

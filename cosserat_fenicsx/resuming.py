@@ -6,10 +6,11 @@ import numpy as np
 from mpi4py import MPI
 
 from cosserat_fenicsx.checks import instance, refuse
-from cosserat_fenicsx.dynamics import Run, marks_of, pace_of, positive_time, solvers
+from cosserat_fenicsx.dynamics import marks_of, pace_of, positive_time, solvers
 from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.models.rodmesh import Layout
 from cosserat_fenicsx.models.scales import Scales
+from cosserat_fenicsx.motion import Motion
 from cosserat_fenicsx.runfolder import RunFolder
 from cosserat_fenicsx.scene import Scene
 from cosserat_fenicsx.stored_history import StoredHistory
@@ -44,25 +45,34 @@ def resume(folder, scene=None, *, duration=None, progress=None, comm=None):
     """
     comm = comm or MPI.COMM_WORLD
     kept, scene = _open(folder, scene, comm)
-    asked, ends = kept.asked, kept.durations
+    ends = kept.durations
     until = ends[-1] if duration is None else positive_time("duration", duration, "resume")
     if until < ends[-1]:
         refuse("resume", "duration", duration, f"None or at least {ends[-1]:g} s, which were asked for")
     if kept.ranks != comm.size:
-        raise SceneError(f"{kept.place} was computed by {kept.ranks} rank(s), and here are {comm.size}: expected as many")
-    history = _history(kept, scene, comm)
-    memory = _memory(kept, history)
-    if memory["t"] >= until:
-        return history
+        raise SceneError(
+            f"{kept.place} was computed by {kept.ranks} rank(s), and here are {comm.size}: expected as many"
+        )
+    if _memory(kept, _history(kept, scene, comm))["t"] >= until:
+        return _history(kept, scene, comm)
     kept.hold()
-    if until > ends[-1]:
-        kept.extend(until)
+    try:
+        if until > ends[-1]:
+            kept.extend(until)
+        return _go_on(kept, scene, comm, progress)
+    finally:
+        kept.release()
+
+
+def _go_on(kept, scene, comm, progress):
+    """To the last of the durations."""
+    asked, (*ends, until) = kept.asked, kept.durations
+    memory = _memory(kept, _history(kept, scene, comm))
     looked_at, layout = scene.over(asked["duration"]), Layout.of(scene, asked["elements"])
     scheme, load_factor = asked["scheme"], asked["load_factor"]
     problem, stepper = solvers(looked_at, layout, asked["degree"], scheme, load_factor, comm, kept.told["model"])
     alike = np.array_equal(memory["nodes"], problem.model.slots)
     if not comm.allreduce(alike, op=MPI.LAND):
-        kept.release()
         raise SceneError(
             f"{kept.place}: nodes are numbered otherwise here: expected the release of dolfinx that it was computed with"
         )
@@ -70,10 +80,10 @@ def resume(folder, scene=None, *, duration=None, progress=None, comm=None):
     history.go_on_after(memory["saved"])
     problem.begin()
     stepper.begin()
-    run = Run(problem, stepper, pace_of(asked["duration"], asked["tol"], asked["dt"], scheme), history, kept)
-    run.recall(memory)
-    marks = marks_of(scene, until, asked["save_every"], [end for end in ends if end < until])
-    return run.over(marks, asked["save_every"] is None, progress)
+    pace = pace_of(asked["duration"], asked["tol"], asked["dt"], scheme)
+    motion = Motion(problem, stepper, pace, history, kept)
+    motion.recall(memory)
+    return motion.over(marks_of(scene, until, asked["save_every"], ends), asked["save_every"] is None, progress)
 
 
 def read_history(folder, scene=None, *, comm=None):

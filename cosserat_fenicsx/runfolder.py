@@ -1,9 +1,9 @@
 """The folder of a motion that is written as it goes: what was asked for, its states, and what it goes on from.
 
-    motion.json    what was asked for and what it is computed with, in words and numbers; written last of what makes a folder
-    scene.pickle   the scene, where it can be pickled
-    instants.npy   the saved states, see `instantfile`
-    start.npz, checkpoint.npz   what the solver remembered at the start, and seconds ago, of every rank
+motion.json    what was asked for and what it is computed with, in words and numbers
+scene.pickle   the scene, where it can be pickled
+instants.npy   the saved states, see `instantfile`
+start.npz, checkpoint.npz   what the solver remembered at the start, and seconds ago, of every rank
 """
 
 import fcntl
@@ -128,7 +128,7 @@ class RunFolder:
 
     def extend(self, duration):
         """A longer duration is asked for."""
-        self.durations.append(duration)
+        self.durations.append(duration)  # and with it to the head
 
         def rewrite():
             fresh = self.place / f"{_HEAD}.new"
@@ -153,7 +153,9 @@ class RunFolder:
             fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
             self.release()
-            raise SceneError(f"{self.place}: another process is at work on this motion: expected it to end first") from None
+            raise SceneError(
+                f"{self.place}: another process is at work on this motion: expected it to end first"
+            ) from None
         except OSError:
             pass  # a file system without locks
 
