@@ -4,6 +4,7 @@ import errno
 import gc
 import os
 import resource
+import shutil
 import signal
 import subprocess
 import sys
@@ -16,10 +17,12 @@ from moving_scenes import flying_in_space
 from test_schemes import everything
 
 import cosserat_fenicsx as cf
-from cosserat_fenicsx import motion, runfolder
+from cosserat_fenicsx import checkpoints, motion, runfolder
 from cosserat_fenicsx.history import Instant
+from cosserat_fenicsx.steppers import SCHEMES
 
 pytestmark = pytest.mark.serial
+SOLVERS = ("cosserat_fenicsx.steppers", "cosserat_fenicsx.pace")
 
 
 @pytest.mark.parametrize(("case", "apart"), [*((case, 0.02) for case in CASES), ("fixed", 0.0), ("adaptive", 1e9)])
@@ -33,6 +36,51 @@ def test_it_goes_on_to_the_same_digits(case, apart, tmp_path, monkeypatch, never
     assert 0 < len(before) < len(history)
     assert all((rows(tmp_path / "part")[: len(before)][name] == before[name]).all() for name in before.dtype.names)
     assert history.times[-1] == CASES[case][1] and history.why == cf.read_history(never_ended(case), scene).why
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+def test_everything_that_steps_depend_on_is_remembered(scheme, tmp_path, monkeypatch):
+    """Of a gentle motion, where tangents serve for long: all numbers that solvers hold come out as they would have."""
+    section = cf.Stiffness((1e6, 1e6), 1e6, (1e3, 1e3), 1e3, mass=1.0, inertia=(1, 1, 2))
+    rod = cf.Rod(cf.Line((0, 0, 0), (10, 0, 0)), section)
+    scene = cf.Scene([rod], [cf.Clamp(rod.start)], [cf.Force(rod.end, cf.Sine((0, 0, 3.0), 0.05))])
+    write, over, kept, motions = checkpoints.write, motion.Motion.over, [], []
+
+    def write_and_keep(file, memory):
+        write(file, memory)
+        kept.append(file.read_bytes())
+
+    def over_and_keep(self, *more):
+        motions.append(self)
+        return over(self, *more)
+
+    monkeypatch.setattr(motion.Motion, "over", over_and_keep)
+    monkeypatch.setattr(checkpoints, "write", write_and_keep)
+    monkeypatch.setattr(runfolder, "APART", 0.0)
+    monkeypatch.setattr(runfolder, "SELDOM", 0)
+    asked = {"dt": 0.02, "scheme": scheme, "elements": 24, "degree": 2}
+    cf.simulate(scene, 0.8, folder=tmp_path / "whole", **asked)
+    expected = numbers_held(motions[-1])
+    monkeypatch.setattr(checkpoints, "write", write)
+    for k in (20, 30, 36, 38, 39):
+        shutil.copytree(tmp_path / "whole", tmp_path / f"from {k}")
+        (tmp_path / f"from {k}" / "checkpoint.npz").write_bytes(kept[k])
+        cf.simulate(scene, 0.1, **asked)
+        cf.resume(tmp_path / f"from {k}", scene)
+        assert numbers_held(motions[-1]) == expected
+        assert_same(tmp_path / f"from {k}", tmp_path / "whole")
+
+
+def numbers_held(thing, before=""):
+    """All numbers that a motion's solvers hold, by the names of attributes."""
+    found = {}
+    for name, value in vars(thing).items():
+        if isinstance(value, bool | int | float):
+            found[before + name] = value
+        elif hasattr(value, "__dict__") and type(value).__module__.startswith(SOLVERS):
+            if name != "problem" or not before:
+                found |= numbers_held(value, f"{before}{name}.")
+    return found
 
 
 @pytest.mark.parametrize(("case", "step"), [("adaptive", 60), ("plane", 100)])
