@@ -106,8 +106,8 @@ def simulate(
     stepper.begin()
     history = (History if folder is None else StoredHistory).of(problem.model, scheme, [why])
     if folder is not None:
-        asked = dict(duration=duration, tol=tol, dt=dt, scheme=scheme, save_every=save_every, load_factor=load_factor,
-                     elements=elements, degree=degree)  # fmt: skip
+        asked = {"duration": duration, "tol": tol, "dt": dt, "scheme": scheme, "save_every": save_every,
+                 "load_factor": load_factor, "elements": elements, "degree": degree}  # fmt: skip
         folder = RunFolder(folder, comm).make(scene, asked, history)
     motion = Motion(problem, stepper, pace, history, folder)
     return motion.over(marks_of(scene, duration, save_every), save_every is None, progress)

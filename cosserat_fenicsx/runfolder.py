@@ -8,11 +8,13 @@ start.npz, checkpoint.npz   what the solver remembered at the start, and seconds
 
 import fcntl
 import json
+import os
 import pickle
 import time
 from pathlib import Path
 
 from cosserat_fenicsx import __version__, checkpoints
+from cosserat_fenicsx.checks import instance
 from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.likeness import difference, likeness
 from cosserat_fenicsx.ranks import on_first
@@ -29,6 +31,9 @@ class RunFolder:
     Args:
         place: its name; comm: MPI communicator.
 
+    Raises:
+        SceneError: no name.
+
     Attributes:
         place: a `pathlib.Path`.
         asked: the arguments of `simulate`; told: what a `History` says of itself.
@@ -36,6 +41,7 @@ class RunFolder:
     """
 
     def __init__(self, place, comm):
+        instance("simulate", "folder", place, str | os.PathLike, "the name of a folder")
         self.place, self.comm, self._lock = Path(place), comm, None
 
     def make(self, scene, asked, history):

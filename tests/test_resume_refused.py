@@ -83,6 +83,8 @@ def test_what_cannot_be_done_is_said(tmp_path, monkeypatch):
     part_of("plane", folder, monkeypatch)
     with pytest.raises(cf.SceneError, match=r"resume.scene = None: expected the scene of .* \(a lambda"):
         cf.resume(folder)
+    with pytest.raises(cf.SceneError, match=r"simulate.folder = 3: expected the name of a folder"):
+        run("plane", 3)
     with pytest.raises(cf.SceneError, match=r"resume.scene = 3: expected a Scene"):
         cf.resume(folder, 3)
     with pytest.raises(cf.SceneError, match=r"resume.duration = 1: expected None or at least 3 s"):
