@@ -29,7 +29,8 @@ class History(Path):
     """A motion: its states at the saved times, and what became of energy and momenta.
 
     All station queries of a `Path` (`position`, `displacement`, `rotation`, `force`, `moment`, `centreline`, `fields`,
-    ...) give one row a time. Contact force and moment include what damping adds.
+    ...) give one row a time. Contact force and moment include what damping adds. With the `folder` of `simulate` the states
+    lie in a file and are read from there.
 
     Attributes:
         times: (n,) s.

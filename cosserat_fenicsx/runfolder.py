@@ -115,10 +115,8 @@ class RunFolder:
             SceneError: none can be had, or it is another one.
         """
         scene = given if given is not None else self._stored_scene()
-        differs = difference(
-            json.loads(json.dumps(likeness(scene, self.asked["duration"]))),
-            self._likeness,
-        )
+        given = json.loads(_text(likeness(scene, self.asked["duration"])))
+        differs = difference(given, self._likeness)
         if differs:
             raise SceneError(f"{self.place}: the scene is not the one of the motion: {differs}")
         return scene
@@ -154,7 +152,7 @@ class RunFolder:
         self._on_first(self._hold)
 
     def _hold(self):
-        self._lock = open(self.place / _HEAD, "rb")  # noqa: SIM115  for as long as the run goes on
+        self._lock = os.open(self.place, os.O_RDONLY)  # the folder itself: its files may be replaced
         try:
             fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
@@ -168,7 +166,7 @@ class RunFolder:
     def release(self):
         """Let other processes write here."""
         if self._lock is not None:
-            self._lock.close()
+            os.close(self._lock)
             self._lock = None
 
     @property

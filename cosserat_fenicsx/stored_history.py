@@ -82,7 +82,7 @@ class StoredHistory(History):
         """The history of some of its times alone, in memory."""
         part = History.__new__(History)
         vars(part).update(vars(self))
-        part._expanded = [self[k] for k in which]
+        part._expanded, part._appended = [self[k] for k in which], []
         return part
 
     @property

@@ -93,6 +93,7 @@ def test_what_cannot_be_done_is_said(tmp_path, monkeypatch):
         run("plane", folder)
     other = runfolder.RunFolder(folder, cf.read_history(folder, scene).comm)
     other.hold()
+    other.open().extend(4)
     with pytest.raises(cf.SceneError, match="another process is at work on this motion"):
         cf.resume(folder, scene)
     other.release()
