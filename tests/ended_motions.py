@@ -61,7 +61,7 @@ def assert_same(one, other):
         assert (one[name] == other[name]).all(), name
 
 
-def part_of(case, folder, monkeypatch, step=30, apart=0.02):
+def part_of(case, folder, monkeypatch, step=25, apart=0.02):
     """A run that was stopped; its scene."""
     stop_at(monkeypatch, step, apart)
     with pytest.raises(Stopped):
