@@ -40,6 +40,7 @@ _HOME = {
     "modes": "modes",
     "Moment": "loads",
     "NotConverged": "errors",
+    "NotStored": "errors",
     "Path": "results",
     "Pin": "supports",
     "Prescribed": "supports",
@@ -64,6 +65,8 @@ _HOME = {
     "Table": "signals",
     "History": "history",
     "simulate": "dynamics",
+    "read_history": "resuming",
+    "resume": "resuming",
     "solve": "statics",
 }
 __all__ = sorted(_HOME)

@@ -3,27 +3,27 @@
 import cosserat_fenicsx.compat  # noqa: F401, I001  first: it says in words what of dolfinx is missing
 
 import functools
-import itertools
 import math
 import numbers
 
 from mpi4py import MPI
 
 from cosserat_fenicsx.checks import instance, number, refuse
-from cosserat_fenicsx.errors import Interrupted, NotConverged, SceneError, nearest
-from cosserat_fenicsx.history import History, Instant, Ledger
-from cosserat_fenicsx.interrupts import obey
+from cosserat_fenicsx.errors import SceneError, nearest
+from cosserat_fenicsx.history import History
 from cosserat_fenicsx.models.conserving import ConservingSpatial
 from cosserat_fenicsx.models.moving import MovingSpatial
 from cosserat_fenicsx.models.moving_planar import MovingPlanar
 from cosserat_fenicsx.models.rodmesh import Layout
 from cosserat_fenicsx.models.shape import Shape
+from cosserat_fenicsx.motion import Motion
 from cosserat_fenicsx.pace import Adaptive, Fixed
-from cosserat_fenicsx.progress import Progress
+from cosserat_fenicsx.runfolder import RunFolder
 from cosserat_fenicsx.scene import Scene
 from cosserat_fenicsx.signals import signals_of
 from cosserat_fenicsx.start import put_start, starts_in
 from cosserat_fenicsx.steppers import SCHEMES
+from cosserat_fenicsx.stored_history import StoredHistory
 
 _MODELS = {
     ("momentum", "spatial"): MovingSpatial,
@@ -33,8 +33,6 @@ _MODELS = {
 #: Elements a rod and degree where none are asked for.
 ELEMENTS, DEGREE = 8, 3
 _TOL = 1e-3
-# A step that fails is halved so often before the motion is given up.
-_HALVINGS = 12
 
 
 def simulate(
@@ -50,6 +48,7 @@ def simulate(
     load_factor=1.0,
     elements=ELEMENTS,
     degree=DEGREE,
+    folder=None,
     progress=None,
     comm=None,
 ):
@@ -74,6 +73,9 @@ def simulate(
         load_factor: multiplies all loads and prescribed motions, as in `solve`.
         elements: elements per rod.
         degree: 1 to 4, of r and q.
+        folder: where the motion is written as it goes, for long runs: the History reads its states from there as they are
+            asked for, and none stays in memory. Whatever ends the run, `resume(folder)` continues it to the same digits.
+            A folder that does not hold a motion yet, which all ranks must see; None keeps the states in memory.
         progress: True, False, or None for a bar on long runs in a terminal.
         comm: MPI communicator; default all ranks. Every rank calls, every rank gets the same History.
 
@@ -84,101 +86,31 @@ def simulate(
         SceneError: an argument outside its range, a rod without inertia, or a start that supports contradict.
         NotConverged: a step fails however short it is; `.path` holds the History up to there.
         Interrupted: Ctrl-C; `.path` holds the History up to there.
+        NotStored: the folder cannot be written any more, such as on a full disk; `.path` holds the History up to there.
     """
     comm = comm or MPI.COMM_WORLD
     instance("simulate", "scene", scene, Scene, "a Scene")
-    duration = _positive("duration", duration)
+    duration = positive_time("duration", duration)
     if scheme not in SCHEMES:
         raise SceneError(f"scheme = {scheme!r}: {nearest(scheme, SCHEMES)}")
-    pace = _pace(duration, tol, dt, scheme)
-    save_every = None if save_every is None else _positive("save_every", save_every)
+    pace = pace_of(duration, tol, dt, scheme)
+    save_every = None if save_every is None else positive_time("save_every", save_every)
     number("simulate", "load_factor", load_factor, "a finite number", math.isfinite)
     if isinstance(elements, bool) or not isinstance(elements, numbers.Integral) or elements < 1:
         refuse("simulate", "elements", elements, "a whole number above zero")
-    scene = scene.over(duration)
-    model, why = _choice(scene, model, scheme, start)
-    problem, stepper = _solvers(scene, Layout.of(scene, elements), degree, scheme, load_factor, comm, model)
+    looked_at = scene.over(duration)
+    model, why = _choice(looked_at, model, scheme, start)
+    problem, stepper = solvers(looked_at, Layout.of(scene, elements), degree, scheme, load_factor, comm, model)
     put_start(problem.model, start)
     problem.begin()
-    run = _Run(problem, stepper, pace, scheme, why)
-    with Progress([duration], progress, comm, "t (s) =") as bar:
-        bar.start(f"{problem.model.name}, {problem.model.unknowns} unknowns")
-        try:
-            run.over(_marks(scene, duration, save_every), save_every is None, bar)
-        except KeyboardInterrupt:
-            raise Interrupted(run.history) from None
-    return run.history
-
-
-class _Run:
-    """The motion of a problem, booked and saved."""
-
-    def __init__(self, problem, stepper, pace, scheme, why):
-        self.problem, self.model, self._stepper, self._pace = problem, problem.model, stepper, pace
-        self.history = History.of(self.model, scheme, [why])
-        self._steps = self._iterations = 0
-
-    def over(self, marks, save_all, bar):
-        """Go over the marks (time, whether something jumps there, whether it is saved), the first of them the start."""
-        self._stepper.begin()
-        self._save(0.0)
-        for (t, jump, _), (end, _, saved) in itertools.pairwise(marks):
-            if jump:
-                self._stepper.jump()
-                self._pace.jump()
-            nothing, first, count, h = 1e-9 * (end - t), t, 0, 0.0
-            while t < end:
-                obey()
-                wanted = self._pace.length(end - t)
-                if abs(wanted - h) > 1e-9 * wanted:  # equal steps are counted, so that times do not gather rounding
-                    first, count, h = t, 0, wanted
-                if not self._advance(t, h):
-                    continue
-                count += 1
-                t = first + count * h
-                t = end if end - t <= nothing else t
-                bar.reached(t)
-                if save_all or (saved and t == end):
-                    self._save(t)
-
-    def _advance(self, t, h, halvings=0):
-        """Step from t by h, in shorter steps where that fails; False where a shorter step is to be tried."""
-        solved = self._stepper.step(t, h)
-        self._iterations += solved.iterations
-        if solved.converged:
-            if not halvings and not self._pace.accepts(self._stepper, h):
-                self._stepper.undo()
-                return False
-            self._steps += 1
-            return True
-        if halvings == _HALVINGS:
-            if self.history[-1].time < t:
-                self._save(t)
-            raise NotConverged(
-                f"the motion was lost at t = {t:.6g} s, where a step of {h:.3g} s still fails: {solved.reason}. "
-                "Try a smaller dt or tol, more elements, or damping.",
-                self.history,
-            )
-        self._advance(t, h / 2, halvings + 1)
-        self._advance(t + h / 2, h / 2, halvings + 1)
-        self._pace.failed(h)
-        return True
-
-    def _save(self, t):
-        model, problem, stepper = self.model, self.problem, self._stepper
-        scales = model.scales
-        momentum, energy = scales.force * model.time, scales.force * scales.length
-        nodal, gauss = model.snapshot()
-        linear, angular = problem.momenta()
-        ledger = Ledger(
-            *(energy * x for x in (*problem.energies(), stepper.work, stepper.dissipated)),
-            momentum * linear,
-            momentum * scales.length * angular,
-        )
-        rates = model.rates()(nodal, model.snapshot_of_rates())
-        iterations, self._iterations = self._iterations, 0
-        self.history.append(Instant(problem.load_factor, nodal, gauss, 0, iterations, problem.multipliers(), time=t, rates=rates,
-                                    steps=self._steps, ledger=ledger))  # fmt: skip
+    stepper.begin()
+    history = (History if folder is None else StoredHistory).of(problem.model, scheme, [why])
+    if folder is not None:
+        asked = {"duration": duration, "tol": tol, "dt": dt, "scheme": scheme, "save_every": save_every,
+                 "load_factor": load_factor, "elements": elements, "degree": degree}  # fmt: skip
+        folder = RunFolder(folder, comm).make(scene, asked, history)
+    motion = Motion(problem, stepper, pace, history, folder)
+    return motion.over(marks_of(scene, duration, save_every), save_every is None, progress)
 
 
 def _choice(scene, model, scheme, start):
@@ -200,7 +132,7 @@ def _choice(scene, model, scheme, start):
     return "spatial", reason
 
 
-def _solvers(scene, layout, degree, scheme, load_factor, comm, model):
+def solvers(scene, layout, degree, scheme, load_factor, comm, model):
     """The loaded problem and stepper of a scene on a mesh."""
     shape = Shape.of(scene, layout, formulation="displacement", degree=degree, model=model)
     if comm in (MPI.COMM_WORLD, MPI.COMM_SELF):
@@ -223,14 +155,14 @@ def _kept(alone, shape, scheme):
     return _make(MPI.COMM_SELF if alone else MPI.COMM_WORLD, shape, scheme)
 
 
-def _pace(duration, tol, dt, scheme):
+def pace_of(duration, tol, dt, scheme):
     """What chooses the steps."""
     if dt is not None:
         if tol is not None:
             raise SceneError(
                 f"simulate: dt = {dt!r} and tol = {tol!r}: expected one of them, a fixed or an adaptive step"
             )
-        return Fixed(min(_positive("dt", dt), duration))
+        return Fixed(min(positive_time("dt", dt), duration))
     if not SCHEMES[scheme].adapts:
         raise SceneError(f"scheme = '{scheme}' knows no error of its steps: expected dt, a fixed step (s)")
     tol = _TOL if tol is None else tol
@@ -239,19 +171,19 @@ def _pace(duration, tol, dt, scheme):
     )
 
 
-def _positive(name, value):
-    return number("simulate", name, value, "a positive number (s)", lambda x: 0 < x < math.inf)
+def positive_time(name, value, owner="simulate"):
+    return number(owner, name, value, "a positive number (s)", lambda x: 0 < x < math.inf)
 
 
-def _marks(scene, duration, save_every):
-    """[(time, whether something jumps there, whether it is saved)], the first at 0, the last the end."""
+def marks_of(scene, duration, save_every, ends=()):
+    """[(time, whether something jumps there, whether it is saved)], the first at 0, the last the end; `ends` are earlier ones."""
     jumps = {
         t for item in scene.moving for signal in signals_of(item).values() for t in signal.jumps if 0 < t < duration
     }
-    saved = set()
+    saved = set(ends)
     if save_every is not None:
         count = math.ceil(duration / save_every - 1e-9)
-        saved = {k * save_every for k in range(1, count)}
+        saved |= {k * save_every for k in range(1, count)}
     marks = [(0.0, False, True)]
     for t in sorted(jumps | saved):
         if t - marks[-1][0] > 1e-9 * duration:

@@ -28,6 +28,18 @@ class NotConverged(CosseratError, RuntimeError):
         self.path = path
 
 
+class NotStored(CosseratError, OSError):
+    """A motion that is written as it goes cannot be written any more, such as on a full disk.
+
+    Attributes:
+        path: the `History` up to there, which lies in its folder.
+    """
+
+    def __init__(self, message, path=None):
+        super().__init__(message)
+        self.path = path
+
+
 class Interrupted(KeyboardInterrupt):
     """Ctrl-C during a solve.
 

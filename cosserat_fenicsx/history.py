@@ -29,7 +29,8 @@ class History(Path):
     """A motion: its states at the saved times, and what became of energy and momenta.
 
     All station queries of a `Path` (`position`, `displacement`, `rotation`, `force`, `moment`, `centreline`, `fields`,
-    ...) give one row a time. Contact force and moment include what damping adds.
+    ...) give one row a time. Contact force and moment include what damping adds. With the `folder` of `simulate` the states
+    lie in a file and are read from there.
 
     Attributes:
         times: (n,) s.
@@ -45,6 +46,7 @@ class History(Path):
     axis = "time"
     more_fields = {"velocity": "velocity", "angular_velocity": "angular_velocity"}  # noqa: RUF012
     load_factors = negative_modes = stable = None  # of a path alone
+    _computed = (*Path._computed, "_all_rates", "_all_gauss")
 
     @classmethod
     def of(cls, model, scheme, why=()):
@@ -116,18 +118,24 @@ class History(Path):
 
         return energy_chart.draw(self, file)
 
-    def append(self, record):
-        """Add a saved state."""
-        super().append(record)
-        self.__dict__.pop("_all_rates", None)
-
     @cached_property
     def _all_rates(self):
+        """(times, nodes, 6) velocities and angular velocities, dimensionless."""
         return np.array([record.rates for record in self._records]).reshape(len(self), -1, 6)
 
     @cached_property
-    def _contact(self):
-        """(points, elements, nodes of one, 6) n and m, dimensionless, by the polynomials through the Gauss points."""
-        along = self.rule.between_gauss(self.rule.nodes)
-        fields = np.array([record.gauss_fields[..., :6] for record in self._records])
-        return np.einsum("jg,kcgi->kcji", along, fields)
+    def _all_gauss(self):
+        """(times, elements, points, 9) n, m and r' at the Gauss points, dimensionless."""
+        return np.array([record.gauss_fields for record in self._records])
+
+    # n and m at the nodes are those of the polynomials through the Gauss points
+
+    @property
+    def _from_gauss(self):
+        return self.rule.between_gauss(self.rule.nodes)
+
+    def _contact_of(self, k):
+        return np.einsum("jg,cgi->cji", self._from_gauss, self._records[k].gauss_fields[..., :6])
+
+    def _contact_in(self, cell):
+        return np.einsum("jg,kgi->kji", self._from_gauss, self._all_gauss[:, cell, :, :6])

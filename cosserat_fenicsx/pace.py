@@ -27,6 +27,13 @@ class Fixed:
     def jump(self):
         """Something jumps here."""
 
+    def memory(self):
+        """What the steps to come depend on, see `Stepper.memory`."""
+        return {}
+
+    def recall(self, memory):
+        """Take back what `memory` gave."""
+
 
 class Adaptive:
     """Steps whose local errors add up to `tol` over the duration.
@@ -68,3 +75,11 @@ class Adaptive:
     def jump(self):
         """See `Fixed`."""
         self._dt *= self._FIRST
+
+    def memory(self):
+        """See `Fixed`."""
+        return {"dt": self._dt}
+
+    def recall(self, memory):
+        """See `Fixed`."""
+        self._dt = memory["dt"]

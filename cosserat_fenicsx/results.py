@@ -35,6 +35,8 @@ class Path:
 
     #: what tells the points apart, in words; fields that files hold beside those of `xdmf.FIELDS`
     axis, more_fields = "load factor", {}
+    #: what is computed once, until a point is added
+    _computed = ("_contact", "_all_rq")
 
     def __init__(self, scene, layout, scales, rule, *, comm, rounding, model, formulation, degree, unknowns, why,
                  expand):  # fmt: skip
@@ -66,7 +68,10 @@ class Path:
     def append(self, record):
         """Add a converged point."""
         self._appended.append(record)
-        for name in ("_contact", "_all_rq"):
+        self._forget()
+
+    def _forget(self):
+        for name in self._computed:
             self.__dict__.pop(name, None)
 
     @property
@@ -94,8 +99,7 @@ class Path:
             which: their indices.
         """
         part = copy.copy(self)
-        for name in ("_contact", "_all_rq"):
-            part.__dict__.pop(name, None)
+        part._forget()
         part.events, part._expanded, part._appended = [], [self[k] for k in which], []
         part._error = None if self._error is None else self._error[which]
         return part
@@ -150,7 +154,7 @@ class Path:
 
     def displacement(self, station):
         """(n, 3) m, inertial, from the reference."""
-        return self._at(station, self._all_rq[:, :, :3] - self._rest) * self.scales.length
+        return self._at(station, self._all_rq[:, :, :3], self._rest) * self.scales.length
 
     def rotation(self, station):
         """(n, 4) unit quaternion (scalar first) from the reference to the current section; its sign is continuous
@@ -188,7 +192,7 @@ class Path:
         i, rows = self._rows(rod)
         s = self.layout.node_s(self.rule.nodes)[i] * rod.length
         record = self._records[k]
-        contact = at_nodes(self._contact[k][self._cells(i)])
+        contact = at_nodes(self._contact_of(k)[self._cells(i)])
         displacement = (record.rq[rows, :3] - self._rest[rows]) * self.scales.length
         q = record.rq[rows, 3:] / np.linalg.norm(record.rq[rows, 3:], axis=1, keepdims=True)
         d = directors(q) @ rod.curve.frame(s)
@@ -243,7 +247,15 @@ class Path:
         """(points, 6) n and m at a station, dimensionless."""
         i, _ = self._rows(instance("Path", "station", station, Station, "a station such as rod.end").rod)
         cell, weights = self.rule.locate(self.layout.breaks[i], station.s / station.rod.length)
-        return np.einsum("j,njk->nk", weights, self._contact[:, self._cells(i).start + cell])
+        return np.einsum("j,njk->nk", weights, self._contact_in(self._cells(i).start + cell))
+
+    def _contact_of(self, k):
+        """(elements, nodes of one, 6) n and m at point k, dimensionless."""
+        return self._contact[k]
+
+    def _contact_in(self, cell):
+        """(points, nodes of one, 6) n and m in one element, dimensionless."""
+        return self._contact[:, cell]
 
     def _cells(self, i):
         """Slice of the elements of the i-th rod."""
@@ -259,12 +271,13 @@ class Path:
         first = sum(n * self.degree + 1 for n in self.elements[:i])
         return i, slice(first, first + self.elements[i] * self.degree + 1)
 
-    def _at(self, station, values):
-        """Values (points, nodes, k) at a station, by the element's polynomial."""
+    def _at(self, station, values, rest=None):
+        """Values (points, nodes, k), less those at rest (nodes, k), at a station, by the element's polynomial."""
         i, rows = self._rows(instance("Path", "station", station, Station, "a station such as rod.end").rod)
         cell, weights = self.rule.locate(self.layout.breaks[i], station.s / station.rod.length)
         first = rows.start + cell * self.degree
-        return np.einsum("j,njk->nk", weights, values[:, first : first + self.degree + 1])
+        nodes = slice(first, first + self.degree + 1)
+        return np.einsum("j,njk->nk", weights, values[:, nodes] if rest is None else values[:, nodes] - rest[nodes])
 
     def sample(self, k, rod, x):
         """Between the nodes, by the elements' polynomials, at point k.

@@ -61,3 +61,18 @@ def reference():
     """tests/reference/eccentric_cantilever.json by eta: strong form, 40 digits, confirmed to 2e-11 by collocation."""
     file = Path(__file__).parent / "reference" / "eccentric_cantilever.json"
     return {point["eta"]: point for point in json.loads(file.read_text(encoding="utf-8"))["points"]}
+
+
+@pytest.fixture(scope="session")
+def never_ended(tmp_path_factory):
+    """The folder of a case that ran in one go."""
+    from ended_motions import run
+
+    folder, made = tmp_path_factory.mktemp("whole"), {}
+
+    def of(case):
+        if case not in made:
+            made[case] = run(case, folder / case)
+        return folder / case
+
+    return of

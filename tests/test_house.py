@@ -39,14 +39,17 @@ def test_forms_know_ufl_alone():
 
 
 SCENE = (
-    "checks", "choose", "curves", "damping", "errors", "frames", "initial", "joints", "loads", "materials", "planes", "polylines", "profiles", "quadrature", "rod",
+    "checks", "choose", "curves", "damping", "errors", "frames", "initial", "joints", "likeness", "loads", "materials", "planes", "polylines", "profiles", "quadrature", "rod",
     "scene", "scenefile", "sections", "signals", "splines", "statical", "supports", "ties",
 )  # fmt: skip
 SOLVERS = (
-    "arclength", "chord", "continuation", "dynamics", "eigen", "follow", "interrupts", "linear", "linear_buckling", "locator", "modes", "pace", "problem",
-    "refinement", "snes", "stability", "start", "statics", "tie_rows", "tracing", "track",
+    "arclength", "chord", "continuation", "dynamics", "eigen", "follow", "interrupts", "linear", "linear_buckling", "locator", "modes", "motion", "pace", "problem",
+    "refinement", "resuming", "snes", "stability", "start", "statics", "tie_rows", "tracing", "track",
 )  # fmt: skip
-RESULTS = ("accuracy", "energy_chart", "history", "plot", "ranks", "records", "recovery", "results", "tables", "xdmf")
+RESULTS = (
+    "accuracy", "checkpoints", "energy_chart", "history", "instantfile", "plot", "ranks", "records", "recovery", "results", "runfolder",
+    "stored_history", "tables", "xdmf",
+)  # fmt: skip
 
 
 def test_data_flows_one_way():
@@ -61,7 +64,9 @@ def test_data_flows_one_way():
         "dynamics",
         "linear_buckling",
         "modes",
+        "motion",
         "refinement",
+        "resuming",
         "start",
         "statics",
         "tracing",

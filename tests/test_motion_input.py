@@ -103,7 +103,7 @@ def test_steps_land_on_jumps_and_on_saved_times():
 
 
 def test_a_motion_that_is_lost_keeps_what_it_had(monkeypatch):
-    from cosserat_fenicsx import dynamics
+    from cosserat_fenicsx import motion
     from cosserat_fenicsx.snes import Solved
     from cosserat_fenicsx.steppers.momentum import Momentum
 
@@ -113,7 +113,7 @@ def test_a_motion_that_is_lost_keeps_what_it_had(monkeypatch):
         return whole(self, t, h) if t < 0.45 else Solved(False, 1, "Newton's iterations ran out")
 
     monkeypatch.setattr(Momentum, "step", step)
-    monkeypatch.setattr(dynamics, "_HALVINGS", 2)
+    monkeypatch.setattr(motion, "_HALVINGS", 2)
     with pytest.raises(cf.NotConverged, match="lost at t = 0.5 s, where a step of 0.025 s still fails") as lost:
         cf.simulate(FREE, 1.0, dt=0.1)
     np.testing.assert_allclose(lost.value.path.times, [0, 0.1, 0.2, 0.3, 0.4, 0.5])

@@ -123,6 +123,11 @@ class Moving:
     # -- what steppers and results ask for ---------------------------------------------------------------------------
 
     @property
+    def slots(self):
+        """(n,) the scene's number of every local node."""
+        return self._slots
+
+    @property
     def rate_arrays(self):
         """The local numbers that tell how fast the state changes."""
         return (self.velocity.x.array,)

@@ -81,3 +81,38 @@ class OneStep:
         for now, before in zip(self._rates, rates, strict=True):
             now[:] = before
         self.problem.begin()
+
+    def memory(self):
+        """See `Stepper`."""
+        past = self._past
+        return {
+            "h": np.nan if self._h is None else self._h,
+            "books": np.array([self.work, self.dissipated]),
+            "rates": _numbered(self._rates),
+            "past": {
+                "steps": np.array([h for h, *_ in past]),
+                "states": np.array([state for _, state, *_ in past]),
+                "rates": _numbered(np.array(kind) for kind in zip(*(rates for *_, rates, _ in past), strict=True)),
+                "books": np.array([books for *_, books in past]),
+            },
+            "problem": self.problem.memory(),
+        }
+
+    def recall(self, memory):
+        """See `Stepper`."""
+        self._h = None if np.isnan(memory["h"]) else memory["h"]
+        self.work, self.dissipated = memory["books"].tolist()
+        for i, rate in enumerate(self._rates):
+            rate[:] = memory["rates"][str(i)]
+        past = memory["past"]
+        rates = zip(*past.get("rates", {}).values(), strict=True)
+        books = map(tuple, past["books"].tolist())
+        self._past = [
+            (float(h), state.copy(), [rate.copy() for rate in kinds], book)
+            for h, state, kinds, book in zip(past["steps"], past["states"], rates, books, strict=True)
+        ]
+        self.problem.recall(memory["problem"])
+
+
+def _numbered(arrays):
+    return {str(i): array for i, array in enumerate(arrays)}

@@ -40,3 +40,12 @@ class Stepper(Protocol):
 
     def undo(self):
         """Take the last step back."""
+
+    def memory(self):
+        """All that the steps to come depend on beside the scene and the time: arrays, numbers, and dicts of them.
+
+        With the problem's own (`StepProblem.memory`): a motion that goes on from it has the same digits.
+        """
+
+    def recall(self, memory):
+        """Take back what `memory` gave, after `begin`, on the same scene."""

@@ -150,3 +150,22 @@ class StepProblem:
     def multipliers(self):
         """Reactions of the added equations, on all ranks."""
         return self.ties.everywhere() if self.ties else np.empty(0)
+
+    def memory(self):
+        """This rank's part of what the steps to come depend on; of a tangent that is kept, its entries."""
+        kept = {"x": self.x.array_r.copy(), "state": self._state.copy(), "fresh": bool(self.fresh)}
+        if not self.fresh:
+            rows, columns, values = self.A.getValuesCSR()
+            kept["tangent"] = {"rows": rows, "columns": columns, "values": values}
+        return kept
+
+    def recall(self, memory):
+        """Take back what `memory` gave."""
+        self._state[:] = memory["state"]
+        self.x.array_w[:] = memory["x"]
+        self.set_state(self.x)
+        self.fresh = bool(memory["fresh"])
+        if not self.fresh:
+            tangent = memory["tangent"]
+            self.A.setValuesCSR(tangent["rows"], tangent["columns"], tangent["values"])
+            self.A.assemble()

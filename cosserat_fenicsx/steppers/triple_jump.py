@@ -51,3 +51,11 @@ class TripleJump:
                     inner.undo()
                 return Solved(False, iterations, solved.reason)
         return Solved(True, iterations, "converged")
+
+    def memory(self):
+        """See `Stepper`."""
+        return self._inner.memory()
+
+    def recall(self, memory):
+        """See `Stepper`."""
+        self._inner.recall(memory)

@@ -1,0 +1,84 @@
+"""Motions that are written as they go, and what ends them."""
+
+import os
+import signal
+
+import numpy as np
+import pytest
+from moving_scenes import flying_in_a_plane, flying_in_space
+from test_schemes import everything
+
+import cosserat_fenicsx as cf
+from cosserat_fenicsx import runfolder
+from cosserat_fenicsx.models.moving import Moving
+
+SMALL = {"elements": 4, "degree": 2}
+CASES = {
+    "fixed": (flying_in_space, 5, {"dt": 0.05}),
+    "adaptive": (flying_in_space, 5, {"tol": 1e-2}),
+    "plane": (flying_in_a_plane, 3, {"dt": 0.02, "save_every": 0.25}),
+    "plane, adaptive": (flying_in_a_plane, 1, {"tol": 1e-2, "save_every": 0.1}),
+    "energy": (flying_in_space, 5, {"tol": 1e-1, "scheme": "energy"}),
+    "triple-jump": (flying_in_space, 2, {"dt": 0.05, "scheme": "triple-jump"}),
+    "ties and damping": (everything, 0.5, {"dt": 0.01}),
+}
+
+
+class Stopped(Exception):
+    """What ends a run here."""
+
+
+def stop_at(monkeypatch, step, apart):
+    """The next run ends in the middle of that step, by `Stopped`; `apart` seconds between checkpoints."""
+    accept, taken = Moving.accept, []
+
+    def accept_or_stop(self, h):
+        accept(self, h)
+        taken.append(h)
+        if len(taken) == step:
+            monkeypatch.setattr(Moving, "accept", accept)
+            raise Stopped
+
+    monkeypatch.setattr(Moving, "accept", accept_or_stop)
+    monkeypatch.setattr(runfolder, "APART", apart)
+    monkeypatch.setattr(runfolder, "SELDOM", 0)
+
+
+def run(case, folder=None):
+    make, duration, more = CASES[case]
+    return cf.simulate(make()[1], duration, folder=folder, **SMALL, **more)
+
+
+def rows(folder):
+    """The saved states, as anybody reads them."""
+    return np.load(folder / "instants.npy", mmap_mode="r")
+
+
+def assert_same(one, other):
+    one, other = rows(one), rows(other)
+    assert len(one) == len(other)
+    for name in one.dtype.names:
+        assert (one[name] == other[name]).all(), name
+
+
+def part_of(case, folder, monkeypatch, step=25, apart=0.02):
+    """A run that was stopped; its scene."""
+    stop_at(monkeypatch, step, apart)
+    with pytest.raises(Stopped):
+        run(case, folder)
+    return CASES[case][0]()[1]
+
+
+def kill_in(case, step, folder):
+    """In a process of its own: run a case, and be killed in the middle of a step."""
+    accept, taken = Moving.accept, []
+
+    def accept_or_die(self, h):
+        accept(self, h)
+        taken.append(h)
+        if len(taken) == step:
+            os.kill(os.getpid(), signal.SIGKILL)
+
+    Moving.accept = accept_or_die
+    runfolder.APART, runfolder.SELDOM = 0.05, 0
+    run(case, folder)
