@@ -217,6 +217,7 @@ def spun(q, omega):
 
 def turned_by(dq, q):
     """(.., 3) the inertial rotations 2 vec(dq conj(q))/|q|^2 of changes dq of q, (.., 4) each."""
-    v, dv = q[..., 1:], dq[..., 1:]
-    turned = 2 * (q[..., :1] * dv - dq[..., :1] * v - np.cross(dv, v))
-    return turned / np.einsum("...i,...i->...", q, q)[..., None]
+    a, b, c, d = np.moveaxis(q, -1, 0)
+    da, db, dc, dd = np.moveaxis(dq, -1, 0)
+    turned = a * db - da * b - dc * d + dd * c, a * dc - da * c - dd * b + db * d, a * dd - da * d - db * c + dc * b
+    return np.stack([2 / (a * a + b * b + c * c + d * d) * x for x in turned], axis=-1)

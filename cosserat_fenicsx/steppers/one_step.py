@@ -53,11 +53,16 @@ class OneStep:
         return solved
 
     def _predicted(self, h):
-        """The state at the end of the step by the velocity at its beginning and the last acceleration."""
+        """The state at the end of the step by the velocities at the beginnings of this step and of the last two."""
         ahead = h * self._velocity
         if self._past:
             before, _, (velocity, *_), _ = self._past[-1]
-            ahead += 0.5 * h**2 / before * (self._velocity - velocity)
+            risen = (self._velocity - velocity) / before
+            ahead += 0.5 * h**2 * risen
+            if len(self._past) > 1:
+                earlier, _, (velocity_before, *_), _ = self._past[-2]
+                bent = (risen - (velocity - velocity_before) / earlier) / (before + earlier)
+                ahead += 0.5 * h**2 * (h + before) * bent
         return self._start + ahead
 
     def error(self):
