@@ -1,7 +1,8 @@
 """Newton's method for a step in time: full steps with a tangent that is kept while it serves, over many steps of time.
 
-An iteration with a kept tangent is one residual and one back-substitution, a tenth of one with a fresh tangent.
-PETSc's SNES would ask for one more residual a step, and for norms that are not looked at: a tenth of the time.
+An iteration with a kept tangent is one residual and one back-substitution, a tenth of one with a fresh tangent on a fine
+mesh. PETSc's SNES would ask for one more residual a step, and for norms that are not looked at. (Broyden's updates of
+the kept tangent were tried: as many iterations, and dearer ones.)
 
 Only the increments of the nodes' unknowns are tested: contact forces and reactions have rounding of their own, and the
 residual of a stiff rod has a floor.
@@ -14,13 +15,12 @@ from petsc4py import PETSc
 from cosserat_fenicsx import linear
 from cosserat_fenicsx.snes import EXTERNAL, Solved
 
-#: Newton stops when what remains after an increment, by its contraction, is below this (root mean square, units L, 1)
-#: times h over the unit of time, for velocities, and with them momenta, are off by so much over h. Rounding may leave
-#: more: where increments below the second number shrink no more, that is the end.
-INCREMENT, ROUNDING = 1e-12, 1e-10
-# A kept tangent is made anew where increments shrink by less than the first number, and after a step of more
-# iterations than the second; the larger the system, the more iterations a tangent costs.
-_SMALL_SYSTEM, _LARGE_SYSTEM, _LARGE = (0.05, 4), (0.3, 8), 400
+#: Newton stops when what remains after an increment, by its contraction, is below the first number times the motion in the
+#: step (root mean square, units L, 1), for velocities, and with them momenta, are off by so much; or below the second,
+#: the rounding of positions. A stiff rod's may be larger: where increments below the third shrink no more, that is the end.
+INCREMENT, SMALLEST, ROUNDING = 1e-12, 2e-16, 1e-10
+# What increments shrink by with a fresh tangent.
+_FRESH = 3e-4
 _MOST, _HUGE = 15, 10.0
 
 
@@ -38,8 +38,9 @@ class StepNewton:
         self._comm = problem.model.comm
         motions = self._comm.allreduce(self._motions)
         self._root = math.sqrt(motions)
-        self._slow, self._many = _LARGE_SYSTEM if motions > _LARGE else _SMALL_SYSTEM
+        self._price = motions / (50 + 0.055 * motions)  # of a tangent, in iterations, as measured
         self._step = numbering.vector()
+        self._spent = self._served = 0
         self._begin()
 
     def _begin(self):
@@ -63,8 +64,10 @@ class StepNewton:
         return Solved(again.converged, solved.iterations + again.iterations, again.reason)
 
     def _attempt(self, guess):
-        problem, steps, found = self.problem, [], None
+        problem, found, steps = self.problem, None, []
+        start = problem.x.array_r[: self._motions].copy()
         problem.guess(guess)
+        self._enough = max(SMALLEST, INCREMENT * self._size(problem.x.array_r[: self._motions] - start))
         while found is None:
             problem.function(None, problem.x, problem.b)
             if not self._solve():
@@ -74,9 +77,13 @@ class StepNewton:
             found = self._outcome(steps)
         problem.set_state(problem.x)
         converged = found == "converged"
-        if not converged or len(steps) > self._many:
+        self._spent, self._served = self._spent + len(steps), self._served + 1
+        if not converged or len(steps) * self._served > self._spent:  # this step cost more than the average so far
             problem.fresh = True
         return Solved(converged, len(steps), found)
+
+    def _size(self, moved):
+        return math.sqrt(self._comm.allreduce(float(moved @ moved))) / self._root
 
     def _solve(self):
         """The increment for the residual; False where the tangent is singular."""
@@ -84,6 +91,7 @@ class StepNewton:
         if problem.fresh:
             problem.jacobian(None, problem.x, problem.A, problem.A)
             ksp.setOperators(problem.A)
+            self._spent, self._served = self._price, 0
         try:
             ksp.solve(problem.b, self._step)
         except PETSc.Error as error:  # PETSc counts solutions begun and not ended, up to two
@@ -95,22 +103,22 @@ class StepNewton:
 
     def _outcome(self, steps):
         """Why Newton stops after the last increment, in words; None where it goes on."""
-        moved = self._step.array_r[: self._motions]
-        step = math.sqrt(self._comm.allreduce(float(moved @ moved))) / self._root
+        step = self._size(self._step.array_r[: self._motions])
         steps.append(step)
         if not math.isfinite(step):
             return "the residual is not a number"
         if step > _HUGE:
             return "Newton's steps grew without bound"
         rate = step / steps[-2] if len(steps) > 1 else 1.0
-        enough = INCREMENT * min(1.0, abs(self.problem.h))
         if (
-            step <= enough
-            or (rate < 0.9 and step * rate / (1 - rate) <= enough)
+            step <= self._enough
+            or (rate < 0.9 and step * rate / (1 - rate) <= self._enough)
             or (step <= ROUNDING and rate > 0.5 and len(steps) > 1)
         ):
             return "converged"
         if len(steps) >= _MOST:
             return "Newton's iterations ran out"
-        self.problem.fresh = rate > self._slow and len(steps) > 1
+        if len(steps) > 1:
+            left = math.log(self._enough / step)
+            self.problem.fresh = rate > 0.9 or left / math.log(rate) > self._price + left / math.log(_FRESH)
         return None

@@ -130,9 +130,10 @@ class StepProblem:
 
     def work(self):
         """What loads and supports did in the step from `start` to the state, dimensionless, over all ranks."""
-        model, eta = self.model, self.load_factor
-        self.numbering.from_local(model.passed(), self._vector)
-        done = eta * self._loads.dot(self._vector)
+        model, eta, done = self.model, self.load_factor, 0.0
+        if self._live or self._loads.norm() > 0:
+            self.numbering.from_local(model.passed(), self._vector)
+            done = eta * self._loads.dot(self._vector)
         if self._live:
             self._assemble(self._live, self._known)
             done += eta * self._known.dot(self._vector)
