@@ -184,12 +184,11 @@ class MovingSpatial(Moving, SpatialModel):
 
     def passed(self):
         """See `Moving`."""
-        nodal = self._nodal
-        now, before = self.state.x.array[nodal], self.start.x.array[nodal]
-        work = np.zeros_like(self.state.x.array)
-        work[nodal[:, :3]] = now[:, :3] - before[:, :3]
-        work[nodal[:, 4:]] = turned_by(now[:, 3:] - before[:, 3:], (now[:, 3:] + before[:, 3:]) / 2)
-        return work
+        now, before = (function.x.array.reshape(-1, 7) for function in (self.state, self.start))  # node by node
+        work = now - before
+        work[:, 4:] = turned_by(work[:, 3:], (now[:, 3:] + before[:, 3:]) / 2)
+        work[:, 3] = 0.0
+        return work.ravel()
 
     def set_velocity(self, linear, angular):
         """See `Moving`."""
