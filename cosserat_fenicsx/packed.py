@@ -47,7 +47,9 @@ class Packed:
     def refresh(self):
         """Pack everything anew; to be called when a scene's numbers were filled in."""
         self._coefficients = self._pack()
-        views = [(numbers, self._coefficients[key][:, run], which, slow) for numbers, key, run, which, slow in self._places]
+        views = [
+            (numbers, self._coefficients[key][:, run], which, slow) for numbers, key, run, which, slow in self._places
+        ]
         self._views, self._slow = ([view[:3] for view in views if view[3] == slow] for slow in (False, True))
 
     def catch_up(self):

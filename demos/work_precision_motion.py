@@ -24,9 +24,7 @@ from work_precision import LIMITS, SAMPLES, Panel, Record, measure, start
 from work_precision_chart import frontier
 from work_precision_table import answered, cheapest, median, milliseconds
 
-PANEL = Panel(
-    motions.PEERS, motions.problems, motions.error, motions.configurations, motions.kind, motions.model
-)
+PANEL = Panel(motions.PEERS, motions.problems, motions.error, motions.configurations, motions.kind, motions.model)
 ACCURACIES = (1e-2, 1e-3, 1e-4)
 ASKED_AT, ASKED = 1e-3, 1 / 2  # the error of the ratio that was asked for, and how large it may be
 BUDGET, QUICK_LIMIT = 5 * 60.0, 5.0  # s of measuring; of a request in a quick run
@@ -99,9 +97,15 @@ def draw(rows, file):
         for name, members in _groups(answered(rows, problem)).items():
             ours, kind = members[0]["peer"] == OWN, members[0]["kind"]
             scheme = kind.removesuffix(", by tol") if ours else members[0]["configuration"]["node"]
-            others = [s for s in sorted({r["configuration"].get("scheme", "momentum") for r in rows}) if s not in _COLOURS]
+            others = [
+                s for s in sorted({r["configuration"].get("scheme", "momentum") for r in rows}) if s not in _COLOURS
+            ]
             colours = {**_COLOURS, **dict(zip(others, _OTHERS, strict=False)), **_THEIRS}
-            style = {"color": colours.get(scheme, "0.4"), "marker": "o" if ours else "s", "ls": ":" if "tol" in kind else "-"}
+            style = {
+                "color": colours.get(scheme, "0.4"),
+                "marker": "o" if ours else "s",
+                "ls": ":" if "tol" in kind else "-",
+            }
             axes.plot(*_points(members), style["marker"], color=style["color"], ms=3, alpha=0.25, mew=0)
             (seen[name],) = axes.plot(*_points(frontier(members)), lw=2.2 if ours else 1.5, ms=5, label=name, **style)
         _, _, share = ratio(rows, problem)

@@ -4,6 +4,8 @@ The sample is one call of SolveDynamic from rest; the model is built and assembl
 holds two nodes together, since a node's frame is that of its section at rest.
 """
 
+from itertools import pairwise
+
 import exudyn as exu
 import numpy as np
 from exudyn import itemInterface as item
@@ -19,7 +21,7 @@ def prepare(problem, configuration):
     container = exu.SystemContainer()
     mbs = container.AddSystem()
     rods = [_rod(mbs, problem, configuration, line) for line in problem["lines"]]
-    for (nodes, frame), (others, other_frame) in zip(rods, rods[1:], strict=False):
+    for (nodes, frame), (others, other_frame) in pairwise(rods):
         ends = [mbs.AddMarker(item.MarkerNodeRigid(nodeNumber=n)) for n in (nodes[-1], others[0])]
         turned = {"rotationMarker0": frame.T, "rotationMarker1": other_frame.T}
         mbs.AddObject(item.ObjectJointGeneric(markerNumbers=ends, constrainedAxes=[1] * 6, **turned))
@@ -94,6 +96,8 @@ def _load(mbs, problem, node):
 
 def _clamp(mbs, node, kind):
     ground = mbs.AddMarker(item.MarkerNodeCoordinate(nodeNumber=mbs.AddNode(item.NodePointGround()), coordinate=0))
-    for coordinate in range(6) if kind == "LG" else (0, 1, 2, 4, 5, 6):  # the scalar Euler parameter has its own equation
+    for coordinate in (
+        range(6) if kind == "LG" else (0, 1, 2, 4, 5, 6)
+    ):  # the scalar Euler parameter has its own equation
         held = mbs.AddMarker(item.MarkerNodeCoordinate(nodeNumber=node, coordinate=coordinate))
         mbs.AddObject(item.ObjectConnectorCoordinate(markerNumbers=[ground, held]))

@@ -1,5 +1,7 @@
 """This package's motions as a peer's; the sample is the whole call of `simulate` and the query of the ends."""
 
+from itertools import pairwise
+
 import numpy as np
 
 import cosserat_fenicsx as cf
@@ -10,7 +12,7 @@ def scene_of(problem):
     EA, GA, EI, GJ = (problem[key] for key in ("EA", "GA", "EI", "GJ"))
     section = cf.Stiffness((GA, GA), EA, (EI, EI), GJ, mass=problem["mass"], inertia=tuple(problem["inertia"]))
     rods = [cf.Rod(cf.Line(*line), section, name=f"rod {i}") for i, line in enumerate(problem["lines"])]
-    joints = [cf.Joint(a.end, b.start) for a, b in zip(rods, rods[1:], strict=False)]
+    joints = [cf.Joint(a.end, b.start) for a, b in pairwise(rods)]
     place = getattr(rods[0], problem["loaded"])
     loads = [
         load(place, cf.Triangle(problem[key], *problem["rise"]))
