@@ -145,3 +145,4 @@ class Energy(OneStep):
     """See `protocol.Stepper`."""
 
     forms, problem_class = "energy", TurnedStepProblem
+    coarseness = 4.0  # averaged directors are shorter than one

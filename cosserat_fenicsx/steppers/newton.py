@@ -21,6 +21,8 @@ from cosserat_fenicsx.snes import EXTERNAL, Solved
 INCREMENT, SMALLEST, ROUNDING = 1e-12, 2e-16, 1e-10
 # What increments shrink by with a fresh tangent.
 _FRESH = 3e-4
+# For so many steps each begins with a fresh tangent after one that did not outlive its step.
+_ANEW = 8
 _MOST, _HUGE = 15, 10.0
 
 
@@ -40,7 +42,7 @@ class StepNewton:
         self._root = math.sqrt(motions)
         self._price = motions / (50 + 0.055 * motions)  # of a tangent, in iterations, as measured
         self._step = numbering.vector()
-        self._spent = self._served = 0
+        self._spent = self._served = self._anew = 0
         self._begin()
 
     def _begin(self):
@@ -65,6 +67,7 @@ class StepNewton:
 
     def _attempt(self, guess):
         problem, found, steps = self.problem, None, []
+        lived, began_fresh = self._served, problem.fresh
         start = problem.x.array_r[: self._motions].copy()
         problem.guess(guess)
         self._enough = max(SMALLEST, INCREMENT * self._size(problem.x.array_r[: self._motions] - start))
@@ -78,8 +81,11 @@ class StepNewton:
         problem.set_state(problem.x)
         converged = found == "converged"
         self._spent, self._served = self._spent + len(steps), self._served + 1
-        if not converged or len(steps) * self._served > self._spent:  # this step cost more than the average so far
-            problem.fresh = True
+        if self._served == 1 and lived == 1 and not began_fresh:  # the tangent did not outlive its step
+            self._anew = _ANEW
+        # anew, too, where this step cost more than the average so far
+        problem.fresh = not converged or self._anew > 0 or len(steps) * self._served > self._spent
+        self._anew -= problem.fresh and self._anew > 0
         return Solved(converged, len(steps), found)
 
     def _size(self, moved):

@@ -14,10 +14,13 @@ class OneStep:
     """See `protocol.Stepper`."""
 
     order, adapts = 2, True
+    #: error of a step over that of the trapezoidal rule, as measured
+    coarseness = 1.0
 
     def __init__(self, problem):
         self.problem, self._newton = problem, StepNewton(problem)
         model = problem.model
+        self._comm = model.comm
         self._state, self._start, self._velocity = (f.x.array for f in (model.state, model.start, model.velocity))
         self._rates = model.rate_arrays
 
@@ -53,17 +56,14 @@ class OneStep:
         return solved
 
     def _predicted(self, h):
-        """The state at the end of the step by the velocities at the beginnings of this step and of the last two."""
-        ahead = h * self._velocity
-        if self._past:
-            before, _, (velocity, *_), _ = self._past[-1]
-            risen = (self._velocity - velocity) / before
-            ahead += 0.5 * h**2 * risen
-            if len(self._past) > 1:
-                earlier, _, (velocity_before, *_), _ = self._past[-2]
-                bent = (risen - (velocity - velocity_before) / earlier) / (before + earlier)
-                ahead += 0.5 * h**2 * (h + before) * bent
-        return self._start + ahead
+        """The state at the end of the step, by the extrapolation that would have foretold the last step best."""
+        now = (h, self._start, self._velocity)
+        known = [(step, state, rates[0]) for step, state, rates, _ in self._past[-3:]]
+        guesses = _extrapolated([*known, now])
+        if len(known) < 3:
+            return guesses[-1]
+        missed = [np.square(guess - self._start).sum() for guess in _extrapolated(known)]
+        return guesses[int(np.argmin(self._comm.allreduce(np.array(missed))))]
 
     def error(self):
         """See `Stepper`: h^3/12 times the third derivative of the cubic through the last four states.
@@ -77,7 +77,7 @@ class OneStep:
         times = np.concatenate([[0.0], np.cumsum(steps)])[::_APART]
         weights = [1 / np.prod([a - b for b in times if b != a]) for a in times]
         third = sum(w * x for w, x in zip(weights, states, strict=True))  # a sixth of the derivative
-        return 0.5 * steps[-1] ** 3 * self.problem.model.largest_of(third, TURNS)
+        return self.coarseness * 0.5 * steps[-1] ** 3 * self.problem.model.largest_of(third, TURNS)
 
     def undo(self):
         """See `Stepper`."""
@@ -86,3 +86,19 @@ class OneStep:
         for now, before in zip(self._rates, rates, strict=True):
             now[:] = before
         self.problem.begin()
+
+
+def _extrapolated(steps):
+    """States at the end of the last of some steps (h, state and velocity at its beginning), by its velocity alone, and
+    by the velocities of one and of two steps before too."""
+    (h, state, velocity), *earlier = steps[::-1]
+    guesses = [state + h * velocity]
+    if earlier:
+        (h1, _, velocity1), *earlier = earlier
+        risen = (velocity - velocity1) / h1
+        guesses.append(guesses[-1] + 0.5 * h**2 * risen)
+        if earlier:
+            h2, _, velocity2 = earlier[0]
+            bent = (risen - (velocity1 - velocity2) / h2) / (h1 + h2)
+            guesses.append(guesses[-1] + 0.5 * h**2 * (h + h1) * bent)
+    return guesses
