@@ -61,6 +61,7 @@ random: setup
 # Goes on where it was broken off; `$(PYTHON) demos/work_precision.py --fresh` forgets the samples that are there.
 work-precision: setup
 	$(PYTHON) demos/work_precision.py
+	$(PYTHON) demos/work_precision_motion.py
 
 setup: .venv/.stamp
 

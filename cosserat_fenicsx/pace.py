@@ -38,7 +38,7 @@ class Fixed:
 class Adaptive:
     """Steps whose local errors add up to `tol` over the duration.
 
-    They change by factors of two alone, and seldom: each change costs a tangent.
+    They change where a change pays: each costs a tangent.
 
     Args:
         tol: see `simulate`; duration: s.
@@ -46,8 +46,11 @@ class Adaptive:
 
     #: the first step after the start or a jump, over the one that would do, and over the duration
     _FIRST, _SHORTEST = 1 / 8, 1e-4
-    #: an error above the first share of what is allowed halves the steps to come, below the second it doubles them
-    _LARGE, _SMALL = 0.9, 0.15
+    #: share of the error that is allowed that steps aim at; the error over the step goes with the square of the step
+    _AIM = 0.5
+    #: steps stay where the next would be longer by less than the first factor and shorter by less than the second; at once
+    #: they grow by no more than the third and shrink by no more than the fourth
+    _LONGER, _SHORTER, _GROW, _SHRINK = 1.2, 0.9, 4.0, 0.25
 
     def __init__(self, tol, duration):
         self._rate, self._dt, self._longest = tol / duration, duration * self._SHORTEST, duration / 20
@@ -62,10 +65,11 @@ class Adaptive:
         if error is None:
             return True
         allowed = self._rate * h
-        if error > self._LARGE * allowed:
-            self._dt = min(self._dt, h / 2 if error < 8 * allowed else h / 4)
-        elif error < self._SMALL * allowed and h > 0.6 * self._dt:
-            self._dt = min(2 * self._dt, self._longest)
+        factor = min(self._GROW, max(self._SHRINK, math.sqrt(self._AIM * allowed / max(error, 1e-300))))
+        if factor < self._SHORTER:
+            self._dt = min(self._dt, factor * h)
+        elif factor > self._LONGER and h > self._dt / self._LONGER:
+            self._dt = min(factor * h, self._longest)
         return error <= 2 * allowed
 
     def failed(self, h):

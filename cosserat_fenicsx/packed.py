@@ -14,17 +14,19 @@ class Packed:
 
     Args:
         form: a compiled form.
-        moving: the Functions whose numbers change between assemblies; all others are taken as they are at `refresh`.
+        moving: the Functions whose numbers change between assemblies.
+        slow: those whose numbers change now and then, and are taken as they are at `catch_up`; all others at `refresh`.
     """
 
-    def __init__(self, form, moving):
+    def __init__(self, form, moving, slow=()):
         self._kernel = compat.kernel(form)
-        self._places = []  # (numbers, key, columns, which number each entry is)
-        for function in moving:
-            self._find(function.x.array)
+        self._places = []  # (numbers, key, columns, which number each entry is, whether it is slow)
+        for functions, is_slow in ((moving, False), (slow, True)):
+            for function in functions:
+                self._find(function.x.array, is_slow)
         self.refresh()
 
-    def _find(self, numbers):
+    def _find(self, numbers, is_slow):
         """Where the numbers of a Function are packed: seen by packing their own indices, and then others."""
         kept, index = numbers.copy(), np.arange(len(numbers), dtype=float)
         numbers[:] = index
@@ -37,7 +39,7 @@ class Packed:
             for run in np.split(columns, np.flatnonzero(np.diff(columns) > 1) + 1):
                 if len(run):
                     which = array[:, run].astype(np.intp)
-                    self._places.append((numbers, key, slice(run[0], run[-1] + 1), which))
+                    self._places.append((numbers, key, slice(run[0], run[-1] + 1), which, is_slow))
 
     def _pack(self):
         return {key: array.copy() for key, array in cpp.fem.pack_coefficients(self._kernel).items()}
@@ -45,7 +47,15 @@ class Packed:
     def refresh(self):
         """Pack everything anew; to be called when a scene's numbers were filled in."""
         self._coefficients = self._pack()
-        self._views = [(numbers, self._coefficients[key][:, run], which) for numbers, key, run, which in self._places]
+        views = [
+            (numbers, self._coefficients[key][:, run], which, slow) for numbers, key, run, which, slow in self._places
+        ]
+        self._views, self._slow = ([view[:3] for view in views if view[3] == slow] for slow in (False, True))
+
+    def catch_up(self):
+        """Take the numbers of the slow Functions."""
+        for numbers, view, which in self._slow:
+            view[...] = numbers[which]
 
     def _renew(self):
         for numbers, view, which in self._views:

@@ -244,6 +244,15 @@ def at(item, t):
     return dataclasses.replace(item, **now, jumps=()) if now else item
 
 
+def jumps_at(signal, t, until):
+    """Whether a signal's value jumps at the time t (s), or its slope alone; `until` tells what is a short time."""
+
+    def rise(apart):
+        return np.abs(np.subtract(signal(t + apart), signal(t - apart))).max()
+
+    return bool(rise(1e-9 * until) > 0.75 * rise(2e-9 * until))
+
+
 def sample_times(item, until):
     """Times (s) up to `until` that stand for all where a load or a support depends on time: its jumps, between them,
     and spread over orders of magnitude; the time 0 where it does not."""

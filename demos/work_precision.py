@@ -17,7 +17,7 @@ import argparse
 import json
 import random
 import time
-from collections import Counter
+from collections import Counter, namedtuple
 from pathlib import Path
 
 import work_precision_chart as chart
@@ -39,15 +39,22 @@ SLOW = 0.5  # s: from here on there is no warm-up run, and no repetition where t
 BUDGET = 24 * 60.0  # s of measuring; a round that would begin later is left out, and the table says so
 
 
+#: What is measured: peers, problems, how their errors are told, the configurations of a peer, and what these are called.
+Panel = namedtuple("Panel", "peers problems error configurations kind model")
+STATICS = Panel(PEERS, problems, error, configurations, kind, model)
+
+
 class Record:
     """What was measured so far, in a file that is whole at any time.
 
     Args:
         file: out/work_precision.json.
         fresh: begin anew.
+        panel: default STATICS.
     """
 
-    def __init__(self, file, fresh=False):
+    def __init__(self, file, fresh=False, panel=None):
+        self.panel = panel or STATICS
         self.file, self.rows, self.spent, self._saved = file, {}, 0.0, 0.0
         self.about = {"machine": record(), "seed": SEED, "samples": SAMPLES, "limits_s": LIMITS}
         self.missing, self.waits, self.versions = {}, [], {}
@@ -57,7 +64,7 @@ class Record:
     def _continue(self, before):
         machine = before["about"]["machine"]
         same = all(machine.get(key) == self.about["machine"][key] for key in ("cpu", "platform"))
-        prints = {peer: fingerprint(peer) for peer in PEERS}
+        prints = {peer: fingerprint(peer) for peer in self.panel.peers}
         if not same or any(row["fingerprint"] != prints[row["peer"]] for row in before["samples"]):
             print(f"{self.file}: from another machine or other sources, so all is measured anew", flush=True)
             return  # what is compared belongs to one run
@@ -73,10 +80,10 @@ class Record:
         """The row of a configuration, made where there is none."""
         key = self.key(problem, peer, configuration)
         if key not in self.rows:
-            name, spatial = kind(peer, configuration)
+            name, spatial = self.panel.kind(peer, configuration)
             self.rows[key] = {
                 "problem": problem, "peer": peer, "kind": name, "spatial": spatial, "configuration": configuration,
-                "model": model(peer, configuration), "fingerprint": fingerprint(peer),
+                "model": self.panel.model(peer, configuration), "fingerprint": fingerprint(peer),
                 "seconds": [], "error": None, "failed": None,
             }  # fmt: skip
         return self.rows[key]
@@ -110,7 +117,7 @@ def start(peers, install, found):
 
 def sample(peer, row, found, wanted, limits):
     """More samples of a row, or why there are none."""
-    problem = problems()[row["problem"]]
+    problem = found.panel.problems()[row["problem"]]
     slow = bool(row["seconds"]) and min(row["seconds"]) > SLOW
     cold = row["peer"] in SLOW_PEERS
     began = time.monotonic()
@@ -125,7 +132,7 @@ def sample(peer, row, found, wanted, limits):
         row["failed"] = answer["failed"]
     else:
         row["seconds"] += answer["seconds"]
-        row["error"] = error(row["problem"], row["model"], answer["tip"])
+        row["error"] = found.panel.error(row["problem"], row["model"], answer["tip"])
         row["failed"] = None
     if "versions" in answer:
         found.versions[peer.name] = answer["versions"]
@@ -155,7 +162,7 @@ def measure(started, names, found, *, quick, wanted, limits, budget):
         found.row(name, peer, configuration)
         for peer in started
         for name in names
-        for configuration in configurations(peer, name, quick)
+        for configuration in found.panel.configurations(peer, name, quick)
     ]
     columns = TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn()
     with Progress(*columns) as bar:

@@ -80,3 +80,14 @@ def test_scaling_quick(tmp_path):
 
     rows = scaling.main(sizes=(4, 16, 64), out=tmp_path)
     assert rows[:, 0].tolist() == [112, 448, 1792] and (rows[:, 1:] > 0).all()
+
+
+@pytest.mark.serial
+def test_steps_quick(tmp_path):
+    """The models and schemes move alike; a kept tangent serves most of the steps. What it costs is for the command to say."""
+    import steps
+
+    found = steps.main(runs=1, duration=0.2, out=tmp_path)
+    tips = [history.position(history.scene.rods[0].start)[-1] for _, _, history in found]
+    assert np.ptp(tips, axis=0).max() < 1e-6 and abs(tips[0][0]) > 1e-3
+    assert all(iterations < 6 for _, iterations, _ in found)

@@ -56,6 +56,20 @@ def test_adaptive_steps_keep_their_promise():
         assert np.linalg.norm(history.position(station)[-1] - expected) < 1e-3 * rod.length
     assert {2.5, 5.0} <= set(history.times) and np.diff(history.times).max() > 5 * np.diff(history.times).min()
     assert np.diff(history.times).min() > 0 and len(history) == history.steps[-1] + 1
+    assert history.steps[-1] < 800  # 600 equal steps are as accurate
+
+
+def test_where_a_load_bends_steps_stay_and_where_it_jumps_they_begin_anew():
+    _, scene = spaghetti(
+        lambda rod: cf.Force(rod.start, cf.Table((0, 1, 1.5, 2), [(0, 0, 0), (9, 0, 0), (9, 5, 0), (0, 5, 0)]))
+    )
+    steps = np.diff(cf.simulate(scene, 2, tol=1e-3, elements=4, degree=2).times)
+    after = np.cumsum(steps)[:-1].searchsorted([1 - 1e-9, 1.5 - 1e-9])
+    assert (steps[after + 1] > 0.8 * steps[after]).all()
+    _, scene = spaghetti(lambda rod: cf.Force(rod.start, cf.Step((9, 0, 0), 0, 1)))
+    steps = np.diff(cf.simulate(scene, 2, tol=1e-3, elements=4, degree=2).times)
+    after = np.cumsum(steps).searchsorted(1 - 1e-9)
+    assert steps[after + 1] < 0.2 * steps[after]
 
 
 def test_a_step_that_fails_is_halved():

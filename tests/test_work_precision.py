@@ -44,6 +44,26 @@ def test_quick(tmp_path, capsys):
         assert (tmp_path / f"work_precision_quick_{name}.png").stat().st_size > 20000
 
 
+def test_quick_motion(tmp_path, capsys):
+    """Every scheme comes as near to the truths as its step allows; Exudyn takes part where it is installed."""
+    import work_precision_motion
+    from peers.environments import OWN
+
+    from cosserat_fenicsx.steppers import SCHEMES
+
+    found = work_precision_motion.main(out=tmp_path, quick=True)
+    rows = list(found.rows.values())
+    own = [row for row in rows if row["peer"] == OWN]
+    assert {row["configuration"]["scheme"] for row in own} == set(SCHEMES)
+    bounds = {"momentum": 2.5e-3, "energy": 1e-2, "triple-jump": 6e-4}
+    assert all(row["error"] < bounds.get(row["configuration"]["scheme"], 5e-2) for row in own), own
+    theirs = [row for row in rows if row["peer"] != OWN]
+    assert ("Exudyn" in found.missing) != bool(theirs)
+    assert all(row["failed"] or row["error"] < 0.1 for row in theirs), theirs
+    assert (tmp_path / "work_precision_motion_quick.png").stat().st_size > 20000
+    assert "| Flying spaghetti in space, ends at t = 10 s | cosserat_fenicsx: energy |" in capsys.readouterr().out
+
+
 def test_broken_off_run_goes_on(tmp_path, monkeypatch):
     """Samples are kept, those of other sources forgotten; an interruption says how to go on."""
     import work_precision
@@ -52,7 +72,8 @@ def test_broken_off_run_goes_on(tmp_path, monkeypatch):
     file = tmp_path / "work_precision.json"
     monkeypatch.setattr(work_precision, "waits", lambda *_: [])
     few = [{"model": "determinate", "formulation": "mixed", "degree": 2, "elements": n} for n in (1, 2)]
-    monkeypatch.setattr(work_precision, "configurations", lambda *_: few)
+    panel = work_precision.STATICS._replace(configurations=lambda *_: few)
+    monkeypatch.setattr(work_precision, "STATICS", panel)
     run = {"out": tmp_path, "peers": (OWN,), "names": ("single",)}
 
     with monkeypatch.context() as patch:

@@ -47,16 +47,17 @@ class CompiledForms:
     weights: np.ndarray
 
 
-def compile_all(model, residual, tangent, dead, seconds, *, fields=None, advance=None, force=None):
-    """The `CompiledForms` of UFL forms and expressions; of `seconds` the symmetric parts count."""
+def compile_all(model, residual, tangent, dead, seconds, *, fields=None, advance=None, force=None, compiled=fem.form):
+    """The `CompiledForms` of UFL forms and expressions; of `seconds` the symmetric parts count. `compiled` makes residual
+    and tangent."""
     seconds = [0.5 * (second + ufl.adjoint(second)) for second in seconds]
     for form in (residual, tangent, *seconds, dead, force):
         if form is not None:
             form.signature()
     points, weights = basix.make_quadrature(basix.CellType.interval, 2 * model.shape.points - 1)
     return CompiledForms(
-        fem.form(residual),
-        fem.form(tangent),
+        compiled(residual),
+        compiled(tangent),
         _unless_none(fem.form, dead),
         tuple(fem.form(second) for second in seconds),
         _unless_none(lambda a: fem.Expression(a, points), fields),

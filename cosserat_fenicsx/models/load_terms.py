@@ -21,7 +21,7 @@ class LoadTerms:
     """
 
     def __init__(self, rods, shape):
-        self._rods, self._shape = rods, shape
+        self._rods, self._shape, self._ends = rods, shape, {}
         self.terms = [(work, place, [self._function(place) for _ in range(n)]) for work, place, n in shape.terms]
 
     def _function(self, place):
@@ -72,15 +72,22 @@ class LoadTerms:
 
     def _at_end(self, function, rod, vertex, value, unit, sizes):
         """Put a point value on the one element that answers for an element end."""
+        if (rod, vertex) not in self._ends:
+            self._ends[rod, vertex] = self._end(function, rod, vertex)
+        dof, element = self._ends[rod, vertex]
+        if dof is not None:
+            # the rule at the ends weighs each by half the element; arms are geometry, not densities
+            density = value if unit == "length" else value * 2 / sizes[element]
+            function.x.array.reshape(-1, 3)[dof] = density
+
+    def _end(self, function, rod, vertex):
+        """The local number of an element end in a term's Functions and the scene's of the element; None on other ranks."""
         inner = min(vertex, self._shape.counts[rod] - 1)
         cell = np.flatnonzero((self._rods.cell_rod == rod) & (self._rods.cell_inner == inner))
         if len(cell) == 0:
-            return
+            return None, None
         end = int(vertex > inner) ^ int(self._rods.reversed[cell[0]])
-        dof = compat.cell_nodes(function.function_space)[cell[0], end]
-        # the rule at the ends weighs each by half the element; arms are geometry, not densities
-        density = value if unit == "length" else value * 2 / sizes[self._rods.cells[cell[0]]]
-        function.x.array.reshape(-1, 3)[dof] = density
+        return compat.cell_nodes(function.function_space)[cell[0], end], self._rods.cells[cell[0]]
 
 
 def _densities(members, scene, layout, scales, rule, t):

@@ -189,12 +189,11 @@ class MovingSpatial(Moving, SpatialModel):
 
     def passed(self):
         """See `Moving`."""
-        nodal = self._nodal
-        now, before = self.state.x.array[nodal], self.start.x.array[nodal]
-        work = np.zeros_like(self.state.x.array)
-        work[nodal[:, :3]] = now[:, :3] - before[:, :3]
-        work[nodal[:, 4:]] = turned_by(now[:, 3:] - before[:, 3:], (now[:, 3:] + before[:, 3:]) / 2)
-        return work
+        now, before = (function.x.array.reshape(-1, 7) for function in (self.state, self.start))  # node by node
+        work = now - before
+        work[:, 4:] = turned_by(work[:, 3:], (now[:, 3:] + before[:, 3:]) / 2)
+        work[:, 3] = 0.0
+        return work.ravel()
 
     def set_velocity(self, linear, angular):
         """See `Moving`."""
@@ -222,6 +221,7 @@ def spun(q, omega):
 
 def turned_by(dq, q):
     """(.., 3) the inertial rotations 2 vec(dq conj(q))/|q|^2 of changes dq of q, (.., 4) each."""
-    v, dv = q[..., 1:], dq[..., 1:]
-    turned = 2 * (q[..., :1] * dv - dq[..., :1] * v - np.cross(dv, v))
-    return turned / np.einsum("...i,...i->...", q, q)[..., None]
+    a, b, c, d = np.moveaxis(q, -1, 0)
+    da, db, dc, dd = np.moveaxis(dq, -1, 0)
+    turned = a * db - da * b - dc * d + dd * c, a * dc - da * c - dd * b + db * d, a * dd - da * d - db * c + dc * b
+    return np.stack([2 / (a * a + b * b + c * c + d * d) * x for x in turned], axis=-1)

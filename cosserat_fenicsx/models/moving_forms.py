@@ -3,7 +3,6 @@
 from dataclasses import dataclass
 
 import ufl
-from dolfinx import fem
 
 from cosserat_fenicsx import compat
 from cosserat_fenicsx.forms import equilibrium, inertia
@@ -118,5 +117,6 @@ def compile_motion(model, residual, tangent, dead, fields, others):
     for form in others.values():
         if form is not None:
             form.signature()
-    steady = compile_all(model, residual, tangent, dead, [], fields=fields)
-    return MotionForms(**vars(steady), **{name: form and fem.form(form) for name, form in others.items()})
+    made = compat.form_for_speed
+    steady = compile_all(model, residual, tangent, dead, [], fields=fields, compiled=made)
+    return MotionForms(**vars(steady), **{name: form and made(form) for name, form in others.items()})

@@ -74,6 +74,8 @@ class Numbering:
         """How values move between the solver's vector and dolfinx's local numbers."""
         self._free = np.flatnonzero(self.rows >= 0)
         self._of_free = self.rows[self._free]
+        mine = (self._of_free >= self.first) & (self._of_free < self.first + self.size)
+        self._mine, self._of_mine = self._free[mine], self._of_free[mine] - self.first
         self._serial = self.comm.size == 1
         self._shared = shared
         if not self._serial:
@@ -98,11 +100,9 @@ class Numbering:
 
     def from_local(self, numbers, x):
         """The other way: take unknowns from local numbers; multipliers become zero."""
-        first = self.first
-        mine = (self._of_free >= first) & (self._of_free < first + self.size)
         array = x.array_w
         array[:] = 0.0
-        array[self._of_free[mine] - first] = numbers[self._free[mine]]
+        array[self._of_mine] = numbers[self._mine]
 
     def add_up(self, numbers, b):
         """Sum local contributions, of all ranks and joined nodes, into a solver's vector."""

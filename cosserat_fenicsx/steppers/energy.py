@@ -43,6 +43,9 @@ class TurnedStepProblem(StepProblem):
         if forms.live_tangent is not None:
             self._live_matrix = numbering.matrix(model.cell_dofs, np.empty(0, dtype=np.int64))
 
+    def _kind(self):
+        return "general"  # a product of matrices is not stored by blocks
+
     def _ends(self):
         return (*super()._ends(), self.model.turning)
 
@@ -56,8 +59,9 @@ class TurnedStepProblem(StepProblem):
     def _pack(self):
         super()._pack()
         if self.model.forms.live_tangent is not None:
-            moving = (*self._ends(), *self.model.moving_loads)
-            self._live_tangent = Packed(self.model.forms.live_tangent, moving)
+            state, *beginning = self._ends()
+            slow = (*beginning, *self.model.moving_loads)
+            self._live_tangent = Packed(self.model.forms.live_tangent, (state,), slow)
 
     def _of_nodes(self, x):
         """(nodes, 4) q of the free nodes of this rank."""
@@ -92,6 +96,7 @@ class TurnedStepProblem(StepProblem):
             return
         self.fresh = False
         self._raw.zeroEntries()
+        self._tangent.catch_up()
         self._tangent.add_to_matrix(self._raw)
         self._raw.assemble()
         blocks = np.zeros((self._nodes, 4, 4))
@@ -103,6 +108,7 @@ class TurnedStepProblem(StepProblem):
         self._fill(P, blocks, 0.0, _ADD)
         if self._live_tangent:
             self._live_matrix.zeroEntries()
+            self._live_tangent.catch_up()
             self._live_tangent.add_to_matrix(self._live_matrix)
             self._live_matrix.assemble()
             P.axpy(-self.load_factor, self._live_matrix, _SAME)
@@ -139,3 +145,4 @@ class Energy(OneStep):
     """See `protocol.Stepper`."""
 
     forms, problem_class = "energy", TurnedStepProblem
+    coarseness = 4.0  # averaged directors are shorter than one

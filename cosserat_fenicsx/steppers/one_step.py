@@ -14,10 +14,13 @@ class OneStep:
     """See `protocol.Stepper`."""
 
     order, adapts = 2, True
+    #: error of a step over that of the trapezoidal rule, as measured
+    coarseness = 1.0
 
     def __init__(self, problem):
         self.problem, self._newton = problem, StepNewton(problem)
         model = problem.model
+        self._comm = model.comm
         self._state, self._start, self._velocity = (f.x.array for f in (model.state, model.start, model.velocity))
         self._rates = model.rate_arrays
 
@@ -25,6 +28,7 @@ class OneStep:
         """See `Stepper`."""
         self._h = None
         self.work = self.dissipated = 0.0
+        self._newton.begin()
         self.jump()
 
     def jump(self):
@@ -53,12 +57,14 @@ class OneStep:
         return solved
 
     def _predicted(self, h):
-        """The state at the end of the step by the velocity at its beginning and the last acceleration."""
-        ahead = h * self._velocity
-        if self._past:
-            before, _, (velocity, *_), _ = self._past[-1]
-            ahead += 0.5 * h**2 / before * (self._velocity - velocity)
-        return self._start + ahead
+        """The state at the end of the step, by the extrapolation that would have foretold the last step best."""
+        now = (h, self._start, self._velocity)
+        known = [(step, state, rates[0]) for step, state, rates, _ in self._past[-3:]]
+        guesses = _extrapolated([*known, now])
+        if len(known) < 3:
+            return guesses[-1]
+        missed = [np.square(guess - self._start).sum() for guess in _extrapolated(known)]
+        return guesses[int(np.argmin(self._comm.allreduce(np.array(missed))))]
 
     def error(self):
         """See `Stepper`: h^3/12 times the third derivative of the cubic through the last four states.
@@ -72,7 +78,7 @@ class OneStep:
         times = np.concatenate([[0.0], np.cumsum(steps)])[::_APART]
         weights = [1 / np.prod([a - b for b in times if b != a]) for a in times]
         third = sum(w * x for w, x in zip(weights, states, strict=True))  # a sixth of the derivative
-        return 0.5 * steps[-1] ** 3 * self.problem.model.largest_of(third, TURNS)
+        return self.coarseness * 0.5 * steps[-1] ** 3 * self.problem.model.largest_of(third, TURNS)
 
     def undo(self):
         """See `Stepper`."""
@@ -96,6 +102,7 @@ class OneStep:
                 "books": np.array([books for *_, books in past]),
             },
             "problem": self.problem.memory(),
+            "newton": self._newton.memory(),
         }
 
     def recall(self, memory):
@@ -112,7 +119,24 @@ class OneStep:
             for h, state, kinds, book in zip(past["steps"], past["states"], rates, books, strict=True)
         ]
         self.problem.recall(memory["problem"])
+        self._newton.recall(memory["newton"])
 
 
 def _numbered(arrays):
     return {str(i): array for i, array in enumerate(arrays)}
+
+
+def _extrapolated(steps):
+    """States at the end of the last of some steps (h, state and velocity at its beginning), by its velocity alone, and
+    by the velocities of one and of two steps before too."""
+    (h, state, velocity), *earlier = steps[::-1]
+    guesses = [state + h * velocity]
+    if earlier:
+        (h1, _, velocity1), *earlier = earlier
+        risen = (velocity - velocity1) / h1
+        guesses.append(guesses[-1] + 0.5 * h**2 * risen)
+        if earlier:
+            h2, _, velocity2 = earlier[0]
+            bent = (risen - (velocity1 - velocity2) / h2) / (h1 + h2)
+            guesses.append(guesses[-1] + 0.5 * h**2 * (h + h1) * bent)
+    return guesses

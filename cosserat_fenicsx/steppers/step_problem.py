@@ -15,6 +15,7 @@ class StepProblem:
 
     Attributes:
         x, b, A: unknowns at the end of the step, residual, tangent; the model's state follows x.
+        tangent: what factors it.
         fresh: whether the tangent is made anew when it is next asked for, or the one at hand serves on.
         h: the length of the step, dimensionless.
         load_factor: what all loads and prescribed motions are multiplied by.
@@ -25,14 +26,19 @@ class StepProblem:
         numbering = self.numbering
         self.ties = MovingTies(model, numbering) if model.shape.connections.ties else None
         tied = self.ties.rows if self.ties else np.empty(0, dtype=np.int64)
-        self.A = numbering.matrix(model.cell_dofs, tied[tied >= 0])
+        self.tangent = self._kind()
+        self.A = numbering.matrix(model.cell_dofs, tied[tied >= 0], blocks=self.tangent == "blocks")
         self.x, self.b, self._known, self._loads, self._momenta, self._vector = (numbering.vector() for _ in range(6))
         self._local = np.zeros(len(numbering.rows))
         self._state, self._start = model.state.x.array, model.start.x.array
         self.load_factor, self.fresh = 1.0, True
 
+    def _kind(self):
+        """What factors the tangent, see `linear.factor_tangent`."""
+        return "general" if self.ties or self.model.comm.size > 1 else "blocks"
+
     def _ends(self):
-        """The Functions that change from step to step."""
+        """The Functions that change from step to step, the state first: it alone changes within one."""
         return self.model.state, self.model.start, self.model.velocity
 
     def load(self, scene, layout, load_factor=1.0):
@@ -47,9 +53,9 @@ class StepProblem:
 
     def _pack(self):
         """Take the numbers of a scene into all forms; what changes in time is looked up anew at every assembly."""
-        forms, moving = self.model.forms, tuple(self.model.moving_loads)
+        forms, moving, (state, *beginning) = self.model.forms, tuple(self.model.moving_loads), self._ends()
         self._residual, self._tangent, self._live = (
-            None if form is None else Packed(form, (*self._ends(), *moving))
+            None if form is None else Packed(form, (state,), (*beginning, *moving))
             for form in (forms.residual, forms.tangent, forms.live)
         )
         self._momentum = Packed(forms.momentum, self._ends())
@@ -73,6 +79,9 @@ class StepProblem:
         if model.moving_loads:
             model.loads_at(t + h / 2)
             self._assemble(self._dead, self._loads)
+        self._residual.catch_up()
+        if self._live:
+            self._live.catch_up()
         self._assemble(self._momentum, self._momenta)
         self._known.set(0.0)
         self._known.axpy(model.time / h, self._momenta)
@@ -113,6 +122,7 @@ class StepProblem:
             return
         self.fresh = False
         P.zeroEntries()
+        self._tangent.catch_up()
         self._tangent.add_to_matrix(P)
         if self.ties:
             self.ties.add_tangent(P, self.load_factor)
@@ -120,9 +130,10 @@ class StepProblem:
 
     def work(self):
         """What loads and supports did in the step from `start` to the state, dimensionless, over all ranks."""
-        model, eta = self.model, self.load_factor
-        self.numbering.from_local(model.passed(), self._vector)
-        done = eta * self._loads.dot(self._vector)
+        model, eta, done = self.model, self.load_factor, 0.0
+        if self._live or self._loads.norm() > 0:
+            self.numbering.from_local(model.passed(), self._vector)
+            done = eta * self._loads.dot(self._vector)
         if self._live:
             self._assemble(self._live, self._known)
             done += eta * self._known.dot(self._vector)

@@ -75,7 +75,8 @@ def surroundings(peer):
 
 def fingerprint(peer):
     """Hash of what a peer's samples depend on here: its script and, for this package, the package."""
-    files = [HERE / SCRIPTS[peer], HERE / "speak.py", HERE / "problems.py"]
+    files = [HERE / name for name in (SCRIPTS[peer], "speak.py", "problems.py", "motions.py")]
+    files += [file for file in [HERE / SCRIPTS[peer].replace("_rod", "_motion")] if file.exists()]
     if peer == OWN:
         files += sorted([*(ROOT / "cosserat_fenicsx").rglob("*.py"), *(ROOT / "forms").rglob("*.py")])
     return _short(file.read_text(encoding="utf-8") for file in files)

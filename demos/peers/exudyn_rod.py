@@ -8,6 +8,7 @@ tolerance on the residual is either too coarse or below its rounding.
 import math
 
 import exudyn as exu
+import exudyn_motion
 import numpy as np
 from exudyn import itemInterface as item
 from speak import Stopped, serve
@@ -18,6 +19,8 @@ NODES = {"planar 3-node": 3, "planar ANCF cable": 2, "spatial 2-node": 2, "spati
 
 
 def prepare(problem, configuration):
+    if "duration" in problem:
+        return exudyn_motion.prepare(problem, configuration)
     container = exu.SystemContainer()
     mbs = container.AddSystem()
     element, tip = configuration["element"], _rod(mbs, problem, configuration)

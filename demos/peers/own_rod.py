@@ -5,6 +5,7 @@ solvers of the shape are kept by `solve` from the call before it (a warm cache);
 """
 
 import numpy as np
+import own_motion
 from speak import serve
 
 import cosserat_fenicsx as cf
@@ -24,6 +25,8 @@ def scene_of(problem):
 
 
 def prepare(problem, configuration):
+    if "duration" in problem:
+        return own_motion.prepare(problem, configuration)
     rod, scene = scene_of(problem)
     factors = [float(factor) for factor in problem["load_factors"]]
 

@@ -1,0 +1,168 @@
+"""Speed against accuracy in motion: the schemes of this package and Exudyn's geometrically exact rods, one chart.
+
+    python demos/work_precision_motion.py            all of it, some six minutes; goes on where it was broken off
+    python demos/work_precision_motion.py --fresh    forgets the samples that are there
+    python demos/work_precision_motion.py --quick    a few configurations, nothing is installed
+
+Leaves in out/: work_precision_motion.json (every sample), .md (the table), .png (the chart). How it is measured:
+`work_precision`. The error is the distance of the ends of the rods at the end from where they should be, over the length
+of a rod (peers/motions.py).
+"""
+
+import argparse
+from pathlib import Path
+
+import matplotlib
+
+matplotlib.use("Agg")
+
+import matplotlib.pyplot as plt
+from machine import in_words
+from peers import motions
+from peers.environments import OWN
+from work_precision import LIMITS, SAMPLES, Panel, Record, measure, start
+from work_precision_chart import frontier
+from work_precision_table import answered, cheapest, median, milliseconds
+
+PANEL = Panel(motions.PEERS, motions.problems, motions.error, motions.configurations, motions.kind, motions.model)
+ACCURACIES = (1e-2, 1e-3, 1e-4)
+ASKED_AT, ASKED = 1e-3, 1 / 2  # the error of the ratio that was asked for, and how large it may be
+BUDGET, QUICK_LIMIT = 5 * 60.0, 5.0  # s of measuring; of a request in a quick run
+_COLOURS = {"momentum": "#08519c", "energy": "#31a354", "triple-jump": "#7570b3"}
+_OTHERS = ("#1b9e77", "#e7298a", "#666666")  # of schemes that come later
+_THEIRS = {"LG": "#d95f02", "EP": "#b2182b"}
+
+
+def called(row):
+    """A configuration in words."""
+    c = row["configuration"]
+    step = f"steps of {1e3 * c['dt']:g} ms" if "dt" in c else f"tol {c['tol']:g}"
+    if row["peer"] == OWN:
+        return f"{c['scheme']}, P{c['degree']}, {c['elements']} elements a rod, {step}"
+    return f"Exudyn {c['node']}, {c['elements']} elements a rod, {step}"
+
+
+def ratio(rows, problem):
+    """The cheapest own and peer's row of an error of ASKED_AT, each or None, and the ratio of their times, or None."""
+    here = answered(rows, problem)
+    mine, theirs = (cheapest([r for r in here if (r["peer"] == OWN) == own], ASKED_AT) for own in (True, False))
+    return mine, theirs, median(mine) / median(theirs) if mine and theirs else None
+
+
+def text(found, rows):
+    """The table, in Markdown."""
+    lines = [
+        f"{in_words(found.about['machine'])}. Random seed of the order {found.about['seed']}.",
+        "",
+        f"Processor time of one thread, warm, medians of {found.about['samples']} samples, peers in alternation. What is timed: here the whole",
+        "call of `simulate` in space, and the query of the ends; for Exudyn `SolveDynamic`, its model built before. The error is",
+        "the distance of the ends from their true places, over the length of a rod; mesh and step the best measured of each.",
+        *(f"\n{peer} is missing: {why}" for peer, why in found.missing.items()),
+        "",
+        "| problem | error | here | Exudyn | ratio | asked at most | |",
+        "|---|---|---|---|---|---|---|",
+    ]
+    for problem, title in motions.TITLES.items():
+        mine, theirs, share = ratio(rows, problem)
+        cells = [f"{milliseconds(median(r))} ({called(r)})" if r else "none is so accurate" for r in (mine, theirs)]
+        verdict = "-" if share is None else "met" if share <= ASKED else "missed"
+        told = "-" if share is None else f"1/{1 / share:.3g}"
+        lines.append(f"| {title} | {ASKED_AT:.0e} | {' | '.join(cells)} | {told} | 1/{1 / ASKED:g} | {verdict} |")
+    heads = " | ".join(f"{accuracy:.0e}" for accuracy in ACCURACIES)
+    lines += ["", f"| problem | solver | {heads} | best error |", "|---|---|" + "---|" * (len(ACCURACIES) + 1)]
+    for problem, title in motions.TITLES.items():
+        for name, members in _groups(answered(rows, problem)).items():
+            best = [cheapest(members, accuracy) for accuracy in ACCURACIES]
+            cells = " | ".join(milliseconds(median(row)) if row else "-" for row in best)
+            lines.append(f"| {title} | {name} | {cells} | {min(row['error'] for row in members):.0e} |")
+    failed = [row for row in rows if row["failed"]]
+    if failed:
+        lines += ["", f"Without an answer: {len(failed)} configurations, such as {called(failed[0])} ({failed[0]['failed'][:80]})."]  # fmt: skip
+    return "\n".join(lines)
+
+
+def _groups(rows):
+    """{name: rows} of every scheme and peer, this package first."""
+    groups = {}
+    for row in sorted(rows, key=lambda row: (row["peer"] != OWN, row["kind"])):
+        groups.setdefault(f"{'cosserat_fenicsx' if row['peer'] == OWN else row['peer']}: {row['kind']}", []).append(row)
+    return groups
+
+
+def draw(rows, file):
+    """The chart: one panel a problem."""
+    figure, panels = plt.subplots(1, len(motions.TITLES), figsize=(12.5, 6.2), layout="constrained", sharey=True)
+    seen = {}
+    for axes, (problem, title) in zip(panels, motions.TITLES.items(), strict=True):
+        for name, members in _groups(answered(rows, problem)).items():
+            ours, kind = members[0]["peer"] == OWN, members[0]["kind"]
+            scheme = kind.removesuffix(", by tol") if ours else members[0]["configuration"]["node"]
+            others = [
+                s for s in sorted({r["configuration"].get("scheme", "momentum") for r in rows}) if s not in _COLOURS
+            ]
+            colours = {**_COLOURS, **dict(zip(others, _OTHERS, strict=False)), **_THEIRS}
+            style = {
+                "color": colours.get(scheme, "0.4"),
+                "marker": "o" if ours else "s",
+                "ls": ":" if "tol" in kind else "-",
+            }
+            axes.plot(*_points(members), style["marker"], color=style["color"], ms=3, alpha=0.25, mew=0)
+            (seen[name],) = axes.plot(*_points(frontier(members)), lw=2.2 if ours else 1.5, ms=5, label=name, **style)
+        _, _, share = ratio(rows, problem)
+        axes.axvline(ASKED_AT, color="0.5", lw=1, ls="--")
+        if share:
+            axes.text(ASKED_AT, 0.985, f" at {ASKED_AT:.0e}: 1/{1 / share:.2g} of Exudyn's time", va="top", fontsize=9,
+                      transform=axes.get_xaxis_transform())  # fmt: skip
+        axes.set(xscale="log", yscale="log", title=title)
+        axes.set_xlabel("error of the ends' positions, over a rod's length (-)")
+        axes.grid(which="major", alpha=0.4)
+    panels[0].set_ylabel("processor time of one warm answer, one thread")
+    panels[0].yaxis.set_major_formatter(lambda s, _: f"{s:g} s" if s >= 1 else f"{1e3 * s:g} ms")
+    panels[0].text(0.01, 0.01, "small dots: every mesh and step measured; lines: the best of each", fontsize=8,
+                   transform=panels[0].transAxes, color="0.3")  # fmt: skip
+    figure.legend(seen.values(), seen.keys(), loc="outside lower center", ncols=3, fontsize=9, frameon=False)
+    figure.savefig(file, dpi=130)
+    plt.close(figure)
+
+
+def _points(rows):
+    return [row["error"] for row in rows], [median(row) for row in rows]
+
+
+def main(out="out", quick=False, fresh=False, peers=motions.PEERS, wanted=None):
+    """Measure, write the JSON, the table and the chart.
+
+    Args:
+        out: folder; quick: few configurations, nothing is installed; fresh: forget earlier samples; peers: which;
+        wanted: samples of every configuration, at least.
+
+    Returns:
+        The `Record`.
+    """
+    out = Path(out)
+    stem = "work_precision_motion_quick" if quick else "work_precision_motion"
+    found = Record(out / f"{stem}.json", fresh or quick, PANEL)
+    started = start(peers, not quick, found)
+    limits = {peer: QUICK_LIMIT if quick and peer != OWN else LIMITS[peer] for peer in peers}
+    wanted = wanted or (2 if quick else SAMPLES)
+    try:
+        rows = measure(started, motions.TITLES, found, quick=quick, wanted=wanted, limits=limits, budget=BUDGET)
+    except KeyboardInterrupt:
+        raise SystemExit(f"\nbroken off; {found.file} keeps the samples, the same command goes on from them") from None
+    finally:
+        for peer in started.values():
+            peer.end()
+        found.write(now=True)
+    told = text(found, rows)
+    (out / f"{stem}.md").write_text(told + "\n", encoding="utf-8")
+    draw(rows, out / f"{stem}.png")
+    print(f"{told}\n\nwritten: {found.file}, {stem}.md, {stem}.png")
+    return found
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--quick", action="store_true", help="a few configurations, nothing is installed")
+    parser.add_argument("--fresh", action="store_true", help="forget the samples of earlier runs")
+    given = parser.parse_args()
+    main(quick=given.quick, fresh=given.fresh)
