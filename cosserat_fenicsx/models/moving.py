@@ -9,7 +9,7 @@ from mpi4py import MPI
 from cosserat_fenicsx import compat
 from cosserat_fenicsx.damping import Damping
 from cosserat_fenicsx.models.connections import ties_of
-from cosserat_fenicsx.models.moving_forms import compile_spatial
+from cosserat_fenicsx.models.moving_forms import SpatialStep, compile_momentum
 from cosserat_fenicsx.models.rod_data import check_inertia, gauss_function, nodal_inertia, rod_data
 from cosserat_fenicsx.models.spatial import SpatialModel
 
@@ -176,7 +176,7 @@ class MovingSpatial(Moving, SpatialModel):
 
     def _compile(self, spaces):
         self._motion_fields()
-        return compile_spatial(self)
+        return compile_momentum(SpatialStep(self))
 
     def _section_inertia(self, J, frames):
         I_R = np.einsum("...ij,...j,...kj->...ik", frames, J, frames)
