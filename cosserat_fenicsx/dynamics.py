@@ -13,6 +13,7 @@ from cosserat_fenicsx.checks import instance, number, refuse
 from cosserat_fenicsx.errors import Interrupted, NotConverged, SceneError, nearest
 from cosserat_fenicsx.history import History, Instant, Ledger
 from cosserat_fenicsx.interrupts import obey
+from cosserat_fenicsx.models.collocated import CollocatedPlanar, CollocatedSpatial
 from cosserat_fenicsx.models.conserving import ConservingSpatial
 from cosserat_fenicsx.models.moving import MovingSpatial
 from cosserat_fenicsx.models.moving_planar import MovingPlanar
@@ -29,6 +30,8 @@ _MODELS = {
     ("momentum", "spatial"): MovingSpatial,
     ("momentum", "planar"): MovingPlanar,
     ("energy", "spatial"): ConservingSpatial,
+    ("collocation", "spatial"): CollocatedSpatial,
+    ("collocation", "planar"): CollocatedPlanar,
 }
 #: Elements a rod and degree where none are asked for.
 ELEMENTS, DEGREE = 8, 3
@@ -45,6 +48,7 @@ def simulate(
     dt=None,
     model="auto",
     scheme="momentum",
+    rho_inf=None,
     save_every=None,
     start=None,
     load_factor=1.0,
@@ -68,7 +72,10 @@ def simulate(
         model: "spatial"; "planar" for a scene that moves in a plane; or "auto", the cheaper one that will do.
         scheme: "momentum" (exact linear and angular momentum, order 2); "triple-jump" (three steps of it, one back in
             time: order 4, for smooth motions without damping, fixed dt); "energy" (exact energy and linear momentum,
-            order 2, in space alone).
+            order 2, in space alone); "generalised-alpha" (dissipates what the steps do not resolve, order 2; what it
+            takes is seen in the balance of the History).
+        rho_inf: of "generalised-alpha": from 0 to 1, by how much a step shrinks what vibrates much faster than the
+            steps; 1 takes nothing (the trapezoidal rule). Default 0.8.
         save_every: s between saved states, landed on exactly; None saves every step.
         start: None for the reference, a `Path` for its last equilibrium, or (Path, k); rods must be the same objects.
         load_factor: multiplies all loads and prescribed motions, as in `solve`.
@@ -90,6 +97,7 @@ def simulate(
     duration = _positive("duration", duration)
     if scheme not in SCHEMES:
         raise SceneError(f"scheme = {scheme!r}: {nearest(scheme, SCHEMES)}")
+    rho_inf = _rho_inf(scheme, rho_inf)
     pace = _pace(duration, tol, dt, scheme)
     save_every = None if save_every is None else _positive("save_every", save_every)
     number("simulate", "load_factor", load_factor, "a finite number", math.isfinite)
@@ -98,6 +106,7 @@ def simulate(
     scene = scene.over(duration)
     model, why = _choice(scene, model, scheme, start)
     problem, stepper = _solvers(scene, Layout.of(scene, elements), degree, scheme, load_factor, comm, model)
+    stepper.rho_inf = rho_inf
     put_start(problem.model, start)
     problem.begin()
     run = _Run(problem, stepper, pace, scheme, why)
@@ -237,6 +246,15 @@ def _pace(duration, tol, dt, scheme):
     return Adaptive(
         number("simulate", "tol", tol, "a number from 1e-10 to below 1", lambda x: 1e-10 <= x < 1), duration
     )
+
+
+def _rho_inf(scheme, rho_inf):
+    known = SCHEMES[scheme].rho_inf
+    if rho_inf is None:
+        return known
+    if known is None:
+        refuse("simulate", "rho_inf", rho_inf, f"None, for scheme = '{scheme}' has nothing of the kind")
+    return number("simulate", "rho_inf", rho_inf, "a number from 0 to 1", lambda x: 0 <= x <= 1)
 
 
 def _positive(name, value):

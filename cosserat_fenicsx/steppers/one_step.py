@@ -13,7 +13,7 @@ TURNS = 0.1
 class OneStep:
     """See `protocol.Stepper`."""
 
-    order, adapts = 2, True
+    order, adapts, rho_inf = 2, True, None
 
     def __init__(self, problem):
         self.problem, self._newton = problem, StepNewton(problem)

@@ -20,10 +20,12 @@ class StepProblem:
         load_factor: what all loads and prescribed motions are multiplied by.
     """
 
+    ties_class = MovingTies
+
     def __init__(self, model):
         self.model, self.numbering = model, model.numbering
         numbering = self.numbering
-        self.ties = MovingTies(model, numbering) if model.shape.connections.ties else None
+        self.ties = self.ties_class(model, numbering) if model.shape.connections.ties else None
         tied = self.ties.rows if self.ties else np.empty(0, dtype=np.int64)
         self.A = numbering.matrix(model.cell_dofs, tied[tied >= 0])
         self.x, self.b, self._known, self._loads, self._momenta, self._vector = (numbering.vector() for _ in range(6))
