@@ -49,7 +49,10 @@ def _halves(a):
 def compile_collocated(step):
     """The `MotionForms` at the end of a step, and the changes of the six strains over it, and their rates at its end."""
     model, dx = step.model, step.dx
-    increment, strains = step.increment(), [collocation.strains(motion, step.section) for motion in (step.before, step.after)]
+    increment, strains = (
+        step.increment(),
+        [collocation.strains(motion, step.section) for motion in (step.before, step.after)],
+    )
     v = model.by_velocity * increment + model.known_velocity
     a = model.by_acceleration * increment + model.known_acceleration
     rates = model.by_velocity * (strains[1] - strains[0]) + model.known_strain_rate
