@@ -80,3 +80,18 @@ def test_scaling_quick(tmp_path):
 
     rows = scaling.main(sizes=(4, 16, 64), out=tmp_path)
     assert rows[:, 0].tolist() == [112, 448, 1792] and (rows[:, 1:] > 0).all()
+
+
+@pytest.mark.serial
+def test_orders_quick(tmp_path):
+    """Schemes have their orders with joints, damping and driven supports too; meshes 2p."""
+    import orders
+
+    temporal, spatial = orders.main(quick=True, out=tmp_path)
+    assert len(temporal) == 7
+    for (scene, scheme), observed in temporal.items():
+        for query, order in observed.items():
+            assert order == pytest.approx(orders.SCHEMES[scheme], rel=0.11), (scene, scheme, query)
+    for degree, order in spatial.items():
+        assert order > 2 * degree - (0.1 if degree < 3 else 1.0), degree
+    assert "| 4 | 4, 8 |" in (tmp_path / "orders.md").read_text(encoding="utf-8")

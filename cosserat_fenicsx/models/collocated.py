@@ -70,6 +70,8 @@ class Collocated:
     def aim(self, ahead):
         """Take the scheme of the step to come.
 
+        `start` is where it begins, and so is the state.
+
         Args:
             ahead: (3, 4), rows v, a, s at its end, columns D and v, a, s at its beginning.
         """
@@ -82,7 +84,7 @@ class Collocated:
 
     def accept(self, h):
         """See `Moving`: by the scheme of the step."""
-        rates = self._ahead @ (self._increments(), self._velocities(self.start), *self._node_rates)
+        rates = self._ahead @ (self._increments(), self._velocities(), *self._node_rates)
         self._put_velocities(rates[0])
         self._node_rates[:] = rates[1:]
         if self.damped:
@@ -91,7 +93,7 @@ class Collocated:
     def take_accelerations(self):
         """Of the step alone its accelerations count: they are those at its beginning."""
         a, s = self._node_rates
-        rates = self._ahead[1] @ (self._increments(), self._velocities(self.start), a, s)
+        rates = self._ahead[1] @ (self._increments(), self._velocities(), a, s)
         if self.damped:
             _, b, c = self._strain_rates
             b[:] = self._ahead[1] @ (self._at_gauss(self._strain_change), *self._strain_rates)
@@ -104,12 +106,12 @@ class Collocated:
         """(nodes * rate_size,) D of the local nodes."""
         raise NotImplementedError
 
-    def _velocities(self, place=None):
-        """(nodes * rate_size,) from `velocity`, at the state or another place."""
+    def _velocities(self):
+        """(nodes * rate_size,) from `velocity`, at the beginning of the step."""
         raise NotImplementedError
 
     def _put_velocities(self, v):
-        """The other way, at the state."""
+        """The other way, at the end of the step."""
         raise NotImplementedError
 
 
@@ -129,8 +131,8 @@ class CollocatedSpatial(Collocated, MovingSpatial):
         turned = 2 * np.where(size > 0, np.arctan2(size, w) / np.where(size > 0, size, 1.0), 1.0)
         return np.concatenate([now[:, :3] - before[:, :3], turned[:, None] * p], axis=1).ravel()
 
-    def _velocities(self, place=None):
-        q = (place or self.state).x.array[self._nodal[:, 3:]]
+    def _velocities(self):
+        q = self.start.x.array[self._nodal[:, 3:]]
         rates = self.velocity.x.array[self._nodal]
         return np.concatenate([rates[:, :3], 2 * conjugate_product(q, rates[:, 3:])], axis=1).ravel()
 
@@ -155,7 +157,7 @@ class CollocatedPlanar(Collocated, MovingPlanar):
     def _increments(self):
         return (self.state.x.array - self.start.x.array)[self._nodal].ravel()
 
-    def _velocities(self, place=None):
+    def _velocities(self):
         return self.velocity.x.array[self._nodal].ravel()
 
     def _put_velocities(self, v):
