@@ -2,6 +2,7 @@
 
 import numpy as np
 from dolfinx import fem
+from mpi4py import MPI
 
 from cosserat_fenicsx import compat
 from cosserat_fenicsx.models.collocated_forms import PlanarCollocation, SpatialCollocation, compile_collocated
@@ -100,6 +101,10 @@ class Collocated:
             c[:] = 0.0
         a[:], s[:] = rates, 0.0
 
+    def turned_over(self):
+        """Whether some node turned by half a turn or more in the step, over all ranks: it is then not the one meant."""
+        return False
+
     # -- what a rung fills in ----------------------------------------------------------------------------------------
 
     def _increments(self):
@@ -130,6 +135,11 @@ class CollocatedSpatial(Collocated, MovingSpatial):
         size = np.sqrt(np.einsum("ni,ni->n", p, p))
         turned = 2 * np.where(size > 0, np.arctan2(size, w) / np.where(size > 0, size, 1.0), 1.0)
         return np.concatenate([now[:, :3] - before[:, :3], turned[:, None] * p], axis=1).ravel()
+
+    def turned_over(self):
+        """See `Collocated`; -q would do as well as q for |q| = 1."""
+        q, q0 = (f.x.array[self._nodal[:, 3:]] for f in (self.state, self.start))
+        return self.comm.allreduce(bool((np.einsum("ni,ni->n", q0, q) <= 0).any()), op=MPI.LOR)
 
     def _velocities(self):
         q = self.start.x.array[self._nodal[:, 3:]]

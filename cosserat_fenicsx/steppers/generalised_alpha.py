@@ -17,13 +17,14 @@ import numpy as np
 
 from cosserat_fenicsx.snes import Solved
 from cosserat_fenicsx.steppers.moving_ties import MovingTies
+from cosserat_fenicsx.steppers.newton import StepNewton
 from cosserat_fenicsx.steppers.one_step import OneStep
 from cosserat_fenicsx.steppers.step_problem import StepProblem
 
 # Loads at the end of a step are asked for so much of it earlier: before a jump that is there.
 _BEFORE = 1e-6
 # Accelerations at a start are those of a step so much shorter than the first.
-_SHORTER = 0.02
+_SHORTER = 0.1
 
 
 class Rule(NamedTuple):
@@ -147,10 +148,25 @@ class CollocationProblem(StepProblem):
         self.ties.shift(4 * values[1] - values[2] - 2 * values[0])
 
 
+class SmallTurns(StepNewton):
+    """Newton's method that finds no step in which sections turn by half a turn: rotation vectors end there."""
+
+    def _attempt(self, guess):
+        solved = super()._attempt(guess)
+        if solved.converged and self.problem.model.turned_over():
+            self.problem.fresh = True
+            return Solved(False, solved.iterations, "a section turned by half a turn or more in one step")
+        return solved
+
+
 class GeneralisedAlpha(OneStep):
     """See `protocol.Stepper`. Numerical dissipation is no part of `dissipated`: the balance of the ledger shows it."""
 
     forms, problem_class, rho_inf = "collocation", CollocationProblem, 0.8
+
+    def __init__(self, problem):
+        super().__init__(problem)
+        self._newton = SmallTurns(problem)
 
     def begin(self):
         """See `Stepper`."""
