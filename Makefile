@@ -45,6 +45,7 @@ tables: setup
 	$(PYTHON) demos/rungs.py
 	$(PYTHON) demos/choice.py
 	$(PYTHON) demos/scaling.py
+	$(PYTHON) demos/orders.py
 	$(PYTHON) demos/readme_tables.py
 
 # What an interrupted run has finished is kept: the same command goes on from there.

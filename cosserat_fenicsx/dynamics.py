@@ -11,16 +11,17 @@ from mpi4py import MPI
 from cosserat_fenicsx.checks import instance, number, refuse
 from cosserat_fenicsx.errors import SceneError, nearest
 from cosserat_fenicsx.history import History
+from cosserat_fenicsx.models.collocated import CollocatedPlanar, CollocatedSpatial
 from cosserat_fenicsx.models.conserving import ConservingSpatial
 from cosserat_fenicsx.models.moving import MovingSpatial
 from cosserat_fenicsx.models.moving_planar import MovingPlanar
 from cosserat_fenicsx.models.rodmesh import Layout
 from cosserat_fenicsx.models.shape import Shape
+from cosserat_fenicsx.marks import marks_of
 from cosserat_fenicsx.motion import Motion
 from cosserat_fenicsx.pace import Adaptive, Fixed
 from cosserat_fenicsx.runfolder import RunFolder
 from cosserat_fenicsx.scene import Scene
-from cosserat_fenicsx.signals import jumps_at, signals_of
 from cosserat_fenicsx.start import put_start, starts_in
 from cosserat_fenicsx.steppers import SCHEMES
 from cosserat_fenicsx.stored_history import StoredHistory
@@ -29,6 +30,8 @@ _MODELS = {
     ("momentum", "spatial"): MovingSpatial,
     ("momentum", "planar"): MovingPlanar,
     ("energy", "spatial"): ConservingSpatial,
+    ("collocation", "spatial"): CollocatedSpatial,
+    ("collocation", "planar"): CollocatedPlanar,
 }
 #: Elements a rod and degree where none are asked for.
 ELEMENTS, DEGREE = 8, 3
@@ -43,6 +46,7 @@ def simulate(
     dt=None,
     model="auto",
     scheme="momentum",
+    rho_inf=None,
     save_every=None,
     start=None,
     load_factor=1.0,
@@ -67,7 +71,10 @@ def simulate(
         model: "spatial"; "planar" for a scene that moves in a plane; or "auto", the cheaper one that will do.
         scheme: "momentum" (exact linear and angular momentum, order 2); "triple-jump" (three steps of it, one back in
             time: order 4, for smooth motions without damping, fixed dt); "energy" (exact energy and linear momentum,
-            order 2, in space alone).
+            order 2, in space alone); "generalised-alpha" (dissipates what the steps do not resolve, order 2; what it
+            takes is seen in the balance of the History).
+        rho_inf: of "generalised-alpha": from 0 to 1, by how much a step shrinks what vibrates much faster than the
+            steps; 1 takes nothing (the trapezoidal rule). Default 0.8.
         save_every: s between saved states, landed on exactly; None saves every step.
         start: None for the reference, a `Path` for its last equilibrium, or (Path, k); rods must be the same objects.
         load_factor: multiplies all loads and prescribed motions, as in `solve`.
@@ -93,6 +100,7 @@ def simulate(
     duration = positive_time("duration", duration)
     if scheme not in SCHEMES:
         raise SceneError(f"scheme = {scheme!r}: {nearest(scheme, SCHEMES)}")
+    rho_inf = _rho_inf(scheme, rho_inf)
     pace = pace_of(duration, tol, dt, scheme)
     save_every = None if save_every is None else positive_time("save_every", save_every)
     number("simulate", "load_factor", load_factor, "a finite number", math.isfinite)
@@ -101,13 +109,14 @@ def simulate(
     looked_at = scene.over(duration)
     model, why = _choice(looked_at, model, scheme, start)
     problem, stepper = solvers(looked_at, Layout.of(scene, elements), degree, scheme, load_factor, comm, model)
+    stepper.rho_inf = rho_inf
     put_start(problem.model, start)
     problem.begin()
     stepper.begin()
     history = (History if folder is None else StoredHistory).of(problem.model, scheme, [why])
     if folder is not None:
         asked = {"duration": duration, "tol": tol, "dt": dt, "scheme": scheme, "save_every": save_every,
-                 "load_factor": load_factor, "elements": elements, "degree": degree}  # fmt: skip
+                 "load_factor": load_factor, "elements": elements, "degree": degree, "rho_inf": rho_inf}  # fmt: skip
         folder = RunFolder(folder, comm).make(scene, asked, history)
     motion = Motion(problem, stepper, pace, history, folder)
     return motion.over(marks_of(scene, duration, save_every), save_every is None, progress)
@@ -175,25 +184,10 @@ def positive_time(name, value, owner="simulate"):
     return number(owner, name, value, "a positive number (s)", lambda x: 0 < x < math.inf)
 
 
-def marks_of(scene, duration, save_every, ends=()):
-    """[(time, whether something jumps there, whether it is saved)], the first at 0, the last the end; `ends` are earlier ones."""
-    signals = [(item, signal) for item in scene.moving for signal in signals_of(item).values()]
-    rough = {t for _, signal in signals for t in signal.jumps if 0 < t < duration}  # steps land there
-    jumps = {
-        t
-        for item, signal in signals
-        for t in signal.jumps
-        if t in rough and (item not in scene.loads or jumps_at(signal, t, duration))
-    }
-    saved = set(ends)
-    if save_every is not None:
-        count = math.ceil(duration / save_every - 1e-9)
-        saved |= {k * save_every for k in range(1, count)}
-    marks = [(0.0, False, True)]
-    for t in sorted(rough | saved):
-        if t - marks[-1][0] > 1e-9 * duration:
-            marks.append((t, t in jumps, t in saved))
-        else:  # two of them that differ by rounding are one
-            before, jump, save = marks[-1]
-            marks[-1] = (t if t in rough else before, jump or t in jumps, save or t in saved)
-    return [*marks, (duration, False, True)]
+def _rho_inf(scheme, rho_inf):
+    known = SCHEMES[scheme].rho_inf
+    if rho_inf is None:
+        return known
+    if known is None:
+        refuse("simulate", "rho_inf", rho_inf, f"None, for scheme = '{scheme}' has nothing of the kind")
+    return number("simulate", "rho_inf", rho_inf, "a number from 0 to 1", lambda x: 0 <= x <= 1)

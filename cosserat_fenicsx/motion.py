@@ -39,15 +39,14 @@ class Motion:
         self._stepper.recall(memory["stepper"])
 
     def over(self, marks, save_all, progress):
-        """Go over the marks (time, whether something jumps there, whether it is saved), the first of them the start, from
-        where the motion is.
+        """Go over the `Mark`s, the first of them the start, from where the motion is.
 
         Returns:
             the history.
         """
         comm, model = self.model.comm, self.model
         try:
-            with Progress([marks[-1][0]], progress, comm, "t (s) =") as bar:
+            with Progress([marks[-1].time], progress, comm, "t (s) =") as bar:
                 bar.start(f"{model.name}, {model.unknowns} unknowns")
                 bar.reached(self._t)
                 self._keep()
@@ -64,13 +63,15 @@ class Motion:
         return self.history
 
     def _between(self, mark, after, save_all, bar):
-        (begin, jump, _), (end, _, saved) = mark, after
+        begin, end = mark.time, after.time
         if end <= self._t:  # a motion that is continued has been there
             return
         if self._t <= begin:
-            if jump:
+            if mark.jumps:
                 self._stepper.jump()
                 self._pace.jump()
+            elif mark.bends:
+                self._stepper.bend()
             self._t = self._first = begin
             self._count, self._h = 0, 0.0
         nothing = 1e-9 * (end - begin)
@@ -85,7 +86,7 @@ class Motion:
             t = self._first + self._count * self._h
             self._t = end if end - t <= nothing else t
             bar.reached(self._t)
-            if save_all or (saved and self._t == end):
+            if save_all or (after.saved and self._t == end):
                 self._save(self._t)
             if self._folder and self._folder.due:
                 self._keep()

@@ -6,8 +6,9 @@ import numpy as np
 from mpi4py import MPI
 
 from cosserat_fenicsx.checks import instance, refuse
-from cosserat_fenicsx.dynamics import marks_of, pace_of, positive_time, solvers
+from cosserat_fenicsx.dynamics import pace_of, positive_time, solvers
 from cosserat_fenicsx.errors import SceneError
+from cosserat_fenicsx.marks import marks_of
 from cosserat_fenicsx.models.rodmesh import Layout
 from cosserat_fenicsx.models.scales import Scales
 from cosserat_fenicsx.motion import Motion
@@ -78,6 +79,7 @@ def _go_on(kept, scene, comm, progress):
         )
     history = _history(kept, scene, comm, problem.model.expansion())
     history.go_on_after(memory["saved"])
+    stepper.rho_inf = asked["rho_inf"]
     problem.begin()
     stepper.begin()
     pace = pace_of(asked["duration"], asked["tol"], asked["dt"], scheme)

@@ -4,7 +4,7 @@ import re
 from pathlib import Path
 
 README = Path(__file__).parent.parent / "README.md"
-TABLES = ("accuracy", "overhead", "rungs", "choice", "scaling", "figure3", "work_precision")
+TABLES = ("accuracy", "overhead", "rungs", "choice", "scaling", "orders", "figure3", "work_precision")
 
 
 def main(out="out"):

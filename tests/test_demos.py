@@ -91,3 +91,18 @@ def test_steps_quick(tmp_path):
     tips = [history.position(history.scene.rods[0].start)[-1] for _, _, history in found]
     assert np.ptp(tips, axis=0).max() < 1e-6 and abs(tips[0][0]) > 1e-3
     assert all(iterations < 6 for _, iterations, _ in found)
+
+
+@pytest.mark.serial
+def test_orders_quick(tmp_path):
+    """Schemes have their orders with joints, damping and driven supports too; meshes 2p."""
+    import orders
+
+    temporal, spatial = orders.main(quick=True, out=tmp_path)
+    assert len(temporal) == 7
+    for (scene, scheme), observed in temporal.items():
+        for query, order in observed.items():
+            assert order == pytest.approx(orders.SCHEMES[scheme], rel=0.11), (scene, scheme, query)
+    for degree, order in spatial.items():
+        assert order > 2 * degree - (0.1 if degree < 3 else 1.0), degree
+    assert "| 4 | 4, 8 |" in (tmp_path / "orders.md").read_text(encoding="utf-8")

@@ -9,7 +9,7 @@ from mpi4py import MPI
 from cosserat_fenicsx import compat
 from cosserat_fenicsx.damping import Damping
 from cosserat_fenicsx.models.connections import ties_of
-from cosserat_fenicsx.models.moving_forms import compile_spatial
+from cosserat_fenicsx.models.moving_forms import SpatialStep, compile_momentum
 from cosserat_fenicsx.models.rod_data import check_inertia, gauss_function, nodal_inertia, rod_data
 from cosserat_fenicsx.models.spatial import SpatialModel
 
@@ -157,6 +157,10 @@ class Moving:
         local = math.sqrt(max(moved, (turns * self.turn) ** 2 * turned))
         return self.comm.allreduce(local, op=MPI.MAX) if self.comm.size > 1 else local
 
+    def turned_over(self):
+        """Whether some node turned by half a turn or more in the step, over all ranks: it is then not the one meant."""
+        return False
+
     def snapshot_of_rates(self):
         """(N, components) `velocity` at the nodes, the scene's order, all ranks, dimensionless."""
         return self._gather_nodes(self.velocity.x.array[self._nodal[: self._owned_nodes]])
@@ -181,7 +185,7 @@ class MovingSpatial(Moving, SpatialModel):
 
     def _compile(self, spaces):
         self._motion_fields()
-        return compile_spatial(self)
+        return compile_momentum(SpatialStep(self))
 
     def _section_inertia(self, J, frames):
         I_R = np.einsum("...ij,...j,...kj->...ik", frames, J, frames)
@@ -194,6 +198,12 @@ class MovingSpatial(Moving, SpatialModel):
         work[:, 4:] = turned_by(work[:, 3:], (now[:, 3:] + before[:, 3:]) / 2)
         work[:, 3] = 0.0
         return work.ravel()
+
+    def turned_over(self):
+        """See `Moving`; -q would do as well as q for |q| = 1."""
+        q, before = (f.x.array[self._nodal[:, 3:]] for f in (self.state, self.start))
+        here = bool((np.einsum("ni,ni->n", before, q) <= 0).any())
+        return self.comm.allreduce(here, op=MPI.LOR) if self.comm.size > 1 else here
 
     def set_velocity(self, linear, angular):
         """See `Moving`."""

@@ -56,59 +56,149 @@ class SpatialData:
         return cls(section, inertia.Viscosity(model.Kt, model.Jt), inertia.Inertia(model.mass[0], I_R))
 
 
+def along(w):
+    """w', the mesh being the line of arc length."""
+    return ufl.grad(w)[:, 0]
+
+
 def parts_of(w):
     """r and q of seven components."""
     return ufl.as_vector([w[i] for i in range(3)]), ufl.as_vector([w[i] for i in range(3, 7)])
 
 
-def compile_spatial(model):
-    """The `MotionForms` of a moving spatial model, momentum scheme."""
-    dx, data = measures(model), SpatialData.of(model)
-    section, viscosity, body = data.section, data.viscosity, data.body
-    # other rules than Gauss's need names of their own where that has one point (compat.alias)
-    named = compat.alias if model.shape.degree == 1 else (lambda function: function)
-    U, U0, V = model.state, model.start, model.velocity
-    nodal, nodal0, rates = named(U), named(U0), named(V)
+class StepForms:
+    """A step of a moving model as its forms read it. A rung fills in what depends on its unknowns.
 
-    def along(w):
-        return ufl.grad(w)[:, 0]  # the mesh is the line of arc length
+    Attributes:
+        state, start, velocity: the Functions; nodal, nodal0, rates: the same by names for rules other than Gauss's.
+        halfway, passed: the average of both ends, and their difference over h, at the nodes.
+        before, after, middle: `Motion`s; section, viscosity: data; test: test functions.
+        derivative: that of a form in the direction of the trial function.
+    """
 
-    before, after, middle = (eq.state_of(w, along(w), w) for w in (U0, U, (U + U0) / 2))
-    phi, trial = ufl.TestFunction(model.space), ufl.TrialFunction(model.space)
-    test = eq.tests_of(phi, along(phi))
+    def __init__(self, model):
+        self.model, self.dx = model, measures(model)
+        # other rules than Gauss's need names of their own where that has one point (compat.alias)
+        named = compat.alias if model.shape.degree == 1 else (lambda function: function)
+        self.state, self.start, self.velocity = U, U0, V = model.state, model.start, model.velocity
+        self.nodal, self.nodal0, self.rates = nodal, nodal0, _ = named(U), named(U0), named(V)
+        self.halfway, self.passed = (nodal + nodal0) / 2, (nodal - nodal0) / model.h
+        self._take_data()
+        self.before, self.after, self.middle = (self.motion_of(w) for w in (U0, U, (U + U0) / 2))
+        phi, trial = ufl.TestFunction(model.space), ufl.TrialFunction(model.space)
+        self.test = self.tests_of(phi)
+        self.derivative = derivative_in(trial, *dict.fromkeys((U, nodal)))
 
-    def momentum(w, w_t):
-        (_, q), (r_t, q_t) = parts_of(w), parts_of(w_t)
-        return inertia.momentum(r_t, inertia.angular_momentum(q, q_t, body), body, test)
+    # -- what a rung fills in ----------------------------------------------------------------------------------------
 
-    rates_after = 2 * (nodal - nodal0) / model.h - rates
-    residual = 1 / model.h * momentum(nodal, rates_after) * dx.nodes
-    residual += inertia.averaged_stress(before, after, middle, section, viscosity, model.h, test) * dx.gauss
+    def _take_data(self):
+        """Set section and viscosity, and what else the rung needs."""
+        raise NotImplementedError
+
+    def motion_of(self, w):
+        """The motion of the unknowns, under Gauss's rule."""
+        raise NotImplementedError
+
+    def tests_of(self, phi):
+        """The test functions of eq. (1)."""
+        raise NotImplementedError
+
+    def rotation_of(self, w):
+        """R from the reference."""
+        raise NotImplementedError
+
+    def momentum(self, w, w_t):
+        """Momenta per length of unknowns and their rates, tested."""
+        raise NotImplementedError
+
+    def kinetic(self, w, w_t):
+        """Kinetic energy per length."""
+        raise NotImplementedError
+
+    def constraint(self):
+        """What the residual holds beside the balances, or 0."""
+        return 0
+
+    def fields(self, n, m):
+        """The numbers of n, m and r' that are unknown on this rung."""
+        raise NotImplementedError
+
+    # -- forms -------------------------------------------------------------------------------------------------------
+
+    def loads(self, w):
+        """The `LoadWork` where the unknowns turn with w."""
+        return load_work(self.model, self.dx, self.test, self.rotation_of(w), {self.state, self.nodal})
+
+    def compiled(self, residual, acting, working):
+        """`MotionForms` of a residual without loads.
+
+        Args:
+            acting: `LoadWork` in the balances; working: the one by which work is booked, half way.
+        """
+        model, dx, section, viscosity, h = self.model, self.dx, self.section, self.viscosity, self.model.h
+        residual, tangent = with_live_loads(model, acting, residual, self.derivative(residual), self.derivative)
+        n, m = inertia.contact(self.after, section, viscosity, lambda a: ufl.derivative(a, self.state, self.velocity))
+        lost = inertia.viscous_loss(self.before, self.after, section, viscosity, h) * dx.gauss
+        lost += 2 * h * model.drag[0] * self.kinetic(self.halfway, self.passed) * dx.nodes
+        others = {
+            "momentum": self.momentum(self.nodal, self.rates) * dx.nodes,
+            "live": sum(term for term, _, _ in working.live) if working.live else None,
+            "kinetic": self.kinetic(self.nodal, self.rates) * dx.nodes,
+            "strain": inertia.strain_energy(self.after, section) * dx.gauss,
+            "dissipated": lost,
+        }
+        return compile_motion(model, residual, tangent, acting.dead, self.fields(n, m), others)
+
+
+def compile_momentum(step, stress=inertia.averaged_stress):
+    """The `MotionForms` of the momentum scheme on the `StepForms` of a rung; `stress` makes the stress of the step."""
+    model, dx, h = step.model, step.dx, step.model.h
+    residual = 1 / h * step.momentum(step.nodal, 2 * step.passed - step.rates) * dx.nodes
+    residual += stress(step.before, step.after, step.middle, step.section, step.viscosity, h, step.test) * dx.gauss
     # drag: -drag times the momenta half way, with the velocities (U - U0)/h
-    passed, halfway = (nodal - nodal0) / model.h, (nodal + nodal0) / 2
-    residual += model.drag[0] * momentum(halfway, passed) * dx.nodes
-    residual += eq.unit_quaternion(after._replace(q_node=parts_of(nodal)[1]), test) * dx.nodes
-    R_middle = rotation_matrix(parts_of(halfway)[1])
-    loads = load_work(model, dx, test, R_middle, {U, nodal})
-    derivative = derivative_in(trial, *dict.fromkeys((U, nodal)))
-    residual, tangent = with_live_loads(model, loads, residual, derivative(residual), derivative)
+    residual += model.drag[0] * step.momentum(step.halfway, step.passed) * dx.nodes
+    residual += step.constraint()
+    loads = step.loads(step.halfway)
+    return step.compiled(residual, loads, loads)
 
-    def kinetic(w, w_t):
+
+class SpatialStep(StepForms):
+    """See `StepForms`."""
+
+    def _take_data(self):
+        data = SpatialData.of(self.model)
+        self.section, self.viscosity, self.body = data.section, data.viscosity, data.body
+
+    def motion_of(self, w):
+        """See `StepForms`."""
+        return eq.state_of(w, along(w), w)
+
+    def tests_of(self, phi):
+        """See `StepForms`."""
+        return eq.tests_of(phi, along(phi))
+
+    def rotation_of(self, w):
+        """See `StepForms`."""
+        return rotation_matrix(parts_of(w)[1])
+
+    def momentum(self, w, w_t):
+        """See `StepForms`."""
         (_, q), (r_t, q_t) = parts_of(w), parts_of(w_t)
-        return inertia.kinetic_energy(r_t, inertia.angular_velocity(q, q_t), body)
+        return inertia.momentum(r_t, inertia.angular_momentum(q, q_t, self.body), self.body, self.test)
 
-    n, m = inertia.contact(after, section, viscosity, lambda a: ufl.derivative(a, U, V))
-    lost = inertia.viscous_loss(before, after, section, viscosity, model.h) * dx.gauss
-    lost += 2 * model.h * model.drag[0] * kinetic(halfway, passed) * dx.nodes
-    live = sum(term for term, _, _ in loads.live) if loads.live else None
-    others = {
-        "momentum": momentum(nodal, rates) * dx.nodes,
-        "live": live,
-        "kinetic": kinetic(nodal, rates) * dx.nodes,
-        "strain": inertia.strain_energy(after, section) * dx.gauss,
-        "dissipated": lost,
-    }
-    return compile_motion(model, residual, tangent, loads.dead, ufl.as_vector([*n, *m, *after.r_s]), others)
+    def kinetic(self, w, w_t):
+        """See `StepForms`."""
+        (_, q), (r_t, q_t) = parts_of(w), parts_of(w_t)
+        return inertia.kinetic_energy(r_t, inertia.angular_velocity(q, q_t), self.body)
+
+    def constraint(self):
+        """See `StepForms`: |q| = 1 at the nodes."""
+        at_nodes = self.after._replace(q_node=parts_of(self.nodal)[1])
+        return eq.unit_quaternion(at_nodes, self.test) * self.dx.nodes
+
+    def fields(self, n, m):
+        """See `StepForms`."""
+        return ufl.as_vector([*n, *m, *self.after.r_s])
 
 
 def compile_motion(model, residual, tangent, dead, fields, others):

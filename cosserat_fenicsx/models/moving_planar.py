@@ -3,13 +3,11 @@
 import numpy as np
 import ufl
 
-from cosserat_fenicsx import compat
 from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.forms import inertia
 from cosserat_fenicsx.forms import planar as eq
-from cosserat_fenicsx.models.compiled import derivative_in, load_work, measures, with_live_loads
 from cosserat_fenicsx.models.moving import Moving
-from cosserat_fenicsx.models.moving_forms import compile_motion
+from cosserat_fenicsx.models.moving_forms import StepForms, along, compile_momentum
 from cosserat_fenicsx.models.planar import PlanarModel
 
 _OFF = 1e-9
@@ -23,7 +21,7 @@ class MovingPlanar(Moving, PlanarModel):
 
     def _compile(self, spaces):
         self._motion_fields()
-        return compile_planar(self)
+        return compile_momentum(PlanarStep(self))
 
     def _section_inertia(self, J, frames):
         along = np.einsum("...ik,i->...k", frames, self.axes[2])
@@ -77,42 +75,35 @@ class MovingPlanar(Moving, PlanarModel):
         return self.state.x.array[self._nodal[:, :2]] @ self.axes[:2] + self._out_of_plane()[self._slots]
 
 
-def compile_planar(model):
-    """The `MotionForms` of a `MovingPlanar`, momentum scheme."""
-    data, dx, h = model.data, measures(model), model.h
-    named = compat.alias if model.shape.degree == 1 else (lambda function: function)
-    U, U0, V = model.state, model.start, model.velocity
-    nodal, nodal0, rates = named(U), named(U0), named(V)
+class PlanarStep(StepForms):
+    """See `StepForms`."""
 
-    def along(w):
-        return ufl.grad(w)[:, 0]  # the mesh is the line of arc length
+    def _take_data(self):
+        data = self.model.data
+        self.section = eq.section_of(data.K, data.K_inv, data.J, data.R_R, data.v_R)
+        self.viscosity = inertia.Viscosity(self.model.Kt, self.model.Jt)
 
-    def motion_of(u):
-        return eq.motion_of(along(u), u[2], along(u)[2])
+    def motion_of(self, w):
+        """See `StepForms`."""
+        return eq.motion_of(along(w), w[2], along(w)[2])
 
-    def weighted(w, a):
-        return model.mass[0] * (w[0] * a[0] + w[1] * a[1]) + model.inertia[0] * w[2] * a[2]
+    def tests_of(self, phi):
+        """See `StepForms`."""
+        return eq.tests_of(phi, along(phi))
 
-    section = eq.section_of(data.K, data.K_inv, data.J, data.R_R, data.v_R)
-    viscosity = inertia.Viscosity(model.Kt, model.Jt)
-    before, after, middle = (motion_of(u) for u in (U0, U, (U + U0) / 2))
-    phi, trial = ufl.TestFunction(model.space), ufl.TrialFunction(model.space)
-    test = eq.tests_of(phi, along(phi))
-    passed = (nodal - nodal0) / h
-    residual = (1 / h * weighted(2 * passed - rates, phi) + model.drag[0] * weighted(passed, phi)) * dx.nodes
-    residual += inertia.averaged_stress(before, after, middle, section, viscosity, h, test) * dx.gauss
-    derivative = derivative_in(trial, *dict.fromkeys((U, nodal)))
-    R_middle = eq.rotation_matrix((nodal[2] + nodal0[2]) / 2)
-    loads = load_work(model, dx, test, R_middle, {U, nodal})
-    residual, tangent = with_live_loads(model, loads, residual, derivative(residual), derivative)
-    n, m = inertia.contact(after, section, viscosity, lambda a: ufl.derivative(a, U, V))
-    lost = inertia.viscous_loss(before, after, section, viscosity, h) * dx.gauss
-    others = {
-        "momentum": weighted(rates, phi) * dx.nodes,
-        "live": sum(term for term, _, _ in loads.live) if loads.live else None,
-        "kinetic": weighted(rates, rates) / 2 * dx.nodes,
-        "strain": inertia.strain_energy(after, section) * dx.gauss,
-        "dissipated": lost + h * model.drag[0] * weighted(passed, passed) * dx.nodes,
-    }
-    fields = ufl.as_vector([n[0], n[1], m[2], after.r_s[0], after.r_s[1]])
-    return compile_motion(model, residual, tangent, loads.dead, fields, others)
+    def rotation_of(self, w):
+        """See `StepForms`."""
+        return eq.rotation_matrix(w[2])
+
+    def momentum(self, w, w_t):
+        """See `StepForms`."""
+        test, mass, J = self.test, self.model.mass[0], self.model.inertia[0]
+        return mass * (w_t[0] * test.phi_r[0] + w_t[1] * test.phi_r[1]) + J * w_t[2] * test.phi[2]
+
+    def kinetic(self, w, w_t):
+        """See `StepForms`."""
+        return (self.model.mass[0] * (w_t[0] ** 2 + w_t[1] ** 2) + self.model.inertia[0] * w_t[2] ** 2) / 2
+
+    def fields(self, n, m):
+        """See `StepForms`."""
+        return ufl.as_vector([n[0], n[1], m[2], self.after.r_s[0], self.after.r_s[1]])

@@ -6,7 +6,13 @@ from cosserat_fenicsx.tie_rows import TieRows, by_nodes, reactions_by_multiplier
 
 
 class MovingTies(TieRows):
-    """See `TieRows`. Reactions along directions half way keep the order 2, and turning what they hold takes no work."""
+    """See `TieRows`. Reactions along directions half way keep the order 2, and turning what they hold takes no work.
+
+    Attributes:
+        share: of the end of the step in where reactions act.
+    """
+
+    share = 0.5
 
     def begin(self, ties):
         """A step starts at what was seen last; `ties` are those of its end."""
@@ -16,7 +22,7 @@ class MovingTies(TieRows):
             self._added_values = (None, None)
 
     def _middle(self):
-        return (self.seen[0] + self._start) / 2
+        return self.share * self.seen[0] + (1 - self.share) * self._start
 
     def _evaluate(self, eta):
         if self._added_values[0] != eta:
@@ -32,7 +38,7 @@ class MovingTies(TieRows):
         trial, test = self.model.tie_maps(self._middle())
         trial_at_end, _ = self.model.tie_maps(self.seen[0])
         equations = by_nodes(self._at_end, trial_at_end)
-        return reactions_by_nodes(test, change, trial / 2), reactions_by_multipliers(test, gradient), equations
+        return reactions_by_nodes(test, change, self.share * trial), reactions_by_multipliers(test, gradient), equations
 
     def make_room(self, A):
         """Put zeros where `add_tangent` will add."""
@@ -48,7 +54,10 @@ class MovingTies(TieRows):
         if not self._here:
             return 0.0
         _, gradient, _ = self._evaluate(eta)
-        nodal, multipliers = self.seen
-        trial, _ = self.model.tie_maps(self._middle())
-        passed = np.einsum("kbe,ke->kb", trial, nodal - self._start)
-        return -float(np.einsum("ikb,kb,i->", gradient, passed, multipliers[list(self._added)]))
+        trial, _ = self.model.tie_maps((self.seen[0] + self._start) / 2)
+        passed = np.einsum("kbe,ke->kb", trial, self.seen[0] - self._start)
+        return -float(np.einsum("ikb,kb,i->", gradient, passed, self._reactions()[list(self._added)]))
+
+    def _reactions(self):
+        """The multipliers that did the work of the step."""
+        return self.seen[1]

@@ -83,6 +83,8 @@ class StepNewton:
             problem.x.axpy(-1.0, self._step)
             found = self._outcome(steps)
         problem.set_state(problem.x)
+        if found == "converged" and problem.model.turned_over():
+            found = "a section turned by half a turn or more in one step"
         converged = found == "converged"
         self._spent, self._served = self._spent + len(steps), self._served + 1
         if self._served == 1 and lived == 1 and not began_fresh:  # the tangent did not outlive its step

@@ -13,7 +13,7 @@ TURNS = 0.1
 class OneStep:
     """See `protocol.Stepper`."""
 
-    order, adapts = 2, True
+    order, adapts, rho_inf = 2, True, None
     #: error of a step over that of the trapezoidal rule, as measured
     coarseness = 1.0
 
@@ -34,6 +34,9 @@ class OneStep:
     def jump(self):
         """See `Stepper`."""
         self._past = []  # (h, state before, rates before, work and dissipation before) of the last steps
+
+    def bend(self):
+        """See `Stepper`: no scheme of one step looks at what was before, but to begin Newton's method."""
 
     def step(self, t, h):
         """See `Stepper`."""

@@ -10,11 +10,13 @@ class Stepper(Protocol):
         order: of the error in the step h.
         forms: the name of the discretisation that its models must have; problem_class: what it solves, a `StepProblem`.
         adapts: whether `error` and `undo` are known.
+        rho_inf: by how much a step shrinks what vibrates much faster than the steps, where that can be set; else None.
         work, dissipated: dimensionless, since `begin`: what loads and supports have done, and what damping has taken.
     """
 
     order: int
     adapts: bool
+    rho_inf: float | None
     forms: str
     problem_class: type
     work: float
@@ -25,6 +27,9 @@ class Stepper(Protocol):
 
     def jump(self):
         """Something jumps here: what was before does not foretell what comes."""
+
+    def bend(self):
+        """A load bends here without a jump: rates of change of accelerations do."""
 
     def step(self, t, h):
         """Go from the time t to t + h, s.

@@ -21,10 +21,12 @@ class StepProblem:
         load_factor: what all loads and prescribed motions are multiplied by.
     """
 
+    ties_class = MovingTies
+
     def __init__(self, model):
         self.model, self.numbering = model, model.numbering
         numbering = self.numbering
-        self.ties = MovingTies(model, numbering) if model.shape.connections.ties else None
+        self.ties = self.ties_class(model, numbering) if model.shape.connections.ties else None
         tied = self.ties.rows if self.ties else np.empty(0, dtype=np.int64)
         self.tangent = self._kind()
         self.A = numbering.matrix(model.cell_dofs, tied[tied >= 0], blocks=self.tangent == "blocks")
@@ -76,18 +78,22 @@ class StepProblem:
         model = self.model
         self.h = model.h.value = h / model.time
         self._start[:] = self._state
-        if model.moving_loads:
-            model.loads_at(t + h / 2)
-            self._assemble(self._dead, self._loads)
-        self._residual.catch_up()
-        if self._live:
-            self._live.catch_up()
+        self._take_loads(t + h / 2)
         self._assemble(self._momentum, self._momenta)
         self._known.set(0.0)
         self._known.axpy(model.time / h, self._momenta)
         self._known.axpy(self.load_factor, self._loads)
         if self.ties:
             self.ties.begin(model.ties_at(t + h))
+
+    def _take_loads(self, t):
+        """Loads as they are at the time t (s), and whatever else does not change within a step."""
+        if self.model.moving_loads:
+            self.model.loads_at(t)
+            self._assemble(self._dead, self._loads)
+        self._residual.catch_up()
+        if self._live:
+            self._live.catch_up()
 
     def _assemble(self, form, vector):
         self._local[:] = 0.0

@@ -15,7 +15,7 @@ _GAMMA = 1 / (2 - 2 ** (1 / 3))
 class TripleJump:
     """See `protocol.Stepper`."""
 
-    order, adapts = 4, False
+    order, adapts, rho_inf = 4, False, None
     forms, problem_class = Momentum.forms, Momentum.problem_class
 
     def __init__(self, problem):
@@ -39,6 +39,10 @@ class TripleJump:
     def jump(self):
         """See `Stepper`."""
         self._inner.jump()
+
+    def bend(self):
+        """See `Stepper`."""
+        self._inner.bend()
 
     def step(self, t, h):
         """See `Stepper`."""

@@ -1,0 +1,164 @@
+"""Models that move by schemes with accelerations: eq. (1) holds at the end of a step."""
+
+import numpy as np
+from dolfinx import fem
+
+from cosserat_fenicsx import compat
+from cosserat_fenicsx.models.collocated_forms import PlanarCollocation, SpatialCollocation, compile_collocated
+from cosserat_fenicsx.models.moving import MovingSpatial
+from cosserat_fenicsx.models.moving_planar import MovingPlanar
+from cosserat_fenicsx.models.rod_data import gauss_function
+from cosserat_fenicsx.quaternions import conjugate_product
+
+_STRAINS = 6
+
+
+class Collocated:
+    """What a moving rung adds for accelerations; it must come first among the bases.
+
+    A step knows its increments D, of the nodes and of the strains at Gauss's points, and its scheme is a matrix: what
+    the rates (v, a, s) are at its end, velocities, accelerations and what else the scheme carries on, in terms of D and
+    of the rates at its beginning. Strains have rates of their own, by the same rule: no rigid motion is damped.
+
+    Attributes:
+        by_velocity, by_acceleration: the Constants that D is multiplied by in v and a.
+        known_velocity, known_acceleration, known_strain_rate: Functions, the rest of them.
+    """
+
+    #: numbers of a node's velocity
+    rate_size = 0
+
+    def _motion_fields(self):
+        super()._motion_fields()
+        self.by_velocity, self.by_acceleration = (fem.Constant(self.mesh, np.float64(0)) for _ in range(2))
+        element = compat.lagrange(self.mesh, self.shape.degree, self.rate_size)
+        space = compat.function_space(self.mesh, element)
+        self.known_velocity, self.known_acceleration = fem.Function(space), fem.Function(space)
+        self.known_strain_rate = gauss_function(self.mesh, self.shape.points, _STRAINS)
+        self._gauss_nodes = compat.cell_nodes(self.known_strain_rate.function_space).ravel()
+        self._node_rates = np.zeros((2, len(self._slots) * self.rate_size))
+        self._strain_rates = np.zeros((3, len(self.known_strain_rate.x.array)))
+
+    def _compile_collocated(self, step):
+        forms, change, rate = compile_collocated(step)
+        points = forms.gauss[:, None]
+        self._strain_change, self._strain_rate = fem.Expression(change, points), fem.Expression(rate, points)
+        return forms
+
+    def _at_gauss(self, expression):
+        values = compat.evaluate(expression, self.mesh, self._local_cells).reshape(-1, _STRAINS)
+        numbers = np.empty_like(self.known_strain_rate.x.array)
+        numbers.reshape(-1, _STRAINS)[self._gauss_nodes] = values
+        return numbers
+
+    @property
+    def rate_arrays(self):
+        """See `Moving`."""
+        return self.velocity.x.array, *self._node_rates, *self._strain_rates
+
+    @property
+    def known(self):
+        """The Functions that change from step to step beside the state."""
+        return self.known_velocity, self.known_acceleration, self.known_strain_rate
+
+    def begin_rates(self):
+        """A motion starts with the state and its velocity: strain rates follow, accelerations are not known yet."""
+        self._node_rates[:] = self._strain_rates[:] = 0.0
+        if self.damped:
+            self._strain_rates[0] = self._at_gauss(self._strain_rate)
+
+    def aim(self, ahead):
+        """Take the scheme of the step to come.
+
+        `start` is where it begins, and so is the state.
+
+        Args:
+            ahead: (3, 4), rows v, a, s at its end, columns D and v, a, s at its beginning.
+        """
+        self._ahead = ahead
+        self.by_velocity.value, self.by_acceleration.value = ahead[:2, 0]
+        rates = self._velocities(), *self._node_rates
+        self.known_velocity.x.array[:], self.known_acceleration.x.array[:], _ = ahead[:, 1:] @ rates
+        if self.damped:
+            self.known_strain_rate.x.array[:] = ahead[0, 1:] @ self._strain_rates
+
+    def accept(self, h):
+        """See `Moving`: by the scheme of the step."""
+        rates = self._ahead @ (self._increments(), self._velocities(), *self._node_rates)
+        self._put_velocities(rates[0])
+        self._node_rates[:] = rates[1:]
+        if self.damped:
+            self._strain_rates[:] = self._ahead @ (self._at_gauss(self._strain_change), *self._strain_rates)
+
+    def take_accelerations(self):
+        """Of the step alone its accelerations count: they are those at its beginning."""
+        a, s = self._node_rates
+        rates = self._ahead[1] @ (self._increments(), self._velocities(), a, s)
+        if self.damped:
+            _, b, c = self._strain_rates
+            b[:] = self._ahead[1] @ (self._at_gauss(self._strain_change), *self._strain_rates)
+            c[:] = 0.0
+        a[:], s[:] = rates, 0.0
+
+    # -- what a rung fills in ----------------------------------------------------------------------------------------
+
+    def _increments(self):
+        """(nodes * rate_size,) D of the local nodes."""
+        raise NotImplementedError
+
+    def _velocities(self):
+        """(nodes * rate_size,) from `velocity`, at the beginning of the step."""
+        raise NotImplementedError
+
+    def _put_velocities(self, v):
+        """The other way, at the end of the step."""
+        raise NotImplementedError
+
+
+class CollocatedSpatial(Collocated, MovingSpatial):
+    """Velocities are r' in time and the angular velocity Om, reference components."""
+
+    rate_size = 6
+
+    def _compile(self, spaces):
+        self._motion_fields()
+        return self._compile_collocated(SpatialCollocation(self))
+
+    def _increments(self):
+        now, before = (f.x.array[self._nodal] for f in (self.state, self.start))
+        p, w = conjugate_product(before[:, 3:], now[:, 3:]), np.einsum("ni,ni->n", before[:, 3:], now[:, 3:])
+        size = np.sqrt(np.einsum("ni,ni->n", p, p))
+        turned = 2 * np.where(size > 0, np.arctan2(size, w) / np.where(size > 0, size, 1.0), 1.0)
+        return np.concatenate([now[:, :3] - before[:, :3], turned[:, None] * p], axis=1).ravel()
+
+    def _velocities(self):
+        q = self.start.x.array[self._nodal[:, 3:]]
+        rates = self.velocity.x.array[self._nodal]
+        return np.concatenate([rates[:, :3], 2 * conjugate_product(q, rates[:, 3:])], axis=1).ravel()
+
+    def _put_velocities(self, v):
+        nodal, v = self._nodal, v.reshape(-1, 6)
+        Om, q = v[:, 3:], self.state.x.array[nodal[:, 3:]]
+        rates = self.velocity.x.array
+        rates[nodal[:, :3]] = v[:, :3]
+        rates[nodal[:, 3]] = -np.einsum("ni,ni->n", q[:, 1:], Om) / 2
+        rates[nodal[:, 4:]] = (q[:, :1] * Om + np.cross(q[:, 1:], Om)) / 2
+
+
+class CollocatedPlanar(Collocated, MovingPlanar):
+    """Velocities are the rates of the unknowns."""
+
+    rate_size = 3
+
+    def _compile(self, spaces):
+        self._motion_fields()
+        return self._compile_collocated(PlanarCollocation(self))
+
+    def _increments(self):
+        return (self.state.x.array - self.start.x.array)[self._nodal].ravel()
+
+    def _velocities(self):
+        return self.velocity.x.array[self._nodal].ravel()
+
+    def _put_velocities(self, v):
+        self.velocity.x.array[self._nodal.ravel()] = v

@@ -1,0 +1,41 @@
+"""Two rules of thumb for a step in time, to be compared with: what stiff thin rods do to them is why they are no schemes.
+
+Both have the velocities, the momenta and the constraint of the momentum scheme, and a stress of their own.
+"""
+
+from cosserat_fenicsx.forms.equilibrium import balance, contact_force, contact_moment
+
+from cosserat_fenicsx import dynamics
+from cosserat_fenicsx.models.moving import MovingSpatial
+from cosserat_fenicsx.models.moving_forms import SpatialStep, compile_momentum
+from cosserat_fenicsx.steppers.momentum import Momentum
+
+
+def at(motion, section, test):
+    """The stress terms of eq. (1) at a configuration."""
+    return balance(contact_force(motion, section), contact_moment(motion, section), motion, test)
+
+
+def midpoint(before, after, middle, section, viscosity, h, test):
+    """Plain midpoint rule: the stress of the averaged configuration."""
+    return at(middle, section, test)
+
+
+def trapezoidal(before, after, middle, section, viscosity, h, test):
+    """Trapezoidal rule: the forces of both ends averaged."""
+    return (at(before, section, test) + at(after, section, test)) / 2
+
+
+def register(monkeypatch):
+    """Let `simulate` know them as the schemes "midpoint" and "trapezoidal", in space, undamped."""
+    for stress in (midpoint, trapezoidal):
+        name = stress.__name__
+
+        def compiled(model, spaces, stress=stress):
+            model._motion_fields()
+            return compile_momentum(SpatialStep(model), stress)
+
+        monkeypatch.setitem(
+            dynamics._MODELS, (name, "spatial"), type(name, (MovingSpatial,), {"_compile": compiled, "variations": ()})
+        )
+        monkeypatch.setitem(dynamics.SCHEMES, name, type(name, (Momentum,), {"forms": name}))
