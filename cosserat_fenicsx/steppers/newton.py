@@ -42,8 +42,13 @@ class StepNewton:
         self._root = math.sqrt(motions)
         self._price = motions / (50 + 0.055 * motions)  # of a tangent, in iterations, as measured
         self._step = numbering.vector()
-        self._spent = self._served = self._anew = 0
         self._begin()
+        self.forget()
+
+    def forget(self):
+        """Go on as if nothing had been solved so far: with a fresh tangent, and without what was learnt of kept ones."""
+        self.problem.fresh = True
+        self._spent = self._served = self._anew = 0
 
     def _begin(self):
         self._ksp = ksp = PETSc.KSP().create(self._comm)
@@ -58,17 +63,17 @@ class StepNewton:
             Solved.
         """
         kept = not self.problem.fresh
-        solved = self._attempt(guess)
+        start = self.problem.x.array_r[: self._motions].copy()
+        solved = self._attempt(guess, start)
         if solved.converged or not kept:
             return solved
         self.problem.fresh = True
-        again = self._attempt(guess)
+        again = self._attempt(guess, start)
         return Solved(again.converged, solved.iterations + again.iterations, again.reason)
 
-    def _attempt(self, guess):
+    def _attempt(self, guess, start):
         problem, found, steps = self.problem, None, []
         lived, began_fresh = self._served, problem.fresh
-        start = problem.x.array_r[: self._motions].copy()
         problem.guess(guess)
         self._enough = max(SMALLEST, INCREMENT * self._size(problem.x.array_r[: self._motions] - start))
         while found is None:

@@ -27,6 +27,7 @@ class OneStep:
     def begin(self):
         """See `Stepper`."""
         self._h = None
+        self._newton.forget()
         self.work = self.dissipated = 0.0
         self.jump()
 
