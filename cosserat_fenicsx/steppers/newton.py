@@ -94,7 +94,8 @@ class StepNewton:
         return Solved(converged, len(steps), found)
 
     def _size(self, moved):
-        return math.sqrt(self._comm.allreduce(float(moved @ moved))) / self._root
+        square = float(moved @ moved)
+        return math.sqrt(self._comm.allreduce(square) if self._comm.size > 1 else square) / self._root
 
     def _solve(self):
         """The increment for the residual; False where the tangent is singular."""
