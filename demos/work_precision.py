@@ -39,9 +39,10 @@ SLOW = 0.5  # s: from here on there is no warm-up run, and no repetition where t
 BUDGET = 24 * 60.0  # s of measuring; a round that would begin later is left out, and the table says so
 
 
-#: What is measured: peers, problems, how their errors are told, the configurations of a peer, and what these are called.
-Panel = namedtuple("Panel", "peers problems error configurations kind model")
-STATICS = Panel(PEERS, problems, error, configurations, kind, model)
+#: What is measured: peers, problems, how their errors are told, the configurations of a peer, what these are called, and
+#: how many samples are taken of one that may be slow.
+Panel = namedtuple("Panel", "peers problems error configurations kind model first")
+STATICS = Panel(PEERS, problems, error, configurations, kind, model, A_VISIT)
 
 
 class Record:
@@ -124,7 +125,7 @@ def sample(peer, row, found, wanted, limits):
     visit = (
         {"warm": 0, "samples": 1}
         if slow or cold
-        else {"warm": 1, "samples": min(A_VISIT, wanted - len(row["seconds"]))}
+        else {"warm": 1, "samples": min(A_VISIT if row["seconds"] else found.panel.first, wanted - len(row["seconds"]))}
     )
     answer = peer.ask(problem, row["configuration"], **visit, limit=limits[peer.name])
     found.spent += time.monotonic() - began

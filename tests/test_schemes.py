@@ -79,6 +79,15 @@ def test_the_ledger_closes_whatever_there_is():
     np.testing.assert_allclose(runs[1].position(b.end)[-1], exact.position(b.end)[-1], atol=2e-2)
 
 
+def test_a_run_does_not_depend_on_the_one_before():
+    """What Newton learnt of kept tangents in a run is forgotten: the same digits, whatever ran on the same forms."""
+    rod, scene = flying_in_space()
+    settings = {"elements": 8, "degree": 2, "save_every": 2}
+    first = cf.simulate(scene, 2, dt=0.05, **settings).position(rod.end)
+    cf.simulate(scene, 7, dt=0.1, **settings)
+    assert (cf.simulate(scene, 2, dt=0.05, **settings).position(rod.end) == first).all()
+
+
 def test_what_a_scheme_cannot_do_is_said():
     rod = cf.Rod(cf.Line((0, 0, 0), (2, 0, 0)), SECTION, damping=cf.Damping(drag=1))
     with pytest.raises(cf.SceneError, match="'triple-jump' knows no error of its steps: expected dt"):

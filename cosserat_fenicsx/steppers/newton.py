@@ -42,11 +42,12 @@ class StepNewton:
         self._root = math.sqrt(motions)
         self._price = motions / (50 + 0.055 * motions)  # of a tangent, in iterations, as measured
         self._step = numbering.vector()
-        self.begin()
         self._make_ksp()
+        self.forget()
 
-    def begin(self):
-        """A motion starts: what another one met decides nothing."""
+    def forget(self):
+        """Go on as if nothing had been solved so far: with a fresh tangent, and without what was learnt of kept ones."""
+        self.problem.fresh = True
         self._spent = self._served = self._anew = 0
 
     def _make_ksp(self):
@@ -62,17 +63,17 @@ class StepNewton:
             Solved.
         """
         kept = not self.problem.fresh
-        solved = self._attempt(guess)
+        start = self.problem.x.array_r[: self._motions].copy()
+        solved = self._attempt(guess, start)
         if solved.converged or not kept:
             return solved
         self.problem.fresh = True
-        again = self._attempt(guess)
+        again = self._attempt(guess, start)
         return Solved(again.converged, solved.iterations + again.iterations, again.reason)
 
-    def _attempt(self, guess):
+    def _attempt(self, guess, start):
         problem, found, steps = self.problem, None, []
         lived, began_fresh = self._served, problem.fresh
-        start = problem.x.array_r[: self._motions].copy()
         problem.guess(guess)
         self._enough = max(SMALLEST, INCREMENT * self._size(problem.x.array_r[: self._motions] - start))
         while found is None:
@@ -95,7 +96,8 @@ class StepNewton:
         return Solved(converged, len(steps), found)
 
     def _size(self, moved):
-        return math.sqrt(self._comm.allreduce(float(moved @ moved))) / self._root
+        square = float(moved @ moved)
+        return math.sqrt(self._comm.allreduce(square) if self._comm.size > 1 else square) / self._root
 
     def _solve(self):
         """The increment for the residual; False where the tangent is singular."""

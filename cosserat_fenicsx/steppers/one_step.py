@@ -27,8 +27,8 @@ class OneStep:
     def begin(self):
         """See `Stepper`."""
         self._h = None
+        self._newton.forget()
         self.work = self.dissipated = 0.0
-        self._newton.begin()
         self.jump()
 
     def jump(self):
@@ -66,8 +66,8 @@ class OneStep:
         guesses = _extrapolated([*known, now])
         if len(known) < 3:
             return guesses[-1]
-        missed = [np.square(guess - self._start).sum() for guess in _extrapolated(known)]
-        return guesses[int(np.argmin(self._comm.allreduce(np.array(missed))))]
+        missed = np.array([np.square(guess - self._start).sum() for guess in _extrapolated(known)])
+        return guesses[int(np.argmin(self._comm.allreduce(missed) if self._comm.size > 1 else missed))]
 
     def error(self):
         """See `Stepper`: h^3/12 times the third derivative of the cubic through the last four states.
