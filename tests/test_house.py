@@ -43,10 +43,10 @@ SCENE = (
     "scene", "scenefile", "sections", "signals", "splines", "statical", "supports", "ties",
 )  # fmt: skip
 SOLVERS = (
-    "arclength", "chord", "continuation", "dynamics", "eigen", "follow", "interrupts", "linear", "linear_buckling", "locator", "modes", "pace", "problem",
+    "arclength", "chord", "continuation", "dynamics", "eigen", "follow", "linear", "linear_buckling", "locator", "modes", "pace", "problem",
     "refinement", "snes", "stability", "start", "statics", "tie_rows", "tracing", "track",
 )  # fmt: skip
-RESULTS = ("accuracy", "energy_chart", "history", "plot", "ranks", "records", "recovery", "results", "tables", "xdmf")
+RESULTS = ("accuracy", "animation", "between", "drawing", "energy_chart", "history", "plot", "ranks", "records", "recovery", "results", "tables", "xdmf")
 
 
 def test_data_flows_one_way():
