@@ -22,6 +22,7 @@ from cosserat_fenicsx.pace import Adaptive, Fixed
 from cosserat_fenicsx.progress import Progress
 from cosserat_fenicsx.scene import Scene
 from cosserat_fenicsx.signals import signals_of
+from cosserat_fenicsx.standing import equilibrium
 from cosserat_fenicsx.start import put_start, starts_in
 from cosserat_fenicsx.steppers import SCHEMES
 
@@ -30,9 +31,8 @@ _MODELS = {
     ("momentum", "planar"): MovingPlanar,
     ("energy", "spatial"): ConservingSpatial,
 }
-#: Elements a rod and degree where none are asked for.
-ELEMENTS, DEGREE = 8, 3
-_TOL = 1e-3
+#: Elements a rod, degree and tolerance where none are asked for.
+ELEMENTS, DEGREE, TOL = 8, 3, 1e-3
 # A step that fails is halved so often before the motion is given up.
 _HALVINGS = 12
 
@@ -47,7 +47,7 @@ def simulate(
     scheme="momentum",
     save_every=None,
     start=None,
-    load_factor=1.0,
+    load_factor=None,
     elements=ELEMENTS,
     degree=DEGREE,
     progress=None,
@@ -70,8 +70,10 @@ def simulate(
             time: order 4, for smooth motions without damping, fixed dt); "energy" (exact energy and linear momentum,
             order 2, in space alone).
         save_every: s between saved states, landed on exactly; None saves every step.
-        start: None for the reference, a `Path` for its last equilibrium, or (Path, k); rods must be the same objects.
-        load_factor: multiplies all loads and prescribed motions, as in `solve`.
+        start: None for the reference, a `Path` for its last equilibrium, or (Path, k); rods must be the same objects. A
+            number is the load factor of an equilibrium of the scene as it is just before t = 0 (`standing.before`).
+        load_factor: multiplies all loads and prescribed motions, as in `solve`; None for that of the start where this is
+            a number, otherwise 1.
         elements: elements per rod.
         degree: 1 to 4, of r and q.
         progress: True, False, or None for a bar on long runs in a terminal.
@@ -92,15 +94,22 @@ def simulate(
         raise SceneError(f"scheme = {scheme!r}: {nearest(scheme, SCHEMES)}")
     pace = _pace(duration, tol, dt, scheme)
     save_every = None if save_every is None else _positive("save_every", save_every)
+    if load_factor is None:
+        load_factor = start if isinstance(start, numbers.Real) else 1.0
     number("simulate", "load_factor", load_factor, "a finite number", math.isfinite)
     if isinstance(elements, bool) or not isinstance(elements, numbers.Integral) or elements < 1:
         refuse("simulate", "elements", elements, "a whole number above zero")
     scene = scene.over(duration)
-    model, why = _choice(scene, model, scheme, start)
+    cautions = []
+    if isinstance(start, numbers.Real):
+        start = equilibrium(scene, start, model=model, elements=elements, degree=degree, comm=comm)
+        if not start.stable[-1]:
+            cautions = ["the equilibrium that it starts from is unstable: rounding decides where it goes"]
+    model, why = chosen_model(scene, model, scheme, start)
     problem, stepper = _solvers(scene, Layout.of(scene, elements), degree, scheme, load_factor, comm, model)
     put_start(problem.model, start)
     problem.begin()
-    run = _Run(problem, stepper, pace, scheme, why)
+    run = _Run(problem, stepper, pace, scheme, [why, *cautions])
     with Progress([duration], progress, comm, "t (s) =") as bar:
         bar.start(f"{problem.model.name}, {problem.model.unknowns} unknowns")
         try:
@@ -115,7 +124,7 @@ class _Run:
 
     def __init__(self, problem, stepper, pace, scheme, why):
         self.problem, self.model, self._stepper, self._pace = problem, problem.model, stepper, pace
-        self.history = History.of(self.model, scheme, [why])
+        self.history = History.of(self.model, scheme, why)
         self._steps = self._iterations = 0
 
     def over(self, marks, save_all, bar):
@@ -181,8 +190,15 @@ class _Run:
                                     steps=self._steps, ledger=ledger))  # fmt: skip
 
 
-def _choice(scene, model, scheme, start):
-    """The model's name, and why it is that one."""
+def chosen_model(scene, model, scheme, start=None):
+    """The model's name, and why it is that one.
+
+    Args:
+        scene, model, scheme: as `simulate` takes them; start: None, a Path or (Path, k).
+
+    Raises:
+        SceneError: an unknown model, or one that the scene does not fit.
+    """
     flat = ("momentum" if scheme not in SCHEMES else SCHEMES[scheme].forms, "planar") in _MODELS
     if model not in ("auto", "planar", "spatial"):
         raise SceneError(f"model = {model!r}: {nearest(model, ('auto', 'planar', 'spatial'))}")
@@ -233,7 +249,7 @@ def _pace(duration, tol, dt, scheme):
         return Fixed(min(_positive("dt", dt), duration))
     if not SCHEMES[scheme].adapts:
         raise SceneError(f"scheme = '{scheme}' knows no error of its steps: expected dt, a fixed step (s)")
-    tol = _TOL if tol is None else tol
+    tol = TOL if tol is None else tol
     return Adaptive(
         number("simulate", "tol", tol, "a number from 1e-10 to below 1", lambda x: 1e-10 <= x < 1), duration
     )

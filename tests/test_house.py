@@ -44,9 +44,9 @@ SCENE = (
 )  # fmt: skip
 SOLVERS = (
     "arclength", "chord", "continuation", "dynamics", "eigen", "follow", "linear", "linear_buckling", "locator", "modes", "pace", "problem",
-    "refinement", "snes", "stability", "start", "statics", "tie_rows", "tracing", "track",
+    "refinement", "snes", "stability", "standing", "start", "statics", "tie_rows", "tracing", "track",
 )  # fmt: skip
-RESULTS = ("accuracy", "animation", "between", "drawing", "energy_chart", "history", "plot", "ranks", "records", "recovery", "results", "tables", "xdmf")
+RESULTS = ("accuracy", "animation", "between", "drawing", "energy_chart", "history", "motion_tables", "plot", "ranks", "records", "recovery", "results", "tables", "xdmf")
 
 
 def test_data_flows_one_way():
@@ -62,6 +62,7 @@ def test_data_flows_one_way():
         "linear_buckling",
         "modes",
         "refinement",
+        "standing",
         "start",
         "statics",
         "tracing",
