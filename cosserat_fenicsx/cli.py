@@ -73,6 +73,7 @@ def _parser():
         const="motion.gif",
         help="motions: write a film too, .gif or .mp4 [motion.gif]",
     )
+    run.add_argument("--speed", type=float, help="films: seconds of the motion in one second [1 where that suits]")
     run.set_defaults(do=_run)
 
     buckling = commands.add_parser("buckling", help="critical load factors by linear buckling")
@@ -178,7 +179,8 @@ def _run(options):
             shown = None if at is None else sorted({int(abs(path.along_axis - x).argmin()) for x in at})
             film = options.animate if code != INTERRUPTED else None  # who stops a run does not wait for its film
             try:
-                _write(path, out, picture=not options.no_picture, film=film, magnify=options.magnify, shown=shown)
+                look = {"magnify": options.magnify, "shown": shown, "film": film, "speed": options.speed}
+                _write(path, out, picture=not options.no_picture, **look)
             except KeyboardInterrupt:
                 trouble, code = "interrupted; the film ends where it was drawn", INTERRUPTED
     if trouble is not None:
@@ -220,11 +222,11 @@ def _report(path):
         print(text)
 
 
-def _write(path, out, *, picture, film, magnify, shown):
+def _write(path, out, *, picture, magnify, shown, film, speed):
     if path.axis == "time":
         from cosserat_fenicsx.cli_motion import write_motion
 
-        written = write_motion(path, out, picture=picture, film=film, magnify=magnify, shown=shown)
+        written = write_motion(path, out, picture=picture, magnify=magnify, shown=shown, film=film, speed=speed)
     else:
         from cosserat_fenicsx.tables import write_csv
 

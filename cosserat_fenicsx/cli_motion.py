@@ -49,13 +49,13 @@ def refuse_other(name, moves):
     )
 
 
-def write_motion(history, out, *, picture, film, magnify, shown):
+def write_motion(history, out, *, picture, magnify, shown, film, speed):
     """Files of a motion in a folder; returns their names.
 
     Args:
         history: a `History`; out: a Path.
-        picture: whether to draw pictures; film: name of a film, or None.
-        magnify, shown: of pictures, see `Path.plot`.
+        picture: whether to draw pictures; magnify, shown: of these, see `Path.plot`.
+        film: name of a film, or None; speed: of it, see `History.animate`.
     """
     from cosserat_fenicsx.motion_tables import write_motion_csv
 
@@ -69,6 +69,6 @@ def write_motion(history, out, *, picture, film, magnify, shown):
             history.plot_energy(out / "energy.png")
             written.append("energy.png")
     if film and len(history) > 1:
-        history.animate(out / film, magnify=magnify)
+        history.animate(out / film, speed=speed, magnify=magnify)
         written.append(film)
     return written

@@ -89,16 +89,10 @@ def simulate(
     """
     comm = comm or MPI.COMM_WORLD
     instance("simulate", "scene", scene, Scene, "a Scene")
-    duration = _positive("duration", duration)
-    if scheme not in SCHEMES:
-        raise SceneError(f"scheme = {scheme!r}: {nearest(scheme, SCHEMES)}")
-    pace = _pace(duration, tol, dt, scheme)
-    save_every = None if save_every is None else _positive("save_every", save_every)
+    pace = pace_of(duration, tol=tol, dt=dt, scheme=scheme, save_every=save_every, elements=elements)
     if load_factor is None:
         load_factor = start if isinstance(start, numbers.Real) else 1.0
     number("simulate", "load_factor", load_factor, "a finite number", math.isfinite)
-    if isinstance(elements, bool) or not isinstance(elements, numbers.Integral) or elements < 1:
-        refuse("simulate", "elements", elements, "a whole number above zero")
     scene = scene.over(duration)
     cautions = []
     if isinstance(start, numbers.Real):
@@ -239,8 +233,21 @@ def _kept(alone, shape, scheme):
     return _make(MPI.COMM_SELF if alone else MPI.COMM_WORLD, shape, scheme)
 
 
-def _pace(duration, tol, dt, scheme):
-    """What chooses the steps."""
+def pace_of(duration, *, tol=None, dt=None, scheme="momentum", save_every=None, elements=ELEMENTS):
+    """What chooses the steps of `simulate`.
+
+    Args: as `simulate` takes them.
+
+    Raises:
+        SceneError: one of them is outside its range.
+    """
+    duration = _positive("duration", duration)
+    if scheme not in SCHEMES:
+        raise SceneError(f"scheme = {scheme!r}: {nearest(scheme, SCHEMES)}")
+    if save_every is not None:
+        _positive("save_every", save_every)
+    if isinstance(elements, bool) or not isinstance(elements, numbers.Integral) or elements < 1:
+        refuse("simulate", "elements", elements, "a whole number above zero")
     if dt is not None:
         if tol is not None:
             raise SceneError(

@@ -1,6 +1,6 @@
 """What would be simulated, in plain sentences, without simulating it."""
 
-from cosserat_fenicsx.dynamics import DEGREE, ELEMENTS, TOL, chosen_model
+from cosserat_fenicsx.dynamics import DEGREE, ELEMENTS, TOL, chosen_model, pace_of
 from cosserat_fenicsx.explain import of_the_scene
 from cosserat_fenicsx.models.rod_data import check_inertia
 from cosserat_fenicsx.models.rodmesh import Layout
@@ -21,8 +21,10 @@ def explain_motion(scene, settings):
         settings: arguments of `simulate`, `duration` among them.
 
     Raises:
-        SceneError: an unknown model or scheme, or a rod without inertia.
+        SceneError: arguments that `simulate` would refuse, or a rod without inertia.
     """
+    checked = ("duration", "tol", "dt", "scheme", "save_every", "elements")
+    pace_of(**{name: settings[name] for name in checked if name in settings})
     duration = settings["duration"]
     scene = scene.over(duration)
     check_inertia(scene)
@@ -77,13 +79,11 @@ def _start(scene, start, load_factor):
     if start is None:
         factor = "" if load_factor in (None, 1) else f" Loads and prescribed motions are taken {load_factor:g} times."
         return f"Start: the reference, free of stress{velocities}.{factor}"
-    loads = ", ".join(describe(x) for x in before(scene).loads)
+    loads = ", ".join(describe(x) for x in before(scene).loads) or "prescribed motions"
+    as_they_are = "as they are just before t = 0" if scene.moving else "constant"
     then = start if load_factor is None else load_factor
     after = "then nothing of the loads remains" if then == 0 else f"then the load factor is {then:g}"
-    return (
-        f"Start: the static equilibrium at load factor {start:g} of all as it is just before t = 0 ({loads}){velocities}; "
-        f"{after}."
-    )
+    return f"Start: the static equilibrium at load factor {start:g} ({loads}, {as_they_are}){velocities}; {after}."
 
 
 def _steps(settings):

@@ -37,7 +37,7 @@ def motion_table(history, rows=ROWS):
             f"{energies[-1][k]:.1e}",
         )
     ends = (
-        f"{place} at ({', '.join(f'{x:.6g}' for x in history.position(place)[-1])}) m"
+        f"{place} at ({', '.join(f'{x if abs(x) > least else 0:.6g}' for x in history.position(place)[-1])}) m"
         for place in _named(history.scene)
     )
     return "\n".join([

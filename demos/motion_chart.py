@@ -82,7 +82,7 @@ def _draw_shapes(figure, place, history, shapes):
         axes.set_aspect("equal")
     if not flat:
         ranges = np.array([axes.get_xlim(), axes.get_ylim(), axes.get_zlim()])
-        axes.set_box_aspect(np.ptp(ranges, axis=1), zoom=1.2)
+        axes.set_box_aspect(np.ptp(ranges, axis=1), zoom=1.1)
         for axis, size in zip((axes.xaxis, axes.yaxis, axes.zaxis), np.ptp(ranges, axis=1), strict=True):
             axis.set_major_locator(MaxNLocator(max(2, round(6 * size / np.ptp(ranges, axis=1).max()))))
     axes.grid(alpha=0.3)

@@ -32,6 +32,22 @@ def test_eccentric_cantilever(tmp_path_all, capsys):
     COMM.barrier()
 
 
+def test_motion(tmp_path_all, capsys):
+    """All seven, the quick way; one of them with its picture."""
+    import motion
+
+    for check, off in motion.main(out=None, quick=True):
+        assert off <= check.allowed, check
+    printed = capsys.readouterr().out
+    _, check = motion.run(motion.damped_column, tmp_path_all, quick=True)
+    if COMM.rank == 0:
+        assert all(demo.__name__ in printed for demo in motion.DEMOS) and len(motion.DEMOS) == 7
+        assert (tmp_path_all / "damped_column.png").stat().st_size > 50_000 and check.found > 0
+    else:
+        assert printed == ""
+    COMM.barrier()
+
+
 @pytest.mark.serial
 def test_overhead_quick(tmp_path):
     """The bare loop and the public face give the same digits; what it costs is for the command to say."""
