@@ -35,7 +35,7 @@ demo: setup
 	$(MPIRUN) -n 2 $(PYTHON) demos/eccentric_cantilever.py
 
 motion: setup
-	$(MPIRUN) -n 2 $(PYTHON) demos/motion.py
+	$(PYTHON) demos/motion.py
 
 # pytest's cache directory is off in parallel: the ranks would write it all at once.
 test: setup
