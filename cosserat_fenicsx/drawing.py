@@ -161,8 +161,9 @@ def _bounds(points, size):
     return tuple(np.column_stack([low, high]).ravel()), labels
 
 
-def _aim(plotter, bounds, span):
-    """Look across the plane of a plane scene, from a corner otherwise, and leave room for labels, title and bar."""
+def view_of(span):
+    """Where the camera looks from (3,), what is right and above in the picture, and what is up in space, for a drawing
+    of this span (3,)."""
     thin = int(np.argmin(span))
     if span[thin] < 0.05 * span.max():
         view = np.zeros(3)
@@ -173,7 +174,12 @@ def _aim(plotter, bounds, span):
     view = view / np.linalg.norm(view)
     right = np.cross(up, view)
     right /= np.linalg.norm(right)
-    above = np.cross(view, right)
+    return view, right, np.cross(view, right), up
+
+
+def _aim(plotter, bounds, span):
+    """Look across the plane of a plane scene, from a corner otherwise, and leave room for labels, title and bar."""
+    view, right, above, up = view_of(span)
     corners = np.array(np.meshgrid(*bounds)).reshape(3, -1).T
     across, high = corners @ right, corners @ above
     width, height = np.ptp(across), np.ptp(high)

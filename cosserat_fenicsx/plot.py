@@ -1,13 +1,17 @@
 """Pictures: the deformed rods in space by pyvista (off-screen), a path as a chart by matplotlib."""
 
+import math
 from pathlib import Path
 
 import numpy as np
 
 from cosserat_fenicsx.checks import positive
-from cosserat_fenicsx.drawing import add_body, at_rest, frame, load_pyvista, swept, thickening
+from cosserat_fenicsx.drawing import add_body, at_rest, frame, load_pyvista, swept, thickening, view_of
 from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.ranks import on_first
+
+# Of the picture: how high a label is, how wide a letter, and a displacement that can hardly be seen.
+_HIGH, _WIDE, _HARDLY = 0.035, 0.016, 0.01
 
 
 def rods(path, file=None, points=None, magnify=1.0):
@@ -65,13 +69,25 @@ def _draw(path, points, magnify):
         add_body(plotter, pyvista, body, factor, peak)
     for line in resting:
         plotter.add_mesh(pyvista.lines_from_points(line), color="grey", line_width=2)
-    _label(plotter, path, shown, bodies, size)
-    plotter.add_text(_note(path, shown, thicker, magnify), position="upper_edge", color="black", font_size=12)
+    _label(plotter, path, shown, bodies, np.ptp(everywhere, axis=0))
+    note = _note(path, shown, thicker, magnify, _small(path, shown, size, magnify))
+    plotter.add_text(note, position="upper_edge", color="black", font_size=12)
     frame(plotter, everywhere)
     return plotter
 
 
-def _note(path, shown, thicker, magnify):
+def _small(path, shown, size, magnify):
+    """Words where displacements can hardly be seen, and what would show them."""
+    largest = max(
+        np.linalg.norm(path.fields(k, rod)["displacement"], axis=1).max() for k in shown for rod in path.scene.rods
+    )
+    if magnify * largest > _HARDLY * size or largest < 1e-12 * size:
+        return ""
+    decade = 10.0 ** math.floor(math.log10(0.1 * size / largest))
+    return f"displacements are at most {largest:.2g} m, magnify={decade:g} shows them"
+
+
+def _note(path, shown, thicker, magnify, small):
     """The title: what is shown, and what is not to scale."""
     which = (
         f"shapes by {path.axis}" if len(shown) == len(path) else f"shapes at {len(shown)} of {len(path)} {path.axis}s"
@@ -79,9 +95,11 @@ def _note(path, shown, thicker, magnify):
     parts = [f"{path.scene.title or 'Deformed rods'}: {which}"]
     if magnify != 1:
         parts.append(f"displacements magnified {magnify:g} times")
+    if small:
+        parts.append(small)
     if thicker:
         parts.append(f"sections drawn {' and '.join(sorted(thicker))} times their size")
-    return parts[0] + (f"\n({', '.join(parts[1:])})" if parts[1:] else "")
+    return "\n".join([parts[0], *(f"({part})" for part in parts[1:])])
 
 
 def chart(file, curves, *, xlabel, ylabel, title, ylim=None):
@@ -121,9 +139,10 @@ def _spread(path, most=5):
     return sorted({int(np.argmin(np.abs(way - w))) for w in wanted})
 
 
-def _label(plotter, path, shown, bodies, size):
+def _label(plotter, path, shown, bodies, span):
     """Load factor, and a word where a point is unstable, where the shapes lie farthest apart; none over another."""
-    rods = path.scene.rods
+    rods, size = path.scene.rods, float(span.max())
+    _, right, above, _ = view_of(span)
     spread = [np.ptp([bodies[k, rod].line for k in shown], axis=0).max(axis=1) for rod in rods]
     rod = max(range(len(rods)), key=lambda i: (round(spread[i].max() / size, 6), -i))
     place = len(spread[rod]) - 1 - int(np.argmax(spread[rod][::-1]))  # the last of equals: an end, not next to it
@@ -132,10 +151,11 @@ def _label(plotter, path, shown, bodies, size):
     for k in reversed(shown):
         body = bodies[k, rods[rod]]
         at = body.line[place] + 0.03 * size * (1 if last else 1.3) * _beyond(body.directors[place, :, 2], last)
-        if any(np.linalg.norm(at - other) < 0.03 * size for other in placed):
-            continue
-        placed.append(at)
         text = path.label(k)
+        across, high = at @ right / size, at @ above / size
+        if any(abs(high - y) < _HIGH and abs(across - x) < _WIDE * (len(text) + n) / 2 for x, y, n in placed):
+            continue
+        placed.append((across, high, len(text)))
         plotter.add_point_labels(
             [at], [text], font_size=20, text_color="black", shape=None, show_points=False, always_visible=True, bold=False,
             justification_horizontal="center", justification_vertical="center",

@@ -20,9 +20,9 @@ def path_table(path):
     table = Table(
         title=f"{title}{path.model} model, {path.formulation} formulation, degree {path.degree}, "
         f"{' + '.join(map(str, path.elements))} elements, {path.unknowns} unknowns",
-        caption=f"dx, dy, dz, rotation: of {station}. stable: 'no (2)' has two negative modes. iterations: Newton's, since "
-        "the row above.\nest. error: of positions, relative to the largest displacement. Loads, times the load factor: "
-        f"{', '.join(map(describe, path.scene.loads)) or 'none'}.",
+        caption=f"dx, dy, dz, rotation: of {station}. stable: 'no (2)' has two negative modes.\n"
+        "iterations: Newton's, since the row above. est. error: of positions, relative to the largest displacement.\n"
+        f"Loads, times the load factor: {', '.join(map(describe, path.scene.loads)) or 'none'}.",
     )
     headings = ("load factor", "dx (m)", "dy (m)", "dz (m)", "rotation (rad)", "stable", "iterations", "est. error")
     for heading in headings:
