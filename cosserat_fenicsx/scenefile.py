@@ -17,7 +17,7 @@ type = "Force"
 station = "column.end"
 force = [0, 0, -1e5]
 
-# in a motion: force = { type = "Triangle", value = [0, 0, 50], peak = 1.0, end = 2.0 }, or Step, Ramp, Sine, Table
+# in a motion: force = { type = "Triangle", value = [0, 0, 50], peak = 1.0, end = 2.0 }, or Step, Ramp, RunUp, Sine, Table
 
 [[velocities]]                    # optional, where a motion starts
 rod = "column"
