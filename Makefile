@@ -17,10 +17,11 @@ export VTK_DEFAULT_OPENGL_WINDOW = vtkEGLRenderWindow
 # A numpy in the user's own site directory would hide the distribution's.
 export PYTHONNOUSERSITE = 1
 
-.PHONY: help setup packages demo test tables figure3 work-precision failures random clean
+.PHONY: help setup packages demo motion test tables figure3 work-precision failures random clean
 
 help:
 	@echo "make demo    solve the eccentric cantilever of the paper on two processes; writes out/"
+	@echo "make motion  seven motions, each a scene file, a picture and a number that must come out; writes out/ (a minute)"
 	@echo "make test    all tests on one, two and four processes"
 	@echo "make tables  the README's tables of accuracy and cost, measured anew and put into it"
 	@echo "make figure3 every curve of the paper's Figure 3, and what was found; writes out/ (about 4 minutes)"
@@ -32,6 +33,9 @@ help:
 
 demo: setup
 	$(MPIRUN) -n 2 $(PYTHON) demos/eccentric_cantilever.py
+
+motion: setup
+	$(PYTHON) demos/motion.py
 
 # pytest's cache directory is off in parallel: the ranks would write it all at once.
 test: setup

@@ -41,7 +41,8 @@ def main(arguments=None):
 def _parser():
     parser = argparse.ArgumentParser(
         prog="cosserat",
-        description="Geometrically exact rods on FEniCSx: equilibrium paths of a scene described in a TOML file.",
+        description="Geometrically exact rods on FEniCSx: equilibrium path or motion of a scene described in a TOML file; a "
+        "motion where the file has a [simulate] table, or --duration is given.",
         epilog="Exit codes: 0 done, 1 not converged, 2 bad input, 130 interrupted; after 1 and 130 what was reached is "
         "printed and written. "
         "In parallel: mpirun -n 2 cosserat run scene.toml",
@@ -49,15 +50,30 @@ def _parser():
     parser.add_argument("--version", action="version", version=f"cosserat_fenicsx {__version__}")
     commands = parser.add_subparsers(dest="command", title="commands")
 
-    run = commands.add_parser("run", help="solve a scene; print a table, write files")
+    run = commands.add_parser("run", help="solve or simulate a scene; print a table, write files")
     _common(run)
     run.add_argument(
         "-o",
         "--output",
         metavar="DIR",
-        help="write path.xdmf, path.h5, path.csv and rods.png there; without it only the table is shown",
+        help="write path.xdmf, path.h5, path.csv and rods.png there, of a motion motion.xdmf, .h5, .csv, rods.png and "
+        "energy.png; without it only the table is shown",
     )
-    run.add_argument("--no-picture", action="store_true", help="write no rods.png")
+    run.add_argument("--no-picture", action="store_true", help="write no pictures")
+    run.add_argument(
+        "--magnify", type=float, default=1.0, help="pictures: draw displacements this many times their size [1]"
+    )
+    run.add_argument(
+        "--at", metavar="A,B,...", help="pictures: the load factors or times (s) to draw; the nearest that there are"
+    )
+    run.add_argument(
+        "--animate",
+        metavar="NAME",
+        nargs="?",
+        const="motion.gif",
+        help="motions: write a film too, .gif or .mp4 [motion.gif]",
+    )
+    run.add_argument("--speed", type=float, help="films: seconds of the motion in one second [1 where that suits]")
     run.set_defaults(do=_run)
 
     buckling = commands.add_parser("buckling", help="critical load factors by linear buckling")
@@ -84,6 +100,15 @@ def _common(parser):
         "--control", help="auto, load (stop at a limit point) or arc (along the path, never back) [auto]"
     )
     parser.add_argument("--branch", type=int, help="1 or -1: leave the path at its first bifurcation")
+    parser.add_argument("--static", action="store_true", help="the equilibrium path, whatever [simulate] says")
+    motion = parser.add_argument_group("motions (--tol, --elements [8], --degree [3] and --model are theirs too)")
+    motion.add_argument("--duration", type=float, help="s; makes a motion of any scene")
+    motion.add_argument("--dt", type=float, help="fixed step, s, instead of --tol [1e-3]")
+    motion.add_argument("--scheme", help="momentum, energy, ... [momentum]")
+    motion.add_argument("--save-every", type=float, help="s between saved states [every step]")
+    motion.add_argument(
+        "--start", type=float, help="begin at the equilibrium of this load factor, as things are just before t = 0"
+    )
 
 
 def _settings(options):
@@ -102,6 +127,16 @@ def _settings(options):
     return scene, load_factors, settings
 
 
+def _numbers(text):
+    """The numbers of --at."""
+    if text is None:
+        return None
+    try:
+        return [float(part) for part in text.split(",")]
+    except ValueError:
+        raise SceneError(f"--at {text}: expected A,B,...: load factors or times (s)") from None
+
+
 def _load_factors(text):
     separator = ":" if ":" in text else ","
     try:
@@ -114,24 +149,40 @@ def _load_factors(text):
 
 
 def _run(options):
-    scene, load_factors, settings = _settings(options)
-    out = None
+    from cosserat_fenicsx.cli_motion import motion_of
+
+    moving = motion_of(options)
+    scene, load_factors, settings = (None, None, None) if moving else _settings(options)
+    out, at = None, _numbers(options.at)
     if options.output:
         out = Path(options.output)
         _prepare(out)  # before the work, not after it
-    from cosserat_fenicsx.statics import solve
+    _check_film(options, moving)
 
     code, trouble = DONE, None
     try:
-        path = solve(scene, load_factors, **settings)
+        if moving:
+            from cosserat_fenicsx.dynamics import simulate
+
+            path = simulate(moving[0], **moving[1])
+        else:
+            from cosserat_fenicsx.statics import solve
+
+            path = solve(scene, load_factors, **settings)
     except NotConverged as failure:
         path, trouble, code = failure.path, failure, NOT_CONVERGED
     except Interrupted as stop:
         path, trouble, code = stop.path, stop, INTERRUPTED
     if path is not None and len(path):
-        if out is not None:
-            _write(path, out, picture=not options.no_picture)
         _report(path)
+        if out is not None:
+            shown = None if at is None else sorted({int(abs(path.along_axis - x).argmin()) for x in at})
+            film = options.animate if code != INTERRUPTED else None  # who stops a run does not wait for its film
+            try:
+                look = {"magnify": options.magnify, "shown": shown, "film": film, "speed": options.speed}
+                _write(path, out, picture=not options.no_picture, **look)
+            except KeyboardInterrupt:
+                trouble, code = "interrupted; the film ends where it was drawn", INTERRUPTED
     if trouble is not None:
         _say(f"cosserat: {trouble}")
     return code
@@ -147,23 +198,44 @@ def _prepare(out):
         raise SceneError(f"output folder {out}: {problem.strerror}: expected a folder that can be written to") from None
 
 
-def _report(path):
-    from cosserat_fenicsx.tables import path_table
+def _check_film(options, moving):
+    """Refuse a film that could not be made, before the work."""
+    if options.animate is None:
+        return
+    if not moving or not options.output:
+        raise SceneError("--animate: expected a motion, and -o DIR to write its film to")
+    from cosserat_fenicsx.animation import check_name
 
-    text = path_table(path)
+    if Path(options.animate).name != options.animate:
+        raise SceneError(f"--animate {options.animate}: expected a name without folders; it is written to -o DIR")
+    check_name(options.animate)
+
+
+def _report(path):
+    if path.axis == "time":
+        from cosserat_fenicsx.motion_tables import motion_table as table
+    else:
+        from cosserat_fenicsx.tables import path_table as table
+
+    text = table(path)
     if _first_rank():
         print(text)
 
 
-def _write(path, out, *, picture):
-    from cosserat_fenicsx.tables import write_csv
+def _write(path, out, *, picture, magnify, shown, film, speed):
+    if path.axis == "time":
+        from cosserat_fenicsx.cli_motion import write_motion
 
-    write_csv(path, out / "path.csv")
-    path.write(out / "path.xdmf")
-    written = ["path.xdmf", "path.h5", "path.csv"]
-    if picture:
-        path.plot(out / "rods.png")
-        written.append("rods.png")
+        written = write_motion(path, out, picture=picture, magnify=magnify, shown=shown, film=film, speed=speed)
+    else:
+        from cosserat_fenicsx.tables import write_csv
+
+        write_csv(path, out / "path.csv")
+        path.write(out / "path.xdmf")
+        written = ["path.xdmf", "path.h5", "path.csv"]
+        if picture:
+            path.plot(out / "rods.png", shown, magnify=magnify)
+            written.append("rods.png")
     _say(f"written to {out}/: {', '.join(written)}", file=sys.stdout)
 
 
@@ -183,10 +255,18 @@ def _buckling(options):
 
 
 def _explain(options):
-    scene, load_factors, settings = _settings(options)
-    from cosserat_fenicsx.explain import explain
+    from cosserat_fenicsx.cli_motion import motion_of
 
-    _say(explain(scene, load_factors, settings), file=sys.stdout)
+    moving = motion_of(options)
+    if moving:
+        from cosserat_fenicsx.explain_motion import explain_motion
+
+        text = explain_motion(*moving)
+    else:
+        from cosserat_fenicsx.explain import explain
+
+        text = explain(*_settings(options))
+    _say(text, file=sys.stdout)
     return DONE
 
 

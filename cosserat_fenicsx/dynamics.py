@@ -22,6 +22,7 @@ from cosserat_fenicsx.motion import Motion
 from cosserat_fenicsx.pace import Adaptive, Fixed
 from cosserat_fenicsx.runfolder import RunFolder
 from cosserat_fenicsx.scene import Scene
+from cosserat_fenicsx.standing import equilibrium
 from cosserat_fenicsx.start import put_start, starts_in
 from cosserat_fenicsx.steppers import SCHEMES
 from cosserat_fenicsx.stored_history import StoredHistory
@@ -33,9 +34,8 @@ _MODELS = {
     ("collocation", "spatial"): CollocatedSpatial,
     ("collocation", "planar"): CollocatedPlanar,
 }
-#: Elements a rod and degree where none are asked for.
-ELEMENTS, DEGREE = 8, 3
-_TOL = 1e-3
+#: Elements a rod, degree and tolerance where none are asked for.
+ELEMENTS, DEGREE, TOL = 8, 3, 1e-3
 
 
 def simulate(
@@ -49,7 +49,7 @@ def simulate(
     rho_inf=None,
     save_every=None,
     start=None,
-    load_factor=1.0,
+    load_factor=None,
     elements=ELEMENTS,
     degree=DEGREE,
     folder=None,
@@ -76,8 +76,10 @@ def simulate(
         rho_inf: of "generalised-alpha": from 0 to 1, by how much a step shrinks what vibrates much faster than the
             steps; 1 takes nothing (the trapezoidal rule). Default 0.8.
         save_every: s between saved states, landed on exactly; None saves every step.
-        start: None for the reference, a `Path` for its last equilibrium, or (Path, k); rods must be the same objects.
-        load_factor: multiplies all loads and prescribed motions, as in `solve`.
+        start: None for the reference, a `Path` for its last equilibrium, or (Path, k); rods must be the same objects. A
+            number is the load factor of an equilibrium of the scene as it is just before t = 0 (`standing.before`).
+        load_factor: multiplies all loads and prescribed motions, as in `solve`; None for that of the start where this is
+            a number, otherwise 1.
         elements: elements per rod.
         degree: 1 to 4, of r and q.
         folder: where the motion is written as it goes, for long runs: the History reads its states from there as they are
@@ -97,23 +99,24 @@ def simulate(
     """
     comm = comm or MPI.COMM_WORLD
     instance("simulate", "scene", scene, Scene, "a Scene")
-    duration = positive_time("duration", duration)
-    if scheme not in SCHEMES:
-        raise SceneError(f"scheme = {scheme!r}: {nearest(scheme, SCHEMES)}")
+    pace = pace_of(duration, tol=tol, dt=dt, scheme=scheme, save_every=save_every, elements=elements)
     rho_inf = _rho_inf(scheme, rho_inf)
-    pace = pace_of(duration, tol, dt, scheme)
-    save_every = None if save_every is None else positive_time("save_every", save_every)
+    if load_factor is None:
+        load_factor = start if isinstance(start, numbers.Real) else 1.0
     number("simulate", "load_factor", load_factor, "a finite number", math.isfinite)
-    if isinstance(elements, bool) or not isinstance(elements, numbers.Integral) or elements < 1:
-        refuse("simulate", "elements", elements, "a whole number above zero")
     looked_at = scene.over(duration)
-    model, why = _choice(looked_at, model, scheme, start)
+    cautions = []
+    if isinstance(start, numbers.Real):
+        start = equilibrium(looked_at, start, model=model, elements=elements, degree=degree, comm=comm)
+        if not start.stable[-1]:
+            cautions = ["the equilibrium that it starts from is unstable: rounding decides where it goes"]
+    model, why = chosen_model(looked_at, model, scheme, start)
     problem, stepper = solvers(looked_at, Layout.of(scene, elements), degree, scheme, load_factor, comm, model)
     stepper.rho_inf = rho_inf
     put_start(problem.model, start)
     problem.begin()
     stepper.begin()
-    history = (History if folder is None else StoredHistory).of(problem.model, scheme, [why])
+    history = (History if folder is None else StoredHistory).of(problem.model, scheme, [why, *cautions])
     if folder is not None:
         asked = {"duration": duration, "tol": tol, "dt": dt, "scheme": scheme, "save_every": save_every,
                  "load_factor": load_factor, "elements": elements, "degree": degree, "rho_inf": rho_inf}  # fmt: skip
@@ -122,8 +125,15 @@ def simulate(
     return motion.over(marks_of(scene, duration, save_every), save_every is None, progress)
 
 
-def _choice(scene, model, scheme, start):
-    """The model's name, and why it is that one."""
+def chosen_model(scene, model, scheme, start=None):
+    """The model's name, and why it is that one.
+
+    Args:
+        scene, model, scheme: as `simulate` takes them; start: None, a Path or (Path, k).
+
+    Raises:
+        SceneError: an unknown model, or one that the scene does not fit.
+    """
     flat = ("momentum" if scheme not in SCHEMES else SCHEMES[scheme].forms, "planar") in _MODELS
     if model not in ("auto", "planar", "spatial"):
         raise SceneError(f"model = {model!r}: {nearest(model, ('auto', 'planar', 'spatial'))}")
@@ -164,8 +174,21 @@ def _kept(alone, shape, scheme):
     return _make(MPI.COMM_SELF if alone else MPI.COMM_WORLD, shape, scheme)
 
 
-def pace_of(duration, tol, dt, scheme):
-    """What chooses the steps."""
+def pace_of(duration, *, tol=None, dt=None, scheme="momentum", save_every=None, elements=ELEMENTS):
+    """What chooses the steps of `simulate`.
+
+    Args: as `simulate` takes them.
+
+    Raises:
+        SceneError: one of them is outside its range.
+    """
+    duration = positive_time("duration", duration)
+    if scheme not in SCHEMES:
+        raise SceneError(f"scheme = {scheme!r}: {nearest(scheme, SCHEMES)}")
+    if save_every is not None:
+        positive_time("save_every", save_every)
+    if isinstance(elements, bool) or not isinstance(elements, numbers.Integral) or elements < 1:
+        refuse("simulate", "elements", elements, "a whole number above zero")
     if dt is not None:
         if tol is not None:
             raise SceneError(
@@ -174,7 +197,7 @@ def pace_of(duration, tol, dt, scheme):
         return Fixed(min(positive_time("dt", dt), duration))
     if not SCHEMES[scheme].adapts:
         raise SceneError(f"scheme = '{scheme}' knows no error of its steps: expected dt, a fixed step (s)")
-    tol = _TOL if tol is None else tol
+    tol = TOL if tol is None else tol
     return Adaptive(
         number("simulate", "tol", tol, "a number from 1e-10 to below 1", lambda x: 1e-10 <= x < 1), duration
     )

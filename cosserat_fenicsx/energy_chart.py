@@ -50,7 +50,7 @@ def _figure(history):
         from matplotlib.figure import Figure
     except ImportError:
         raise SceneError("charts need matplotlib: pip install matplotlib") from None
-    figure = Figure(figsize=(9, 6), layout="constrained")
+    figure = Figure(figsize=(11, 6), layout="constrained")
     FigureCanvasAgg(figure)
     above, below = figure.subplots(2, 1, sharex=True, height_ratios=(3, 1))
     for name, label, colour, style in _CURVES:
@@ -59,7 +59,7 @@ def _figure(history):
             above.plot(history.times, values, style, color=colour, label=label)
     above.set_ylabel("energy (J)")
     above.set_title(f"{history.scene.title or 'Motion'}: energy, scheme {history.scheme}")
-    above.legend(loc="best", frameon=False)
+    above.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), frameon=False)  # beside the curves, never over them
     below.plot(history.times, history.balance, color="black")
     below.set_ylabel("not accounted\nfor (J)")
     below.set_xlabel("time (s)")

@@ -44,17 +44,7 @@ def explain(scene, load_factors, settings):
         return Shape.of(scene, layout, formulation=formulation, degree=degree, model=model)
 
     shape = shape_of(choice.model)
-    lines = [scene.title] if scene.title else []
-    for rod in scene.rods:
-        lines.append(
-            f"Rod '{rod.name}': {_curve(rod.curve)}, length {rod.length:g} m, {_sections(rod)}; "
-            f"{_stiffnesses(rod)}. {_directions(rod)}"
-        )
-    lines.append(
-        f"{len(scene.supports)} support(s): {', '.join(describe(x) for x in scene.supports)}. "
-        f"{len(scene.loads)} load(s): {', '.join(describe(x) for x in scene.loads) or 'none'}."
-        + "".join(f" {joint.first} is joined to {joint.second}{_release(joint)}." for joint in scene.joints)
-    )
+    lines = of_the_scene(scene)
     what = _UNKNOWNS[choice.model, shape.flat]
     lines.append(f"Model: {choice.model} ({what}): {'; '.join(choice.why)}.")
     if choice.promoted:
@@ -79,6 +69,22 @@ def explain(scene, load_factors, settings):
         listed = ", ".join(f"{x:g}" for x in np.atleast_1d(load_factors))
         lines.append(f"Path: load factors {listed}, landed on exactly, with steps between where needed.")
     return "\n".join(lines)
+
+
+def of_the_scene(scene):
+    """Sentences on rods, supports, loads and joints."""
+    lines = [scene.title] if scene.title else []
+    for rod in scene.rods:
+        lines.append(
+            f"Rod '{rod.name}': {_curve(rod.curve)}, length {rod.length:g} m, {_sections(rod)}; "
+            f"{_stiffnesses(rod)}. {_directions(rod)}"
+        )
+    lines.append(
+        f"{len(scene.supports)} support(s): {', '.join(describe(x) for x in scene.supports) or 'none'}. "
+        f"{len(scene.loads)} load(s): {', '.join(describe(x) for x in scene.loads) or 'none'}."
+        + "".join(f" {joint.first} is joined to {joint.second}{_release(joint)}." for joint in scene.joints)
+    )
+    return lines
 
 
 def _curve(curve):

@@ -72,6 +72,11 @@ class History(Path):
         return np.array([getattr(ledger, name) for ledger in (x.ledger for x in self._records)])
 
     @property
+    def time_unit(self):
+        """s: what the rates of an `Instant` are made dimensionless with."""
+        return self._time_unit
+
+    @property
     def energy(self):
         """(n,) kinetic + strain, J."""
         return self.kinetic + self.strain
@@ -117,6 +122,21 @@ class History(Path):
         from cosserat_fenicsx import energy_chart
 
         return energy_chart.draw(self, file)
+
+    def animate(self, file, *, fps=25, speed=None, magnify=1.0, size=(960, 720), progress=None):
+        """Film of the rods, coloured by bending moment, at a constant rate of frames; see `animation.film`.
+
+        Args:
+            file: .gif or .mp4.
+            fps: frames per second.
+            speed: seconds of the motion in a second of the film; None for a round number that suits, 1 if possible.
+            magnify: displacements are drawn this many times their size.
+            size: (width, height), pixels.
+            progress: True, False, or None for a bar where it takes long.
+        """
+        from cosserat_fenicsx import animation
+
+        animation.film(self, file, fps=fps, speed=speed, magnify=magnify, size=size, progress=progress)
 
     @cached_property
     def _all_rates(self):

@@ -283,14 +283,14 @@ class Path:
         """Between the nodes, by the elements' polynomials, at point k.
 
         Args:
-            k: the point.
+            k: the point, or a `Record`.
             rod: the rod.
             x: arc lengths (n,) over the rod's length, in [0, 1].
 
         Returns:
             positions (n, 3), m, and directors (n, 3, 3) as columns, both inertial.
         """
-        moved = self.motion(rod, x, [self._records[k]])[0]
+        moved = self.motion(rod, x, [k if hasattr(k, "rq") else self._records[k]])[0]
         s, q = np.asarray(x) * rod.length, moved[:, 3:]
         return rod.curve.position(s) + moved[:, :3] * self.scales.length, directors(q) @ rod.curve.frame(s)
 

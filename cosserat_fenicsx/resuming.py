@@ -82,7 +82,7 @@ def _go_on(kept, scene, comm, progress):
     stepper.rho_inf = asked["rho_inf"]
     problem.begin()
     stepper.begin()
-    pace = pace_of(asked["duration"], asked["tol"], asked["dt"], scheme)
+    pace = pace_of(asked["duration"], tol=asked["tol"], dt=asked["dt"], scheme=scheme)
     motion = Motion(problem, stepper, pace, history, kept)
     motion.recall(memory)
     return motion.over(marks_of(scene, until, asked["save_every"], ends), asked["save_every"] is None, progress)

@@ -17,7 +17,7 @@ type = "Force"
 station = "column.end"
 force = [0, 0, -1e5]
 
-# in a motion: force = { type = "Triangle", value = [0, 0, 50], peak = 1.0, end = 2.0 }, or Step, Ramp, Sine, Table
+# in a motion: force = { type = "Triangle", value = [0, 0, 50], peak = 1.0, end = 2.0 }, or Step, Ramp, RunUp, Sine, Table
 
 [[velocities]]                    # optional, where a motion starts
 rod = "column"
@@ -29,6 +29,11 @@ second = "beam.start"
 
 [solve]                           # optional: defaults of the command line
 load_factors = [0.5, 1.0]
+
+[simulate]                        # a motion, instead of an equilibrium path; arguments of `simulate`
+duration = 10.0                   # s
+tol = 1e-3                        # or dt = 0.01
+start = 0.9                       # optional: an equilibrium at this load factor first, of the loads just before t = 0
 """
 
 import dataclasses
@@ -60,6 +65,12 @@ SOLVE_KEYS = {
     "control": (str,),
     "branch": (int,),
 }
+#: What [simulate] may hold: the arguments of `simulate` that are plain values.
+SIMULATE_KEYS = {
+    **dict.fromkeys(("duration", "tol", "dt", "save_every", "start", "load_factor"), (int, float)),
+    **dict.fromkeys(("scheme", "model"), (str,)),
+    **dict.fromkeys(("elements", "degree"), (int,)),
+}
 
 
 def read_scene(file):
@@ -75,6 +86,28 @@ def read_scene(file):
         SceneError: the file is missing or no TOML, a key or a type is unknown (named, with the nearest known one), or a
             value is not what its field expects.
     """
+    scene, settings, _ = _read(file)
+    return scene, settings
+
+
+def read_motion(file):
+    """A scene and the arguments of its motion from a TOML file: `simulate(scene, **arguments)`.
+
+    Args:
+        file: path of the file.
+
+    Returns:
+        (Scene, dict of the [simulate] table), empty where there is none.
+
+    Raises:
+        SceneError: see `read_scene`.
+    """
+    scene, _, settings = _read(file)
+    return scene, settings
+
+
+def _read(file):
+    """Scene, [solve] and [simulate] of a file."""
     file = Path(file)
     try:
         with file.open("rb") as stream:
@@ -91,7 +124,9 @@ def read_scene(file):
 
 def _scene(tables, folder):
     _known_keys(
-        "the file", tables, {"title", "materials", "rods", "supports", "joints", "loads", "velocities", "solve"}
+        "the file",
+        tables,
+        {"title", "materials", "rods", "supports", "joints", "loads", "velocities", "solve", "simulate"},
     )
     materials = {
         name: _build(f"materials.{name}", table, (Material,), {})
@@ -108,13 +143,21 @@ def _scene(tables, folder):
     title = tables.get("title", "")
     if not isinstance(title, str):
         raise SceneError(f"title = {title!r}: expected a string")
-    settings = _table("solve", tables.get("solve", {}))
-    _known_keys("[solve]", settings, SOLVE_KEYS)
+    settings = [_settings(name, tables, keys) for name, keys in (("solve", SOLVE_KEYS), ("simulate", SIMULATE_KEYS))]
+    if "simulate" in tables and "duration" not in settings[1]:
+        raise SceneError("[simulate]: 'duration' is missing: expected how long the motion lasts (s)")
+    return Scene(rods, supports, loads, joints, title, velocities), *settings
+
+
+def _settings(name, tables, keys):
+    """A table of arguments, of known names and types."""
+    settings = _table(name, tables.get(name, {}))
+    _known_keys(f"[{name}]", settings, keys)
     for key, value in settings.items():
-        if not isinstance(value, SOLVE_KEYS[key]) or isinstance(value, bool):
-            names = " or ".join(kind.__name__ for kind in SOLVE_KEYS[key])
-            raise SceneError(f"[solve].{key} = {value!r}: expected {names}")
-    return Scene(rods, supports, loads, joints, title, velocities), settings
+        if not isinstance(value, keys[key]) or isinstance(value, bool):
+            names = " or ".join(kind.__name__ for kind in keys[key])
+            raise SceneError(f"[{name}].{key} = {value!r}: expected {names}")
+    return settings
 
 
 def _rod(where, entry, materials, folder):

@@ -66,6 +66,37 @@ class Ramp:
 
 
 @dataclass(frozen=True)
+class RunUp:
+    """What runs up to a speed: zero up to `start`, the rate `value` (per s) from `end` on; in between the rate of change
+    of the speed is value/T (1 - cos(2 pi t/T)), T = end - start, so that nothing jerks. Times in s.
+
+    After Kane, Ryan & Banerjee, J. Guid. Control Dyn. 10 (1987) 139, doi:10.2514/3.20195.
+
+    Raises:
+        SceneError: numbers that are not finite, or an end that is not after the start.
+    """
+
+    value: tuple
+    start: float = 0.0
+    end: float = 1.0
+
+    def __post_init__(self):
+        _check(self, "start", "end")
+
+    @property
+    def jumps(self):
+        """Where it is not smooth, s."""
+        return self.start, self.end
+
+    def __call__(self, t):
+        """The vector at t."""
+        whole = self.end - self.start
+        x = min(max((t - self.start) / whole, 0.0), 1.0)
+        ran = x * x / 2 + (math.cos(2 * math.pi * x) - 1) / (2 * math.pi) ** 2
+        return _times(whole * ran + max(t - self.end, 0.0), self.value)
+
+
+@dataclass(frozen=True)
 class Triangle:
     """From zero at `start` to `value` at `peak` and back to zero at `end`, straight; zero otherwise. Times in s.
 
@@ -177,7 +208,7 @@ def _times(factor, value):
 
 
 #: Functions of time by the words of the scene file.
-SIGNALS = (Step, Ramp, Triangle, Sine, Table)
+SIGNALS = (Step, Ramp, RunUp, Triangle, Sine, Table)
 
 
 @dataclass(frozen=True)

@@ -63,7 +63,7 @@ def starts_in(scene, plane, start):
 
 def _point(start):
     path, k = start if isinstance(start, tuple) and len(start) == 2 else (start, -1)
-    instance("simulate", "start", path, Path, "a Path, or (Path, index of its point)")
+    instance("simulate", "start", path, Path, "a load factor, a Path, or (Path, index of its point)")
     if not len(path) or not -len(path) <= k < len(path):
         refuse("simulate", "start", start, f"a point that the path has; it has {len(path)}")
     return path, k

@@ -14,15 +14,15 @@ _WORTH_TELLING = 0.2
 
 def path_table(path):
     """Text: load factor, motion of the station that moves most, stability, work and estimated error at every point."""
-    station = _busiest(path)
+    station = busiest(path)
     tip, angle = path.displacement(station), path.rotation_angle(station)
     title = f"{path.scene.title}\n" if path.scene.title else ""
     table = Table(
         title=f"{title}{path.model} model, {path.formulation} formulation, degree {path.degree}, "
         f"{' + '.join(map(str, path.elements))} elements, {path.unknowns} unknowns",
-        caption=f"dx, dy, dz, rotation: of {station}. stable: 'no (2)' has two negative modes. iterations: Newton's, since "
-        "the row above.\nest. error: of positions, relative to the largest displacement. Loads, times the load factor: "
-        f"{', '.join(map(describe, path.scene.loads)) or 'none'}.",
+        caption=f"dx, dy, dz, rotation: of {station}. stable: 'no (2)' has two negative modes.\n"
+        "iterations: Newton's, since the row above. est. error: of positions, relative to the largest displacement.\n"
+        f"Loads, times the load factor: {', '.join(map(describe, path.scene.loads)) or 'none'}.",
     )
     headings = ("load factor", "dx (m)", "dy (m)", "dz (m)", "rotation (rad)", "stable", "iterations", "est. error")
     for heading in headings:
@@ -41,7 +41,7 @@ def path_table(path):
     return "\n".join([*lines, f"{path.model} model: {'; '.join(path.why)}."])
 
 
-def _busiest(path):
+def busiest(path):
     """The end of a rod, or the station of a load or support, that moves most; another place where these hardly move."""
 
     def moves(station):
@@ -98,20 +98,39 @@ def as_text(table):
 
 def write_csv(path, file):
     """Load factors, stability, work, error; displacement (m), quaternion, contact force n (N) and moment m (N m) at both
-    ends of every rod, where loads and supports act, and at the station of the table. n and m are what the part beyond exerts: the reaction of a support at the start is their opposite."""
-    names = ["load_factor", "negative_modes", "iterations", "estimated_error"]
-    columns = [path.load_factors, path.negative_modes, path.iterations, path.error]
-    busiest = _busiest(path)
+    ends of every rod, where loads and supports act, and at the station of the table. n and m are what the part beyond
+    exerts: the reaction of a support at the start is their opposite."""
+    head = {
+        "load_factor": path.load_factors,
+        "negative_modes": path.negative_modes,
+        "iterations": path.iterations,
+        "estimated_error": path.error,
+    }
+    write_columns(path, file, head | station_columns(path))
+
+
+def station_columns(path, more=()):
+    """Columns by their names: displacement, quaternion, contact force and moment at the stations of `write_csv`.
+
+    Args:
+        more: further quantities, (query, name, names of its components).
+    """
+    columns, most = {}, busiest(path)
+    quantities = (("displacement", "displacement (m)", "xyz"), ("rotation", "quaternion", "abcd"), *more,
+                  ("force", "contact force (N)", "xyz"), ("moment", "contact moment (N m)", "xyz"))  # fmt: skip
     for rod in path.scene.rods:
-        stations = [rod.start, *path.scene.stations(rod), rod.end, *([busiest] if busiest.rod is rod else [])]
+        stations = [rod.start, *path.scene.stations(rod), rod.end, *([most] if most.rod is rod else [])]
         for station in {station.s: station for station in sorted(stations, key=lambda station: station.s)}.values():
-            for quantity, name, axes in (("displacement", "displacement (m)", "xyz"), ("rotation", "quaternion", "abcd"),
-                                         ("force", "contact force (N)", "xyz"), ("moment", "contact moment (N m)", "xyz")):  # fmt: skip
+            for quantity, name, axes in quantities:
                 values = getattr(path, quantity)(station)
-                for i, axis in enumerate(axes):
-                    names.append(f"{station} {name} {axis}")
-                    columns.append(values[:, i])
-    on_first(path.comm, lambda: _write_rows(file, names, zip(*(column.tolist() for column in columns), strict=True)))
+                columns |= {f"{station} {name} {axis}": values[:, i] for i, axis in enumerate(axes)}
+    return columns
+
+
+def write_columns(path, file, columns):
+    """Columns (n,) by their names as CSV, on rank 0."""
+    rows = zip(*(column.tolist() for column in columns.values()), strict=True)
+    on_first(path.comm, lambda: _write_rows(file, list(columns), rows))
 
 
 def _write_rows(file, names, rows):

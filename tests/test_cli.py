@@ -47,6 +47,21 @@ def test_run_prints_a_table_and_writes_files(tmp_path):
     assert done.stderr == ""
 
 
+def test_pictures_are_asked_for(tmp_path):
+    """Which points, how much larger; where displacements can hardly be seen the picture says what would show them."""
+    from cosserat_fenicsx import plot, read_scene, solve
+
+    look = ("--at", "0.01,0.03", "--magnify", "500")
+    done = cosserat("run", DEMO, "--load-factors", "0.01,0.02,0.03", "-o", tmp_path, *look)
+    assert done.returncode == 0 and (tmp_path / "rods.png").stat().st_size > 10_000, done.stderr
+    scene, _ = read_scene(DEMO)
+    path = solve(scene, [0.01, 0.02, 0.03])
+    assert plot._small(path, [0, 2], 20.0, 1.0) == "displacements are at most 0.0076 m, magnify=100 shows them"
+    assert plot._small(path, [0, 2], 20.0, 100.0) == ""
+    refused = cosserat("run", DEMO, "--load-factors", "0.01", "-o", tmp_path, "--magnify", "-2")
+    assert refused.returncode == 2 and "plot.magnify = -2.0" in refused.stderr
+
+
 def test_run_of_a_range_lets_the_solver_choose():
     done = cosserat("run", DEMO, "--load-factors", "0:0.9", "--elements", "8", "--degree", "3")
     assert done.returncode == 0 and "unknown" in done.stdout and "2.2006154" in done.stdout

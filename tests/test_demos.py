@@ -33,6 +33,32 @@ def test_eccentric_cantilever(tmp_path_all, capsys):
 
 
 @pytest.mark.serial
+def test_motion_quick(capsys):
+    """All seven."""
+    import motion
+
+    for check, off in motion.main(out=None, quick=True):
+        assert off <= check.allowed, check
+    printed = capsys.readouterr().out
+    assert all(demo.__name__ in printed for demo in motion.DEMOS) and len(motion.DEMOS) == 7
+
+
+def test_motion(tmp_path_all, capsys):
+    """The shortest, with its picture, on any number of processes."""
+    import motion
+
+    ((check, off),) = motion.main(["released_column"], tmp_path_all, quick=True)
+    assert off <= check.allowed, check
+    printed = capsys.readouterr().out
+    if COMM.rank == 0:
+        assert "released_column" in printed
+        assert (tmp_path_all / "released_column.png").stat().st_size > 50_000
+    else:
+        assert printed == ""
+    COMM.barrier()
+
+
+@pytest.mark.serial
 def test_overhead_quick(tmp_path):
     """The bare loop and the public face give the same digits; what it costs is for the command to say."""
     import overhead

@@ -178,25 +178,27 @@ def test_flight_in_space():
     assert drift(coarse.energy[late]) < 1e-3 and drift(coarse.angular_momentum[late]) < 2e-3
 
 
-def test_a_step_by_half_a_turn_is_none(monkeypatch):
+@pytest.mark.parametrize("scheme", [SCHEME, "momentum", "energy"])
+def test_a_step_by_half_a_turn_is_none(monkeypatch, scheme):
     """-q would do for |q| = 1 where q does; Newton's method that finds it has failed."""
     rod = cf.Rod(cf.Line((0, 0, 0), (2, 0, 0)), STIFF)
     scene = cf.Scene([rod], [cf.Clamp(rod.start)], velocities=[cf.InitialVelocity(rod, angular=lambda s: (0, s, 0))])
     predicted, flips = OneStep._predicted, []
 
     def flipped(stepper, h):
-        guess = predicted(stepper, h)
+        guesses = predicted(stepper, h)
         if len(stepper._past) == 3 and not flips:
             flips.append(h)
             tip = stepper.problem.model._nodal[-1, 3:]
-            guess[tip] *= -1
-        return guess
+            for guess in guesses:
+                guess[tip] *= -1
+        return guesses
 
-    plain = cf.simulate(scene, 0.1, dt=0.01, elements=2, degree=2, scheme=SCHEME)
+    plain = cf.simulate(scene, 0.1, dt=0.01, elements=2, degree=2, model="spatial", scheme=scheme)
     monkeypatch.setattr(OneStep, "_predicted", flipped)
-    halved = cf.simulate(scene, 0.1, dt=0.01, elements=2, degree=2, scheme=SCHEME)
+    halved = cf.simulate(scene, 0.1, dt=0.01, elements=2, degree=2, model="spatial", scheme=scheme)
     assert flips and halved.steps[-1] == 11
-    np.testing.assert_allclose(halved.rotation(rod.end)[-1], plain.rotation(rod.end)[-1], atol=1e-4)
+    np.testing.assert_allclose(halved.rotation(rod.end)[-1], plain.rotation(rod.end)[-1], atol=1e-3)
 
 
 def test_refusals():

@@ -43,12 +43,12 @@ SCENE = (
     "scene", "scenefile", "sections", "signals", "splines", "statical", "supports", "ties",
 )  # fmt: skip
 SOLVERS = (
-    "arclength", "chord", "continuation", "dynamics", "eigen", "follow", "interrupts", "linear", "linear_buckling", "locator", "modes", "motion", "pace", "problem",
-    "refinement", "resuming", "snes", "stability", "start", "statics", "tie_rows", "tracing", "track",
+    "arclength", "chord", "continuation", "dynamics", "eigen", "follow", "linear", "linear_buckling", "locator", "marks", "modes", "motion", "pace",
+    "problem", "refinement", "resuming", "snes", "stability", "standing", "start", "statics", "tie_rows", "tracing", "track",
 )  # fmt: skip
 RESULTS = (
-    "accuracy", "checkpoints", "energy_chart", "history", "instantfile", "plot", "ranks", "records", "recovery", "results", "runfolder",
-    "stored_history", "tables", "xdmf",
+    "accuracy", "animation", "between", "checkpoints", "drawing", "energy_chart", "history", "instantfile", "motion_tables", "plot", "ranks",
+    "records", "recovery", "results", "runfolder", "stored_history", "tables", "xdmf",
 )  # fmt: skip
 
 
@@ -67,6 +67,7 @@ def test_data_flows_one_way():
         "motion",
         "refinement",
         "resuming",
+        "standing",
         "start",
         "statics",
         "tracing",

@@ -182,7 +182,7 @@ class GeneralisedAlpha(OneStep):
         problem.rule, problem.fresh, self._h = _FIRST, True, None
         problem.aim(t, h)
         problem.free_velocities(t, h)
-        solved = self._newton.solve(self._start + problem.h * self._velocity)
+        solved = self._newton.solve([self._start + problem.h * self._velocity])
         self._accelerations_known = solved.converged
         if solved.converged:
             model.take_accelerations()

@@ -56,20 +56,23 @@ class StepNewton:
         ksp.setOperators(self.problem.A)
         linear.factor_tangent(ksp.getPC(), self.problem.A, self.problem.tangent)
 
-    def solve(self, guess):
-        """Newton from local numbers of the state, with the tangent at hand, and with a fresh one where that fails.
+    def solve(self, guesses):
+        """Newton from local numbers of the state, with the tangent at hand, and with a fresh one where that fails, also from the
+        other guesses: sections that turn far in a step are hard to foretell.
 
         Returns:
             Solved.
         """
         kept = not self.problem.fresh
         start = self.problem.x.array_r[: self._motions].copy()
-        solved = self._attempt(guess, start)
-        if solved.converged or not kept:
-            return solved
-        self.problem.fresh = True
-        again = self._attempt(guess, start)
-        return Solved(again.converged, solved.iterations + again.iterations, again.reason)
+        iterations = 0
+        for guess in [guesses[0], *guesses] if kept else guesses:
+            solved = self._attempt(guess, start)
+            iterations += solved.iterations
+            if solved.converged:
+                break
+            self.problem.fresh = True
+        return Solved(solved.converged, iterations, solved.reason)
 
     def _attempt(self, guess, start):
         problem, found, steps = self.problem, None, []

@@ -60,14 +60,15 @@ class OneStep:
         return solved
 
     def _predicted(self, h):
-        """The state at the end of the step, by the extrapolation that would have foretold the last step best."""
+        """States at the end of the step by extrapolations, the one first that would have foretold the last step best."""
         now = (h, self._start, self._velocity)
         known = [(step, state, rates[0]) for step, state, rates, _ in self._past[-3:]]
         guesses = _extrapolated([*known, now])
         if len(known) < 3:
-            return guesses[-1]
+            return guesses[::-1]
         missed = np.array([np.square(guess - self._start).sum() for guess in _extrapolated(known)])
-        return guesses[int(np.argmin(self._comm.allreduce(missed) if self._comm.size > 1 else missed))]
+        order = np.argsort(self._comm.allreduce(missed) if self._comm.size > 1 else missed)
+        return [guesses[k] for k in order]
 
     def error(self):
         """See `Stepper`: h^3/12 times the third derivative of the cubic through the last four states.

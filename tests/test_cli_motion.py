@@ -1,0 +1,169 @@
+"""Motions on the command line, and in scene files: table, files, words, what is refused."""
+
+import csv
+import re
+
+import numpy as np
+import pytest
+from test_cli import DEMO
+
+import cosserat_fenicsx as cf
+from cosserat_fenicsx import cli, explain_motion, interrupts, motion_tables
+from cosserat_fenicsx.standing import before
+
+pytestmark = pytest.mark.serial
+MOTIONS = DEMO.parent / "motions"
+FLIGHT = MOTIONS / "flying_spaghetti_3d.toml"
+SHORT = ("--duration", "1", "--dt", "0.05")
+
+
+@pytest.fixture
+def cosserat(capsys, monkeypatch):
+    """The command line in this process: exit code, what it prints, what it complains of."""
+    monkeypatch.setattr(interrupts, "listen", lambda: None)  # the signals are pytest's
+
+    def command(*arguments):
+        code = cli.main([str(x) for x in arguments])
+        return code, *capsys.readouterr()
+
+    return command
+
+
+def test_run_of_a_motion(tmp_path, cosserat):
+    """Table, files and film; the numbers are those of `simulate`."""
+    from PIL import Image
+
+    film = ("--animate", "--speed", "5")
+    code, said, trouble = cosserat("run", FLIGHT, *SHORT, "-o", tmp_path, *film, "--at", "0,1", "--save-every", "0.1")
+    assert code == 0 and trouble == ""
+    assert {f.name for f in tmp_path.iterdir()} == {
+        "motion.xdmf", "motion.h5", "motion.csv", "rods.png", "energy.png", "motion.gif",
+    }  # fmt: skip
+    assert all(f.stat().st_size > 3000 for f in tmp_path.iterdir()), sorted(tmp_path.iterdir())
+    scene, settings = cf.read_motion(FLIGHT)
+    history = cf.simulate(scene, **{**settings, "duration": 1.0, "dt": 0.05, "save_every": 0.1})
+    end = history.position(scene.rods[0].start)[-1]
+    assert f"spaghetti.start at ({', '.join(f'{x:.6g}' for x in end)}) m" in said
+    assert "20 steps, 11 times" in said and "balance" in said and "spatial model:" in said
+    with (tmp_path / "motion.csv").open() as stream:
+        rows = list(csv.DictReader(stream))
+    assert len(rows) == 11 and float(rows[-1]["time (s)"]) == 1
+    assert float(rows[-1]["spaghetti.start displacement (m) x"]) == pytest.approx(end[0] - 6, rel=1e-12)
+    assert float(rows[-1]["spaghetti.end velocity (m/s) y"]) == history.velocity(scene.rods[0].end)[-1, 1]
+    assert float(rows[-1]["work (J)"]) == history.work[-1]
+    with Image.open(tmp_path / "motion.gif") as film:
+        assert film.info["duration"] == 40 and film.n_frames == 6
+
+
+def test_the_table_picks_rows_and_the_csv_keeps_all(tmp_path):
+    scene, _ = cf.read_motion(FLIGHT)
+    history = cf.simulate(scene, 1, dt=0.01, elements=2, degree=2)
+    text = motion_tables.motion_table(history)
+    assert "21 of 101 times" in text and len(re.findall(r"^│", text, re.MULTILINE)) == 21
+    motion_tables.write_motion_csv(history, tmp_path / "a.csv")
+    assert len((tmp_path / "a.csv").read_text().splitlines()) == 102
+
+
+WORDS = {
+    "flying_spaghetti_2d": ("Motion: 15 s. Steps of 0.02 s, halved where one fails. Every step is saved.", "by Step, steps land on t = 0, 2.5 s",
+                            "0 support(s): none", "Start: the reference, free of stress, at rest.", "75 unknowns", "Model: planar"),
+    "damped_column": ("Kelvin-Voigt damping, 0.03 s times", "equilibrium at load factor 1 (Force at column.end, constant), at rest; then nothing of the loads remains"),
+    "released_column": ("(Force at column.end, Moment at column.end, as they are just before t = 0)", "then the load factor is 1.1"),
+    "whirling_shaft": ("a drag of 10 1/s times the momentum", "rotation by RunUp, steps land on t = 0, 6 s", "Model: spatial"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", WORDS)
+def test_explain(name):
+    scene, settings = cf.read_motion(MOTIONS / f"{name}.toml")
+    told = explain_motion.explain_motion(scene, settings)
+    for words in WORDS[name]:
+        assert words in told, told
+
+
+def test_explained_is_what_is_done(cosserat):
+    code, said, _ = cosserat("explain", FLIGHT, *SHORT, "--elements", "3", "--scheme", "energy")
+    assert code == 0 and "Motion: 1 s" in said and "Scheme: energy" in said
+    scene, _ = cf.read_motion(FLIGHT)
+    history = cf.simulate(scene, 0.1, dt=0.05, elements=3, scheme="energy")
+    assert f" {history.unknowns} unknowns" in said
+    assert cosserat("explain", DEMO) == cosserat("explain", DEMO, "--static")
+
+
+@pytest.mark.parametrize(
+    "arguments, words",
+    [
+        (("run", FLIGHT, "--load-factors", "0:1"), "--load-factors is for an equilibrium path"),
+        (("run", DEMO, "--dt", "0.1"), "--dt is for a motion, and this scene is an equilibrium path"),
+        (("run", FLIGHT, "--static"), "depends on time, and statics knows none: expected a vector, or a motion"),
+        (("run", FLIGHT, "--animate"), "expected a motion, and -o DIR"),
+        (("run", FLIGHT, "--animate", "a.avi", "-o", "{tmp}"), "expected a name that ends in .gif or .mp4"),
+        (("run", FLIGHT, "--animate", "b/a.gif", "-o", "{tmp}"), "expected a name without folders"),
+        (("run", FLIGHT, "--at", "x", "-o", "{tmp}"), "--at x: expected A,B,..."),
+        (("run", FLIGHT, "--duration", "-1"), "simulate.duration = -1.0"),
+        (("explain", FLIGHT, "--scheme", "momentun"), "did you mean 'momentum'?"),
+        (("explain", DEMO, "--duration", "nan"), "simulate.duration = nan"),
+        (("explain", FLIGHT, "--elements", "0"), "simulate.elements = 0"),
+    ],
+)
+def test_refused(arguments, words, tmp_path, cosserat):
+    code, _, trouble = cosserat(*(str(x).format(tmp=tmp_path) for x in arguments))
+    assert code == 2 and words in trouble, trouble
+
+
+TABLES = {
+    "[simulate]\ndt = 0.1": "[simulate]: 'duration' is missing",
+    "[simulate]\nduration = 1\nduratoin = 2": "[simulate]: unknown key 'duratoin'",
+    "[simulate]\nduration = 'long'": "[simulate].duration = 'long': expected int or float",
+    "[simulate]\nduration = 1\nelements = 2.5": "[simulate].elements = 2.5: expected int",
+}
+
+
+@pytest.mark.parametrize("table", TABLES)
+def test_tables_that_are_refused(table, tmp_path):
+    file = tmp_path / "scene.toml"
+    file.write_text(DEMO.read_text() + table)
+    with pytest.raises(cf.SceneError) as refusal:
+        cf.read_motion(file)
+    assert TABLES[table] in str(refusal.value)
+
+
+def test_a_static_scene_has_no_motion_and_may_be_given_one(cosserat):
+    assert cf.read_motion(DEMO)[1] == {}
+    code, said, _ = cosserat("run", DEMO, "--duration", "0.5", "--dt", "0.05", "--start", "0.5", "--elements", "2")
+    assert code == 0 and "10 steps, 11 times" in said
+    last = [line for line in said.splitlines() if line.startswith("│")][-1].split("│")
+    assert float(last[5]) < 1e-6, "under constant loads an equilibrium stays"
+
+
+def test_what_a_start_takes_from_loads_in_time():
+    """Loads as they are just before t = 0: steps from 0 on are not there yet, those up to 0 let go."""
+    section = cf.Stiffness((1e5, 1e5), 1e5, (1e3, 1e3), 1e3, mass=2.0, inertia=(0.1, 0.1, 0.2))
+    rod = cf.Rod(cf.Line((0, 0, 0), (2, 0, 0)), section)
+    v = (0.0, 0.0, -5.0)
+
+    def scene(signal):
+        return cf.Scene([rod], [cf.Clamp(rod.start)], [cf.Force(rod.end, signal)])
+
+    for signal, factor in ((cf.Step(v), 0), (cf.Step(v, -1, 0), 1), (cf.Ramp(v), 0), (cf.Ramp(v, -1, 1), 0.5), (cf.Table((0, 1), (v, v)), 1)):  # fmt: skip
+        np.testing.assert_allclose(before(scene(signal)).loads[0].force, np.multiply(factor, v))
+    released = cf.simulate(scene(cf.Step(v, -1, 0)), 0.2, dt=0.01, start=2.0, elements=2, degree=2)
+    path = cf.solve(scene(v), [2.0], elements=2, degree=2, model="planar")
+    np.testing.assert_allclose(released.position(rod.end)[0], path.position(rod.end)[0], atol=1e-12)
+    assert (
+        released.kinetic[-1] > 0.1 * released.strain[0] and np.abs(released.balance).max() < 1e-3 * released.strain[0]
+    )
+    still = cf.simulate(scene(v), 0.2, dt=0.01, start=2.0, elements=2, degree=2)
+    assert np.ptp(still.position(rod.end), axis=0).max() < 1e-12 and still.kinetic.max() < 1e-20
+
+
+def test_a_run_up():
+    """Its speed rises without a jerk, and its angle is what the speed adds up to."""
+    run = cf.RunUp((0, 0, 6.0), 1.0, 16.0)
+    t = np.linspace(0, 20, 20001)
+    angle = np.array([run(x)[2] for x in t])
+    speed = np.gradient(angle, t)
+    assert run(0.5) == (0, 0, 0) and angle[-1] == pytest.approx(6 * (20 - 1 - 7.5), rel=1e-12)
+    assert speed[t > 16.01] == pytest.approx(6) and np.diff(speed).min() > -1e-9
+    assert np.abs(np.gradient(speed, t))[(np.abs(t - 1) < 0.05) | (np.abs(t - 16) < 0.05)].max() < 1e-3
+    assert run.jumps == (1.0, 16.0)
