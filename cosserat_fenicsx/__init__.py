@@ -36,8 +36,8 @@ _HOME = {
     "LineForce": "loads",
     "LineMoment": "loads",
     "Material": "materials",
-    "Modes": "modes",
-    "modes": "modes",
+    "Modes": "natural_modes",
+    "modes": "natural_modes",
     "Moment": "loads",
     "NotConverged": "errors",
     "NotStored": "errors",
@@ -85,4 +85,4 @@ def __getattr__(name):
 
 
 def __dir__():
-    return sorted({*globals(), *__all__})
+    return sorted({*__all__, *(name for name in globals() if name.startswith("__"))})
