@@ -12,7 +12,7 @@ from cosserat_fenicsx.checks import number
 from cosserat_fenicsx.continuation import StepControl
 from cosserat_fenicsx.errors import NotConverged, SceneError
 from cosserat_fenicsx.follow import Follower
-from cosserat_fenicsx.models.rodmesh import Layout
+from cosserat_fenicsx.refinement import until_two_meshes_agree
 from cosserat_fenicsx.stability import oriented
 from cosserat_fenicsx.statics import FIRST_ELEMENTS, check_arguments, solvers_of
 
@@ -83,22 +83,22 @@ def buckling(scene, count=1, *, load_factor=0.0, tol=1e-5, elements=None, degree
         raise SceneError(f"count = {count!r}: expected a whole number above zero")
     number("buckling", "load_factor", load_factor, "a finite number", math.isfinite)
     comm = comm or MPI.COMM_WORLD
-    layout, coarse, best = Layout.of(scene, elements or FIRST_ELEMENTS), None, math.inf
-    while True:
-        load_factors, modes = _critical(scene, layout, count, load_factor, degree, comm)
-        error = np.full(len(load_factors), np.nan)
-        if coarse is not None and len(coarse) == len(load_factors):
-            error = np.abs(load_factors - coarse) / np.abs(load_factors - load_factor)
-            reached = error.max(initial=0.0)
-            if reached > max(tol, best) or (reached > tol and max(layout.counts) >= _MOST_ELEMENTS):
-                raise NotConverged(
-                    f"the accuracy tol = {tol:g} was not reached with {max(layout.counts)} elements of degree {degree} "
-                    f"per rod: the estimated error stays at {min(reached, best):.2g}. Ask for a larger tol."
-                )
-            best = reached
-        if elements or best <= tol:
-            return Buckling(scene, load_factors, modes, error, layout.counts, degree)
-        coarse, layout = load_factors, layout.finer(scene, 2)
+
+    def apart(fine, coarse):
+        return np.abs(fine - coarse) / np.abs(fine - load_factor)
+
+    (load_factors, modes), error, layout = until_two_meshes_agree(
+        scene,
+        lambda layout: _critical(scene, layout, count, load_factor, degree, comm),
+        apart,
+        tol,
+        first=FIRST_ELEMENTS,
+        most=_MOST_ELEMENTS,
+        elements=elements,
+        degree=degree,
+        advice="a larger tol",
+    )
+    return Buckling(scene, load_factors, modes, error, layout.counts, degree)
 
 
 def _critical(scene, layout, count, load_factor, degree, comm):

@@ -15,9 +15,9 @@ from cosserat_fenicsx.errors import NotConverged
 from cosserat_fenicsx.follow import Follower
 from cosserat_fenicsx.models.compiled import lobatto_weights
 from cosserat_fenicsx.models.rod_data import check_inertia, nodal_inertia
-from cosserat_fenicsx.models.rodmesh import Layout
 from cosserat_fenicsx.packed import Packed
 from cosserat_fenicsx.quaternions import directors
+from cosserat_fenicsx.refinement import until_two_meshes_agree
 from cosserat_fenicsx.scene import Scene
 from cosserat_fenicsx.statics import FIRST_ELEMENTS, check_arguments, solvers_of
 
@@ -109,22 +109,22 @@ def modes(scene, count=1, *, load_factor=0.0, tol=1e-6, elements=None, degree=4,
     if load_factor:
         check_arguments(scene, tol, elements)
     comm = comm or MPI.COMM_WORLD
-    layout, coarse, best = Layout.of(scene, elements or FIRST_ELEMENTS), None, math.inf
-    while True:
-        squares, shapes, negative = _on_mesh(scene, layout, count, load_factor, degree, comm)
-        error = np.full(len(squares), np.nan)
-        if coarse is not None and len(coarse) == len(squares):
-            error = np.abs(squares - coarse) / np.where(squares == 0, np.inf, np.abs(squares))
-            reached = error.max(initial=0.0)
-            if reached > max(tol, best) or (reached > tol and max(layout.counts) >= _MOST_ELEMENTS):
-                raise NotConverged(
-                    f"the accuracy tol = {tol:g} was not reached with {max(layout.counts)} elements of degree {degree} per rod: the "
-                    f"estimated error stays at {min(reached, best):.2g}. Ask for a larger tol or fewer modes."
-                )
-            best = reached
-        if elements or best <= tol:
-            return Modes(scene, squares, error, shapes, negative, layout.counts, degree)
-        coarse, layout = squares, layout.finer(scene, 2)
+
+    def apart(fine, coarse):
+        return np.abs(fine - coarse) / np.where(fine == 0, np.inf, np.abs(fine))
+
+    (squares, shapes, negative), error, layout = until_two_meshes_agree(
+        scene,
+        lambda layout: _on_mesh(scene, layout, count, load_factor, degree, comm),
+        apart,
+        tol,
+        first=FIRST_ELEMENTS,
+        most=_MOST_ELEMENTS,
+        elements=elements,
+        degree=degree,
+        advice="a larger tol or fewer modes",
+    )
+    return Modes(scene, squares, error, shapes, negative, layout.counts, degree)
 
 
 def _on_mesh(scene, layout, count, load_factor, degree, comm):

@@ -9,6 +9,7 @@ import numpy as np
 
 from cosserat_fenicsx.accuracy import carry_error, estimate_error, hardest, spread_error
 from cosserat_fenicsx.errors import Interrupted, NotConverged
+from cosserat_fenicsx.models.rodmesh import Layout
 
 _MOST_ELEMENTS = 1024
 # Two meshes that agree to this, relative to the largest displacement, are on one branch: the finer may start from the coarser.
@@ -133,6 +134,41 @@ class _Search:
         whole = self._trace(layout, self.whole) if rest is None else few.with_points(rest, others)
         spread_error(whole, few, self._which, self.whole)
         return self._keep(whole, None)
+
+
+def until_two_meshes_agree(scene, on_mesh, apart, tol, *, first, most, elements, degree, advice):
+    """Numbers that two meshes in a row agree on.
+
+    Args:
+        scene: what lies on the meshes.
+        on_mesh: a layout -> a tuple, the numbers (n,) in front.
+        apart: (the numbers, those of the mesh before) -> relative differences (n,).
+        tol: how far these may be apart.
+        first, most: elements per rod of the first mesh and of the last; elements: those of the only one, or None.
+        degree, advice: for the words of a refusal.
+
+    Returns:
+        (what `on_mesh` gave, differences (n,) or NaN, layout).
+
+    Raises:
+        NotConverged: the accuracy is not reached.
+    """
+    layout, coarse, best = Layout.of(scene, elements or first), None, math.inf
+    while True:
+        found = on_mesh(layout)
+        error = np.full(len(found[0]), np.nan)
+        if coarse is not None and len(coarse) == len(found[0]):
+            error = apart(found[0], coarse)
+            reached = error.max(initial=0.0)
+            if reached > max(tol, best) or (reached > tol and max(layout.counts) >= most):
+                raise NotConverged(
+                    f"the accuracy tol = {tol:g} was not reached with {max(layout.counts)} elements of degree {degree} per rod: the "
+                    f"estimated error stays at {min(reached, best):.2g}. Ask for {advice}."
+                )
+            best = reached
+        if elements or best <= tol:
+            return found, error, layout
+        coarse, layout = found[0], layout.finer(scene, 2)
 
 
 def _not_accurate(tol, reached, elements, degree):

@@ -41,12 +41,8 @@ class Step:
 
 
 @dataclass(frozen=True)
-class Ramp:
-    """Zero up to `start`, in proportion to time from there, `value` from `end` on. Times in s.
-
-    Raises:
-        SceneError: numbers that are not finite, or an end that is not after the start.
-    """
+class _FromTo:
+    """What happens between two times, s."""
 
     value: tuple
     start: float = 0.0
@@ -60,13 +56,22 @@ class Ramp:
         """Where it is not smooth, s."""
         return self.start, self.end
 
+
+@dataclass(frozen=True)
+class Ramp(_FromTo):
+    """Zero up to `start`, in proportion to time from there, `value` from `end` on. Times in s.
+
+    Raises:
+        SceneError: numbers that are not finite, or an end that is not after the start.
+    """
+
     def __call__(self, t):
         """The vector at t."""
         return _times(min(max((t - self.start) / (self.end - self.start), 0.0), 1.0), self.value)
 
 
 @dataclass(frozen=True)
-class RunUp:
+class RunUp(_FromTo):
     """What runs up to a speed: zero up to `start`, the rate `value` (per s) from `end` on; in between the rate of change
     of the speed is value/T (1 - cos(2 pi t/T)), T = end - start, so that nothing jerks. Times in s.
 
@@ -75,18 +80,6 @@ class RunUp:
     Raises:
         SceneError: numbers that are not finite, or an end that is not after the start.
     """
-
-    value: tuple
-    start: float = 0.0
-    end: float = 1.0
-
-    def __post_init__(self):
-        _check(self, "start", "end")
-
-    @property
-    def jumps(self):
-        """Where it is not smooth, s."""
-        return self.start, self.end
 
     def __call__(self, t):
         """The vector at t."""
