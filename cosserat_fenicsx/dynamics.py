@@ -101,6 +101,11 @@ def simulate(
     instance("simulate", "scene", scene, Scene, "a Scene")
     pace = pace_of(duration, tol=tol, dt=dt, scheme=scheme, save_every=save_every, elements=elements)
     rho_inf = _rho_inf(scheme, rho_inf)
+    for rod in scene.rods:
+        if math.isinf(rod.profile.range[1].K.max()):
+            raise SceneError(
+                f"Rod '{rod.name}': an infinite axial or shear stiffness: expected finite ones, for a motion"
+            )
     if load_factor is None:
         load_factor = start if isinstance(start, numbers.Real) else 1.0
     number("simulate", "load_factor", load_factor, "a finite number", math.isfinite)
@@ -113,7 +118,7 @@ def simulate(
     model, why = chosen_model(looked_at, model, scheme, start)
     problem, stepper = solvers(looked_at, Layout.of(scene, elements), degree, scheme, load_factor, comm, model)
     stepper.rho_inf = rho_inf
-    put_start(problem.model, start)
+    cautions += put_start(problem.model, start)
     problem.begin()
     stepper.begin()
     history = (History if folder is None else StoredHistory).of(problem.model, scheme, [why, *cautions])
@@ -194,7 +199,9 @@ def pace_of(duration, *, tol=None, dt=None, scheme="momentum", save_every=None, 
             raise SceneError(
                 f"simulate: dt = {dt!r} and tol = {tol!r}: expected one of them, a fixed or an adaptive step"
             )
-        return Fixed(min(positive_time("dt", dt), duration))
+        if positive_time("dt", dt) > duration:
+            refuse("simulate", "dt", dt, f"at most the duration, {duration:g} s")
+        return Fixed(dt)
     if not SCHEMES[scheme].adapts:
         raise SceneError(f"scheme = '{scheme}' knows no error of its steps: expected dt, a fixed step (s)")
     tol = TOL if tol is None else tol

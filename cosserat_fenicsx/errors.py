@@ -48,7 +48,7 @@ class Interrupted(KeyboardInterrupt):
     """
 
     def __init__(self, path):
-        super().__init__(f"interrupted; {len(path)} {path.axis}(s) done so far are kept")
+        super().__init__(f"interrupted after {len(path)} {path.axis}(s)")
         self.path = path
 
 

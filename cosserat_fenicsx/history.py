@@ -39,7 +39,7 @@ class History(Path):
         kinetic, strain: (n,) energies, J.
         work: (n,) J, what loads and prescribed motions have done since the start.
         dissipated: (n,) J, what damping has taken since the start.
-        balance: (n,) J, kinetic + strain - work + dissipated, over its value at the start; zero for an exact solution.
+        balance: (n,) J, kinetic + strain - work + dissipated, minus its value at the start; zero for an exact solution.
         linear_momentum: (n, 3) kg m/s; angular_momentum: (n, 3) kg m^2/s about the inertial origin, inertial.
     """
 

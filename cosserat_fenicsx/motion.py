@@ -6,6 +6,7 @@ from cosserat_fenicsx.errors import Interrupted, NotConverged
 from cosserat_fenicsx.history import Instant, Ledger
 from cosserat_fenicsx.interrupts import obey
 from cosserat_fenicsx.progress import Progress
+from cosserat_fenicsx.start import drive
 
 # A step that fails is halved so often before the motion is given up.
 _HALVINGS = 12
@@ -68,6 +69,8 @@ class Motion:
             return
         if self._t <= begin:
             if mark.jumps:
+                if begin > 0 and self._stepper.keeps_kinks:
+                    self._drive(begin)
                 self._stepper.jump()
                 self._pace.jump()
             elif mark.bends:
@@ -91,6 +94,12 @@ class Motion:
             if self._folder and self._folder.due:
                 self._keep()
 
+    def _drive(self, t):
+        """See `start.drive`; the kinetic energy that it gives or takes is work of the supports."""
+        kinetic, _ = self.problem.energies()
+        drive(self.model, t)
+        self._stepper.add_work(self.problem.energies()[0] - kinetic)
+
     def _keep(self):
         if self._folder:
             self._folder.keep(self.memory(), self.history)
@@ -105,6 +114,8 @@ class Motion:
                 return False
             self._steps += 1
             return True
+        if not halvings and self._pace.failed(h):
+            return False
         if halvings == _HALVINGS:
             if self.history[-1].time < t:
                 self._save(t)
@@ -115,7 +126,6 @@ class Motion:
             )
         self._advance(t, h / 2, halvings + 1)
         self._advance(t + h / 2, h / 2, halvings + 1)
-        self._pace.failed(h)
         return True
 
     def _save(self, t):

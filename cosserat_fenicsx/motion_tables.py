@@ -22,7 +22,7 @@ def motion_table(history, rows=ROWS):
         f"{' + '.join(map(str, history.elements))} elements, {history.unknowns} unknowns, "
         f"{history.steps[-1]} steps, {which}",
         caption=f"dx, dy, dz, speed: of {station}. work: of loads and prescribed motions.\n"
-        "balance: kinetic + strain - work + dissipated, over its value at the start; zero for an exact solution.",
+        "balance: kinetic + strain - work + dissipated, minus its value at the start; zero for an exact solution.",
     )
     for heading in ("time (s)", "dx (m)", "dy (m)", "dz (m)", "speed (m/s)", *(f"{name} (J)" for name in _ENERGIES)):
         table.add_column(heading, justify="right")

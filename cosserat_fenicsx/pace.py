@@ -22,7 +22,8 @@ class Fixed:
         return True
 
     def failed(self, h):
-        """A step of length h failed, and was taken in shorter ones."""
+        """A step of length h failed: whether a shorter one is tried in its place; otherwise it is halved, whatever that gives."""
+        return False
 
     def jump(self):
         """Something jumps here."""
@@ -52,8 +53,13 @@ class Adaptive:
     #: they grow by no more than the third and shrink by no more than the fourth
     _LONGER, _SHORTER, _GROW, _SHRINK = 1.2, 0.9, 4.0, 0.25
 
+    #: `error` looks far back, and sees little of what sets in all at once: a step that ends farther from where it was foretold
+    #: than this share of tol is not believed, unless it is shorter than that share of the duration
+    _SURPRISING, _BELIEVED = 0.06, 1e-7
+
     def __init__(self, tol, duration):
-        self._rate, self._dt, self._longest = tol / duration, duration * self._SHORTEST, duration / 20
+        self._rate, self._dt, self._longest = tol / duration, duration * self._SHORTEST, duration / 100
+        self._surprising, self._believed = self._SURPRISING * tol, self._BELIEVED * duration
 
     def length(self, left):
         """See `Fixed`."""
@@ -61,6 +67,9 @@ class Adaptive:
 
     def accepts(self, stepper, h):
         """See `Fixed`."""
+        if h > self._believed and stepper.surprise() > self._surprising:
+            self._dt = self._SHRINK * h
+            return False
         error = stepper.error()
         if error is None:
             return True
@@ -75,6 +84,7 @@ class Adaptive:
     def failed(self, h):
         """See `Fixed`."""
         self._dt = h / 2
+        return h > self._believed
 
     def jump(self):
         """See `Fixed`."""

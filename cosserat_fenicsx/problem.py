@@ -70,8 +70,10 @@ class Problem:
         return anew
 
     def _holds(self, scene, layout):
-        """Whether this very scene is loaded, on this mesh, and nothing in it is a function that might say something else now."""
+        """Whether this very scene is loaded, on this mesh, and nothing in it is a function, or a load of a user's own, that might say something else now."""
         if self._loaded is None or self._loaded[0] is not scene or not all(rod.uniform for rod in scene.rods):
+            return False
+        if not all(type(load).__module__.startswith("cosserat_fenicsx.") for load in scene.loads):
             return False
         return all(map(np.array_equal, self._loaded[1].breaks, layout.breaks))
 

@@ -101,7 +101,7 @@ class RunFolder:
             self.ranks, self._likeness, self._head = head["ranks"], head["scene"], head
         except OSError as problem:
             raise SceneError(
-                f"{self.place}: {problem.strerror}: expected a folder that simulate(..., folder=...) wrote"
+                f"{self.place}: no motion was found there ({_HEAD}: {problem.strerror}): expected a folder that simulate(..., folder=...) wrote"
             ) from None
         except (ValueError, KeyError, TypeError) as problem:
             raise SceneError(f"{self.place / _HEAD} is damaged ({problem!r})") from None

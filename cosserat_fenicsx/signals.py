@@ -190,6 +190,8 @@ class Table:
 
 
 def _check(signal, *times):
+    if not isinstance(signal.value, tuple | list | np.ndarray):
+        refuse(signal, "value", signal.value, "a vector, such as (0, 0, 1)")
     values = [number(signal, field, getattr(signal, field), "a time (s)", math.isfinite) for field in times]
     for field, before, after in zip(times[1:], values[:-1], values[1:], strict=True):
         if after <= before:

@@ -10,6 +10,10 @@ from cosserat_fenicsx.results import Path
 # Positions (lengths) and turns (rad) of a start that supports do not hold are refused above this; velocities relative
 # to the largest.
 _APART = 1e-6
+# Prescribed velocities at the time 0 are differences over this share of the unit of time.
+_AHEAD = 1e-6
+# Slower than this nothing is a shock, dimensionless.
+_SLOW = 1e-9
 # What leaves a plane by less keeps to it.
 _FLAT = 1e-10
 
@@ -20,6 +24,9 @@ def put_start(model, start):
     Args:
         model: see `models.moving.Moving`.
         start: None for the reference, a Path for its last point, or (Path, k).
+
+    Returns:
+        what to be told of it, sentences.
 
     Raises:
         SceneError: a start of another scene's rods, or one that supports contradict.
@@ -34,11 +41,21 @@ def put_start(model, start):
         if abs(c[k]) > _APART:
             raise SceneError(
                 f"{_holder(scene, k)} does not hold at the time 0: it is off by {abs(c[k]):.3g} (lengths or rad). Expected motions "
-                "that start where the rods are, such as a Ramp"
+                "that start where the rods are, such as a RunUp (a Ramp starts with a speed)"
             )
     linear, angular = _velocities(model, rq)
-    _check_velocities(model, rq, np.concatenate([linear, angular], axis=1))
-    model.set_velocity(linear, angular)
+    rates, cautions = np.concatenate([linear, angular], axis=1), []
+    if np.abs(rates).max() > 0:
+        _check_velocities(model, rq, rates)
+    elif model.ties:
+        rates = _driven(model, rq, rates)
+        if np.abs(rates).max() > _SLOW:
+            cautions = [
+                "a prescribed motion starts with a speed, and the rods at rest: the shock rings on in contact forces; RunUp starts "
+                "without one, and the scheme 'generalised-alpha' lets it die out"
+            ]
+    model.set_velocity(rates[:, :3], rates[:, 3:])
+    return cautions
 
 
 def starts_in(scene, plane, start):
@@ -103,11 +120,44 @@ def _velocities(model, rq):
     return linear, angular
 
 
+def drive(model, t):
+    """Give the nodes that prescribed motions drive the velocities that these have from the time t (s) on, where they have a kink
+    there; see `_driven`. All other velocities stay."""
+    if not model.ties:
+        return
+    nodal, _ = model.snapshot()
+    rates = model.rates()(nodal, model.snapshot_of_rates())
+    rq = np.empty((len(nodal), 7))
+    rq[model.tied_slots] = model.tied_motion(nodal[model.tied_slots])
+    driven = _driven(model, rq, rates, t)
+    if np.abs(driven - rates).max() > _SLOW * np.abs(rates).max(initial=1.0):
+        model.set_velocity(driven[:, :3], driven[:, 3:])
+
+
+def _driven(model, rq, rates, t=0.0):
+    """Velocities, but for the nodes that prescribed motions drive: these take the speed of the motion from the time t (s) on at once.
+    Without that the trapezoidal rule would make velocities and reactions there alternate from step to step for good."""
+    off, gradient, _ = _off(model, rq, rates, t)
+    at = model.tied_slots
+    change = np.linalg.lstsq(gradient.reshape(len(off), -1), -off, rcond=None)[0]
+    driven = rates.copy()
+    driven[at] += change.reshape(len(at), 6)
+    return driven
+
+
+def _off(model, rq, rates, t=0.0):
+    """How fast the equations of supports and joints change from the time t (s) on with these velocities, their gradient, and how fast
+    by prescribed motions alone."""
+    eta, now, count = float(model.load_factor.value), rates[model.tied_slots], len(ties_of(model.scene))
+    c, gradient, _ = model.ties_at(t).evaluate(rq[model.tied_slots], eta, np.zeros(count))
+    later, _, _ = model.ties_at(t + _AHEAD * model.time).evaluate(rq[model.tied_slots], eta, np.zeros(count))
+    driven = (later - c) / _AHEAD
+    return np.einsum("ikb,kb->i", gradient, now) + driven, gradient, driven
+
+
 def _check_velocities(model, rq, rates):
     scene, layout = model.scene, model.layout
     size = np.abs(rates).max()
-    if not size:
-        return
 
     def of(station):
         rod, vertex = layout.vertex(scene, station)
@@ -121,14 +171,9 @@ def _check_velocities(model, rq, rates):
         if joint.rigid and np.abs(of(joint.first) - of(joint.second)).max() > _APART * size:
             _against(f"joints[{i}] ({joint.first} with {joint.second})")
     if model.ties:
-        eta, now = float(model.load_factor.value), rates[model.tied_slots]
-        ahead = 1e-6 * model.time
-        count = len(ties_of(scene))
-        c, gradient, _ = model.ties_at(0.0).evaluate(rq[model.tied_slots], eta, np.zeros(count))
-        later, _, _ = model.ties_at(ahead).evaluate(rq[model.tied_slots], eta, np.zeros(count))
-        off = np.abs(np.einsum("ikb,kb->i", gradient, now) + (later - c) / 1e-6)
-        k = int(np.argmax(off))
-        if off[k] > 10 * _APART * max(size, np.abs(later - c).max() / 1e-6):
+        off, _, driven = _off(model, rq, rates)
+        k = int(np.argmax(np.abs(off)))
+        if abs(off[k]) > 10 * _APART * max(size, np.abs(driven).max()):
             _against(_holder(scene, k))
 
 

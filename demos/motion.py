@@ -235,6 +235,8 @@ def main(names=(), out="out", *, quick=False, film=False):
         found.append((check, off))
     if MPI.COMM_WORLD.rank == 0:
         print(as_text(table))
+        if out is not None and not quick:
+            print(f"Pictures: {out}/")
     return found
 
 

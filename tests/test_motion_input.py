@@ -63,7 +63,9 @@ REFUSED = {
     "about with a function": (lambda: cf.InitialVelocity(ROD, lambda s: (0, 0, 0), about=(0, 0, 0)), "InitialVelocity.about"),
     "a support that jumps": (lambda: cf.simulate(cf.Scene([ROD], [cf.Prescribed(ROD.end, (0, 0, 1))]), 1.0), "does not hold at the time 0"),
     "statics in time": (lambda: cf.solve(LATE_NAN, [1.0]), "the Force depends on time, and statics knows none"),
-    "infinite stiffness": (lambda: moving(rods=[cf.Rod(ROD.curve, sections(axial=math.inf), name="a")]), "cannot take an infinite stiffness"),
+    "a step longer than the motion": (lambda: cf.simulate(FREE, 1.0, dt=50.0), "simulate.dt = 50.0: expected at most the duration, 1 s"),
+    "a number for a vector": (lambda: cf.Sine(5.0, 2.0), "Sine.value = 5.0: expected a vector"),
+    "infinite stiffness": (lambda: moving(rods=[cf.Rod(ROD.curve, sections(axial=math.inf), name="a")]), "infinite axial or shear stiffness: expected finite ones, for a motion"),
 }  # fmt: skip
 
 

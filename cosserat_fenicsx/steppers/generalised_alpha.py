@@ -145,7 +145,7 @@ class CollocationProblem(StepProblem):
 class GeneralisedAlpha(OneStep):
     """See `protocol.Stepper`. Numerical dissipation is no part of `dissipated`: the balance of the ledger shows it."""
 
-    forms, problem_class, rho_inf = "collocation", CollocationProblem, 0.8
+    forms, problem_class, rho_inf, keeps_kinks = "collocation", CollocationProblem, 0.8, False
 
     def begin(self):
         """See `Stepper`."""

@@ -13,7 +13,7 @@ TURNS = 0.1
 class OneStep:
     """See `protocol.Stepper`."""
 
-    order, adapts, rho_inf = 2, True, None
+    order, adapts, rho_inf, keeps_kinks = 2, True, None, True
     #: error of a step over that of the trapezoidal rule, as measured
     coarseness = 1.0
 
@@ -35,6 +35,10 @@ class OneStep:
         """See `Stepper`."""
         self._past = []  # (h, state before, rates before, work and dissipation before) of the last steps
 
+    def add_work(self, done):
+        """See `Stepper`."""
+        self.work += done
+
     def bend(self):
         """See `Stepper`: no scheme of one step looks at what was before, but to begin Newton's method."""
 
@@ -45,7 +49,8 @@ class OneStep:
             problem.fresh, self._h = True, h
         problem.aim(t, h)
         unit = problem.h
-        solved = self._newton.solve(self._predicted(unit))
+        guesses = self._predicted(unit)
+        solved = self._newton.solve(guesses)
         if not solved.converged:
             self._state[:] = self._start
             problem.begin()
@@ -54,6 +59,7 @@ class OneStep:
             *self._past[1 - 3 * _APART :],
             (unit, self._start.copy(), [rate.copy() for rate in self._rates], (self.work, self.dissipated)),
         ]
+        self._surprise = self._state - guesses[0]
         self.work += problem.work()
         self.dissipated += problem.dissipated()
         problem.model.accept(unit)
@@ -83,6 +89,10 @@ class OneStep:
         weights = [1 / np.prod([a - b for b in times if b != a]) for a in times]
         third = sum(w * x for w, x in zip(weights, states, strict=True))  # a sixth of the derivative
         return self.coarseness * 0.5 * steps[-1] ** 3 * self.problem.model.largest_of(third, TURNS)
+
+    def surprise(self):
+        """See `Stepper`."""
+        return self.problem.model.largest_of(self._surprise, TURNS)
 
     def undo(self):
         """See `Stepper`."""

@@ -9,12 +9,14 @@ class Stepper(Protocol):
     Attributes:
         order: of the error in the step h.
         forms: the name of the discretisation that its models must have; problem_class: what it solves, a `StepProblem`.
+        keeps_kinks: whether a kink of a prescribed motion would make its velocities alternate for good.
         adapts: whether `error` and `undo` are known.
         rho_inf: by how much a step shrinks what vibrates much faster than the steps, where that can be set; else None.
         work, dissipated: dimensionless, since `begin`: what loads and supports have done, and what damping has taken.
     """
 
     order: int
+    keeps_kinks: bool
     adapts: bool
     rho_inf: float | None
     forms: str
@@ -27,6 +29,9 @@ class Stepper(Protocol):
 
     def jump(self):
         """Something jumps here: what was before does not foretell what comes."""
+
+    def add_work(self, done):
+        """Supports have done work between two steps, dimensionless."""
 
     def bend(self):
         """A load bends here without a jump: rates of change of accelerations do."""
@@ -42,6 +47,9 @@ class Stepper(Protocol):
     def error(self):
         """Estimated local error of the last step, of positions (lengths) and rotations (rad); None where too few steps
         are known since the start or a jump."""
+
+    def surprise(self):
+        """How far the last step ended from where the steps before foretold it, as `error` measures it."""
 
     def undo(self):
         """Take the last step back."""

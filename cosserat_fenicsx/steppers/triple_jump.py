@@ -15,7 +15,7 @@ _GAMMA = 1 / (2 - 2 ** (1 / 3))
 class TripleJump:
     """See `protocol.Stepper`."""
 
-    order, adapts, rho_inf = 4, False, None
+    order, adapts, rho_inf, keeps_kinks = 4, False, None, True
     forms, problem_class = Momentum.forms, Momentum.problem_class
 
     def __init__(self, problem):
@@ -39,6 +39,10 @@ class TripleJump:
     def jump(self):
         """See `Stepper`."""
         self._inner.jump()
+
+    def add_work(self, done):
+        """See `Stepper`."""
+        self._inner.add_work(done)
 
     def bend(self):
         """See `Stepper`."""
