@@ -11,13 +11,13 @@ from mpi4py import MPI
 from cosserat_fenicsx.checks import instance, number, refuse
 from cosserat_fenicsx.errors import SceneError, nearest
 from cosserat_fenicsx.history import History
+from cosserat_fenicsx.marks import marks_of
 from cosserat_fenicsx.models.collocated import CollocatedPlanar, CollocatedSpatial
 from cosserat_fenicsx.models.conserving import ConservingSpatial
 from cosserat_fenicsx.models.moving import MovingSpatial
 from cosserat_fenicsx.models.moving_planar import MovingPlanar
 from cosserat_fenicsx.models.rodmesh import Layout
 from cosserat_fenicsx.models.shape import Shape
-from cosserat_fenicsx.marks import marks_of
 from cosserat_fenicsx.motion import Motion
 from cosserat_fenicsx.pace import Adaptive, Fixed
 from cosserat_fenicsx.runfolder import RunFolder

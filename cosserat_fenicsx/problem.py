@@ -3,6 +3,7 @@
 import numpy as np
 from petsc4py import PETSc
 
+from cosserat_fenicsx.equations import Equations
 from cosserat_fenicsx.packed import Packed
 from cosserat_fenicsx.tie_rows import TieRows
 
@@ -10,38 +11,35 @@ from cosserat_fenicsx.tie_rows import TieRows
 _CHANGE = 1e-4
 
 
-class Problem:
+class Problem(Equations):
     """Residual and tangent of a model as PETSc wants them, in the solver's unknowns (`models.numbering`).
 
     Args:
         model: see `models.base.RodModel` for the protocol.
 
     Attributes:
-        x: the solution vector; the model's state follows it.
-        b, A: residual and tangent.
+        see `Equations`.
         load_factor: what all loads and prescribed motions are multiplied by.
         load_norm: size of the dead loads at load factor 1.
     """
 
+    ties_class = TieRows
+
     def __init__(self, model):
-        self.model, self.numbering = model, model.numbering
-        numbering = self.numbering
-        self.ties = TieRows(model, numbering) if model.shape.connections.ties else None
-        tied = self.ties.rows if self.ties else np.empty(0, dtype=np.int64)
-        self.A = numbering.matrix(model.cell_dofs, tied[tied >= 0], blocks=model.tangent == "blocks")
-        self.A.setOption(PETSc.Mat.Option.SYMMETRIC, model.tangent == "symmetric")
-        self.x, self.b, self._dead, *self._difference = (numbering.vector() for _ in range(5))
-        self._local = np.zeros(len(numbering.rows))
+        super().__init__(model)
+        self.A.setOption(PETSc.Mat.Option.SYMMETRIC, self.tangent == "symmetric")
+        self._dead, *self._difference = (self.numbering.vector() for _ in range(3))
         moving = (model.state, *model.carried)
         self._residual, self._tangent = Packed(model.forms.residual, moving), Packed(model.forms.tangent, moving)
         self._loads = None if model.forms.dead is None else Packed(model.forms.dead, ())
-        self._state = model.state.x.array
         self._live = [function.x.array for function in model.carried]
         self.load_factor = self.load_norm = 0.0
-        self._eta = (
-            model.load_factor.value
-        )  # written in place: the property's setter costs as much as a residual of few elements
+        # Written in place: the property's setter costs as much as a residual of few elements.
+        self._eta = model.load_factor.value
         self._loaded = None
+
+    def _kind(self):
+        return self.model.tangent
 
     def load(self, scene, layout):
         """Take the numbers of a scene; the state becomes its reference configuration.
@@ -56,10 +54,9 @@ class Problem:
             model.load(scene, layout)
             self._residual.refresh()
             self._tangent.refresh()
-            self._dead.set(0.0)
             if self._loads:
                 self._loads.refresh()
-                self._assemble(self._loads, self._dead)
+            self._assemble(self._loads, self._dead)
             self.load_norm = self._dead.norm() + model.load_norm
             self._loaded = scene, layout
         else:
@@ -70,7 +67,8 @@ class Problem:
         return anew
 
     def _holds(self, scene, layout):
-        """Whether this very scene is loaded, on this mesh, and nothing in it is a function, or a load of a user's own, that might say something else now."""
+        """Whether this very scene is loaded, on this mesh, and nothing in it is a function, or a load of a user's own, that might say
+        something else now."""
         if self._loaded is None or self._loaded[0] is not scene or not all(rod.uniform for rod in scene.rods):
             return False
         if not all(type(load).__module__.startswith("cosserat_fenicsx.") for load in scene.loads):
@@ -81,17 +79,6 @@ class Problem:
         """Multiply all loads and prescribed motions by eta from now on."""
         self.load_factor = eta
         self._eta[...] = eta
-
-    def _assemble(self, form, vector):
-        self._local[:] = 0.0
-        form.add_to_vector(self._local)
-        self.numbering.add_up(self._local, vector)
-
-    def set_state(self, x):
-        """Put a vector of unknowns into the model's state, ghosts too."""
-        self.numbering.to_local(x, self._state)
-        if self.ties:
-            self.ties.see(x)
 
     def numbers(self):
         """Everything that says where the problem is, to be kept: this rank's unknowns and carried fields."""
@@ -115,10 +102,6 @@ class Problem:
         if self.ties:
             self.ties.put(self.x, multipliers)
         self.set_state(self.x)
-
-    def multipliers(self):
-        """Reactions of the added equations, on all ranks."""
-        return self.ties.everywhere() if self.ties else np.empty(0)
 
     def function(self, snes, x, b):
         """Residual at x for SNES."""

@@ -56,10 +56,8 @@ class _Search:
         self.whole = self._few = self._which = None  # `_few`: points that are looked at, on the last mesh
         self._apart, self._apart_of_whole = None, None  # their differences to the mesh before, and of all points
         self._level, self._level_of_whole = -1, -2
-        self._order, self._factor = (
-            1.0,
-            2.0,
-        )  # of the error in h that is counted on; elements over those of the mesh before
+        # Of the error in h, as it is counted on; elements over those of the mesh before.
+        self._order, self._factor = 1.0, 2.0
         self._failed, self._best = False, math.inf
 
     def on(self, layout):

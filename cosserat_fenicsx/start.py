@@ -122,7 +122,7 @@ def _velocities(model, rq):
 
 def drive(model, t):
     """Give the nodes that prescribed motions drive the velocities that these have from the time t (s) on, where they have a kink
-    there; see `_driven`. All other velocities stay."""
+    there; see `_driven`. All others stay what they are, up to rounding."""
     if not model.ties:
         return
     nodal, _ = model.snapshot()

@@ -118,10 +118,10 @@ def solve(
         follow["steps"] = replace(steps, largest=min(steps.largest or math.inf, _LARGEST_TURN / _turn(scene)))
 
     def take(choice, bar):
-        strayed, last = [], [None, None]  # `last`: a layout and the solvers loaded with it
+        strayed = []
 
-        def solvers(layout):
-            return solvers_of(
+        def tracing(layout, *, from_rest=True):
+            solvers = solvers_of(
                 scene,
                 layout,
                 formulation=formulation,
@@ -130,9 +130,7 @@ def solve(
                 comm=comm,
                 model=choice.model,
             )
-
-        def tracing(layout):
-            return Tracing(solvers(layout), formulation, follow, choice, bar)
+            return Tracing(solvers, formulation, follow, choice, bar, from_rest=from_rest)
 
         def trace(layout, like=None):
             """`like`: a path whose points are found again, where the solver chose them."""
@@ -149,9 +147,7 @@ def solve(
         def correct(layout, coarse):
             if coarse.events or coarse.control == "arc" or until or not steps.adaptive:
                 return None
-            if last[0] is not layout:
-                last[:] = layout, solvers(layout)
-            return Tracing(last[1], formulation, follow, choice, bar, from_rest=False).corrected(coarse)
+            return tracing(layout, from_rest=False).corrected(coarse)
 
         if elements is not None:
             return trace(Layout.of(scene, elements))

@@ -8,7 +8,6 @@ A run that is broken off keeps its cells; the same command goes on from them. Pr
 `make work-precision` installs them.
 """
 
-import argparse
 import hashlib
 import json
 import os
@@ -21,6 +20,7 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 from trials import catalogue, methods, picture, programs, table
 from trials.cells import MISSING, SILENT, Cell
+from unfinished import command
 
 ROOT = Path(__file__).resolve().parents[1]
 
@@ -125,12 +125,4 @@ def main(out="out", quick=False, fresh=False):
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--quick", action="store_true", help="without other programs, fewer steps; at most a minute")
-    parser.add_argument("--fresh", action="store_true", help="continue no earlier run")
-    parser.add_argument("-o", "--out", default="out", help="folder for what is written (default: out)")
-    try:
-        main(**vars(parser.parse_args()))
-    except KeyboardInterrupt:
-        print("\nbroken off; what is done is kept, and the same command goes on from there", file=sys.stderr)
-        sys.exit(130)
+    command(main, __doc__, quick="without other programs, fewer steps; at most a minute")

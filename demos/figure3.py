@@ -8,7 +8,6 @@ A run that is broken off keeps every curve and every point of the solid that it 
 goes on from there.
 """
 
-import argparse
 import json
 import os
 import sys
@@ -20,6 +19,7 @@ import numpy as np
 from comparison import curves, picture, verdicts
 from comparison.follow import Point
 from mpi4py import MPI
+from unfinished import command
 
 
 class Store:
@@ -148,12 +148,4 @@ def main(out="out", quick=False, fresh=False):
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--quick", action="store_true", help="coarse meshes")
-    parser.add_argument("--fresh", action="store_true", help="continue no earlier run")
-    parser.add_argument("-o", "--out", default="out", help="folder for what is written (default: out)")
-    try:
-        main(**vars(parser.parse_args()))
-    except KeyboardInterrupt:
-        print("\nbroken off; what is done is kept, and the same command goes on from there", file=sys.stderr)
-        sys.exit(130)
+    command(main, __doc__, quick="coarse meshes")

@@ -45,7 +45,7 @@ SCENE = (
     "scene", "scenefile", "sections", "signals", "splines", "statical", "supports", "ties",
 )  # fmt: skip
 SOLVERS = (
-    "arclength", "chord", "continuation", "dynamics", "eigen", "follow", "linear", "linear_buckling", "locator", "marks", "motion", "natural_modes",
+    "arclength", "chord", "continuation", "dynamics", "eigen", "equations", "follow", "linear", "linear_buckling", "locator", "marks", "motion", "natural_modes",
     "pace", "problem", "refinement", "resuming", "snes", "stability", "standing", "start", "statics", "tie_rows", "tracing", "track",
 )  # fmt: skip
 RESULTS = (

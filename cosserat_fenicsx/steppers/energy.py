@@ -74,21 +74,17 @@ class TurnedStepProblem(StepProblem):
         self._known.set(0.0)
         self._known.axpy(self.load_factor, self._loads)
 
-    def function(self, snes, x, b):
+    def _put_stresses(self, x, b):
         """See `StepProblem`."""
-        self.set_state(x)
         self._assemble(self._residual, b)
         q = self._of_nodes(x)
         rows = b.array_w[: 7 * self._nodes].reshape(-1, 7)[:, 3:]
         self._of_q, self._middle, self._q = rows.copy(), (self._q_start + q) / 2, q.copy()
         rows[:, 1:] = np.einsum("nij,nj->ni", _turning(self._middle), self._of_q)
         rows[:, 0] = np.einsum("ni,ni->n", q, q) - 1
-        b.axpy(-1.0, self._known)
         if self._live:
             self._assemble(self._live, self._vector)
             b.axpy(-self.load_factor, self._vector)
-        if self.ties:
-            self.ties.add_residual(b, self.load_factor)
 
     def jacobian(self, snes, x, A, P):
         """See `StepProblem`."""

@@ -59,7 +59,7 @@ class OneStep:
             *self._past[1 - 3 * _APART :],
             (unit, self._start.copy(), [rate.copy() for rate in self._rates], (self.work, self.dissipated)),
         ]
-        self._surprise = self._state - guesses[0]
+        self._foretold = guesses[0]
         self.work += problem.work()
         self.dissipated += problem.dissipated()
         problem.model.accept(unit)
@@ -92,7 +92,7 @@ class OneStep:
 
     def surprise(self):
         """See `Stepper`."""
-        return self.problem.model.largest_of(self._surprise, TURNS)
+        return self.problem.model.largest_of(self._state - self._foretold, TURNS)
 
     def undo(self):
         """See `Stepper`."""

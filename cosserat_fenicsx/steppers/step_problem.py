@@ -1,21 +1,20 @@
 """One step of a moving model as PETSc wants it: residual and tangent in the solver's unknowns."""
 
-import numpy as np
 from dolfinx import fem
 
+from cosserat_fenicsx.equations import Equations
 from cosserat_fenicsx.packed import Packed
 from cosserat_fenicsx.steppers.moving_ties import MovingTies
 
 
-class StepProblem:
+class StepProblem(Equations):
     """The equations of a step, whatever the scheme that made the model's forms.
 
     Args:
         model: see `models.moving.Moving` for the protocol.
 
     Attributes:
-        x, b, A: unknowns at the end of the step, residual, tangent; the model's state follows x.
-        tangent: what factors it.
+        see `Equations`; x is at the end of the step.
         fresh: whether the tangent is made anew when it is next asked for, or the one at hand serves on.
         h: the length of the step, dimensionless.
         load_factor: what all loads and prescribed motions are multiplied by.
@@ -24,19 +23,12 @@ class StepProblem:
     ties_class = MovingTies
 
     def __init__(self, model):
-        self.model, self.numbering = model, model.numbering
-        numbering = self.numbering
-        self.ties = self.ties_class(model, numbering) if model.shape.connections.ties else None
-        tied = self.ties.rows if self.ties else np.empty(0, dtype=np.int64)
-        self.tangent = self._kind()
-        self.A = numbering.matrix(model.cell_dofs, tied[tied >= 0], blocks=self.tangent == "blocks")
-        self.x, self.b, self._known, self._loads, self._momenta, self._vector = (numbering.vector() for _ in range(6))
-        self._local = np.zeros(len(numbering.rows))
-        self._state, self._start = model.state.x.array, model.start.x.array
+        super().__init__(model)
+        self._known, self._loads, self._momenta, self._vector = (self.numbering.vector() for _ in range(4))
+        self._start = model.start.x.array
         self.load_factor, self.fresh = 1.0, True
 
     def _kind(self):
-        """What factors the tangent, see `linear.factor_tangent`."""
         return "general" if self.ties or self.model.comm.size > 1 else "blocks"
 
     def _ends(self):
@@ -95,18 +87,6 @@ class StepProblem:
         if self._live:
             self._live.catch_up()
 
-    def _assemble(self, form, vector):
-        self._local[:] = 0.0
-        if form:
-            form.add_to_vector(self._local)
-        self.numbering.add_up(self._local, vector)
-
-    def set_state(self, x):
-        """Put a vector of unknowns into the model's state, ghosts too."""
-        self.numbering.to_local(x, self._state)
-        if self.ties:
-            self.ties.see(x)
-
     def guess(self, values):
         """Start Newton from local numbers of the state; reactions stay what they were."""
         multipliers = self.ties.everywhere() if self.ties else None
@@ -117,10 +97,14 @@ class StepProblem:
     def function(self, snes, x, b):
         """Residual at x for SNES."""
         self.set_state(x)
-        self._assemble(self._residual, b)
+        self._put_stresses(x, b)
         b.axpy(-1.0, self._known)
         if self.ties:
             self.ties.add_residual(b, self.load_factor)
+
+    def _put_stresses(self, x, b):
+        """What of the residual depends on the state, but for added equations, into b."""
+        self._assemble(self._residual, b)
 
     def jacobian(self, snes, x, A, P):
         """Tangent at the state that `function` was last called with; kept where it is not to be fresh."""
@@ -163,10 +147,6 @@ class StepProblem:
 
     def _scalar(self, form):
         return self.model.comm.allreduce(fem.assemble_scalar(form))
-
-    def multipliers(self):
-        """Reactions of the added equations, on all ranks."""
-        return self.ties.everywhere() if self.ties else np.empty(0)
 
     def memory(self):
         """This rank's part of what the steps to come depend on; of a tangent that is kept, its entries."""
