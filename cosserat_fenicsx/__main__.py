@@ -2,6 +2,6 @@
 
 import sys
 
-from cosserat_fenicsx.cli import main
+from cosserat_fenicsx.cli.main import main
 
 sys.exit(main())

@@ -17,8 +17,8 @@ import numpy as np
 
 import cosserat_fenicsx as cf
 from cosserat_fenicsx import compat
-from cosserat_fenicsx.choose import fitting
-from cosserat_fenicsx.scenefile import read_scene
+from cosserat_fenicsx.scene.choose import fitting
+from cosserat_fenicsx.scene.scenefile import read_scene
 
 SCENES = ("eccentric_cantilever", "bend_45", "lees_frame", "helical_spring", "riser", "tripod")
 COUNTS = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64)

@@ -14,8 +14,9 @@ from mpi4py import MPI
 from rich.table import Table
 
 import cosserat_fenicsx as cf
-from cosserat_fenicsx import analytic, plot
-from cosserat_fenicsx.tables import as_text, stability
+from cosserat_fenicsx import analytic
+from cosserat_fenicsx.pictures import plot
+from cosserat_fenicsx.results.tables import as_text, stability
 
 L, DIAMETER, ECCENTRICITY = 20.0, 0.2, 0.2  # m
 TABULATED = (0.1, 0.3, 0.5, 0.7, 0.8, 0.9, 0.95, 0.99, 1.0, 1.1, 1.3, 1.5, 2.0)

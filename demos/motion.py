@@ -23,8 +23,8 @@ from scipy.integrate import solve_ivp
 
 import cosserat_fenicsx as cf
 from cosserat_fenicsx import analytic
-from cosserat_fenicsx.standing import before
-from cosserat_fenicsx.tables import as_text
+from cosserat_fenicsx.dynamics.standing import before
+from cosserat_fenicsx.results.tables import as_text
 
 SCENES = Path(__file__).parent / "motions"
 #: A number, what it should be and from where, and how far it may be off (absolute).

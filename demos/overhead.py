@@ -19,7 +19,8 @@ from eccentric_cantilever import column
 from petsc4py import PETSc
 
 import cosserat_fenicsx as cf
-from cosserat_fenicsx import compat, statics
+from cosserat_fenicsx import compat
+from cosserat_fenicsx.statics import solvers
 
 ETAS = np.linspace(0.05, 1.5, 31)
 MESHES = ((2, 8), (3, 8), (3, 4))  # degree, elements
@@ -101,7 +102,7 @@ def compare(degree, elements, runs):
         return cf.solve(scene, ETAS, degree=degree, elements=elements, model="spatial")
 
     path = public()
-    problem, _, _ = statics.solvers_of(scene, path.layout, degree=degree)
+    problem, _, _ = solvers.solvers_of(scene, path.layout, degree=degree)
     bare = BareLoop(problem.model, path)
     layout = path.layout
     tips = bare.run(scene, layout, stability=False)

@@ -19,8 +19,9 @@ from pathlib import Path
 import numpy as np
 from eccentric_cantilever import column
 
-from cosserat_fenicsx import compat, statics
+from cosserat_fenicsx import compat
 from cosserat_fenicsx.models.rodmesh import Layout
+from cosserat_fenicsx.statics import solvers
 
 SIZES = (4, 16, 64, 256, 1024, 4096, 16384, 35700)  # elements of degree 4: 28 unknowns each
 QUICK = SIZES[:5]
@@ -32,7 +33,7 @@ def measure(elements):
     the tangent is factored by blocks."""
     _, scene = column()
     layout = Layout.of(scene, elements)
-    problem, newton, stability = statics.solvers_of(scene, layout, degree=_DEGREE)
+    problem, newton, stability = solvers.solvers_of(scene, layout, degree=_DEGREE)
     newton.allow(1)
     start, steps, counts = problem.numbers(), [], []
     for _ in range(max(3, min(100, 20000 // elements))):

@@ -9,8 +9,8 @@ from moving_scenes import flying_in_a_plane, flying_in_space
 from test_schemes import everything
 
 import cosserat_fenicsx as cf
-from cosserat_fenicsx import runfolder
 from cosserat_fenicsx.models.moving import Moving
+from cosserat_fenicsx.storage import runfolder
 
 SMALL = {"elements": 4, "degree": 2}
 CASES = {

@@ -5,10 +5,10 @@ Both have the velocities, the momenta and the constraint of the momentum scheme,
 
 from cosserat_fenicsx.forms.equilibrium import balance, contact_force, contact_moment
 
-from cosserat_fenicsx import dynamics
+from cosserat_fenicsx.dynamics import solvers
+from cosserat_fenicsx.dynamics.steppers.momentum import Momentum
 from cosserat_fenicsx.models.moving import MovingSpatial
 from cosserat_fenicsx.models.moving_forms import SpatialStep, compile_momentum
-from cosserat_fenicsx.steppers.momentum import Momentum
 
 
 def at(motion, section, test):
@@ -36,6 +36,6 @@ def register(monkeypatch):
             return compile_momentum(SpatialStep(model), stress)
 
         monkeypatch.setitem(
-            dynamics._MODELS, (name, "spatial"), type(name, (MovingSpatial,), {"_compile": compiled, "variations": ()})
+            solvers._MODELS, (name, "spatial"), type(name, (MovingSpatial,), {"_compile": compiled, "variations": ()})
         )
-        monkeypatch.setitem(dynamics.SCHEMES, name, type(name, (Momentum,), {"forms": name}))
+        monkeypatch.setitem(solvers.SCHEMES, name, type(name, (Momentum,), {"forms": name}))

@@ -9,8 +9,8 @@ import pytest
 from moving_scenes import flying_in_space
 
 import cosserat_fenicsx as cf
-from cosserat_fenicsx import animation
-from cosserat_fenicsx.between import Between
+from cosserat_fenicsx.pictures import animation
+from cosserat_fenicsx.pictures.between import Between
 
 pytestmark = pytest.mark.serial
 SMALL = {"size": (320, 240), "fps": 4, "speed": 1}
@@ -136,7 +136,7 @@ def test_ctrl_c_ends_the_film(flight, tmp_path, monkeypatch):
 
 
 def test_nothing_is_loaded_before_it_is_needed():
-    code = "import sys, cosserat_fenicsx.animation; print({'pyvista', 'PIL', 'imageio_ffmpeg', 'matplotlib'} & set(sys.modules))"
+    code = "import sys, cosserat_fenicsx.pictures.animation; print({'pyvista', 'PIL', 'imageio_ffmpeg', 'matplotlib'} & set(sys.modules))"
     root = Path(__file__).parent.parent
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, encoding="utf-8", cwd=root)
     assert done.stdout.strip() == "set()", done.stderr

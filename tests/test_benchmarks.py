@@ -10,8 +10,8 @@ import random_scenes
 from scipy.spatial.transform import Rotation
 
 import cosserat_fenicsx as cf
-from cosserat_fenicsx import statics
-from cosserat_fenicsx.accuracy import on_mesh
+from cosserat_fenicsx.results.accuracy import on_mesh
+from cosserat_fenicsx.statics import solvers
 
 pytestmark = pytest.mark.serial  # the truths are scipy's and slow
 TRUTH = json.loads((Path(__file__).parent / "reference" / "statics.json").read_text(encoding="utf-8"))
@@ -112,7 +112,7 @@ def test_order_of_loads_does_not_matter():
     rod = cf.Rod(cf.Line((0, 0, 0), (0, 0, 1.0)), cf.Stiffness((1e3, 2e3), 3e3, (1.0, 2.0), 0.8))
     force, moment = cf.Force(rod.end, (0.7, 1.0, -0.8)), cf.Moment(rod.end, (0.5, -0.4, 0.6))
     together = cf.solve(held(rod, force, moment), [1.0], elements=6)
-    problem, newton, _ = statics.solvers_of(held(rod, force, moment), together.layout)
+    problem, newton, _ = solvers.solvers_of(held(rod, force, moment), together.layout)
     newton.allow(10)
     for first in (force, moment):
         alone = cf.solve(held(rod, first), [1.0], elements=6)

@@ -18,7 +18,7 @@ DEMO = ROOT / "demos" / "eccentric_cantilever.toml"
 def cosserat(*arguments, **environment):
     """Run the command line in a process of its own."""
     return subprocess.run(
-        [sys.executable, "-m", "cosserat_fenicsx.cli", *map(str, arguments)],
+        [sys.executable, "-m", "cosserat_fenicsx.cli.main", *map(str, arguments)],
         capture_output=True,
         encoding="utf-8",
         cwd=ROOT,
@@ -27,7 +27,7 @@ def cosserat(*arguments, **environment):
 
 
 def test_help_and_version_load_nothing_heavy():
-    code = "import sys, cosserat_fenicsx.cli; print({'numpy', 'dolfinx', 'petsc4py', 'mpi4py', 'pyvista'} & set(sys.modules))"
+    code = "import sys, cosserat_fenicsx.cli.main; print({'numpy', 'dolfinx', 'petsc4py', 'mpi4py', 'pyvista'} & set(sys.modules))"
     loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=ROOT)
     assert loaded.stdout.strip() == "set()", loaded.stderr
     help_ = cosserat("--help")
@@ -49,7 +49,8 @@ def test_run_prints_a_table_and_writes_files(tmp_path):
 
 def test_pictures_are_asked_for(tmp_path):
     """Which points, how much larger; where displacements can hardly be seen the picture says what would show them."""
-    from cosserat_fenicsx import plot, read_scene, solve
+    from cosserat_fenicsx import read_scene, solve
+    from cosserat_fenicsx.pictures import plot
 
     look = ("--at", "0.01,0.03", "--magnify", "500")
     done = cosserat("run", DEMO, "--load-factors", "0.01,0.02,0.03", "-o", tmp_path, *look)

@@ -8,8 +8,11 @@ import pytest
 from test_cli import DEMO
 
 import cosserat_fenicsx as cf
-from cosserat_fenicsx import cli, explain_motion, interrupts, motion_tables
-from cosserat_fenicsx.standing import before
+from cosserat_fenicsx import interrupts
+from cosserat_fenicsx.cli import explain_motion
+from cosserat_fenicsx.cli import main as cli
+from cosserat_fenicsx.dynamics.standing import before
+from cosserat_fenicsx.results import motion_tables
 
 pytestmark = pytest.mark.serial
 MOTIONS = DEMO.parent / "motions"

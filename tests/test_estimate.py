@@ -7,7 +7,7 @@ import pytest
 from conftest import column
 
 import cosserat_fenicsx as cf
-from cosserat_fenicsx.scenefile import read_scene
+from cosserat_fenicsx.scene.scenefile import read_scene
 
 pytestmark = pytest.mark.serial  # estimates know no ranks
 DEMOS = Path(__file__).parent.parent / "demos"
@@ -74,7 +74,7 @@ def test_a_smooth_rod_does_not_hide_another():
 
 
 def test_an_interrupted_search_hands_over_what_is_complete(monkeypatch):
-    from cosserat_fenicsx import tracing
+    from cosserat_fenicsx.statics import tracing
 
     def stop():
         raise KeyboardInterrupt

@@ -9,8 +9,8 @@ import cosserat_fenicsx as cf
 from cosserat_fenicsx.models.rodmesh import Layout
 from cosserat_fenicsx.models.shape import Shape
 from cosserat_fenicsx.models.spatial import SpatialModel
-from cosserat_fenicsx.problem import Problem
-from cosserat_fenicsx.stability import NegativeModes
+from cosserat_fenicsx.statics.problem import Problem
+from cosserat_fenicsx.statics.stability import NegativeModes
 
 pytestmark = pytest.mark.serial
 
@@ -113,7 +113,7 @@ def test_second_variation_counts_what_an_eigensolver_counts():
     stability = NegativeModes(problem)
     problem.load(scene, layout)
     stability.load()
-    from cosserat_fenicsx.snes import Newton
+    from cosserat_fenicsx.statics.snes import Newton
 
     newton = Newton(problem)
     newton.allow(10)

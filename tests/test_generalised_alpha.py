@@ -9,7 +9,7 @@ from moving_scenes import drift, flying_in_space
 from test_schemes import smooth
 
 import cosserat_fenicsx as cf
-from cosserat_fenicsx.steppers.one_step import OneStep
+from cosserat_fenicsx.dynamics.steppers.one_step import OneStep
 
 pytestmark = pytest.mark.serial
 SCHEME = "generalised-alpha"

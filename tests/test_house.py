@@ -40,48 +40,62 @@ def test_forms_know_ufl_alone():
         assert all(name.startswith("forms") for name in inside(file)), file
 
 
-SCENE = (
-    "checks", "choose", "curves", "damping", "errors", "frames", "initial", "joints", "likeness", "loads", "materials", "planes", "polylines", "profiles", "quadrature", "rod",
-    "scene", "scenefile", "sections", "signals", "splines", "statical", "supports", "ties",
-)  # fmt: skip
-SOLVERS = (
-    "arclength", "chord", "continuation", "dynamics", "eigen", "equations", "follow", "linear", "linear_buckling", "locator", "marks", "motion", "natural_modes",
-    "pace", "problem", "refinement", "resuming", "snes", "stability", "standing", "start", "statics", "tie_rows", "tracing", "track",
-)  # fmt: skip
-RESULTS = (
-    "accuracy", "animation", "between", "checkpoints", "drawing", "energy_chart", "history", "instantfile", "motion_tables", "plot", "ranks",
-    "records", "recovery", "results", "runfolder", "stored_history", "tables", "xdmf",
-)  # fmt: skip
+#: What all rooms share; and the rooms that each room may know beside these and itself.
+SHARED = {
+    "analytic",
+    "checks",
+    "compat",
+    "element",
+    "errors",
+    "interrupts",
+    "progress",
+    "quadrature",
+    "quaternions",
+    "ranks",
+}
+ROOMS = {
+    "scene": set(),
+    "algebra": set(),
+    "models": {"scene", "forms"},
+    "results": {"scene", "storage", "pictures"},
+    "storage": {"scene", "results"},
+    "pictures": {"scene", "results"},
+    "statics": {"scene", "models", "algebra", "results"},
+    "dynamics": {"scene", "models", "algebra", "results", "storage", "statics"},
+    "cli": {"scene", "models", "statics", "dynamics", "results", "storage", "pictures"},
+}
+#: Files that put a scene's model, its solvers and its results together; the other solvers know no rung, no scene, no result.
+FITTERS = {
+    "statics": {"first_mesh", "linear_buckling", "refinement", "solve", "solvers", "tracing"},
+    "dynamics": {"motion", "natural_modes", "resuming", "simulate", "solvers", "standing", "start", "marks"},
+}
+
+
+def rooms_known_in(file):
+    return {name.split(".")[0] for name in inside(file)} - {"__version__"}
 
 
 def test_data_flows_one_way():
-    for name in SCENE:
-        known = {part.split(".")[0] for part in inside(PACKAGE / f"{name}.py")}
-        assert known <= set(SCENE), name
-        assert outside(PACKAGE / f"{name}.py").isdisjoint({"dolfinx", "ufl", "petsc4py", "mpi4py"}), name
-    for name in RESULTS:
-        known = {part.split(".")[0] for part in inside(PACKAGE / f"{name}.py")}
-        assert known.isdisjoint({*SOLVERS, "models", "forms"}), name
-    for name in set(SOLVERS) - {
-        "dynamics",
-        "linear_buckling",
-        "motion",
-        "natural_modes",
-        "refinement",
-        "resuming",
-        "standing",
-        "start",
-        "statics",
-        "tracing",
-    }:  # solvers know no rung
-        known = {part.split(".")[0] for part in inside(PACKAGE / f"{name}.py")}
-        assert known.isdisjoint({"models", "forms", "results", *RESULTS}), name
-    for file in (PACKAGE / "steppers").glob("*.py"):
-        known = {part.split(".")[0] for part in inside(file)}
-        assert known.isdisjoint({"models", "forms", "scene", *RESULTS}), file
-    for file in (PACKAGE / "models").glob("*.py"):
-        known = {part.split(".")[0] for part in inside(file)}
-        assert known.isdisjoint({*SOLVERS, *RESULTS}), file
+    assert set(ROOMS) == {folder.name for folder in PACKAGE.iterdir() if (folder / "__init__.py").is_file()}
+    assert {file.stem for file in PACKAGE.glob("[a-z]*.py")} == SHARED
+    for file in PACKAGE.glob("[a-z]*.py"):
+        assert rooms_known_in(file) <= SHARED, file
+    for room, others in ROOMS.items():
+        for file in (PACKAGE / room).rglob("*.py"):
+            assert rooms_known_in(file) <= SHARED | {room} | others, file
+
+
+def test_scenes_know_no_solver_library():
+    for file in (PACKAGE / "scene").glob("*.py"):
+        assert outside(file).isdisjoint({"dolfinx", "ufl", "petsc4py", "mpi4py"}), file
+
+
+def test_solvers_know_the_protocol_of_models_alone():
+    for room, fitters in FITTERS.items():
+        assert all((PACKAGE / room / f"{name}.py").is_file() for name in fitters)
+        for file in (PACKAGE / room).rglob("*.py"):
+            if file.stem not in fitters:
+                assert rooms_known_in(file).isdisjoint({"scene", "models", "results", "storage"}), file
 
 
 def test_no_module_takes_the_name_of_something_public():

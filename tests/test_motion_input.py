@@ -108,9 +108,9 @@ def test_steps_land_on_jumps_and_on_saved_times():
 
 
 def test_a_motion_that_is_lost_keeps_what_it_had(monkeypatch):
-    from cosserat_fenicsx import motion
-    from cosserat_fenicsx.snes import Solved
-    from cosserat_fenicsx.steppers.momentum import Momentum
+    from cosserat_fenicsx.dynamics import motion
+    from cosserat_fenicsx.dynamics.steppers.momentum import Momentum
+    from cosserat_fenicsx.statics.snes import Solved
 
     whole = Momentum.step
 

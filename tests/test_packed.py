@@ -5,9 +5,9 @@ import pytest
 from conftest import COMM, column
 from dolfinx.fem import petsc as fem_petsc
 
-from cosserat_fenicsx import statics
+from cosserat_fenicsx.algebra.packed import Packed
 from cosserat_fenicsx.models.rodmesh import Layout
-from cosserat_fenicsx.packed import Packed
+from cosserat_fenicsx.statics import solvers
 
 
 @pytest.mark.parametrize("formulation", ["mixed", "displacement", "multiplier"])
@@ -20,7 +20,7 @@ def test_packed_forms_are_the_forms(formulation, degree):
     for length in (20.0, 30.0):
         _, scene = column(arm=True, length=length)
         layout = Layout.of(scene, 3)
-        problem, _, stability = statics.solvers_of(scene, layout, formulation=formulation, degree=degree)
+        problem, _, stability = solvers.solvers_of(scene, layout, formulation=formulation, degree=degree)
         model, forms = problem.model, problem.model.forms
         moving = [model.state, *model.carried]
         if packed is None:

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import cosserat_fenicsx as cf
-from cosserat_fenicsx.explain import explain
+from cosserat_fenicsx.cli.explain import explain
 
 pytestmark = pytest.mark.serial  # no ranks in it
 

@@ -17,12 +17,13 @@ from moving_scenes import flying_in_space
 from test_schemes import everything
 
 import cosserat_fenicsx as cf
-from cosserat_fenicsx import checkpoints, motion, runfolder
-from cosserat_fenicsx.history import Instant
-from cosserat_fenicsx.steppers import SCHEMES
+from cosserat_fenicsx.dynamics import motion
+from cosserat_fenicsx.dynamics.steppers import SCHEMES
+from cosserat_fenicsx.results.history import Instant
+from cosserat_fenicsx.storage import checkpoints, runfolder
 
 pytestmark = pytest.mark.serial
-SOLVERS = ("cosserat_fenicsx.steppers", "cosserat_fenicsx.pace")
+SOLVERS = ("cosserat_fenicsx.dynamics.steppers", "cosserat_fenicsx.dynamics.pace")
 
 
 @pytest.mark.parametrize(("case", "apart"), [*((case, 0.02) for case in CASES), ("fixed", 0.0), ("adaptive", 1e9)])

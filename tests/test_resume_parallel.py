@@ -9,8 +9,8 @@ from conftest import COMM
 from moving_scenes import right_angle
 
 import cosserat_fenicsx as cf
-from cosserat_fenicsx import runfolder
 from cosserat_fenicsx.models.moving import Moving
+from cosserat_fenicsx.storage import runfolder
 
 ASKED = {"duration": 2, "dt": 0.05, "elements": 4, "degree": 2}
 

@@ -7,7 +7,7 @@ from ended_motions import assert_same, part_of, rows, run
 from moving_scenes import flying_in_a_plane, flying_in_space
 
 import cosserat_fenicsx as cf
-from cosserat_fenicsx import runfolder
+from cosserat_fenicsx.storage import runfolder
 
 pytestmark = pytest.mark.serial
 

@@ -131,7 +131,7 @@ def test_not_converged_keeps_the_partial_path():
 
 
 def test_accuracy_that_cannot_be_met_is_refused(monkeypatch):
-    from cosserat_fenicsx import refinement
+    from cosserat_fenicsx.statics import refinement
 
     monkeypatch.setattr(refinement, "_MOST_ELEMENTS", 8)
     _, scene = column()
@@ -141,7 +141,7 @@ def test_accuracy_that_cannot_be_met_is_refused(monkeypatch):
 
 
 def test_interruption_keeps_what_is_done():
-    from cosserat_fenicsx.continuation import Continuation
+    from cosserat_fenicsx.statics.continuation import Continuation
 
     _, scene = column()
     whole = Continuation._attempt

@@ -6,7 +6,7 @@ from moving_scenes import drift
 from other_schemes import register
 
 import cosserat_fenicsx as cf
-from cosserat_fenicsx import motion
+from cosserat_fenicsx.dynamics import motion
 
 pytestmark = pytest.mark.serial
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from cosserat_fenicsx.models.ties import Ties
-from cosserat_fenicsx.ties import AngleTie, PositionTie, TurnTie
+from cosserat_fenicsx.scene.ties import AngleTie, PositionTie, TurnTie
 
 pytestmark = pytest.mark.serial  # pure numpy
 ETA, STEP = 0.4, 1e-6

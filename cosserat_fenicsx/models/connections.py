@@ -2,8 +2,8 @@
 
 from dataclasses import dataclass
 
-from cosserat_fenicsx.planes import independent_in
-from cosserat_fenicsx.signals import at
+from cosserat_fenicsx.scene.planes import independent_in
+from cosserat_fenicsx.scene.signals import at
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ from dolfinx import fem
 from cosserat_fenicsx import compat
 from cosserat_fenicsx.models.rod_data import gauss_function
 from cosserat_fenicsx.models.shape import place_loads
-from cosserat_fenicsx.signals import at, signals_of
+from cosserat_fenicsx.scene.signals import at, signals_of
 
 
 class LoadTerms:

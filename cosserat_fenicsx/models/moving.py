@@ -7,11 +7,11 @@ from dolfinx import fem
 from mpi4py import MPI
 
 from cosserat_fenicsx import compat
-from cosserat_fenicsx.damping import Damping
 from cosserat_fenicsx.models.connections import ties_of
 from cosserat_fenicsx.models.moving_forms import SpatialStep, compile_momentum
 from cosserat_fenicsx.models.rod_data import check_inertia, gauss_function, nodal_inertia, rod_data
 from cosserat_fenicsx.models.spatial import SpatialModel
+from cosserat_fenicsx.scene.damping import Damping
 
 
 class Moving:

@@ -8,7 +8,7 @@ import numpy as np
 from cosserat_fenicsx.errors import SceneError, nearest
 from cosserat_fenicsx.forms import loads as virtual_work
 from cosserat_fenicsx.models.connections import Connections
-from cosserat_fenicsx.signals import at
+from cosserat_fenicsx.scene.signals import at
 
 #: Unknowns of a node, and numbers of a contact force, by the model's name and whether it is that of a plane.
 _SIZES = {

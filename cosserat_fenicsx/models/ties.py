@@ -9,14 +9,14 @@ from functools import lru_cache
 import numpy as np
 
 from cosserat_fenicsx.quaternions import cross, directors, skew
-from cosserat_fenicsx.ties import AngleTie, PositionTie
+from cosserat_fenicsx.scene.ties import AngleTie, PositionTie
 
 
 class Ties:
     """The ties of a scene, dimensionless.
 
     Args:
-        ties: the scene's (`cosserat_fenicsx.ties`).
+        ties: the scene's (`cosserat_fenicsx.scene.ties`).
         nodes: (a, b) of every tie as indices into the tied nodes; b = -1 for the ground.
         reference: (tied nodes, 3) positions at rest.
         length: unit of length, m.

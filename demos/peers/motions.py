@@ -8,7 +8,7 @@ before ends, rigidly joined, clamped at the start if `clamped`; EA, GA (N), EI, 
 
 import numpy as np
 
-from cosserat_fenicsx.steppers import SCHEMES
+from cosserat_fenicsx.dynamics.steppers import SCHEMES
 from peers.environments import OWN
 
 PEERS = (OWN, "Exudyn")

@@ -14,8 +14,9 @@ from dolfinx import fem
 from dolfinx.fem import petsc as fem_petsc
 from petsc4py import PETSc
 
-from cosserat_fenicsx import compat, statics
+from cosserat_fenicsx import compat
 from cosserat_fenicsx.models.rodmesh import Layout
+from cosserat_fenicsx.statics import solvers
 from trials import problems
 from trials.cells import Answer, NotForIt, Stopped
 
@@ -41,7 +42,7 @@ class Loop:
                  formulation="displacement", degree=2, points=None, elements=8, predict=False, weak=False):  # fmt: skip
         _, scene = problems.scene_of(problem)
         layout = Layout.of(scene, elements)
-        loaded, _, _ = statics.solvers_of(scene, layout, formulation=formulation, degree=degree, points=points)
+        loaded, _, _ = solvers.solvers_of(scene, layout, formulation=formulation, degree=degree, points=points)
         self.problem, self.model = problem, loaded.model
         self.forms = weakly_unit(self.model) if weak else self.model.forms
         forms, nodal, slots = self.model.forms, self.model._nodal, self.model._slots

@@ -6,7 +6,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 import cosserat_fenicsx as cf
-from cosserat_fenicsx import statics
+from cosserat_fenicsx.statics import solvers
 from trials import problems
 from trials.cells import Answer, NotForIt, Stopped, load_factor_in
 
@@ -83,14 +83,14 @@ class Own:
 
     def _in_stages(self, problem):
         """Force and moment each by factors of their own: Newton from state to state, on the solvers that `solve` uses."""
-        degree = statics.default_degree(self.options.get("formulation", "mixed"))
+        degree = solvers.default_degree(self.options.get("formulation", "mixed"))
         _, scene = problems.scene_of(problem)
         plain = cf.solve(scene, [0.0], elements=6, progress=False, **self.options)
         options = {"formulation": plain.formulation, "degree": degree, "model": plain.model}
         state = None
         for force, moment in problem["history"]:
             scaled = _with_loads(problem, force, moment)
-            solver, newton, _ = statics.solvers_of(problems.scene_of(scaled)[1], plain.layout, **options)
+            solver, newton, _ = solvers.solvers_of(problems.scene_of(scaled)[1], plain.layout, **options)
             if state is not None:
                 solver.put(state)
             solver.set_load_factor(1.0)

@@ -1,0 +1,1 @@
+"""A model's equations in PETSc's and SLEPc's terms: vectors, matrices, factorisations, eigenvalues."""

@@ -1,0 +1,74 @@
+"""The command line's motions: what `cosserat run` and `cosserat explain` do with a scene that has a duration."""
+
+from cosserat_fenicsx.errors import SceneError
+
+#: Options of a motion, and those of an equilibrium path, by the names of the arguments of `simulate` and `solve`.
+MOTION, PATH = ("duration", "dt", "scheme", "save_every", "start"), ("load_factors", "formulation", "control", "branch")
+_BOTH = ("tol", "elements", "degree", "model")
+
+
+def motion_of(options):
+    """The scene and the arguments of `simulate`, or None where an equilibrium path is asked for.
+
+    Args:
+        options: of the command line; they go before what the file says.
+
+    Raises:
+        SceneError: a file that cannot be read, or options of the one with the other.
+    """
+    from cosserat_fenicsx.scene.scenefile import read_motion
+
+    given = {name: getattr(options, name) for name in (*MOTION, *PATH, *_BOTH)}
+    given = {name: value for name, value in given.items() if value is not None}
+    scene, settings = read_motion(options.scene)
+    moves = not options.static and (settings or "duration" in given)
+    for name in PATH if moves else MOTION:
+        if name in given:
+            refuse_other(name, moves)
+    if not moves:
+        return None
+    if "dt" in given:
+        settings.pop("tol", None)
+    if "tol" in given:
+        settings.pop("dt", None)
+    return scene, {**settings, **given}
+
+
+def refuse_other(name, moves):
+    """Refuse an option of a path for a motion, or of a motion for a path.
+
+    Raises:
+        SceneError: always.
+    """
+    option = f"--{name.replace('_', '-')}"
+    if moves:
+        raise SceneError(f"{option} is for an equilibrium path, and this scene is a motion: expected --static as well")
+    raise SceneError(
+        f"{option} is for a motion, and this scene is an equilibrium path: expected a duration too, under [simulate] in the "
+        "file or by --duration, and no --static"
+    )
+
+
+def write_motion(history, out, *, picture, magnify, shown, film, speed):
+    """Files of a motion in a folder; returns their names.
+
+    Args:
+        history: a `History`; out: a Path.
+        picture: whether to draw pictures; magnify, shown: of these, see `Path.plot`.
+        film: name of a film, or None; speed: of it, see `History.animate`.
+    """
+    from cosserat_fenicsx.results.motion_tables import write_motion_csv
+
+    write_motion_csv(history, out / "motion.csv")
+    history.write(out / "motion.xdmf")
+    written = ["motion.xdmf", "motion.h5", "motion.csv"]
+    if picture:
+        history.plot(out / "rods.png", shown, magnify=magnify)
+        written.append("rods.png")
+        if len(history) > 1:
+            history.plot_energy(out / "energy.png")
+            written.append("energy.png")
+    if film and len(history) > 1:
+        history.animate(out / film, speed=speed, magnify=magnify)
+        written.append(film)
+    return written

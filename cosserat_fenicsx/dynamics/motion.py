@@ -1,0 +1,146 @@
+"""A motion step by step: what is landed on, what is halved, what is saved, and what it goes on from."""
+
+import itertools
+
+from cosserat_fenicsx.dynamics.start import drive
+from cosserat_fenicsx.errors import Interrupted, NotConverged
+from cosserat_fenicsx.interrupts import obey
+from cosserat_fenicsx.progress import Progress
+from cosserat_fenicsx.results.history import Instant, Ledger
+
+# A step that fails is halved so often before the motion is given up.
+_HALVINGS = 12
+
+
+class Motion:
+    """The motion of a problem, booked and saved.
+
+    Args:
+        problem, stepper, pace: what computes it.
+        history: what takes its states; folder: the `RunFolder` where the history and what it goes on from lie, or None.
+    """
+
+    def __init__(self, problem, stepper, pace, history, folder):
+        self.problem, self.model, self._stepper, self._pace = problem, problem.model, stepper, pace
+        self.history, self._folder = history, folder
+        self._t = self._first = self._h = 0.0
+        self._count = self._steps = self._iterations = self._saved = 0
+
+    def memory(self):
+        """All that the motion goes on from between two steps, see `Stepper.memory`."""
+        names = ("_t", "_first", "_h", "_count", "_steps", "_iterations", "_saved")
+        counts = {name.removeprefix("_"): getattr(self, name) for name in names}
+        return {**counts, "pace": self._pace.memory(), "stepper": self._stepper.memory(), "nodes": self.model.slots}
+
+    def recall(self, memory):
+        """Take back what `memory` gave."""
+        for name in ("t", "first", "h", "count", "steps", "iterations", "saved"):
+            setattr(self, f"_{name}", memory[name])
+        self._pace.recall(memory.get("pace", {}))
+        self._stepper.recall(memory["stepper"])
+
+    def over(self, marks, save_all, progress):
+        """Go over the `Mark`s, the first of them the start, from where the motion is.
+
+        Returns:
+            the history.
+        """
+        comm, model = self.model.comm, self.model
+        try:
+            with Progress([marks[-1].time], progress, comm, "t (s) =") as bar:
+                bar.start(f"{model.name}, {model.unknowns} unknowns")
+                bar.reached(self._t)
+                self._keep()
+                if not self._saved:
+                    self._save(self._t)
+                for mark, after in itertools.pairwise(marks):
+                    self._between(mark, after, save_all, bar)
+                self._keep()
+        except KeyboardInterrupt:
+            raise Interrupted(self.history) from None
+        finally:
+            if self._folder:
+                self._folder.release()
+        return self.history
+
+    def _between(self, mark, after, save_all, bar):
+        begin, end = mark.time, after.time
+        if end <= self._t:  # a motion that is continued has been there
+            return
+        if self._t <= begin:
+            if mark.jumps:
+                if begin > 0 and self._stepper.keeps_kinks:
+                    self._drive(begin)
+                self._stepper.jump()
+                self._pace.jump()
+            elif mark.bends:
+                self._stepper.bend()
+            self._t = self._first = begin
+            self._count, self._h = 0, 0.0
+        nothing = 1e-9 * (end - begin)
+        while self._t < end:
+            obey()
+            wanted = self._pace.length(end - self._t)
+            if abs(wanted - self._h) > 1e-9 * wanted:  # equal steps are counted, so that times do not gather rounding
+                self._first, self._count, self._h = self._t, 0, wanted
+            if not self._advance(self._t, self._h):
+                continue
+            self._count += 1
+            t = self._first + self._count * self._h
+            self._t = end if end - t <= nothing else t
+            bar.reached(self._t)
+            if save_all or (after.saved and self._t == end):
+                self._save(self._t)
+            if self._folder and self._folder.due:
+                self._keep()
+
+    def _drive(self, t):
+        """See `start.drive`; the kinetic energy that it gives or takes is work of the supports."""
+        kinetic, _ = self.problem.energies()
+        drive(self.model, t)
+        self._stepper.add_work(self.problem.energies()[0] - kinetic)
+
+    def _keep(self):
+        if self._folder:
+            self._folder.keep(self.memory(), self.history)
+
+    def _advance(self, t, h, halvings=0):
+        """Step from t by h, in shorter steps where that fails; False where a shorter step is to be tried."""
+        solved = self._stepper.step(t, h)
+        self._iterations += solved.iterations
+        if solved.converged:
+            if not halvings and not self._pace.accepts(self._stepper, h):
+                self._stepper.undo()
+                return False
+            self._steps += 1
+            return True
+        if not halvings and self._pace.failed(h):
+            return False
+        if halvings == _HALVINGS:
+            if self.history[-1].time < t:
+                self._save(t)
+            raise NotConverged(
+                f"the motion was lost at t = {t:.6g} s, where a step of {h:.3g} s still fails: {solved.reason}. "
+                "Try a smaller dt or tol, more elements, or damping.",
+                self.history,
+            )
+        self._advance(t, h / 2, halvings + 1)
+        self._advance(t + h / 2, h / 2, halvings + 1)
+        return True
+
+    def _save(self, t):
+        model, problem, stepper = self.model, self.problem, self._stepper
+        scales = model.scales
+        momentum, energy = scales.force * model.time, scales.force * scales.length
+        nodal, gauss = model.snapshot()
+        linear, angular = problem.momenta()
+        ledger = Ledger(
+            *(energy * x for x in (*problem.energies(), stepper.work, stepper.dissipated)),
+            momentum * linear,
+            momentum * scales.length * angular,
+        )
+        rates = model.rates()(nodal, model.snapshot_of_rates())
+        iterations, self._iterations = self._iterations, 0
+        self._saved += 1
+        self.history.append(Instant(problem.load_factor, nodal, gauss, 0, iterations, problem.multipliers(), time=t, rates=rates,
+                                    steps=self._steps, ledger=ledger))  # fmt: skip

@@ -1,0 +1,130 @@
+"""`resume`: a motion that was written as it went goes on; `read_history`: it is looked at as far as it is."""
+
+import cosserat_fenicsx.compat  # noqa: F401, I001  first: it says in words what of dolfinx is missing
+
+import numpy as np
+from mpi4py import MPI
+
+from cosserat_fenicsx.checks import instance, refuse
+from cosserat_fenicsx.dynamics.simulate import pace_of, positive_time
+from cosserat_fenicsx.dynamics.solvers import solvers_of
+from cosserat_fenicsx.errors import SceneError
+from cosserat_fenicsx.dynamics.marks import marks_of
+from cosserat_fenicsx.models.rodmesh import Layout
+from cosserat_fenicsx.models.scales import Scales
+from cosserat_fenicsx.dynamics.motion import Motion
+from cosserat_fenicsx.storage.runfolder import RunFolder
+from cosserat_fenicsx.scene.scene import Scene
+from cosserat_fenicsx.results.stored_history import StoredHistory
+
+
+def resume(folder, scene=None, *, duration=None, progress=None, comm=None):
+    """Continue a motion from the folder that `simulate(..., folder=...)` writes, to the same digits.
+
+    It does not matter what ended the run: a killed process, Ctrl-C, a full disk. All saved states are kept; the run goes on
+    from what its solver remembered, two seconds of its work earlier at most (or fifty times as long as it takes to write
+    that down), and computes what lies between anew. In serial, with the same libraries, every number is the one of a run that
+    was never ended, bit by bit; in parallel to rounding, since MUMPS pivots as it finds its matrix. What comes to an
+    end in the same way again, such as steps that fail however short they are, needs another `simulate`, with
+    `start=` if need be.
+
+    Args:
+        folder: its name.
+        scene: the `Scene` of the motion; it is compared with what the folder tells of it. None for the folder's own, which is
+            there unless the scene's functions have no name to be found by, such as a lambda. It is a pickle: load no
+            folder that you do not trust, or give the scene.
+        duration: s; None for the one asked for last. In a longer one steps still land on the first end, and errors
+            may grow on at the rate that `tol` set.
+        progress, comm: as of `simulate`; as many ranks as there were.
+
+    Returns:
+        History, with all states from the start on; at once where the motion is complete.
+
+    Raises:
+        SceneError: no such folder, another scene, a shorter duration, another number of ranks, another process that is at
+            work there, or nothing left to go on from.
+        NotConverged, Interrupted, NotStored: as of `simulate`.
+    """
+    comm = comm or MPI.COMM_WORLD
+    kept, scene = _open(folder, scene, comm)
+    ends = kept.durations
+    until = ends[-1] if duration is None else positive_time("duration", duration, "resume")
+    if until < ends[-1]:
+        refuse("resume", "duration", duration, f"None or at least {ends[-1]:g} s, which were asked for")
+    if kept.ranks != comm.size:
+        raise SceneError(
+            f"{kept.place} was computed by {kept.ranks} rank(s), and here are {comm.size}: expected as many"
+        )
+    if _memory(kept, _history(kept, scene, comm))["t"] >= until:
+        return _history(kept, scene, comm)
+    kept.hold()
+    try:
+        if until > ends[-1]:
+            kept.extend(until)
+        return _go_on(kept, scene, comm, progress)
+    finally:
+        kept.release()
+
+
+def _go_on(kept, scene, comm, progress):
+    """To the last of the durations."""
+    asked, (*ends, until) = kept.asked, kept.durations
+    memory = _memory(kept, _history(kept, scene, comm))
+    looked_at, layout = scene.over(asked["duration"]), Layout.of(scene, asked["elements"])
+    scheme, load_factor = asked["scheme"], asked["load_factor"]
+    problem, stepper = solvers_of(looked_at, layout, asked["degree"], scheme, load_factor, comm, kept.told["model"])
+    alike = np.array_equal(memory["nodes"], problem.model.slots)
+    if not comm.allreduce(alike, op=MPI.LAND):
+        raise SceneError(
+            f"{kept.place}: nodes are numbered otherwise here: expected the release of dolfinx that it was computed with"
+        )
+    history = _history(kept, scene, comm, problem.model.expansion())
+    history.go_on_after(memory["saved"])
+    stepper.rho_inf = asked["rho_inf"]
+    problem.begin()
+    stepper.begin()
+    pace = pace_of(asked["duration"], tol=asked["tol"], dt=asked["dt"], scheme=scheme)
+    motion = Motion(problem, stepper, pace, history, kept)
+    motion.recall(memory)
+    return motion.over(marks_of(scene, until, asked["save_every"], ends), asked["save_every"] is None, progress)
+
+
+def read_history(folder, scene=None, *, comm=None):
+    """The states that a motion has saved so far; it may still be going on elsewhere.
+
+    Args:
+        folder, scene: as of `resume`.
+        comm: MPI communicator, any number of ranks; default all.
+
+    Returns:
+        History.
+
+    Raises:
+        SceneError: no such folder, or another scene.
+    """
+    comm = comm or MPI.COMM_WORLD
+    return _history(*_open(folder, scene, comm), comm)
+
+
+def _open(folder, scene, comm):
+    """The `RunFolder`, and the scene."""
+    if scene is not None:
+        instance("resume", "scene", scene, Scene, "a Scene, or None for the folder's own")
+    kept = RunFolder(folder, comm).open()
+    return kept, kept.scene(scene)
+
+
+def _history(kept, scene, comm, expand=None):
+    layout, scales = Layout.of(scene, kept.asked["elements"]), Scales.of(scene)
+    return StoredHistory.as_told(kept.told, scene, layout, scales, comm, expand).keep_in(kept.place)
+
+
+def _memory(kept, history):
+    """What this rank remembered last with all states before it saved."""
+    for memory in kept.memories():
+        if memory["saved"] <= len(history):
+            return memory
+    raise SceneError(
+        f"{kept.place}: nothing to go on from is left (checkpoint.npz and start.npz are missing or damaged): expected a "
+        "new run by simulate; read_history shows the states that were saved"
+    )

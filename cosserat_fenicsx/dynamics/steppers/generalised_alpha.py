@@ -1,0 +1,207 @@
+"""Dissipation of unresolved modes: the generalised-alpha scheme, order 2, on rotations as they are.
+
+Eq. (1) holds at the end of every step; an acceleration b beside the true one, a, carries velocities and positions on
+(Arnold & Bruels, Multibody Syst. Dyn. 18 (2007) 185, doi:10.1007/s11044-007-9084-0, and with rotation vectors as
+increments Bruels & Cardona, J. Comput. Nonlinear Dyn. 5 (2010) 031002, doi:10.1115/1.4001370):
+
+    (1 - alpha_m) b_1 + alpha_m b_0 = (1 - alpha_f) a_1 + alpha_f a_0
+    D = h v_0 + h^2 ((1/2 - beta) b_0 + beta b_1),   v_1 = v_0 + h ((1 - gamma) b_0 + gamma b_1)
+
+where D is r_1 - r_0 and the rotation vector from q_0 to q_1. The numbers are those of Chung & Hulbert (J. Appl. Mech. 60
+(1993) 371): what vibrates much faster than the steps shrinks by rho_inf a step. With rho_inf = 1 it is the trapezoidal rule.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from cosserat_fenicsx.dynamics.steppers.moving_ties import MovingTies
+from cosserat_fenicsx.dynamics.steppers.one_step import OneStep
+from cosserat_fenicsx.dynamics.steppers.step_problem import StepProblem
+from cosserat_fenicsx.statics.snes import Solved
+
+# Loads at the end of a step are asked for so much of it earlier: before a jump that is there.
+_BEFORE = 1e-6
+# Accelerations at a start are those of a step so much shorter than the first.
+_SHORTER = 0.1
+
+
+class Rule(NamedTuple):
+    """The numbers of the scheme."""
+
+    alpha_m: float
+    alpha_f: float
+    beta: float
+    gamma: float
+
+    @classmethod
+    def of(cls, rho_inf):
+        """Those of Chung & Hulbert."""
+        alpha_m, alpha_f = (2 * rho_inf - 1) / (rho_inf + 1), rho_inf / (rho_inf + 1)
+        return cls(alpha_m, alpha_f, (1 + alpha_f - alpha_m) ** 2 / 4, 0.5 + alpha_f - alpha_m)
+
+    def ahead(self, h):
+        """(3, 4) for `Collocated.aim`, with s = (b - a)/h, which holds on when h changes."""
+        D, v0, a0, s0 = np.eye(4)
+        b0 = a0 + h * s0
+        b1 = (D - h * v0) / (self.beta * h**2) - (0.5 / self.beta - 1) * b0
+        v1 = v0 + h * ((1 - self.gamma) * b0 + self.gamma * b1)
+        a1 = ((1 - self.alpha_m) * b1 + self.alpha_m * b0 - self.alpha_f * a0) / (1 - self.alpha_f)
+        return np.array([v1, a1, (b1 - a1) / h])
+
+    @property
+    def leading_error(self):
+        """Of positions over h^3 times their third derivative, in a step."""
+        return abs((self.alpha_m - self.alpha_f) / 2 + self.beta - 1 / 6)
+
+
+# A step in which nothing of the accelerations before it is left.
+_FIRST = Rule(0.0, 0.0, 0.5, 1.0)
+
+
+class EndTies(MovingTies):
+    """Equations of supports and joints whose reactions act where these hold, at the end of a step."""
+
+    share = 1.0
+
+    def begin(self, ties):
+        """See `MovingTies`."""
+        super().begin(ties)
+        self._shift = 0.0
+        if self._here:
+            self._reactions_before = self.seen[1]
+
+    def forget(self):
+        """The step begun last has failed: reactions are those before it."""
+        if self._here:
+            self.seen = self.seen[0], self._reactions_before
+
+    def shift(self, values):
+        """In this step the equations are to have these values instead of zero; see `values`."""
+        self._shift = values
+
+    def values(self, ties, eta):
+        """Those of the added equations where the nodes are now, for `ties` of another time; 0 on all but the last rank."""
+        if not self._here:
+            return 0.0
+        nodal, multipliers = self.seen
+        return ties.evaluate(self.model.tied_motion(nodal), eta, multipliers[list(self._added)], self._added)[0]
+
+    def _evaluate(self, eta):
+        c, gradient, change = super()._evaluate(eta)
+        return c - self._shift, gradient, change
+
+    def _reactions(self):
+        return (self._reactions_before + self.seen[1]) / 2
+
+
+class CollocationProblem(StepProblem):
+    """See `StepProblem`: eq. (1) at the end of a step, on a model with accelerations.
+
+    Attributes:
+        rule: the `Rule` of the steps to come.
+    """
+
+    ties_class = EndTies
+
+    def _ends(self):
+        return (*super()._ends(), *self.model.known)
+
+    def aim(self, t, h):
+        """See `StepProblem`."""
+        model = self.model
+        self.h, self._middle = h / model.time, t + h / 2
+        model.h.value = self.h
+        self._start[:] = self._state
+        model.aim(self.rule.ahead(self.h))
+        self._take_loads(t + (1 - _BEFORE) * h)
+        self._known.set(0.0)
+        self._known.axpy(self.load_factor, self._loads)
+        if self.ties:
+            self.ties.begin(model.ties_at(t + h))
+
+    def work(self):
+        """See `StepProblem`: by loads half way, and the reactions of both ends."""
+        self._take_loads(self._middle)
+        return super().work()
+
+    def free_velocities(self, t, h):
+        """In the step from t to t + h, s, supports and joints are to take velocities as they are.
+
+        Equations c may then grow as they do at the start: by its value and first derivative there, from three points
+        of the straight way ahead. Velocities that a scheme has left not quite as supports want them, or that a kink of
+        a prescribed motion contradicts, would otherwise count as accelerations.
+        """
+        if not self.ties:
+            return
+        velocity, values = self.model.velocity.x.array, []
+        for share in (0.0, 0.5, 1.0):
+            self.guess(self._start + share * self.h * velocity)
+            self.set_state(self.x)
+            values.append(self.ties.values(self.model.ties_at(t + share * h), self.load_factor))
+        self.ties.shift(4 * values[1] - values[2] - 2 * values[0])
+
+
+class GeneralisedAlpha(OneStep):
+    """See `protocol.Stepper`. Numerical dissipation is no part of `dissipated`: the balance of the ledger shows it."""
+
+    forms, problem_class, rho_inf, keeps_kinks = "collocation", CollocationProblem, 0.8, False
+
+    def begin(self):
+        """See `Stepper`."""
+        super().begin()
+        self.problem.model.begin_rates()
+
+    def jump(self):
+        """See `Stepper`."""
+        super().jump()
+        self.bend()
+
+    def bend(self):
+        """See `Stepper`: the acceleration that carries the motion on lags behind, and momenta would not be constant at once where
+        loads end."""
+        self._accelerations_known = False
+
+    def step(self, t, h):
+        """See `Stepper`."""
+        iterations = 0
+        if not self._accelerations_known:
+            found = self._accelerate(t, _SHORTER * h)
+            if not found.converged:
+                return found
+            iterations = found.iterations
+        self.problem.rule = Rule.of(self.rho_inf)
+        solved = super().step(t, h)
+        if not solved.converged and self.problem.ties:
+            self.problem.ties.forget()
+        return Solved(solved.converged, iterations + solved.iterations, solved.reason)
+
+    def _accelerate(self, t, h):
+        """Find accelerations and reactions at the time t by a step of length h, which is taken back."""
+        problem, model = self.problem, self.problem.model
+        problem.rule, problem.fresh, self._h = _FIRST, True, None
+        problem.aim(t, h)
+        problem.free_velocities(t, h)
+        solved = self._newton.solve([self._start + problem.h * self._velocity])
+        self._accelerations_known = solved.converged
+        if solved.converged:
+            model.take_accelerations()
+        elif problem.ties:
+            problem.ties.forget()
+        self._state[:] = self._start
+        problem.begin()
+        return solved
+
+    def error(self):
+        """See `Stepper`."""
+        found = super().error()
+        return None if found is None else 12 * Rule.of(self.rho_inf).leading_error * found
+
+    def memory(self):
+        """See `Stepper`."""
+        return {**super().memory(), "accelerations_known": self._accelerations_known, "rho_inf": self.rho_inf}
+
+    def recall(self, memory):
+        """See `Stepper`."""
+        super().recall(memory)
+        self._accelerations_known, self.rho_inf = memory["accelerations_known"], memory["rho_inf"]

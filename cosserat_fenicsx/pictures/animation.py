@@ -1,0 +1,293 @@
+"""Films of a motion: .gif by Pillow, which matplotlib brings along, .mp4 by ffmpeg."""
+
+import errno
+import math
+import shutil
+import socket
+import subprocess
+from pathlib import Path
+
+import numpy as np
+
+from cosserat_fenicsx.checks import number, positive, refuse
+from cosserat_fenicsx.errors import SceneError
+from cosserat_fenicsx.interrupts import obey
+from cosserat_fenicsx.pictures.between import Between
+from cosserat_fenicsx.pictures.drawing import add_body, at_rest, frame, load_pyvista, points_of, prefix, thickening
+from cosserat_fenicsx.progress import Progress
+from cosserat_fenicsx.ranks import on_first
+
+#: Frames per second, width and height in pixels, where none are asked for.
+FPS, SIZE = 25, (960, 720)
+# In real time a film lasts so long at least and at most, s, and otherwise so long at most; how many frames it may have.
+_SHORT, _LONG, _ELSE, _MOST = 4.0, 20.0, 10.0, 10_000
+# A .gif's colours from here on are white: a mean of white and nearly white is none, and looks like a stain.
+_WHITE = 244
+# Points along a rod.
+_PIECES = 100
+
+
+def film(history, file, *, fps=FPS, speed=None, magnify=1.0, size=SIZE, progress=None):
+    """A film of the rods, coloured by bending moment, from a camera that holds the whole motion.
+
+    Frames come at a constant rate, whatever times were saved (`between.Between`).
+
+    Args:
+        history: a `History` with at least two times.
+        file: .gif or .mp4 (rank 0 writes). A .gif knows hundredths of a second alone: its rate is rounded to these.
+        fps: frames per second, 1 to 100.
+        speed: seconds of the motion in a second of the film; None for 1 where the film then takes 4 to 20 s, and
+            otherwise for 1, 2 or 5 times a power of ten.
+        magnify: displacements are drawn this many times their size.
+        size: (width, height), pixels, even.
+        progress: True, False, or None for a bar where it takes long, in a terminal.
+
+    Raises:
+        SceneError: fewer than two times, another ending, an argument outside its range, or pyvista, Pillow or ffmpeg is
+            missing: says what to install.
+        OSError: the file cannot be written.
+        KeyboardInterrupt: Ctrl-C; the file ends there.
+    """
+    file = check_name(file)
+    if len(history) < 2:
+        raise SceneError(f"{file}: the history has no two times to make a film of")
+    fps = number("animate", "fps", fps, "a number from 1 to 100", lambda x: 1 <= x <= 100)
+    positive("animate", "magnify", magnify, "-")
+    width, height = _pixels(size)
+    if file.suffix == ".gif":
+        fps = 100 / round(100 / fps)
+    duration = history.times[-1] - history.times[0]
+    speed = _round_speed(duration) if speed is None else positive("animate", "speed", speed, "-")
+    times = _times(history.times[0], duration, speed, fps)
+    on_first(history.comm, lambda: _make(history, file, times, fps, speed, magnify, (width, height), progress))
+
+
+def check_name(file):
+    """A film's name as a Path; refuses what could not be written.
+
+    Raises:
+        SceneError: an ending other than .gif and .mp4, or what it needs is missing.
+    """
+    file = Path(file)
+    if file.suffix not in _WRITERS:
+        raise SceneError(f"{file}: expected a name that ends in .gif or .mp4")
+    _WRITERS[file.suffix].check()
+    return file
+
+
+def _pixels(size):
+    expected = "(width, height), even numbers of pixels from 100 to 4000"
+    if not isinstance(size, tuple | list) or len(size) != 2:
+        refuse("animate", "size", size, expected)
+    for side in size:
+        number("animate", "size", side, expected, lambda x: 100 <= x <= 4000 and x % 2 == 0)
+    return int(size[0]), int(size[1])
+
+
+def _round_speed(duration):
+    """Real time where that suits the duration (s), or the smallest round number that makes the film short enough."""
+    if _SHORT <= duration <= _LONG:
+        return 1.0
+    decade = 10.0 ** math.floor(math.log10(duration / _ELSE))
+    return next(x * decade for x in (1, 2, 5, 10) if duration / (x * decade) <= _ELSE * (1 + 1e-9))
+
+
+def _times(start, duration, speed, fps):
+    """The times of the frames, s, and the end."""
+    step = speed / fps
+    count = math.ceil(duration / step - 1e-6)
+    if count > _MOST:
+        refuse("animate", "speed", speed, f"one that needs at most {_MOST} frames, not {count}: more, or fewer fps")
+    return start + np.append(step * np.arange(count), duration)
+
+
+def _pace_in_words(speed):
+    if speed == 1:
+        return "real time"
+    return f"{speed:g} times faster than real" if speed > 1 else f"{1 / speed:g} times slower than real"
+
+
+def _make(history, file, times, fps, speed, magnify, size, progress):
+    """Draw and write, on one rank."""
+    file.parent.mkdir(parents=True, exist_ok=True)
+    with open(file, "wb"):
+        pass  # an unwritable place is said here, plainly
+    stage = _Stage(history, times, magnify, size, _pace_in_words(speed))
+    try:
+        samples = [stage.at(t) for t in times[:: max(1, len(times) // 6)]]
+        with (
+            _WRITERS[file.suffix](file, fps, size, samples) as writer,
+            Progress([len(times)], progress, _Alone, "frame") as bar,
+        ):
+            bar.start(file.name)
+            for i, t in enumerate(times):
+                obey()
+                writer.add(stage.at(t))
+                bar.reached(i + 1)
+    finally:
+        stage.close()
+
+
+class _Alone:
+    """The one rank that draws."""
+
+    rank = 0
+
+
+class _Stage:
+    """The drawing that moves: what stays is drawn once."""
+
+    def __init__(self, history, times, magnify, size, pace):
+        pyvista = load_pyvista()
+        self._between, self._magnify, self._pace = Between(history), magnify, pace
+        self._x = np.linspace(0, 1, _PIECES + 1)
+        self._digits = max(0, 2 - math.floor(math.log10(times[-1] - times[0])))
+        resting = at_rest(history.scene)
+        bodies = [self._between.bodies(t, self._x, magnify) for t in times]
+        everywhere = np.concatenate([*resting, *(body.line for made in bodies for body in made)])
+        extent = float(np.ptp(everywhere, axis=0).max())
+        peak = max(body.moment.max() for made in bodies for body in made)
+        self._scale, _ = prefix(peak)
+        self._plotter = pyvista.Plotter(off_screen=True, window_size=size)
+        self._plotter.set_background("white")
+        self._plotter.enable_anti_aliasing("msaa")
+        self._factors = [thickening(body, extent) for body in bodies[0]]
+        self._meshes = [
+            add_body(self._plotter, pyvista, body, factor, peak, moving=True)
+            for body, factor in zip(bodies[0], self._factors, strict=True)
+        ]
+        for line in resting:
+            self._plotter.add_mesh(pyvista.lines_from_points(line), color="lightgrey", line_width=2)
+        self._head = history.scene.title or "Motion"
+        self._notes = self._not_to_scale()
+        frame(self._plotter, everywhere)
+
+    def _not_to_scale(self):
+        notes = [f"displacements magnified {self._magnify:g} times"] if self._magnify != 1 else []
+        thicker = sorted({f"{factor:.2g}" for factor in self._factors if factor > 1})
+        notes += [f"sections drawn {' and '.join(thicker)} times their size"] if thicker else []
+        if self._between.smooth < 1:
+            notes.append("saved too seldom to be smooth")
+        return "".join(f"\n{note}" for note in notes)
+
+    def at(self, t):
+        """(height, width, 3) the picture at t (s)."""
+        for mesh, body, factor in zip(
+            self._meshes, self._between.bodies(t, self._x, self._magnify), self._factors, strict=True
+        ):
+            mesh.points[:] = points_of(body, factor)
+            mesh["moment"][:] = np.repeat(body.moment / self._scale, body.outline.shape[1])
+            mesh.GetPoints().Modified()
+            mesh.GetPointData().GetScalars().Modified()
+        self._plotter.add_text(
+            f"{self._head}: t = {t:.{self._digits}f} s ({self._pace}){self._notes}",
+            position="upper_edge",
+            color="black",
+            font_size=10,
+            name="time",
+        )
+        return self._plotter.screenshot(return_img=True)
+
+    def close(self):
+        self._plotter.close()
+
+
+class _Gif:
+    """Frames into a .gif, of the colours of some samples, without dithering: small, and the same bytes every time."""
+
+    def __init__(self, file, fps, size, samples):
+        self._file, self._pause, self._frames, image = file, round(1000 / fps), [], _pillow()
+        self._kind, self._plain = image.fromarray, image.Dither.NONE
+        self._palette = self._kind(np.concatenate(samples)).quantize(255, dither=self._plain)
+        colours = np.reshape(self._palette.getpalette(), (-1, 3))
+        colours[colours.min(axis=1) > _WHITE] = 255
+        self._palette.putpalette(colours.ravel().tolist())
+
+    @staticmethod
+    def check():
+        _pillow()
+
+    def __enter__(self):
+        return self
+
+    def add(self, picture):
+        self._frames.append(self._kind(picture).quantize(palette=self._palette, dither=self._plain))
+
+    def __exit__(self, *exception):
+        if self._frames:
+            first, *others = self._frames
+            first.save(self._file, save_all=True, append_images=others, duration=self._pause, loop=0, optimize=False)
+
+
+def _pillow():
+    try:
+        from PIL import Image
+    except ImportError:
+        raise SceneError("films as .gif need Pillow: pip install 'cosserat-fenicsx[pictures]'") from None
+    return Image
+
+
+class _Mp4:
+    """Frames into a .mp4 (H.264), by a pipe to ffmpeg; nothing in it depends on the time or the machine's name."""
+
+    def __init__(self, file, fps, size, samples):
+        command = [_ffmpeg(), "-y", "-loglevel", "error", "-f", "rawvideo", "-pix_fmt", "rgb24",
+                   "-s", f"{size[0]}x{size[1]}", "-r", f"{fps:g}", "-i", "-", "-an", "-c:v", "libx264", "-threads", "1",
+                   "-crf", "20", "-pix_fmt", "yuv420p", "-movflags", "+faststart", "-fflags", "+bitexact",
+                   "-flags:v", "+bitexact", "-map_metadata", "-1", str(file)]  # fmt: skip
+        self._file = file
+        # A socket and no pipe: where ffmpeg dies PETSc would end the process for SIGPIPE. A session of its own: Ctrl-C
+        # ends the film, not its writer.
+        self._way, its = socket.socketpair()
+        with its:
+            self._process = subprocess.Popen(
+                command, stdin=its, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, start_new_session=True
+            )
+
+    @staticmethod
+    def check():
+        _ffmpeg()
+
+    def __enter__(self):
+        return self
+
+    def add(self, picture):
+        try:
+            self._way.sendall(np.ascontiguousarray(picture), socket.MSG_NOSIGNAL)
+        except OSError:
+            self._end()
+            raise
+
+    def __exit__(self, kind, *exception):
+        if kind is None or issubclass(kind, KeyboardInterrupt):
+            self._end()
+        else:
+            self._way.close()
+            self._process.kill()
+            self._process.wait()
+
+    def _end(self):
+        """Wait for ffmpeg, and say why it failed."""
+        self._way.close()
+        _, said = self._process.communicate()
+        if self._process.returncode:
+            words = said.decode(errors="replace").strip().splitlines() or ["it gave no reason"]
+            raise OSError(errno.EIO, f"ffmpeg could not write the film: {words[-1]}", str(self._file)) from None
+
+
+def _ffmpeg():
+    """ffmpeg's name: that of imageio-ffmpeg, else the system's."""
+    try:
+        from imageio_ffmpeg import get_ffmpeg_exe
+
+        return get_ffmpeg_exe()
+    except (ImportError, RuntimeError):
+        found = shutil.which("ffmpeg")
+    if found is None:
+        raise SceneError(
+            "films as .mp4 need ffmpeg: pip install 'cosserat-fenicsx[films]', or apt install ffmpeg; a .gif needs neither"
+        )
+    return found
+
+
+_WRITERS = {".gif": _Gif, ".mp4": _Mp4}

@@ -1,0 +1,161 @@
+"""A motion as arrays with named fields, in SI units. Knows no solver; files and pictures are made by other rooms."""
+
+from collections import namedtuple
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from cosserat_fenicsx.quaternions import directors
+from cosserat_fenicsx.results.path import Path
+from cosserat_fenicsx.results.records import Record
+
+#: Energies so far, J, and momenta, kg m/s and kg m^2/s, inertial, the latter about the inertial origin.
+Ledger = namedtuple("Ledger", "kinetic strain work dissipated linear_momentum angular_momentum")
+
+
+@dataclass(frozen=True)
+class Instant(Record):
+    """A `Record` at a time (s), with velocities and angular velocities of the nodes (N, 6), dimensionless, inertial,
+    the steps taken so far and the `Ledger`."""
+
+    time: float = 0.0
+    rates: np.ndarray = None
+    steps: int = 0
+    ledger: Ledger = None
+
+
+class History(Path):
+    """A motion: its states at the saved times, and what became of energy and momenta.
+
+    All station queries of a `Path` (`position`, `displacement`, `rotation`, `force`, `moment`, `centreline`, `fields`,
+    ...) give one row a time. Contact force and moment include what damping adds. With the `folder` of `simulate` the states
+    lie in a file and are read from there.
+
+    Attributes:
+        times: (n,) s.
+        scheme: the scheme's name.
+        steps: (n,) steps taken up to there, iterations: (n,) Newton iterations since the time before.
+        kinetic, strain: (n,) energies, J.
+        work: (n,) J, what loads and prescribed motions have done since the start.
+        dissipated: (n,) J, what damping has taken since the start.
+        balance: (n,) J, kinetic + strain - work + dissipated, minus its value at the start; zero for an exact solution.
+        linear_momentum: (n, 3) kg m/s; angular_momentum: (n, 3) kg m^2/s about the inertial origin, inertial.
+    """
+
+    axis = "time"
+    more_fields = {"velocity": "velocity", "angular_velocity": "angular_velocity"}  # noqa: RUF012
+    load_factors = negative_modes = stable = None  # of a path alone
+    _computed = (*Path._computed, "_all_rates", "_all_gauss")
+
+    @classmethod
+    def of(cls, model, scheme, why=()):
+        """An empty history for the scene that a moving model was loaded with."""
+        history = super().of(model, "displacement", why)
+        history.scheme, history._time_unit = scheme, model.time
+        return history
+
+    def __repr__(self):
+        reach = f"t = {self.times[0]:g} .. {self.times[-1]:g} s" if len(self) else "empty"
+        return f"<History: {len(self)} times, {reach}, {self.model}, {self.unknowns} unknowns, scheme {self.scheme}>"
+
+    times = property(lambda self: self._array("time"))
+    steps = property(lambda self: self._array("steps"))
+    kinetic = property(lambda self: self._booked("kinetic"))
+    strain = property(lambda self: self._booked("strain"))
+    work = property(lambda self: self._booked("work"))
+    dissipated = property(lambda self: self._booked("dissipated"))
+    linear_momentum = property(lambda self: self._booked("linear_momentum"))
+    angular_momentum = property(lambda self: self._booked("angular_momentum"))
+
+    def _booked(self, name):
+        return np.array([getattr(ledger, name) for ledger in (x.ledger for x in self._records)])
+
+    @property
+    def time_unit(self):
+        """s: what the rates of an `Instant` are made dimensionless with."""
+        return self._time_unit
+
+    @property
+    def energy(self):
+        """(n,) kinetic + strain, J."""
+        return self.kinetic + self.strain
+
+    @property
+    def balance(self):
+        """(n,) J, see the class."""
+        total = self.energy - self.work + self.dissipated
+        return total - total[:1]
+
+    def velocity(self, station):
+        """(n, 3) m/s, inertial."""
+        return self._at(station, self._all_rates[:, :, :3]) * (self.scales.length / self._time_unit)
+
+    def angular_velocity(self, station, *, material=False):
+        """(n, 3) rad/s, inertial; or along d_1, d_2, d_3 of the moving section."""
+        angular = self._at(station, self._all_rates[:, :, 3:]) / self._time_unit
+        if not material:
+            return angular
+        return np.einsum("nij,ni->nj", directors(self.rotation(station)) @ station.rod.curve.frame(station.s), angular)
+
+    @property
+    def along_axis(self):
+        """(n,) s."""
+        return self.times
+
+    def label(self, k):
+        """What a picture writes beside time k."""
+        return f"{self.times[k]:.3g} s"
+
+    def fields(self, k, rod):
+        """As of a `Path`, at time k; with velocity (m/s) and angular_velocity (rad/s), inertial."""
+        rates = self._records[k].rates[self._rows(rod)[1]] / self._time_unit
+        velocity = rates[:, :3] * self.scales.length
+        return {**super().fields(k, rod), "velocity": velocity, "angular_velocity": rates[:, 3:]}
+
+    def plot_energy(self, file=None):
+        """Chart of the energies over time.
+
+        Args:
+            file: a .png or .pdf; None returns matplotlib's Figure.
+        """
+        from cosserat_fenicsx.pictures import energy_chart
+
+        return energy_chart.draw(self, file)
+
+    def animate(self, file, *, fps=25, speed=None, magnify=1.0, size=(960, 720), progress=None):
+        """Film of the rods, coloured by bending moment, at a constant rate of frames; see `animation.film`.
+
+        Args:
+            file: .gif or .mp4.
+            fps: frames per second.
+            speed: seconds of the motion in a second of the film; None for a round number that suits, 1 if possible.
+            magnify: displacements are drawn this many times their size.
+            size: (width, height), pixels.
+            progress: True, False, or None for a bar where it takes long.
+        """
+        from cosserat_fenicsx.pictures import animation
+
+        animation.film(self, file, fps=fps, speed=speed, magnify=magnify, size=size, progress=progress)
+
+    @cached_property
+    def _all_rates(self):
+        """(times, nodes, 6) velocities and angular velocities, dimensionless."""
+        return np.array([record.rates for record in self._records]).reshape(len(self), -1, 6)
+
+    @cached_property
+    def _all_gauss(self):
+        """(times, elements, points, 9) n, m and r' at the Gauss points, dimensionless."""
+        return np.array([record.gauss_fields for record in self._records])
+
+    # n and m at the nodes are those of the polynomials through the Gauss points
+
+    @property
+    def _from_gauss(self):
+        return self.rule.between_gauss(self.rule.nodes)
+
+    def _contact_of(self, k):
+        return np.einsum("jg,cgi->cji", self._from_gauss, self._records[k].gauss_fields[..., :6])
+
+    def _contact_in(self, cell):
+        return np.einsum("jg,kgi->kji", self._from_gauss, self._all_gauss[:, cell, :, :6])

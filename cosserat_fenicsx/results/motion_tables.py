@@ -1,0 +1,68 @@
+"""A motion as a table for the screen and as CSV."""
+
+import numpy as np
+from rich.table import Table
+
+from cosserat_fenicsx.results.tables import as_text, busiest, station_columns, write_columns
+
+#: Rows of the table, where more times were saved.
+ROWS = 21
+_ENERGIES = ("kinetic", "strain", "work", "dissipated", "balance")
+
+
+def motion_table(history, rows=ROWS):
+    """Text: time, motion of the station that moves most, energies at some times; where all named stations are at the end."""
+    shown = np.unique(np.round(np.linspace(0, len(history) - 1, rows)).astype(int))
+    station = busiest(history)
+    moved, speed = history.displacement(station), np.linalg.norm(history.velocity(station), axis=1)
+    title = f"{history.scene.title}\n" if history.scene.title else ""
+    which = f"{len(shown)} of {len(history)} times" if len(shown) < len(history) else f"{len(history)} times"
+    table = Table(
+        title=f"{title}{history.model} model, scheme {history.scheme}, degree {history.degree}, "
+        f"{' + '.join(map(str, history.elements))} elements, {history.unknowns} unknowns, "
+        f"{history.steps[-1]} steps, {which}",
+        caption=f"dx, dy, dz, speed: of {station}. work: of loads and prescribed motions.\n"
+        "balance: kinetic + strain - work + dissipated, minus its value at the start; zero for an exact solution.",
+    )
+    for heading in ("time (s)", "dx (m)", "dy (m)", "dz (m)", "speed (m/s)", *(f"{name} (J)" for name in _ENERGIES)):
+        table.add_column(heading, justify="right")
+    energies = [getattr(history, name) for name in _ENERGIES]
+    least = 1e-12 * history.scales.length
+    for k in shown:
+        table.add_row(
+            f"{history.times[k]:.6g}",
+            *(f"{x:.6g}" if abs(x) > least else "0" for x in moved[k]),
+            f"{speed[k]:.4g}",
+            *(f"{energy[k]:.5g}" for energy in energies[:-1]),
+            f"{energies[-1][k]:.1e}",
+        )
+    ends = (
+        f"{place} at ({', '.join(f'{x if abs(x) > least else 0:.6g}' for x in history.position(place)[-1])}) m"
+        for place in _named(history.scene)
+    )
+    return "\n".join([
+        as_text(table),
+        f"t = {history.times[-1]:.6g} s: {'; '.join(ends)}.",
+        f"{history.model} model: {'; '.join(history.why)}.",
+    ])  # fmt: skip
+
+
+def _named(scene):
+    """The ends of all rods and what supports, loads and joints name, each place once."""
+    places = {}
+    for rod in scene.rods:
+        for station in (rod.start, *scene.stations(rod), rod.end):
+            places.setdefault(tuple(np.round(rod.curve.position(station.s), 9)), station)
+    return places.values()
+
+
+def write_motion_csv(history, file):
+    """Times (s), steps, energies (J), momenta; displacement (m), quaternion, velocity (m/s), angular velocity (rad/s),
+    contact force n (N) and moment m (N m), inertial, at the stations of `tables.write_csv`."""
+    head = {"time (s)": history.times, "steps": history.steps}
+    head |= {f"{name} (J)": getattr(history, name) for name in _ENERGIES}
+    for quantity, unit in (("linear_momentum", "kg m/s"), ("angular_momentum", "kg m^2/s")):
+        values = getattr(history, quantity)
+        head |= {f"{quantity.replace('_', ' ')} ({unit}) {axis}": values[:, i] for i, axis in enumerate("xyz")}
+    more = (("velocity", "velocity (m/s)", "xyz"), ("angular_velocity", "angular velocity (rad/s)", "xyz"))
+    write_columns(history, file, head | station_columns(history, more))

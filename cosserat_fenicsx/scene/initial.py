@@ -1,0 +1,71 @@
+"""What moves at the start of a motion."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from cosserat_fenicsx.checks import instance, refuse, store, vector
+from cosserat_fenicsx.errors import SceneError
+from cosserat_fenicsx.scene.rod import Rod
+
+
+@dataclass(frozen=True, eq=False)
+class InitialVelocity:
+    """Velocity of a rod at the time 0.
+
+    Two vectors are a rigid motion: the point `about` moves with `linear`, and all sections turn with `angular` about
+    it. Where one of the two is a function of the arc length, each speaks for its section alone.
+
+    Args:
+        rod: the rod.
+        linear: m/s, inertial; or a function of arc length (m) that gives it.
+        angular: rad/s, inertial; or a function of arc length (m) that gives it.
+        about: m, a point of the rigid motion; None for the rod's start as it lies at the time 0.
+
+    Raises:
+        SceneError: not a rod, no three finite numbers, or a point without a rigid motion.
+    """
+
+    rod: Rod
+    linear: object = (0.0, 0.0, 0.0)
+    angular: object = (0.0, 0.0, 0.0)
+    about: tuple | None = None
+
+    def __post_init__(self):
+        instance(self, "rod", self.rod, Rod, "a Rod")
+        for field, unit in (("linear", "m/s"), ("angular", "rad/s")):
+            if not callable(getattr(self, field)):
+                store(self, **{field: vector(self, field, getattr(self, field), unit)})
+        if self.about is not None:
+            if not self._rigid:
+                refuse(self, "about", self.about, "None, since the velocity is a function of arc length")
+            store(self, about=vector(self, "about", self.about, "m"))
+
+    @property
+    def _rigid(self):
+        return not callable(self.linear) and not callable(self.angular)
+
+    def at(self, s, position):
+        """Velocities (n, 3) m/s and angular velocities (n, 3) rad/s, inertial, at arc lengths s (n,), where the rod
+        lies at `position` (n, 3) m.
+
+        Raises:
+            SceneError: a function that gives no three finite numbers; says at which arc length.
+        """
+        linear, angular = self._along("linear", "m/s", s), self._along("angular", "rad/s", s)
+        if self._rigid:
+            about = position[0] if self.about is None else np.array(self.about)
+            linear = linear + np.cross(angular, position - about)
+        return linear, angular
+
+    def _along(self, field, unit, s):
+        value = getattr(self, field)
+        if not callable(value):
+            return np.tile(value, (len(s), 1))
+        rows = []
+        for x in s:
+            try:
+                rows.append(vector(self, field, value(float(x)), unit))
+            except SceneError as problem:
+                raise SceneError(f"{problem}, at s = {x:g} m") from None
+        return np.array(rows)

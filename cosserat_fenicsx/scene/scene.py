@@ -1,0 +1,168 @@
+"""A scene: rods, what joins and holds them and what acts on them. Knows no solver and no mesh."""
+
+import copy
+from dataclasses import dataclass
+from functools import cached_property
+
+from cosserat_fenicsx.checks import instance
+from cosserat_fenicsx.errors import SceneError
+from cosserat_fenicsx.scene.initial import InitialVelocity
+from cosserat_fenicsx.scene.joints import Joint
+from cosserat_fenicsx.scene.loads import LOADS
+from cosserat_fenicsx.scene.planes import find_plane
+from cosserat_fenicsx.scene.rod import Rod
+from cosserat_fenicsx.scene.signals import signals_of
+from cosserat_fenicsx.scene.statical import check_held_once
+from cosserat_fenicsx.scene.supports import SUPPORTS
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """Everything a solver needs to know.
+
+    Args:
+        rods: the rods.
+        supports: `Clamp`, `Pin`, `Hinge`, `Roller`, `Prescribed`.
+        loads: `Force`, `Moment`, `EccentricForce`, `FollowerForce`, `FollowerMoment`, `LineForce`, `LineMoment`,
+            `Weight`; all are multiplied by the load factor.
+        joints: `Joint`s between stations that touch; rods without one stand by themselves.
+        velocities: `InitialVelocity`s, at most one a rod; rods without one start at rest. For motions alone.
+        title: for tables and pictures.
+
+    Raises:
+        SceneError: an empty or inconsistent scene, or one that is held twice. (A mechanism may move: statics refuses
+            it.)
+    """
+
+    rods: tuple
+    supports: tuple = ()
+    loads: tuple = ()
+    joints: tuple = ()
+    title: str = ""
+    velocities: tuple = ()
+
+    #: s: for how long what depends on time is looked at beforehand
+    horizon = 1.0
+
+    def __post_init__(self):
+        for field in ("rods", "supports", "loads", "joints", "velocities"):
+            value = getattr(self, field)
+            if not isinstance(value, list | tuple):
+                raise SceneError(f"Scene.{field} = {value!r}: expected a list")
+            object.__setattr__(self, field, tuple(value))
+        if not self.rods:
+            raise SceneError("Scene.rods is empty: expected at least one Rod")
+        for i, rod in enumerate(self.rods):
+            instance("Scene", f"rods[{i}]", rod, Rod, "a Rod")
+        names = [rod.name for rod in self.rods]
+        for name in names:
+            if names.count(name) > 1:
+                raise SceneError(f"Scene.rods: {names.count(name)} rods are named '{name}': expected one each")
+        for i, support in enumerate(self.supports):
+            instance("Scene", f"supports[{i}]", support, SUPPORTS, "a support such as Clamp(rod.start)")
+            self._check_rod(f"supports[{i}]", support.station, support.station.rod)
+        for i, joint in enumerate(self.joints):
+            instance("Scene", f"joints[{i}]", joint, Joint, "a Joint(one.end, other.start)")
+            for end in (joint.first, joint.second):
+                self._check_rod(f"joints[{i}]", end, end.rod)
+        for i, load in enumerate(self.loads):
+            self._check_load(f"loads[{i}]", load)
+        for i, velocity in enumerate(self.velocities):
+            instance("Scene", f"velocities[{i}]", velocity, InitialVelocity, "an InitialVelocity(rod)")
+            self._check_rod(f"velocities[{i}]", velocity.rod, velocity.rod)
+            if velocity.rod in [other.rod for other in self.velocities[:i]]:
+                raise SceneError(
+                    f"Scene.velocities[{i}] is the second of rod '{velocity.rod.name}': expected one a rod"
+                )
+        check_held_once(self)
+        object.__setattr__(self, "_leaders", self._find_leaders())
+
+    def _check_load(self, field, load):
+        if not hasattr(load, "work") or isinstance(load, type):
+            instance("Scene", field, load, LOADS, "a load such as Force(rod.end, (0, 0, -1))")
+        if load.station is not None:
+            self._check_rod(field, load.station, load.station.rod)
+            return
+        if hasattr(load, "rod"):
+            self._check_rod(field, load.rod, load.rod)
+        for rod in self.rods:
+            if load.acts_on(rod):
+                load.check_rod(rod)
+
+    def _check_rod(self, field, place, rod):
+        if rod not in self.rods:
+            raise SceneError(
+                f"Scene.{field} acts at {place}, a station of a rod that is not in the scene: "
+                f"expected one of {', '.join(rod.name for rod in self.rods)}"
+            )
+
+    def _find_leaders(self):
+        """For every rod the first rod of the structure it is joined to."""
+        leaders = {rod: rod for rod in self.rods}
+
+        def find(rod):
+            while leaders[rod] is not rod:
+                rod = leaders[rod]
+            return rod
+
+        for joint in self.joints:
+            one, other = sorted((find(joint.first.rod), find(joint.second.rod)), key=self.rods.index)
+            leaders[other] = one
+        return {rod: find(rod) for rod in self.rods}
+
+    def leader(self, rod):
+        """The first rod of the structure that a rod belongs to."""
+        return self._leaders[rod]
+
+    def origin(self, rod):
+        """(3,) m: where the structure that a rod belongs to starts. Solvers count positions from there, so that digits
+        are not lost on where a structure stands."""
+        return self._leaders[rod].curve.position(0.0)
+
+    def over(self, duration):
+        """The same scene, looked at beforehand for so long (s)."""
+        scene = copy.copy(self)
+        scene.__dict__.pop("flatness", None)
+        object.__setattr__(scene, "horizon", duration)
+        return scene
+
+    @cached_property
+    def flatness(self):
+        """(the `Plane` that everything keeps to, "") or (None, what leaves it, in words)."""
+        return find_plane(self)
+
+    @property
+    def plane(self):
+        """The `Plane` that everything keeps to, or None."""
+        return self.flatness[0]
+
+    @property
+    def moving(self):
+        """Its loads and supports that depend on time."""
+        return [item for item in (*self.loads, *self.supports) if signals_of(item)]
+
+    def line_loads(self, rod):
+        """The loads that act along a rod."""
+        return [load for load in self.loads if load.station is None and load.acts_on(rod)]
+
+    def stations(self, rod):
+        """All stations of a rod that supports, loads and joints name."""
+        named = [x.station for x in (*self.supports, *self.loads) if x.station is not None]
+        named += [end for joint in self.joints for end in (joint.first, joint.second)]
+        return [station for station in named if station.rod is rod]
+
+    @property
+    def cautions(self):
+        """What a user of any answer should know, in sentences."""
+        following = [load for load in self.loads if getattr(load, "follows", False)]
+        if not following:
+            return []
+        kinds = " and ".join(dict.fromkeys(type(load).__name__ for load in following))
+        return [
+            f"{kinds}: a follower load has no potential, so a count of negative modes cannot see flutter; a column may sway "
+            "itself to pieces where statics calls it stable (Beck's column at 20.05 EI/L^2), and only dynamics can tell"
+        ]
+
+    def rod(self, name):
+        """The rod of that name."""
+        return next(rod for rod in self.rods if rod.name == name)

@@ -1,0 +1,280 @@
+"""Scene files in TOML: the words are the package's own class and argument names.
+
+[[rods]]
+name = "column"
+curve = { type = "Line", start = [0, 0, 0], end = [0, 0, 20] }
+section = { type = "Circle", diameter = 0.2 }
+material = { E = 210e9, nu = 0.3 }
+# a section that jumps: section = [{ to = 5.0, type = "Circle", diameter = 0.2 }, { type = "Circle", diameter = 0.1 }]
+# a curve from a file beside this one: curve = { type = "Spline", points = "survey.csv" }
+
+[[supports]]
+type = "Clamp"
+station = "column.start"          # or "column.end", or "column@5.0" for s = 5 m
+
+[[loads]]
+type = "Force"
+station = "column.end"
+force = [0, 0, -1e5]
+
+# in a motion: force = { type = "Triangle", value = [0, 0, 50], peak = 1.0, end = 2.0 }, or Step, Ramp, RunUp, Sine, Table
+
+[[velocities]]                    # optional, where a motion starts
+rod = "column"
+angular = [0, 0, 6.28]
+
+[[joints]]                        # optional, between rods that touch
+first = "column.end"
+second = "beam.start"
+
+[solve]                           # optional: defaults of the command line
+load_factors = [0.5, 1.0]
+
+[simulate]                        # a motion, instead of an equilibrium path; arguments of `simulate`
+duration = 10.0                   # s
+tol = 1e-3                        # or dt = 0.01
+start = 0.9                       # optional: an equilibrium at this load factor first, of the loads just before t = 0
+"""
+
+import dataclasses
+import inspect
+import tomllib
+from pathlib import Path
+
+from cosserat_fenicsx.errors import SceneError, nearest
+from cosserat_fenicsx.scene.curves import CURVES
+from cosserat_fenicsx.scene.damping import Damping
+from cosserat_fenicsx.scene.initial import InitialVelocity
+from cosserat_fenicsx.scene.joints import Joint
+from cosserat_fenicsx.scene.loads import LOADS
+from cosserat_fenicsx.scene.materials import Material
+from cosserat_fenicsx.scene.rod import Rod, Station
+from cosserat_fenicsx.scene.scene import Scene
+from cosserat_fenicsx.scene.sections import SECTIONS
+from cosserat_fenicsx.scene.signals import SIGNALS
+from cosserat_fenicsx.scene.supports import SUPPORTS
+
+#: What [solve] may hold: the arguments of `solve` that are plain values, with their TOML types.
+SOLVE_KEYS = {
+    "load_factors": (list, str, int, float),
+    "model": (str,),
+    "formulation": (str,),
+    "tol": (int, float),
+    "elements": (int,),
+    "degree": (int,),
+    "control": (str,),
+    "branch": (int,),
+}
+#: What [simulate] may hold: the arguments of `simulate` that are plain values.
+SIMULATE_KEYS = {
+    **dict.fromkeys(("duration", "tol", "dt", "save_every", "start", "load_factor"), (int, float)),
+    **dict.fromkeys(("scheme", "model"), (str,)),
+    **dict.fromkeys(("elements", "degree"), (int,)),
+}
+
+
+def read_scene(file):
+    """A scene and its solver settings from a TOML file.
+
+    Args:
+        file: path of the file.
+
+    Returns:
+        (Scene, dict of the [solve] table).
+
+    Raises:
+        SceneError: the file is missing or no TOML, a key or a type is unknown (named, with the nearest known one), or a
+            value is not what its field expects.
+    """
+    scene, settings, _ = _read(file)
+    return scene, settings
+
+
+def read_motion(file):
+    """A scene and the arguments of its motion from a TOML file: `simulate(scene, **arguments)`.
+
+    Args:
+        file: path of the file.
+
+    Returns:
+        (Scene, dict of the [simulate] table), empty where there is none.
+
+    Raises:
+        SceneError: see `read_scene`.
+    """
+    scene, _, settings = _read(file)
+    return scene, settings
+
+
+def _read(file):
+    """Scene, [solve] and [simulate] of a file."""
+    file = Path(file)
+    try:
+        with file.open("rb") as stream:
+            tables = tomllib.load(stream)
+    except OSError as problem:
+        raise SceneError(f"{file}: cannot be read ({problem.strerror}): expected a scene file in TOML") from None
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as problem:
+        raise SceneError(f"{file}: not valid TOML: {problem}") from None
+    try:
+        return _scene(tables, file.parent)
+    except SceneError as problem:
+        raise SceneError(f"{file}: {problem}") from None
+
+
+def _scene(tables, folder):
+    _known_keys(
+        "the file",
+        tables,
+        {"title", "materials", "rods", "supports", "joints", "loads", "velocities", "solve", "simulate"},
+    )
+    materials = {
+        name: _build(f"materials.{name}", table, (Material,), {})
+        for name, table in _table("materials", tables.get("materials", {})).items()
+    }
+    rods = [_rod(f"rods[{i}]", entry, materials, folder) for i, entry in _entries("rods", tables)]
+    stations = {rod.name: rod for rod in rods}
+    supports = [_build(f"supports[{i}]", entry, SUPPORTS, stations) for i, entry in _entries("supports", tables)]
+    loads = [_build(f"loads[{i}]", entry, LOADS, stations) for i, entry in _entries("loads", tables)]
+    joints = [_build(f"joints[{i}]", entry, (Joint,), stations) for i, entry in _entries("joints", tables)]
+    velocities = [
+        _build(f"velocities[{i}]", entry, (InitialVelocity,), stations) for i, entry in _entries("velocities", tables)
+    ]
+    title = tables.get("title", "")
+    if not isinstance(title, str):
+        raise SceneError(f"title = {title!r}: expected a string")
+    settings = [_settings(name, tables, keys) for name, keys in (("solve", SOLVE_KEYS), ("simulate", SIMULATE_KEYS))]
+    if "simulate" in tables and "duration" not in settings[1]:
+        raise SceneError("[simulate]: 'duration' is missing: expected how long the motion lasts (s)")
+    return Scene(rods, supports, loads, joints, title, velocities), *settings
+
+
+def _settings(name, tables, keys):
+    """A table of arguments, of known names and types."""
+    settings = _table(name, tables.get(name, {}))
+    _known_keys(f"[{name}]", settings, keys)
+    for key, value in settings.items():
+        if not isinstance(value, keys[key]) or isinstance(value, bool):
+            names = " or ".join(kind.__name__ for kind in keys[key])
+            raise SceneError(f"[{name}].{key} = {value!r}: expected {names}")
+    return settings
+
+
+def _rod(where, entry, materials, folder):
+    _known_keys(where, entry, {"name", "curve", "section", "material", "damping"})
+    for key in ("curve", "section"):
+        if key not in entry:
+            raise SceneError(f"{where}: '{key}' is missing: expected a table with a type")
+    material = entry.get("material")
+    if isinstance(material, str):
+        if material not in materials:
+            raise SceneError(
+                f"{where}.material = '{material}': {nearest(material, materials) or 'no [materials] given'}"
+            )
+        material = materials[material]
+    elif material is not None:
+        material = _build(f"{where}.material", material, (Material,), {})
+    curve = _build(f"{where}.curve", entry["curve"], CURVES, {}, folder)
+    section = _section(f"{where}.section", entry["section"])
+    more = {"name": entry["name"]} if "name" in entry else {}
+    if "damping" in entry:
+        more["damping"] = _build(f"{where}.damping", entry["damping"], (Damping,), {})
+    try:
+        return Rod(curve, section, material, **more)
+    except SceneError as problem:
+        raise SceneError(f"{where}: {problem}") from None
+
+
+def _section(where, entry):
+    """A section, or the pieces (s_end, section) of an array of them; the last may do without its `to`."""
+    if not isinstance(entry, list):
+        return _build(where, entry, SECTIONS, {})
+    pieces = []
+    for i, piece in enumerate(entry):
+        piece = dict(_table(f"{where}[{i}]", piece))
+        if "to" not in piece and i < len(entry) - 1:
+            raise SceneError(f"{where}[{i}]: 'to' is missing: expected the arc length (m) where this piece ends")
+        pieces.append((piece.pop("to", None), _build(f"{where}[{i}]", piece, SECTIONS, {})))
+    return pieces
+
+
+def _build(where, entry, classes, rods, folder=None):
+    """An object from a table whose keys are the class's arguments; names of files start at `folder`."""
+    entry = dict(_table(where, entry))
+    names = {cls.__name__: cls for cls in classes}
+    if "type" not in entry and len(classes) > 1:
+        raise SceneError(f"{where}: 'type' is missing; known: {', '.join(names)}")
+    name = entry.pop("type", classes[0].__name__)
+    if name not in names:
+        raise SceneError(f"{where}.type = {name!r}: {nearest(name, names)}")
+    kind = names[name]
+    arguments = inspect.signature(kind).parameters
+    _known_keys(f"{where} ({kind.__name__})", entry, arguments)
+    for name, parameter in arguments.items():
+        if name not in entry and parameter.default is inspect.Parameter.empty:
+            raise SceneError(f"{where} ({kind.__name__}): '{name}' is missing")
+    for field in dataclasses.fields(kind):
+        if field.metadata.get("file") and isinstance(entry.get(field.name), str):
+            entry[field.name] = folder / entry[field.name]
+    for name in [name for name in arguments if name in entry]:
+        if arguments[name].annotation is Station:
+            entry[name] = _station(f"{where}.{name}", entry[name], rods)
+        elif arguments[name].annotation is Rod:
+            entry[name] = _known_rod(f"{where}.{name}", entry[name], rods)
+        elif isinstance(entry[name], dict):
+            entry[name] = _build(f"{where}.{name}", entry[name], SIGNALS, {})
+    try:
+        return kind(**entry)
+    except SceneError as problem:
+        raise SceneError(f"{where}: {problem}") from None
+
+
+def _known_rod(where, name, rods):
+    if not isinstance(name, str) or name not in rods:
+        raise SceneError(f"{where} = {name!r}: no rod has this name, {nearest(name, rods)}")
+    return rods[name]
+
+
+def _station(where, text, rods):
+    """'name.start', 'name.end' or 'name@s'."""
+    expected = "expected 'rod.start', 'rod.end' or 'rod@s' with s in m"
+    if not isinstance(text, str):
+        raise SceneError(f"{where} = {text!r}: {expected}")
+    if "@" in text:
+        name, _, s = text.partition("@")
+        try:
+            place = float(s)
+        except ValueError:
+            raise SceneError(f"{where} = '{text}': {expected}") from None
+    else:
+        name, _, place = text.rpartition(".")
+        if place not in ("start", "end"):
+            raise SceneError(f"{where} = '{text}': {expected}")
+    if name not in rods:
+        raise SceneError(f"{where} = '{text}': no rod is named '{name}', {nearest(name, rods)}")
+    if isinstance(place, str):
+        return getattr(rods[name], place)
+    try:
+        return rods[name].at(place)
+    except SceneError as problem:
+        raise SceneError(f"{where} = '{text}': {problem}") from None
+
+
+def _entries(key, tables):
+    """The tables of an array of tables, numbered."""
+    entries = tables.get(key, [])
+    if not isinstance(entries, list):
+        raise SceneError(f"{key} = {entries!r}: expected an array of tables, [[{key}]]")
+    return [(i, _table(f"{key}[{i}]", entry)) for i, entry in enumerate(entries)]
+
+
+def _table(where, value):
+    if not isinstance(value, dict):
+        raise SceneError(f"{where} = {value!r}: expected a table")
+    return value
+
+
+def _known_keys(where, table, known):
+    for key in table:
+        if key not in known:
+            raise SceneError(f"{where}: unknown key '{key}', {nearest(key, known)}")

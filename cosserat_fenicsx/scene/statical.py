@@ -1,0 +1,150 @@
+"""Whether a scene's supports and joints hold it: once each, and altogether. Small motions of the reference alone."""
+
+import functools
+
+import numpy as np
+
+from cosserat_fenicsx.errors import SceneError
+from cosserat_fenicsx.scene.ties import PositionTie, TurnTie
+
+_SMALL = 1e-9
+
+
+def rows_of(tie):
+    """What a tie holds of a and of b, as rows over (displacement, small rotation)."""
+    if isinstance(tie, PositionTie):
+        row = np.r_[tie.direction, 0, 0, 0]
+    elif isinstance(tie, TurnTie):
+        row = np.r_[0, 0, 0, tie.axis]
+    else:
+        row = np.r_[0, 0, 0, np.cross(tie.t, tie.w)]
+    return ((tie.a, row), (tie.b, -row)) if tie.b is not None else ((tie.a, row),)
+
+
+def _all_rows(scene):
+    """(what holds, [(station, row over six motions)]) for every scalar equation of the scene."""
+    for support in scene.supports:
+        if support.clamps:
+            yield from ((support, [(support.station, row)]) for row in np.eye(6))
+        yield from ((support, rows_of(tie)) for tie in support.ties())
+    together = _Together()
+    for joint in scene.joints:
+        if joint.rigid and not together.join(joint.first, joint.second):
+            continue  # a rigid joint that closes a loop of rigid joints says nothing new
+        if joint.rigid:
+            yield from ((joint, [(joint.first, row), (joint.second, -row)]) for row in np.eye(6))
+        else:
+            yield from ((joint, rows_of(tie)) for tie in joint.ties())
+
+
+class _Together:
+    """Stations that rigid joints have made one."""
+
+    def __init__(self):
+        self._groups = []
+
+    def join(self, *stations):
+        """Join two; False where they were one already."""
+        keys = {_key(station) for station in stations}
+        if any(keys <= group for group in self._groups):
+            return False
+        met = [group for group in self._groups if group & keys]
+        self._groups = [group for group in self._groups if not group & keys] + [keys.union(*met)]
+        return True
+
+
+def _key(station):
+    """What tells stations apart: nearer ones share an element end."""
+    return station.rod, round(station.s / station.rod.length, 9)
+
+
+def check_held_once(scene):
+    """Refuse a scene that something holds twice. The rods between stations are elastic: what acts on one station must
+    not be asked for twice.
+
+    Raises:
+        SceneError: naming the supports and joints at fault.
+    """
+    stations, holders, rows = [], [], []
+    for holder, parts in _all_rows(scene):
+        row = {}
+        for station, values in parts:
+            key = _key(station)
+            if key not in stations:
+                stations.append(key)
+            row[stations.index(key)] = values
+        holders.append(holder)
+        rows.append(row)
+    if not rows:
+        return
+    matrix = np.zeros((len(rows), 6 * len(stations)))
+    for i, row in enumerate(rows):
+        for k, values in row.items():
+            matrix[i, 6 * k : 6 * k + 6] = values
+    left, sizes, _ = np.linalg.svd(matrix)
+    idle = left[:, np.count_nonzero(sizes > _SMALL * sizes[0]) :]
+    guilty = [holder for holder, part in zip(holders, idle, strict=True) if np.abs(part).max(initial=0) > 1e-6]
+    if guilty:
+        names = list(dict.fromkeys(_name(scene, holder) for holder in guilty))
+        raise SceneError(
+            f"Scene: {' and '.join(names)} hold the same motion twice, or contradict each other: expected each motion of "
+            "a station to be held once"
+        )
+
+
+def _name(scene, holder):
+    if holder in scene.supports:
+        return f"supports[{scene.supports.index(holder)}] ({type(holder).__name__} at {holder.station})"
+    return f"joints[{scene.joints.index(holder)}] ({holder.first} with {holder.second})"
+
+
+@functools.lru_cache(maxsize=32)  # scenes do not change, and are solved again and again
+def check_no_mechanism(scene):
+    """Refuse a scene with rigid motions of the rods that no support and no joint resists.
+
+    Raises:
+        SceneError: naming the motion that is free.
+    """
+    size = max(rod.length for rod in scene.rods)
+    starts = [rod.curve.position(0.0) for rod in scene.rods]
+    rows = []
+    for _, parts in _all_rows(scene):
+        row = np.zeros(6 * len(scene.rods))
+        for station, values in parts:
+            k = scene.rods.index(station.rod)
+            arm = (station.rod.curve.position(station.s) - starts[k]) / size
+            row[6 * k : 6 * k + 3] += values[:3]
+            row[6 * k + 3 : 6 * k + 6] += values[3:] + np.cross(arm, values[:3])
+        rows.append(row)
+    matrix = np.array(rows).reshape(-1, 6 * len(scene.rods))
+    _, sizes, right = np.linalg.svd(matrix)
+    held = np.count_nonzero(sizes > _SMALL * sizes.max(initial=0))
+    free = right[held:].reshape(-1, len(scene.rods), 6)
+    if len(free) == 0:
+        return
+    for k, rod in enumerate(scene.rods):
+        if np.linalg.matrix_rank(free[:, k], tol=1e-6) == 6:
+            raise SceneError(
+                f"Scene.supports: nothing holds rod '{rod.name}', it is free to move: "
+                f"expected a support such as Clamp({rod.name}.start)"
+            )
+    k = int(np.argmax(np.abs(free).max(axis=(0, 2))))
+    motion = free[np.argmax(np.abs(free[:, k]).max(axis=1)), k]
+    others = f", and {len(free) - 1} more motion(s) are free" if len(free) > 1 else ""
+    raise SceneError(
+        f"Scene is a mechanism: rod '{scene.rods[k].name}' can {_words(motion, starts[k], size)}{others}: "
+        "expected supports and joints that hold it, such as a Clamp or a Hinge"
+    )
+
+
+def _words(motion, start, size):
+    """A rigid motion (velocity of the start over size, rotation) in words."""
+    moved, turn = motion[:3], motion[3:]
+    if np.linalg.norm(turn) <= 1e-6:
+        return f"move along ({_numbers(moved / np.abs(moved).max())})"
+    point = start + size * np.cross(turn, moved) / (turn @ turn)
+    return f"turn about the axis ({_numbers(turn / np.abs(turn).max())}) through ({_numbers(point, size)}) m"
+
+
+def _numbers(x, size=1.0):
+    return ", ".join(f"{value:.4g}" for value in np.where(np.abs(x) < 1e-9 * size, 0.0, x))

@@ -1,0 +1,150 @@
+"""What holds a rod.
+
+A support either holds a station entirely (`clamps`) or says which scalar equations hold there (`ties`); nothing else in
+the package knows a support by name.
+"""
+
+from dataclasses import dataclass
+
+from cosserat_fenicsx.checks import direction, instance, refuse, store
+from cosserat_fenicsx.scene import ties
+from cosserat_fenicsx.scene.rod import Station
+from cosserat_fenicsx.scene.signals import at, vector_or_signal
+
+_A_STATION = "a station such as rod.start"
+
+
+@dataclass(frozen=True)
+class Clamp:
+    """Position and rotation of a station are held as they are in the reference.
+
+    Raises:
+        SceneError: not a station.
+    """
+
+    station: Station
+
+    clamps = True
+
+    def __post_init__(self):
+        instance(self, "station", self.station, Station, _A_STATION)
+
+    def ties(self):
+        """No equations: the station has no unknowns left."""
+        return ()
+
+
+@dataclass(frozen=True)
+class Pin:
+    """The position of a station is held; it may turn about every axis.
+
+    Raises:
+        SceneError: not a station.
+    """
+
+    station: Station
+
+    clamps = False
+
+    def __post_init__(self):
+        instance(self, "station", self.station, Station, _A_STATION)
+
+    def ties(self):
+        """The equations that hold."""
+        return ties.same_place(self.station)
+
+
+@dataclass(frozen=True)
+class Hinge:
+    """The position of a station is held; it may turn about one axis, which is fixed in space.
+
+    Args:
+        station: where.
+        axis: direction of the axis, inertial.
+
+    Raises:
+        SceneError: not a station, or an axis that is no direction.
+    """
+
+    station: Station
+    axis: tuple
+
+    clamps = False
+
+    def __post_init__(self):
+        instance(self, "station", self.station, Station, _A_STATION)
+        store(self, axis=direction(self, "axis", self.axis))
+
+    def ties(self):
+        """The equations that hold."""
+        return (*ties.same_place(self.station), *ties.same_axis(self.station, None, self.axis))
+
+
+@dataclass(frozen=True)
+class Roller:
+    """A station stays in a plane; it may move along the plane and turn about every axis.
+
+    Args:
+        station: where.
+        normal: direction of the plane's normal, inertial.
+
+    Raises:
+        SceneError: not a station, or a normal that is no direction.
+    """
+
+    station: Station
+    normal: tuple
+
+    clamps = False
+
+    def __post_init__(self):
+        instance(self, "station", self.station, Station, _A_STATION)
+        store(self, normal=direction(self, "normal", self.normal))
+
+    def ties(self):
+        """The equations that hold."""
+        return (ties.PositionTie(self.station, None, self.normal, 0.0),)
+
+
+@dataclass(frozen=True)
+class Prescribed:
+    """A station is moved, in proportion to the load factor; what is None stays free.
+
+    Both motions may be functions of time (`signals`), with `jumps` where these are not smooth.
+
+    Args:
+        station: where.
+        displacement: at load factor 1, m, inertial.
+        rotation: rotation vector at load factor 1, rad, inertial: the section is turned by load factor times it.
+
+    Raises:
+        SceneError: not a station, numbers that are not finite, or neither of the two.
+    """
+
+    station: Station
+    displacement: object = None
+    rotation: object = None
+    jumps: tuple = ()
+
+    clamps = False
+
+    def __post_init__(self):
+        instance(self, "station", self.station, Station, _A_STATION)
+        if self.displacement is None and self.rotation is None:
+            refuse(self, "displacement", None, "a displacement (m) or a rotation (rad), or both")
+        given = [("displacement", self.displacement, "m"), ("rotation", self.rotation, "rad")]
+        moving = any(callable(value) for _, value, _ in given)
+        for field, value, unit in given:
+            if value is not None:
+                jumps = () if moving and not callable(value) else self.jumps
+                store(self, **{field: vector_or_signal(self, field, value, unit, jumps)})
+
+    def ties(self):
+        """The equations that hold; at the time 0 where the motion depends on time."""
+        now = at(self, 0.0)
+        moved = () if now.displacement is None else ties.same_place(self.station, None, now.displacement)
+        return moved if now.rotation is None else (*moved, *ties.turned(self.station, now.rotation))
+
+
+#: Supports by the words of the scene file.
+SUPPORTS = (Clamp, Pin, Hinge, Roller, Prescribed)

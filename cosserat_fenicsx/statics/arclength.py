@@ -1,0 +1,217 @@
+"""Continuation in the arc length of the path: past limit points, through snap-through and snap-back.
+
+The unknowns are (x, eta); a step is held in the plane perpendicular to its prediction (pseudo-arc-length: Keller, in:
+Applications of Bifurcation Theory, 1977, 359). Lengths are measured in (r, q) and eta, weighted so that both count
+equally where the path is stiffest so far; elsewhere (r, q) do, which keeps the turns of the load factor round.
+"""
+
+import itertools
+import math
+
+from cosserat_fenicsx.interrupts import obey
+from cosserat_fenicsx.statics.locator import Lost
+from cosserat_fenicsx.statics.track import AIM, FAR, growth_of, through
+
+# A step is refused that is off its prediction by more than this times its length, or by more than the second where
+# negative modes appear or vanish though the load factor does not turn: it may have changed to another branch.
+_BEND, _SURE = 0.4, 0.1
+# A step passes through a point that is beside it by less than this over its length.
+_BESIDE = 0.1
+# The first step over the length of the path from the unloaded state, where there is no step before it.
+_FIRST = 0.02
+
+
+class ArcLength:
+    """Steps a track along its arc length.
+
+    Args:
+        track: a `Track`.
+        control: a `StepControl`.
+        locator: a `Locator` that finds what lies between two points.
+    """
+
+    def __init__(self, track, control, locator):
+        self.track, self.control, self._locator = track, control, locator
+        self._step = None
+
+    def to(self, target, *, first=None, slope=None, on_step=None, on_event=None):
+        """Along the path to the next place where the load factor is `target`, landing on it exactly.
+
+        Args:
+            target: load factor.
+            first, slope: a `Point` to go through first, onto a branch, and dx/d eta there.
+            on_step: called with every accepted `Point`, the landing too.
+            on_event: called with every `Crossing` on the way; True from it ends the walk there.
+
+        Returns:
+            bool: False where the steps became too small or too many; the track's `failure` says why.
+        """
+        track = self.track
+        if first is None:
+            self._set_out(target)
+        else:
+            self._branch_off(first, slope)
+        begin, steps = first, 0
+        for _ in range(self.control.most_steps):
+            branching, point, first = first is not None, first or self._attempt(), None
+            if point is not None:
+                try:
+                    look = self._locator.between
+                    landing, crossings = look(track.here, point, target, self._weight, probe=not branching)
+                except Lost as far:
+                    track.failure = "what lies on a step could not be told"
+                    if branching:
+                        return track.restore()
+                    self._step = self._length(track.here, point)
+                    point = self._shorten(far.args[0])
+            if point is None:
+                if self._step < self.control.smallest * self._scale:
+                    return False
+                continue
+            begin, steps = begin or point, steps + 1
+            if steps > 3 and self._passes(begin, track.here, point):
+                track.failure = "the path is closed: it came back to where it was, and does not lead there"
+                return track.restore()
+            for crossing in crossings:
+                if on_event and on_event(crossing):
+                    track.restore()
+                    return True
+            self._accept(landing or point, point)
+            if on_step:
+                on_step(track.here)
+            if landing is not None:
+                return True
+        track.failure = f"{self.control.most_steps} steps along the path did not lead there (StepControl.most_steps)"
+        return track.restore()
+
+    def _accept(self, point, end):
+        """Keep a point of a step that leads to `end`."""
+        track = self.track
+        track.put(point.numbers, point.load_factor)
+        if len(track.history) > 1 and self._length(track.here, point) < 0.05 * self._length(track.here, end):
+            track.history.pop()  # predictions need points that are apart
+        track.keep(point)
+
+    def _set_out(self, target):
+        """Weight, direction and first step from the last point on."""
+        track = self.track
+        here = track.here
+        track.restore()
+        slope = track.slope()
+        self._weigh(slope)
+        if len(track.history) == 1:  # towards the target
+            change = self.control.first or abs(target - here.load_factor) / 10 or 0.1
+            self._step = self._scale = change * math.sqrt(track.product(slope, slope) + self._weight)
+            track.aim(here, slope, 0 * slope, math.copysign(1.0, target - here.load_factor), self._weight)
+            return
+        before = track.history[-2]
+        track.aim(here, slope, here.numbers[0] - before.numbers[0], here.load_factor - before.load_factor, self._weight)
+        last = self._length(before, here)
+        self._scale = self._length(track.origin, here) or last
+        self._step = min(max(last, _FIRST * self._scale), 0.1 * self._scale)
+
+    def _branch_off(self, first, slope):
+        """Weight, direction and first step where the last point is a bifurcation."""
+        track = self.track
+        here = track.here
+        self._weigh(slope)
+        moved, change = first.numbers[0] - here.numbers[0], first.load_factor - here.load_factor
+        track.aim(first, slope, moved, change, self._weight)
+        here.rise = 0.0
+        self._step = self._scale = self._length(here, first)
+
+    def _weigh(self, slope):
+        """Choose the weight of the load factor."""
+        track = self.track
+        moved = track.here.numbers[0] - track.origin.numbers[0]
+        change = track.here.load_factor - track.origin.load_factor
+        local = track.square(slope)
+        self._weight = min(local, track.square(moved) / change**2) if change else local
+        self._weight = self._weight or 1.0
+
+    def _weigh_less(self):
+        """Where the path is stiffer than before the load factor would drown the rest, and hairpins be sharp: its weight
+        goes down to what it is here."""
+        track = self.track
+        here, weight = track.here, self._weight
+        if not here.rise:
+            return
+        local = track.product(here.along, here.along) / here.rise**2
+        if 0 < local < weight:
+            shrunk = math.sqrt(2 * local / (local + weight))
+            self._weight = local
+            here.rise, here.along = here.rise / shrunk, here.along / shrunk
+            self._step *= shrunk
+            self._scale *= shrunk
+
+    def _passes(self, place, a, b):
+        """Whether the step from a to b goes through a point, in the direction in which it was left."""
+        track, w = self.track, self._weight
+        chord, change = b.numbers[0] - a.numbers[0], b.load_factor - a.load_factor
+        moved, gain = place.numbers[0] - a.numbers[0], place.load_factor - a.load_factor
+        size = track.product(chord, chord) + w * change**2
+        along = track.product(moved, chord) + w * gain * change
+        beside = track.product(moved, moved) + w * gain**2 - along**2 / size
+        onward = track.product(place.along, chord) + w * place.rise * change
+        return 0 <= along < size and beside < (_BESIDE**2) * size and onward > 0
+
+    def _length(self, a, b):
+        moved, change = b.numbers[0] - a.numbers[0], b.load_factor - a.load_factor
+        return math.sqrt(self.track.product(moved, moved) + self._weight * change**2)
+
+    def _predict(self, step):
+        """(numbers, load factor) a step ahead: by the tangent and the points before; n by the points alone."""
+        history = self.track.history
+        here = history[-1]
+        lengths = [self._length(a, b) for a, b in itertools.pairwise(history)]
+        places = [-sum(lengths[i:]) for i in range(len(lengths))]
+        numbers, _ = through(history, [*places, 0.0], step)
+        numbers[0] = here.numbers[0] + step * here.along
+        eta = here.load_factor + step * here.rise
+        for i, (place, point) in enumerate(zip(places, history, strict=False)):
+            weight = (step / place) ** 2
+            weight *= math.prod((step - other) / (place - other) for j, other in enumerate(places) if j != i)
+            numbers[0] += weight * (point.numbers[0] - here.numbers[0] - place * here.along)
+            eta += weight * (point.load_factor - here.load_factor - place * here.rise)
+        return numbers, eta
+
+    def _attempt(self):
+        """One step: predict, correct, judge. A `Point`, not yet kept; or None, the step shortened."""
+        obey()
+        self._weigh_less()
+        track = self.track
+        here = track.here
+        predicted, eta = self._predict(self._step)
+        bound = self.control.largest
+        if bound and abs(eta - here.load_factor) > bound:
+            self._step *= 0.9 * bound / abs(eta - here.load_factor)
+            predicted, eta = self._predict(self._step)
+        foreseen = predicted[0] - here.numbers[0]
+        change = eta - here.load_factor
+        length = math.sqrt(track.product(foreseen, foreseen) + self._weight * change**2)
+        solved = track.on_plane(predicted, eta, foreseen, self._weight * change)
+        if not solved.converged:
+            return self._shorten()
+        numbers, found = track.problem.numbers(), track.problem.load_factor
+        if bound and abs(found - here.load_factor) > bound:
+            return self._shorten(0.9 * bound / abs(found - here.load_factor))
+        off = track.distance(numbers, predicted)
+        beside = numbers[0] - predicted[0]
+        bend = math.sqrt(track.product(beside, beside) + self._weight * (found - eta) ** 2) / length
+        order = len(track.history) + 1
+        if off > FAR or bend > _BEND:
+            track.failure = "the path bends too sharply"
+            return self._shorten()
+        point = track.point(solved)
+        moved, change = numbers[0] - here.numbers[0], found - here.load_factor
+        track.aim(point, track.slope_found(), moved, change, self._weight)
+        if point.negative_modes != here.negative_modes and point.rise * here.rise > 0 and bend > _SURE:
+            track.failure = "the step crossed a point where stability changes"
+            return self._shorten()
+        growth = growth_of(max(off, AIM / _SURE * bend), order, solved.iterations)
+        self._step = max(self._step, length * growth) if growth >= 1 else length * growth
+        return point
+
+    def _shorten(self, share=0.5):
+        self._step *= share
+        self.track.restore()

@@ -1,0 +1,146 @@
+"""Saved states of a motion in a file that grows: rows of one length in NumPy's .npy format, read as they are asked for.
+
+A row counts once it is complete. Whatever ends the writing (a killed process, a full disk, a copy that was cut off)
+costs the last row at most, and `numpy.load(file, mmap_mode="r")` opens the rest, with fields by name.
+"""
+
+import ast
+import os
+import struct
+from pathlib import Path
+
+import numpy as np
+
+from cosserat_fenicsx.errors import SceneError
+from cosserat_fenicsx.results.history import Instant, Ledger
+
+_MAGIC = b"\x93NUMPY\x01\x00"
+#: Columns of a row, of an `Instant` and of its `Ledger`, and whether they are whole numbers.
+_OF_INSTANT = {"time": "<f8", "load_factor": "<f8", "steps": "<i8", "iterations": "<i8"}
+_ARRAYS = ("rq", "rates", "gauss_fields", "reactions")
+
+
+class InstantFile:
+    """The rows of one file, like a list of `Instant`s: those that it had when it was last looked at.
+
+    Args:
+        file: its name; what does not exist has no rows.
+
+    Raises:
+        SceneError: a file that is none of these.
+    """
+
+    def __init__(self, file):
+        self.file, self._dtype, self._rows = Path(file), None, None
+        self.look()
+
+    def look(self):
+        """See what there is by now."""
+        size = self.file.stat().st_size if self.file.exists() else 0
+        if self._dtype is None and size:
+            self._dtype, self._first = _read_header(self.file)
+        self._count = max(0, size - self._first) // self._dtype.itemsize if self._dtype else 0
+
+    def put(self, k, instant):
+        """Write row k, the first one beyond the end or one that is there; the first one of all makes the file. `look` tells it.
+
+        Raises:
+            OSError: it cannot be written; the rows before it stay.
+        """
+        if self._dtype is None:
+            self._make(_dtype_of(instant))
+        row = np.zeros((), self._dtype)
+        for name in (*_OF_INSTANT, *_ARRAYS):
+            row[name] = getattr(instant, name)
+        for name, value in instant.ledger._asdict().items():
+            row[name] = value
+        place = self._first + k * self._dtype.itemsize
+        with open(self.file, "r+b", buffering=0) as stream:
+            try:
+                _write(stream, place, row.tobytes())
+            except OSError:
+                if k == self._count:
+                    stream.truncate(place)
+                raise
+            _write(stream, 0, _header(self._dtype, max(self._count, k + 1)))
+
+    def settle(self):
+        """Have the operating system put the rows on the disk, so that they outlive a power cut."""
+        if self.file.exists():
+            with open(self.file, "rb") as stream:
+                os.fsync(stream.fileno())
+
+    def _make(self, dtype):
+        with open(self.file, "wb", buffering=0) as stream:
+            try:
+                _write(stream, 0, _header(dtype, 0))
+            except OSError:
+                stream.truncate(0)
+                raise
+        self.look()
+
+    def __len__(self):
+        return self._count
+
+    @property
+    def rows(self):
+        """(n,) the rows of now as they lie in the file, with a field for each column: nothing is read before it is
+        looked at."""
+        if self._rows is None or len(self._rows) != self._count:
+            shape = (self._count,)
+            self._rows = (
+                np.memmap(self.file, self._dtype, "r", self._first, shape) if self._count else np.empty(0, self._dtype)
+            )
+        return self._rows
+
+    def __getitem__(self, k):
+        row = self.rows[k]
+        more = {name: row[name].item() for name in _OF_INSTANT}
+        more |= {name: np.array(row[name]) for name in _ARRAYS}
+        ledger = Ledger(*(np.array(row[name]) if row[name].ndim else row[name].item() for name in Ledger._fields))
+        return Instant(rq=more.pop("rq"), negative_modes=0, ledger=ledger, **more)
+
+    def __iter__(self):
+        return (self[k] for k in range(len(self)))
+
+
+def _dtype_of(instant):
+    columns = list(_OF_INSTANT.items())
+    columns += [(name, "<f8", np.shape(value)) for name, value in instant.ledger._asdict().items()]
+    columns += [(name, "<f8", np.shape(getattr(instant, name))) for name in _ARRAYS]
+    return np.dtype(columns)
+
+
+def _write(stream, place, data):
+    """All of it: the system may take less at once."""
+    data = memoryview(data)
+    while data:
+        done = os.pwrite(stream.fileno(), data, place)
+        data, place = data[done:], place + done
+
+
+def _header(dtype, count):
+    """The header of a .npy file of that many rows; always of one length, so that it can be written anew."""
+
+    def text(n):
+        return repr({"descr": dtype.descr, "fortran_order": False, "shape": (n,)}).encode()
+
+    size = -(-(len(_MAGIC) + 2 + len(text(10**18)) + 1) // 64) * 64
+    inside = size - len(_MAGIC) - 2
+    return _MAGIC + struct.pack("<H", inside) + text(count).ljust(inside - 1) + b"\n"
+
+
+def _read_header(file):
+    try:
+        with open(file, "rb") as stream:
+            start = stream.read(len(_MAGIC) + 2)
+            (inside,) = struct.unpack("<H", start[len(_MAGIC) :])
+            told = ast.literal_eval(stream.read(inside).decode())
+        if not start.startswith(_MAGIC):
+            raise ValueError("no .npy file")
+        columns = [(name, kind, *map(tuple, shape)) for name, kind, *shape in told["descr"]]
+        return np.dtype(columns), len(start) + inside
+    except (ValueError, SyntaxError, struct.error, KeyError, TypeError) as problem:
+        raise SceneError(
+            f"{file} is damaged ({problem}): expected saved states; without the file, cosserat_fenicsx.resume computes them anew"
+        ) from None
