@@ -67,6 +67,29 @@ def test_the_table_picks_rows_and_the_csv_keeps_all(tmp_path):
     assert len((tmp_path / "a.csv").read_text().splitlines()) == 102
 
 
+def test_a_motion_that_is_written_as_it_goes(tmp_path, cosserat):
+    """`--folder` and `resume`: the table is that of one run."""
+    options = ("--dt", "0.05", "--elements", "2", "--degree", "2")
+    assert cosserat("run", FLIGHT, "--duration", "0.5", *options, "--folder", tmp_path / "a")[0] == 0
+    code, said, trouble = cosserat("resume", tmp_path / "a", "--duration", "1", "--at", "7", "-o", tmp_path / "out")
+    assert code == 0 and trouble == "cosserat: --at 7 lies beyond 0 .. 1; the nearest is drawn\n"
+    _, whole, _ = cosserat("run", FLIGHT, "--duration", "1", *options)
+    assert said.startswith(whole) and (tmp_path / "out" / "rods.png").is_file()
+    for arguments, words in (
+        (("run", DEMO, "--folder", tmp_path / "b"), "--folder is for a motion"),
+        (("resume", tmp_path / "b"), "no motion was found there"),
+        (("resume", tmp_path / "a", "--duration", "0.2"), "at least 1 s"),
+    ):
+        code, _, trouble = cosserat(*arguments)
+        assert code == 2 and words in trouble, trouble
+
+
+def test_a_scene_behind_animate(capsys):
+    with pytest.raises(SystemExit) as end:
+        cli.main(["run", "--animate", str(FLIGHT)])
+    assert end.value.code == 2 and "put the scene before --animate" in capsys.readouterr().err
+
+
 WORDS = {
     "flying_spaghetti_2d": ("Motion: 15 s. Steps of 0.02 s, halved where one fails. Every step is saved.", "by Step, steps land on t = 0, 2.5 s",
                             "0 support(s): none", "Start: the reference, free of stress, at rest.", "75 unknowns", "Model: planar"),
@@ -112,6 +135,22 @@ def test_explained_is_what_is_done(cosserat):
 def test_refused(arguments, words, tmp_path, cosserat):
     code, _, trouble = cosserat(*(str(x).format(tmp=tmp_path) for x in arguments))
     assert code == 2 and words in trouble, trouble
+
+
+def test_damping_by_a_ratio(tmp_path):
+    def damped(by):
+        text = (MOTIONS / "damped_column.toml").read_text()
+        assert text.count("damping = ") == 1
+        file = tmp_path / "scene.toml"
+        file.write_text(re.sub("damping = .*", f"damping = {by}", text))
+        return cf.read_motion(file)[0].rods[0].damping
+
+    assert damped("{ ratio = 0.02, frequencies = [1, 10] }") == cf.Damping.ratio(0.02, (1.0, 10.0))
+    for by, words in (("{ ratio = 0.02 }", "'frequencies' is missing"), ("{ ratio = 2, frequencies = [1, 2] }", "damping: Damping.ratio"),
+                      ("{ ratio = 0.1, frequencies = [1, 2], time = 1 }", "unknown key 'time'")):  # fmt: skip
+        with pytest.raises(cf.SceneError) as refusal:
+            damped(by)
+        assert words in str(refusal.value)
 
 
 TABLES = {

@@ -3,7 +3,10 @@
 from cosserat_fenicsx.errors import SceneError
 
 #: Options of a motion, and those of an equilibrium path, by the names of the arguments of `simulate` and `solve`.
-MOTION, PATH = ("duration", "dt", "scheme", "save_every", "start"), ("load_factors", "formulation", "control", "branch")
+MOTION, PATH = (
+    ("duration", "dt", "scheme", "save_every", "start", "folder"),
+    ("load_factors", "formulation", "control", "branch"),
+)
 _BOTH = ("tol", "elements", "degree", "model")
 
 
@@ -18,7 +21,7 @@ def motion_of(options):
     """
     from cosserat_fenicsx.scene.scenefile import read_motion
 
-    given = {name: getattr(options, name) for name in (*MOTION, *PATH, *_BOTH)}
+    given = {name: getattr(options, name, None) for name in (*MOTION, *PATH, *_BOTH)}
     given = {name: value for name, value in given.items() if value is not None}
     scene, settings = read_motion(options.scene)
     moves = not options.static and (settings or "duration" in given)

@@ -178,9 +178,22 @@ def _rod(where, entry, materials, folder):
     section = _section(f"{where}.section", entry["section"])
     more = {"name": entry["name"]} if "name" in entry else {}
     if "damping" in entry:
-        more["damping"] = _build(f"{where}.damping", entry["damping"], (Damping,), {})
+        more["damping"] = _damping(f"{where}.damping", entry["damping"])
     try:
         return Rod(curve, section, material, **more)
+    except SceneError as problem:
+        raise SceneError(f"{where}: {problem}") from None
+
+
+def _damping(where, entry):
+    """Damping by its numbers, or by { ratio, frequencies }."""
+    if "ratio" not in _table(where, entry):
+        return _build(where, entry, (Damping,), {})
+    _known_keys(f"{where} (by a ratio)", entry, {"ratio", "frequencies"})
+    if "frequencies" not in entry:
+        raise SceneError(f"{where}: 'frequencies' is missing: expected the two (Hz) that have this ratio")
+    try:
+        return Damping.ratio(**entry)
     except SceneError as problem:
         raise SceneError(f"{where}: {problem}") from None
 

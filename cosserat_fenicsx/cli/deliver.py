@@ -1,0 +1,122 @@
+"""What a command has computed, or what of it was reached, is printed and written."""
+
+import sys
+import tempfile
+from pathlib import Path
+
+from cosserat_fenicsx.cli.say import DONE, INTERRUPTED, NOT_CONVERGED, first_rank, say
+from cosserat_fenicsx.errors import Interrupted, NotConverged, NotStored, SceneError
+
+
+def deliver(computed, options, moving):
+    """Print and write what is computed, or what of it was reached.
+
+    Args:
+        computed: -> Path or History.
+        options: of the command line.
+        moving: whether it is a motion.
+
+    Returns:
+        the exit code.
+    """
+    out, at = None, _numbers(options.at)
+    if options.output:
+        out = Path(options.output)
+        _prepare(out)  # before the work, not after it
+    _check_film(options, moving)
+
+    code, trouble = DONE, None
+    try:
+        path = computed()
+    except (NotConverged, NotStored) as failure:
+        path, trouble, code = failure.path, failure, NOT_CONVERGED
+    except Interrupted as stop:
+        path, trouble, code = stop.path, stop, INTERRUPTED
+    if path is not None and len(path):
+        _report(path)
+        if out is not None:
+            film = options.animate if code != INTERRUPTED else None  # who stops a run does not wait for its film
+            if code == INTERRUPTED:
+                say("cosserat: interrupted; what was reached is written, Ctrl-C again leaves out what is not written yet")
+            try:
+                look = {"magnify": options.magnify, "shown": _shown(path, at), "film": film, "speed": options.speed}
+                _write(path, out, picture=not options.no_picture, **look)
+            except KeyboardInterrupt:
+                trouble, code = "interrupted; what was being drawn or written then is incomplete", INTERRUPTED
+    if trouble is not None:
+        say(f"cosserat: {trouble}")
+        if getattr(options, "folder", None) and not isinstance(trouble, NotConverged):
+            say(f"cosserat: `cosserat resume {options.folder}` goes on from there")
+    return code
+
+
+def _shown(path, at):
+    """Indices of what is nearest to the numbers of --at; None where there are none."""
+    if at is None:
+        return None
+    along = path.along_axis
+    for x in at:
+        if not along.min() <= x <= along.max():
+            say(f"cosserat: --at {x:g} lies beyond {along.min():g} .. {along.max():g}; the nearest is drawn")
+    return sorted({int(abs(along - x).argmin()) for x in at})
+
+
+def _prepare(out):
+    """Make the output folder, and see that it can be written to."""
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=out):
+            pass
+    except OSError as problem:
+        raise SceneError(f"output folder {out}: {problem.strerror}: expected a folder that can be written to") from None
+
+
+def _check_film(options, moving):
+    """Refuse a film that could not be made, before the work."""
+    if options.animate is None:
+        return
+    if not moving or not options.output:
+        raise SceneError("--animate: expected a motion, and -o DIR to write its film to")
+    from cosserat_fenicsx.pictures.animation import check_name
+
+    if Path(options.animate).name != options.animate:
+        raise SceneError(f"--animate {options.animate}: expected a name without folders; it is written to -o DIR")
+    check_name(options.animate)
+
+
+def _report(path):
+    if path.axis == "time":
+        from cosserat_fenicsx.results.motion_tables import motion_table as table
+    else:
+        from cosserat_fenicsx.results.tables import path_table as table
+
+    text = table(path)
+    if first_rank():
+        print(text)
+
+
+def _write(path, out, *, picture, magnify, shown, film, speed):
+    if path.axis == "time":
+        from cosserat_fenicsx.cli.motion import write_motion
+
+        written = write_motion(path, out, picture=picture, magnify=magnify, shown=shown, film=film, speed=speed)
+    else:
+        from cosserat_fenicsx.results.tables import write_csv
+
+        write_csv(path, out / "path.csv")
+        path.write(out / "path.xdmf")
+        written = ["path.xdmf", "path.h5", "path.csv"]
+        if picture:
+            path.plot(out / "rods.png", shown, magnify=magnify)
+            written.append("rods.png")
+    say(f"written to {out}/: {', '.join(written)}", file=sys.stdout)
+
+
+def _numbers(text):
+    """The numbers of --at."""
+    if text is None:
+        return None
+    try:
+        return [float(part) for part in text.split(",")]
+    except ValueError:
+        raise SceneError(f"--at {text}: expected A,B,...: load factors or times (s)") from None
