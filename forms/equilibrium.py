@@ -91,16 +91,17 @@ def carried_force_update(n_k, motion, section, derivative):
     return n_k + _force_of(g + derivative(g), motion, section)
 
 
-def second_variation(n, motion, section, test, direction):
+def second_variation(n, motion, section, test, direction, stiffness=1):
     """The change of `balance` in a direction (phi_r_s, phi, phi_s) of small displacement and inertial rotation phi.
 
     Symmetric in test and direction but for what a moment without potential leaves; K and K_inv need not be each
     other's inverse. With d = phi: dR = d x R, d(curvature) = R^T d', so that dm = d x m + T J T^T d' and
-    dg = dr' - d x T v_R - d x (T K^-1 T^T n) + T K^-1 T^T (d x n), dn = T K T^T dg.
+    dn = d x n + T K T^T (dr' - d x T (v_R + K^-1 T^T n)). `stiffness` multiplies K and J in the changes: with 0 what is
+    left is that of the contact force and moment alone, as they turn.
     """
-    dg = direction.phi_r_s - turned_tangent(n, motion, section, direction.phi)
-    dn = _force_of(dg, motion, section)
-    dm = turned_moment(motion, section, direction)
+    g = direction.phi_r_s - ufl.cross(direction.phi, tangent_of_force(n, motion, section))
+    dn = ufl.cross(direction.phi, n) + stiffness * _force_of(g, motion, section)
+    dm = turned_moment(motion, section, direction, stiffness)
     change = ufl.cross(direction.phi_r_s, n) + ufl.cross(motion.r_s, dn)
     return ufl.dot(dn, test.phi_r_s) + ufl.dot(dm, test.phi_s) - ufl.dot(change, test.phi)
 
@@ -112,10 +113,11 @@ def turned_tangent(n, motion, section, phi):
     return ufl.cross(phi, tangent_of_force(n, motion, section)) - T * turned_n
 
 
-def turned_moment(motion, section, direction):
-    """The change of `contact_moment` under a small inertial rotation."""
+def turned_moment(motion, section, direction, stiffness=1):
+    """The change of `contact_moment` under a small inertial rotation; `stiffness` as of `second_variation`."""
     T = frame(motion, section)
-    return ufl.cross(direction.phi, contact_moment(motion, section)) + T * scaled(section.J, T.T * direction.phi_s)
+    bent = T * scaled(section.J, T.T * direction.phi_s)
+    return ufl.cross(direction.phi, contact_moment(motion, section)) + stiffness * bent
 
 
 def load_variation(work, test, R, phi):

@@ -9,15 +9,48 @@ import cosserat_fenicsx as cf
 STEEL = cf.Material(E=210e9, nu=0.3, density=7850.0)
 
 
+def sheared(euler, GA):
+    """The critical load P of a column that is not shortened: P (1 + P/GA) = P_Euler."""
+    return GA / 2 * (np.sqrt(1 + 4 * euler / GA) - 1)
+
+
+@pytest.mark.parametrize("EA, GA", [(np.inf, 20.0), (1e3, 400.0), (20.0, 20.0)])
+def test_shear_counts(EA, GA):
+    """And where EA is infinite the events of `solve` agree; from a loaded state the estimate nears them."""
+    rod = cf.Rod(cf.Line((0, 0, 0), (0, 0, 1.0)), cf.Stiffness((GA, GA), EA, (1.0, 2.0), 1.0))
+    scene = cf.Scene([rod], [cf.Clamp(rod.start)], [cf.Force(rod.end, (0, 0, -1.0))])
+    found = cf.buckling(scene, tol=1e-6)
+    assert found.load_factors == pytest.approx([sheared(np.pi**2 / 4, GA)], rel=1e-6)
+    (event,) = cf.solve(scene, (0.0, 3.0), model="spatial").events
+    shortened = 1 / GA - 1 / EA  # P (1 - P/EA + P/GA) = P_Euler
+    exact = np.pi**2 / 4 if abs(shortened) < 1e-12 else sheared(np.pi**2 / 4, 1 / shortened)
+    assert event.load_factor == pytest.approx(exact, rel=1e-7)
+    near = cf.buckling(scene, load_factor=0.95 * exact).load_factors[0]
+    assert abs(near - exact) <= max(0.2 * abs(found.load_factors[0] - exact), 1e-6)
+
+
+def test_the_error_bar_holds_what_both_meshes_have_in_common():
+    """Infinite stiffnesses are bounded: a propped column, (4.4934)^2 and twice that, at two tolerances."""
+    rod = cf.Rod(cf.Line((0, 0, 0), (0, 0, 1.0)), cf.Stiffness((np.inf, np.inf), np.inf, (1.0, 2.0), 1.0))
+    guide = [cf.Roller(rod.end, (1, 0, 0)), cf.Roller(rod.end, (0, 1, 0))]
+    scene = cf.Scene([rod], [cf.Clamp(rod.start), *guide], [cf.Force(rod.end, (0, 0, -1.0))])
+    found = cf.buckling(scene, 2)
+    off = np.abs(found.load_factors / (4.493409457909064**2 * np.array([1, 2])) - 1)
+    assert (off <= found.error).all() and (found.error < 1e-6).all()
+    with pytest.raises(cf.NotConverged, match="bounds the stiffnesses"):
+        cf.buckling(scene, 2, tol=1e-7)
+
+
 @pytest.mark.parametrize("section", [cf.Circle(0.2), cf.Rectangle(0.2, 0.25)])
 def test_euler_columns(section):
     rod = cf.Rod(cf.Line((0, 0, 0), (0, 0, 20.0)), section, STEEL)
     scene = cf.Scene([rod], [cf.Clamp(rod.start)], [cf.Force(rod.end, (0, 0, -cf.euler_load(rod)))])
     found = cf.buckling(scene, 4)
     ratio = max(rod.stiffness.bending) / min(rod.stiffness.bending)
-    # off by the strains at buckling, 1.5e-5 and nine times that
-    np.testing.assert_allclose(found.load_factors, [1, ratio, 9, 9 * ratio], rtol=4e-4)
-    np.testing.assert_allclose(found.load_factors[:2], [1, ratio], rtol=4e-5)
+    euler = np.array([1, ratio, 9, 9 * ratio])
+    expected = sheared(euler, rod.stiffness.shear[0] / cf.euler_load(rod))
+    np.testing.assert_allclose(found.load_factors, expected, rtol=1e-6)
+    assert abs(found.load_factors / euler - 1).max() > 2e-5, "shear shows"
     assert (found.error <= 1e-5).all()
     s = np.linspace(0, 1, 4 * found.elements[0] + 1)[::4]  # element ends
     for k, axis in ((0, 0), (1, 1)):

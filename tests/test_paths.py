@@ -251,3 +251,51 @@ def test_an_inextensible_column_stands_still_until_it_buckles(weak, elements):
         and (np.diff(path.load_factors) > 0).all()
     )
     assert np.abs(path.displacement(rod.end)).max() < 1e-12
+
+
+def t_frame(soft, k=1.5):
+    """A column (EI = 1 and k) under a beam that is softer by a factor, both halves guided."""
+
+    def section(EI, k):
+        return cf.Stiffness((1e4 * EI,) * 2, 2e4 * EI, (EI, k * EI), EI)
+
+    column = cf.Rod(cf.Line((0, 0, 0), (0, 0, 1)), section(1.0, k), name="column")
+    left = cf.Rod(cf.Line((-0.8, 0, 1), (0, 0, 1)), section(soft, 1.0), name="left")
+    right = cf.Rod(cf.Line((0, 0, 1), (0.8, 0, 1)), section(soft, 1.0), name="right")
+    guides = [cf.Roller(end, axis) for end in (left.start, right.end) for axis in ((0, 0, 1), (0, 1, 0))]
+    joints = [cf.Joint(column.end, left.end), cf.Joint(column.end, right.start)]
+    return cf.Scene(
+        [column, left, right], [cf.Clamp(column.start), *guides], [cf.Force(column.end, (0, 0, -1.0))], joints
+    )
+
+
+def test_bifurcations_are_neither_lost_nor_found_twice():
+    """A soft member's mode is the lowest one until another crosses zero: its eigenvalue has a kink in between."""
+    scene = t_frame(0.1)
+    fine = cf.solve(scene, [3.0, 4.0, 9.0]).events
+    for load_factors in ([3.0, 9.0], (0.0, 9.0)):
+        found = cf.solve(scene, load_factors).events
+        assert [event.kind for event in found] == ["bifurcation"] * 2
+        np.testing.assert_allclose([e.load_factor for e in found], [e.load_factor for e in fine], rtol=1e-6)
+    np.testing.assert_allclose([e.load_factor for e in fine], [3.410490, 5.058076], rtol=1e-6)
+
+
+@pytest.mark.parametrize("soft, located", [(1e-2, 1), (1e-4, 1), (1e-6, 0)])
+def test_what_could_not_be_located_is_told(soft, located):
+    """A propped column whose head is joined to a rod that is softer by orders of magnitude; (4.4934)^2."""
+    stiff = cf.Stiffness((np.inf,) * 2, np.inf, (1.0, 50.0), 1.0)
+    column = cf.Rod(cf.Line((0, 0, 0), (0, 0, 1)), stiff, name="column")
+    stub = cf.Rod(cf.Line((0, 0, 1), (0, 1, 1)), cf.Stiffness((np.inf,) * 2, np.inf, (soft, soft), soft), name="stub")
+    held = [
+        cf.Roller(stub.start, (1, 0, 0)),
+        cf.Roller(stub.start, (0, 1, 0)),
+        cf.Prescribed(stub.end, rotation=(0, 0, 0)),
+    ]
+    joint = cf.Joint(column.end, stub.start, release="all")
+    load = cf.Force(column.end, (0, 0, -1.0))
+    path = cf.solve(
+        cf.Scene([column, stub], [cf.Clamp(column.start), *held], [load], [joint]), [19.0, 22.0], model="spatial"
+    )
+    assert path.negative_modes.tolist() == [0, 1] and len(path.events) == located
+    assert [e.load_factor for e in path.events] == pytest.approx([4.493409457909064**2] * located, rel=1e-6)
+    assert any("negative modes go from 0 to 1" in sentence for sentence in path.why) == (not located)

@@ -99,6 +99,7 @@ REFUSED = {
     "spline of words": (lambda: cf.Spline([("a", "b", "c")]), "expected points of three numbers"),
     "spline of a number": (lambda: cf.Spline(3.0), "expected points of three numbers"),
     "spline, NaN": (lambda: cf.Spline([(0, 0, 0), (1, math.nan, 0)]), "Spline.points[1] = (1.0, nan, 0.0): expected finite numbers"),
+    "spline, nearly": (lambda: cf.Spline([(0, 0, 0), (1, 0, 0), (1 + 1e-9, 0, 0), (2, 0, 1)]), "Spline.points[2] = (1.000000001, 0.0, 0.0): expected a point apart"),
     "spline, repeated": (lambda: cf.Spline([(0, 0, 0), (1, 1, 0), (1, 1, 0)]), "Spline.points[2] = (1.0, 1.0, 0.0): expected a point apart"),
     "spline, one point twice": (lambda: cf.Spline([(1, 1, 0), (1, 1, 0)], closed=False), "Spline.points[1]"),
     "closed spline of two": (lambda: cf.Spline([(0, 0, 0), (1, 0, 0), (0, 0, 0)], closed=True), "expected three points or more"),

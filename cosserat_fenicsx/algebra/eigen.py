@@ -9,6 +9,8 @@ from slepc4py import SLEPc
 from cosserat_fenicsx.algebra import linear
 
 _TOLERANCE = 1e-12
+# Where eigenvalues of the other sign may lie much nearer to zero: their rounding is in those that are asked for.
+_COARSE = 1e-9
 
 
 class _Inverse:
@@ -22,13 +24,14 @@ class _Inverse:
         self._pc.apply(x, y)
 
 
-def nearest_zero(K, pc, count):
+def nearest_zero(K, pc, count, side=0):
     """Eigenvalues of a symmetric matrix next to zero, by the factorisation that is at hand.
 
     Args:
         K: the matrix.
         pc: a PC that holds its factors.
         count: how many.
+        side: 1 for positive ones, -1 for negative ones, 0 for both.
 
     Returns:
         (values (n,), vectors): nearest first, n <= count; PETSc vectors of length one.
@@ -37,7 +40,8 @@ def nearest_zero(K, pc, count):
     inverse.setUp()
     solver = SLEPc.EPS().create(K.comm)
     solver.setOperators(inverse)
-    values, vectors = _solve(solver, SLEPc.EPS.ProblemType.HEP, SLEPc.EPS.Which.LARGEST_MAGNITUDE, count, K)
+    which = {0: "LARGEST_MAGNITUDE", 1: "LARGEST_REAL", -1: "SMALLEST_REAL"}[side]
+    values, vectors = _solve(solver, SLEPc.EPS.ProblemType.HEP, getattr(SLEPc.EPS.Which, which), count, K, _COARSE if side else _TOLERANCE)
     return 1 / values, vectors
 
 
@@ -98,13 +102,13 @@ class _Congruent:
         y.array_w[:] = self._L.T @ self._factors.solve(force)[: len(x.array_r)]
 
 
-def _solve(solver, kind, which, count, like):
+def _solve(solver, kind, which, count, like, tolerance=_TOLERANCE):
     solver.setProblemType(kind)
     solver.setWhichEigenpairs(which)
     size = like.getSize()[0]
     count = min(count, size)
     solver.setDimensions(count, min(size, max(2 * count, count + 15)))
-    solver.setTolerances(_TOLERANCE, 500)
+    solver.setTolerances(tolerance, 500)
     start = like.createVecRight()
     first, last = start.getOwnershipRange()
     start.array_w[:] = 1 + np.sin(np.arange(first, last) + 1.0)  # the same at every run and on any number of ranks

@@ -3,6 +3,7 @@
 import contextlib
 
 import numpy as np
+from dolfinx import fem
 
 from cosserat_fenicsx import compat
 from cosserat_fenicsx.models.base import RodModel
@@ -22,6 +23,7 @@ class SpatialModel(RodModel):
         return super()._elements(degree)
 
     def _compile(self, spaces):
+        self.stiffness = fem.Constant(self.mesh, np.float64(1))  # of the second variation, see `stress_alone`
         return compile_forms(self, *spaces, *(self.carried or (None,)))
 
     def _at_rest(self):
@@ -48,15 +50,13 @@ class SpatialModel(RodModel):
 
     @contextlib.contextmanager
     def stress_alone(self):
-        """Within it the second variation has no stiffness against stretch and shear: its change along a path is then
-        that of the contact force and moment, and of the load, but not of the directions of the stiffness."""
-        stiff = self.data.K_stiff.x.array
-        kept = stiff.copy()
-        stiff[:] = 0
+        """Within it the second variation has no stiffness: what is left is that of the contact force and moment, and of the
+        load."""
+        self.stiffness.value = 0.0
         try:
             yield
         finally:
-            stiff[:] = kept
+            self.stiffness.value = 1.0
 
     def shape_of(self, change):
         """(N, 3) displacements of all nodes, in the scene's order on all ranks, in a change of this rank's part of the

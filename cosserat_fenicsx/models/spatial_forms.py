@@ -74,7 +74,7 @@ def compile_forms(model, rotations, carried_n):
     psi, w = ufl.TestFunction(rotations), ufl.TrialFunction(rotations)
     rigid, direction = eq.rotation_tests_of(psi, along(psi)), eq.rotation_tests_of(w, along(w))
     stiff = section._replace(K=data.K_stiff) if variant in ("condensed", "field") else section
-    second = ds(equilibrium.second_variation(n, state, stiff, rigid, direction))
+    second = ds(equilibrium.second_variation(n, state, stiff, rigid, direction, model.stiffness))
     second -= turned_loads(model, loads, rigid, R_node, direction.phi)
     fields = ufl.as_vector([*n, *m, *state.r_s])
     return compile_all(model, residual, tangent, loads.dead, [second], fields=fields, advance=advance)

@@ -9,6 +9,9 @@ import numpy as np
 
 from cosserat_fenicsx.checks import refuse
 
+# Nearer points than this leave the curvature between them to rounding.
+_APART = 1e-7
+
 
 def polyline(owner, field, given, *, closed):
     """The points (n, 3), m, of an array or a file, without repetitions.
@@ -46,12 +49,14 @@ def polyline(owner, field, given, *, closed):
     again = np.flatnonzero(_coincide(points[1:], points[:-1], points))
     if len(again):
         row = int(again[0]) + 1
-        refuse(owner, f"{field}[{row}]", tuple(points[row].tolist()), "a point apart from the one before")
+        apart = f"a point apart from the one before, by more than {_APART:g} of the extent of all"
+        refuse(owner, f"{field}[{row}]", tuple(points[row].tolist()), apart)
     return points
 
 
 def _coincide(a, b, points):
-    return ~(np.linalg.norm(a - b, axis=1) > 1e-12 * np.abs(points).max())
+    near = max(1e-12 * np.abs(points).max(), _APART * np.ptp(points, axis=0).max())
+    return ~(np.linalg.norm(a - b, axis=1) > near)
 
 
 def _from_csv(owner, field, file):

@@ -15,6 +15,8 @@ from cosserat_fenicsx.statics.track import through
 _FINE, _MOST = 1e-8, 25
 # Places where a long step is looked into for modes that come and go on it.
 _PROBES = (1 / 3, 2 / 3)
+# Every so many tries the bracket of a root is halved, whatever the polynomial says.
+_OFTEN = 6
 # Places nearer to one another than this tell nothing new.
 _APART = 1e-5
 # How far beyond the ends a zero is looked for, and how far beside a place another will do.
@@ -132,23 +134,30 @@ class Chord:
         return None
 
     def root(self, value):
-        """The place where a function of the path's points changes its sign.
+        """The place where a function of the path's points changes its sign, as it does between the ends.
 
-        The polynomial through the nearest values is solved for it, until two answers for the load factor agree. The
-        last is not solved for: there the tangent would be singular.
+        The polynomial through the nearest values, and those on either side of the change, is solved for it, until two
+        answers for the load factor agree. The last is not solved for: there the tangent would be singular. An answer
+        next to a known place is believed if the sign changes right beside it; where it does not, as before a kink, and
+        now and then where answers do not settle, the bracket is halved.
         """
         values = {at: value(point) for at, point in self.known}
         low, high = 0.0, 1.0
-        place, estimate = 0.5, None
-        for _ in range(_MOST):
-            places = _nearest(values, place)
+        place, estimate, halve = 0.5, None, False
+        for k in range(1, _MOST):
+            places = _nearest(values, place, always=(low, high))
             place = _zero(places, [values[at] for at in places], low, high)
             eta = self.load_factor(place)
             settled = estimate is not None and abs(eta - estimate) <= _FINE * max(abs(eta), abs(self.change))
-            if settled or min(abs(place - at) for at in values) < _APART:
+            known = min(abs(place - at) for at in values) < _APART
+            if settled or (known and high - low < 4 * _APART):
                 break
-            estimate = eta
-            found = self.at(place)
+            estimate, look = eta, place
+            if halve or k % _OFTEN == 0:
+                look, halve = (low + high) / 2, False
+            elif known:
+                look, halve = place + math.copysign(2 * _APART, low + high - 2 * place), True
+            found = self.at(look)
             if found is None:
                 break
             values[found[0]] = value(found[1])
@@ -158,14 +167,15 @@ class Chord:
                 low = max(low, found[0])
             else:
                 high = min(high, found[0])
+            halve = halve and high - low > 4 * _APART
         return place
 
 
-def _nearest(places, place):
-    """Up to four places nearest to a place and apart from one another."""
-    chosen = []
+def _nearest(places, place, always=()):
+    """Up to four places nearest to a place and apart from one another, beside those that are to be there always."""
+    chosen = list(always)
     for at in sorted(places, key=lambda at: abs(at - place)):
-        if len(chosen) < 4 and all(abs(at - other) >= _APART for other in chosen):
+        if len(chosen) < 4 + len(always) and all(abs(at - other) >= _APART for other in chosen):
             chosen.append(at)
     return chosen
 

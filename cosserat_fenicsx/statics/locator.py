@@ -121,8 +121,7 @@ class Locator:
         conservative its symmetric part may become indefinite where no other path crosses: then there is no crossing.
         """
         track = self.track
-        track.put(point.numbers, point.load_factor)
-        modes = track.stability.whole.modes(together)
+        modes = self._modes(chord, place, point, together)
         motion = modes[0] / math.sqrt(track.product(modes[0], modes[0]))
 
         def resistance(known):
@@ -138,6 +137,20 @@ class Locator:
         return [
             Crossing("bifurcation", point, place, mode, partner) for mode, partner in zip(modes, partners, strict=True)
         ]
+
+    def _modes(self, chord, place, point, together):
+        """The modes that lose their stability there. Of a member that is far softer than the rest other modes may be as near to
+        zero: then that of the point just behind, where it is negative."""
+        track, stability = self.track, self.track.stability.whole
+        track.put(point.numbers, point.load_factor)
+        modes = stability.modes(together)
+        behind = max(chord.neighbours(place), key=lambda known: known.negative_modes)
+        if together == 1 and behind.negative_modes > point.negative_modes:
+            track.put(behind.numbers, behind.load_factor)
+            known = stability.modes(1, side=-1)
+            if track.product(known[0], modes[0]) ** 2 < 0.25 * track.square(known[0]) * track.square(modes[0]):
+                return known
+        return modes
 
     def _vanishing(self, chord, j, last):
         """(place, `Point`, number of eigenvalues that vanish there together) for the j-th eigenvalue, of those below `last`."""

@@ -2,6 +2,7 @@
 
 import cosserat_fenicsx.compat  # noqa: F401, I001  first: it says in words what of dolfinx is missing
 
+import itertools
 import math
 import numbers
 from dataclasses import replace
@@ -136,9 +137,26 @@ def solve(
 
     with Progress(targets, progress, comm) as bar:
         try:
-            return take(choice, bar)
+            path = take(choice, bar)
         except Promoted as found:
-            return take(choice.in_space(found.reason), bar)
+            path = take(choice.in_space(found.reason), bar)
+    path.why.extend(_not_located(path))
+    return path
+
+
+def _not_located(path):
+    """Sentences on negative modes that came or went where no event was found."""
+    if path.model != "spatial" or path.scene.cautions:  # in a plane nobody looks for events; and that has been said
+        return
+    counts = [0, *path.negative_modes.tolist()]
+    for k, (before, after) in enumerate(itertools.pairwise(counts)):
+        located = sum(event.after == k - 1 for event in path.events)
+        if min(before, after) >= 0 and abs(after - before) > located:
+            yield (
+                f"negative modes go from {before} to {after} on the way to the load factor {path.load_factors[k]:.6g}, where "
+                f"{located or 'no'} event{'' if located == 1 else 's'} could be located: the path may have gone over to another one, or "
+                "the loads have no potential; try load factors in between"
+            )
 
 
 def _follow_options(steps, control, branch):

@@ -86,16 +86,13 @@ class Part:
         """The second variation at the problem's state and load factor, in K.
 
         Args:
-            stress_alone: leave out what holds whatever the stress: the stiffness against stretch and shear, and that
-                of supports and joints.
+            stress_alone: leave out what holds whatever the stress: the stiffness of sections, supports and joints.
         """
         problem, variation = self.problem, self.variation
         self.K.zeroEntries()
         if stress_alone:
             with self.model.stress_alone():
-                self._form.refresh()
                 self._form.add_to_matrix(self.K)
-            self._form.refresh()
         else:
             self._form.add_to_matrix(self.K)
         if problem.ties:
@@ -115,14 +112,14 @@ class Part:
             return negative - int(not zero and self._nearest(1)[0][0] < 0)
         return -1 if zero else negative
 
-    def _nearest(self, count):
-        """Eigenvalues next to zero and their vectors at the state that was counted last."""
+    def _nearest(self, count, side=0):
+        """Eigenvalues next to zero, on one side of it or both, and their vectors at the state that was counted last."""
         if self._zero:  # MUMPS leaves null pivots out of its solutions: the same vectors with all eigenvalues shifted
             self._zero, self._shift = 0, 10 * _ROUNDING * self.K.norm(_LARGEST_ROW)
             self.K.shift(self._shift)
             self.pc.setOperators(self.K)
             self.pc.setUp()
-        values, vectors = eigen.nearest_zero(self.K, self.pc, count)
+        values, vectors = eigen.nearest_zero(self.K, self.pc, count, side)
         return values - self._shift, vectors
 
     def is_neutral(self):
@@ -135,18 +132,18 @@ class Part:
         those next to zero."""
         self.count()
         above = j - self._negative  # 0: the smallest positive one, -1: the negative one next to zero
-        needed = 1 + (above if above >= 0 else -1 - above)
-        for wanted in (2 * needed, 4 * needed + 6, 16 * needed + 24):
-            values = np.sort(self._nearest(wanted)[0])
-            side = values[values >= 0] if above >= 0 else values[values < 0]
-            if len(side) >= needed:
-                return float(side[above])
-        return float(values[np.argmin(np.abs(values))])  # zero to round-off: the count says one sign, this another
+        needed, side = (1 + above, 1) if above >= 0 else (-above, -1)
+        values = self._nearest(needed, side)[0]
+        found = np.sort(np.abs(values[values * side >= 0]))
+        if len(found) >= needed:
+            return float(side * found[needed - 1])
+        return float(self._nearest(1)[0][0])  # zero to round-off: the count says one sign, this another
 
-    def modes(self, count):
-        """The modes of the eigenvalues nearest zero, as changes of the unknowns (owned numbers), see `oriented`."""
+    def modes(self, count, side=0):
+        """The modes of the eigenvalues nearest zero, on one side of it or both, as changes of the unknowns (owned numbers),
+        see `oriented`."""
         self.count()
-        return oriented(self.model, self._nearest(count)[1])
+        return oriented(self.model, self._nearest(count, side)[1])
 
 
 def oriented(model, vectors):
