@@ -185,6 +185,12 @@ def test_what_is_not_determined_is_said_in_words():
             cf.solve(scene, [1.0], model=model)
 
 
+def test_equal_supports_are_both_named():
+    rod = cf.Rod(cf.Line((0, 0, 0), (0, 0, 1.0)), SECTION)
+    with pytest.raises(cf.SceneError, match=r"supports\[0\] .* and supports\[1\] .* twice"):
+        cf.Scene([rod], [cf.Clamp(rod.start), cf.Clamp(rod.start)])
+
+
 def test_nearly_one_station():
     rod = cf.Rod(cf.Line((0, 0, 0), (0, 0, 1.0)), SECTION)
     with pytest.raises(cf.SceneError, match="hold the same motion twice"):

@@ -93,9 +93,11 @@ def check_held_once(scene):
 
 
 def _name(scene, holder):
-    if holder in scene.supports:
-        return f"supports[{scene.supports.index(holder)}] ({type(holder).__name__} at {holder.station})"
-    return f"joints[{scene.joints.index(holder)}] ({holder.first} with {holder.second})"
+    for i, support in enumerate(scene.supports):
+        if support is holder:  # another may be equal
+            return f"supports[{i}] ({type(holder).__name__} at {holder.station})"
+    (i,) = (i for i, joint in enumerate(scene.joints) if joint is holder)
+    return f"joints[{i}] ({holder.first} with {holder.second})"
 
 
 @functools.lru_cache(maxsize=32)  # scenes do not change, and are solved again and again
