@@ -48,7 +48,7 @@ class Interrupted(KeyboardInterrupt):
     """
 
     def __init__(self, path):
-        super().__init__(f"interrupted after {len(path)} {path.axis}(s)")
+        super().__init__(f"interrupted after {len(path)} {path.axis}{'' if len(path) == 1 else 's'}")
         self.path = path
 
 

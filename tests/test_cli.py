@@ -2,12 +2,14 @@
 
 import csv
 import os
+import re
 import signal
 import subprocess
 import sys
 import time
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 pytestmark = pytest.mark.serial
@@ -194,3 +196,27 @@ def test_every_demo_scene(scene, tmp_path):
 def test_buckling():
     done = cosserat("buckling", DEMO, "--count", "2")
     assert done.returncode == 0 and "critical load factor" in done.stdout, done.stderr
+
+
+def test_modes(capsys):
+    """Frequencies are those of `modes`; the table says where a mode moves, and which way."""
+    from cosserat_fenicsx import modes, read_scene
+    from cosserat_fenicsx.cli import main as cli
+
+    assert cli.main(["modes", str(DEMO), "--count", "2"]) == 0
+    said = capsys.readouterr().out
+    found = modes(read_scene(DEMO)[0], 2)
+    rows = [line.split("│") for line in said.splitlines() if line.startswith("│")]
+    assert [float(row[1]) for row in rows] == pytest.approx(found.frequencies, rel=1e-6)
+    for row in rows:
+        along = [float(x) for x in row[5].strip().strip("()").split(",")]
+        assert "column@20" in row[4] and along[2] == 0 and np.hypot(*along[:2]) == pytest.approx(1, abs=0.01)
+
+
+def test_soft_materials_are_asked_about(tmp_path, capsys):
+    from cosserat_fenicsx.cli import main as cli
+
+    file = tmp_path / "scene.toml"
+    file.write_text(re.sub("E = .*", "E = 210000", DEMO.read_text()))
+    cli.main(["run", str(file), "--load-factors", "1e-9"])
+    assert "E = 210000 Pa is softer than rubber: are the units SI" in capsys.readouterr().err

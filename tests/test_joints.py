@@ -224,3 +224,11 @@ def test_every_pair_of_three_rods_may_be_joined():
         path = cf.solve(cf.Scene(rods, [cf.Clamp(rods[0].end)], loads, joints), [1.0], elements=3)
         shapes.append(path.position(rods[2].end))
     np.testing.assert_allclose(shapes[0], shapes[1], atol=1e-13)
+
+
+def test_a_forgotten_joint_is_named():
+    first = cf.Rod(cf.Line((0, 0, 0), (0, 0, 1.0)), SECTION, name="leg")
+    second = cf.Rod(cf.Line((0, 0, 1.0), (1.0, 0, 1.0)), SECTION, name="beam")
+    scene = cf.Scene([first, second], [cf.Clamp(first.start)], [cf.Force(second.end, (0, 0, 1.0))])
+    with pytest.raises(cf.SceneError, match=r"Clamp\(beam.start\), or a Joint\(beam.start, leg.end\)"):
+        cf.solve(scene, [1.0])

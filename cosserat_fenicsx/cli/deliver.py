@@ -37,7 +37,9 @@ def deliver(computed, options, moving):
         if out is not None:
             film = options.animate if code != INTERRUPTED else None  # who stops a run does not wait for its film
             if code == INTERRUPTED:
-                say("cosserat: interrupted; what was reached is written, Ctrl-C again leaves out what is not written yet")
+                say(
+                    "cosserat: interrupted; what was reached is written, Ctrl-C again leaves out what is not written yet"
+                )
             try:
                 look = {"magnify": options.magnify, "shown": _shown(path, at), "film": film, "speed": options.speed}
                 _write(path, out, picture=not options.no_picture, **look)
@@ -45,6 +47,8 @@ def deliver(computed, options, moving):
                 trouble, code = "interrupted; what was being drawn or written then is incomplete", INTERRUPTED
     if trouble is not None:
         say(f"cosserat: {trouble}")
+        if moving and code == INTERRUPTED and not getattr(options, "folder", None):
+            say("cosserat: a motion that is run with --folder DIR can be gone on with")
         if getattr(options, "folder", None) and not isinstance(trouble, NotConverged):
             say(f"cosserat: `cosserat resume {options.folder}` goes on from there")
     return code
@@ -92,7 +96,7 @@ def _report(path):
 
     text = table(path)
     if first_rank():
-        print(text)
+        print(text, flush=True)  # before what is said of its end
 
 
 def _write(path, out, *, picture, magnify, shown, film, speed):

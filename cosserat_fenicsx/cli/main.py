@@ -18,7 +18,7 @@ def main(arguments=None):
     Returns:
         0 done, 1 not converged (the partial path is written), 2 bad input, 130 interrupted (likewise written).
     """
-    whole = parser({"run": _run, "resume": _resume, "buckling": _buckling, "explain": _explain})
+    whole = parser({"run": _run, "resume": _resume, "buckling": _buckling, "modes": _modes, "explain": _explain})
     options = whole.parse_args(arguments)
     if options.command is None:
         whole.print_help()
@@ -68,6 +68,9 @@ def _run(options):
     moving = motion_of(options)
     scene, load_factors, settings = (None, None, None) if moving else _settings(options)
 
+    for caution in (moving[0] if moving else scene).cautions:
+        say(f"cosserat: {caution}")
+
     def computed():
         if moving:
             from cosserat_fenicsx.dynamics.simulate import simulate
@@ -101,6 +104,21 @@ def _buckling(options):
         say(f"cosserat: {failure}")
         return NOT_CONVERGED
     say(buckling_table(found), file=sys.stdout)
+    return DONE
+
+
+def _modes(options):
+    from cosserat_fenicsx.dynamics.natural_modes import modes
+    from cosserat_fenicsx.results.tables import modes_table
+    from cosserat_fenicsx.scene.scenefile import read_scene
+
+    scene, _ = read_scene(options.scene)
+    try:
+        found = modes(scene, options.count, load_factor=options.load_factor)
+    except NotConverged as failure:
+        say(f"cosserat: {failure}")
+        return NOT_CONVERGED
+    say(modes_table(found), file=sys.stdout)
     return DONE
 
 

@@ -44,6 +44,12 @@ def parser(do):
     buckling.add_argument("--count", type=int, default=3, help="how many [3]")
     buckling.set_defaults(do=do["buckling"])
 
+    modes = commands.add_parser("modes", help="natural frequencies about any equilibrium")
+    modes.add_argument("scene", help="scene file (TOML)")
+    modes.add_argument("--count", type=int, default=5, help="how many [5]")
+    modes.add_argument("--load-factor", type=float, default=0.0, help="of the equilibrium [0: the unloaded rods]")
+    modes.set_defaults(do=do["modes"])
+
     explain = commands.add_parser("explain", help="say which model would be solved and how large it is")
     _common(explain)
     explain.set_defaults(do=do["explain"])

@@ -74,7 +74,7 @@ class StoredHistory(History):
             until = f"the states up to t = {self.times[-1]:.6g} s are" if len(self) else "nothing is"
             raise NotStored(
                 f"{self.folder}: {what} cannot be written: {problem.strerror or problem}. Make room; {until} kept there, "
-                f"and cosserat_fenicsx.resume({str(self.folder)!r}) goes on with it",
+                f"and cosserat_fenicsx.resume({str(self.folder)!r}), or `cosserat resume {self.folder}`, goes on with it",
                 self,
             ) from None
 

@@ -10,6 +10,8 @@ from cosserat_fenicsx.ranks import on_first
 
 # A named station is shown if it moves by this share of what moves most.
 _WORTH_TELLING = 0.2
+# A mode that displaces less than this (its largest displacement or turn is 1) is one of twist.
+_TWIST = 1e-6
 
 
 def path_table(path):
@@ -64,14 +66,37 @@ def buckling_table(found):
         caption="Load factors at which the unloaded state, extrapolated, loses its stability; estimated relative error. A "
         "structure that bends much before it buckles needs `cosserat run` instead.",
     )
-    for heading in ("critical load factor", "est. error", "mode moves most at (m)"):
+    for heading in ("critical load factor", "est. error", "mode moves most at (m)", "there along"):
         table.add_column(heading, justify="right")
     for k, (eta, error) in enumerate(zip(found.load_factors, found.error, strict=True)):
-        sizes = [(np.linalg.norm(found.mode(k, rod), axis=1), rod) for rod in found.scene.rods]
-        size, rod = max(sizes, key=lambda item: item[0].max())
-        s = rod.length * np.argmax(size) / (len(size) - 1)
-        table.add_row(f"{eta:.7g}", f"{error:.1e}", f"{rod.name}@{s:.4g}")
+        table.add_row(f"{eta:.7g}", f"{error:.1e}", *_farthest(found, k))
     return as_text(table) if len(found.load_factors) else "No buckling under positive load factors."
+
+
+def modes_table(found):
+    """Text: natural frequencies, and where each mode moves most."""
+    table = Table(
+        title=f"{found.scene.title or 'Natural frequencies'}: degree {found.degree}, {' + '.join(map(str, found.elements))} elements",
+        caption="Estimated relative error of the square of the frequency. 0 Hz: a free motion, or one that grows as exp(growth t).",
+    )
+    for heading in ("frequency (Hz)", "growth (1/s)", "est. error", "mode moves most at (m)", "there along"):
+        table.add_column(heading, justify="right")
+    for k, (frequency, growth, error) in enumerate(zip(found.frequencies, found.growth, found.error, strict=True)):
+        table.add_row(f"{frequency:.7g}", f"{growth:.4g}", f"{error:.1e}", *_farthest(found, k))
+    return as_text(table)
+
+
+def _farthest(found, k):
+    """The station that a mode moves most, and the direction there, inertial; of a mode of twist neither."""
+    sizes = [(np.linalg.norm(found.mode(k, rod), axis=1), rod) for rod in found.scene.rods]
+    size, rod = max(sizes, key=lambda item: item[0].max())
+    if size.max() < _TWIST:
+        return "sections turn", "-"
+    place = int(np.argmax(size))
+    along = found.mode(k, rod)[place] / size[place]
+    return f"{rod.name}@{rod.length * place / (len(size) - 1):.4g}", "({:.2f}, {:.2f}, {:.2f})".format(
+        *(np.round(along, 2) + 0.0)
+    )
 
 
 def describe(item):

@@ -15,6 +15,9 @@ from cosserat_fenicsx.scene.signals import signals_of
 from cosserat_fenicsx.scene.statical import check_held_once
 from cosserat_fenicsx.scene.supports import SUPPORTS
 
+# Young's moduli below this, Pa, are those of gels, or slips of units.
+_GEL = 1e6
+
 
 @dataclass(frozen=True, eq=False)
 class Scene:
@@ -154,10 +157,26 @@ class Scene:
     @property
     def cautions(self):
         """What a user of any answer should know, in sentences."""
-        following = [load for load in self.loads if getattr(load, "follows", False)]
-        if not following:
+        return [*self._softness(), *self._following()]
+
+    @property
+    def follows(self):
+        """Whether a load turns with its rod, so that it has no potential."""
+        return any(getattr(load, "follows", False) for load in self.loads)
+
+    def _softness(self):
+        """Young's moduli that may be in other units."""
+        soft = {rod.material.E for rod in self.rods if rod.material is not None and rod.material.E < _GEL}
+        return [
+            f"E = {E:g} Pa is softer than rubber: are the units SI (N, m, Pa; steel has 210e9)?" for E in sorted(soft)
+        ]
+
+    def _following(self):
+        kinds = " and ".join(
+            dict.fromkeys(type(load).__name__ for load in self.loads if getattr(load, "follows", False))
+        )
+        if not kinds:
             return []
-        kinds = " and ".join(dict.fromkeys(type(load).__name__ for load in following))
         return [
             f"{kinds}: a follower load has no potential, so negative modes, which are those of the tangent's symmetric part, do not "
             "decide on stability: an equilibrium that has some may be stable (Beck's column from pi^2 to 20.05 EI/L^2), one that has "

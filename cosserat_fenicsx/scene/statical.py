@@ -127,8 +127,8 @@ def check_no_mechanism(scene):
     for k, rod in enumerate(scene.rods):
         if np.linalg.matrix_rank(free[:, k], tol=1e-6) == 6:
             raise SceneError(
-                f"Scene.supports: nothing holds rod '{rod.name}', it is free to move: "
-                f"expected a support such as Clamp({rod.name}.start)"
+                f"Scene.supports: nothing holds rod '{rod.name}', it is free to move: expected a support such as "
+                f"Clamp({rod.name}.start){_or_a_joint(scene, rod)}"
             )
     k = int(np.argmax(np.abs(free).max(axis=(0, 2))))
     motion = free[np.argmax(np.abs(free[:, k]).max(axis=1)), k]
@@ -137,6 +137,16 @@ def check_no_mechanism(scene):
         f"Scene is a mechanism: rod '{scene.rods[k].name}' can {_words(motion, starts[k], size)}{others}: "
         "expected supports and joints that hold it, such as a Clamp or a Hinge"
     )
+
+
+def _or_a_joint(scene, rod):
+    """What else a rod that is free may be missing, in words, where one of its ends lies on another's."""
+    for end in (rod.start, rod.end):
+        for there in (there for other in scene.rods if other is not rod for there in (other.start, other.end)):
+            apart = rod.curve.position(end.s) - there.rod.curve.position(there.s)
+            if np.linalg.norm(apart) <= 1e-6 * rod.length:
+                return f", or a Joint({end}, {there}), which lie at one point"
+    return ""
 
 
 def _words(motion, start, size):

@@ -146,7 +146,7 @@ def solve(
 
 def _not_located(path):
     """Sentences on negative modes that came or went where no event was found."""
-    if path.model != "spatial" or path.scene.cautions:  # in a plane nobody looks for events; and that has been said
+    if path.model != "spatial" or path.scene.follows:  # in a plane nobody looks for events; and that has been said
         return
     counts = [0, *path.negative_modes.tolist()]
     for k, (before, after) in enumerate(itertools.pairwise(counts)):

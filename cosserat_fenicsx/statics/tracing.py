@@ -71,7 +71,7 @@ class Tracing:
         self._bar.at(point)
         if self._choice.promoted and point.negative_modes:
             where = f"before the load factor {point.load_factor:.4g}"
-            if self.problem.model.scene.cautions:
+            if self.problem.model.scene.follows:
                 raise Promoted(f"negative modes appear {where}, and the spatial model follows what comes of it")
             if self.stability.sideways:
                 raise Promoted(

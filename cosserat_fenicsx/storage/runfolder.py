@@ -74,7 +74,7 @@ class RunFolder:
         if (place / _HEAD).exists() and (place / _START).exists():  # else its process was killed before the first step
             raise SceneError(
                 f"simulate.folder = {str(place)!r}: it holds a motion already: expected another name, or that it is removed "
-                f"first; cosserat_fenicsx.resume({str(place)!r}) goes on with it"
+                f"first; cosserat_fenicsx.resume({str(place)!r}), or `cosserat resume {place}`, goes on with it"
             )
         place.mkdir(parents=True, exist_ok=True)
         for name in ("instants.npy", _SCENE, _START, _LATEST):
