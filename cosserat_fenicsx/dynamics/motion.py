@@ -80,7 +80,7 @@ class Motion:
         nothing = 1e-9 * (end - begin)
         while self._t < end:
             obey()
-            wanted = self._pace.length(end - self._t)
+            wanted = self._pace.length(self._t, end - self._t)
             if abs(wanted - self._h) > 1e-9 * wanted:  # equal steps are counted, so that times do not gather rounding
                 self._first, self._count, self._h = self._t, 0, wanted
             if not self._advance(self._t, self._h):

@@ -2,6 +2,8 @@
 
 import math
 
+from cosserat_fenicsx.dynamics.resolution import Resolution
+
 
 class Fixed:
     """Steps of one length, shorter where they have to land on a time.
@@ -13,9 +15,12 @@ class Fixed:
     def __init__(self, dt):
         self._dt = dt
 
-    def length(self, left):
-        """The next step where so much is left to the next time to land on, s."""
-        return left / max(1, math.ceil(left / self._dt - 1e-9))
+    #: steps in a row that were too short to come to an end
+    tiny = 0
+
+    def length(self, t, left):
+        """The next step from the time t where so much is left to the next time to land on, s."""
+        return _even(left, self._dt)
 
     def accepts(self, stepper, h):
         """Whether a stepper's last step, of length h, stands."""
@@ -24,6 +29,9 @@ class Fixed:
     def failed(self, h):
         """A step of length h failed: whether a shorter one is tried in its place; otherwise it is halved, whatever that gives."""
         return False
+
+    def watch(self, scene, load_factor):
+        """The loads of this scene are to be looked at."""
 
     def jump(self):
         """Something jumps here."""
@@ -57,16 +65,39 @@ class Adaptive:
     #: than this share of tol is not believed, unless it is shorter than that share of the duration
     _SURPRISING, _BELIEVED = 0.06, 1e-7
 
-    def __init__(self, tol, duration):
-        self._rate, self._dt, self._longest = tol / duration, duration * self._SHORTEST, duration / 100
-        self._surprising, self._believed = self._SURPRISING * tol, self._BELIEVED * duration
+    #: steps shorter than this share of the duration are tiny; for so many steps after loads have asked for shorter ones they
+    #: do not grow
+    _TINY, _STAY = 1e-6, 24
 
-    def length(self, left):
+    def __init__(self, tol, duration):
+        self._duration, self._rate, self._dt, self._longest = duration, tol / duration, duration * self._SHORTEST, duration / 100
+        self._surprising, self._believed = self._SURPRISING * tol, self._BELIEVED * duration
+        self._tol, self._stay, self.tiny = tol, 0, 0
+
+    def watch(self, scene, load_factor):
+        """Steps are to resolve what the loads and the prescribed motions of a scene do."""
+        self._resolution = Resolution(scene, self._duration, load_factor, self._tol)
+
+    def length(self, t, left):
         """See `Fixed`."""
-        return left / max(1, math.ceil(left / self._dt - 1e-9))
+        h = _even(left, self._dt)
+        resolved = self._resolution.longest(t, h)
+        if resolved < h:
+            self._dt, self._stay = resolved, self._STAY
+            h = _even(left, resolved)
+        return h
 
     def accepts(self, stepper, h):
         """See `Fixed`."""
+        accepted = self._accepts(stepper, h)
+        if h < self._TINY * self._duration:
+            self.tiny += 1
+        elif accepted:
+            self.tiny = 0
+        self._stay -= accepted and self._stay > 0
+        return accepted
+
+    def _accepts(self, stepper, h):
         if h > self._believed and stepper.surprise() > self._surprising:
             self._dt = self._SHRINK * h
             return False
@@ -77,7 +108,7 @@ class Adaptive:
         factor = min(self._GROW, max(self._SHRINK, math.sqrt(self._AIM * allowed / max(error, 1e-300))))
         if factor < self._SHORTER:
             self._dt = min(self._dt, factor * h)
-        elif factor > self._LONGER and h > self._dt / self._LONGER:
+        elif factor > self._LONGER and not self._stay and h > self._dt / self._LONGER:
             self._dt = min(factor * h, self._longest)
         return error <= 2 * allowed
 
@@ -92,8 +123,14 @@ class Adaptive:
 
     def memory(self):
         """See `Fixed`."""
-        return {"dt": self._dt}
+        return {"dt": self._dt, "stay": self._stay, "tiny": self.tiny, "seen": self._resolution.memory()}
 
     def recall(self, memory):
         """See `Fixed`."""
-        self._dt = memory["dt"]
+        self._dt, self._stay, self.tiny = memory["dt"], memory["stay"], memory["tiny"]
+        self._resolution.recall(memory["seen"])
+
+
+def _even(left, dt):
+    """A step of dt at most that goes evenly into what is left, but for rounding."""
+    return left / max(1, math.ceil(left / dt - 1e-9))

@@ -98,6 +98,7 @@ def simulate(
         load_factor = start if isinstance(start, numbers.Real) else 1.0
     number("simulate", "load_factor", load_factor, "a finite number", math.isfinite)
     looked_at = scene.over(duration)
+    pace.watch(scene, load_factor)
     cautions = []
     if isinstance(start, numbers.Real):
         start = equilibrium(looked_at, start, model=model, elements=elements, degree=degree, comm=comm)
