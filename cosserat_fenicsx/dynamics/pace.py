@@ -2,7 +2,7 @@
 
 import math
 
-from cosserat_fenicsx.dynamics.resolution import Resolution
+from cosserat_fenicsx.dynamics.resolution import Resolution, coarse_for
 
 
 class Fixed:
@@ -10,13 +10,15 @@ class Fixed:
 
     Args:
         dt: s.
+
+    Attributes:
+        stuck: whether steps have been too short for so long that there is no end of it.
     """
 
     def __init__(self, dt):
         self._dt = dt
 
-    #: steps in a row that were too short to come to an end
-    tiny = 0
+    stuck = False
 
     def length(self, t, left):
         """The next step from the time t where so much is left to the next time to land on, s."""
@@ -30,8 +32,16 @@ class Fixed:
         """A step of length h failed: whether a shorter one is tried in its place; otherwise it is halved, whatever that gives."""
         return False
 
-    def watch(self, scene, load_factor):
-        """The loads of this scene are to be looked at."""
+    def watch(self, scene, duration, load_factor, missed):
+        """Look at the loads and the prescribed motions of a scene.
+
+        Args: as of `Resolution`.
+
+        Returns:
+            what to be told of it, sentences.
+        """
+        told = coarse_for(scene, duration, self._dt)
+        return [told] if told else []
 
     def jump(self):
         """Something jumps here."""
@@ -45,7 +55,7 @@ class Fixed:
 
 
 class Adaptive:
-    """Steps whose local errors add up to `tol` over the duration.
+    """Steps whose local errors add up to `tol` over the duration, and that resolve loads and prescribed motions.
 
     They change where a change pays: each costs a tangent.
 
@@ -65,18 +75,30 @@ class Adaptive:
     #: than this share of tol is not believed, unless it is shorter than that share of the duration
     _SURPRISING, _BELIEVED = 0.06, 1e-7
 
-    #: steps shorter than this share of the duration are tiny; for so many steps after loads have asked for shorter ones they
-    #: do not grow
-    _TINY, _STAY = 1e-6, 24
+    #: steps shorter than this share of the duration are tiny, and so many of them in a row too many
+    _TINY, _MANY = 1e-6, 5000
+    #: for so many steps after loads have asked for shorter ones they do not grow
+    _STAY = 24
 
     def __init__(self, tol, duration):
-        self._duration, self._rate, self._dt, self._longest = duration, tol / duration, duration * self._SHORTEST, duration / 100
+        self._duration, self._rate, self._dt, self._longest = (
+            duration,
+            tol / duration,
+            duration * self._SHORTEST,
+            duration / 100,
+        )
         self._surprising, self._believed = self._SURPRISING * tol, self._BELIEVED * duration
-        self._tol, self._stay, self.tiny = tol, 0, 0
+        self._tol, self._stay, self._tiny = tol, 0, 0
 
-    def watch(self, scene, load_factor):
-        """Steps are to resolve what the loads and the prescribed motions of a scene do."""
-        self._resolution = Resolution(scene, self._duration, load_factor, self._tol)
+    def watch(self, scene, duration, load_factor, missed):
+        """See `Fixed`: steps are to resolve them."""
+        self._resolution = Resolution(scene, duration, self._tol, load_factor, missed)
+        return []
+
+    @property
+    def stuck(self):
+        """See `Fixed`."""
+        return self._tiny > self._MANY
 
     def length(self, t, left):
         """See `Fixed`."""
@@ -91,9 +113,9 @@ class Adaptive:
         """See `Fixed`."""
         accepted = self._accepts(stepper, h)
         if h < self._TINY * self._duration:
-            self.tiny += 1
+            self._tiny += 1
         elif accepted:
-            self.tiny = 0
+            self._tiny = 0
         self._stay -= accepted and self._stay > 0
         return accepted
 
@@ -101,10 +123,11 @@ class Adaptive:
         if h > self._believed and stepper.surprise() > self._surprising:
             self._dt = self._SHRINK * h
             return False
-        error = stepper.error()
-        if error is None:
-            return True
-        allowed = self._rate * h
+        error, allowed = stepper.error(), self._rate * h
+        if error is None:  # soon after a jump steps may only grow
+            error = stepper.error(early=True)
+            if error is None or self._LONGER**2 * error > self._AIM * allowed:
+                return True
         factor = min(self._GROW, max(self._SHRINK, math.sqrt(self._AIM * allowed / max(error, 1e-300))))
         if factor < self._SHORTER:
             self._dt = min(self._dt, factor * h)
@@ -123,11 +146,11 @@ class Adaptive:
 
     def memory(self):
         """See `Fixed`."""
-        return {"dt": self._dt, "stay": self._stay, "tiny": self.tiny, "seen": self._resolution.memory()}
+        return {"dt": self._dt, "stay": self._stay, "tiny": self._tiny, "seen": self._resolution.memory()}
 
     def recall(self, memory):
         """See `Fixed`."""
-        self._dt, self._stay, self.tiny = memory["dt"], memory["stay"], memory["tiny"]
+        self._dt, self._stay, self._tiny = memory["dt"], memory["stay"], memory["tiny"]
         self._resolution.recall(memory["seen"])
 
 

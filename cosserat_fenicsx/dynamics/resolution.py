@@ -6,14 +6,16 @@ time is looked at within a step before it is made, at places that no frequency f
 
 Two things are asked of it. Straight between the ends of the step it must be what it is, but for a share of its range: that
 is ten steps a period or more. And the impulse that a load gives by its value half way must be the true one: of a smooth load
-f the sum of what is missed is h^2/24 times how much f' changes (Euler & Maclaurin), and as a speed that nothing takes back it
-grows to a displacement until the end of the motion, or, of what is clamped, for as long as the rod takes to swing back.
+f the sum of what is missed is h^2/24 times how much f' changes, with its values at the ends h^2/12 (Euler & Maclaurin). As a
+speed that nothing takes back it grows to a displacement until the end of the motion, or, of what is clamped, for as long as
+the rods take to swing back.
 """
 
 import math
 
 import numpy as np
 
+from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.scene.signals import signals_of
 
 # Places in a step, its ends but for jumps that are there; no two distances between them are in a simple ratio.
@@ -26,8 +28,11 @@ _SCANNED, _LEAST = 512, 16
 _NOTHING = 0.1
 # Share of the tolerance that the impulses missed may amount to.
 _SHARE = 0.5
-# What a step has seen counts in those after it, by so much less in each: steps of one length miss least.
-_FORGOTTEN = 0.99
+# What a step has seen counts in those after it, by so much less in each: steps of one length miss least. It is forgotten
+# soon where so little of it is left: a jump that nobody told of.
+_FORGOTTEN, _SUDDEN = 0.99, 1e-3
+# Fixed steps are looked at in so many places, and told of where they are longer than resolves by more than this.
+_LOOKED, _COARSE = 200, 0.85
 _GOLDEN = (math.sqrt(5) - 1) / 2
 
 
@@ -35,17 +40,16 @@ class Resolution:
     """The functions of time of a scene.
 
     Args:
-        scene: a `Scene`; duration: s; load_factor: of all loads.
-        tol: see `simulate`.
+        scene: a `Scene`; duration: s; tol: see `simulate`.
+        load_factor: of all loads; missed: see `Stepper.missed`.
     """
 
-    def __init__(self, scene, duration, load_factor, tol):
-        allowed = _SHARE * tol * max(rod.length for rod in scene.rods) / max(abs(load_factor), 1e-300)
+    def __init__(self, scene, duration, tol, load_factor, missed):
+        size = max(rod.length for rod in scene.rods)
+        allowed = _SHARE * tol * size / max(24 * missed * abs(load_factor), 1e-300)
         self._watched = [
             _Watched(signal, _sway(scene, item, field), _memory_of(scene, duration), duration, allowed)
-            for item in scene.moving
-            for field, signal in signals_of(item).items()
-            if not getattr(signal.function, "straight", False)
+            for item, field, signal in _curved(scene)
         ]
 
     def longest(self, t, h):
@@ -64,6 +68,35 @@ class Resolution:
             if end > begin:
                 watched.enter(begin, end)
                 watched.range, watched.bent = seen
+
+
+def coarse_for(scene, duration, dt):
+    """What steps of one length do not resolve, a sentence, or None.
+
+    Args: as of `Resolution`; dt: s.
+    """
+    for item, field, signal in _curved(scene):
+        watched = _Watched(signal, None, duration, duration, 1.0)
+        steps = max(1, math.ceil(duration / dt - 1e-9))
+        for t in sorted({dt * int(steps * x) for x in np.arange(_LOOKED) * _GOLDEN % 1}):
+            h = min([dt, *(x - t for x in signal.jumps if x > t + 1e-6 * dt)])
+            if watched.longest(t, h) < _COARSE * h:
+                return (
+                    f"{type(item).__name__}.{field} changes faster than steps of {dt:g} s can follow, such as at t = {t:.4g} s: "
+                    "fewer than about ten steps a swing, or a rise within a step; another answer may come out without a sign "
+                    "of it. Try a smaller dt, or tol"
+                )
+    return None
+
+
+def _curved(scene):
+    """(load or support, field, `Signal`) of a scene that are not straight between their jumps."""
+    return [
+        (item, field, signal)
+        for item in scene.moving
+        for field, signal in signals_of(item).items()
+        if not getattr(signal.function, "straight", False)
+    ]
 
 
 class _Watched:
@@ -95,14 +128,16 @@ class _Watched:
         begin, end = self.piece
         if not begin <= t + 1e-6 * h < end:
             before = max((x for x in self._marks if x <= t + 1e-6 * h), default=0.0)
-            after = min((x for x in self._marks if x > t + 1e-6 * h), default=self._duration * math.ceil((t + h) / self._duration))
+            after = min(
+                (x for x in self._marks if x > t + 1e-6 * h),
+                default=self._duration * math.ceil((t + h) / self._duration),
+            )
             self.enter(before, after)
-        self.bent *= _FORGOTTEN
-        while h > self._shortest:
-            self.bent = max(self.bent, self._bent(t, h))
-            if self.bent * h**2 <= 1:
-                break
+        before, now = self.bent, self._bent(t, h)
+        self.bent = max(now, before * (_FORGOTTEN if now > _SUDDEN * before else 0.5))
+        while self.bent * h**2 > 1 and h > self._shortest:
             h = max(h / 4, 0.95 / math.sqrt(self.bent), self._shortest)
+            self.bent = max(self.bent, self._bent(t, h))
         return h
 
     def _bent(self, t, h):
@@ -119,7 +154,13 @@ class _Watched:
         return max(off / (_OFF * self.range), self._drift * missed) / h**2
 
     def _at(self, times):
-        return np.array([self._signal(t) for t in times])
+        values = []
+        for t in times:
+            try:
+                values.append(self._signal(t))
+            except SceneError:  # a step that gets there will say so
+                values.append(values[-1] if values else (0.0, 0.0, 0.0))
+        return np.array(values)
 
 
 def _sway(scene, item, field):
@@ -141,8 +182,9 @@ def _sway(scene, item, field):
 
 
 def _memory_of(scene, duration):
-    """How long a speed lasts that a load gives, s: to the end, or where a clamp holds all up, while the softest rod swings back."""
-    if not any(support.clamps for support in scene.supports):
+    """How long a speed lasts that a load gives, s: to the end, or where clamps hold all, while the softest rod swings back."""
+    clamped = {scene.leader(support.station.rod) for support in scene.supports if support.clamps}
+    if not clamped.issuperset(map(scene.leader, scene.rods)) or not all(joint.rigid for joint in scene.joints):
         return duration
     size, soft = sum(rod.length for rod in scene.rods), []
     for rod in scene.rods:
