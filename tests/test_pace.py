@@ -5,6 +5,7 @@ import pytest
 
 import cosserat_fenicsx as cf
 from cosserat_fenicsx.dynamics.pace import Adaptive
+from cosserat_fenicsx.dynamics.resolution import Resolution
 
 pytestmark = pytest.mark.serial
 
@@ -112,3 +113,17 @@ def test_steps_that_stay_tiny_end_in_words(monkeypatch):
     with pytest.raises(cf.NotConverged, match="do not get longer again.*jumps") as caught:
         cf.simulate(cf.Scene([rod], [], [noise]), 10.0, elements=1, degree=1, save_every=1.0)
     assert len(caught.value.path) > 1
+
+
+def test_what_steps_have_seen_of_loads_is_remembered():
+    """A motion that goes on from what was kept takes the same steps."""
+    section = cf.Stiffness((1e3, 1e3), 1e3, (10, 10), 10, mass=1.0, inertia=(1e-3, 1e-3, 2e-3))
+    rod = cf.Rod(cf.Line((0, 0, 0), (1, 0, 0)), section)
+    load = cf.Force(rod.end, lambda t: (0, np.exp(-((t - 3.3) ** 2) * 100), 0), jumps=(6.0,))
+    first, second = (Resolution(cf.Scene([rod], [], [load]), 10.0, 1e-3, 1.0, 1 / 24) for _ in range(2))
+    for t in (0.5, 3.2, 3.25):
+        first.longest(t, 0.1)
+    second.recall(first.memory())
+    steps = [first.longest(t, 0.1) for t in (3.3, 3.5, 7.0)]
+    assert steps == [second.longest(t, 0.1) for t in (3.3, 3.5, 7.0)]
+    assert steps[0] < 0.1
