@@ -67,7 +67,17 @@ ROOMS = {
 #: Files that put a scene's model, its solvers and its results together; the other solvers know no rung, no scene, no result.
 FITTERS = {
     "statics": {"first_mesh", "linear_buckling", "refinement", "solve", "solvers", "tracing"},
-    "dynamics": {"motion", "natural_modes", "resuming", "simulate", "solvers", "standing", "start", "marks"},
+    "dynamics": {
+        "motion",
+        "natural_modes",
+        "resuming",
+        "simulate",
+        "solvers",
+        "standing",
+        "start",
+        "marks",
+        "resolution",
+    },
 }
 
 

@@ -80,7 +80,13 @@ class Motion:
         nothing = 1e-9 * (end - begin)
         while self._t < end:
             obey()
-            wanted = self._pace.length(end - self._t)
+            if self._pace.stuck:
+                self._lose(
+                    self._t,
+                    f"steps of {self._h:.3g} s do not get longer again: something swings or jumps there faster than is worth "
+                    "following. Try a fixed dt, a larger tol, damping, scheme='generalised-alpha', or `jumps` where a load is not smooth.",
+                )
+            wanted = self._pace.length(self._t, end - self._t)
             if abs(wanted - self._h) > 1e-9 * wanted:  # equal steps are counted, so that times do not gather rounding
                 self._first, self._count, self._h = self._t, 0, wanted
             if not self._advance(self._t, self._h):
@@ -117,16 +123,18 @@ class Motion:
         if not halvings and self._pace.failed(h):
             return False
         if halvings == _HALVINGS:
-            if self.history[-1].time < t:
-                self._save(t)
-            raise NotConverged(
-                f"the motion was lost at t = {t:.6g} s, where a step of {h:.3g} s still fails: {solved.reason}. "
-                "Try a smaller dt or tol, more elements, or damping.",
-                self.history,
+            self._lose(
+                t,
+                f"a step of {h:.3g} s still fails: {solved.reason}. Try a smaller dt or tol, more elements, or damping.",
             )
         self._advance(t, h / 2, halvings + 1)
         self._advance(t + h / 2, h / 2, halvings + 1)
         return True
+
+    def _lose(self, t, why):
+        if self.history[-1].time < t:
+            self._save(t)
+        raise NotConverged(f"the motion was lost at t = {t:.6g} s, where {why}", self.history)
 
     def _save(self, t):
         model, problem, stepper = self.model, self.problem, self._stepper

@@ -84,6 +84,7 @@ def _go_on(kept, scene, comm, progress):
     problem.begin()
     stepper.begin()
     pace = pace_of(asked["duration"], tol=asked["tol"], dt=asked["dt"], scheme=scheme)
+    pace.watch(scene, asked["duration"], load_factor, stepper.missed)
     motion = Motion(problem, stepper, pace, history, kept)
     motion.recall(memory)
     return motion.over(marks_of(scene, until, asked["save_every"], ends), asked["save_every"] is None, progress)

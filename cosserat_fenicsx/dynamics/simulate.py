@@ -53,9 +53,10 @@ def simulate(
         scene: a `Scene`; every rod needs a mass and inertia.
         duration: s.
         tol: what the errors of single steps may add up to over the whole duration, of positions over the longest rod's
-            length and of a tenth of rotations (rad); steps adapt to it. Default 1e-3, unless `dt` is given. The mesh
-            does not adapt: compare with more `elements`.
-        dt: fixed step, s; shorter where it would step over a jump or a saved time. A step that fails is halved.
+            length and of a tenth of rotations (rad); steps adapt to it, and resolve what loads and prescribed motions do.
+            Default 1e-3, unless `dt` is given. The mesh does not adapt: compare with more `elements`.
+        dt: fixed step, s; shorter where it would step over a jump or a saved time. A step that fails is halved. History.why
+            tells where loads change faster than it can follow.
         model: "spatial"; "planar" for a scene that moves in a plane; or "auto", the cheaper one that will do.
         scheme: "momentum" (exact linear and angular momentum, order 2); "triple-jump" (three steps of it, one back in
             time: order 4, for smooth motions without damping, fixed dt); "energy" (exact energy and linear momentum,
@@ -81,7 +82,7 @@ def simulate(
 
     Raises:
         SceneError: an argument outside its range, a rod without inertia, or a start that supports contradict.
-        NotConverged: a step fails however short it is; `.path` holds the History up to there.
+        NotConverged: a step fails however short it is, or thousands of them stay tiny; `.path` holds the History up to there.
         Interrupted: Ctrl-C; `.path` holds the History up to there.
         NotStored: the folder cannot be written any more, such as on a full disk; `.path` holds the History up to there.
     """
@@ -106,6 +107,7 @@ def simulate(
     model, why = chosen_model(looked_at, model, scheme, start)
     problem, stepper = solvers_of(looked_at, Layout.of(scene, elements), degree, scheme, load_factor, comm, model)
     stepper.rho_inf = rho_inf
+    cautions += pace.watch(scene, duration, load_factor, stepper.missed)
     cautions += put_start(problem.model, start)
     problem.begin()
     stepper.begin()

@@ -64,6 +64,10 @@ class Collocated:
     def begin_rates(self):
         """A motion starts with the state and its velocity: strain rates follow, accelerations are not known yet."""
         self._node_rates[:] = self._strain_rates[:] = 0.0
+        self.follow_velocities()
+
+    def follow_velocities(self):
+        """Strain rates become those of the velocities, where a step begins."""
         if self.damped:
             self._strain_rates[0] = self._at_gauss(self._strain_rate)
 

@@ -1,7 +1,8 @@
 """Vectors that depend on time: any function of t, and the usual ones by name.
 
 A load or a prescribed motion takes a vector, one of the classes below, or a function of time (s) that gives a vector,
-with `jumps` where it is not smooth: steps in time land on these.
+with `jumps` where it is not smooth: steps in time land on these. What is `straight` between them says so: no step is too long
+to see what it does.
 """
 
 import dataclasses
@@ -26,6 +27,8 @@ class Step:
     value: tuple
     start: float = 0.0
     end: float | None = None
+
+    straight = True
 
     def __post_init__(self):
         _check(self, "start", *(() if self.end is None else ("end",)))
@@ -65,6 +68,8 @@ class Ramp(_FromTo):
         SceneError: numbers that are not finite, or an end that is not after the start.
     """
 
+    straight = True
+
     def __call__(self, t):
         """The vector at t."""
         return _times(min(max((t - self.start) / (self.end - self.start), 0.0), 1.0), self.value)
@@ -101,6 +106,8 @@ class Triangle:
     start: float = 0.0
     peak: float = 1.0
     end: float = 2.0
+
+    straight = True
 
     def __post_init__(self):
         _check(self, "start", "peak", "end")
@@ -162,6 +169,8 @@ class Table:
 
     times: tuple
     values: tuple
+
+    straight = True
 
     def __post_init__(self):
         times = self._array("times", 1)

@@ -14,6 +14,7 @@ class OneStep:
     """See `protocol.Stepper`."""
 
     order, adapts, rho_inf, keeps_kinks = 2, True, None, True
+    missed = 1 / 24  # loads act as they are half way
     #: error of a step over that of the trapezoidal rule, as measured
     coarseness = 1.0
 
@@ -76,16 +77,18 @@ class OneStep:
         order = np.argsort(self._comm.allreduce(missed) if self._comm.size > 1 else missed)
         return [guesses[k] for k in order]
 
-    def error(self):
-        """See `Stepper`: h^3/12 times the third derivative of the cubic through the last four states.
+    def error(self, early=False):
+        """See `Stepper`: h^3/12 times the third derivative of the cubic through four states, the last of them that of now.
 
         Positions alone, since velocities carry what fast waves leave; those are not resolved, and small.
         """
-        if len(self._past) < 3 * _APART:
+        apart = min(_APART, len(self._past) // 3) if early else _APART
+        past = self._past[-3 * apart :]
+        if not apart or len(past) < 3 * apart:
             return None
-        steps = np.array([h for h, *_ in self._past])
-        states = [state for _, state, *_ in self._past[::_APART]] + [self._state]
-        times = np.concatenate([[0.0], np.cumsum(steps)])[::_APART]
+        steps = np.array([h for h, *_ in past])
+        states = [state for _, state, *_ in past[::apart]] + [self._state]
+        times = np.concatenate([[0.0], np.cumsum(steps)])[::apart]
         weights = [1 / np.prod([a - b for b in times if b != a]) for a in times]
         third = sum(w * x for w, x in zip(weights, states, strict=True))  # a sixth of the derivative
         return self.coarseness * 0.5 * steps[-1] ** 3 * self.problem.model.largest_of(third, TURNS)

@@ -12,6 +12,7 @@ class Stepper(Protocol):
         keeps_kinks: whether a kink of a prescribed motion would make its velocities alternate for good.
         adapts: whether `error` and `undo` are known.
         rho_inf: by how much a step shrinks what vibrates much faster than the steps, where that can be set; else None.
+        missed: impulse that steps h miss of a load, over h^2 times how much its rate of change rises meanwhile.
         work, dissipated: dimensionless, since `begin`: what loads and supports have done, and what damping has taken.
     """
 
@@ -19,6 +20,7 @@ class Stepper(Protocol):
     keeps_kinks: bool
     adapts: bool
     rho_inf: float | None
+    missed: float
     forms: str
     problem_class: type
     work: float
@@ -44,9 +46,9 @@ class Stepper(Protocol):
             converged, all is as it was at t.
         """
 
-    def error(self):
+    def error(self, early=False):
         """Estimated local error of the last step, of positions (lengths) and rotations (rad); None where too few steps
-        are known since the start or a jump."""
+        are known since the start or a jump. `early`: also from few steps; what waves do in them then counts too."""
 
     def surprise(self):
         """How far the last step ended from where the steps before foretold it, as `error` measures it."""

@@ -16,7 +16,7 @@ class TripleJump:
     """See `protocol.Stepper`."""
 
     order, adapts, rho_inf, keeps_kinks = 4, False, None, True
-    forms, problem_class = Momentum.forms, Momentum.problem_class
+    forms, problem_class, missed = Momentum.forms, Momentum.problem_class, Momentum.missed
 
     def __init__(self, problem):
         self.problem, self._inner = problem, Momentum(problem)
