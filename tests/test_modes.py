@@ -80,6 +80,31 @@ def test_a_free_rod_has_six_motions_for_nothing():
     assert beta(modes, rod)[6] == pytest.approx(4.7300407, rel=2e-2) and modes.squares[7] > modes.squares[6]
 
 
+@pytest.mark.parametrize("EI", [1e-4, 1e-7])
+def test_no_copy_of_a_low_frequency_is_missing(EI):
+    """A round wire at the end of a heavy steel shaft: pairs of equal squares, ten orders and more below the shaft's own."""
+    A, I = math.pi * 0.1**2, math.pi * 0.1**4 / 4  # noqa: E741
+    steel = cf.Stiffness((7e10 * A,) * 2, 2e11 * A, (2e11 * I,) * 2, 1.6e11 * I, mass=7850 * A, inertia=(7850 * I,) * 3)
+    wire = cf.Stiffness((EI * 1e4,) * 2, EI * 1e4, (EI, EI), EI, mass=0.01, inertia=(1e-7, 1e-7, 2e-7))
+    first = cf.Rod(cf.Line((0, 0, 0), (2, 0, 0)), steel, name="shaft")
+    second = cf.Rod(cf.Line((2, 0, 0), (3, 0, 0)), wire, name="wire")
+    scene = cf.Scene([first, second], [cf.Clamp(first.start)], joints=[cf.Joint(first.end, second.start)])
+    alone = cf.Scene([second], [cf.Clamp(second.start)])
+    for count in (2, 3):
+        squares = cf.modes(scene, count, elements=4).squares
+        np.testing.assert_allclose(squares, cf.modes(alone, count, elements=4).squares, rtol=1e-7)
+    np.testing.assert_allclose(squares[:2] * 0.01 / EI, 1.8751041**4, rtol=1e-3)
+    assert squares[2] > 30 * squares[1]
+
+
+def test_motions_for_nothing_of_a_very_thin_rod():
+    """Length over diameter 1e4: rounding moves their squares by 1e-2 in units of EI/(rho A L^4)."""
+    rod = cf.Rod(LINE, cf.Circle(1e-4), cf.Material(1e9, 0.3, 1e3))
+    squares = cf.modes(cf.Scene([rod]), 7, elements=8).squares
+    assert squares[:6].tolist() == [0.0] * 6
+    assert squares[6] == pytest.approx(4.7300407**4 * 1e9 * (0.5e-4) ** 2 / 4 / 1e3, rel=1e-2)
+
+
 def test_a_compressed_column_loses_its_frequency():
     """Pinned at both ends, omega^2 = omega_0^2 (1 - P/P_cr); beyond P_cr it is unstable, as `negative_modes` says."""
     section = cf.Stiffness((1e6, 1e6), 1e6, (1.0, 50.0), 10.0, mass=1.0, inertia=(1e-6, 1e-4, 1e-4))

@@ -8,8 +8,8 @@ import numpy as np
 from mpi4py import MPI
 from scipy import sparse
 
-from cosserat_fenicsx.algebra import eigen
 from cosserat_fenicsx.algebra.packed import Packed
+from cosserat_fenicsx.algebra.pencil import Pencil
 from cosserat_fenicsx.checks import instance, number, refuse
 from cosserat_fenicsx.errors import NotConverged
 from cosserat_fenicsx.models.compiled import lobatto_weights
@@ -24,8 +24,6 @@ from cosserat_fenicsx.statics.solve import check_arguments
 from cosserat_fenicsx.statics.solvers import solvers_of
 
 _MOST_ELEMENTS = 128
-# Squares of frequencies below this, over EI/(rho A L^4), are zero: motions that nothing resists.
-_NOTHING = 1e-6
 # A mode that displaces less than this, over the longest rod's length times its largest turn, is one of twist.
 _TWIST = 1e-6
 
@@ -141,24 +139,11 @@ def _on_mesh(scene, layout, count, load_factor, degree, comm):
     K, rows, held = _stiffness(problem)
     unit = max(float(rod.profile.range[1].mass) for rod in scene.rods)
     M = _mass(problem.model, rows, K.shape[0], unit)
-    squares, vectors = _lowest(K, M, held, count, max(negative, 0))
-    squares, vectors = squares[:count], vectors[:, :count]
-    squares = np.where(np.abs(squares) < _NOTHING, 0.0, squares)
+    squares, vectors = Pencil(K, M, held).lowest(count)
     scales = problem.model.scales
     shapes = np.array([_shape(vector, rows) for vector in vectors.T]).reshape(len(squares), -1, 6)
     shapes[:, :, 3:] /= scales.length
     return squares * scales.force / (unit * scales.length**2), shapes, negative
-
-
-def _lowest(K, M, held, count, negative):
-    """The lowest eigenvalues of the constrained pencil and their vectors (size, n), ascending; `negative` of them below 0."""
-    wanted = count + negative
-    while True:
-        squares, vectors = eigen.lowest_of_constrained(K, M, held, wanted)
-        if np.count_nonzero(squares < -_NOTHING) >= negative or wanted >= K.shape[0]:
-            order = np.argsort(squares)
-            return squares[order], vectors[:, order]
-        wanted = min(2 * wanted, K.shape[0])
 
 
 def _shape(vector, rows):
