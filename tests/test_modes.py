@@ -83,7 +83,7 @@ def test_a_free_rod_has_six_motions_for_nothing():
 @pytest.mark.parametrize("EI", [1e-4, 1e-7])
 def test_no_copy_of_a_low_frequency_is_missing(EI):
     """A round wire at the end of a heavy steel shaft: pairs of equal squares, ten orders and more below the shaft's own."""
-    A, I = math.pi * 0.1**2, math.pi * 0.1**4 / 4  # noqa: E741
+    A, I = math.pi * 0.1**2, math.pi * 0.1**4 / 4
     steel = cf.Stiffness((7e10 * A,) * 2, 2e11 * A, (2e11 * I,) * 2, 1.6e11 * I, mass=7850 * A, inertia=(7850 * I,) * 3)
     wire = cf.Stiffness((EI * 1e4,) * 2, EI * 1e4, (EI, EI), EI, mass=0.01, inertia=(1e-7, 1e-7, 2e-7))
     first = cf.Rod(cf.Line((0, 0, 0), (2, 0, 0)), steel, name="shaft")
