@@ -1,5 +1,6 @@
 """Natural frequencies against Timoshenko's and Euler's beams, about loaded states, of free rods; and long vibrations."""
 
+import itertools
 import math
 
 import numpy as np
@@ -118,6 +119,42 @@ def test_a_compressed_column_loses_its_frequency():
         path = cf.solve(scene, [eta], model="spatial", elements=4, control="load")
         assert path.negative_modes[-1] == modes.negative_modes
     assert modes.growth[0] == pytest.approx(math.pi**2 * math.sqrt(0.3), rel=1e-3) and modes.frequencies[0] == 0
+
+
+def hanging(held, rods=1, down=(0, 0, -1)):
+    """Rods of 1 m, 2 kg, one below the other on hinges about y, under their weight."""
+    section = cf.Stiffness((1e7,) * 2, 1e7, (1e4, 1e4), 1e4, mass=2.0, inertia=(1e-4, 1e-4, 2e-4))
+    ends = [np.multiply(k, down) for k in range(rods + 1)]
+    rods = [cf.Rod(cf.Line(tuple(a), tuple(b)), section) for a, b in itertools.pairwise(ends)]
+    joints = [cf.Joint(a.end, b.start, (0, 1, 0)) for a, b in itertools.pairwise(rods)]
+    return cf.Scene(rods, [held(rods[0].start)], [cf.Weight()], joints)
+
+
+def on_a_hinge(station):
+    return cf.Hinge(station, (0, 1, 0))
+
+
+def test_pendulums():
+    """Mechanisms without their weight. One rod: omega^2 = m g L/2 over m L^2/3 + J; two: the eigenvalues of their small swings."""
+    square = 9.81 / (2 / 3 + 1e-4)
+    down = cf.modes(hanging(on_a_hinge), 2, load_factor=1.0)
+    assert down.squares[0] == pytest.approx(square, rel=1e-5) and down.negative_modes == 0
+    assert down.squares[1] > 1e4 and down.error.max() <= 1e-6
+    assert cf.modes(hanging(on_a_hinge), 1, load_factor=2.0).squares[0] == pytest.approx(2 * square, rel=1e-5)
+    up = cf.modes(hanging(on_a_hinge, down=(0, 0, 1)), 1, load_factor=1.0, elements=2)
+    assert up.squares[0] == pytest.approx(-square, rel=1e-4) and up.negative_modes == 1
+    ball = cf.modes(hanging(cf.Pin), 3, load_factor=1.0, elements=2)
+    assert ball.squares[0] == 0 and ball.negative_modes == 0  # it spins about itself
+    np.testing.assert_allclose(ball.squares[1:], square, rtol=1e-5)
+    two = cf.modes(hanging(on_a_hinge, rods=2), 2, load_factor=1.0, elements=2)
+    inertia, stiffness = [[4 / 3 + 5e-5, 1 / 2], [1 / 2, 1 / 3 + 5e-5]], np.diag([1.5, 0.5])
+    exact = np.sort(np.linalg.eigvals(np.linalg.solve(inertia, 9.81 * stiffness)))
+    np.testing.assert_allclose(two.squares, exact, rtol=1e-3)  # they bend a little
+    with pytest.raises(cf.NotConverged, match="next to the reference, where the scene is a mechanism"):
+        cf.modes(hanging(on_a_hinge, down=(1, 0, 0)), 1, load_factor=1.0, elements=2)
+    rod = cf.Rod(LINE, cf.Circle(0.1), cf.Material(1e9, 0.3, 1e3), name="rod")
+    with pytest.raises(cf.SceneError, match="nothing holds rod 'rod'"):
+        cf.modes(cf.Scene([rod], loads=[cf.Weight()]), 1, load_factor=1.0)
 
 
 @pytest.mark.serial
