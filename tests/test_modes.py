@@ -143,9 +143,6 @@ def test_pendulums():
     assert cf.modes(hanging(on_a_hinge), 1, load_factor=2.0).squares[0] == pytest.approx(2 * square, rel=1e-5)
     up = cf.modes(hanging(on_a_hinge, down=(0, 0, 1)), 1, load_factor=1.0, elements=2)
     assert up.squares[0] == pytest.approx(-square, rel=1e-4) and up.negative_modes == 1
-    ball = cf.modes(hanging(cf.Pin), 3, load_factor=1.0, elements=2)
-    assert ball.squares[0] == 0 and ball.negative_modes == 0  # it spins about itself
-    np.testing.assert_allclose(ball.squares[1:], square, rtol=1e-5)
     two = cf.modes(hanging(on_a_hinge, rods=2), 2, load_factor=1.0, elements=2)
     inertia, stiffness = [[4 / 3 + 5e-5, 1 / 2], [1 / 2, 1 / 3 + 5e-5]], np.diag([1.5, 0.5])
     exact = np.sort(np.linalg.eigvals(np.linalg.solve(inertia, 9.81 * stiffness)))
@@ -155,6 +152,13 @@ def test_pendulums():
     rod = cf.Rod(LINE, cf.Circle(0.1), cf.Material(1e9, 0.3, 1e3), name="rod")
     with pytest.raises(cf.SceneError, match="nothing holds rod 'rod'"):
         cf.modes(cf.Scene([rod], loads=[cf.Weight()]), 1, load_factor=1.0)
+
+
+@pytest.mark.serial  # factors of many ranks call the tangent singular, which a spin makes it but for rounding
+def test_a_pendulum_on_a_ball_spins_about_itself():
+    ball = cf.modes(hanging(cf.Pin), 3, load_factor=1.0, elements=2)
+    assert ball.squares[0] == 0 and ball.negative_modes == 0
+    np.testing.assert_allclose(ball.squares[1:], 9.81 / (2 / 3 + 1e-4), rtol=1e-5)
 
 
 @pytest.mark.serial
