@@ -12,7 +12,13 @@ class InstallationError(CosseratError, ImportError):
 
 
 class SceneError(CosseratError, ValueError):
-    """A scene that cannot be solved as it is described: says what, where, and what was expected."""
+    """A scene that cannot be solved as it is described: says what, where, and what was expected.
+
+    Attributes:
+        path: the `History` up to there, where it was found while a motion was computed, else None.
+    """
+
+    path = None
 
 
 class NotConverged(CosseratError, RuntimeError):

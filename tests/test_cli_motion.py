@@ -1,6 +1,7 @@
 """Motions on the command line, and in scene files: table, files, words, what is refused."""
 
 import csv
+import math
 import re
 
 import numpy as np
@@ -13,6 +14,7 @@ from cosserat_fenicsx.cli import explain_motion
 from cosserat_fenicsx.cli import main as cli
 from cosserat_fenicsx.dynamics.standing import before
 from cosserat_fenicsx.results import motion_tables
+from cosserat_fenicsx.scene.signals import Triangle
 
 pytestmark = pytest.mark.serial
 MOTIONS = DEMO.parent / "motions"
@@ -82,6 +84,15 @@ def test_a_motion_that_is_written_as_it_goes(tmp_path, cosserat):
     ):
         code, _, trouble = cosserat(*arguments)
         assert code == 2 and words in trouble, trouble
+
+
+def test_a_load_that_fails_late_leaves_what_was_reached(tmp_path, cosserat, monkeypatch):
+    late = Triangle.__call__
+    monkeypatch.setattr(Triangle, "__call__", lambda self, t: late(self, t) if t < 0.5 else (math.nan,) * 3)
+    file = DEMO.parent / "motions" / "flying_spaghetti_3d.toml"
+    code, table, said = cosserat("run", file, "--model", "spatial", *SHORT, "-o", tmp_path, "--no-picture")
+    assert code == 2 and "at the time t = 0.525 s, of the Force at" in said
+    assert "0.5" in table and len((tmp_path / "motion.csv").read_text().splitlines()) > 10
 
 
 def test_a_scene_behind_animate(capsys):

@@ -1,5 +1,6 @@
 """Natural frequencies against Timoshenko's and Euler's beams, about loaded states, of free rods; and long vibrations."""
 
+import itertools
 import math
 
 import numpy as np
@@ -80,6 +81,31 @@ def test_a_free_rod_has_six_motions_for_nothing():
     assert beta(modes, rod)[6] == pytest.approx(4.7300407, rel=2e-2) and modes.squares[7] > modes.squares[6]
 
 
+@pytest.mark.parametrize("EI", [1e-4, 1e-7])
+def test_no_copy_of_a_low_frequency_is_missing(EI):
+    """A round wire at the end of a heavy steel shaft: pairs of equal squares, ten orders and more below the shaft's own."""
+    A, I = math.pi * 0.1**2, math.pi * 0.1**4 / 4
+    steel = cf.Stiffness((7e10 * A,) * 2, 2e11 * A, (2e11 * I,) * 2, 1.6e11 * I, mass=7850 * A, inertia=(7850 * I,) * 3)
+    wire = cf.Stiffness((EI * 1e4,) * 2, EI * 1e4, (EI, EI), EI, mass=0.01, inertia=(1e-7, 1e-7, 2e-7))
+    first = cf.Rod(cf.Line((0, 0, 0), (2, 0, 0)), steel, name="shaft")
+    second = cf.Rod(cf.Line((2, 0, 0), (3, 0, 0)), wire, name="wire")
+    scene = cf.Scene([first, second], [cf.Clamp(first.start)], joints=[cf.Joint(first.end, second.start)])
+    alone = cf.Scene([second], [cf.Clamp(second.start)])
+    for count in (2, 3):
+        squares = cf.modes(scene, count, elements=4).squares
+        np.testing.assert_allclose(squares, cf.modes(alone, count, elements=4).squares, rtol=1e-7)
+    np.testing.assert_allclose(squares[:2] * 0.01 / EI, 1.8751041**4, rtol=1e-3)
+    assert squares[2] > 30 * squares[1]
+
+
+def test_motions_for_nothing_of_a_very_thin_rod():
+    """Length over diameter 1e4: rounding moves their squares by 1e-2 in units of EI/(rho A L^4)."""
+    rod = cf.Rod(LINE, cf.Circle(1e-4), cf.Material(1e9, 0.3, 1e3))
+    squares = cf.modes(cf.Scene([rod]), 7, elements=8).squares
+    assert squares[:6].tolist() == [0.0] * 6
+    assert squares[6] == pytest.approx(4.7300407**4 * 1e9 * (0.5e-4) ** 2 / 4 / 1e3, rel=1e-2)
+
+
 def test_a_compressed_column_loses_its_frequency():
     """Pinned at both ends, omega^2 = omega_0^2 (1 - P/P_cr); beyond P_cr it is unstable, as `negative_modes` says."""
     section = cf.Stiffness((1e6, 1e6), 1e6, (1.0, 50.0), 10.0, mass=1.0, inertia=(1e-6, 1e-4, 1e-4))
@@ -93,6 +119,46 @@ def test_a_compressed_column_loses_its_frequency():
         path = cf.solve(scene, [eta], model="spatial", elements=4, control="load")
         assert path.negative_modes[-1] == modes.negative_modes
     assert modes.growth[0] == pytest.approx(math.pi**2 * math.sqrt(0.3), rel=1e-3) and modes.frequencies[0] == 0
+
+
+def hanging(held, rods=1, down=(0, 0, -1)):
+    """Rods of 1 m, 2 kg, one below the other on hinges about y, under their weight."""
+    section = cf.Stiffness((1e7,) * 2, 1e7, (1e4, 1e4), 1e4, mass=2.0, inertia=(1e-4, 1e-4, 2e-4))
+    ends = [np.multiply(k, down) for k in range(rods + 1)]
+    rods = [cf.Rod(cf.Line(tuple(a), tuple(b)), section) for a, b in itertools.pairwise(ends)]
+    joints = [cf.Joint(a.end, b.start, (0, 1, 0)) for a, b in itertools.pairwise(rods)]
+    return cf.Scene(rods, [held(rods[0].start)], [cf.Weight()], joints)
+
+
+def on_a_hinge(station):
+    return cf.Hinge(station, (0, 1, 0))
+
+
+def test_pendulums():
+    """Mechanisms without their weight. One rod: omega^2 = m g L/2 over m L^2/3 + J; two: the eigenvalues of their small swings."""
+    square = 9.81 / (2 / 3 + 1e-4)
+    down = cf.modes(hanging(on_a_hinge), 2, load_factor=1.0)
+    assert down.squares[0] == pytest.approx(square, rel=1e-5) and down.negative_modes == 0
+    assert down.squares[1] > 1e4 and down.error.max() <= 1e-6
+    assert cf.modes(hanging(on_a_hinge), 1, load_factor=2.0).squares[0] == pytest.approx(2 * square, rel=1e-5)
+    up = cf.modes(hanging(on_a_hinge, down=(0, 0, 1)), 1, load_factor=1.0, elements=2)
+    assert up.squares[0] == pytest.approx(-square, rel=1e-4) and up.negative_modes == 1
+    two = cf.modes(hanging(on_a_hinge, rods=2), 2, load_factor=1.0, elements=2)
+    inertia, stiffness = [[4 / 3 + 5e-5, 1 / 2], [1 / 2, 1 / 3 + 5e-5]], np.diag([1.5, 0.5])
+    exact = np.sort(np.linalg.eigvals(np.linalg.solve(inertia, 9.81 * stiffness)))
+    np.testing.assert_allclose(two.squares, exact, rtol=1e-3)  # they bend a little
+    with pytest.raises(cf.NotConverged, match="next to the reference, where the scene is a mechanism"):
+        cf.modes(hanging(on_a_hinge, down=(1, 0, 0)), 1, load_factor=1.0, elements=2)
+    rod = cf.Rod(LINE, cf.Circle(0.1), cf.Material(1e9, 0.3, 1e3), name="rod")
+    with pytest.raises(cf.SceneError, match="nothing holds rod 'rod'"):
+        cf.modes(cf.Scene([rod], loads=[cf.Weight()]), 1, load_factor=1.0)
+
+
+@pytest.mark.serial  # factors of many ranks call the tangent singular, which a spin makes it but for rounding
+def test_a_pendulum_on_a_ball_spins_about_itself():
+    ball = cf.modes(hanging(cf.Pin), 3, load_factor=1.0, elements=2)
+    assert ball.squares[0] == 0 and ball.negative_modes == 0
+    np.testing.assert_allclose(ball.squares[1:], 9.81 / (2 / 3 + 1e-4), rtol=1e-5)
 
 
 @pytest.mark.serial

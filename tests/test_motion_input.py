@@ -65,6 +65,12 @@ REFUSED = {
     "statics in time": (lambda: cf.solve(LATE_NAN, [1.0]), "the Force depends on time, and statics knows none"),
     "a step longer than the motion": (lambda: cf.simulate(FREE, 1.0, dt=50.0), "simulate.dt = 50.0: expected at most the duration, 1 s"),
     "a number for a vector": (lambda: cf.Sine(5.0, 2.0), "Sine.value = 5.0: expected a vector"),
+    "no end of steps": (lambda: cf.simulate(FREE, 1.0, dt=1e-18), "simulate: duration = 1 s and dt = 1e-18 s: expected at most 1e+09 steps"),
+    "no end of states": (lambda: cf.simulate(FREE, 1.0, save_every=1e-12), "save_every = 1e-12 s: expected at most 1e+06 saved states"),
+    "no end": (lambda: cf.simulate(FREE, 1e308), "simulate.duration = 1e+308: expected a positive number (s), from 1e-30 to 1e30"),
+    "no step": (lambda: cf.simulate(FREE, 1.0, dt=1e-300), "simulate.dt = 1e-300: expected a positive number (s), from"),
+    "schemes": (lambda: cf.simulate(FREE, 1.0, scheme=["energy"]), "scheme = ['energy']: did you mean 'energy'?"),
+    "true start": (lambda: cf.simulate(FREE, 1.0, start=True), "simulate.start = True: expected a load factor, a Path"),
     "infinite stiffness": (lambda: moving(rods=[cf.Rod(ROD.curve, sections(axial=math.inf), name="a")]), "infinite axial or shear stiffness: expected finite ones, for a motion"),
 }  # fmt: skip
 
@@ -75,6 +81,70 @@ def test_refused(case):
     with pytest.raises(cf.SceneError) as refusal:
         make()
     assert words in str(refusal.value)
+
+
+def driven(**motion):
+    return cf.Scene([ROD], [cf.Prescribed(ROD.start, **motion)], [cf.Force(ROD.end, cf.Step((0, 1, 0), 0.5))])
+
+
+@pytest.mark.parametrize("scheme", ["momentum", "energy", "triple-jump", "generalised-alpha"])
+def test_a_support_that_jumps_is_refused(scheme):
+    """What it does depends on the step alone."""
+
+    def jumping(t):
+        return (0, 0, 0) if t < 0.5 else (0, 0.01 + 1e-3 * (t - 0.5), 0)
+
+    refused = {
+        "displacement jumps at t = 0.5 s, by 0.05 m": {"displacement": cf.Step((0, 0.05, 0), 0.5)},
+        "rotation jumps at t = 1 s, by 0.3 rad": {"rotation": cf.Step((0, 0, 0.3), 1.0)},
+        "displacement jumps at t = 0.5 s, by 0.03 m": {
+            "displacement": cf.Table((0.5, 0.5 + 1e-12), ((0, 0, 0), (0, 0.03, 0)))
+        },
+        "displacement jumps at t = 0.25 s, by 0.02 m": {"displacement": cf.Sine((0, 0.02, 0), 1.0, math.pi / 2, 0.25)},
+        "displacement jumps at t = 0.5 s, by 0.01 m": {"displacement": jumping, "jumps": (0.25, 0.5)},
+    }
+    for words, motion in refused.items():
+        with pytest.raises(
+            cf.SceneError,
+            match=rf"supports\[0\] \(Prescribed at rod.start\): its {words}: expected .* a Ramp or a RunUp",
+        ):
+            cf.simulate(driven(**motion), 1.0, dt=0.25, scheme=scheme)
+
+
+def test_a_support_that_bends_and_a_load_that_jumps_are_taken():
+    back = cf.Table((0, 0.5, 0.6), ((0, 0, 0), (0, 0.05, 0), (0, 0, 0)))
+
+    def run_up(t):
+        """With the rounding of 1 - cos where it is next to nothing, and not known after the end."""
+        assert t <= 1
+        return (0, max(0.0, t - 0.25) ** 2 / 2 + (math.cos(max(0.0, t - 0.25)) - 1), 0)
+
+    assert (
+        cf.simulate(driven(displacement=run_up, jumps=(0.25, 1.0)), 1.0, dt=0.25, elements=1, degree=1).times[-1] == 1.0
+    )
+    for motion in (back, cf.Ramp((0, 1e-3, 0), 0.25, 0.5), cf.RunUp((0, 1e-3, 0), 0.25, 0.5)):
+        assert cf.simulate(driven(displacement=motion), 1.0, dt=0.25, elements=1, degree=1).times[-1] == 1.0
+
+
+def raising(t):
+    return (0, 1 / (1.0 if t < 0.5 else 0), 0)
+
+
+def no_number(t):
+    return (0, 1.0 if t < 0.5 else math.nan, 0)
+
+
+@pytest.mark.parametrize("force", [raising, no_number])
+def test_a_function_of_time_that_fails_late_leaves_the_history(force):
+    """And says which load failed, and when."""
+    scene = cf.Scene([ROD], loads=[cf.Force(ROD.start, (0, 1, 0)), cf.Force(ROD.end, force)])
+    how = {"dt": 0.1, "model": "spatial", "elements": 1, "degree": 1}
+    with pytest.raises(cf.SceneError, match=r"at the time t = 0.55 s, of the Force at rod.end") as failure:
+        cf.simulate(scene, 1.0, **how)
+    np.testing.assert_allclose(failure.value.path.times, [0, 0.1, 0.2, 0.3, 0.4, 0.5])
+    if force is raising:
+        assert "Force.force: its function raised ZeroDivisionError (" in str(failure.value)
+        assert isinstance(failure.value.__cause__, ZeroDivisionError)
 
 
 def test_functions_of_time():

@@ -93,7 +93,7 @@ def test_what_cannot_be_done_is_said(tmp_path, monkeypatch):
         run("plane", folder)
     other = runfolder.RunFolder(folder, cf.read_history(folder, scene).comm)
     other.hold()
-    other.open().extend(4)
+    other.open().extend(4, scene)
     with pytest.raises(cf.SceneError, match="another process is at work on this motion"):
         cf.resume(folder, scene)
     other.release()
@@ -104,3 +104,82 @@ def test_what_cannot_be_done_is_said(tmp_path, monkeypatch):
     (tmp_path / "file").write_text("")
     with pytest.raises(cf.SceneError, match=r"simulate.folder = .*: expected a folder that can be written to"):
         run("plane", tmp_path / "file")
+
+
+SECTION = cf.Stiffness((5e3, 5e3), 1e4, (50, 50), 40, mass=1.0, inertia=(0.01, 0.01, 0.02))
+ROD = cf.Rod(cf.Line((0, 0, 0), (1, 0, 0)), SECTION, name="rod")
+HELD = [cf.Clamp(ROD.start)]
+BEGUN = {"dt": 0.05, "elements": 1, "degree": 2}
+
+
+def pushed(force):
+    return cf.Scene([ROD], HELD, [cf.Force(ROD.end, force)])
+
+
+def test_a_scene_that_changes_after_the_first_duration_is_another(tmp_path):
+    """It is looked at over the longest duration that was ever asked for, also of the one that is asked for now."""
+    folder = tmp_path / "motion"
+    first = pushed(lambda t: (0, 5.0, 0))
+    cf.simulate(first, 1.0, folder=folder, **BEGUN)
+    head = (folder / "motion.json").read_text()
+    changes = {2.0: 1.0, 2.9: 2.5}
+    for until, since in changes.items():
+        other = pushed(lambda t, since=since: (0, 5.0 if t <= since else 50.0, 0))
+        with pytest.raises(
+            cf.SceneError, match=r"force at t = .* s is \[0.0, 50.0, 0.0\], where the motion has \[0.0, 5.0, 0.0\]"
+        ):
+            cf.resume(folder, other, duration=until)
+        assert cf.resume(folder, other).times[-1] < until  # the same motion so far
+        assert (folder / "motion.json").read_text() == head
+        assert cf.resume(folder, first, duration=until).times[-1] == until
+        with pytest.raises(cf.SceneError, match="the scene is not the one of the motion"):
+            cf.resume(folder, other)
+        head = (folder / "motion.json").read_text()
+
+
+def test_what_differs_is_told_where_it_differs_most(tmp_path):
+    """A sine that is zero to rounding half way says nothing there."""
+    folder = tmp_path / "motion"
+    cf.simulate(pushed(cf.Sine((0, 5, 0), 2.0)), 1.0, folder=folder, **BEGUN)
+    with pytest.raises(cf.SceneError) as refusal:
+        cf.resume(folder, pushed(cf.Sine((0, 6, 0), 2.0)))
+    told, expected = (float(part.split(", ")[1]) for part in str(refusal.value).split("[")[-2:])
+    assert told / expected == pytest.approx(1.2) and abs(told - expected) > 0.9
+    assert len(cf.resume(folder, pushed(cf.Sine((0, 5, 0), 2.0 * (1 + 1e-12))))) == 21
+
+
+def contents(folder):
+    return {file.name: file.read_bytes() for file in folder.iterdir()}
+
+
+LATE = {
+    "load": pushed(lambda t: (0, 1.0, 0 if t < 2 else 5.0)),
+    "motion": cf.Scene([ROD], [cf.Prescribed(ROD.start, lambda t: (0, 0.01 * t**2, max(0, t - 2) ** 3), (0, 0, 0))]),
+    "plane": cf.Scene([ROD], HELD, [cf.Force(ROD.end, lambda t: (0, 0, 0 if t < 2 else 5.0))]),
+}
+
+
+@pytest.mark.parametrize("case", LATE)
+def test_what_leaves_its_plane_later_is_refused_before_anything_is_written(tmp_path, case):
+    folder = tmp_path / "motion"
+    assert cf.simulate(LATE[case], 1.0, folder=folder, **BEGUN).model == "planar"
+    before = contents(folder)
+    with pytest.raises(
+        cf.SceneError, match=r"resume.duration = 3: .* was computed in the x-y plane, and until then"
+    ) as refusal:
+        cf.resume(folder, LATE[case], duration=3.0)
+    assert "a motion in space, by another simulate" in str(refusal.value) and "velocities" not in str(refusal.value)
+    assert contents(folder) == before
+    assert cf.resume(folder, LATE[case], duration=1.5).times[-1] == 1.5
+
+
+def test_a_longer_duration_that_is_refused_leaves_no_trace(tmp_path):
+    """A support that jumps later; more steps than can be."""
+    folder = tmp_path / "motion"
+    scene = cf.Scene([ROD], [cf.Prescribed(ROD.start, cf.Step((0, 0.1, 0), 2.0), (0, 0, 0))])
+    cf.simulate(scene, 1.0, folder=folder, **BEGUN)
+    before = (folder / "motion.json").read_bytes()
+    for until, words in ((3.0, "displacement jumps at t = 2 s, by 0.1 m"), (1e12, "expected at most 1e.09 steps")):
+        with pytest.raises(cf.SceneError, match=words):
+            cf.resume(folder, scene, duration=until)
+    assert (folder / "motion.json").read_bytes() == before

@@ -2,8 +2,6 @@
 
 import numpy as np
 from petsc4py import PETSc
-from scipy import sparse
-from scipy.sparse.linalg import splu
 from slepc4py import SLEPc
 
 from cosserat_fenicsx.algebra import linear
@@ -41,7 +39,14 @@ def nearest_zero(K, pc, count, side=0):
     solver = SLEPc.EPS().create(K.comm)
     solver.setOperators(inverse)
     which = {0: "LARGEST_MAGNITUDE", 1: "LARGEST_REAL", -1: "SMALLEST_REAL"}[side]
-    values, vectors = _solve(solver, SLEPc.EPS.ProblemType.HEP, getattr(SLEPc.EPS.Which, which), count, K, _COARSE if side else _TOLERANCE)
+    values, vectors = _solve(
+        solver,
+        SLEPc.EPS.ProblemType.HEP,
+        getattr(SLEPc.EPS.Which, which),
+        count,
+        K,
+        tolerance=_COARSE if side else _TOLERANCE,
+    )
     return 1 / values, vectors
 
 
@@ -59,53 +64,36 @@ def largest_of_pencil(A, B, count):
     return _solve(solver, SLEPc.EPS.ProblemType.GHEP, SLEPc.EPS.Which.LARGEST_REAL, count, A)
 
 
-def lowest_of_constrained(K, M, held, count, shift=-1.0):
-    """Eigenvalues of K x = lambda M x with held x = 0, next to `shift`; each rank solves all of it.
-
-    With M = L L^T in blocks these are those of L^T A L, A the part of the inverse of [[K - shift M, held^T],
-    [held, 0]] that belongs to x: 1/(lambda - shift).
+def largest_of_operator(operator, size, count, known):
+    """Eigenvalues of the largest magnitude of a symmetric operator, on this rank alone.
 
     Args:
-        K: symmetric, sparse, of scipy; M: symmetric and positive definite, of diagonal blocks (scipy's bsr_matrix).
-        held: (equations, size), dense.
+        operator: has `mult(mat, x, y)`.
+        size: of its vectors; count: how many are asked for.
+        known: (size, k) eigenvectors of length one that are not looked for.
 
     Returns:
-        (values (n,), vectors (size, n)), n <= count.
+        (values (n,), vectors (size, n) of length one), the largest first, n <= count.
     """
-    size, equations = K.shape[0], len(held)
-    L = M.copy()
-    L.data = np.linalg.cholesky(M.data)
-    held = sparse.csr_matrix(held)
-    factors = splu(
-        sparse.bmat([[K - shift * M, held.T], [held, None]] if equations else [[K - shift * M]], format="csc")
-    )
-    inverse = PETSc.Mat().createPython([size, size], _Congruent(factors, L, size + equations), comm=PETSc.COMM_SELF)
-    inverse.setUp()
+    matrix = PETSc.Mat().createPython([size, size], operator, comm=PETSc.COMM_SELF)
+    matrix.setUp()
     solver = SLEPc.EPS().create(PETSc.COMM_SELF)
-    solver.setOperators(inverse)
-    count = min(count, size - equations)
-    values, vectors = _solve(solver, SLEPc.EPS.ProblemType.HEP, SLEPc.EPS.Which.LARGEST_MAGNITUDE, count, inverse)
-    blocks = np.array([v.array_r for v in vectors]).reshape(len(vectors), *M.data.shape[:2], 1)
-    return shift + 1 / values, np.linalg.solve(L.data.transpose(0, 2, 1), blocks).reshape(len(vectors), size).T
+    solver.setOperators(matrix)
+    if known.shape[1]:
+        solver.setDeflationSpace(
+            [PETSc.Vec().createWithArray(column.copy(), comm=PETSc.COMM_SELF) for column in known.T]
+        )
+    room = size - known.shape[1]
+    values, vectors = _solve(
+        solver, SLEPc.EPS.ProblemType.HEP, SLEPc.EPS.Which.LARGEST_MAGNITUDE, count, matrix, room=room
+    )
+    return values, np.array([v.array_r for v in vectors]).reshape(len(vectors), size).T
 
 
-class _Congruent:
-    """L^T A L as a matrix, see `lowest_of_constrained`."""
-
-    def __init__(self, factors, L, size):
-        self._factors, self._L, self._size = factors, L, size
-
-    def mult(self, mat, x, y):
-        """PETSc's name for y = L^T A L x."""
-        force = np.zeros(self._size)
-        force[: len(x.array_r)] = self._L @ x.array_r
-        y.array_w[:] = self._L.T @ self._factors.solve(force)[: len(x.array_r)]
-
-
-def _solve(solver, kind, which, count, like, tolerance=_TOLERANCE):
+def _solve(solver, kind, which, count, like, *, room=None, tolerance=_TOLERANCE):
     solver.setProblemType(kind)
     solver.setWhichEigenpairs(which)
-    size = like.getSize()[0]
+    size = room or like.getSize()[0]
     count = min(count, size)
     solver.setDimensions(count, min(size, max(2 * count, count + 15)))
     solver.setTolerances(tolerance, 500)

@@ -31,13 +31,24 @@ def factor_tangent(pc, A, kind="general"):
 
 def factor_second_variation(pc, K):
     """A factorisation that tells the number of negative squares."""
-    pc.setType("cholesky")
     if K.comm.size == 1:
+        pc.setType("cholesky")
         pc.setFactorOrdering("nd")
     else:
-        factor = _mumps(pc, K)
-        factor.setMumpsIcntl(13, 1)  # the root front in one piece, or negative pivots are not all counted
-        factor.setMumpsIcntl(24, 1)  # null pivots are counted apart
+        factor_constrained(pc, K)
+
+
+def factor_constrained(pc, K, null=0.0):
+    """The same, of a matrix whose diagonal may be zero, because of added equations.
+
+    Args:
+        null: what pivots must be below to count as zero; 0.0 for rounding, relative to the largest row.
+    """
+    pc.setType("cholesky")
+    factor = _mumps(pc, K)
+    factor.setMumpsIcntl(13, 1)  # the root front in one piece, or negative pivots are not all counted
+    factor.setMumpsIcntl(24, 1)  # null pivots are counted apart
+    factor.setMumpsCntl(3, -null)
 
 
 def _mumps(pc, A):

@@ -4,7 +4,7 @@ import sys
 import tempfile
 from pathlib import Path
 
-from cosserat_fenicsx.cli.say import DONE, INTERRUPTED, NOT_CONVERGED, first_rank, say
+from cosserat_fenicsx.cli.say import BAD_INPUT, DONE, INTERRUPTED, NOT_CONVERGED, first_rank, say
 from cosserat_fenicsx.errors import Interrupted, NotConverged, NotStored, SceneError
 
 
@@ -30,6 +30,10 @@ def deliver(computed, options, moving):
         path = computed()
     except (NotConverged, NotStored) as failure:
         path, trouble, code = failure.path, failure, NOT_CONVERGED
+    except SceneError as failure:
+        if failure.path is None:
+            raise
+        path, trouble, code = failure.path, failure, BAD_INPUT
     except Interrupted as stop:
         path, trouble, code = stop.path, stop, INTERRUPTED
     if path is not None and len(path):
@@ -49,7 +53,7 @@ def deliver(computed, options, moving):
         say(f"cosserat: {trouble}")
         if moving and code == INTERRUPTED and not getattr(options, "folder", None):
             say("cosserat: a motion that is run with --folder DIR can be gone on with")
-        if getattr(options, "folder", None) and not isinstance(trouble, NotConverged):
+        if getattr(options, "folder", None) and not isinstance(trouble, NotConverged | SceneError):
             say(f"cosserat: `cosserat resume {options.folder}` goes on from there")
     return code
 

@@ -3,7 +3,7 @@
 import itertools
 
 from cosserat_fenicsx.dynamics.start import drive
-from cosserat_fenicsx.errors import Interrupted, NotConverged
+from cosserat_fenicsx.errors import Interrupted, NotConverged, SceneError
 from cosserat_fenicsx.interrupts import obey
 from cosserat_fenicsx.progress import Progress
 from cosserat_fenicsx.results.history import Instant, Ledger
@@ -58,6 +58,9 @@ class Motion:
                 self._keep()
         except KeyboardInterrupt:
             raise Interrupted(self.history) from None
+        except SceneError as problem:  # a function of time that says something impossible late
+            problem.path = self.history
+            raise
         finally:
             if self._folder:
                 self._folder.release()

@@ -8,14 +8,15 @@ import numpy as np
 from mpi4py import MPI
 from scipy import sparse
 
-from cosserat_fenicsx.algebra import eigen
 from cosserat_fenicsx.algebra.packed import Packed
+from cosserat_fenicsx.algebra.pencil import Pencil
 from cosserat_fenicsx.checks import instance, number, refuse
 from cosserat_fenicsx.errors import NotConverged
 from cosserat_fenicsx.models.compiled import lobatto_weights
 from cosserat_fenicsx.models.rod_data import check_inertia, nodal_inertia
 from cosserat_fenicsx.quaternions import directors
 from cosserat_fenicsx.scene.scene import Scene
+from cosserat_fenicsx.scene.statical import without_mechanism
 from cosserat_fenicsx.statics.continuation import StepControl
 from cosserat_fenicsx.statics.first_mesh import FIRST_ELEMENTS
 from cosserat_fenicsx.statics.follow import Follower
@@ -24,8 +25,8 @@ from cosserat_fenicsx.statics.solve import check_arguments
 from cosserat_fenicsx.statics.solvers import solvers_of
 
 _MOST_ELEMENTS = 128
-# Squares of frequencies below this, over EI/(rho A L^4), are zero: motions that nothing resists.
-_NOTHING = 1e-6
+# Newton iterations from an equilibrium that is held fast to the same one that is not.
+_CORRECTIONS = 10
 # A mode that displaces less than this, over the longest rod's length times its largest turn, is one of twist.
 _TWIST = 1e-6
 
@@ -87,7 +88,8 @@ def modes(scene, count=1, *, load_factor=0.0, tol=1e-6, elements=None, degree=4,
     Args:
         scene: a `Scene`; every rod needs a mass and inertia. Without a load factor it may be free to move.
         count: how many, from the smallest square on.
-        load_factor: eta of the state, a point of the path of load control from the unloaded reference.
+        load_factor: eta of the state, a point of the path of load control from the unloaded reference. A mechanism must be
+            drawn where its loads keep it, but for strains, such as a rod that hangs on a hinge.
         tol: relative accuracy of the squares: elements are doubled until two meshes agree to it, unless `elements` is
             given.
         elements: elements per rod; fixes the mesh.
@@ -109,7 +111,7 @@ def modes(scene, count=1, *, load_factor=0.0, tol=1e-6, elements=None, degree=4,
             refuse("modes", name, value, "a whole number above zero")
     number("modes", "tol", tol, "a number from 1e-12 to below 1", lambda x: 1e-12 <= x < 1)
     if load_factor:
-        check_arguments(scene, tol, elements)
+        check_arguments(without_mechanism(scene), tol, elements)
     comm = comm or MPI.COMM_WORLD
 
     def apart(fine, coarse):
@@ -131,34 +133,46 @@ def modes(scene, count=1, *, load_factor=0.0, tol=1e-6, elements=None, degree=4,
 
 def _on_mesh(scene, layout, count, load_factor, degree, comm):
     """Squares (n,), shapes (n, N, 6) and the number of negative modes on one mesh."""
-    problem, newton, stability = solvers_of(scene, layout, degree=degree, comm=comm)
-    if load_factor:
-        follower = Follower(problem, newton, stability, StepControl(), control="load")
-        if not follower.to(load_factor, abs(load_factor)):
-            failure = follower.track.failure
-            raise NotConverged(f"no equilibrium was found at the load factor {load_factor:g}: {failure}")
+    problem, stability = _loaded(scene, layout, load_factor, degree, comm)
     negative = stability.count() if load_factor else 0
     K, rows, held = _stiffness(problem)
     unit = max(float(rod.profile.range[1].mass) for rod in scene.rods)
     M = _mass(problem.model, rows, K.shape[0], unit)
-    squares, vectors = _lowest(K, M, held, count, max(negative, 0))
-    squares, vectors = squares[:count], vectors[:, :count]
-    squares = np.where(np.abs(squares) < _NOTHING, 0.0, squares)
+    squares, vectors = Pencil(K, M, held).lowest(count)
+    if (squares == 0).any():  # those below are known then, and rounding has given these a sign
+        negative = np.count_nonzero(squares < 0)
     scales = problem.model.scales
     shapes = np.array([_shape(vector, rows) for vector in vectors.T]).reshape(len(squares), -1, 6)
     shapes[:, :, 3:] /= scales.length
     return squares * scales.force / (unit * scales.length**2), shapes, negative
 
 
-def _lowest(K, M, held, count, negative):
-    """The lowest eigenvalues of the constrained pencil and their vectors (size, n), ascending; `negative` of them below 0."""
-    wanted = count + negative
-    while True:
-        squares, vectors = eigen.lowest_of_constrained(K, M, held, wanted)
-        if np.count_nonzero(squares < -_NOTHING) >= negative or wanted >= K.shape[0]:
-            order = np.argsort(squares)
-            return squares[order], vectors[:, order]
-        wanted = min(2 * wanted, K.shape[0])
+def _loaded(scene, layout, load_factor, degree, comm):
+    """The problem, in equilibrium at a load factor, and its stability.
+
+    A mechanism that its loads keep in place has no path from the unloaded state: its equilibrium is the one where it is held
+    fast, from where Newton's method goes on without.
+    """
+    held = without_mechanism(scene) if load_factor else scene
+    problem, newton, stability = solvers_of(held, layout, degree=degree, comm=comm)
+    if load_factor:
+        follower = Follower(problem, newton, stability, StepControl(), control="load")
+        if not follower.to(load_factor, abs(load_factor)):
+            _give_up(load_factor, follower.track.failure)
+    if held is not scene:
+        rq, n = problem.model.snapshot()  # on the same mesh
+        problem, newton, stability = solvers_of(scene, layout, degree=degree, comm=comm)
+        problem.set_load_factor(load_factor)
+        problem.begin_at(problem.model.unknowns_of(rq), n[..., :3], np.zeros(len(problem.multipliers())))
+        newton.allow(_CORRECTIONS)
+        solved = newton.solve()
+        if not solved.converged:
+            _give_up(load_factor, f"{solved.reason} next to the reference, where the scene is a mechanism")
+    return problem, stability
+
+
+def _give_up(load_factor, why):
+    raise NotConverged(f"no equilibrium was found at the load factor {load_factor:g}: {why}")
 
 
 def _shape(vector, rows):

@@ -6,7 +6,7 @@ import numpy as np
 from mpi4py import MPI
 
 from cosserat_fenicsx.checks import instance, refuse
-from cosserat_fenicsx.dynamics.simulate import pace_of, positive_time
+from cosserat_fenicsx.dynamics.simulate import check_counts, pace_of, positive_time
 from cosserat_fenicsx.dynamics.solvers import solvers_of
 from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.dynamics.marks import marks_of
@@ -34,7 +34,7 @@ def resume(folder, scene=None, *, duration=None, progress=None, comm=None):
             there unless the scene's functions have no name to be found by, such as a lambda. It is a pickle: load no
             folder that you do not trust, or give the scene.
         duration: s; None for the one asked for last. In a longer one steps still land on the first end, and errors
-            may grow on at the rate that `tol` set.
+            may grow on at the rate that `tol` set; what was computed in a plane must keep to it.
         progress, comm: as of `simulate`; as many ranks as there were.
 
     Returns:
@@ -46,11 +46,12 @@ def resume(folder, scene=None, *, duration=None, progress=None, comm=None):
         NotConverged, Interrupted, NotStored: as of `simulate`.
     """
     comm = comm or MPI.COMM_WORLD
-    kept, scene = _open(folder, scene, comm)
-    ends = kept.durations
-    until = ends[-1] if duration is None else positive_time("duration", duration, "resume")
-    if until < ends[-1]:
-        refuse("resume", "duration", duration, f"None or at least {ends[-1]:g} s, which were asked for")
+    if duration is not None:
+        positive_time("duration", duration, "resume")
+    kept, scene = _open(folder, scene, comm, duration)
+    until = duration or kept.durations[-1]
+    check_counts("resume", until, kept.asked["dt"], kept.asked["save_every"])
+    _check_plane(kept, scene, until)
     if kept.ranks != comm.size:
         raise SceneError(
             f"{kept.place} was computed by {kept.ranks} rank(s), and here are {comm.size}: expected as many"
@@ -59,16 +60,28 @@ def resume(folder, scene=None, *, duration=None, progress=None, comm=None):
         return _history(kept, scene, comm)
     kept.hold()
     try:
-        if until > ends[-1]:
-            kept.extend(until)
-        return _go_on(kept, scene, comm, progress)
+        return _go_on(kept, scene, until, comm, progress)
     finally:
         kept.release()
 
 
-def _go_on(kept, scene, comm, progress):
-    """To the last of the durations."""
-    asked, (*ends, until) = kept.asked, kept.durations
+def _check_plane(kept, scene, until):
+    """Refuse what leaves the plane that a motion was computed in."""
+    if kept.told["model"] != "planar":
+        return
+    before, (after, why) = scene.over(kept.asked["duration"]).plane, scene.over(until).flatness
+    if after is not None and not np.allclose(after.axes[2], before.axes[2], rtol=0, atol=1e-9):
+        why = f"{after.words} is then the one that everything keeps to"
+    if why:
+        raise SceneError(
+            f"resume.duration = {until:g}: {kept.place} was computed in {before.words}, and until then {why}: expected a shorter "
+            "duration, or a motion in space, by another simulate(..., model='spatial')"
+        )
+
+
+def _go_on(kept, scene, until, comm, progress):
+    asked, ends = kept.asked, [t for t in kept.durations if t < until]
+    marks = marks_of(scene, until, asked["save_every"], ends)
     memory = _memory(kept, _history(kept, scene, comm))
     looked_at, layout = scene.over(asked["duration"]), Layout.of(scene, asked["elements"])
     scheme, load_factor = asked["scheme"], asked["load_factor"]
@@ -87,7 +100,9 @@ def _go_on(kept, scene, comm, progress):
     pace.watch(scene, asked["duration"], load_factor, stepper.missed)
     motion = Motion(problem, stepper, pace, history, kept)
     motion.recall(memory)
-    return motion.over(marks_of(scene, until, asked["save_every"], ends), asked["save_every"] is None, progress)
+    if until > kept.durations[-1]:
+        kept.extend(until, scene)
+    return motion.over(marks, asked["save_every"] is None, progress)
 
 
 def read_history(folder, scene=None, *, comm=None):
@@ -107,12 +122,15 @@ def read_history(folder, scene=None, *, comm=None):
     return _history(*_open(folder, scene, comm), comm)
 
 
-def _open(folder, scene, comm):
-    """The `RunFolder`, and the scene."""
+def _open(folder, scene, comm, duration=None):
+    """The `RunFolder`, and the scene, which is the one of the motion for so long."""
     if scene is not None:
         instance("resume", "scene", scene, Scene, "a Scene, or None for the folder's own")
     kept = RunFolder(folder, comm).open()
-    return kept, kept.scene(scene)
+    last = kept.durations[-1]
+    if duration is not None and duration < last:
+        refuse("resume", "duration", duration, f"None or at least {last:g} s, which were asked for")
+    return kept, kept.scene(scene, duration or last)
 
 
 def _history(kept, scene, comm, expand=None):

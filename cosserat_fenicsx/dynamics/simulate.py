@@ -24,6 +24,8 @@ from cosserat_fenicsx.results.stored_history import StoredHistory
 
 #: Elements a rod, degree and tolerance where none are asked for.
 ELEMENTS, DEGREE, TOL = 8, 3, 1e-3
+#: More of them are a slip of the pen.
+MOST_STEPS, MOST_SAVED = 1e9, 1e6
 
 
 def simulate(
@@ -81,7 +83,9 @@ def simulate(
         History.
 
     Raises:
-        SceneError: an argument outside its range, a rod without inertia, or a start that supports contradict.
+        SceneError: an argument outside its range, a rod without inertia, a start that supports contradict, or a prescribed
+            motion that jumps; a function of time that raises or gives no finite numbers, `.path` then holds the History
+            up to there.
         NotConverged: a step fails however short it is, or thousands of them stay tiny; `.path` holds the History up to there.
         Interrupted: Ctrl-C; `.path` holds the History up to there.
         NotStored: the folder cannot be written any more, such as on a full disk; `.path` holds the History up to there.
@@ -95,12 +99,14 @@ def simulate(
             raise SceneError(
                 f"Rod '{rod.name}': an infinite axial or shear stiffness: expected finite ones, for a motion"
             )
+    marks = marks_of(scene, duration, save_every)
+    standing = isinstance(start, numbers.Real) and not isinstance(start, bool)
     if load_factor is None:
-        load_factor = start if isinstance(start, numbers.Real) else 1.0
+        load_factor = start if standing else 1.0
     number("simulate", "load_factor", load_factor, "a finite number", math.isfinite)
     looked_at = scene.over(duration)
     cautions = []
-    if isinstance(start, numbers.Real):
+    if standing:
         start = equilibrium(looked_at, start, model=model, elements=elements, degree=degree, comm=comm)
         if not start.stable[-1]:
             cautions = ["the equilibrium that it starts from is unstable: rounding decides where it goes"]
@@ -117,7 +123,7 @@ def simulate(
                  "load_factor": load_factor, "elements": elements, "degree": degree, "rho_inf": rho_inf}  # fmt: skip
         folder = RunFolder(folder, comm).make(scene, asked, history)
     motion = Motion(problem, stepper, pace, history, folder)
-    return motion.over(marks_of(scene, duration, save_every), save_every is None, progress)
+    return motion.over(marks, save_every is None, progress)
 
 
 def pace_of(duration, *, tol=None, dt=None, scheme="momentum", save_every=None, elements=ELEMENTS):
@@ -129,7 +135,7 @@ def pace_of(duration, *, tol=None, dt=None, scheme="momentum", save_every=None, 
         SceneError: one of them is outside its range.
     """
     duration = positive_time("duration", duration)
-    if scheme not in SCHEMES:
+    if not isinstance(scheme, str) or scheme not in SCHEMES:
         raise SceneError(f"scheme = {scheme!r}: {nearest(scheme, SCHEMES)}")
     if save_every is not None:
         positive_time("save_every", save_every)
@@ -142,6 +148,8 @@ def pace_of(duration, *, tol=None, dt=None, scheme="momentum", save_every=None, 
             )
         if positive_time("dt", dt) > duration:
             refuse("simulate", "dt", dt, f"at most the duration, {duration:g} s")
+    check_counts("simulate", duration, dt, save_every)
+    if dt is not None:
         return Fixed(dt)
     if not SCHEMES[scheme].adapts:
         raise SceneError(f"scheme = '{scheme}' knows no error of its steps: expected dt, a fixed step (s)")
@@ -152,7 +160,31 @@ def pace_of(duration, *, tol=None, dt=None, scheme="momentum", save_every=None, 
 
 
 def positive_time(name, value, owner="simulate"):
-    return number(owner, name, value, "a positive number (s)", lambda x: 0 < x < math.inf)
+    """A time that can be divided by another one, s.
+
+    Raises:
+        SceneError: it is something else.
+    """
+    return number(owner, name, value, "a positive number (s), from 1e-30 to 1e30", lambda x: 1e-30 <= x <= 1e30)
+
+
+def check_counts(owner, duration, dt, save_every):
+    """Refuse more steps or saved states than can ever be.
+
+    Args:
+        owner: for the words; the others as `simulate` takes them, checked.
+
+    Raises:
+        SceneError: naming the two that do not go together.
+    """
+    for name, apart, most, what in (
+        ("dt", dt, MOST_STEPS, "steps"),
+        ("save_every", save_every, MOST_SAVED, "saved states"),
+    ):
+        if apart is not None and duration / apart > most:
+            raise SceneError(
+                f"{owner}: duration = {duration:g} s and {name} = {apart:g} s: expected at most {most:g} {what}"
+            )
 
 
 def _rho_inf(scheme, rho_inf):

@@ -9,6 +9,7 @@ from cosserat_fenicsx.forms import planar as eq
 from cosserat_fenicsx.models.moving import Moving
 from cosserat_fenicsx.models.moving_forms import StepForms, along, compile_momentum
 from cosserat_fenicsx.models.planar import PlanarModel
+from cosserat_fenicsx.scene.signals import signals_of
 
 _OFF = 1e-9
 
@@ -36,7 +37,7 @@ class MovingPlanar(Moving, PlanarModel):
         e1, e2, normal = self.axes
         off = max(np.abs(linear @ normal).max(), np.abs(angular @ e1).max(), np.abs(angular @ e2).max())
         if off > _OFF * max(np.abs(linear).max(), np.abs(angular).max(), 1e-300):
-            raise SceneError("Scene.velocities leave the plane of the scene: expected model = 'spatial'")
+            raise SceneError("Scene.velocities leave the plane of the scene: expected model = 'spatial' in simulate")
         x = self.velocity.x.array
         x[self._nodal[:, :2]] = (linear @ self.axes[:2].T)[self._slots]
         x[self._nodal[:, 2]] = (angular @ normal)[self._slots]
@@ -45,7 +46,9 @@ class MovingPlanar(Moving, PlanarModel):
         """See `RodModel`."""
         off = np.abs((rq[:, :3] - self.reference) @ self.axes[2]).max(), np.abs(rq[:, 4:] @ self.axes[:2].T).max()
         if max(off) > _OFF:
-            raise SceneError("simulate.start lies outside the plane of the scene: expected model = 'spatial'")
+            raise SceneError(
+                "simulate.start lies outside the plane of the scene: expected model = 'spatial' in simulate"
+            )
         return super().unknowns_of(rq)
 
     def loads_at(self, t):
@@ -59,9 +62,25 @@ class MovingPlanar(Moving, PlanarModel):
             given = vectors.x.array.reshape(-1, 3)
             off = given[:, :2] if "moment" in work.__name__ else given[:, 2]
             if np.abs(off).max(initial=0.0) > _OFF * np.abs(given).max(initial=0.0):
-                raise SceneError(
-                    f"a {work.__name__.replace('_', ' ')} leaves the plane at t = {t:g} s: expected model = 'spatial'"
-                )
+                self._refuse(f"a {work.__name__.replace('_', ' ')}", t)
+
+    def ties_at(self, t):
+        """See `Moving`.
+
+        Raises:
+            SceneError: a prescribed motion that leaves the plane at this time.
+        """
+        across = self.axes[2], self.axes[:2]
+        for support in self.scene.supports:
+            for field, signal in signals_of(support).items():
+                given = np.array(signal(t))
+                off = across[field == "rotation"] @ given
+                if np.abs(off).max() > _OFF * np.abs(given).max():
+                    self._refuse(f"the {field} of the {type(support).__name__} at {support.station}", t)
+        return super().ties_at(t)
+
+    def _refuse(self, what, t):
+        raise SceneError(f"{what} leaves the plane at t = {t:g} s: expected model = 'spatial' in simulate")
 
     def rates(self):
         """See `Moving`."""

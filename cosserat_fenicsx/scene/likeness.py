@@ -1,15 +1,19 @@
 """What a scene amounts to, in numbers and words: to see whether it is the one that a motion was computed for."""
 
+import contextlib
 import reprlib
 
 import numpy as np
 
+from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.scene.rod import Rod, Station
-from cosserat_fenicsx.scene.signals import Signal, sample_times
+from cosserat_fenicsx.scene.signals import Signal, sample_times, signals_of
 
 _SAMPLES = 9
 #: Numbers that differ by less, relatively, are those of another release of a library.
 _ROUNDING = 1e-9
+#: Over a duration: times after it where functions of time are looked at, in case that a longer one is asked for later.
+_AHEAD = np.geomspace(1.001, 1009.0, 40)
 
 
 def likeness(scene, duration):
@@ -33,13 +37,37 @@ def likeness(scene, duration):
     return found
 
 
+def likeness_at(scene, times):
+    """What depends on time in a scene, at `times` (s): a part of its likeness; what cannot be told then is left out."""
+    found = {}
+    for kind in ("supports", "loads"):
+        for i, item in enumerate(getattr(scene, kind)):
+            for name, signal in signals_of(item).items():
+                for t in times:
+                    with contextlib.suppress(SceneError):  # a function need not be one beyond the duration
+                        found[_time_words(f"{kind}[{i}] ({type(item).__name__}).{name}", t)] = list(signal(t))
+    return found
+
+
+def times_ahead(duration):
+    """Times (s) after a duration, see `likeness_at`."""
+    return (duration * _AHEAD).tolist()
+
+
 def difference(given, expected):
-    """Where two likenesses differ first, in words; None where they are alike."""
-    for what, value in expected.items():
-        if what not in given:
-            return f"it has no {what}"
-        if not _alike(given[what], value):
-            return f"{what} is {reprlib.repr(given[what])}, where the motion has {reprlib.repr(value)}"
+    """Where two likenesses differ, in words; None where they are alike. What differs first is told where it differs most."""
+    groups = {}
+    for what in expected:
+        groups.setdefault(what.partition(" at ")[0], []).append(what)
+    for group in groups.values():
+        missing = next((what for what in group if what not in given), None)
+        if missing:
+            return f"it has no {missing}"
+        size = max(_size(expected[what]) for what in group)
+        apart = [_apart(given[what], expected[what]) for what in group]
+        if max(apart) > _ROUNDING * size:
+            what = group[int(np.argmax(apart))]
+            return f"{what} is {reprlib.repr(given[what])}, where the motion has {reprlib.repr(expected[what])}"
     return next((f"the motion has no {what}" for what in given if what not in expected), None)
 
 
@@ -65,7 +93,7 @@ def _of_item(where, item, duration):
             found[what] = value.name
         elif isinstance(value, Signal):
             found[f"{what}: jumps"] = list(value.jumps)
-            found |= {f"{what} at t = {t!r} s": list(value(t)) for t in sample_times(item, duration)}
+            found |= {_time_words(what, t): list(value(t)) for t in sample_times(item, duration)}
         elif value is None or isinstance(value, str | bool | int | float):
             found[what] = value
         elif _is_numbers(value):
@@ -75,6 +103,10 @@ def _of_item(where, item, duration):
     return found
 
 
+def _time_words(what, t):
+    return f"{what} at t = {t!r} s"
+
+
 def _is_numbers(value):
     try:
         return np.asarray(value).dtype.kind in "iuf"
@@ -82,9 +114,21 @@ def _is_numbers(value):
         return False
 
 
-def _alike(a, b):
-    numbers = [x for x in (a, b) if isinstance(x, list | int | float) and not isinstance(x, bool)]
-    if len(numbers) < 2 or any(isinstance(y, str) for x in numbers if isinstance(x, list) for y in x):
-        return a == b
-    a, b = (np.asarray(x, dtype=float) for x in (a, b))
-    return a.shape == b.shape and bool(np.allclose(a, b, rtol=_ROUNDING, atol=_ROUNDING * np.abs(b).max(initial=0.0)))
+def _apart(a, b):
+    """How far two values are apart; infinitely where they are not numbers alike."""
+    a, b = _array(a), _array(b)
+    if a.dtype.kind == "f" and b.dtype.kind == "f" and a.shape == b.shape:
+        return float(np.abs(np.where(a == b, 0.0, a - b)).max(initial=0.0))  # infinity is infinity
+    return 0.0 if a.shape == b.shape and bool((a == b).all()) else np.inf
+
+
+def _size(value):
+    array = _array(value)
+    return float(np.abs(array[np.isfinite(array)]).max(initial=0.0)) if array.dtype.kind == "f" else 0.0
+
+
+def _array(value):
+    """Numbers as floats, anything else as it is."""
+    if _is_numbers(value):
+        return np.asarray(value, dtype=float)
+    return np.array(value, dtype=object)

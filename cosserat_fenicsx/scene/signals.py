@@ -9,6 +9,7 @@ import dataclasses
 import itertools
 import math
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -195,7 +196,13 @@ class Table:
 
     def __call__(self, t):
         """The vector at t."""
-        return tuple(float(np.interp(t, self.times, column)) for column in np.transpose(self.values))
+        times, columns = self._numbers
+        return tuple(float(np.interp(t, times, column)) for column in columns)
+
+    @cached_property
+    def _numbers(self):
+        """Arrays: a long table is asked for again and again."""
+        return np.array(self.times, dtype=float), np.array(np.transpose(self.values), dtype=float, order="C")
 
 
 def _check(signal, *times):
@@ -223,6 +230,7 @@ class Signal:
         owner: the name of its class; field, unit: for the words of refusals.
         function: of t (s), gives `size` numbers.
         jumps: times where it is not smooth, s.
+        place: where its load or support acts, in words.
     """
 
     owner: str
@@ -231,17 +239,25 @@ class Signal:
     function: object
     jumps: tuple
     size: int = 3
+    place: str = ""
 
     def __call__(self, t):
         """The vector at t, s.
 
         Raises:
-            SceneError: not so many finite numbers; says at which time.
+            SceneError: not so many finite numbers, or what its function raised; says at which time.
         """
+        when = f"at the time t = {t:g} s" + (f", of the {self.owner} at {self.place}" if self.place else "")
         try:
-            return vector(self.owner, self.field, self.function(t), self.unit, self.size)
+            given = self.function(t)
+        except Exception as problem:  # a user's function may raise whatever it pleases
+            raise SceneError(
+                f"{self.owner}.{self.field}: its function raised {type(problem).__name__} ({problem}), {when}"
+            ) from problem
+        try:
+            return vector(self.owner, self.field, given, self.unit, self.size)
         except SceneError as problem:
-            raise SceneError(f"{problem}, at the time t = {t:g} s") from None
+            raise SceneError(f"{problem}, {when}") from None
 
 
 def vector_or_signal(owner, field, value, unit, jumps=()):
@@ -254,7 +270,9 @@ def vector_or_signal(owner, field, value, unit, jumps=()):
         if len(jumps):
             refuse(owner, "jumps", jumps, f"none, since {field} does not depend on time")
         return vector(owner, field, value, unit)
-    signal = Signal(type(owner).__name__, field, unit, value, _times_of(owner, value, jumps))
+    place = getattr(owner, "station", None) or getattr(owner, "rod", None)
+    place = str(getattr(place, "name", place) or "")
+    signal = Signal(type(owner).__name__, field, unit, value, _times_of(owner, value, jumps), place=place)
     signal(0.0)
     return signal
 
@@ -277,15 +295,6 @@ def at(item, t):
     """A load or a support as it is at the time t (s); itself where nothing depends on time."""
     now = {name: signal(t) for name, signal in signals_of(item).items()}
     return dataclasses.replace(item, **now, jumps=()) if now else item
-
-
-def jumps_at(signal, t, until):
-    """Whether a signal's value jumps at the time t (s), or its slope alone; `until` tells what is a short time."""
-
-    def rise(apart):
-        return np.abs(np.subtract(signal(t + apart), signal(t - apart))).max()
-
-    return bool(rise(1e-9 * until) > 0.75 * rise(2e-9 * until))
 
 
 def sample_times(item, until):

@@ -1,10 +1,14 @@
 """Whether a scene's supports and joints hold it: once each, and altogether. Small motions of the reference alone."""
 
+import contextlib
+import dataclasses
 import functools
 
 import numpy as np
 
 from cosserat_fenicsx.errors import SceneError
+from cosserat_fenicsx.scene.joints import Joint
+from cosserat_fenicsx.scene.supports import Clamp
 from cosserat_fenicsx.scene.ties import PositionTie, TurnTie
 
 _SMALL = 1e-9
@@ -147,6 +151,35 @@ def _or_a_joint(scene, rod):
             if np.linalg.norm(apart) <= 1e-6 * rod.length:
                 return f", or a Joint({end}, {there}), which lie at one point"
     return ""
+
+
+def without_mechanism(scene):
+    """A scene itself; or, where it is a mechanism, one whose joints and then supports hold all until it is none any more.
+
+    Where the reference of a mechanism is in equilibrium, but for strains, both have the same one: what is held in addition has
+    nothing to hold.
+
+    Raises:
+        SceneError: nothing can be held.
+    """
+    loose = [("joints", i, Joint(x.first, x.second)) for i, x in enumerate(scene.joints) if not x.rigid]
+    loose += [("supports", i, Clamp(x.station)) for i, x in enumerate(scene.supports) if not x.clamps]
+    held = scene
+    for kind, i, fast in loose:
+        try:
+            check_no_mechanism(held)
+            return held
+        except SceneError:
+            items = list(getattr(held, kind))
+            items[i] = fast
+            with contextlib.suppress(SceneError):  # it would be held twice
+                held = dataclasses.replace(held, **{kind: items})
+    try:
+        check_no_mechanism(held)
+    except SceneError:
+        check_no_mechanism(scene)  # in its words
+        raise
+    return held
 
 
 def _words(motion, start, size):

@@ -17,7 +17,7 @@ from cosserat_fenicsx import __version__
 from cosserat_fenicsx.checks import instance
 from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.ranks import on_first
-from cosserat_fenicsx.scene.likeness import difference, likeness
+from cosserat_fenicsx.scene.likeness import difference, likeness, likeness_at, times_ahead
 from cosserat_fenicsx.storage import checkpoints
 
 #: s between checkpoints; and how many times longer than it takes to write one they are apart, at least.
@@ -63,6 +63,7 @@ class RunFolder:
             "durations": [asked["duration"]],
             "told": history.told(),
             "scene": likeness(scene, asked["duration"]),
+            "ahead": _ahead(scene, asked["duration"]),
         }
         self._on_first(lambda: self._make(scene, _text(head)))
         history.keep_in(self.place)
@@ -109,15 +110,23 @@ class RunFolder:
         self._last = None
         return self
 
-    def scene(self, given):
+    def scene(self, given, until):
         """The scene of the motion: the one that is given, or the one in the folder.
+
+        Args:
+            given: a `Scene` or None; until: s: for how long it must be the one of the motion.
 
         Raises:
             SceneError: none can be had, or it is another one.
         """
         scene = given if given is not None else self._stored_scene()
-        given = json.loads(_text(likeness(scene, self.asked["duration"])))
-        differs = difference(given, self._likeness)
+        ahead = [(t, told) for t, told in self._head.get("ahead", ()) if self.durations[-1] < t <= until]
+        given, expected = likeness_at(scene, [t for t, _ in ahead]), dict(self._likeness)
+        for duration in self.durations:
+            given |= likeness(scene, duration)
+        for _, told in ahead:
+            expected |= told
+        differs = difference(json.loads(_text(given)), expected)
         if differs:
             raise SceneError(f"{self.place}: the scene is not the one of the motion: {differs}")
         return scene
@@ -131,9 +140,11 @@ class RunFolder:
             why = f"the folder's own cannot be loaded here ({type(problem).__name__}: {problem})"
         raise SceneError(f"resume.scene = None: expected the scene of {self.place}, because {why}")
 
-    def extend(self, duration):
-        """A longer duration is asked for."""
+    def extend(self, duration, scene):
+        """A longer duration is asked for, of the scene of the motion."""
         self.durations.append(duration)  # and with it to the head
+        self._likeness |= likeness(scene, duration)
+        self._head["ahead"] = _ahead(scene, duration)
 
         def rewrite():
             fresh = self.place / f"{_HEAD}.new"
@@ -211,6 +222,12 @@ class RunFolder:
             raise SceneError(
                 f"simulate.folder = {str(self.place)!r}: {problem.strerror or problem}: expected a folder that can be written to"
             ) from None
+
+
+def _ahead(scene, duration):
+    """[(time, likeness)] after a duration, where a scene depends on time."""
+    told = ((t, likeness_at(scene, [t])) for t in times_ahead(duration))
+    return [(t, values) for t, values in told if values]
 
 
 def _text(head):

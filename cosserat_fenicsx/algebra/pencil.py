@@ -1,0 +1,158 @@
+"""The lowest eigenvalues of K x = lambda M x with held x = 0, every copy of them; each rank solves all of it."""
+
+import numpy as np
+from petsc4py import PETSc
+from scipy import sparse
+
+from cosserat_fenicsx.algebra import eigen, linear
+from cosserat_fenicsx.errors import NotConverged
+
+# Next to a shift that is so many times larger eigenvalues are one cluster, whose vectors mix.
+_BLURRED = 1e-5
+# Of the rounding of x^T K x, below which it is zero: it adds up at random, and reaches a fifth of this.
+_SAFETY = 2.0
+# Eigenvalues that differ by less, relatively, are counted together.
+_TOGETHER = 1e-6
+# How near to a value that is missing a shift is put, relatively.
+_NEXT = 0.05
+# Of the inertia of turns about a thin rod's axis pivots are honestly small.
+_NO_PIVOT = 1e-200
+# Passes, each of which finds at least one vector more, or comes nearer to those that mix.
+_PASSES = 100
+
+
+class Pencil:
+    """K x = lambda M x, held x = 0.
+
+    Args:
+        K: (size, size), symmetric, sparse, of scipy.
+        M: symmetric and positive definite, of diagonal blocks (scipy's bsr_matrix).
+        held: (equations, size), dense, of full rank.
+    """
+
+    def __init__(self, K, M, held):
+        self._K, self._M, self._held = K, M, sparse.csr_matrix(held)
+        self._K_sizes = abs(K)
+        self._L = M.copy()
+        self._L.data = np.linalg.cholesky(M.data)
+        self.size = K.shape[0]
+        #: how many eigenvalues there are
+        self.count = self.size - len(held)
+
+    def lowest(self, count):
+        """The lowest eigenvalues, every copy of them.
+
+        What an eigensolver finds next to a shift may lack copies of repeated eigenvalues, or such as are small against the shift:
+        the number of negative squares of K - lambda M tells how many there are below lambda (Sylvester), and what is
+        missing is looked for where these numbers say it lies.
+
+        Returns:
+            (values (n,) ascending, vectors (size, n)), n <= count; what is zero to rounding is 0.0.
+
+        Raises:
+            NotConverged: some were not found.
+        """
+        count = min(count, self.count)
+        values, vectors = np.empty(0), np.empty((self.size, 0))  # in the variables L^T x, orthonormal
+        shift, asked = -1.0, count
+        for _ in range(_PASSES):
+            fresh, found = self._nearest(shift, asked, vectors)
+            blurred = (np.abs(fresh) < _BLURRED * abs(shift)) & (fresh != 0)
+            values, vectors = np.append(values, fresh[~blurred]), np.hstack([vectors, found[:, ~blurred]])
+            if blurred.any():
+                shift, asked = -np.abs(fresh[blurred]).max(), int(blurred.sum())
+                continue
+            order = np.argsort(values)
+            values, vectors = values[order], vectors[:, order]
+            if len(values) >= count:
+                top = values[count - 1]
+                rounding = 10 * self._rounding(vectors[:, :count]).max()
+                beyond = top + max(_TOGETHER * abs(top), rounding)
+                asked = self._below(beyond) - np.count_nonzero(values < beyond)
+                if asked <= 0:
+                    return values[:count], self._unknowns(vectors[:, :count])
+                shift = self._missing_next_to(values, beyond, rounding)
+            else:
+                asked = count - len(values)
+        raise NotConverged(
+            f"{len(values)} natural frequencies were found, and {asked} more below the highest of them not. Ask for fewer modes, or "
+            "another number of elements."
+        )
+
+    def _nearest(self, shift, count, known):
+        """Eigenvalues next to a shift, and vectors that are orthogonal to those that are known."""
+        factored = _Factored(self._shifted(shift), self._L, self.size)
+        _, vectors = eigen.largest_of_operator(factored, self.size, min(count, self.count - known.shape[1]), known)
+        factored.free()
+        x = self._unknowns(vectors)
+        values, turn = np.linalg.eigh(x.T @ (self._K @ x))  # more accurate than 1/theta + shift, next to a large shift
+        vectors = vectors @ turn
+        return np.where(np.abs(values) <= self._rounding(vectors), 0.0, values), vectors
+
+    def _rounding(self, vectors):
+        """Of the values of vectors."""
+        x = np.abs(self._unknowns(vectors))
+        return _SAFETY * np.finfo(float).eps * np.einsum("ik,ik->k", x, self._K_sizes @ x)
+
+    def _missing_next_to(self, values, beyond, rounding):
+        """A shift next to the lowest value below `beyond` that `values` (ascending) lack."""
+        high, low = beyond, -abs(beyond)
+        while self._below(low):
+            low *= 8
+        while high - low > max(_NEXT * max(abs(high), abs(low)), rounding):
+            middle = (high + low) / 2
+            if self._below(middle) > np.count_nonzero(values < middle):
+                high = middle
+            else:
+                low = middle
+        return low
+
+    def _below(self, value):
+        """How many eigenvalues are below a value."""
+        factored = _Factored(self._shifted(value), self._L, self.size)
+        negative = factored.negative
+        factored.free()
+        return negative - (self.size - self.count)  # every equation that is held adds one
+
+    def _shifted(self, shift):
+        """[[K - shift M, held^T], [held, 0]]"""
+        inner = self._K - shift * self._M
+        return sparse.bmat(
+            [[inner, self._held.T], [self._held, None]] if self._held.shape[0] else [[inner]], format="csr"
+        )
+
+    def _unknowns(self, vectors):
+        """x of L^T x."""
+        blocks = vectors.T.reshape(vectors.shape[1], *self._L.data.shape[:2], 1)
+        return np.linalg.solve(self._L.data.transpose(0, 2, 1), blocks).reshape(vectors.shape[1], self.size).T
+
+
+class _Factored:
+    """L^T A L as a matrix, where M = L L^T and A is the part of the inverse of a matrix that belongs to x: of
+    [[K - shift M, held^T], [held, 0]] its eigenvalues are 1/(lambda - shift)."""
+
+    def __init__(self, matrix, L, size):
+        self._L, self._size = L, size
+        A = PETSc.Mat().createAIJ(matrix.shape, csr=(matrix.indptr, matrix.indices, matrix.data), comm=PETSc.COMM_SELF)
+        A.setOption(PETSc.Mat.Option.SYMMETRIC, True)
+        self._pc = PETSc.PC().create(PETSc.COMM_SELF)
+        self._pc.setOperators(A)
+        linear.factor_constrained(self._pc, A, _NO_PIVOT)
+        self._pc.setUp()
+        self._force, self._moved = A.createVecs()
+
+    @property
+    def negative(self):
+        """The number of negative squares of the matrix."""
+        return self._pc.getFactorMatrix().getInertia()[0]
+
+    def mult(self, mat, x, y):
+        """PETSc's name for y = L^T A L x."""
+        self._force.array_w[:] = 0.0
+        self._force.array_w[: self._size] = self._L @ x.array_r
+        self._pc.apply(self._force, self._moved)
+        y.array_w[:] = self._L.T @ self._moved.array_r[: self._size]
+
+    def free(self):
+        """Give the factors back."""
+        self._pc.destroy()
