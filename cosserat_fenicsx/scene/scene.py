@@ -159,8 +159,9 @@ class Scene:
             return []
         kinds = " and ".join(dict.fromkeys(type(load).__name__ for load in following))
         return [
-            f"{kinds}: a follower load has no potential, so a count of negative modes cannot see flutter; a column may sway "
-            "itself to pieces where statics calls it stable (Beck's column at 20.05 EI/L^2), and only dynamics can tell"
+            f"{kinds}: a follower load has no potential, so negative modes, which are those of the tangent's symmetric part, do not "
+            "decide on stability: an equilibrium that has some may be stable (Beck's column from pi^2 to 20.05 EI/L^2), one that has "
+            "none may flutter, which statics cannot see; only dynamics can tell"
         ]
 
     def rod(self, name):
