@@ -26,6 +26,7 @@ class Path:
         negative_modes: (n,) negative squares of the second variation; 0 at a stable point, -1 where it is singular.
         stable: (n,) bool.
         error: (n,) estimated error of the positions, relative to the largest displacement; NaN where not estimated.
+        rounding: what rounding of the residual alone may make of it.
         events: the `Event`s met, in order: limit points and bifurcations.
         left: whether the path was left at its first bifurcation, for a branch.
         control: "load", or "arc" where the path, or a part of it, was followed in arc length.
@@ -43,7 +44,7 @@ class Path:
         self.scene, self.layout, self.scales, self.rule, self.comm = scene, layout, scales, rule, comm
         self.model, self.formulation, self.degree, self.unknowns = model, formulation, degree, unknowns
         self.elements, self.why, self.events = layout.counts, why, []
-        self._expand, self._expanded, self._appended, self._rounding = expand, [], [], rounding
+        self._expand, self._expanded, self._appended, self.rounding = expand, [], [], rounding
         self.control, self.left = "load", False
         self._error = None
 
@@ -144,7 +145,7 @@ class Path:
 
     def set_error(self, error):
         """Take an estimate; it is never below what rounding leaves of the residual."""
-        self._error = np.maximum(error, self._rounding)
+        self._error = np.maximum(error, self.rounding)
 
     # -- queries -----------------------------------------------------------------------------------------------------
 

@@ -72,6 +72,8 @@ class _Search:
             self._failed, self._few, self._apart = True, None, None
             return None
         self._failed = False
+        if found.rounding > self._tol:  # which grows with the number of elements
+            raise NotConverged(_rounding_hides(self._tol, found.rounding, elements, found.formulation), found)
         if np.isfinite(found.error).all():
             reached = float(found.error.max())
             if reached <= self._tol and found is self.whole:
@@ -167,6 +169,13 @@ def until_two_meshes_agree(scene, on_mesh, apart, tol, *, first, most, elements,
         if elements or best <= tol:
             return found, error, layout
         coarse, layout = found[0], layout.finer(scene, 2)
+
+
+def _rounding_hides(tol, rounding, elements, formulation):
+    return (
+        f"the accuracy tol = {tol:g} is out of reach of the formulation {formulation!r} on rods as slender as these: rounding alone may cost "
+        f"{rounding:.2g} with {elements} elements per rod. Ask for the formulation 'mixed', or a larger tol."
+    )
 
 
 def _not_accurate(tol, reached, elements, degree):

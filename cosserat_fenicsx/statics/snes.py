@@ -153,12 +153,14 @@ class Newton:
     def _little_is_left(self):
         """Whether the error after the last step is below INCREMENT, if steps go on contracting as they did, c; or far below, if
         they contract as Newton's do, by c^2, of which only a tenth is counted on; and nothing on a slender rod, whose tangent
-        rounding makes inexact for soft motions (without a contact force of its own its steps need not contract so far)."""
-        if len(self._steps) < 2:
-            return False
-        before, step = self._steps[-2:]
-        c = step / before
+        rounding makes inexact for soft motions. Without a contact force of its own a rod's steps come in pairs, one that bends
+        and one that takes back the stretch of it: c is that of pairs then, since a small step beat says nothing."""
         model = self.problem.model
+        beat = 1 if model.carries_force else 2
+        if len(self._steps) < 2 * beat:
+            return False
+        before, step = max(self._steps[-2 * beat : -beat]), max(self._steps[-beat:])
+        c = step / before
         newton = 1.0 if model.shape.slender and model.carries_force else min(1.0, 100 * c)
         return c < 0.9 and step * c * newton <= INCREMENT * (1 - c)
 

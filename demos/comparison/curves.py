@@ -11,7 +11,7 @@ from mpi4py import MPI
 import cosserat_fenicsx as cf
 from comparison import corotational, mcre
 from comparison.column import Column
-from comparison.follow import follow
+from comparison.follow import Stopped, follow, newton
 from comparison.mcre_limit import TruncatedColumn
 from comparison.solid_bar import SolidBar
 from cosserat_fenicsx import analytic
@@ -28,6 +28,7 @@ class Settings:
         rungs: elements of the co-rotational beam, each twice the one before.
         mcre: elements of the reconstructed MCRE whose limit points are found.
         along, refinement: of the solid's mesh, see `SolidBar`.
+        finer, finer_etas: elements along the solid's finer mesh, and where it is solved on it too.
         clamped_etas: where the solid is also solved with its foot fixed altogether.
     """
 
@@ -37,6 +38,8 @@ class Settings:
     mcre: tuple
     along: int
     refinement: int
+    finer: int
+    finer_etas: tuple
     clamped_etas: tuple
 
 
@@ -50,6 +53,8 @@ FULL = Settings(
     mcre=(1, 2, 4, 8, 16, 32, 64, 128, 256),
     along=40,
     refinement=2,
+    finer=64,
+    finer_etas=(0.5, 0.9, 1.0, 1.5, 2.0),
     clamped_etas=(0.9, 1.0),
 )
 QUICK = Settings(
@@ -59,6 +64,8 @@ QUICK = Settings(
     mcre=(1, 2, 32),
     along=16,
     refinement=1,
+    finer=24,
+    finer_etas=(0.9,),
     clamped_etas=(0.9,),
 )
 #: Elements of the MCRE that stand for many.
@@ -141,8 +148,10 @@ def solid(settings, keep, clamp, points=(), so_far=None):
         points, so_far: what `keep` was given last, by a run that was broken off.
     """
     bar = SolidBar(Column(arm=True), settings.along, settings.refinement, clamp)
+    finer = SolidBar(Column(arm=True), settings.finer, settings.refinement) if clamp == "plane" else None
     wanted = settings.coarse_etas if clamp == "plane" else settings.clamped_etas
-    curve = so_far or {"eta": [], "delta": [], "unknowns": bar.size, "elements": bar.elements, "iterations": []}
+    curve = so_far or {"eta": [], "delta": [], "unknowns": bar.size, "along": bar.along, "elements": bar.elements,
+                        "iterations": []}  # fmt: skip
     known, began = list(points), time.perf_counter() - curve.get("seconds", 0.0)
     etas = [eta for eta in wanted if eta not in curve["eta"]]
     with Progress(etas, None, MPI.COMM_SELF) as progress:
@@ -152,10 +161,22 @@ def solid(settings, keep, clamp, points=(), so_far=None):
             curve["eta"].append(point.eta)
             curve["delta"].append(float(bar.tip(point.x)[0]))
             curve["iterations"].append(point.iterations)
+            if finer and point.eta in settings.finer_etas:
+                _on_finer(finer, bar, point, curve)
             curve["seconds"] = round(time.perf_counter() - began, 2)
             keep(curve, known)
             progress.at(SimpleNamespace(load_factor=point.eta))
     return curve
+
+
+def _on_finer(finer, bar, point, curve):
+    """Solve on the finer mesh from the point of the other, and keep delta there."""
+    x, _ = newton(finer, finer.carried(bar, point.x), point.eta, tolerance=1e-4)
+    if x is None:
+        raise Stopped(f"Newton's method does not converge on the finer mesh at the load factor {point.eta:g}")
+    found = curve.setdefault("finer", {"eta": [], "delta": [], "along": finer.along, "unknowns": finer.size})
+    found["eta"].append(point.eta)
+    found["delta"].append(float(finer.tip(x)[0]))
 
 
 def timed(name, compute):

@@ -77,13 +77,18 @@ def _differences(axes, curves):
     axes.semilogy(
         solid["eta"], _percent(solid["delta"], exact(solid["eta"], arm=True)), "s", mfc="none", mec="tab:orange", ms=6
     )
+    finer = solid["finer"]
+    axes.semilogy(solid["eta"], np.full(len(solid["eta"]), np.nan), "s", mfc="none", mec="tab:orange", ms=6,
+                  label=f"3D elasticity, {solid['along']} elements along (the curve)")  # fmt: skip
+    axes.semilogy(finer["eta"], _percent(finer["delta"], exact(finer["eta"], arm=True)), "s", color="tab:orange", ms=6,
+                  label=f"3D elasticity, {finer['along']} elements along: less of the mesh's error")  # fmt: skip
     axes.semilogy(clamped["eta"], _percent(clamped["delta"], exact(clamped["eta"], arm=True)), "D", color="tab:orange", ms=6,
                   label="3D elasticity with the foot's face fixed altogether")  # fmt: skip
     for name, colour in _GREEN.items():
         _, eta, delta, turn = _branch(curves, name)
         axes.semilogy(eta[1 : turn + 1], _percent(delta[1 : turn + 1], exact(eta[1 : turn + 1])), color=colour, lw=2)
     rods = 100 * max(curves[name]["error"] for name in ("mixed", "displacement", "arm"))
-    axes.set(xlim=(0, 2), ylim=(1e-4, 100), xlabel=_ETA, ylabel=r"|difference| of $\delta$ (%)")
+    axes.set(xlim=(0, 2), ylim=(3e-5, 100), xlabel=_ETA, ylabel=r"|difference| of $\delta$ (%)")
     axes.set_title(
         f"Difference from the exact rod under the same load\n(the Cosserat rod here: {rods:.0e} %, below the chart)"
     )

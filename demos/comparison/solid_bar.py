@@ -16,6 +16,7 @@ from dolfinx import mesh as dolfinx_mesh
 from dolfinx.fem import petsc as fem_petsc
 from mpi4py import MPI
 from petsc4py import PETSc
+from scipy.interpolate import CubicSpline
 
 from comparison.bar_mesh import half_disc, moments, swept
 from comparison.column import CRITICAL, Column
@@ -36,6 +37,7 @@ class SolidBar:
             the section's place and direction and not its shape; "face" fixes all of it, and the mesh is finer there.
 
     Attributes:
+        along: elements along the bar, as asked for.
         elements: hexahedra of the half bar.
 
     Raises:
@@ -45,7 +47,8 @@ class SolidBar:
     def __init__(self, column=None, along=40, refinement=2, clamp="plane"):
         if clamp not in ("plane", "face"):
             refuse("SolidBar", "clamp", clamp, '"plane" or "face"')
-        self.column = column = column or Column()
+        self.column, self.along = column or Column(), along
+        column = self.column
         radius = column.diameter / column.length / 2
         points, quads = half_disc(radius, refinement)
         levels = np.linspace(0, 1, along + 1)
@@ -60,7 +63,7 @@ class SolidBar:
             space = compat.function_space(mesh, compat.lagrange(mesh, 2, 3))
         self._u, self._before = fem.Function(space), fem.Function(space)
         self.size = len(self._u.x.array)
-        x = space.tabulate_dof_coordinates()
+        x = self._nodes = space.tabulate_dof_coordinates()
         self._tip = int(np.argmin(np.abs(x - (0, 0, 1)).sum(axis=1)))
         self._held = self._supports(space, x, clamp)
         self._compile(mesh, space, moments(points, quads))
@@ -142,6 +145,24 @@ class SolidBar:
     def negative_modes(self, x, eta):
         """Negative eigenvalues of the tangent that was factorised last: at a converged state, the one before its last step."""
         return self._solver.getPC().getFactorMatrix().getInertia()[0]
+
+    def carried(self, coarser, x):
+        """The state x of a bar with the same section and other elements along it, on this one's nodes: splines along z.
+
+        Args:
+            coarser: a `SolidBar` of the same refinement.
+            x: its state.
+        """
+        (theirs, levels), (mine, wanted) = coarser._fibres(), self._fibres()
+        found = np.empty((len(mine), 3))
+        fibres = x.reshape(-1, 3)[theirs].reshape(-1, len(levels), 3)
+        found[mine] = CubicSpline(levels, fibres, axis=1)(wanted).reshape(-1, 3)
+        return found.ravel()
+
+    def _fibres(self):
+        """(nodes, fibre by fibre along the bar; the z of a fibre's nodes)."""
+        places = np.rint(1e9 * self._nodes).astype(np.int64)
+        return np.lexsort(places.T[[2, 1, 0]]), np.unique(places[:, 2]) / 1e9
 
     def tip(self, x):
         """(delta, shortening, rotation) of the end face's centre: m, m, rad (of the material line along x through it)."""

@@ -90,9 +90,19 @@ def solids(curves):
             f"{percent(at(found, eta) / value - 1)} at {eta:g}" for eta, value in zip(etas, truth, strict=True)
         )
 
+    finer = found["finer"]
+    like = exact(finer["eta"], arm=True)
+    model = ", ".join(f"{percent(delta / value - 1)} at {eta:g}"
+                      for eta, delta, value in zip(finer["eta"], finer["delta"], like, strict=True))  # fmt: skip
+    mesh = ", ".join(
+        f"{percent(at(found, eta) / delta - 1)} at {eta:g}"
+        for eta, delta in zip(finer["eta"], finer["delta"], strict=True)
+    )
     yield "3D elasticity", "one of its five curves", (
-        f"against its like, the rod with the force on a turning arm: {against(arm)}; against the constant moment: {against(moment)} "
-        f"({found['elements']} hexahedra of second order on half of the bar, {found['unknowns']} unknowns)")  # fmt: skip
+        f"against its like, the rod with the force on a turning arm: {model} with {finer['along']} hexahedra of second order along the bar "
+        f"({finer['unknowns']} unknowns on half of it); the curve's {found['along']} along ({found['unknowns']} unknowns) differ from those, "
+        f"by the mesh alone, by {mesh}, and so from the rod by {against(arm)}; against the constant moment: "
+        f"{against(moment)}")  # fmt: skip
     clamped = curves["solid_clamped"]
     apart = ", ".join(f"{percent(delta / value - 1)} at {eta:g}"
                       for eta, delta, value in zip(clamped["eta"], clamped["delta"], exact(clamped["eta"], arm=True), strict=True))  # fmt: skip

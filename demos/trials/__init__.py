@@ -3,6 +3,7 @@
 cells           a cell: a number and a verdict
 problems        what is solved, as dicts that every method reads, and the truths
 catalogue       the trials: what is tried, what right means, how a method's answer becomes a cell
+ways            trials of several ways to one end
 methods         the columns of the map, each of one protocol
 own             this package through its public face: the default, the rungs, the formulations
 chains          the co-rotational beam and the reconstructed MCRE

@@ -19,6 +19,7 @@ from cosserat_fenicsx.models.rodmesh import Layout
 from cosserat_fenicsx.statics import solvers
 from trials import problems
 from trials.cells import Answer, NotForIt, Stopped
+from trials.own import against_steps
 
 _CLAMPED = (0, 1, 2, 3, 4, 5, 6)
 
@@ -163,7 +164,7 @@ class Bare:
     )
     spatial: bool = True
     own: bool = False
-    turn: tuple = ()
+    turn: tuple = (0.0, 0.0, 0.0)
 
     def solve(self, problem, jump=False):
         """Jumps alone: everything else is this package's own answer."""
@@ -188,5 +189,8 @@ class Bare:
         }[key]  # fmt: skip
         loop = Loop(problem, **options)
         tips = [loop.to(eta) for eta in etas]
-        number = loop.snes.getIterationNumber() if key == "line_search" else None
-        return problem, Answer(tips[-1][None], "", note), number, "Newton iterations"
+        answer = Answer(tips[-1][None], "", note)
+        if key != "line_search":
+            return problem, answer, None, ""
+        same = {"model": "spatial", "formulation": "displacement", "degree": 2}
+        return problem, against_steps(problem, answer, **same), loop.snes.getIterationNumber(), "Newton iterations"

@@ -61,6 +61,7 @@ class Answer:
         note: more about the answer.
         events: load factors of the limit points it reports.
         iterations: Newton's, where they are known.
+        stable: what it calls stable, by load factor, (n,) bool; None where it has no word on that.
     """
 
     tip: np.ndarray
@@ -68,6 +69,7 @@ class Answer:
     note: str = ""
     events: tuple = ()
     iterations: int | None = None
+    stable: np.ndarray | None = None
 
 
 class Stopped(Exception):

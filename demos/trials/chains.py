@@ -170,7 +170,10 @@ class ChainMethod:
         negative = max(point.negative_modes for point in points)
         said = f"unstable, {negative} negative modes" if negative else ""
         work = sum(point.iterations for point in points)
-        return Answer(np.array([chain.tip_moved(each) for each in x]), said, f"{chain.elements} elements", (), work)
+        stable = np.array([point.negative_modes == 0 for point in points])
+        return Answer(
+            np.array([chain.tip_moved(each) for each in x]), said, f"{chain.elements} elements", (), work, stable
+        )
 
     def _turned(self, chain, point, angle):
         """The end of the path, turned with clamp and loads by parts of the angle, and solved again after each."""
@@ -223,7 +226,8 @@ class ChainMethod:
 
 def _elements(problem):
     """Few where locking is looked for, and where unsymmetric eigenvalues are."""
-    return 8 if problem.get("coarse") else 16 if problem.get("follower") else ELEMENTS
+    few = 8 if problem.get("coarse") else 16 if problem.get("follower") else ELEMENTS
+    return few * problem.get("finer", 1)
 
 
 def _beam(length, axial, shear):

@@ -1,4 +1,4 @@
-"""OpenSeesPy's runner of `demos/peers` with a history of loads, a held tip, and a test on the residual; see `peers.speak`."""
+"""OpenSeesPy's runner of `demos/peers` with a history of loads, a held tip, a clamp that turns, and a test on the residual; see `peers.speak`."""
 
 import sys
 from pathlib import Path
@@ -22,6 +22,8 @@ def _solve(problem, configuration):
     if "residual" in configuration:  # of the largest load
         size = max(map(abs, [*problem["force"], *problem["moment"]])) * max(problem["load_factors"])
         ops.test("NormUnbalance", configuration["residual"] * size, 12, 0)
+    if "turn" in problem:
+        _turn_the_clamp(problem["turn"], problem["load_factors"][-1])
     if not history:
         return _analyse(problem, configuration.get("substeps", 1), tip)
     times = [float(k) for k in range(len(history) + 1)]
@@ -43,6 +45,23 @@ def _solve(problem, configuration):
             raise Stopped(f"no convergence in stage {reached:.4g} of {len(history)}")
     u = ops.nodeDisp(tip)
     return [(u[0], u[1], u[2] if ops.getNDM()[0] == 3 else 0.0)]
+
+
+def _turn_the_clamp(vector, last):
+    """The clamp's rotation grows with the load, about an axis that stays, to the whole of it at the last load factor."""
+    ops.wipeAnalysis()
+    ops.timeSeries("Linear", 4, "-factor", 1 / last)
+    ops.pattern("Plain", 4, 4)
+    for axis, angle in zip((4, 5, 6), vector, strict=True):
+        ops.remove("sp", 1, axis)
+        ops.sp(1, axis, angle)
+    ops.constraints("Transformation")
+    ops.numberer("Plain")
+    ops.system("BandGeneral")
+    ops.test("NormDispIncr", 1e-8, 30, 0)
+    ops.algorithm("Newton")
+    ops.integrator("LoadControl", 1.0)
+    ops.analysis("Static")
 
 
 if __name__ == "__main__":

@@ -1,6 +1,6 @@
 """This package: the default, the rungs and the formulations, through its public face."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -55,6 +55,8 @@ class Own:
             options |= {"elements": 4, "degree": 2}
         if "mesh" in problem and not self.default:
             options |= {"elements": problem["mesh"] * (1 if self.options.get("formulation", "mixed") == "mixed" else 2)}
+        if "finer" in problem:
+            options |= {"tol": self.tol / problem["finer"] ** 2}
         if problem.get("guided") and not self.default:
             options |= {"control": "load"}
         try:
@@ -79,13 +81,13 @@ class Own:
             tip = path.position(rod.end) - [rod.length, 0, 0]
         events = tuple(event.load_factor for event in path.events if event.kind == "limit")
         note = f"{path.model}, {path.formulation}, degree {path.degree}, {sum(path.elements)} elements"
-        return Answer(tip, "; ".join(said), note, events, int(path.iterations.sum()))
+        return Answer(tip, "; ".join(said), note, events, int(path.iterations.sum()), path.stable)
 
     def _in_stages(self, problem):
         """Force and moment each by factors of their own: Newton from state to state, on the solvers that `solve` uses."""
-        degree = solvers.default_degree(self.options.get("formulation", "mixed"))
+        degree, elements = solvers.default_degree(self.options.get("formulation", "mixed")), 6 * problem.get("finer", 1)
         _, scene = problems.scene_of(problem)
-        plain = cf.solve(scene, [0.0], elements=6, progress=False, **self.options)
+        plain = cf.solve(scene, [0.0], elements=elements, progress=False, **self.options)
         options = {"formulation": plain.formulation, "degree": degree, "model": plain.model}
         state = None
         for force, moment in problem["history"]:
@@ -101,7 +103,7 @@ class Own:
             state = solver.numbers()
         rq, _ = solver.model.expansion()(np.ones(1), *(None if a is None else a[None] for a in solver.model.snapshot()))
         tip = (rq[0, -1, :3] - solver.model.reference[-1]) * solver.model.scales.length
-        return Answer(tip[None], "", f"{plain.model}, {plain.formulation}, degree {degree}, 6 elements")
+        return Answer(tip[None], "", f"{plain.model}, {plain.formulation}, degree {degree}, {elements} elements")
 
     def numerics(self, key):
         """(problem, answer, number, unit) of a trial about loops; number None for the error itself."""
@@ -113,9 +115,22 @@ class Own:
             points = {"gauss_points": degree + 1, "tol": max(1e-4, self.tol), "degree": degree}
             return problem, self.solve(problem, **points), None, ""
         if key == "line_search":
-            answer = self.solve(problem, **({} if self.default else {"steps": cf.StepControl(adaptive=False)}))
-            return problem, answer, answer.iterations, "Newton iterations"
+            if self.default:
+                raise NotForIt(
+                    "it goes in steps of its own: the other columns of this package show its Newton's method alone"
+                )
+            answer = self.solve(problem, jump=True)
+            return problem, against_steps(problem, answer, **self.options), answer.iterations, "Newton iterations"
         return problem, self.solve(problem), None, ""
+
+
+def against_steps(problem, answer, **options):
+    """The answer of a jump on 8 elements, its error counted from what this package finds there in steps."""
+    rod, scene = problems.scene_of(problem)
+    path = cf.solve(scene, problem["load_factors"], elements=_IN_ONE_STEP["elements"], progress=False, **options)
+    ratio = problems.column_truth(problem)[:, 1] / path.displacement(rod.end)[:, 1]
+    note = "; ".join(word for word in (answer.note, "against the same mesh in steps") if word)
+    return replace(answer, tip=answer.tip * [[1, r, 1] for r in ratio], note=note)
 
 
 def _with_loads(problem, force, moment):

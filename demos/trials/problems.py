@@ -7,6 +7,7 @@ times the `load_factors`. More than the peers' problems may have:
     turn      rotation vector, rad: the clamp is turned by it, and the loads with it
     follower  the force turns with the tip's section
     coarse    few elements, to see what locks
+    finer     times as many elements, where the method lets choose; this package: that power of two more accurate
     mesh      elements for the quick map, where a method of this package is not the default
 """
 

@@ -156,7 +156,7 @@ class RotationVector:
         """An `Answer`: one step a load factor."""
         if problem.get("guided") or problem.get("follower"):
             raise NotForIt("written for a cantilever under dead loads")
-        rod = Rod(problem, 8 if problem.get("coarse") else 32)
+        rod = Rod(problem, (8 if problem.get("coarse") else 32) * problem.get("finer", 1))
         L = problem["length"]
         unit = problem["EI"] / L**2
         whole = np.array([*problem["force"], *(np.array(problem["moment"]) / L)]) / unit
