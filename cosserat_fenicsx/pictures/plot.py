@@ -145,11 +145,11 @@ def _label(plotter, path, shown, bodies, span):
     spread = [np.ptp([bodies[k, rod].line for k in shown], axis=0).max(axis=1) for rod in rods]
     rod = max(range(len(rods)), key=lambda i: (round(spread[i].max() / size, 6), -i))
     place = len(spread[rod]) - 1 - int(np.argmax(spread[rod][::-1]))  # the last of equals: an end, not next to it
-    last = place == len(spread[rod]) - 1
+    end = 1 if place == len(spread[rod]) - 1 else -1 if place == 0 else 0
     placed = []
     for k in reversed(shown):
         body = bodies[k, rods[rod]]
-        at = body.line[place] + 0.03 * size * (1 if last else 1.3) * _beyond(body.directors[place, :, 2], last)
+        at = body.line[place] + 0.03 * size * (1 if end else 1.3) * _beyond(body.directors[place, :, 2], end)
         text = path.label(k)
         across, high = at @ right / size, at @ above / size
         if any(abs(high - y) < _HIGH and abs(across - x) < _WIDE * (len(text) + n) / 2 for x, y, n in placed):
@@ -162,9 +162,10 @@ def _label(plotter, path, shown, bodies, span):
 
 
 def _beyond(tangent, end):
-    """Where a label goes: on along the tangent at an end; beside the rod elsewhere, upwards if that is possible."""
+    """Where a label goes: on along the tangent at the end (1), back along it at the start (-1); beside the rod elsewhere (0),
+    upwards if that is possible."""
     if end:
-        return tangent
+        return end * tangent
     up = np.array([0.0, 0.0, 1.0]) if abs(tangent[2]) < 0.95 else np.array([1.0, 0.0, 0.0])
     across = up - (up @ tangent) * tangent
     return across / np.linalg.norm(across)
