@@ -202,7 +202,7 @@ class RodModel:
         """(N, block) numbers of all nodes in the second variation (of a rung with one part), the scene's order, on all
         ranks; -1 where clamped."""
         (part,) = self._variations
-        dofs = np.arange(part.numbering.block * len(self._slots)).reshape(len(self._slots), -1)
+        dofs = np.arange(part.numbering.block * len(self._slots)).reshape(-1, part.numbering.block)
         rows = np.empty((self._gather_nodes.total, part.numbering.block), dtype=np.int64)
         for slots, numbers in self.comm.allgather((self._slots, part.numbering.rows[dofs])):
             rows[slots] = numbers

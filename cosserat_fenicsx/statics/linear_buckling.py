@@ -23,7 +23,7 @@ _MOST_ELEMENTS = 256
 _STEP = 1e-3
 # What Rayleigh's quotient leaves of the error of bounded stiffnesses, at most.
 _LEFT = 0.1
-# No rod bears more than this, in the same units.
+# No rod bears more than this, in the same units, nor more than EA or GA: at about GA the pencil has a root under tension.
 _HUGE = 1e8
 # Load factors nearer than this to one another are one, with several modes.
 _SAME = 1e-6
@@ -76,7 +76,8 @@ def buckling(scene, count=1, *, load_factor=0.0, tol=1e-5, elements=None, degree
         comm: MPI communicator; default all ranks. Every rank calls.
 
     Returns:
-        Buckling. It holds fewer than `count` load factors where no more lie on the side of positive load.
+        Buckling. It holds fewer than `count` load factors where no more lie on the side of positive load, below the smallest EA
+        and GA.
 
     Raises:
         SceneError: an argument outside its range.
@@ -138,7 +139,9 @@ def _critical(scene, layout, count, load_factor, degree, comm):
     track.restore()
     stability.whole.assemble()
     values, vectors = eigen.largest_of_pencil(slack, stability.whole.K, count + 2)
-    values = values[values * _HUGE > unit]  # what is left is rounding of zero, or buckles under the opposite load
+    true = model.data.K.x.array
+    softest = comm.allreduce(true[true > 0].min(initial=_HUGE), op=MPI.MIN)  # an infinite one is kept as 0
+    values = values[values * softest > unit]  # others are rounding of zero, or buckle under the opposite load
     modes, k = [], 0
     while k < len(values):
         same = int(np.count_nonzero(np.abs(values[k:] - values[k]) <= _SAME * values[k]))
