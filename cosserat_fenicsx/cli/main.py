@@ -94,31 +94,28 @@ def _resume(options):
 
 def _buckling(options):
     from cosserat_fenicsx.results.tables import buckling_table
-    from cosserat_fenicsx.scene.scenefile import read_scene
     from cosserat_fenicsx.statics.linear_buckling import buckling
 
-    scene, _ = read_scene(options.scene)
-    try:
-        found = buckling(scene, options.count)
-    except NotConverged as failure:
-        say(f"cosserat: {failure}")
-        return NOT_CONVERGED
-    say(buckling_table(found), file=sys.stdout)
-    return DONE
+    return _tabulate(options, lambda scene: buckling_table(buckling(scene, options.count)))
 
 
 def _modes(options):
     from cosserat_fenicsx.dynamics.natural_modes import modes
     from cosserat_fenicsx.results.tables import modes_table
+
+    return _tabulate(options, lambda scene: modes_table(modes(scene, options.count, load_factor=options.load_factor)))
+
+
+def _tabulate(options, table_of):
+    """Print a table of the scene; the exit code."""
     from cosserat_fenicsx.scene.scenefile import read_scene
 
     scene, _ = read_scene(options.scene)
     try:
-        found = modes(scene, options.count, load_factor=options.load_factor)
+        say(table_of(scene), file=sys.stdout)
     except NotConverged as failure:
         say(f"cosserat: {failure}")
         return NOT_CONVERGED
-    say(modes_table(found), file=sys.stdout)
     return DONE
 
 
