@@ -38,15 +38,10 @@ def nearest_zero(K, pc, count, side=0):
     inverse.setUp()
     solver = SLEPc.EPS().create(K.comm)
     solver.setOperators(inverse)
-    which = {0: "LARGEST_MAGNITUDE", 1: "LARGEST_REAL", -1: "SMALLEST_REAL"}[side]
-    values, vectors = _solve(
-        solver,
-        SLEPc.EPS.ProblemType.HEP,
-        getattr(SLEPc.EPS.Which, which),
-        count,
-        K,
-        tolerance=_COARSE if side else _TOLERANCE,
-    )
+    which = SLEPc.EPS.Which
+    where = {0: which.LARGEST_MAGNITUDE, 1: which.LARGEST_REAL, -1: which.SMALLEST_REAL}[side]
+    tolerance = _COARSE if side else _TOLERANCE
+    values, vectors = _solve(solver, SLEPc.EPS.ProblemType.HEP, where, count, K, tolerance=tolerance)
     return 1 / values, vectors
 
 

@@ -51,10 +51,10 @@ def deliver(computed, options, moving):
                 trouble, code = "interrupted; what was being drawn or written then is incomplete", INTERRUPTED
     if trouble is not None:
         say(f"cosserat: {trouble}")
-        if moving and code == INTERRUPTED and not getattr(options, "folder", None):
-            say("cosserat: a motion that is run with --folder DIR can be gone on with")
-        if getattr(options, "folder", None) and not isinstance(trouble, NotConverged | SceneError):
+        if options.folder and not isinstance(trouble, NotConverged | SceneError):
             say(f"cosserat: `cosserat resume {options.folder}` goes on from there")
+        elif moving and code == INTERRUPTED:
+            say("cosserat: a motion that is run with --folder DIR can be gone on with")
     return code
 
 
@@ -104,19 +104,26 @@ def _report(path):
 
 
 def _write(path, out, *, picture, magnify, shown, film, speed):
-    if path.axis == "time":
-        from cosserat_fenicsx.cli.motion import write_motion
-
-        written = write_motion(path, out, picture=picture, magnify=magnify, shown=shown, film=film, speed=speed)
+    moving = path.axis == "time"
+    if moving:
+        from cosserat_fenicsx.results.motion_tables import write_motion_csv as write_csv
     else:
         from cosserat_fenicsx.results.tables import write_csv
 
-        write_csv(path, out / "path.csv")
-        path.write(out / "path.xdmf")
-        written = ["path.xdmf", "path.h5", "path.csv"]
+    name = "motion" if moving else "path"
+    write_csv(path, out / f"{name}.csv")
+    path.write(out / f"{name}.xdmf")
+    written = [f"{name}.{kind}" for kind in ("xdmf", "h5", "csv")]
+    if picture:
+        path.plot(out / "rods.png", shown, magnify=magnify)
+        written.append("rods.png")
+    if moving and len(path) > 1:
         if picture:
-            path.plot(out / "rods.png", shown, magnify=magnify)
-            written.append("rods.png")
+            path.plot_energy(out / "energy.png")
+            written.append("energy.png")
+        if film:
+            path.animate(out / film, speed=speed, magnify=magnify)
+            written.append(film)
     say(f"written to {out}/: {', '.join(written)}", file=sys.stdout)
 
 

@@ -50,28 +50,3 @@ def refuse_other(name, moves):
         f"{option} is for a motion, and this scene is an equilibrium path: expected a duration too, under [simulate] in the "
         "file or by --duration, and no --static"
     )
-
-
-def write_motion(history, out, *, picture, magnify, shown, film, speed):
-    """Files of a motion in a folder; returns their names.
-
-    Args:
-        history: a `History`; out: a Path.
-        picture: whether to draw pictures; magnify, shown: of these, see `Path.plot`.
-        film: name of a film, or None; speed: of it, see `History.animate`.
-    """
-    from cosserat_fenicsx.results.motion_tables import write_motion_csv
-
-    write_motion_csv(history, out / "motion.csv")
-    history.write(out / "motion.xdmf")
-    written = ["motion.xdmf", "motion.h5", "motion.csv"]
-    if picture:
-        history.plot(out / "rods.png", shown, magnify=magnify)
-        written.append("rods.png")
-        if len(history) > 1:
-            history.plot_energy(out / "energy.png")
-            written.append("energy.png")
-    if film and len(history) > 1:
-        history.animate(out / film, speed=speed, magnify=magnify)
-        written.append(film)
-    return written

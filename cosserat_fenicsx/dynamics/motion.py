@@ -2,7 +2,6 @@
 
 import itertools
 
-from cosserat_fenicsx.dynamics.start import drive
 from cosserat_fenicsx.errors import Interrupted, NotConverged, SceneError
 from cosserat_fenicsx.interrupts import obey
 from cosserat_fenicsx.progress import Progress
@@ -73,7 +72,7 @@ class Motion:
         if self._t <= begin:
             if mark.jumps:
                 if begin > 0 and self._stepper.keeps_kinks:
-                    self._drive(begin)
+                    self._stepper.drive(begin)
                 self._stepper.jump()
                 self._pace.jump()
             elif mark.bends:
@@ -102,12 +101,6 @@ class Motion:
                 self._save(self._t)
             if self._folder and self._folder.due:
                 self._keep()
-
-    def _drive(self, t):
-        """See `start.drive`; the kinetic energy that it gives or takes is work of the supports."""
-        kinetic, _ = self.problem.energies()
-        drive(self.model, t)
-        self._stepper.add_work(self.problem.energies()[0] - kinetic)
 
     def _keep(self):
         if self._folder:

@@ -47,8 +47,9 @@ class Resolution:
     def __init__(self, scene, duration, tol, load_factor, missed):
         size = max(rod.length for rod in scene.rods)
         allowed = _SHARE * tol * size / max(24 * missed * abs(load_factor), 1e-300)
+        lasts = _memory_of(scene, duration)
         self._watched = [
-            _Watched(signal, _sway(scene, item, field), _memory_of(scene, duration), duration, allowed)
+            _Watched(signal, _sway(scene, item, field), lasts, duration, allowed)
             for item, field, signal in _curved(scene)
         ]
 

@@ -162,7 +162,11 @@ class Scene:
     @property
     def follows(self):
         """Whether a load turns with its rod, so that it has no potential."""
-        return any(getattr(load, "follows", False) for load in self.loads)
+        return bool(self._followers)
+
+    @property
+    def _followers(self):
+        return [load for load in self.loads if getattr(load, "follows", False)]
 
     def _softness(self):
         """Young's moduli that may be in other units."""
@@ -172,11 +176,9 @@ class Scene:
         ]
 
     def _following(self):
-        kinds = " and ".join(
-            dict.fromkeys(type(load).__name__ for load in self.loads if getattr(load, "follows", False))
-        )
-        if not kinds:
+        if not self.follows:
             return []
+        kinds = " and ".join(dict.fromkeys(type(load).__name__ for load in self._followers))
         return [
             f"{kinds}: a follower load has no potential, so negative modes, which are those of the tangent's symmetric part, do not "
             "decide on stability: an equilibrium that has some may be stable (Beck's column from pi^2 to 20.05 EI/L^2), one that has "

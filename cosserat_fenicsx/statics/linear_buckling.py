@@ -61,9 +61,9 @@ def buckling(scene, count=1, *, load_factor=0.0, tol=1e-5, elements=None, degree
 
     K(eta) + lambda dK/deta is singular, with K the second variation at the load factor eta (0: the unloaded
     reference) and dK/deta its change with the contact force and moment alone, as in textbooks and codes: the rod is
-    prestressed there, but neither bent nor shortened further; shear counts, P (1 + P/GA) = P_Euler. Where a structure bends much before it buckles, as an arch
-    does, this is an estimate, and the events of `solve` are the answer; a straight column's critical load is off by its
-    strain at buckling. From a prestressed state (`load_factor`) near the answer the estimate is good.
+    prestressed there, but neither bent nor shortened further; shear counts, P (1 + P/GA) = P_Euler of a column. Where a
+    structure bends much before it buckles, as an arch does, this is an estimate, and the events of `solve` are the answer; a
+    straight column's critical load is off by its strain at buckling. From a prestressed state (`load_factor`) near the answer the estimate is good.
 
     Args:
         scene: a `Scene`.
@@ -172,5 +172,4 @@ def _softness(part, vectors):
     energies = [((part.K * v).dot(v), (whole * v).dot(v)) for v in vectors]
     stiff[:] = kept
     part.load()
-    part.assemble()
     return np.array([2 * of_excess / of_all for of_excess, of_all in energies])

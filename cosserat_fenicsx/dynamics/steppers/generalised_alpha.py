@@ -15,7 +15,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cosserat_fenicsx.dynamics.start import drive
 from cosserat_fenicsx.dynamics.steppers.moving_ties import MovingTies
 from cosserat_fenicsx.dynamics.steppers.one_step import OneStep
 from cosserat_fenicsx.dynamics.steppers.step_problem import StepProblem
@@ -186,11 +185,9 @@ class GeneralisedAlpha(OneStep):
         After a step of length h that velocity is off by the order h^2, and over a shorter step that would be an acceleration
         to make up for it, the larger the shorter the step is.
         """
-        kinetic, _ = self.problem.energies()
-        drive(self.problem.model, t)
+        self.drive(t)
         self._start[:] = self._state
         self.problem.model.follow_velocities()
-        self.add_work(self.problem.energies()[0] - kinetic)
         self.bend()
 
     def _accelerate(self, t, h):

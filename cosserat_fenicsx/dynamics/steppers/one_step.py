@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from cosserat_fenicsx.dynamics.start import drive
 from cosserat_fenicsx.dynamics.steppers.newton import StepNewton
 
 # Error estimates look back over three times so many steps: what changes within a few steps is not resolved, but small.
@@ -36,9 +37,11 @@ class OneStep:
         """See `Stepper`."""
         self._past = []  # (h, state before, rates before, work and dissipation before) of the last steps
 
-    def add_work(self, done):
+    def drive(self, t):
         """See `Stepper`."""
-        self.work += done
+        kinetic, _ = self.problem.energies()
+        drive(self.problem.model, t)
+        self.work += self.problem.energies()[0] - kinetic
 
     def bend(self):
         """See `Stepper`: no scheme of one step looks at what was before, but to begin Newton's method."""

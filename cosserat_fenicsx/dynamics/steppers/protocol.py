@@ -32,8 +32,8 @@ class Stepper(Protocol):
     def jump(self):
         """Something jumps here: what was before does not foretell what comes."""
 
-    def add_work(self, done):
-        """Supports have done work between two steps, dimensionless."""
+    def drive(self, t):
+        """See `start.drive`, t in s; the kinetic energy that it gives or takes is work of the supports."""
 
     def bend(self):
         """A load bends here without a jump: rates of change of accelerations do."""

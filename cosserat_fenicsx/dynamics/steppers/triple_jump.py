@@ -40,9 +40,9 @@ class TripleJump:
         """See `Stepper`."""
         self._inner.jump()
 
-    def add_work(self, done):
+    def drive(self, t):
         """See `Stepper`."""
-        self._inner.add_work(done)
+        self._inner.drive(t)
 
     def bend(self):
         """See `Stepper`."""
