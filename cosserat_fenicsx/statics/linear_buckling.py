@@ -63,7 +63,8 @@ def buckling(scene, count=1, *, load_factor=0.0, tol=1e-5, elements=None, degree
     reference) and dK/deta its change with the contact force and moment alone, as in textbooks and codes: the rod is
     prestressed there, but neither bent nor shortened further; shear counts, P (1 + P/GA) = P_Euler of a column. Where a
     structure bends much before it buckles, as an arch does, this is an estimate, and the events of `solve` are the answer; a
-    straight column's critical load is off by its strain at buckling. From a prestressed state (`load_factor`) near the answer the estimate is good.
+    straight column's critical load is off by its strain at buckling. From a prestressed state (`load_factor`) near the answer
+    the estimate is good.
 
     Args:
         scene: a `Scene`.
