@@ -20,6 +20,7 @@ class Packed:
 
     def __init__(self, form, moving, slow=()):
         self._kernel = compat.kernel(form)
+        self._constants = cpp.fem.pack_constants(self._kernel)
         self._places = []  # (numbers, key, columns, which number each entry is, whether it is slow)
         for functions, is_slow in ((moving, False), (slow, True)):
             for function in functions:
@@ -60,7 +61,9 @@ class Packed:
     def _renew(self):
         for numbers, view, which in self._views:
             view[...] = numbers[which]
-        return cpp.fem.pack_constants(self._kernel), self._coefficients
+        if len(self._constants):
+            self._constants = cpp.fem.pack_constants(self._kernel)
+        return self._constants, self._coefficients
 
     def add_to_vector(self, array):
         """Add a linear form to an array of local numbers, ghosts too."""

@@ -14,7 +14,7 @@ from cosserat_fenicsx.results.records import Record
 Ledger = namedtuple("Ledger", "kinetic strain work dissipated linear_momentum angular_momentum")
 
 
-@dataclass(frozen=True)
+@dataclass
 class Instant(Record):
     """A `Record` at a time (s), with velocities and angular velocities of the nodes (N, 6), dimensionless, inertial,
     the steps taken so far and the `Ledger`."""

@@ -1,7 +1,6 @@
 """Results as arrays with named fields, in SI units. Knows no solver; files and pictures are made by other rooms."""
 
 import copy
-from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
@@ -83,7 +82,8 @@ class Path:
             gauss = None if new[0].gauss_fields is None else np.array([x.gauss_fields for x in new])
             etas = np.array([x.load_factor for x in new])
             rq, fields = self._expand(etas, np.array([x.rq for x in new]), gauss)
-            self._expanded += [replace(x, rq=a, gauss_fields=b) for x, a, b in zip(new, rq, fields, strict=True)]
+            for x, x.rq, x.gauss_fields in zip(new, rq, fields, strict=True):
+                self._expanded.append(x)
         return self._expanded
 
     def __len__(self):

@@ -2,7 +2,7 @@
 
 from peers.environments import OWN
 
-_MESHES = (1, 2, 4, 8, 16, 32, 64)
+_MESHES = (1, 2, 3, 4, 8, 16, 32, 64)
 #: The mechanical model that an element converges to; Reissner where it is not named.
 _MODELS = {"planar ANCF cable": "shear-rigid", "planar elastic": "shear-rigid", "spatial elastic": "shear-rigid",
            "planar CBDI": "shear-rigid", "spatial CBDI": "shear-rigid"}  # fmt: skip
