@@ -17,6 +17,6 @@ RUN PIP_NO_CACHE_DIR=1 make setup
 
 # What the Makefile sets, for commands that do not go through it; the comments are there.
 ENV PATH=/home/rod/cosserat/.venv/bin:$PATH \
-    OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 OMPI_MCA_btl=^tcp \
+    OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 OMPI_MCA_btl=^tcp,ofi \
     MPLBACKEND=Agg VTK_DEFAULT_OPENGL_WINDOW=vtkEGLRenderWindow
 CMD ["make", "demo"]

@@ -7,10 +7,11 @@ MPIRUN = /usr/bin/mpirun --oversubscribe --timeout 1800
 # Threads inside BLAS slow some solvers down a thousand times; ranks are the parallelism here.
 export OMP_NUM_THREADS = 1
 export OPENBLAS_NUM_THREADS = 1
-# Open MPI refuses root otherwise, and on Debian 13 complains about network interfaces that one machine does not need.
+# Open MPI refuses root otherwise, and on Debian 13 complains about network interfaces that one machine does not need
+# (without tcp, ofi would look for others for a second, in every process).
 export OMPI_ALLOW_RUN_AS_ROOT = 1
 export OMPI_ALLOW_RUN_AS_ROOT_CONFIRM = 1
-export OMPI_MCA_btl = ^tcp
+export OMPI_MCA_btl = ^tcp,ofi
 # Pictures without a screen.
 export MPLBACKEND = Agg
 export VTK_DEFAULT_OPENGL_WINDOW = vtkEGLRenderWindow

@@ -4,7 +4,17 @@ import re
 from pathlib import Path
 
 README = Path(__file__).parent.parent / "README.md"
-TABLES = ("accuracy", "overhead", "rungs", "choice", "scaling", "orders", "figure3", "work_precision", "work_precision_motion")
+TABLES = (
+    "accuracy",
+    "overhead",
+    "rungs",
+    "choice",
+    "scaling",
+    "orders",
+    "figure3",
+    "work_precision",
+    "work_precision_motion",
+)
 
 
 def main(out="out"):
@@ -14,7 +24,9 @@ def main(out="out"):
         file = Path(out) / f"{name}.md"
         if file.exists():
             found = file.read_text(encoding="utf-8").strip()
-            if name.startswith("work_precision"):  # the tables of all solvers stay in out/, and in demos/work_precision.md
+            if name.startswith(
+                "work_precision"
+            ):  # the tables of all solvers stay in out/, and in demos/work_precision.md
                 found = found.partition("\n\n| problem | solver")[0]
             table = f"<!-- {name} -->\n{found}\n<!-- /{name} -->"
             text = re.sub(f"<!-- {name} -->.*<!-- /{name} -->", lambda _, table=table: table, text, flags=re.DOTALL)

@@ -8,9 +8,9 @@
 Leaves in out/: work_precision.json (every sample), work_precision.md (the table), work_precision_*.png.
 
 Every peer is a process of its own, in an environment of its own, on one thread. A sample is processor time of the
-process around one warm solution from the unloaded state; a round asks every configuration for three samples (slow ones
-for one), in an order that changes from round to round, so that peers alternate, until a configuration has five or more.
-A number is their median.
+process around one warm solution from the unloaded state; a first round asks every configuration for three samples (slow ones
+for one), later ones for the rest, in an order that changes from round to round, so that peers alternate, until a
+configuration has five. A number is their median.
 """
 
 import argparse
@@ -30,19 +30,19 @@ from peers.process import Peer
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 from waiting import waits
 
-SAMPLES, A_VISIT, SEED = 5, 3, 2026  # at least so many of a row; so many at a visit of a fast one
+SAMPLES, SEED = 5, 2026  # at least so many of a row
 #: Time limits of a request, s: here it may compile a form; the last two compile, relax or are whole programs.
 LIMITS = {OWN: 40.0, "Exudyn": 5.0, "OpenSeesPy": 5.0, "PyElastica": 20.0, "CalculiX": 20.0}
 SLOW_PEERS = ("PyElastica", "CalculiX")
 QUICK_LIMIT = 5.0  # s, of all peers in a quick run
 SLOW = 0.5  # s: from here on there is no warm-up run, and no repetition where the same peer has something better
-BUDGET = 24 * 60.0  # s of measuring; a round that would begin later is left out, and the table says so
+BUDGET = 22 * 60.0  # s of measuring; a round that would begin later is left out, and the table says so
 
 
-#: What is measured: peers, problems, how their errors are told, the configurations of a peer, what these are called, and
-#: how many samples are taken of one that may be slow.
-Panel = namedtuple("Panel", "peers problems error configurations kind model first")
-STATICS = Panel(PEERS, problems, error, configurations, kind, model, A_VISIT)
+#: What is measured: peers, problems, how their errors are told, the configurations of a peer, what these are called, how
+#: many samples are taken first of one that may be slow, and whether all fast ones of this package get all samples.
+Panel = namedtuple("Panel", "peers problems error configurations kind model first whole")
+STATICS = Panel(PEERS, problems, error, configurations, kind, model, 3, True)
 
 
 class Record:
@@ -125,7 +125,10 @@ def sample(peer, row, found, wanted, limits):
     visit = (
         {"warm": 0, "samples": 1}
         if slow or cold
-        else {"warm": 1, "samples": min(A_VISIT if row["seconds"] else found.panel.first, wanted - len(row["seconds"]))}
+        else {
+            "warm": 1,
+            "samples": min(found.panel.first, wanted) if not row["seconds"] else wanted - len(row["seconds"]),
+        }
     )
     answer = peer.ask(problem, row["configuration"], **visit, limit=limits[peer.name])
     found.spent += time.monotonic() - began
@@ -139,16 +142,16 @@ def sample(peer, row, found, wanted, limits):
         found.versions[peer.name] = answer["versions"]
 
 
-def worth(row, rows):
+def worth(row, rows, whole):
     """Whether another sample can matter: not where the same element, or this package, is clearly better elsewhere.
 
-    All of this package's rows below SLOW are repeated. Otherwise a row is not repeated that another of its kind (of its
+    If `whole`, all of this package's rows below SLOW are repeated. Otherwise a row is not repeated that another of its kind (of its
     peer, where it is slow) beats in error and by half in time; its point in the chart then has fewer samples.
     """
     if row["failed"] or not row["seconds"]:
         return not row["failed"]
     slow = min(row["seconds"]) > SLOW
-    if row["peer"] == OWN and not slow:
+    if whole and row["peer"] == OWN and not slow:
         return True
     return not any(
         1.5 * min(r["seconds"]) < min(row["seconds"]) and r["error"] <= row["error"]
@@ -171,7 +174,7 @@ def measure(started, names, found, *, quick, wanted, limits, budget):
             here = [row for row in rows if row["problem"] == name]
             like = {peer: [row for row in here if row["peer"] == peer] for peer in started}
             for number in range(wanted):
-                todo = [r for r in here if len(r["seconds"]) < wanted and worth(r, like[r["peer"]])]
+                todo = [r for r in here if len(r["seconds"]) < wanted and worth(r, like[r["peer"]], found.panel.whole)]
                 if todo and number and found.spent > budget:
                     print(f"{name}: the time is spent, {len(todo)} rows keep fewer samples", flush=True)
                     break
@@ -188,7 +191,7 @@ def _round(todo, like, started, found, wanted, limits, bar, name):
         if not bar.console.is_terminal and time.monotonic() - told > 30:  # a bar that nobody sees
             told = time.monotonic()
             print(f"{name}: {i} of {len(todo)}", flush=True)
-        if worth(row, like[row["peer"]]):
+        if worth(row, like[row["peer"]], found.panel.whole):
             sample(started[row["peer"]], row, found, wanted, limits)
             found.write()
     bar.update(task, description=name, completed=len(todo))

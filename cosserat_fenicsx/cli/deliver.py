@@ -37,7 +37,7 @@ def deliver(computed, options, moving):
     except Interrupted as stop:
         path, trouble, code = stop.path, stop, INTERRUPTED
     if path is not None and len(path):
-        _report(path)
+        _report(path, options.station)
         if out is not None:
             film = options.animate if code != INTERRUPTED else None  # who stops a run does not wait for its film
             if code == INTERRUPTED:
@@ -46,7 +46,7 @@ def deliver(computed, options, moving):
                 )
             try:
                 look = {"magnify": options.magnify, "shown": _shown(path, at), "film": film, "speed": options.speed}
-                _write(path, out, picture=not options.no_picture, **look)
+                _write(path, out, options.station, picture=not options.no_picture, **look)
             except KeyboardInterrupt:
                 trouble, code = "interrupted; what was being drawn or written then is incomplete", INTERRUPTED
     if trouble is not None:
@@ -92,18 +92,18 @@ def _check_film(options, moving):
     check_name(options.animate)
 
 
-def _report(path):
+def _report(path, station):
     if path.axis == "time":
         from cosserat_fenicsx.results.motion_tables import motion_table as table
     else:
         from cosserat_fenicsx.results.tables import path_table as table
 
-    text = table(path)
+    text = table(path, station)
     if first_rank():
         print(text, flush=True)  # before what is said of its end
 
 
-def _write(path, out, *, picture, magnify, shown, film, speed):
+def _write(path, out, station, *, picture, magnify, shown, film, speed):
     moving = path.axis == "time"
     if moving:
         from cosserat_fenicsx.results.motion_tables import write_motion_csv as write_csv
@@ -111,7 +111,7 @@ def _write(path, out, *, picture, magnify, shown, film, speed):
         from cosserat_fenicsx.results.tables import write_csv
 
     name = "motion" if moving else "path"
-    write_csv(path, out / f"{name}.csv")
+    write_csv(path, out / f"{name}.csv", station)
     path.write(out / f"{name}.xdmf")
     written = [f"{name}.{kind}" for kind in ("xdmf", "h5", "csv")]
     if picture:

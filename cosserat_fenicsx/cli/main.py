@@ -68,7 +68,10 @@ def _run(options):
     moving = motion_of(options)
     scene, load_factors, settings = (None, None, None) if moving else _settings(options)
 
-    for caution in (moving[0] if moving else scene).cautions:
+    scene = moving[0] if moving else scene
+    if options.station:
+        scene.station(options.station)  # refused before the work
+    for caution in scene.cautions:
         say(f"cosserat: {caution}")
 
     def computed():

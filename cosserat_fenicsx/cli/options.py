@@ -70,6 +70,9 @@ def _outputs(parser):
         "--magnify", type=float, default=1.0, help="pictures: draw displacements this many times their size [1]"
     )
     parser.add_argument(
+        "--station", metavar="ROD@S", help="what the table tells of: rod.end, rod@1.5 (m) [the station that moves most]"
+    )
+    parser.add_argument(
         "--at", metavar="A,B,...", help="pictures: the load factors or times (s) to draw; the nearest that there are"
     )
     parser.add_argument(

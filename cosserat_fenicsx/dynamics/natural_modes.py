@@ -15,6 +15,7 @@ from cosserat_fenicsx.errors import NotConverged
 from cosserat_fenicsx.models.compiled import lobatto_weights
 from cosserat_fenicsx.models.rod_data import check_inertia, nodal_inertia
 from cosserat_fenicsx.quaternions import directors
+from cosserat_fenicsx.results.on_nodes import OnNodes
 from cosserat_fenicsx.scene.scene import Scene
 from cosserat_fenicsx.scene.statical import without_mechanism
 from cosserat_fenicsx.statics.continuation import StepControl
@@ -32,7 +33,7 @@ _TWIST = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
-class Modes:
+class Modes(OnNodes):
     """Result of `modes`.
 
     Attributes:
@@ -66,16 +67,11 @@ class Modes:
 
     def mode(self, k, rod=None):
         """(nodes, 3) displacements of the k-th mode at the nodes of a rod (default the first)."""
-        return self.shapes[k, self._rows(rod), :3]
+        return self.shapes[k, self._rows(rod)[1], :3]
 
     def turns(self, k, rod=None):
         """(nodes, 3) small rotations of the k-th mode at the nodes of a rod (default the first), rad."""
-        return self.shapes[k, self._rows(rod), 3:]
-
-    def _rows(self, rod):
-        i = 0 if rod is None else self.scene.rods.index(rod)
-        nodes = [cells * self.degree + 1 for cells in self.elements]
-        return slice(sum(nodes[:i]), sum(nodes[: i + 1]))
+        return self.shapes[k, self._rows(rod)[1], 3:]
 
 
 def modes(scene, count=1, *, load_factor=0.0, tol=1e-6, elements=None, degree=4, comm=None):

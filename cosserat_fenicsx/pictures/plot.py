@@ -91,7 +91,9 @@ def _note(path, shown, thicker, magnify, small):
     """The title: what is shown, and what is not to scale."""
     some = "" if len(shown) == len(path) else f" (of {len(path)})"
     values = ", ".join(path.label(k) for k in shown)
-    parts = [f"{path.scene.title or 'Deformed rods'}: shapes at {path.axis}{'s' if len(shown) > 1 else ''} {values}{some}"]
+    parts = [
+        f"{path.scene.title or 'Deformed rods'}: shapes at {path.axis}{'s' if len(shown) > 1 else ''} {values}{some}"
+    ]
     if magnify != 1:
         parts.append(f"displacements magnified {magnify:g} times")
     if small:

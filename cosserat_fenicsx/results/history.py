@@ -96,6 +96,7 @@ class History(Path):
         angular = self._at(station, self._all_rates[:, :, 3:]) / self._time_unit
         if not material:
             return angular
+        station = self.station(station)
         return np.einsum("nij,ni->nj", directors(self.rotation(station)) @ station.rod.curve.frame(station.s), angular)
 
     @property

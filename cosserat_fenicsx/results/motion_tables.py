@@ -10,10 +10,11 @@ ROWS = 21
 _ENERGIES = ("kinetic", "strain", "work", "dissipated", "balance")
 
 
-def motion_table(history, rows=ROWS):
-    """Text: time, motion of the station that moves most, energies at some times; where all named stations are at the end."""
+def motion_table(history, station=None, rows=ROWS):
+    """Text: time, motion of a station (default the one that moves most), energies at some times; where all named stations are
+    at the end."""
     shown = np.unique(np.round(np.linspace(0, len(history) - 1, rows)).astype(int))
-    station = busiest(history)
+    station = history.station(station or busiest(history))
     moved, speed = history.displacement(station), np.linalg.norm(history.velocity(station), axis=1)
     title = f"{history.scene.title}\n" if history.scene.title else ""
     which = f"{len(shown)} of {len(history)} times" if len(shown) < len(history) else f"{len(history)} times"
@@ -56,7 +57,7 @@ def _named(scene):
     return places.values()
 
 
-def write_motion_csv(history, file):
+def write_motion_csv(history, file, station=None):
     """Times (s), steps, energies (J), momenta; displacement (m), quaternion, velocity (m/s), angular velocity (rad/s),
     contact force n (N) and moment m (N m), inertial, at the stations of `tables.write_csv`."""
     head = {"time (s)": history.times, "steps": history.steps}
@@ -65,4 +66,4 @@ def write_motion_csv(history, file):
         values = getattr(history, quantity)
         head |= {f"{quantity.replace('_', ' ')} ({unit}) {axis}": values[:, i] for i, axis in enumerate("xyz")}
     more = (("velocity", "velocity (m/s)", "xyz"), ("angular_velocity", "angular velocity (rad/s)", "xyz"))
-    write_columns(history, file, head | station_columns(history, more))
+    write_columns(history, file, head | station_columns(history, station, more))

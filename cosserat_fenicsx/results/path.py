@@ -6,13 +6,13 @@ from functools import cached_property
 import numpy as np
 
 from cosserat_fenicsx.checks import instance
-from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.quaternions import directors
+from cosserat_fenicsx.results.on_nodes import OnNodes
 from cosserat_fenicsx.results.recovery import at_nodes, element_contact
 from cosserat_fenicsx.scene.rod import Station
 
 
-class Path:
+class Path(OnNodes):
     """An equilibrium path: a sequence of converged points.
 
     Attributes:
@@ -30,7 +30,8 @@ class Path:
         left: whether the path was left at its first bifurcation, for a branch.
         control: "load", or "arc" where the path, or a part of it, was followed in arc length.
 
-    Station queries return one row a point, in inertial components unless they say material.
+    Station queries take a `Station` or its name as in scene files ("column.end", "column@5.0"), and return one row a point,
+    in inertial components unless they say material.
     """
 
     #: what tells the points apart, in words; fields that files hold beside those of `xdmf.FIELDS`
@@ -147,10 +148,21 @@ class Path:
         """Take an estimate; it is never below what rounding leaves of the residual."""
         self._error = np.maximum(error, self.rounding)
 
-    # -- queries -----------------------------------------------------------------------------------------------------
+    # -- queries: a station, such as rod.end, or its name, such as "rod.end" or "rod@1.5" --------------------------------
+
+    def station(self, station):
+        """The `Station` that a query means.
+
+        Raises:
+            SceneError: it is neither a station nor the name of one.
+        """
+        if isinstance(station, str):
+            return self.scene.station(station)
+        return instance("Path", "station", station, Station, "a station such as rod.end, or its name")
 
     def position(self, station):
         """(n, 3) m, inertial."""
+        station = self.station(station)
         return self.displacement(station) + station.rod.curve.position(station.s)
 
     def displacement(self, station):
@@ -224,7 +236,7 @@ class Path:
 
     def mode(self, event, rod=None):
         """(nodes, 3) the mode of an event at the nodes of a rod (default the first), see `Event`."""
-        return event.mode[self._rows(rod or self.scene.rods[0])[1]]
+        return event.mode[self._rows(rod)[1]]
 
     @cached_property
     def _all_rq(self):
@@ -246,7 +258,8 @@ class Path:
 
     def _contact_at(self, station):
         """(points, 6) n and m at a station, dimensionless."""
-        i, _ = self._rows(instance("Path", "station", station, Station, "a station such as rod.end").rod)
+        station = self.station(station)
+        i, _ = self._rows(station.rod)
         cell, weights = self.rule.locate(self.layout.breaks[i], station.s / station.rod.length)
         return np.einsum("j,njk->nk", weights, self._contact_in(self._cells(i).start + cell))
 
@@ -263,18 +276,10 @@ class Path:
         first = sum(self.elements[:i])
         return slice(first, first + self.elements[i])
 
-    def _rows(self, rod):
-        """(index of a rod, slice of its nodes)."""
-        if rod not in self.scene.rods:
-            known = ", ".join(rod.name for rod in self.scene.rods)
-            raise SceneError(f"{rod!r} is no rod of this path's scene: expected one of {known}")
-        i = self.scene.rods.index(rod)
-        first = sum(n * self.degree + 1 for n in self.elements[:i])
-        return i, slice(first, first + self.elements[i] * self.degree + 1)
-
     def _at(self, station, values, rest=None):
         """Values (points, nodes, k), less those at rest (nodes, k), at a station, by the element's polynomial."""
-        i, rows = self._rows(instance("Path", "station", station, Station, "a station such as rod.end").rod)
+        station = self.station(station)
+        i, rows = self._rows(station.rod)
         cell, weights = self.rule.locate(self.layout.breaks[i], station.s / station.rod.length)
         first = rows.start + cell * self.degree
         nodes = slice(first, first + self.degree + 1)

@@ -14,9 +14,10 @@ _WORTH_TELLING = 0.2
 _TWIST = 1e-6
 
 
-def path_table(path):
-    """Text: load factor, motion of the station that moves most, stability, work and estimated error at every point."""
-    station = busiest(path)
+def path_table(path, station=None):
+    """Text: load factor, motion of a station (default the one that moves most), stability, work and estimated error at every
+    point."""
+    station = path.station(station or busiest(path))
     tip, angle = path.displacement(station), path.rotation_angle(station)
     title = f"{path.scene.title}\n" if path.scene.title else ""
     table = Table(
@@ -40,7 +41,40 @@ def path_table(path):
         )
     lines = [as_text(table), *(f"{event.kind} point at the load factor {event.load_factor:.7g}" if event.kind == "limit"
                                else f"bifurcation at the load factor {event.load_factor:.7g}" for event in path.events)]  # fmt: skip
-    return "\n".join([*lines, f"{path.model} model: {'; '.join(path.why)}."])
+    return "\n".join([*lines, *_last_point(path), f"{path.model} model: {'; '.join(path.why)}."])
+
+
+def _last_point(path):
+    """What the rods bear at the last point, and what their ends' supports hold with, in lines."""
+    most = {"bending moment": (0.0, "", "N m"), "contact force": (0.0, "", "N")}
+    for rod in path.scene.rods:
+        told = path.fields(-1, rod)
+        sizes = {"bending moment": told["bending_moment"], "contact force": np.linalg.norm(told["force"], axis=1)}
+        for what, size in sizes.items():
+            place = int(np.argmax(size))
+            if size[place] > most[what][0]:
+                most[what] = size[place], f" at {rod.at(told['s'][place])}", most[what][2]
+    told = ", ".join(f"{what} up to {size:.6g} {unit}{where}" for what, (size, where, unit) in most.items())
+    yield f"At the load factor {path.load_factors[-1]:.6g}: {told}."
+    for support in path.scene.supports:
+        if _alone(path.scene, support):
+            station, sign = support.station, 1 if support.station.s else -1
+            force, moment = sign * path.force(station)[-1], sign * path.moment(station)[-1]
+            yield f"{describe(support)} holds with {_vector(force)} N and {_vector(moment)} N m."
+
+
+def _alone(scene, support):
+    """Whether a support is all that acts at the end of a rod, so that the contact force there is its reaction."""
+    station = support.station
+    others = [x for x in (*scene.supports, *scene.loads) if x is not support and x.station == station]
+    joined = [end for joint in scene.joints for end in (joint.first, joint.second) if end == station]
+    return station in (station.rod.start, station.rod.end) and not others and not joined
+
+
+def _vector(a):
+    """Components, those that are rounding beside the largest as 0."""
+    least = 1e-9 * np.abs(a).max()
+    return f"({', '.join(f'{x:.6g}' if abs(x) > least else '0' for x in a)})"
 
 
 def busiest(path):
@@ -121,7 +155,7 @@ def as_text(table):
     return capture.get().rstrip()
 
 
-def write_csv(path, file):
+def write_csv(path, file, station=None):
     """Load factors, stability, work, error; displacement (m), quaternion, contact force n (N) and moment m (N m) at both
     ends of every rod, where loads and supports act, and at the station of the table. n and m are what the part beyond
     exerts: the reaction of a support at the start is their opposite."""
@@ -131,20 +165,21 @@ def write_csv(path, file):
         "iterations": path.iterations,
         "estimated_error": path.error,
     }
-    write_columns(path, file, head | station_columns(path))
+    write_columns(path, file, head | station_columns(path, station))
 
 
-def station_columns(path, more=()):
+def station_columns(path, station=None, more=()):
     """Columns by their names: displacement, quaternion, contact force and moment at the stations of `write_csv`.
 
     Args:
+        station: of the table; default the one that moves most.
         more: further quantities, (query, name, names of its components).
     """
-    columns, most = {}, busiest(path)
+    columns, told = {}, path.station(station or busiest(path))
     quantities = (("displacement", "displacement (m)", "xyz"), ("rotation", "quaternion", "abcd"), *more,
                   ("force", "contact force (N)", "xyz"), ("moment", "contact moment (N m)", "xyz"))  # fmt: skip
     for rod in path.scene.rods:
-        stations = [rod.start, *path.scene.stations(rod), rod.end, *([most] if most.rod is rod else [])]
+        stations = [rod.start, *path.scene.stations(rod), rod.end, *([told] if told.rod is rod else [])]
         for station in {station.s: station for station in sorted(stations, key=lambda station: station.s)}.values():
             for quantity, name, axes in quantities:
                 values = getattr(path, quantity)(station)

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from cosserat_fenicsx.checks import instance, number, store
+from cosserat_fenicsx.errors import SceneError, nearest
 from cosserat_fenicsx.quadrature import gauss
 from cosserat_fenicsx.scene.curves import CURVES
 from cosserat_fenicsx.scene.damping import Damping
@@ -127,6 +128,38 @@ class Station:
         return f"{self.rod.name}.start" if self.s == 0 else f"{self.rod.name}@{self.s:g}"
 
     __repr__ = __str__
+
+
+def station_named(where, text, rods):
+    """The station 'rod.start', 'rod.end' or 'rod@s', s in m.
+
+    Args:
+        where: what is named so, for the message; rods: {name: rod}.
+
+    Raises:
+        SceneError: it is none of these, or no rod has this name, or it lies beyond its rod.
+    """
+    expected = "expected 'rod.start', 'rod.end' or 'rod@s' with s in m"
+    if not isinstance(text, str):
+        raise SceneError(f"{where} = {text!r}: {expected}")
+    if "@" in text:
+        name, _, s = text.partition("@")
+        try:
+            place = float(s)
+        except ValueError:
+            raise SceneError(f"{where} = '{text}': {expected}") from None
+    else:
+        name, _, place = text.rpartition(".")
+        if place not in ("start", "end"):
+            raise SceneError(f"{where} = '{text}': {expected}")
+    if name not in rods:
+        raise SceneError(f"{where} = '{text}': no rod is named '{name}', {nearest(name, rods)}")
+    if isinstance(place, str):
+        return getattr(rods[name], place)
+    try:
+        return rods[name].at(place)
+    except SceneError as problem:
+        raise SceneError(f"{where} = '{text}': {problem}") from None
 
 
 def euler_load(rod):

@@ -10,7 +10,7 @@ from cosserat_fenicsx.scene.initial import InitialVelocity
 from cosserat_fenicsx.scene.joints import Joint
 from cosserat_fenicsx.scene.loads import LOADS
 from cosserat_fenicsx.scene.planes import find_plane
-from cosserat_fenicsx.scene.rod import Rod
+from cosserat_fenicsx.scene.rod import Rod, station_named
 from cosserat_fenicsx.scene.signals import signals_of
 from cosserat_fenicsx.scene.statical import check_held_once
 from cosserat_fenicsx.scene.supports import SUPPORTS
@@ -184,6 +184,14 @@ class Scene:
             "decide on stability: an equilibrium that has some may be stable (Beck's column from pi^2 to 20.05 EI/L^2), one that has "
             "none may flutter, which statics cannot see; only dynamics can tell"
         ]
+
+    def station(self, name):
+        """The station 'rod.start', 'rod.end' or 'rod@s', s in m, as scene files name it.
+
+        Raises:
+            SceneError: there is none of that name.
+        """
+        return station_named("station", name, {rod.name: rod for rod in self.rods})
 
     def rod(self, name):
         """The rod of that name."""

@@ -48,7 +48,7 @@ from cosserat_fenicsx.scene.initial import InitialVelocity
 from cosserat_fenicsx.scene.joints import Joint
 from cosserat_fenicsx.scene.loads import LOADS
 from cosserat_fenicsx.scene.materials import Material
-from cosserat_fenicsx.scene.rod import Rod, Station
+from cosserat_fenicsx.scene.rod import Rod, Station, station_named
 from cosserat_fenicsx.scene.scene import Scene
 from cosserat_fenicsx.scene.sections import SECTIONS
 from cosserat_fenicsx.scene.signals import SIGNALS
@@ -231,7 +231,7 @@ def _build(where, entry, classes, rods, folder=None):
             entry[field.name] = folder / entry[field.name]
     for name in [name for name in arguments if name in entry]:
         if arguments[name].annotation is Station:
-            entry[name] = _station(f"{where}.{name}", entry[name], rods)
+            entry[name] = station_named(f"{where}.{name}", entry[name], rods)
         elif arguments[name].annotation is Rod:
             entry[name] = _known_rod(f"{where}.{name}", entry[name], rods)
         elif isinstance(entry[name], dict):
@@ -246,31 +246,6 @@ def _known_rod(where, name, rods):
     if not isinstance(name, str) or name not in rods:
         raise SceneError(f"{where} = {name!r}: no rod has this name, {nearest(name, rods)}")
     return rods[name]
-
-
-def _station(where, text, rods):
-    """'name.start', 'name.end' or 'name@s'."""
-    expected = "expected 'rod.start', 'rod.end' or 'rod@s' with s in m"
-    if not isinstance(text, str):
-        raise SceneError(f"{where} = {text!r}: {expected}")
-    if "@" in text:
-        name, _, s = text.partition("@")
-        try:
-            place = float(s)
-        except ValueError:
-            raise SceneError(f"{where} = '{text}': {expected}") from None
-    else:
-        name, _, place = text.rpartition(".")
-        if place not in ("start", "end"):
-            raise SceneError(f"{where} = '{text}': {expected}")
-    if name not in rods:
-        raise SceneError(f"{where} = '{text}': no rod is named '{name}', {nearest(name, rods)}")
-    if isinstance(place, str):
-        return getattr(rods[name], place)
-    try:
-        return rods[name].at(place)
-    except SceneError as problem:
-        raise SceneError(f"{where} = '{text}': {problem}") from None
 
 
 def _entries(key, tables):

@@ -10,6 +10,7 @@ from mpi4py import MPI
 from cosserat_fenicsx.algebra import eigen
 from cosserat_fenicsx.checks import number
 from cosserat_fenicsx.errors import NotConverged, SceneError
+from cosserat_fenicsx.results.on_nodes import OnNodes
 from cosserat_fenicsx.statics.continuation import StepControl
 from cosserat_fenicsx.statics.first_mesh import FIRST_ELEMENTS
 from cosserat_fenicsx.statics.follow import Follower
@@ -30,7 +31,7 @@ _SAME = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
-class Buckling:
+class Buckling(OnNodes):
     """Result of `buckling`.
 
     Attributes:
@@ -51,9 +52,7 @@ class Buckling:
 
     def mode(self, k, rod=None):
         """(nodes, 3) the k-th mode at the nodes of a rod (default the first)."""
-        i = 0 if rod is None else self.scene.rods.index(rod)
-        nodes = [count * self.degree + 1 for count in self.elements]
-        return self.modes[k, sum(nodes[:i]) : sum(nodes[: i + 1])]
+        return self.modes[k, self._rows(rod)[1]]
 
 
 def buckling(scene, count=1, *, load_factor=0.0, tol=1e-5, elements=None, degree=4, comm=None):
