@@ -131,7 +131,7 @@ def _bars(waits, file):
     names = [f"{row['who']}, {row['caches']}\n{row['what']}" for row in shown]
     axes.set_yticks(np.arange(len(shown)), names, fontsize=8)
     axes.invert_yaxis()
-    axes.margins(x=0.2)
+    axes.margins(x=0.25)
     axes.set_xlabel("wall clock from the start of the process to its end (s), median")
     axes.set_title("What a person waits for an answer: eccentric cantilever, whole processes")
     axes.grid(axis="x", alpha=0.4)

@@ -65,8 +65,15 @@ def test_the_table_picks_rows_and_the_csv_keeps_all(tmp_path):
     history = cf.simulate(scene, 1, dt=0.01, elements=2, degree=2)
     text = motion_tables.motion_table(history)
     assert "21 of 101 times" in text and len(re.findall(r"^│", text, re.MULTILINE)) == 21
-    motion_tables.write_motion_csv(history, tmp_path / "a.csv")
-    assert len((tmp_path / "a.csv").read_text().splitlines()) == 102
+    assert "speed: of spaghetti@2.5." in motion_tables.motion_table(history, "spaghetti@2.5")
+    motion_tables.write_motion_csv(history, tmp_path / "a.csv", "spaghetti@2.5")
+    lines = (tmp_path / "a.csv").read_text().splitlines()
+    assert len(lines) == 102 and "spaghetti@2.5 velocity (m/s) x" in lines[0]
+    middle = scene.rods[0].at(2.5)
+    for query in ("position", "velocity", "angular_velocity", "moment"):
+        assert np.array_equal(getattr(history, query)("spaghetti@2.5"), getattr(history, query)(middle))
+    with pytest.raises(cf.SceneError, match="no rod is named 'spagheti', did you mean 'spaghetti'"):
+        history.position("spagheti@2.5")
 
 
 def test_a_motion_that_is_written_as_it_goes(tmp_path, cosserat):

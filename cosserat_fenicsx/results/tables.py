@@ -10,6 +10,8 @@ from cosserat_fenicsx.ranks import on_first
 
 # A named station is shown if it moves by this share of what moves most.
 _WORTH_TELLING = 0.2
+# Less than this share of what it stands beside is rounding.
+_ROUNDING = 1e-9
 # A mode that displaces less than this (its largest displacement or turn is 1) is one of twist.
 _TWIST = 1e-6
 
@@ -51,8 +53,8 @@ def _last_point(path):
         told = path.fields(-1, rod)
         sizes = {"bending moment": told["bending_moment"], "contact force": np.linalg.norm(told["force"], axis=1)}
         for what, size in sizes.items():
-            place = int(np.argmax(size))
-            if size[place] > most[what][0]:
+            place = int(np.argmax(size >= (1 - _ROUNDING) * size.max()))  # the first of many alike
+            if size[place] > (1 + _ROUNDING) * most[what][0]:
                 most[what] = size[place], f" at {rod.at(told['s'][place])}", most[what][2]
     told = ", ".join(f"{what} up to {size:.6g} {unit}{where}" for what, (size, where, unit) in most.items())
     yield f"At the load factor {path.load_factors[-1]:.6g}: {told}."
@@ -60,7 +62,8 @@ def _last_point(path):
         if _alone(path.scene, support):
             station, sign = support.station, 1 if support.station.s else -1
             force, moment = sign * path.force(station)[-1], sign * path.moment(station)[-1]
-            yield f"{describe(support)} holds with {_vector(force)} N and {_vector(moment)} N m."
+            force, moment = _vector(force, most["contact force"][0]), _vector(moment, most["bending moment"][0])
+            yield f"{describe(support)} holds with {force} N and {moment} N m."
 
 
 def _alone(scene, support):
@@ -71,9 +74,9 @@ def _alone(scene, support):
     return station in (station.rod.start, station.rod.end) and not others and not joined
 
 
-def _vector(a):
-    """Components, those that are rounding beside the largest as 0."""
-    least = 1e-9 * np.abs(a).max()
+def _vector(a, beside):
+    """Components in words, those that are rounding beside each other or a number as 0."""
+    least = _ROUNDING * max(np.abs(a).max(), beside)
     return f"({', '.join(f'{x:.6g}' if abs(x) > least else '0' for x in a)})"
 
 
