@@ -85,7 +85,7 @@ def _head(found):
     lines = [
         f"{in_words(found.about['machine'])}. Peers: {told or 'none'}. Random seed of the order {found.about['seed']}.",
         "",
-        f"Processor time of one thread, warm, medians of {found.about['samples']} samples, peers in alternation. What is timed: here the",
+        f"Processor time of one thread, warm, medians of {found.about['samples']} samples (some of what takes over 0.5 s of fewer), peers in alternation. What is timed: here the",
         "whole call of `solve` and the tip's position, with the stability count (a scene that was solved before is at hand); for Exudyn `SolveStatic`, for OpenSeesPy the",
         "analysis (the model of both is built before and not counted); for PyElastica the whole relaxation; for CalculiX the whole program. Time at an accuracy: the cheapest configuration measured whose error,",
         "against the truth of its own mechanical model, is below it. The error is that of delta, largest over the load factors, on the eccentric",

@@ -62,8 +62,8 @@ def _exudyn(problem):
     found = []
     for substeps in _substeps(problem):
         if problem == "sweep":
-            found += _grid("planar 3-node", (4, 6, 8, 12, 16, 24, 32, 40, 64), (1e-3, 1e-5), substeps)
-            found += _grid("planar ANCF cable", (8, 12, 16, 20, 24, 32, 48, 64), (1e-3, 1e-5), substeps)
+            found += _grid("planar 3-node", (4, 6, 8, 10, 12, 16, 24, 32, 40, 64), (1e-3, 3e-4, 1e-4, 1e-5), substeps)
+            found += _grid("planar ANCF cable", (8, 12, 16, 20, 24, 32, 48, 64), (1e-3, 1e-4, 1e-5), substeps)
         elif problem != "bend":
             found += _grid("planar 3-node", (4, 8, 16, 32, 64), (1e-3, 1e-5), substeps)
             found += _grid("planar ANCF cable", (8, 16, 32, 64), (1e-5,), substeps)
@@ -86,7 +86,7 @@ def _opensees(problem):
                 continue
             found += _grid(f"{space} elastic", (8, 16, 32, 48, 64, 128, 256), (1e-4,), substeps)
             found += _grid(f"{space} CBDI", (3, 4, 6, 8, 10, 12, 16), (1e-3, 1e-5), substeps)
-            found += _grid(f"{space} CBDI", (20, 24, 32, 48), (1e-4, 1e-6), substeps, inner=1e-16)
+            found += _grid(f"{space} CBDI", (20, 21, 24, 32, 48), (1e-4, 1e-5, 1e-6), substeps, inner=1e-16)
     return found
 
 

@@ -67,6 +67,8 @@ def surroundings(peer):
     given |= {f"{name}_NUM_THREADS": "1" for name in ("OMP", "OPENBLAS", "MKL", "NUMBA")}
     if peer == OWN:
         given["PYTHONPATH"] = str(ROOT)
+    if peer == "Exudyn":
+        given["EXUDYN_MODULE"] = "fast"  # its build without range checks
     if peer == "CalculiX":
         libraries = {str(file.parent) for file in (cache() / "CalculiX").rglob("*.so.*")}
         given["LD_LIBRARY_PATH"] = ":".join([*sorted(libraries), os.environ.get("LD_LIBRARY_PATH", "")])
