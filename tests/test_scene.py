@@ -180,3 +180,32 @@ def test_frames_of_a_line():
         np.testing.assert_allclose(R.T @ R, np.eye(3), atol=1e-14)
         assert np.linalg.det(R) == pytest.approx(1)
         np.testing.assert_allclose(R[:, 2], np.array(end) / np.linalg.norm(end))
+
+
+def test_what_looks_like_a_slip_is_asked_about():
+    """A forgotten joint, a section in mm, a modulus in MPa; and nothing where two rods are held at one point, or joined."""
+
+    def scene(across=0.1, E=210e9, joints=(), clamps=("start", "end")):
+        steel, section = cf.Material(E, density=7850.0), cf.Rectangle(across, across)
+        one = cf.Rod(cf.Line((0, 0, 0), (0, 0, 4)), section, steel, name="one")
+        two = cf.Rod(cf.Line((0, 0, 4), (5, 0, 4)), section, steel, name="two")
+        held = [cf.Clamp(one.start), cf.Clamp(two.end)] + [cf.Clamp(one.end), cf.Clamp(two.start)] * ("both" in clamps)
+        joined = [cf.Joint(one.end, two.start)] if joints else []
+        return cf.Scene([one, two], held, [cf.Force(two.at(2.5), (0, 0, -1.0))], joined)
+
+    assert scene().doubts == (
+        "one.end and two.start lie at one point and are not joined: if they should be, add Joint(one.end, two.start)",
+    )
+    assert scene(joints=True).doubts == () == scene(clamps="both").doubts
+    thick = scene(across=100, joints=True)
+    assert "rod 'one' is 100 m across and 4 m long: are all lengths in m?" in thick.doubts
+    soft = scene(E=210e3, joints=True)
+    assert "are the units SI" in soft.cautions[0]
+    path = cf.solve(scene(), [1.0])
+    assert any("add Joint(one.end, two.start)" in why for why in path.why)
+    with pytest.raises(cf.SceneError, match="a name without '@'"):
+        cf.Rod(cf.Line((0, 0, 0), (0, 0, 4)), cf.Circle(0.1), cf.Material(1e9), name="b@2")
+    with pytest.raises(
+        cf.SceneError, match="scene is a tuple: expected a Scene, which is the first of what read_scene"
+    ):
+        cf.solve((scene(), {}), [1.0])

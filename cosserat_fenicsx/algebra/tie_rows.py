@@ -73,6 +73,9 @@ class TieRows:
             _, found, _ = self.model.ties.evaluate(self.model.tied_motion(nodal), 0.0, multipliers)
         return comm.bcast(found, root=comm.size - 1)
 
+    @np.errstate(
+        invalid="ignore", over="ignore"
+    )  # a wild step of Newton's: its residual is no number, and SNES stops there
     def add_residual(self, b, eta):
         """Add reactions to the rows of the nodes, and the equations in rows of their own."""
         if self._here:
@@ -84,6 +87,7 @@ class TieRows:
             b.setValues(self._multipliers, c, _ADD)
         b.assemble()
 
+    @np.errstate(invalid="ignore", over="ignore")
     def add_tangent(self, A, eta):
         """Add the derivative of `add_residual`."""
         if not self._here:

@@ -24,6 +24,10 @@ def deliver(computed, options, moving):
         out = Path(options.output)
         _prepare(out)  # before the work, not after it
     _check_film(options, moving)
+    if options.magnify <= 0:
+        raise SceneError(f"--magnify {options.magnify:g}: expected a number above zero")
+    if at is not None and out is None:
+        say("cosserat: --at is about pictures, which are drawn with -o DIR alone")
 
     code, trouble = DONE, None
     try:

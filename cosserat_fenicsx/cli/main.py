@@ -87,6 +87,11 @@ def _run(options):
 
 
 def _resume(options):
+    if options.station:
+        from cosserat_fenicsx.dynamics.resuming import read_history
+
+        read_history(options.folder).station(options.station)  # refused before the work
+
     def computed():
         from cosserat_fenicsx.dynamics.resuming import resume
 

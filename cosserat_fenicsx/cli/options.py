@@ -70,7 +70,9 @@ def _outputs(parser):
         "--magnify", type=float, default=1.0, help="pictures: draw displacements this many times their size [1]"
     )
     parser.add_argument(
-        "--station", metavar="ROD@S", help="what the table tells of: rod.end, rod@1.5 (m) [the station that moves most]"
+        "--station",
+        metavar="ROD@S",
+        help="what the table tells of: rod.end, rod@1.5 (m) [the end, or place of a load or support, that moves most]",
     )
     parser.add_argument(
         "--at", metavar="A,B,...", help="pictures: the load factors or times (s) to draw; the nearest that there are"
@@ -97,7 +99,7 @@ def _common(parser):
     """What is solved or simulated; returns the group of a motion's options."""
     parser.add_argument("scene", help="scene file (TOML)")
     parser.add_argument("--load-factors", metavar="A:B | A,B,...",
-                        help="0:1.5 lets the solver choose its steps, 0.5,0.9,1 lands on each")  # fmt: skip
+                        help="0:1.5 lets the solver choose its steps, 0.5,0.9,1 lands on each; negative ones with =, --load-factors=-1:1")  # fmt: skip
     parser.add_argument("--tol", type=float,
                         help="estimated error of positions over the largest displacement [1e-6]; of a motion that of its steps, "
                         "over the longest rod's length [1e-3]")  # fmt: skip

@@ -1,6 +1,7 @@
 """Pictures: the deformed rods in space by pyvista (off-screen), a path as a chart by matplotlib."""
 
 import math
+import textwrap
 from pathlib import Path
 
 import numpy as np
@@ -10,8 +11,9 @@ from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.pictures.drawing import add_body, at_rest, frame, load_pyvista, swept, thickening, view_of
 from cosserat_fenicsx.ranks import on_first
 
-# Of the picture: how high a label is, how wide a letter, and a displacement that can hardly be seen.
+# Of the picture: how high a label is, how wide a letter, and a displacement that can hardly be seen; letters in its width.
 _HIGH, _WIDE, _HARDLY = 0.035, 0.016, 0.01
+_TITLE = 80
 
 
 def rods(path, file=None, points=None, magnify=1.0):
@@ -84,7 +86,7 @@ def _small(path, shown, size, magnify):
     if magnify * largest > _HARDLY * size or largest < 1e-12 * size:
         return ""
     decade = 10.0 ** math.floor(math.log10(0.1 * size / largest))
-    return f"displacements are at most {largest:.2g} m, magnify={decade:g} shows them"
+    return f"displacements are at most {largest:.2g} m, magnify={decade:g} (--magnify {decade:g}) shows them"
 
 
 def _note(path, shown, thicker, magnify, small):
@@ -100,7 +102,7 @@ def _note(path, shown, thicker, magnify, small):
         parts.append(small)
     if thicker:
         parts.append(f"sections drawn {' and '.join(sorted(thicker))} times their size")
-    return "\n".join([parts[0], *(f"({part})" for part in parts[1:])])
+    return "\n".join(textwrap.fill(part, _TITLE) for part in (parts[0], *(f"({part})" for part in parts[1:])))
 
 
 def chart(file, curves, *, xlabel, ylabel, title, ylim=None):

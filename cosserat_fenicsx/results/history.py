@@ -108,7 +108,7 @@ class History(Path):
         """What a picture writes beside time k."""
         return f"{self.times[k]:.3g} s"
 
-    def fields(self, k, rod):
+    def fields(self, k, rod=None):
         """As of a `Path`, at time k; with velocity (m/s) and angular_velocity (rad/s), inertial."""
         rates = self._records[k].rates[self._rows(rod)[1]] / self._time_unit
         velocity = rates[:, :3] * self.scales.length

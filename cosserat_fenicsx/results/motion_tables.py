@@ -3,6 +3,7 @@
 import numpy as np
 from rich.table import Table
 
+from cosserat_fenicsx.results.bearing import largest_in_words
 from cosserat_fenicsx.results.tables import as_text, busiest, station_columns, write_columns
 
 #: Rows of the table, where more times were saved.
@@ -44,6 +45,7 @@ def motion_table(history, station=None, rows=ROWS):
     return "\n".join([
         as_text(table),
         f"t = {history.times[-1]:.6g} s: {'; '.join(ends)}.",
+        largest_in_words(history),
         f"{history.model} model: {'; '.join(history.why)}.",
     ])  # fmt: skip
 

@@ -6,17 +6,21 @@ from cosserat_fenicsx.errors import SceneError
 class OnNodes:
     """A result on a mesh: it has the `scene`, the `elements` of each rod and their `degree`."""
 
-    def _rows(self, rod=None):
-        """(index of a rod, default the first; slice of its nodes among those of all rods).
+    def rod(self, rod=None):
+        """A rod of the scene, given as one or by its name; default the first.
 
         Raises:
-            SceneError: it is no rod of the scene.
+            SceneError: the scene has none such.
         """
         rods = self.scene.rods
-        if rod is not None and rod not in rods:
-            raise SceneError(
-                f"{rod!r} is no rod of this result's scene: expected one of {', '.join(x.name for x in rods)}"
-            )
-        i = 0 if rod is None else rods.index(rod)
+        found = rods[0] if rod is None else next((x for x in rods if x is rod or x.name == rod), None)
+        if found is None:
+            known = ", ".join(x.name for x in rods)
+            raise SceneError(f"{rod!r} is no rod of this result's scene: expected one of {known}")
+        return found
+
+    def _rows(self, rod=None):
+        """(index of a rod, slice of its nodes among those of all rods)."""
+        i = self.scene.rods.index(self.rod(rod))
         first = sum(n * self.degree + 1 for n in self.elements[:i])
         return i, slice(first, first + self.elements[i] * self.degree + 1)

@@ -192,16 +192,17 @@ class Path(OnNodes):
 
     def centreline(self, k=-1, rod=None):
         """(nodes, 3) m, inertial: the nodes of a rod (default the first) at point k."""
-        return self.fields(k, rod or self.scene.rods[0])["position"]
+        return self.fields(k, rod)["position"]
 
-    def fields(self, k, rod):
-        """Everything at the nodes of a rod at point k.
+    def fields(self, k, rod=None):
+        """Everything at the nodes of a rod, given as one or by its name (default the first), at point k.
 
         Returns:
             dict of arrays (nodes, ...): s (m), position, displacement (m), quaternion, d1, d2, d3, force (N), moment
             (N m), all inertial; strain (v - v_R: shear 1, shear 2, stretch) and curvature (u - u_R: bending 1,
             bending 2, twist; 1/m), both material; bending_moment (N m, its size).
         """
+        rod = self.rod(rod)
         i, rows = self._rows(rod)
         s = self.layout.node_s(self.rule.nodes)[i] * rod.length
         record = self._records[k]

@@ -7,11 +7,10 @@ from rich.console import Console
 from rich.table import Table
 
 from cosserat_fenicsx.ranks import on_first
+from cosserat_fenicsx.results.bearing import largest_in_words, reactions_in_words
 
 # A named station is shown if it moves by this share of what moves most.
 _WORTH_TELLING = 0.2
-# Less than this share of what it stands beside is rounding.
-_ROUNDING = 1e-9
 # A mode that displaces less than this (its largest displacement or turn is 1) is one of twist.
 _TWIST = 1e-6
 
@@ -25,7 +24,7 @@ def path_table(path, station=None):
     table = Table(
         title=f"{title}{path.model} model, {path.formulation} formulation, degree {path.degree}, "
         f"{' + '.join(map(str, path.elements))} elements, {path.unknowns} unknowns",
-        caption=f"dx, dy, dz, rotation: of {station}. stable: 'no (2)' has two negative modes.\n"
+        caption=f"dx, dy, dz, size of the rotation: of {station}. stable: 'no (2)' has two negative modes.\n"
         "iterations: Newton's, since the row above. est. error: of positions, relative to the largest displacement.\n"
         f"Loads, times the load factor: {', '.join(map(describe, path.scene.loads)) or 'none'}.",
     )
@@ -43,41 +42,13 @@ def path_table(path, station=None):
         )
     lines = [as_text(table), *(f"{event.kind} point at the load factor {event.load_factor:.7g}" if event.kind == "limit"
                                else f"bifurcation at the load factor {event.load_factor:.7g}" for event in path.events)]  # fmt: skip
-    return "\n".join([*lines, *_last_point(path), f"{path.model} model: {'; '.join(path.why)}."])
-
-
-def _last_point(path):
-    """What the rods bear at the last point, and what their ends' supports hold with, in lines."""
-    most = {"bending moment": (0.0, "", "N m"), "contact force": (0.0, "", "N")}
-    for rod in path.scene.rods:
-        told = path.fields(-1, rod)
-        sizes = {"bending moment": told["bending_moment"], "contact force": np.linalg.norm(told["force"], axis=1)}
-        for what, size in sizes.items():
-            place = int(np.argmax(size >= (1 - _ROUNDING) * size.max()))  # the first of many alike
-            if size[place] > (1 + _ROUNDING) * most[what][0]:
-                most[what] = size[place], f" at {rod.at(told['s'][place])}", most[what][2]
-    told = ", ".join(f"{what} up to {size:.6g} {unit}{where}" for what, (size, where, unit) in most.items())
-    yield f"At the load factor {path.load_factors[-1]:.6g}: {told}."
-    for support in path.scene.supports:
-        if _alone(path.scene, support):
-            station, sign = support.station, 1 if support.station.s else -1
-            force, moment = sign * path.force(station)[-1], sign * path.moment(station)[-1]
-            force, moment = _vector(force, most["contact force"][0]), _vector(moment, most["bending moment"][0])
-            yield f"{describe(support)} holds with {force} N and {moment} N m."
-
-
-def _alone(scene, support):
-    """Whether a support is all that acts at the end of a rod, so that the contact force there is its reaction."""
-    station = support.station
-    others = [x for x in (*scene.supports, *scene.loads) if x is not support and x.station == station]
-    joined = [end for joint in scene.joints for end in (joint.first, joint.second) if end == station]
-    return station in (station.rod.start, station.rod.end) and not others and not joined
-
-
-def _vector(a, beside):
-    """Components in words, those that are rounding beside each other or a number as 0."""
-    least = _ROUNDING * max(np.abs(a).max(), beside)
-    return f"({', '.join(f'{x:.6g}' if abs(x) > least else '0' for x in a)})"
+    if not path.left and any(event.kind == "bifurcation" for event in path.events):
+        lines.append(
+            "The path goes straight on there; --branch 1 or -1 (branch= in Python) leaves it at the first bifurcation."
+        )
+    return "\n".join(
+        [*lines, largest_in_words(path), *reactions_in_words(path), f"{path.model} model: {'; '.join(path.why)}."]
+    )
 
 
 def busiest(path):

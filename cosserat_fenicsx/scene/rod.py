@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from cosserat_fenicsx.checks import instance, number, store
+from cosserat_fenicsx.checks import instance, number, refuse, store
 from cosserat_fenicsx.errors import SceneError, nearest
 from cosserat_fenicsx.quadrature import gauss
 from cosserat_fenicsx.scene.curves import CURVES
@@ -51,6 +51,8 @@ class Rod:
         if self.name is None:
             store(self, name=f"rod{next(_unnamed)}")
         instance(self, "name", self.name, str, "a string")
+        if "@" in self.name:
+            refuse(self, "name", self.name, "a name without '@', which parts it from the s of a station")
         instance(self, "curve", self.curve, CURVES, "a curve such as Line(start, end)")
         if self.material is not None:
             instance(self, "material", self.material, Material, "a Material")

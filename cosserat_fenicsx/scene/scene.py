@@ -4,6 +4,8 @@ import copy
 from dataclasses import dataclass
 from functools import cached_property
 
+import numpy as np
+
 from cosserat_fenicsx.checks import instance
 from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.scene.initial import InitialVelocity
@@ -17,6 +19,8 @@ from cosserat_fenicsx.scene.supports import SUPPORTS
 
 # Young's moduli below this, Pa, are those of gels, or slips of units.
 _GEL = 1e6
+# Ends that lie at one point, over a rod's length.
+_TOUCH = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -157,7 +161,12 @@ class Scene:
     @property
     def cautions(self):
         """What a user of any answer should know, in sentences."""
-        return [*self._softness(), *self._following()]
+        return [*self.doubts, *self._following()]
+
+    @cached_property
+    def doubts(self):
+        """What looks like a slip in the scene, in sentences."""
+        return (*self._softness(), *self._thickness(), *self._unjoined())
 
     @property
     def follows(self):
@@ -174,6 +183,25 @@ class Scene:
         return [
             f"E = {E:g} Pa is softer than rubber: are the units SI (N, m, Pa; steel has 210e9)?" for E in sorted(soft)
         ]
+
+    def _thickness(self):
+        """Sections that may be in other units."""
+        for rod in self.rods:
+            section = rod.section_at(0.0)
+            across = max(getattr(section, name, 0.0) for name in ("diameter", "outer_diameter", "width", "height"))
+            if across >= rod.length:
+                yield f"rod '{rod.name}' is {across:g} m across and {rod.length:g} m long: are all lengths in m?"
+
+    def _unjoined(self):
+        """Ends of different structures at one point, where not both are held."""
+        ends = [end for rod in self.rods for end in (rod.start, rod.end)]
+        places = np.array([end.rod.curve.position(end.s) for end in ends])
+        held = {str(support.station) for support in self.supports}
+        for i, end in enumerate(ends):
+            near = np.linalg.norm(places[i + 1 :] - places[i], axis=1) <= _TOUCH * end.rod.length
+            for other in (ends[i + 1 + j] for j in np.flatnonzero(near)):
+                if self.leader(end.rod) is not self.leader(other.rod) and not {str(end), str(other)} <= held:
+                    yield f"{end} and {other} lie at one point and are not joined: if they should be, add Joint({end}, {other})"
 
     def _following(self):
         if not self.follows:

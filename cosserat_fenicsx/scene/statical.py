@@ -146,7 +146,9 @@ def check_no_mechanism(scene):
 def _or_a_joint(scene, rod):
     """What else a rod that is free may be missing, in words, where one of its ends lies on another's."""
     for end in (rod.start, rod.end):
-        for there in (there for other in scene.rods if other is not rod for there in (other.start, other.end)):
+        for there in (
+            x for other in scene.rods if scene.leader(other) is not scene.leader(rod) for x in (other.start, other.end)
+        ):
             apart = rod.curve.position(end.s) - there.rod.curve.position(there.s)
             if np.linalg.norm(apart) <= 1e-6 * rod.length:
                 return f", or a Joint({end}, {there}), which lie at one point"

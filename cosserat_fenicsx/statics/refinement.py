@@ -81,7 +81,9 @@ class _Search:
             if elements >= _MOST_ELEMENTS or (reached > self._best and self._best < 1e-8):
                 if found is not self.whole:
                     found = self._all_points(layout, found)
-                raise NotConverged(_not_accurate(self._tol, min(reached, self._best), elements, self._degree), found)
+                raise NotConverged(
+                    _not_accurate(self._tol, min(reached, self._best), elements, self._degree, found), found
+                )
             self._best = min(self._best, reached)
         if found is self.whole:
             if len(found) * found.unknowns <= _CHEAP:
@@ -178,8 +180,10 @@ def _rounding_hides(tol, rounding, elements, formulation):
     )
 
 
-def _not_accurate(tol, reached, elements, degree):
+def _not_accurate(tol, reached, elements, degree, path):
     advice = "a larger tol" if degree == 4 else "a larger tol, or degree 4"
+    if path.scene.doubts:
+        advice = f"{advice}, but first: {'; '.join(path.scene.doubts)}"
     return (
         f"the accuracy tol = {tol:g} was not reached with {elements} elements of degree {degree} per rod: "
         f"the estimated error stays at {reached:.2g}. Ask for {advice}."

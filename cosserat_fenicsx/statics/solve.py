@@ -218,7 +218,8 @@ def check_arguments(scene, tol, elements):
         SceneError: naming the argument, its value and what was expected.
     """
     if not isinstance(scene, Scene):
-        raise SceneError(f"scene = {scene!r}: expected a Scene")
+        hint = ", which is the first of what read_scene returns" if isinstance(scene, tuple) else ""
+        raise SceneError(f"scene is a {type(scene).__name__}: expected a Scene{hint}")
     if not scene.loads and not any(isinstance(support, Prescribed) for support in scene.supports):
         raise SceneError(
             "Scene.loads is empty: expected at least one load, such as Force(rod.end, (0, 0, -1)), or a Prescribed motion"

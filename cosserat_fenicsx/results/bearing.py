@@ -1,0 +1,125 @@
+"""What rods bear over a path or a motion, and what supports hold with, in words."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from cosserat_fenicsx.quaternions import directors
+from cosserat_fenicsx.scene.loads import Force, Moment
+
+# Places looked at in an element, for each degree of its polynomials.
+_PLACES = 6
+# Less than this share of what it stands beside is rounding.
+_ROUNDING = 1e-6
+# Stations nearer than this, over a rod's length, are one node of the mesh.
+_SAME = 1e-9
+_UNITS = {"bending moment": "N m", "twisting moment": "N m", "shear force": "N", "tension": "N", "compression": "N"}
+
+
+@dataclass(frozen=True)
+class Largest:
+    """The largest of a quantity: its size (N m or N), its station, and the point of the path."""
+
+    size: float
+    station: object
+    point: int
+
+
+def largest(path):
+    """{quantity: `Largest`} over all points and places of a path or a motion, both sides of a jump and between the nodes; on
+    the mesh there is, which `tol` does not speak of. What is zero everywhere but for rounding is left out."""
+    found = dict.fromkeys(_UNITS, Largest(0.0, None, 0))
+    inside = np.linspace(0, 1, _PLACES * path.degree + 1)
+    basis = path.rule.basis(inside)
+    places = []
+    for i, rod in enumerate(path.scene.rods):
+        breaks = path.layout.breaks[i]
+        s = ((breaks[:-1, None] + np.diff(breaks)[:, None] * inside) * rod.length).ravel()
+        nodes = np.arange(path.elements[i])[:, None] * path.degree + np.arange(path.degree + 1)
+        places.append((rod, s, rod.curve.frame(s)[:, :, 2], path._rows(rod)[1], path._cells(i), nodes))
+    for k in range(len(path)):
+        contact, rq = path._contact_of(k), path[k].rq
+        for rod, s, d3, rows, cells, nodes in places:
+            n, m = np.split(np.einsum("qj,cjk->cqk", basis, contact[cells]).reshape(-1, 6), 2, axis=1)
+            q = np.einsum("qj,cjk->cqk", basis, rq[rows, 3:][nodes]).reshape(-1, 4)
+            t = np.einsum("nij,nj->ni", directors(q / np.linalg.norm(q, axis=1, keepdims=True)), d3)
+            axial, twist = np.einsum("ni,ni->n", n, t), np.einsum("ni,ni->n", m, t)
+            force, moment = path.scales.force, path.scales.moment
+            sizes = (
+                moment * np.linalg.norm(m - twist[:, None] * t, axis=1),
+                moment * np.abs(twist),
+                force * np.linalg.norm(n - axial[:, None] * t, axis=1),
+                force * axial,
+                -force * axial,
+            )
+            for what, size in zip(_UNITS, sizes, strict=True):
+                place = int(np.argmax(size >= size.max() - _ROUNDING * abs(size.max())))  # the first of many alike
+                if size[place] > (1 + _ROUNDING) * found[what].size:
+                    found[what] = Largest(float(size[place]), rod.at(s[place]), k)
+    most = {unit: max(x.size for what, x in found.items() if _UNITS[what] == unit) for unit in ("N m", "N")}
+    return {what: x for what, x in found.items() if x.size > _ROUNDING * most[_UNITS[what]]}
+
+
+def largest_in_words(path):
+    """`largest` as a sentence."""
+    where = "time" if path.axis == "time" else path.axis
+    unit = " s" if path.axis == "time" else ""
+    told = [
+        f"{what} {x.size:.4g} {_UNITS[what]} ({x.station}, {where} {path.along_axis[x.point]:.4g}{unit})"
+        for what, x in largest(path).items()
+    ]
+    return f"Largest, on this mesh (tol speaks of positions): {'; '.join(told) or 'no contact force or moment'}."
+
+
+def reactions_in_words(path):
+    """What every support holds with at the last point, a sentence each."""
+    contact = path._contact_of(len(path) - 1)
+    n = np.linalg.norm(contact[..., :3], axis=-1).max() * path.scales.force
+    m = np.linalg.norm(contact[..., 3:], axis=-1).max() * path.scales.moment
+    for support in path.scene.supports:
+        who = f"{type(support).__name__} at {support.station}"
+        others = _others(path.scene, support)
+        if others:
+            yield f"{who} shares its place with {', '.join(others)}: what it alone holds with is not told."
+            continue
+        force, moment = _reaction(path, support, contact)
+        yield f"{who} holds with {_vector(force, n)} N and {_vector(moment, m)} N m at the load factor {path.load_factors[-1]:.6g}."
+
+
+def _there(station, other):
+    """Whether two stations are one node."""
+    return station.rod is other.rod and abs(station.s - other.s) <= _SAME * station.rod.length
+
+
+def _others(scene, support):
+    """What acts at a support's place and is neither a dead force nor a dead moment, in words."""
+    place, found = support.station, []
+    for item in (*scene.supports, *scene.loads):
+        plain = isinstance(item, Force | Moment) or item is support or item.station is None
+        if not plain and _there(place, item.station):
+            found.append(f"the {type(item).__name__}")
+    return found + ["a Joint" for x in scene.joints if _there(place, x.first) or _there(place, x.second)]
+
+
+def _reaction(path, support, contact):
+    """(force, moment) of a support on its rod, N and N m, inertial, by the balance of its node."""
+    rod, s = support.station.rod, support.station.s
+    i = path.scene.rods.index(rod)
+    cells, j = contact[path._cells(i)], int(np.argmin(np.abs(path.layout.breaks[i] - s / rod.length)))
+    before = cells[j - 1, -1] if j else np.zeros(6)
+    after = cells[j, 0] if j < len(cells) else np.zeros(6)
+    force, moment = np.split(before - after, 2)
+    force, moment = force * path.scales.force, moment * path.scales.moment
+    for load in path.scene.loads:
+        if load.station is not None and _there(support.station, load.station):
+            if isinstance(load, Force):
+                force = force - path.load_factors[-1] * np.asarray(load.force)
+            else:
+                moment = moment - path.load_factors[-1] * np.asarray(load.moment)
+    return force, moment
+
+
+def _vector(a, beside):
+    """Components in words; those that are rounding beside each other or a number as 0."""
+    least = _ROUNDING * max(np.abs(a).max(), beside)
+    return f"({', '.join(f'{x:.6g}' if abs(x) > least else '0' for x in a)})"
