@@ -93,16 +93,18 @@ def _note(path, shown, thicker, magnify, small):
     """The title: what is shown, and what is not to scale."""
     some = "" if len(shown) == len(path) else f" (of {len(path)})"
     values = ", ".join(path.label(k) for k in shown)
-    parts = [
-        f"{path.scene.title or 'Deformed rods'}: shapes at {path.axis}{'s' if len(shown) > 1 else ''} {values}{some}"
-    ]
+    title = f"{path.scene.title or 'Deformed rods'}:"
+    shapes = f"shapes at {path.axis}{'s' if len(shown) > 1 else ''} {values}{some}"
+    parts = [f"{title} {shapes}"] if len(title) + len(shapes) < _TITLE else [title, shapes]
+    first = len(parts)
     if magnify != 1:
         parts.append(f"displacements magnified {magnify:g} times")
     if small:
         parts.append(small)
     if thicker:
         parts.append(f"sections drawn {' and '.join(sorted(thicker))} times their size")
-    return "\n".join(textwrap.fill(part, _TITLE) for part in (parts[0], *(f"({part})" for part in parts[1:])))
+    parts[first:] = [f"({part})" for part in parts[first:]]
+    return "\n".join(textwrap.fill(part, _TITLE) for part in parts)
 
 
 def chart(file, curves, *, xlabel, ylabel, title, ylim=None):
