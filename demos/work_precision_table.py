@@ -100,7 +100,7 @@ def _ratios(rows):
     for words, accuracy, mine, peer, ratio, largest in ratios(rows):
         cells = [f"{milliseconds(median(r))} ({called(r)})" if r else "none is so accurate" for r in (mine, peer)]
         verdict = "-" if ratio is None else "met" if ratio <= largest else "missed"
-        told = "-" if ratio is None else f"1/{1 / ratio:.3g}"
+        told = "-" if ratio is None else f"1/{1 / ratio:.3g}" if ratio <= 1 else f"{ratio:.3g} (slower)"
         lines.append(f"| {words} | {accuracy:.0e} | {' | '.join(cells)} | {told} | 1/{1 / largest:.3g} | {verdict} |")
     return lines
 

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 import cosserat_fenicsx as cf
-from cosserat_fenicsx.results.bearing import _reaction as reaction
-from cosserat_fenicsx.results.bearing import largest, reactions_in_words
+from cosserat_fenicsx.results.bearing import reactions_in_words
 
 pytestmark = pytest.mark.serial
 SECTION = cf.Stiffness(shear=(1e6, 1e6), axial=1e6, bending=(100.0, 100.0), torsion=80.0)
@@ -13,8 +12,7 @@ SECTION = cf.Stiffness(shear=(1e6, 1e6), axial=1e6, bending=(100.0, 100.0), tors
 
 def balance(path, supports, loads):
     """(force, moment about the origin) of reactions and of (position, force, moment) of loads, over what they sum up."""
-    contact = path._contact_of(len(path) - 1)
-    parts = [(path.position(x.station)[-1], *reaction(path, x, contact)) for x in supports] + loads
+    parts = [(path.position(x.station)[-1], *(values[-1] for values in path.reaction(x))) for x in supports] + loads
     total = np.array([np.concatenate([f, np.cross(at, f) + m]) for at, f, m in parts])
     return np.abs(total.sum(axis=0)).max() / np.abs(total).max()
 
@@ -34,8 +32,9 @@ def test_reactions_balance_the_loads(off):
     path = cf.solve(cf.Scene([rod], supports, loads), [0.5, 1.0], model="spatial")
     acting = [(path.position(at)[-1], np.array(f), np.array(m)) for at, (f, m) in zip(places, vectors)]
     assert balance(path, supports, acting) < 1e-6
-    force, moment = reaction(path, supports[0], path._contact_of(1))
-    assert abs(moment[1]) < 1e-6 * abs(force).max() * L  # a hinge has none about its axis
+    force, moment = path.reaction(supports[0])
+    assert force.shape == moment.shape == (2, 3)
+    assert (abs(moment[:, 1]) < 1e-6 * abs(force).max() * L).all()  # a hinge has none about its axis
 
 
 def test_what_shares_its_place_is_not_told():
@@ -48,19 +47,23 @@ def test_what_shares_its_place_is_not_told():
     assert "Clamp at one.start shares its place with the FollowerForce" in told[0]
     assert "Roller at two.start shares its place with a Joint" in told[1]
     assert "Roller at two.end holds with" in told[2]
+    with pytest.raises(cf.SceneError, match="Roller at two.start shares its place with a Joint"):
+        path.reaction(supports[1])
+    with pytest.raises(cf.SceneError, match="no support of this path's scene"):
+        path.reaction(cf.Clamp(one.start))
 
 
 def test_the_largest_moment_is_found_beyond_a_jump_and_between_nodes():
     """A rod that is clamped inside; a beam under a line load and an end moment, by textbook."""
     rod = cf.Rod(cf.Line((0, 0, 0), (10, 0, 0)), SECTION, name="rod")
     held = cf.Scene([rod], [cf.Clamp(rod.at(3))], [cf.Force(rod.end, (0, 0, 0.01))])
-    found = largest(cf.solve(held, [1.0]))["bending moment"]
+    found = cf.solve(held, [1.0]).largest()["bending moment"]
     assert found.size == pytest.approx(0.07, rel=1e-4) and found.station.s == pytest.approx(3)
     q, M, L = 1e-3, 4e-3, 10.0
     loads = [cf.LineForce(rod, (0, 0, -q)), cf.Moment(rod.start, (0, M, 0))]
     beam = cf.Scene([rod], [cf.Hinge(rod.start, (0, 1, 0)), cf.Roller(rod.end, (0, 0, 1))], loads)
     path = cf.solve(beam, [-1.0, 0.5], elements=2, model="planar")
-    found = largest(path)["bending moment"]
+    found = path.largest()["bending moment"]
     place = L / 2 - M / (q * L)
     assert found.size == pytest.approx(q * place * (L - place) / 2 + M * (1 - place / L), rel=1e-3)
     assert found.station.s == pytest.approx(place, abs=0.2) and found.point == 0
@@ -69,4 +72,4 @@ def test_the_largest_moment_is_found_beyond_a_jump_and_between_nodes():
 def test_what_is_zero_is_left_out():
     rod = cf.Rod(cf.Line((0, 0, 0), (10, 0, 0)), SECTION, name="rod")
     path = cf.solve(cf.Scene([rod], [cf.Clamp(rod.start)], [cf.Force(rod.end, (2.0, 0, 0))]), [1.0])
-    assert set(largest(path)) == {"tension"} and largest(path)["tension"].size == pytest.approx(2.0)
+    assert set(path.largest()) == {"tension"} and path.largest()["tension"].size == pytest.approx(2.0)

@@ -4,7 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.quaternions import directors
+from cosserat_fenicsx.results.on_nodes import OnNodes
 from cosserat_fenicsx.scene.loads import Force, Moment
 
 # Places looked at in an element, for each degree of its polynomials.
@@ -25,48 +27,82 @@ class Largest:
     point: int
 
 
-def largest(path):
-    """{quantity: `Largest`} over all points and places of a path or a motion, both sides of a jump and between the nodes; on
-    the mesh there is, which `tol` does not speak of. What is zero everywhere but for rounding is left out."""
-    found = dict.fromkeys(_UNITS, Largest(0.0, None, 0))
-    inside = np.linspace(0, 1, _PLACES * path.degree + 1)
-    basis = path.rule.basis(inside)
-    places = []
-    for i, rod in enumerate(path.scene.rods):
-        breaks = path.layout.breaks[i]
-        s = ((breaks[:-1, None] + np.diff(breaks)[:, None] * inside) * rod.length).ravel()
-        nodes = np.arange(path.elements[i])[:, None] * path.degree + np.arange(path.degree + 1)
-        places.append((rod, s, rod.curve.frame(s)[:, :, 2], path._rows(rod)[1], path._cells(i), nodes))
-    for k in range(len(path)):
-        contact, rq = path._contact_of(k), path[k].rq
-        for rod, s, d3, rows, cells, nodes in places:
-            n, m = np.split(np.einsum("qj,cjk->cqk", basis, contact[cells]).reshape(-1, 6), 2, axis=1)
-            q = np.einsum("qj,cjk->cqk", basis, rq[rows, 3:][nodes]).reshape(-1, 4)
-            t = np.einsum("nij,nj->ni", directors(q / np.linalg.norm(q, axis=1, keepdims=True)), d3)
-            axial, twist = np.einsum("ni,ni->n", n, t), np.einsum("ni,ni->n", m, t)
-            force, moment = path.scales.force, path.scales.moment
-            sizes = (
-                moment * np.linalg.norm(m - twist[:, None] * t, axis=1),
-                moment * np.abs(twist),
-                force * np.linalg.norm(n - axial[:, None] * t, axis=1),
-                force * axial,
-                -force * axial,
+class Bearing(OnNodes):
+    """What a path or a motion tells of its contact forces and moments as a whole."""
+
+    def largest(self):
+        """{quantity: `Largest`} over all points and places of a path or a motion, both sides of a jump and between the nodes; on
+        the mesh there is, which `tol` does not speak of. What is zero everywhere but for rounding is left out."""
+        found = dict.fromkeys(_UNITS, Largest(0.0, None, 0))
+        inside = np.linspace(0, 1, _PLACES * self.degree + 1)
+        basis = self.rule.basis(inside)
+        places = []
+        for i, rod in enumerate(self.scene.rods):
+            breaks = self.layout.breaks[i]
+            s = ((breaks[:-1, None] + np.diff(breaks)[:, None] * inside) * rod.length).ravel()
+            nodes = np.arange(self.elements[i])[:, None] * self.degree + np.arange(self.degree + 1)
+            places.append((rod, s, rod.curve.frame(s)[:, :, 2], self._rows(rod)[1], self._cells(i), nodes))
+        for k in range(len(self)):
+            contact, rq = self._contact_of(k), self[k].rq
+            for rod, s, d3, rows, cells, nodes in places:
+                n, m = np.split(np.einsum("qj,cjk->cqk", basis, contact[cells]).reshape(-1, 6), 2, axis=1)
+                q = np.einsum("qj,cjk->cqk", basis, rq[rows, 3:][nodes]).reshape(-1, 4)
+                t = np.einsum("nij,nj->ni", directors(q / np.linalg.norm(q, axis=1, keepdims=True)), d3)
+                axial, twist = np.einsum("ni,ni->n", n, t), np.einsum("ni,ni->n", m, t)
+                force, moment = self.scales.force, self.scales.moment
+                sizes = (
+                    moment * np.linalg.norm(m - twist[:, None] * t, axis=1),
+                    moment * np.abs(twist),
+                    force * np.linalg.norm(n - axial[:, None] * t, axis=1),
+                    force * axial,
+                    -force * axial,
+                )
+                for what, size in zip(_UNITS, sizes, strict=True):
+                    place = int(np.argmax(size >= size.max() - _ROUNDING * abs(size.max())))  # the first of many alike
+                    if size[place] > (1 + _ROUNDING) * found[what].size:
+                        found[what] = Largest(float(size[place]), rod.at(s[place]), k)
+        most = {unit: max(x.size for what, x in found.items() if _UNITS[what] == unit) for unit in ("N m", "N")}
+        return {what: x for what, x in found.items() if x.size > _ROUNDING * most[_UNITS[what]]}
+
+    def reaction(self, support):
+        """What a support holds its rod with at every point of a path, by the balance of its node.
+
+        Returns:
+            force, moment: (n, 3) each, N and N m, inertial.
+
+        Raises:
+            SceneError: it is no support of the scene, or shares its place with what the balance cannot be told from.
+        """
+        if not any(x is support for x in self.scene.supports):
+            raise SceneError(f"{support!r} is no support of this path's scene")
+        others = _others(self.scene, support)
+        if others:
+            raise SceneError(
+                f"{_name(support)} shares its place with {', '.join(others)}: what it alone holds with is not told"
             )
-            for what, size in zip(_UNITS, sizes, strict=True):
-                place = int(np.argmax(size >= size.max() - _ROUNDING * abs(size.max())))  # the first of many alike
-                if size[place] > (1 + _ROUNDING) * found[what].size:
-                    found[what] = Largest(float(size[place]), rod.at(s[place]), k)
-    most = {unit: max(x.size for what, x in found.items() if _UNITS[what] == unit) for unit in ("N m", "N")}
-    return {what: x for what, x in found.items() if x.size > _ROUNDING * most[_UNITS[what]]}
+        rod, s = support.station.rod, support.station.s
+        i = self.scene.rods.index(rod)
+        cells, j = self._cells(i), int(np.argmin(np.abs(self.layout.breaks[i] - s / rod.length)))
+        before = self._contact_in(cells.start + j - 1)[:, -1] if j else 0.0
+        after = self._contact_in(cells.start + j)[:, 0] if cells.start + j < cells.stop else 0.0
+        force, moment = np.split(before - after, 2, axis=1)
+        force, moment = force * self.scales.force, moment * self.scales.moment
+        for load in self.scene.loads:
+            if load.station is not None and _there(support.station, load.station):
+                if isinstance(load, Force):
+                    force -= np.multiply.outer(self.load_factors, load.force)
+                else:
+                    moment -= np.multiply.outer(self.load_factors, load.moment)
+        return force, moment
 
 
 def largest_in_words(path):
-    """`largest` as a sentence."""
+    """`Bearing.largest` as a sentence."""
     where = "time" if path.axis == "time" else path.axis
     unit = " s" if path.axis == "time" else ""
     told = [
         f"{what} {x.size:.4g} {_UNITS[what]} ({x.station}, {where} {path.along_axis[x.point]:.4g}{unit})"
-        for what, x in largest(path).items()
+        for what, x in path.largest().items()
     ]
     return f"Largest, on this mesh (tol speaks of positions): {'; '.join(told) or 'no contact force or moment'}."
 
@@ -77,13 +113,17 @@ def reactions_in_words(path):
     n = np.linalg.norm(contact[..., :3], axis=-1).max() * path.scales.force
     m = np.linalg.norm(contact[..., 3:], axis=-1).max() * path.scales.moment
     for support in path.scene.supports:
-        who = f"{type(support).__name__} at {support.station}"
-        others = _others(path.scene, support)
-        if others:
-            yield f"{who} shares its place with {', '.join(others)}: what it alone holds with is not told."
+        try:
+            force, moment = (values[-1] for values in path.reaction(support))
+        except SceneError as shared:
+            yield f"{shared}."
             continue
-        force, moment = _reaction(path, support, contact)
-        yield f"{who} holds with {_vector(force, n)} N and {_vector(moment, m)} N m at the load factor {path.load_factors[-1]:.6g}."
+        told = f"{_vector(force, n)} N and {_vector(moment, m)} N m"
+        yield f"{_name(support)} holds with {told} at the load factor {path.load_factors[-1]:.6g}."
+
+
+def _name(support):
+    return f"{type(support).__name__} at {support.station}"
 
 
 def _there(station, other):
@@ -99,24 +139,6 @@ def _others(scene, support):
         if not plain and _there(place, item.station):
             found.append(f"the {type(item).__name__}")
     return found + ["a Joint" for x in scene.joints if _there(place, x.first) or _there(place, x.second)]
-
-
-def _reaction(path, support, contact):
-    """(force, moment) of a support on its rod, N and N m, inertial, by the balance of its node."""
-    rod, s = support.station.rod, support.station.s
-    i = path.scene.rods.index(rod)
-    cells, j = contact[path._cells(i)], int(np.argmin(np.abs(path.layout.breaks[i] - s / rod.length)))
-    before = cells[j - 1, -1] if j else np.zeros(6)
-    after = cells[j, 0] if j < len(cells) else np.zeros(6)
-    force, moment = np.split(before - after, 2)
-    force, moment = force * path.scales.force, moment * path.scales.moment
-    for load in path.scene.loads:
-        if load.station is not None and _there(support.station, load.station):
-            if isinstance(load, Force):
-                force = force - path.load_factors[-1] * np.asarray(load.force)
-            else:
-                moment = moment - path.load_factors[-1] * np.asarray(load.moment)
-    return force, moment
 
 
 def _vector(a, beside):

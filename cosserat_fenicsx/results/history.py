@@ -6,6 +6,7 @@ from functools import cached_property
 
 import numpy as np
 
+from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.quaternions import directors
 from cosserat_fenicsx.results.path import Path
 from cosserat_fenicsx.results.records import Record
@@ -98,6 +99,10 @@ class History(Path):
             return angular
         station = self.station(station)
         return np.einsum("nij,ni->nj", directors(self.rotation(station)) @ station.rod.curve.frame(station.s), angular)
+
+    def reaction(self, support):
+        """Of a `Path` alone: in a motion ask for `force` and `moment` next to the support."""
+        raise SceneError("a History has no reaction of its supports: ask for force and moment at the station")
 
     @property
     def along_axis(self):

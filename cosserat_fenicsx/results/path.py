@@ -7,12 +7,12 @@ import numpy as np
 
 from cosserat_fenicsx.checks import instance
 from cosserat_fenicsx.quaternions import directors
-from cosserat_fenicsx.results.on_nodes import OnNodes
+from cosserat_fenicsx.results.bearing import Bearing
 from cosserat_fenicsx.results.recovery import at_nodes, element_contact
 from cosserat_fenicsx.scene.rod import Station
 
 
-class Path(OnNodes):
+class Path(Bearing):
     """An equilibrium path: a sequence of converged points.
 
     Attributes:
