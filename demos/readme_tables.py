@@ -24,9 +24,8 @@ def main(out="out"):
         file = Path(out) / f"{name}.md"
         if file.exists():
             found = file.read_text(encoding="utf-8").strip()
-            if name.startswith(
-                "work_precision"
-            ):  # the tables of all solvers stay in out/, and in demos/work_precision.md
+            if name.startswith("work_precision"):
+                # the tables of all solvers stay in out/, and in demos/work_precision.md
                 found = found.partition("\n\n| problem | solver")[0]
             table = f"<!-- {name} -->\n{found}\n<!-- /{name} -->"
             text = re.sub(f"<!-- {name} -->.*<!-- /{name} -->", lambda _, table=table: table, text, flags=re.DOTALL)

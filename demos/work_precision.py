@@ -122,14 +122,9 @@ def sample(peer, row, found, wanted, limits):
     slow = bool(row["seconds"]) and min(row["seconds"]) > SLOW
     cold = row["peer"] in SLOW_PEERS
     began = time.monotonic()
-    visit = (
-        {"warm": 0, "samples": 1}
-        if slow or cold
-        else {
-            "warm": 1,
-            "samples": min(found.panel.first, wanted) if not row["seconds"] else wanted - len(row["seconds"]),
-        }
-    )
+    rest = wanted - len(row["seconds"])
+    more = rest if row["seconds"] else min(found.panel.first, rest)
+    visit = {"warm": 0, "samples": 1} if slow or cold else {"warm": 1, "samples": more}
     answer = peer.ask(problem, row["configuration"], **visit, limit=limits[peer.name])
     found.spent += time.monotonic() - began
     if "failed" in answer:

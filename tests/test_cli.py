@@ -79,7 +79,7 @@ def test_pictures_are_asked_for(tmp_path):
     )
     assert plot._small(path, [0, 2], 20.0, 100.0) == ""
     refused = cosserat("run", DEMO, "--load-factors", "0.01", "-o", tmp_path, "--magnify", "-2")
-    assert refused.returncode == 2 and "--magnify -2: expected" in refused.stderr
+    assert refused.returncode == 2 and "plot.magnify = -2.0" in refused.stderr
 
 
 def test_run_of_a_range_lets_the_solver_choose():

@@ -6,6 +6,8 @@ from petsc4py import PETSc
 _ADD = PETSc.InsertMode.ADD_VALUES
 #: Stiffness that holds an added equation where only the sign of the second variation is asked for, over that of an element.
 _HELD = 1e3
+#: A step of Newton's may be wild: its residual is no number then, and SNES stops there without numpy's warnings.
+_WILD = {"invalid": "ignore", "over": "ignore"}
 
 
 class TieRows:
@@ -73,9 +75,7 @@ class TieRows:
             _, found, _ = self.model.ties.evaluate(self.model.tied_motion(nodal), 0.0, multipliers)
         return comm.bcast(found, root=comm.size - 1)
 
-    @np.errstate(
-        invalid="ignore", over="ignore"
-    )  # a wild step of Newton's: its residual is no number, and SNES stops there
+    @np.errstate(**_WILD)
     def add_residual(self, b, eta):
         """Add reactions to the rows of the nodes, and the equations in rows of their own."""
         if self._here:
@@ -87,7 +87,7 @@ class TieRows:
             b.setValues(self._multipliers, c, _ADD)
         b.assemble()
 
-    @np.errstate(invalid="ignore", over="ignore")
+    @np.errstate(**_WILD)
     def add_tangent(self, A, eta):
         """Add the derivative of `add_residual`."""
         if not self._here:

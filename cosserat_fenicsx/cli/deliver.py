@@ -19,13 +19,14 @@ def deliver(computed, options, moving):
     Returns:
         the exit code.
     """
+    from cosserat_fenicsx.checks import positive
+
     out, at = None, _numbers(options.at)
     if options.output:
         out = Path(options.output)
         _prepare(out)  # before the work, not after it
     _check_film(options, moving)
-    if options.magnify <= 0:
-        raise SceneError(f"--magnify {options.magnify:g}: expected a number above zero")
+    positive("plot", "magnify", options.magnify, "-")
     if at is not None and out is None:
         say("cosserat: --at is about pictures, which are drawn with -o DIR alone")
 
@@ -41,7 +42,8 @@ def deliver(computed, options, moving):
     except Interrupted as stop:
         path, trouble, code = stop.path, stop, INTERRUPTED
     if path is not None and len(path):
-        _report(path, options.station)
+        station = options.station or _busiest(path)
+        _report(path, station)
         if out is not None:
             film = options.animate if code != INTERRUPTED else None  # who stops a run does not wait for its film
             if code == INTERRUPTED:
@@ -50,7 +52,7 @@ def deliver(computed, options, moving):
                 )
             try:
                 look = {"magnify": options.magnify, "shown": _shown(path, at), "film": film, "speed": options.speed}
-                _write(path, out, options.station, picture=not options.no_picture, **look)
+                _write(path, out, station, picture=not options.no_picture, **look)
             except KeyboardInterrupt:
                 trouble, code = "interrupted; what was being drawn or written then is incomplete", INTERRUPTED
     if trouble is not None:
@@ -94,6 +96,13 @@ def _check_film(options, moving):
     if Path(options.animate).name != options.animate:
         raise SceneError(f"--animate {options.animate}: expected a name without folders; it is written to -o DIR")
     check_name(options.animate)
+
+
+def _busiest(path):
+    """What table and CSV tell of, where no station was asked for."""
+    from cosserat_fenicsx.results.tables import busiest
+
+    return busiest(path)
 
 
 def _report(path, station):

@@ -6,10 +6,10 @@ import numpy as np
 
 from cosserat_fenicsx.models.rodmesh import Layout
 from cosserat_fenicsx.models.shape import Shape
-from cosserat_fenicsx.results.tables import describe
 from cosserat_fenicsx.scene.choose import choose, fitting, force_in_words
 from cosserat_fenicsx.scene.curves import Line, Spline
 from cosserat_fenicsx.scene.sections import Rectangle, Stiffness
+from cosserat_fenicsx.scene.words import describe
 from cosserat_fenicsx.statics.first_mesh import FIRST_ELEMENTS
 from cosserat_fenicsx.statics.solve import check_arguments
 from cosserat_fenicsx.statics.solvers import default_degree

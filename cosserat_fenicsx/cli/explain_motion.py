@@ -8,8 +8,8 @@ from cosserat_fenicsx.dynamics.steppers import SCHEMES
 from cosserat_fenicsx.models.rod_data import check_inertia
 from cosserat_fenicsx.models.rodmesh import Layout
 from cosserat_fenicsx.models.shape import Shape
-from cosserat_fenicsx.results.tables import describe
 from cosserat_fenicsx.scene.signals import signals_of
+from cosserat_fenicsx.scene.words import describe
 
 _UNKNOWNS = {"planar": "centreline and angle theta in a plane", "spatial": "centreline r and quaternion q in space"}
 

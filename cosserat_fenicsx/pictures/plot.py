@@ -95,16 +95,14 @@ def _note(path, shown, thicker, magnify, small):
     values = ", ".join(path.label(k) for k in shown)
     title = f"{path.scene.title or 'Deformed rods'}:"
     shapes = f"shapes at {path.axis}{'s' if len(shown) > 1 else ''} {values}{some}"
-    parts = [f"{title} {shapes}"] if len(title) + len(shapes) < _TITLE else [title, shapes]
-    first = len(parts)
+    lines = [f"{title} {shapes}"] if len(title) + len(shapes) < _TITLE else [title, shapes]
     if magnify != 1:
-        parts.append(f"displacements magnified {magnify:g} times")
+        lines.append(f"(displacements magnified {magnify:g} times)")
     if small:
-        parts.append(small)
+        lines.append(f"({small})")
     if thicker:
-        parts.append(f"sections drawn {' and '.join(sorted(thicker))} times their size")
-    parts[first:] = [f"({part})" for part in parts[first:]]
-    return "\n".join(textwrap.fill(part, _TITLE) for part in parts)
+        lines.append(f"(sections drawn {' and '.join(sorted(thicker))} times their size)")
+    return "\n".join(textwrap.fill(line, _TITLE) for line in lines)
 
 
 def chart(file, curves, *, xlabel, ylabel, title, ylim=None):

@@ -8,13 +8,12 @@ from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.quaternions import directors
 from cosserat_fenicsx.results.on_nodes import OnNodes
 from cosserat_fenicsx.scene.loads import Force, Moment
+from cosserat_fenicsx.scene.words import describe
 
 # Places looked at in an element, for each degree of its polynomials.
 _PLACES = 6
 # Less than this share of what it stands beside is rounding.
 _ROUNDING = 1e-6
-# Stations nearer than this, over a rod's length, are one node of the mesh.
-_SAME = 1e-9
 _UNITS = {"bending moment": "N m", "twisting moment": "N m", "shear force": "N", "tension": "N", "compression": "N"}
 
 
@@ -32,7 +31,10 @@ class Bearing(OnNodes):
 
     def largest(self):
         """{quantity: `Largest`} over all points and places of a path or a motion, both sides of a jump and between the nodes; on
-        the mesh there is, which `tol` does not speak of. What is zero everywhere but for rounding is left out."""
+        the mesh there is, which `tol` does not speak of. What is zero everywhere but for rounding is left out.
+
+        With the tangent t = d3: bending |m - (m.t) t|, twisting |m.t|, shear |n - (n.t) t|, tension n.t, compression -n.t.
+        """
         found = dict.fromkeys(_UNITS, Largest(0.0, None, 0))
         inside = np.linspace(0, 1, _PLACES * self.degree + 1)
         basis = self.rule.basis(inside)
@@ -65,7 +67,8 @@ class Bearing(OnNodes):
         return {what: x for what, x in found.items() if x.size > _ROUNDING * most[_UNITS[what]]}
 
     def reaction(self, support):
-        """What a support holds its rod with at every point of a path, by the balance of its node.
+        """What a support holds its rod with at every point of a path, by the balance of its node: n(s-) - n(s+) - F with the dead
+        force F there (n = 0 beyond the ends), and likewise m.
 
         Returns:
             force, moment: (n, 3) each, N and N m, inertial.
@@ -75,20 +78,19 @@ class Bearing(OnNodes):
         """
         if not any(x is support for x in self.scene.supports):
             raise SceneError(f"{support!r} is no support of this path's scene")
-        others = _others(self.scene, support)
+        others = _others(self, support)
         if others:
             raise SceneError(
-                f"{_name(support)} shares its place with {', '.join(others)}: what it alone holds with is not told"
+                f"{describe(support)} shares its place with {', '.join(others)}: what it alone holds with is not told"
             )
-        rod, s = support.station.rod, support.station.s
-        i = self.scene.rods.index(rod)
-        cells, j = self._cells(i), int(np.argmin(np.abs(self.layout.breaks[i] - s / rod.length)))
+        i, j = node = _node(self, support.station)
+        cells = self._cells(i)
         before = self._contact_in(cells.start + j - 1)[:, -1] if j else 0.0
         after = self._contact_in(cells.start + j)[:, 0] if cells.start + j < cells.stop else 0.0
         force, moment = np.split(before - after, 2, axis=1)
         force, moment = force * self.scales.force, moment * self.scales.moment
         for load in self.scene.loads:
-            if load.station is not None and _there(support.station, load.station):
+            if load.station is not None and _node(self, load.station) == node:
                 if isinstance(load, Force):
                     force -= np.multiply.outer(self.load_factors, load.force)
                 else:
@@ -119,26 +121,25 @@ def reactions_in_words(path):
             yield f"{shared}."
             continue
         told = f"{_vector(force, n)} N and {_vector(moment, m)} N m"
-        yield f"{_name(support)} holds with {told} at the load factor {path.load_factors[-1]:.6g}."
+        yield f"{describe(support)} holds with {told} at the load factor {path.load_factors[-1]:.6g}."
 
 
-def _name(support):
-    return f"{type(support).__name__} at {support.station}"
-
-
-def _there(station, other):
-    """Whether two stations are one node."""
-    return station.rod is other.rod and abs(station.s - other.s) <= _SAME * station.rod.length
-
-
-def _others(scene, support):
-    """What acts at a support's place and is neither a dead force nor a dead moment, in words."""
-    place, found = support.station, []
+def _others(path, support):
+    """What acts at the node of a support and is neither a dead force nor a dead moment, in words."""
+    scene, node, found = path.scene, _node(path, support.station), []
     for item in (*scene.supports, *scene.loads):
         plain = isinstance(item, Force | Moment) or item is support or item.station is None
-        if not plain and _there(place, item.station):
+        if not plain and _node(path, item.station) == node:
             found.append(f"the {type(item).__name__}")
-    return found + ["a Joint" for x in scene.joints if _there(place, x.first) or _there(place, x.second)]
+    return found + [
+        "a Joint" for joint in scene.joints if node in (_node(path, joint.first), _node(path, joint.second))
+    ]
+
+
+def _node(path, station):
+    """(index of the rod, index of the element end) where the mesh has a station of a support, a load or a joint."""
+    i = path.scene.rods.index(station.rod)
+    return i, int(np.argmin(np.abs(path.layout.breaks[i] - station.s / station.rod.length)))
 
 
 def _vector(a, beside):

@@ -12,12 +12,13 @@ class OnNodes:
         Raises:
             SceneError: the scene has none such.
         """
+        if isinstance(rod, str):
+            return self.scene.rod(rod)
         rods = self.scene.rods
-        found = rods[0] if rod is None else next((x for x in rods if x is rod or x.name == rod), None)
-        if found is None:
+        if rod is not None and rod not in rods:
             known = ", ".join(x.name for x in rods)
             raise SceneError(f"{rod!r} is no rod of this result's scene: expected one of {known}")
-        return found
+        return rods[0] if rod is None else rod
 
     def _rows(self, rod=None):
         """(index of a rod, slice of its nodes among those of all rods)."""

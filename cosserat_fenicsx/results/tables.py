@@ -8,6 +8,7 @@ from rich.table import Table
 
 from cosserat_fenicsx.ranks import on_first
 from cosserat_fenicsx.results.bearing import largest_in_words, reactions_in_words
+from cosserat_fenicsx.scene.words import describe
 
 # A named station is shown if it moves by this share of what moves most.
 _WORTH_TELLING = 0.2
@@ -105,13 +106,6 @@ def _farthest(found, k):
     return f"{rod.name}@{rod.length * place / (len(size) - 1):.4g}", "({:.2f}, {:.2f}, {:.2f})".format(
         *(np.round(along, 2) + 0.0)
     )
-
-
-def describe(item):
-    """A support or a load in few words: its kind and its station."""
-    if item.station is not None:
-        return f"{type(item).__name__} at {item.station}"
-    return f"{type(item).__name__} on {item.rod.name}" if hasattr(item, "rod") else type(item).__name__
 
 
 def stability(negative_modes):

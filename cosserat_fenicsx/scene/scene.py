@@ -4,23 +4,19 @@ import copy
 from dataclasses import dataclass
 from functools import cached_property
 
-import numpy as np
-
 from cosserat_fenicsx.checks import instance
-from cosserat_fenicsx.errors import SceneError
+from cosserat_fenicsx.errors import SceneError, nearest
 from cosserat_fenicsx.scene.initial import InitialVelocity
 from cosserat_fenicsx.scene.joints import Joint
 from cosserat_fenicsx.scene.loads import LOADS
 from cosserat_fenicsx.scene.planes import find_plane
 from cosserat_fenicsx.scene.rod import Rod, station_named
 from cosserat_fenicsx.scene.signals import signals_of
-from cosserat_fenicsx.scene.statical import check_held_once
+from cosserat_fenicsx.scene.statical import check_held_once, touching
 from cosserat_fenicsx.scene.supports import SUPPORTS
 
 # Young's moduli below this, Pa, are those of gels, or slips of units.
 _GEL = 1e6
-# Ends that lie at one point, over a rod's length.
-_TOUCH = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -194,14 +190,11 @@ class Scene:
 
     def _unjoined(self):
         """Ends of different structures at one point, where not both are held."""
-        ends = [end for rod in self.rods for end in (rod.start, rod.end)]
-        places = np.array([end.rod.curve.position(end.s) for end in ends])
-        held = {str(support.station) for support in self.supports}
-        for i, end in enumerate(ends):
-            near = np.linalg.norm(places[i + 1 :] - places[i], axis=1) <= _TOUCH * end.rod.length
-            for other in (ends[i + 1 + j] for j in np.flatnonzero(near)):
-                if self.leader(end.rod) is not self.leader(other.rod) and not {str(end), str(other)} <= held:
-                    yield f"{end} and {other} lie at one point and are not joined: if they should be, add Joint({end}, {other})"
+        held, told = [support.station for support in self.supports], []
+        for end, other in touching(self):
+            if not (end in held and other in held) and (other, end) not in told:
+                told.append((end, other))
+                yield f"{end} and {other} lie at one point and are not joined: if they should be, add Joint({end}, {other})"
 
     def _following(self):
         if not self.follows:
@@ -222,5 +215,12 @@ class Scene:
         return station_named("station", name, {rod.name: rod for rod in self.rods})
 
     def rod(self, name):
-        """The rod of that name."""
-        return next(rod for rod in self.rods if rod.name == name)
+        """The rod of that name.
+
+        Raises:
+            SceneError: there is none of that name.
+        """
+        for rod in self.rods:
+            if rod.name == name:
+                return rod
+        raise SceneError(f"no rod is named {name!r}, {nearest(name, [rod.name for rod in self.rods])}")

@@ -12,6 +12,8 @@ from cosserat_fenicsx.scene.supports import Clamp
 from cosserat_fenicsx.scene.ties import PositionTie, TurnTie
 
 _SMALL = 1e-9
+# Ends this near, over a rod's length, lie at one point.
+_TOUCH = 1e-6
 
 
 def rows_of(tie):
@@ -145,14 +147,20 @@ def check_no_mechanism(scene):
 
 def _or_a_joint(scene, rod):
     """What else a rod that is free may be missing, in words, where one of its ends lies on another's."""
-    for end in (rod.start, rod.end):
-        for there in (
-            x for other in scene.rods if scene.leader(other) is not scene.leader(rod) for x in (other.start, other.end)
-        ):
-            apart = rod.curve.position(end.s) - there.rod.curve.position(there.s)
-            if np.linalg.norm(apart) <= 1e-6 * rod.length:
-                return f", or a Joint({end}, {there}), which lie at one point"
+    for end, there in sorted(touching(scene), key=lambda pair: pair[0].s):
+        if end.rod is rod:
+            return f", or a Joint({end}, {there}), which lie at one point"
     return ""
+
+
+def touching(scene):
+    """Pairs of ends of different structures that lie at one point, each both ways round, in the order of the rods."""
+    ends = [end for rod in scene.rods for end in (rod.start, rod.end)]
+    places = np.array([end.rod.curve.position(end.s) for end in ends])
+    for end, place in zip(ends, places, strict=True):
+        for j in np.flatnonzero(np.linalg.norm(places - place, axis=1) <= _TOUCH * end.rod.length):
+            if scene.leader(end.rod) is not scene.leader(ends[j].rod):
+                yield end, ends[j]
 
 
 def without_mechanism(scene):
