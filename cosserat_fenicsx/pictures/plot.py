@@ -13,7 +13,7 @@ from cosserat_fenicsx.ranks import on_first
 
 # Of the picture: how high a label is, how wide a letter, and a displacement that can hardly be seen; letters in its width.
 _HIGH, _WIDE, _HARDLY = 0.035, 0.016, 0.01
-_TITLE = 80
+_TITLE = 88
 
 
 def rods(path, file=None, points=None, magnify=1.0):
