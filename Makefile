@@ -2,7 +2,7 @@
 PYTHON = .venv/bin/python
 # By full path, like /usr/bin/python3 below: another MPI or Python may come first on PATH, and dolfinx belongs to these.
 # A rank that fails leaves the others waiting for it: the time limit, in seconds, ends them.
-MPIRUN = /usr/bin/mpirun --oversubscribe --timeout 1800
+MPIRUN = /usr/bin/mpirun --oversubscribe --timeout 2700
 
 # Threads inside BLAS slow some solvers down a thousand times; ranks are the parallelism here.
 export OMP_NUM_THREADS = 1

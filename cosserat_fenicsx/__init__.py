@@ -1,6 +1,6 @@
 """Geometrically exact rods on FEniCSx: equilibrium paths of special Cosserat rods under large displacements.
 
-Names load when they are first used, so that `import cosserat_fenicsx` and the command line's --help stay instant.
+Modules are imported when their names are first used, so that `import cosserat_fenicsx` and --help stay instant.
 """
 
 import importlib
@@ -10,11 +10,15 @@ __version__ = "0.1.0"
 
 _checkout = _FilePath(__file__).resolve().parent.parent
 if (_checkout / "forms" / "spatial.py").is_file() and (_checkout / "pyproject.toml").is_file():
-    # A plain checkout: forms/ lies beside the package, where an installation has it inside.
+    # A plain checkout: forms/ lies beside the package; an installation has it inside.
     __path__.append(str(_checkout))
 
 _HOME = {
     "analytic": None,
+    "Action": "scene.action",
+    "Along": "scene.along",
+    "AlongPieces": "scene.along",
+    "AlongTable": "scene.along",
     "Arc": "scene.curves",
     "Buckling": "statics.linear_buckling",
     "buckling": "statics.linear_buckling",
@@ -22,17 +26,21 @@ _HOME = {
     "Clamp": "scene.supports",
     "CosseratError": "errors",
     "Damping": "scene.damping",
+    "Dashpot": "actions.dashpot",
+    "Drag": "actions.drag",
     "EccentricForce": "scene.loads",
     "FollowerForce": "scene.loads",
     "FollowerMoment": "scene.loads",
     "Event": "results.records",
     "Force": "scene.loads",
+    "Foundation": "actions.foundation",
     "Hinge": "scene.supports",
     "InstallationError": "errors",
     "Helix": "scene.curves",
     "Interrupted": "errors",
     "Joint": "scene.joints",
     "Line": "scene.curves",
+    "LineAction": "scene.action",
     "LineForce": "scene.loads",
     "LineMoment": "scene.loads",
     "Material": "scene.materials",
@@ -43,6 +51,8 @@ _HOME = {
     "NotStored": "errors",
     "Path": "results.path",
     "Pin": "scene.supports",
+    "PointAction": "scene.action",
+    "PointMass": "actions.point_mass",
     "Prescribed": "scene.supports",
     "Rectangle": "scene.sections",
     "Rod": "scene.rod",
@@ -50,10 +60,12 @@ _HOME = {
     "Scene": "scene.scene",
     "SceneError": "errors",
     "Spline": "scene.curves",
-    "StepControl": "statics.continuation",
+    "Spring": "actions.spring",
+    "StepControl": "statics.path.load_control",
     "Stiffness": "scene.sections",
     "Tube": "scene.sections",
     "UniformCurvature": "scene.curves",
+    "Wall": "actions.wall",
     "Weight": "scene.loads",
     "euler_load": "scene.rod",
     "read_motion": "scene.scenefile",
@@ -72,6 +84,11 @@ _HOME = {
     "solve": "statics.solve",
 }
 __all__ = sorted(_HOME)
+
+
+def names_in(room):
+    """The public names defined in a subpackage."""
+    return [name for name, home in _HOME.items() if home and home.startswith(f"{room}.")]
 
 
 def __getattr__(name):

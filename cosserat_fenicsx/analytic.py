@@ -1,4 +1,4 @@
-"""Closed forms and high-precision references for a straight cantilever in a plane; they share nothing with the solver.
+"""Closed forms and high-precision references for a straight cantilever in a plane, independent of the solver.
 
 The rod lies along z, clamped at s = 0, and bends in the x-z plane; theta turns z towards x (about y). Section 3 of the
 paper compresses it by a dead tip force F = eta P_cr, P_cr = pi^2 EI/(2L)^2, with a tip moment M = F e: `secant_delta`
@@ -20,12 +20,12 @@ from cosserat_fenicsx.errors import NotConverged
 
 @dataclass(frozen=True, eq=False)
 class Tip:
-    """Where the tip went; floats, or arrays of the shape of the load factors. Inertial components.
+    """The motion of the tip; floats, or arrays of the shape of the load factors. Inertial components.
 
     Attributes:
         delta: transverse displacement along x, m.
         shortening: axial displacement towards the clamp (along -z), m.
-        tip_rotation: theta at the tip, rad, counted through full turns.
+        tip_rotation: theta at the tip, rad, continuous beyond pi.
     """
 
     delta: float | np.ndarray
@@ -41,7 +41,7 @@ def secant_delta(eta, eccentricity):
         eccentricity: e, m.
 
     Returns:
-        delta, m: infinite at eta = 1, nan beyond, where the formula says nothing.
+        delta, m: infinite at eta = 1, nan beyond, where the formula does not hold.
 
     Raises:
         SceneError: a negative or infinite eta, an eccentricity that is not positive.
@@ -66,7 +66,7 @@ def elastica(eta, eccentricity, length):
 
     Raises:
         SceneError: a negative or infinite eta, a length that is not positive, or a tip that would turn by 2 pi or more
-            (only where (e/L) sqrt(eta) > 4/pi), where the branch may turn back in eta (`reissner` goes on).
+            (only where (e/L) sqrt(eta) > 4/pi), where the branch may turn back in eta (`reissner` follows it further).
     """
     eta = _load_factors("elastica", "eta", eta)
     e = positive("elastica", "eccentricity", eccentricity, "m")
@@ -80,9 +80,10 @@ def _elastica(p, ratio):
     EI theta'' = -F sin(theta) integrates to (L theta')^2 = 4 p^2 (k^2 - sin(theta/2)^2). At the tip L theta' = p^2 e/L
     = 2 p h and S, C = sin, cos(theta_L/2): k^2 = h^2 + S^2; at the clamp L theta' = 2 p k. Since theta' > 0 throughout,
     p = F(phi, k) with k sin(phi) = S, and the shortening is (2/p)(F - E). In Carlson's symmetric integrals (DLMF 19.25)
-    F = S R_F and F - E = k^2 S^3 R_D/3, both of (h^2, k^2 C^2, k^2): regular through k = 1, where swinging gives way to
-    turning. Beyond theta_L = pi they are two half turns less what is missing. Moments about the clamp, EI theta'(0) =
-    M + F delta, give delta/L = 2 (k - h)/p = 2 S^2/(p (k + h)).
+    F = S R_F and F - E = k^2 S^3 R_D/3, both of (h^2, k^2 C^2, k^2): regular through k = 1, where the pendulum of the
+    kinetic analogy changes from oscillation to rotation. Beyond theta_L = pi they are twice the complete integrals less
+    those of the remainder. Moments about the clamp, EI theta'(0) = M + F delta, give delta/L = 2 (k - h)/p
+    = 2 S^2/(p (k + h)).
     """
     if p == 0:
         return 0.0, 0.0, 0.0
@@ -96,7 +97,7 @@ def _elastica(p, ratio):
         F, F_minus_E = S * elliprf(*args), k2 * S**3 * elliprd(*args) / 3
         if theta <= math.pi:
             return F, F_minus_E
-        if h + C <= 0:  # k <= 1: such a rod swings back before it gets there, however long it is
+        if h + C <= 0:  # k <= 1: theta turns back before it reaches this angle, however long the rod is
             return math.inf, math.inf
         half = (h - C) * (h + C), 0.0, k2  # k^2 - 1 first
         return 2 * elliprf(*half) - F, 2 * k2 * elliprd(*half) / 3 - F_minus_E
@@ -107,7 +108,7 @@ def _elastica(p, ratio):
         refuse("elastica", "eccentricity / length", ratio, f"less: at eta = {eta:g} the tip turns by 2 pi or more")
     theta = brentq(lambda x: min(integrals(x)[0], 2 * p) - p, 0, 2 * math.pi, xtol=1e-300, rtol=1e-15, maxiter=2000)
     F, F_minus_E = integrals(theta)
-    if theta > math.pi / 2:  # here the rounding of theta shows in F, hardly in E, and p is exact
+    if theta > math.pi / 2:  # here rounding of theta affects F much more than E, and F = p is known exactly
         F_minus_E += p - F
     S = math.sin(theta / 2)
     return 2 * S * S / (p * (math.hypot(h, S) + h)), 2 * F_minus_E / p, theta
@@ -189,7 +190,8 @@ def planar_tip(load_factors, length, *, bending, axial=math.inf, shear=math.inf,
 
 @cache
 def _gauss(n):
-    """The n-stage Gauss method on [0, 1]: nodes, weights, integrals from 0 to each node, Legendre coefficients."""
+    """The n-stage Gauss method on [0, 1]: nodes and weights (n,), matrices (n, n) from values at the nodes to the
+    integrals from 0 to each node and to Legendre coefficients."""
     x, w = roots_legendre(n)
     P = np.polynomial.legendre.legvander(x, n)
     j = np.arange(n)
@@ -247,7 +249,7 @@ class _Rod:
                 trial = min(load + step, target)
                 predicted = kappa + (trial - load) * tangent
                 found = self.newton(trial, predicted)
-                # Far from its prediction a state may lie on another branch, however well Newton converged.
+                # A state far from its prediction may lie on another branch, although Newton's method converged.
                 if found is None or np.abs(found[0] - predicted).max() > 0.3 * np.abs(found[0]).max():
                     step = (trial - load) / 2
                     if step < 1e-9 * target:
@@ -258,7 +260,7 @@ class _Rod:
             yield self.tip(load, kappa)
 
     def resolve(self, load, kappa, tangent):
-        """The same state with as many nodes as it needs, judged by the last Legendre coefficients."""
+        """The same state with as many nodes as resolve it: the last Legendre coefficients are small."""
         while True:
             _, _, A, coefficients = _gauss(len(kappa))
             s, c, _, _ = self.strains(A @ kappa)

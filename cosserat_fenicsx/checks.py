@@ -1,4 +1,4 @@
-"""Checks of what a user hands in; every refusal names the field, its value and what was expected."""
+"""Checks of users' input; every refusal names the field, its value and what was expected."""
 
 import math
 import numbers
@@ -9,7 +9,7 @@ from cosserat_fenicsx.errors import SceneError
 
 
 def refuse(owner, field, value, expected):
-    """Raise a SceneError in the house's one wording."""
+    """Raise a SceneError: 'owner.field = value: expected ...'."""
     where = owner if isinstance(owner, str) else type(owner).__name__
     raise SceneError(f"{where}.{field} = {value!r}: expected {expected}")
 
@@ -44,7 +44,7 @@ def vector(owner, field, value, unit, size=3):
 
 
 def direction(owner, field, value):
-    """A unit tuple along three finite numbers that are not all zero."""
+    """The unit vector along three finite numbers that are not all zero, a tuple."""
     given = vector(owner, field, value, "direction")
     size = math.hypot(*given)
     if size == 0.0:

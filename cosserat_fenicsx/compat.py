@@ -1,7 +1,7 @@
-"""The one place that knows which release of dolfinx is installed.
+"""Differences between releases of dolfinx: the only module that depends on the installed version.
 
 Supported: 0.5.2 (Debian 12), 0.9.0 (Debian 13) and, by the same interface, 0.10 and later.
-Everything else in the package calls the functions below and never asks for a version.
+All other modules call the functions below and contain no version checks.
 """
 
 import contextlib
@@ -21,7 +21,7 @@ _HOW_TO_INSTALL = (
 
 try:
     import dolfinx
-    import mpi4py.MPI  # noqa: F401  missing or broken, it is named below like the others
+    import mpi4py.MPI  # noqa: F401  where it is missing or broken, the message below names it
     import ufl
     from dolfinx import fem
     from dolfinx import mesh as dolfinx_mesh
@@ -80,12 +80,15 @@ if _VERSION < (0, 8):
         """The finite element space of `element` on `mesh`."""
         return fem.FunctionSpace(mesh, element)
 
+    def interval_domain():
+        """UFL's domain of a line, without a mesh."""
+        cell = ufl.Cell("interval", geometric_dimension=1)
+        # FFCx 0.5 gives the element this variant when it compiles: signatures before and after must be equal
+        return ufl.Mesh(ufl.VectorElement("Lagrange", cell, 1, variant="equispaced"))
+
     def create_interval_mesh(comm, cells, x):
         """A mesh of intervals on a line from `cells (n, 2)` and `x (m, 1)`, given on rank 0 alone."""
-        cell = ufl.Cell("interval", geometric_dimension=1)
-        # FFCx 0.5 gives the element this variant when it compiles: forms signed before and after must have one name
-        coordinates = ufl.VectorElement("Lagrange", cell, 1, variant="equispaced")
-        return dolfinx_mesh.create_mesh(comm, cells, x, ufl.Mesh(coordinates))
+        return dolfinx_mesh.create_mesh(comm, cells, x, interval_domain())
 
     def create_solid_mesh(comm, cells, x):
         """A mesh of second-order hexahedra from `cells (n, 27)`, in basix' order of nodes, and `x (m, 3)`."""
@@ -121,6 +124,10 @@ else:
         """The finite element space of `element` on `mesh`."""
         return fem.functionspace(mesh, element)
 
+    def interval_domain():
+        """UFL's domain of a line, without a mesh."""
+        return ufl.Mesh(basix.ufl.element("Lagrange", "interval", 1, shape=(1,)))
+
     def create_interval_mesh(comm, cells, x):
         """A mesh of intervals on a line from `cells (n, 2)` and `x (m, 1)`, given on rank 0 alone."""
         coordinates = basix.ufl.element("Lagrange", "interval", 1, shape=(1,))
@@ -146,17 +153,17 @@ else:
 
 
 def alias(function):
-    """A second UFL coefficient over the very same numbers as `function`.
+    """A second UFL coefficient that shares the values of `function`.
 
-    FFCx keeps the value of a coefficient under a one-point rule as constant over the cell and then takes it for every
-    other rule of the same form too. A term with a rule of its own must therefore name its coefficient differently.
+    FFCx treats a coefficient under a one-point quadrature rule as constant over the cell, and then uses that value for
+    every other rule of the same form, too. A term with its own rule must therefore use another coefficient.
     """
     return fem.Function(function.function_space, function.x)
 
 
 def form_for_speed(form):
-    """A compiled form whose kernel runs a hundred thousand times: optimised further, in half the time to run and a tenth more
-    to compile."""
+    """A form compiled with more optimisation, for kernels that run very often: half the running time, a tenth more to
+    compile."""
     options = {"cffi_extra_compile_args": ["-O3"]}
     return fem.form(form, **{"jit_params" if _VERSION < (0, 6) else "jit_options": options})
 
@@ -173,7 +180,8 @@ def element_nodes(space):
 
 
 def cell_nodes(space):
-    """Local node (block) indices of every local cell of a space, shape (cells, nodes per cell); a rank may have none."""
+    """Local node (block) indices of every local cell of a space, shape (cells, nodes per cell); a rank may have
+    none."""
     cells = space.dofmap.list
     if not hasattr(cells, "array"):
         return cells
@@ -181,7 +189,7 @@ def cell_nodes(space):
 
 
 def version():
-    """Releases of dolfinx, PETSc, numpy and Python, for reports."""
+    """Versions of dolfinx, PETSc, numpy and Python, for reports."""
     petsc = ".".join(map(str, PETSc.Sys.getVersion()))
     python = platform.python_version()
     return f"dolfinx {dolfinx.__version__}, PETSc {petsc}, numpy {np.__version__}, Python {python}"

@@ -1,10 +1,10 @@
-"""What can go wrong, in words a user can act on."""
+"""Exceptions, with messages that say what to do."""
 
 import difflib
 
 
 class CosseratError(Exception):
-    """Anything this package refuses to do."""
+    """Base of the errors that this package raises."""
 
 
 class InstallationError(CosseratError, ImportError):
@@ -15,17 +15,17 @@ class SceneError(CosseratError, ValueError):
     """A scene that cannot be solved as it is described: says what, where, and what was expected.
 
     Attributes:
-        path: the `History` up to there, where it was found while a motion was computed, else None.
+        path: the `History` so far where the error arose during a motion, else None.
     """
 
     path = None
 
 
 class NotConverged(CosseratError, RuntimeError):
-    """A solver could not go on.
+    """A solver did not converge.
 
     Attributes:
-        path: everything up to the last converged point (a `Path` or a `History`, possibly empty), or None where
+        path: the result up to the last converged point (a `Path` or a `History`, possibly empty), or None where
             nothing was solved.
     """
 
@@ -35,10 +35,10 @@ class NotConverged(CosseratError, RuntimeError):
 
 
 class NotStored(CosseratError, OSError):
-    """A motion that is written as it goes cannot be written any more, such as on a full disk.
+    """The folder of a motion can no longer be written to, such as on a full disk.
 
     Attributes:
-        path: the `History` up to there, which lies in its folder.
+        path: the `History` of the states that are stored in the folder.
     """
 
     def __init__(self, message, path=None):
@@ -50,7 +50,7 @@ class Interrupted(KeyboardInterrupt):
     """Ctrl-C during a solve.
 
     Attributes:
-        path: everything up to the last converged point.
+        path: the result up to the last converged point.
     """
 
     def __init__(self, path):

@@ -1,4 +1,4 @@
-"""Progress of long runs: a bar on rank 0 of a terminal, plain lines elsewhere, nothing for what is over at once."""
+"""Progress of long runs on rank 0: a bar in a terminal, lines of text elsewhere, nothing for short runs."""
 
 import sys
 import time
@@ -8,13 +8,13 @@ _LINE_EVERY = 10.0  # s between plain lines
 
 
 class Progress:
-    """Context manager that follows a path towards its last load factor.
+    """Context manager that shows the progress of a path or a motion.
 
     Args:
-        targets: the requested load factors.
-        wanted: True, False, or None for where a person is likely to wait.
+        targets: the requested load factors or times (s), in their order.
+        wanted: True, False, or None to show it in runs of more than two seconds.
         comm: MPI communicator; only rank 0 shows anything.
-        quantity: what is followed, in words.
+        quantity: the name of the quantity that advances.
     """
 
     def __init__(self, targets, wanted, comm, quantity="load factor"):
@@ -31,17 +31,17 @@ class Progress:
         return self
 
     def start(self, what):
-        """A new run over the whole way."""
+        """Start a run over all targets; `what` describes it."""
         self._what, self._done, self._eta = what, 0.0, 0.0
         if self._bar is not None:
             self._bar.reset(self._task, description=what)
 
     def at(self, point):
-        """The run has come to a point."""
+        """The run has reached a point of a path."""
         self.reached(point.load_factor)
 
     def reached(self, eta):
-        """The run has come to a load factor, or a time."""
+        """The run has reached a load factor, or a time (s)."""
         self._done += abs(eta - self._eta)
         self._eta = eta
         now = time.monotonic()

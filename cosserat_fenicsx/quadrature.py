@@ -21,6 +21,6 @@ class Gauss(NamedTuple):
 def gauss(n):
     """The `Gauss` rule of n points."""
     points, weights = legendre.leggauss(n)
-    # An inverse, not Gauss sums of the polynomials: those lose two digits to the rounding of the points.
+    # By inversion: discrete orthogonality with Gauss weights loses two digits to the rounding of the points.
     series = np.linalg.inv(legendre.legvander(points, n - 1))
     return Gauss(points, weights, series, legendre.legint(series, lbnd=-1, axis=0))

@@ -1,4 +1,4 @@
-"""Unit quaternions as numbers, scalar first; the algebra of unknowns is in forms/rotation.py."""
+"""Unit quaternions in numpy, scalar first; for UFL see forms/rotation.py."""
 
 import numpy as np
 
@@ -21,8 +21,15 @@ def conjugate_product(p, q):
     return p[..., :1] * w - q[..., :1] * v - np.cross(v, w)
 
 
+def product_conjugate(p, q):
+    """(..., 4) p conj(q)."""
+    v, w = p[..., 1:], q[..., 1:]
+    scalar = np.einsum("...i,...i", p, q)[..., None]
+    return np.concatenate([scalar, q[..., :1] * v - p[..., :1] * w - np.cross(v, w)], axis=-1)
+
+
 def cross(u, v):
-    """(k, 3) cross products of rows; np.cross takes five times as long on a few."""
+    """(k, 3) cross products of rows; np.cross takes five times as long for few rows."""
     result = np.empty_like(u)
     result[:, 0] = u[:, 1] * v[:, 2] - u[:, 2] * v[:, 1]
     result[:, 1] = u[:, 2] * v[:, 0] - u[:, 0] * v[:, 2]
@@ -31,12 +38,12 @@ def cross(u, v):
 
 
 def skew(u):
-    """The (3, 3) matrix of u x."""
+    """The (3, 3) skew matrix of the cross product, skew(u) v = u x v."""
     return np.array([[0.0, -u[2], u[1]], [u[2], 0.0, -u[0]], [-u[1], u[0], 0.0]])
 
 
 def small_rotations(q):
-    """(k, 3, 4): the inertial rotations 2 vec(dq conj(q))/|q|^2 of changes dq of q (k, 4), as matrices on dq."""
+    """(k, 3, 4) matrices from changes dq of q (k, 4) to small inertial rotations 2 vec(dq conj(q))/|q|^2."""
     a, b, c, d = (q * (2 / (q * q).sum(axis=1, keepdims=True))).T
     result = np.empty((len(q), 3, 4))
     for i, row in enumerate(((-b, a, -d, c), (-c, d, a, -b), (-d, -c, b, a))):

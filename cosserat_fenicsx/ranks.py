@@ -1,10 +1,10 @@
-"""What one rank does for all: files and pictures."""
+"""Work that one MPI rank does for all: files and pictures."""
 
 from cosserat_fenicsx.errors import SceneError
 
 
 def on_first(comm, action):
-    """Run `action()` on rank 0; where it fails, every rank raises the same.
+    """Run `action()` on rank 0; where it fails, every rank raises the same exception.
 
     Raises:
         OSError, SceneError: as `action` did.

@@ -17,7 +17,7 @@ import numpy as np
 
 import cosserat_fenicsx as cf
 from cosserat_fenicsx import compat
-from cosserat_fenicsx.scene.choose import fitting
+from cosserat_fenicsx.models.choose import fitting
 from cosserat_fenicsx.scene.scenefile import read_scene
 
 SCENES = ("eccentric_cantilever", "bend_45", "lees_frame", "helical_spring", "riser", "tripod")

@@ -23,7 +23,7 @@ from scipy.integrate import solve_ivp
 
 import cosserat_fenicsx as cf
 from cosserat_fenicsx import analytic
-from cosserat_fenicsx.dynamics.standing import before
+from cosserat_fenicsx.dynamics.initial_equilibrium import before
 from cosserat_fenicsx.results.tables import as_text
 
 SCENES = Path(__file__).parent / "motions"

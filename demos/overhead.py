@@ -102,24 +102,24 @@ def compare(degree, elements, runs):
         return cf.solve(scene, ETAS, degree=degree, elements=elements, model="spatial")
 
     path = public()
-    problem, _, _ = solvers.solvers_of(scene, path.layout, degree=degree)
-    bare = BareLoop(problem.model, path)
-    layout = path.layout
-    tips = bare.run(scene, layout, stability=False)
-    difference = np.abs(tips * path.scales.length + rod.curve.position(0.0) - path.position(rod.end)).max()
-    tasks = (
-        public,
-        lambda: bare.run(scene, layout, stability=False),
-        lambda: bare.run(scene, layout, stability=True),
-    )
-    times = np.empty((runs, 3))
-    for i in range(runs):
-        for j, task in enumerate(tasks):
-            began = time.process_time()
-            task()
-            times[i, j] = time.process_time() - began
-    ratios = np.median(times[:, :1] / times[:, 1:], axis=0)
-    return np.median(times, axis=0), ratios, difference, int(path.iterations.sum())
+    with solvers.solvers_of(scene, path.layout, degree=degree) as (problem, _, _):
+        bare = BareLoop(problem.model, path)
+        layout = path.layout
+        tips = bare.run(scene, layout, stability=False)
+        difference = np.abs(tips * path.scales.length + rod.curve.position(0.0) - path.position(rod.end)).max()
+        tasks = (
+            public,
+            lambda: bare.run(scene, layout, stability=False),
+            lambda: bare.run(scene, layout, stability=True),
+        )
+        times = np.empty((runs, 3))
+        for i in range(runs):
+            for j, task in enumerate(tasks):
+                began = time.process_time()
+                task()
+                times[i, j] = time.process_time() - began
+        ratios = np.median(times[:, :1] / times[:, 1:], axis=0)
+        return np.median(times, axis=0), ratios, difference, int(path.iterations.sum())
 
 
 def main(runs=15, out="out"):

@@ -18,7 +18,7 @@ from eccentric_cantilever import column, exact
 
 import cosserat_fenicsx as cf
 from cosserat_fenicsx import compat
-from cosserat_fenicsx.scene.choose import fitting
+from cosserat_fenicsx.models.choose import fitting
 
 STEEL = cf.Material(E=210e9, nu=0.3, density=7850.0)
 SWEEP = np.linspace(0.05, 1.5, 31)

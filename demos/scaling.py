@@ -5,7 +5,7 @@
 
 Each size runs in a process of its own: a thick cantilever under a small force across, degree 4, one Newton step (residual,
 tangent, factorisation, solution, update of n) repeated from rest, and one count of negative modes; medians. Small matrices are
-factored by blocks of nodes, which is cheaper, large ones with pivots everywhere (`Shape.slender`): exponents are told of each.
+factored by blocks of nodes, which is cheaper, large ones with pivots everywhere (`Signature.slender`): exponents are told of each.
 """
 
 import argparse
@@ -33,26 +33,26 @@ def measure(elements):
     the tangent is factored by blocks."""
     _, scene = column()
     layout = Layout.of(scene, elements)
-    problem, newton, stability = solvers.solvers_of(scene, layout, degree=_DEGREE)
-    newton.allow(1)
-    start, steps, counts = problem.numbers(), [], []
-    for _ in range(max(3, min(100, 20000 // elements))):
-        problem.put(start)
-        problem.set_load_factor(1e-6)
-        began = time.process_time()
-        newton.solve()
-        steps.append(time.process_time() - began)
-        began = time.process_time()
-        stability.count()
-        counts.append(time.process_time() - began)
-    memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
-    return (
-        problem.model.unknowns,
-        float(np.median(steps)),
-        float(np.median(counts)),
-        memory,
-        problem.tangent == "blocks",
-    )
+    with solvers.solvers_of(scene, layout, degree=_DEGREE) as (problem, newton, stability):
+        newton.allow(1)
+        start, steps, counts = problem.numbers(), [], []
+        for _ in range(max(3, min(100, 20000 // elements))):
+            problem.put(start)
+            problem.set_load_factor(1e-6)
+            began = time.process_time()
+            newton.solve()
+            steps.append(time.process_time() - began)
+            began = time.process_time()
+            stability.count()
+            counts.append(time.process_time() - began)
+        memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+        return (
+            problem.model.unknowns,
+            float(np.median(steps)),
+            float(np.median(counts)),
+            memory,
+            problem.tangent == "blocks",
+        )
 
 
 def exponent(x, y):

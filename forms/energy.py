@@ -1,32 +1,38 @@
-"""A step in time that conserves energy: rates of quadratic directors, tested with changes of q.
+"""An energy-conserving time step: directors quadratic in q, test functions that are changes of q.
 
 The directors R(q) of eq. (6) are homogeneous and quadratic in q, so that R(q_1) - R(q_0) is the derivative of R at the
-average q_m in the direction q_1 - q_0, exactly. Strains that are products of R, r', q and q' as they stand change over
-a step by what their averages resist, and rotational energy is that of the rates W of R, E = tr(I_R)/2 - I_R, by the
-trapezoidal rule. Tested with (r_1 - r_0, q_1 - q_0) the step is the balance of energy, to the last digit. |q| = 1 is
-held at the nodes, where tests are perpendicular to q_m: so it does no work.
+average q_m in the direction q_1 - q_0, exactly. The strains are products of R, r', q and q' without normalisation;
+their increments over a step are then linear in the increments of r and q with averaged coefficients. Rotational energy
+is that of the rates W of R, with Euler's tensor E = tr(I_R)/2 - I_R, by the trapezoidal rule. With the test function
+(r_1 - r_0, q_1 - q_0) the step is the balance of energy, exact to rounding. The constraint |q| = 1 is imposed at the
+nodes, where test functions are perpendicular to q_m, so that it does no work.
 """
 
 from collections import namedtuple
 
 import ufl
-from cosserat_fenicsx.forms.equilibrium import scaled
+from cosserat_fenicsx.forms import law
 from cosserat_fenicsx.forms.rotation import conjugate_product, directors
 
 #: r', q and q' of a configuration.
-Line = namedtuple("Line", "r_s q q_s")
-#: Tests: delta r and delta q, and their derivatives.
-Tests = namedtuple("Tests", "r q r_s q_s")
+Configuration = namedtuple("Configuration", "r_s q q_s")
+#: Test functions of the step: delta r and delta q, and their derivatives along the rod.
+Variation = namedtuple("Variation", "r q r_s q_s")
 
 
 def stretch_and_shear(line, section):
-    """v - v_R with the directors as they stand, material."""
+    """v - v_R with directors that are not normalised, material."""
     return section.R_R.T * (directors(line.q).T * line.r_s) - section.v_R
 
 
 def bending_and_torsion(line, section):
-    """u - u_R with q as it stands, material."""
+    """u - u_R with q not normalised, material."""
     return section.R_R.T * (2 * conjugate_product(line.q, line.q_s))
+
+
+def strains(line, section):
+    """(v - v_R, u - u_R) with directors and q not normalised, material."""
+    return stretch_and_shear(line, section), bending_and_torsion(line, section)
 
 
 def turned(q, dq):
@@ -49,7 +55,7 @@ def turned(q, dq):
 
 
 def euler_tensor(I_R):
-    """E = tr(I_R)/2 - I_R, by which rotational energy is (W E : W)/2."""
+    """E = tr(I_R)/2 - I_R; rotational energy per unit length is (W E : W)/2."""
     return ufl.tr(I_R) / 2 * ufl.Identity(3) - I_R
 
 
@@ -59,7 +65,7 @@ def kinetic_energy(r_t, W, inertia):
 
 
 def rate_work(rate, W_rate, q_m, inertia, test):
-    """Rates of r_t and W, or velocities that drag resists, tested: rho A rate . delta r + (W_rate E) : delta R."""
+    """Virtual work rho A rate . delta r + (W_rate E) : delta R of accelerations, or of velocities for drag."""
     turning = ufl.inner(W_rate * euler_tensor(inertia.I_R), turned(q_m, test.q))
     return inertia.mass * ufl.dot(rate, test.r) + turning
 
@@ -71,31 +77,23 @@ def angular_momentum(q, W, inertia):
 
 
 def stress_work(before, after, section, viscosity, h, test):
-    """Averaged stress on the change of strain that a test amounts to."""
+    """Virtual work of the averaged stress on the strain variation of the test function, per unit length."""
     r_m, q_m, q_ms = ((b + a) / 2 for b, a in zip(before, after, strict=True))
     mean = (directors(before.q) + directors(after.q)) / 2
     de = section.R_R.T * (mean.T * test.r_s + turned(q_m, test.q).T * r_m)
     du = section.R_R.T * (2 * (conjugate_product(test.q, q_ms) + conjugate_product(q_m, test.q_s)))
-    total = 0
-    for K, Kt, strain, change in (
-        (section.K, viscosity.Kt, stretch_and_shear, de),
-        (section.J, viscosity.Jt, bending_and_torsion, du),
-    ):
-        b, a = strain(before, section), strain(after, section)
-        total += ufl.dot(scaled(K, (b + a) / 2) + scaled(Kt, (a - b) / h), change)
-    return total
+    ends = list(zip(strains(before, section), strains(after, section), strict=True))
+    averages, rates = [(b + a) / 2 for b, a in ends], [(a - b) / h for b, a in ends]
+    n, m = law.damped(section.law, viscosity, averages, rates)
+    return ufl.dot(n, de) + ufl.dot(m, du)
 
 
 def strain_energy(line, section):
     """Per length."""
-    e, u = stretch_and_shear(line, section), bending_and_torsion(line, section)
-    return (ufl.dot(e, scaled(section.K, e)) + ufl.dot(u, scaled(section.J, u))) / 2
+    return law.energy(section.law, *strains(line, section))
 
 
 def viscous_loss(before, after, section, viscosity, h):
-    """What Kelvin-Voigt damping takes in a step, per length."""
-    total = 0
-    for Kt, strain in ((viscosity.Kt, stretch_and_shear), (viscosity.Jt, bending_and_torsion)):
-        change = strain(after, section) - strain(before, section)
-        total += ufl.dot(change, scaled(Kt, change)) / h
-    return total
+    """Energy that Kelvin-Voigt damping dissipates in a step, per unit length."""
+    ends = zip(strains(before, section), strains(after, section), strict=True)
+    return law.power(viscosity, *(a - b for b, a in ends)) / h

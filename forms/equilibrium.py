@@ -1,25 +1,25 @@
-"""Eq. (1) of the paper, static part, whatever carries the rotation: every rung is this on a `Motion` of its own.
+"""Eq. (1) of the paper, static part, for any parametrisation of the rotation: each model supplies its own `Motion`.
 
-Strong form: n' + f = 0, m' + r' x n + mu = 0, with the laws (2)-(3) for material components,
-n = T K (v - v_R), m = T J (u - u_R), T = R R_R. The contact force n may be a quantity of its own: a field of unknowns,
-values carried from step to step, or known from statics.
-`ds(a)` is the integral of a over the rod by p Gauss points an element.
+Strong form: n' + f = 0, m' + r' x n + mu = 0, with a law of forms/law.py for the material components, T^T n and T^T m
+with T = R R_R, of the strains v - v_R and u - u_R. The contact force n may be independent of the motion: a field of
+unknowns, values at the quadrature points updated from one Newton step to the next, or known from statics; m then
+follows from n and u - u_R. `ds(a)` is the integral of a over the rod with p Gauss points per element.
 """
 
 from collections import namedtuple
 
 import ufl
+from cosserat_fenicsx.forms import law
 
-#: What eq. (1) sees of a motion: r', the rotation R from the reference, and the axial vector of R^T R', R_R (u - u_R).
+#: The configuration as eq. (1) needs it: r', the rotation R from the reference, and the axial vector of R^T R', which
+#: is R_R (u - u_R).
 Motion = namedtuple("Motion", "r_s R curvature")
-#: Material stiffness K = (GA1, GA2, EA), its inverse, J = (EI1, EI2, GJ), the reference frame R_R = [d_1R d_2R d_3R]
-#: and the reference strain v_R = R_R^T r_R', which is (0, 0, 1) on the curve itself; vectors and a matrix of UFL.
-Section = namedtuple("Section", "K K_inv J R_R v_R")
-
-
-def scaled(D, a):
-    """diag(D) a for a diagonal given as a vector."""
-    return ufl.as_vector([D[i] * a[i] for i in range(3)])
+#: Virtual displacement phi_r and virtual rotation phi, both inertial, and their derivatives along the rod; phi_qa is
+#: the test function of |q| = 1 where the unknown is q. Derivatives that a term does not need may be None.
+VirtualMotion = namedtuple("VirtualMotion", "phi_r phi phi_r_s phi_s phi_qa", defaults=(None, None, 0))
+#: The law of forms/law.py, the reference frame R_R = [d_1R d_2R d_3R] and the reference strain v_R = R_R^T r_R', which
+#: is (0, 0, 1) on the exact curve; UFL matrix and vector.
+Section = namedtuple("Section", "law R_R v_R")
 
 
 def frame(motion, section):
@@ -37,24 +37,31 @@ def bending_and_torsion(motion, section):
     return section.R_R.T * motion.curvature
 
 
-def contact_force(motion, section):
-    """n = T K (v - v_R), eq. (2), inertial."""
-    return frame(motion, section) * scaled(section.K, stretch_and_shear(motion, section))
+def strains(motion, section):
+    """(v - v_R, u - u_R), material."""
+    return stretch_and_shear(motion, section), bending_and_torsion(motion, section)
 
 
-def contact_moment(motion, section):
-    """m = T J (u - u_R), eq. (3), inertial."""
-    return frame(motion, section) * scaled(section.J, bending_and_torsion(motion, section))
+def contact(motion, section):
+    """(n, m) by the law, inertial."""
+    T = frame(motion, section)
+    return tuple(T * a for a in law.stress(section.law, *strains(motion, section)))
+
+
+def contact_moment(n, motion, section):
+    """The contact moment m where the contact force is n, inertial."""
+    T = frame(motion, section)
+    return T * section.law.moment(T.T * n, bending_and_torsion(motion, section))
 
 
 def tangent_of_force(n, motion, section):
-    """The r' = T (v_R + K^-1 T^T n) that goes with a contact force n: the law (2) read backwards, inertial."""
+    """r' = T (v_R + e) with the strain e = v - v_R from the contact force n by the inverse law, inertial."""
     T = frame(motion, section)
-    return T * (section.v_R + scaled(section.K_inv, T.T * n))
+    return T * (section.v_R + section.law.strain(T.T * n, bending_and_torsion(motion, section)))
 
 
 def compatibility(n, motion, section):
-    """r' - T (v_R + K^-1 T^T n): zero where the contact force n and the motion agree."""
+    """r' less `tangent_of_force`: zero where the contact force n and the motion agree."""
     return motion.r_s - tangent_of_force(n, motion, section)
 
 
@@ -64,71 +71,67 @@ def balance(n, m, motion, test):
 
 
 def displacement(motion, section, test, ds):
-    """Eq. (1) to the letter, n from eq. (2)."""
-    return ds(balance(contact_force(motion, section), contact_moment(motion, section), motion, test))
+    """Eq. (1) with displacements and rotations as the only unknowns, n and m by the law."""
+    return ds(balance(*contact(motion, section), motion, test))
 
 
 def mixed(n, motion, section, test, phi_n, ds):
-    """Eq. (1) with the contact force n (inertial) as a field of its own: finite for infinite stiffness."""
-    m = contact_moment(motion, section)
+    """Eq. (1) with the contact force n (inertial) as an additional unknown field: regular for infinite stiffness."""
+    m = contact_moment(n, motion, section)
     return ds(balance(n, m, motion, test)) + ds(ufl.dot(compatibility(n, motion, section), phi_n))
 
 
 def carried_force_tangent(n_k, motion, section, test, ds, derivative):
-    """Tangent of `mixed` with n condensed at the quadrature points, where n_k is carried from step to step.
+    """Tangent of `mixed` with n condensed at the quadrature points; n_k is the value there at this Newton step.
 
     Mixed-integration-point Newton (Magisano, Leonetti & Garcea, CMAME 313 (2017) 986). `derivative(a)` is the
-    derivative of a form or an expression in the direction of the trial function.
+    derivative of a form or an expression in the direction of the trial function. With g = `compatibility` a Newton step
+    changes the strain behind n by g + dg, and n and m by the law; the residual is therefore that of `displacement` for
+    any n_k.
     """
-    frozen = ds(balance(n_k, contact_moment(motion, section), motion, test))
-    dn = _force_of(derivative(compatibility(n_k, motion, section)), motion, section)
-    return derivative(frozen) + ds(ufl.dot(dn, test.phi_r_s) - ufl.dot(ufl.cross(motion.r_s, dn), test.phi))
+    frozen = ds(balance(n_k, contact_moment(n_k, motion, section), motion, test))
+    dn, dm = _stress_of(derivative(compatibility(n_k, motion, section)), motion, section)
+    return derivative(frozen) + ds(balance(dn, dm, motion, test))
 
 
 def carried_force_update(n_k, motion, section, derivative):
-    """n_k+1 = n_k + C (g + dg[step]) with g = `compatibility` and C = T K T^T, at the motion before the step."""
+    """n_k+1 = n_k + T n(T^T (g + dg[step])), g = `compatibility`, n(e) the law, at the motion before the step."""
     g = compatibility(n_k, motion, section)
-    return n_k + _force_of(g + derivative(g), motion, section)
+    return n_k + _stress_of(g + derivative(g), motion, section)[0]
 
 
 def second_variation(n, motion, section, test, direction, stiffness=1):
     """The change of `balance` in a direction (phi_r_s, phi, phi_s) of small displacement and inertial rotation phi.
 
-    Symmetric in test and direction but for what a moment without potential leaves; K and K_inv need not be each
-    other's inverse. With d = phi: dR = d x R, d(curvature) = R^T d', so that dm = d x m + T J T^T d' and
-    dn = d x n + T K T^T (dr' - d x T (v_R + K^-1 T^T n)). `stiffness` multiplies K and J in the changes: with 0 what is
-    left is that of the contact force and moment alone, as they turn.
+    Symmetric in test and direction, except for a term of moments without potential; the stiffness of the law need not
+    be the inverse of its flexibility. With d = phi: dR = d x R and d(curvature) = R^T d', so that dn is d x n and dm is
+    d x m, plus the law's response to the strain changes T^T (dr' - d x `tangent_of_force`) and T^T d'. `stiffness`
+    multiplies this response; with 0 only the geometric stiffness of n and m remains.
     """
+    T = frame(motion, section)
     g = direction.phi_r_s - ufl.cross(direction.phi, tangent_of_force(n, motion, section))
-    dn = ufl.cross(direction.phi, n) + stiffness * _force_of(g, motion, section)
-    dm = turned_moment(motion, section, direction, stiffness)
+    strained, bent = (T * a for a in law.stress(section.law, T.T * g, T.T * direction.phi_s))
+    dn = ufl.cross(direction.phi, n) + stiffness * strained
+    dm = ufl.cross(direction.phi, contact_moment(n, motion, section)) + stiffness * bent
     change = ufl.cross(direction.phi_r_s, n) + ufl.cross(motion.r_s, dn)
     return ufl.dot(dn, test.phi_r_s) + ufl.dot(dm, test.phi_s) - ufl.dot(change, test.phi)
 
 
-def turned_tangent(n, motion, section, phi):
-    """The change of `tangent_of_force` under a small inertial rotation phi, n held."""
+def turned_tangent(n, motion, section, direction):
+    """The change of `tangent_of_force` under a small inertial rotation, n held."""
+    T, phi = frame(motion, section), direction.phi
+    relaxed = section.law.strain(T.T * ufl.cross(phi, n), -(T.T * direction.phi_s))
+    return ufl.cross(phi, tangent_of_force(n, motion, section)) - T * relaxed
+
+
+def turned_moment(n, motion, section, direction):
+    """The change of `contact_moment` under a small inertial rotation, n held."""
+    T, phi = frame(motion, section), direction.phi
+    bent = section.law.moment(-(T.T * ufl.cross(phi, n)), T.T * direction.phi_s)
+    return ufl.cross(phi, contact_moment(n, motion, section)) + T * bent
+
+
+def _stress_of(g, motion, section):
+    """The (n, m), inertial, of the strain T^T g without bending or torsion."""
     T = frame(motion, section)
-    turned_n = scaled(section.K_inv, T.T * ufl.cross(phi, n))
-    return ufl.cross(phi, tangent_of_force(n, motion, section)) - T * turned_n
-
-
-def turned_moment(motion, section, direction, stiffness=1):
-    """The change of `contact_moment` under a small inertial rotation; `stiffness` as of `second_variation`."""
-    T = frame(motion, section)
-    bent = T * scaled(section.J, T.T * direction.phi_s)
-    return ufl.cross(direction.phi, contact_moment(motion, section)) + stiffness * bent
-
-
-def load_variation(work, test, R, phi):
-    """The change of a load's virtual work `work(test, R)` under a small inertial rotation phi."""
-    turning = ufl.variable(R)
-    change = [ufl.cross(phi, R[:, j]) for j in range(3)]
-    slope = ufl.diff(work(test, turning), turning)
-    return sum(slope[i, j] * change[j][i] for i in range(3) for j in range(3))
-
-
-def _force_of(g, motion, section):
-    """C g, C = T K T^T."""
-    T = frame(motion, section)
-    return T * scaled(section.K, T.T * g)
+    return tuple(T * a for a in law.stress(section.law, T.T * g, ufl.as_vector([0, 0, 0])))

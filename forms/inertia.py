@@ -1,31 +1,24 @@
-"""The momentum terms of eq. (1), rho A r'' and the rate of kappa, and the step in time that conserves them.
+"""The inertia terms of eq. (1), and a time step that conserves linear and angular momentum.
 
-q turns the reference frame; what it turns is therefore written with reference components, along the inertial axes at
-rest: the angular velocity Om = 2 vec(conj(q) q_t) and the inertia of a section, I_R = R_R diag(Jrho) R_R^T.
+q rotates the reference configuration; vectors that rotate with a section therefore have components along the inertial
+axes before that rotation ("reference components"): the angular velocity Om = 2 vec(conj(q) q_t) and the inertia of a
+section, I_R = R_R diag(Jrho) R_R^T.
 
 A step goes from `before` to `after` in the time h, with the trapezoidal rule for the velocities of the nodes,
 r_t1 = 2 (r_1 - r_0)/h - r_t0 and the same for q. Stress is that of the averaged strains on the directors of the
-averaged configuration, `middle`. Tested with a x r_m and a constant a the step then gives the exact balances of linear and
-angular momentum, since the sum over the step of r_m x (r_t1 - r_t0) is that of (r x r_t)_1 - (r x r_t)_0, whatever the
-directors do.
+averaged configuration, `middle`. With the test functions a and a x r_m, a constant, the step then gives the exact
+balances of linear and angular momentum, since r_m x (r_t1 - r_t0) = (r x r_t)_1 - (r x r_t)_0 for any directors.
 """
 
 from collections import namedtuple
 
 import ufl
-from cosserat_fenicsx.forms.equilibrium import (
-    balance,
-    bending_and_torsion,
-    frame,
-    scaled,
-    stretch_and_shear,
-)
+from cosserat_fenicsx.forms import law
+from cosserat_fenicsx.forms.equilibrium import balance, frame, strains
 from cosserat_fenicsx.forms.rotation import conjugate_product, directors
 
 #: rho A, and I_R as a matrix, at the points where inertia is integrated.
 Inertia = namedtuple("Inertia", "mass I_R")
-#: Kelvin-Voigt stiffness: Kt = (GAt1, GAt2, EAt), Jt = (EIt1, EIt2, GJt), for the rates of the material strains.
-Viscosity = namedtuple("Viscosity", "Kt Jt")
 
 
 def angular_velocity(q, q_t):
@@ -39,7 +32,7 @@ def angular_momentum(q, q_t, inertia):
 
 
 def momentum(r_t, kappa, inertia, test):
-    """Momenta per length, tested: rho A r_t . phi_r + kappa . phi."""
+    """Momenta times test functions, per unit length: rho A r_t . phi_r + kappa . phi."""
     return inertia.mass * ufl.dot(r_t, test.phi_r) + ufl.dot(kappa, test.phi)
 
 
@@ -50,35 +43,24 @@ def kinetic_energy(r_t, Om, inertia):
 
 def strain_energy(motion, section):
     """Per length."""
-    e, u = stretch_and_shear(motion, section), bending_and_torsion(motion, section)
-    return (ufl.dot(e, scaled(section.K, e)) + ufl.dot(u, scaled(section.J, u))) / 2
+    return law.energy(section.law, *strains(motion, section))
 
 
 def averaged_stress(before, after, middle, section, viscosity, h, test):
-    """The stress terms of eq. (1) over a step: strains of both ends averaged, and their differences over h damped."""
-    T = frame(middle, section)
-    n, m = (
-        T * (scaled(K, (b + a) / 2) + scaled(Kt, (a - b) / h))
-        for K, Kt, b, a in (
-            (section.K, viscosity.Kt, stretch_and_shear(before, section), stretch_and_shear(after, section)),
-            (section.J, viscosity.Jt, bending_and_torsion(before, section), bending_and_torsion(after, section)),
-        )
-    )
-    return balance(n, m, middle, test)
+    """The stress terms of eq. (1) over a step: elastic for the average strains of both ends, viscous for their
+    differences over h."""
+    T, ends = frame(middle, section), list(zip(strains(before, section), strains(after, section), strict=True))
+    averages, rates = [(b + a) / 2 for b, a in ends], [(a - b) / h for b, a in ends]
+    return balance(*(T * a for a in law.damped(section.law, viscosity, averages, rates)), middle, test)
 
 
 def viscous_loss(before, after, section, viscosity, h):
-    """What Kelvin-Voigt damping takes in a step, per length."""
-    total = 0
-    for Kt, strain in ((viscosity.Kt, stretch_and_shear), (viscosity.Jt, bending_and_torsion)):
-        rate = (strain(after, section) - strain(before, section)) / h
-        total += h * ufl.dot(rate, scaled(Kt, rate))
-    return total
+    """Energy that Kelvin-Voigt damping dissipates in a step, per unit length."""
+    ends = zip(strains(before, section), strains(after, section), strict=True)
+    return h * law.power(viscosity, *((a - b) / h for b, a in ends))
 
 
 def contact(motion, section, viscosity, rate):
-    """(n, m), eqs. (2)-(3) with their viscous terms, inertial; `rate(a)` is the time derivative of an expression."""
-    T, e, u = frame(motion, section), stretch_and_shear(motion, section), bending_and_torsion(motion, section)
-    return T * (scaled(section.K, e) + scaled(viscosity.Kt, rate(e))), T * (
-        scaled(section.J, u) + scaled(viscosity.Jt, rate(u))
-    )
+    """(n, m) by the law and its viscous terms, inertial; `rate(a)` is the time derivative of an expression."""
+    T, both = frame(motion, section), strains(motion, section)
+    return tuple(T * a for a in law.damped(section.law, viscosity, both, [rate(a) for a in both]))

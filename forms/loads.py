@@ -1,50 +1,34 @@
-"""The virtual work of every load: one function a kind, work per unit of the load factor, the same on every rung.
+"""The virtual work of every load: one function per kind, shared by all models.
 
-The vectors come first, then the test functions and R, the rotation of the section from its reference: a material
-vector is given by its inertial components at rest, and R turns it. Where the contact force is known from statics there
-is no virtual displacement: phi_r is zero, and so is the work of a dead force.
-A point load is an integral over cells with one quadrature point on each cell end (`Points`): its coefficient is zero
-everywhere but at the loaded end of one cell, so that it counts once, in parallel and at branching points too.
+Arguments: the point where it acts (`point.Point`), the virtual motion (`equilibrium.VirtualMotion`), and the load's
+data. A vector that rotates with the section is given by its inertial components at rest, and R rotates it. The work is
+that of the whole load at a point, or per unit length of a distributed one, at load factor 1. In the determinate models
+there is no virtual displacement: phi_r is zero, and so is the work of a dead force.
 """
-
-from collections import namedtuple
 
 import ufl
 
-#: Virtual displacement phi_r and virtual rotation phi, both inertial.
-Test = namedtuple("Test", "phi_r phi")
 
-
-def force(F, test, R):
-    """Dead force F (inertial)."""
+def force(point, test, F):
+    """Dead force F (inertial), at a point or per unit of reference arc length."""
     return ufl.dot(F, test.phi_r)
 
 
-def moment(M, test, R):
-    """Dead moment M (inertial)."""
+def moment(point, test, M):
+    """Dead moment M (inertial), at a point or per unit of reference arc length."""
     return ufl.dot(M, test.phi)
 
 
-def eccentric_force(F, arm, test, R):
+def eccentric_force(point, test, F, arm):
     """Dead force F at the end of a rigid arm that turns with the section; `arm` is inertial, at rest."""
-    return ufl.dot(F, test.phi_r) + ufl.dot(ufl.cross(R * arm, F), test.phi)
+    return ufl.dot(F, test.phi_r) + ufl.dot(ufl.cross(point.R * arm, F), test.phi)
 
 
-def line_force(f, test, R):
-    """Dead force f (inertial) per unit of reference arc length."""
-    return ufl.dot(f, test.phi_r)
-
-
-def line_moment(mu, test, R):
-    """Dead moment mu (inertial) per unit of reference arc length."""
-    return ufl.dot(mu, test.phi)
-
-
-def follower_force(F, test, R):
+def follower_force(point, test, F):
     """Force that turns with the section; F is inertial, at rest."""
-    return ufl.dot(R * F, test.phi_r)
+    return ufl.dot(point.R * F, test.phi_r)
 
 
-def follower_moment(M, test, R):
+def follower_moment(point, test, M):
     """Moment that turns with the section; M is inertial, at rest."""
-    return ufl.dot(R * M, test.phi)
+    return ufl.dot(point.R * M, test.phi)

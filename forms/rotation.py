@@ -2,6 +2,9 @@
 
 import ufl
 
+# Where sin(angle/2)^2 is below this, the series of the rotation vector is exact to rounding.
+_SMALL = 1e-4
+
 
 def vector_part(q):
     """(q_b, q_c, q_d)."""
@@ -30,12 +33,37 @@ def rotation_matrix(q):
     return directors(q) / ufl.dot(q, q)
 
 
+def rotation_vector(q):
+    """The rotation vector of q, inertial, for angles between -2 pi and 2 pi: 2 acos(q_a/|q|) along (q_b, q_c, q_d)."""
+    v = vector_part(q)
+    square, size = ufl.dot(v, v), ufl.sqrt(ufl.dot(q, q))
+    sine = ufl.sqrt(ufl.max_value(square / size**2, _SMALL))
+    cosine = q[0] / size
+    # near the identity: asin(x)/x = 1 + x^2/6 + 3 x^4/40 + 15 x^6/336
+    x = square / size**2
+    series = 2 * (1 + x / 6 + 3 * x**2 / 40 + 15 * x**3 / 336)
+    closed = 2 * ufl.acos(ufl.max_value(ufl.min_value(cosine, 1 - _SMALL / 4), -1 + _SMALL / 4)) / sine
+    return ufl.conditional(ufl.And(ufl.lt(x, _SMALL), ufl.gt(cosine, 0)), series, closed) / size * v
+
+
 def curvature(q, q_s):
     """Curvature and twist u of eqs. (4)-(5), material: 2 vec(conj(q) q') times |q|^2."""
     return 2 * conjugate_product(q, q_s)
 
 
 def small_rotation(dq, q):
-    """The inertial rotation 2 vec(dq conj(q))/|q|^2 that a change dq of q amounts to."""
-    v, dv = vector_part(q), vector_part(dq)
-    return 2 * (q[0] * dv - dq[0] * v - ufl.cross(dv, v)) / ufl.dot(q, q)
+    """The small inertial rotation 2 vec(dq conj(q))/|q|^2 of a change dq of q."""
+    return 2 * _product_conjugate(dq, q) / ufl.dot(q, q)
+
+
+def small_rotation_s(dq, dq_s, q, q_s):
+    """The derivative of `small_rotation` along the rod."""
+    change = _product_conjugate(dq_s, q) + _product_conjugate(dq, q_s)
+    squared = ufl.dot(q, q)
+    return 2 * (change - 2 * ufl.dot(q, q_s) / squared * _product_conjugate(dq, q)) / squared
+
+
+def _product_conjugate(p, q):
+    """Vector part of p conj(q)."""
+    v, w = vector_part(p), vector_part(q)
+    return q[0] * v - p[0] * w - ufl.cross(v, w)

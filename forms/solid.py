@@ -1,4 +1,5 @@
-"""Three-dimensional elasticity of the St Venant-Kirchhoff solid, at finite displacements, on the reference configuration.
+"""Three-dimensional elasticity of the St Venant-Kirchhoff solid, at finite displacements, on the reference
+configuration.
 
 H = Grad(u), F = I + H, E = (F^T F - I)/2 (Green-Lagrange), S = lambda tr(E) I + 2 mu E (second Piola-Kirchhoff).
 """
@@ -12,7 +13,7 @@ def green_lagrange(H):
 
 
 def change(H, dH):
-    """The change of E with that of H: sym(F^T dH)."""
+    """The variation of E for a variation dH of H: sym(F^T dH)."""
     return ufl.sym(dH + H.T * dH)
 
 
@@ -27,9 +28,9 @@ def virtual_work(H, test, lame):
 
 
 def carried_stress(H, before, lame):
-    """The stress that a Newton step from `before` to H has predicted, S(before) + C : dE.
+    """The stress by linear extrapolation over the Newton step from `before` to H, S(before) + C : dE.
 
-    E is quadratic in H, so that this is the stress of E less half the square of the step.
+    E is quadratic in H, so that this is the stress of E minus half the square of the step.
     """
     step = H - before
     return stress(green_lagrange(H) - step.T * step / 2, lame)
@@ -38,8 +39,9 @@ def carried_stress(H, before, lame):
 def carried_stress_tangent(H, before, trial, test, lame):
     """Tangent of `virtual_work` with the carried stress in its geometric part: mixed-integration-point Newton.
 
-    Magisano, Leonetti & Garcea, Int. J. Numer. Methods Eng. 109 (2017) 1237: Newton's path is that of a formulation with the
-    stress as an unknown of its own, its limit is that of the displacements alone. With before = H it is Newton's method.
+    Magisano, Leonetti & Garcea, Int. J. Numer. Methods Eng. 109 (2017) 1237: the Newton iterates are those of a
+    formulation with the stress as an additional unknown, the converged solution is that of the displacement
+    formulation. With before = H it is Newton's method.
     """
     geometric = ufl.inner(carried_stress(H, before, lame), ufl.sym(trial.T * test))
     return ufl.inner(stress(change(H, trial), lame), change(H, test)) + geometric

@@ -1,9 +1,9 @@
-"""The truncated energy that many elements of the MCRE tend to, in a plane; a reconstruction.
+"""The truncated energy to which the MCRE converges under refinement, in a plane; a reconstruction.
 
-The MCRE (Liu, Cao, Rosing, Wang & Richardson, Int. J. Solids Struct. 44 (2007) 7785) keeps an element's energy to fourth
-order in displacements and rotations that are measured from the undeformed frame. Here: the rod's exact strains
-v_3 - 1 = (1 + u') cos(phi) + w' sin(phi) - 1 and v_1 = w' cos(phi) - (1 + u') sin(phi), squared and cut after that order.
-The result is not objective: a pure rotation by phi leaves the energy -EA phi^6/8 and more.
+The MCRE (Liu, Cao, Rosing, Wang & Richardson, Int. J. Solids Struct. 44 (2007) 7785) keeps an element's energy to
+fourth order in displacements and rotations that are measured from the undeformed frame. Here: the rod's exact strains
+v_3 - 1 = (1 + u') cos(phi) + w' sin(phi) - 1 and v_1 = w' cos(phi) - (1 + u') sin(phi), squared and truncated after
+that order. The result is not objective: a rigid rotation by phi has the energy -EA phi^6/8 and terms of higher order.
 
 u is the axial, w the transverse displacement, phi the rotation; _s is d/ds. Material stiffness EA, GA, EI.
 """

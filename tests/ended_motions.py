@@ -58,7 +58,7 @@ def assert_same(one, other):
     one, other = rows(one), rows(other)
     assert len(one) == len(other)
     for name in one.dtype.names:
-        assert (one[name] == other[name]).all(), name
+        assert np.array_equal(one[name], other[name], equal_nan=one[name].dtype.kind == "f"), name
 
 
 def part_of(case, folder, monkeypatch, step=25, apart=0.02):

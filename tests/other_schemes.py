@@ -3,7 +3,7 @@
 Both have the velocities, the momenta and the constraint of the momentum scheme, and a stress of their own.
 """
 
-from cosserat_fenicsx.forms.equilibrium import balance, contact_force, contact_moment
+from cosserat_fenicsx.forms.equilibrium import balance, contact
 
 from cosserat_fenicsx.dynamics import solvers
 from cosserat_fenicsx.dynamics.steppers.momentum import Momentum
@@ -13,7 +13,7 @@ from cosserat_fenicsx.models.moving_forms import SpatialStep, compile_momentum
 
 def at(motion, section, test):
     """The stress terms of eq. (1) at a configuration."""
-    return balance(contact_force(motion, section), contact_moment(motion, section), motion, test)
+    return balance(*contact(motion, section), motion, test)
 
 
 def midpoint(before, after, middle, section, viscosity, h, test):

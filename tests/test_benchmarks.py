@@ -112,17 +112,17 @@ def test_order_of_loads_does_not_matter():
     rod = cf.Rod(cf.Line((0, 0, 0), (0, 0, 1.0)), cf.Stiffness((1e3, 2e3), 3e3, (1.0, 2.0), 0.8))
     force, moment = cf.Force(rod.end, (0.7, 1.0, -0.8)), cf.Moment(rod.end, (0.5, -0.4, 0.6))
     together = cf.solve(held(rod, force, moment), [1.0], elements=6)
-    problem, newton, _ = solvers.solvers_of(held(rod, force, moment), together.layout)
-    newton.allow(10)
-    for first in (force, moment):
-        alone = cf.solve(held(rod, first), [1.0], elements=6)
-        problem.load(held(rod, force, moment), together.layout)
-        problem.set_load_factor(1.0)
-        (rq,), (n,) = on_mesh(alone, together.layout)
-        problem.begin_at(problem.model.unknowns_of(rq), n, alone[0].reactions)
-        assert newton.solve().converged
-        rq, _ = problem.model.snapshot()
-        np.testing.assert_allclose(rq, together[0].rq, atol=1e-12)
+    with solvers.solvers_of(held(rod, force, moment), together.layout) as (problem, newton, _):
+        newton.allow(10)
+        for first in (force, moment):
+            alone = cf.solve(held(rod, first), [1.0], elements=6)
+            problem.load(held(rod, force, moment), together.layout)
+            problem.set_load_factor(1.0)
+            (rq,), (n,) = on_mesh(alone, together.layout)
+            problem.begin_at(problem.model.unknowns_of(rq), n, alone[0].reactions)
+            assert newton.solve().converged
+            rq, _ = problem.model.snapshot()
+            np.testing.assert_allclose(rq, together[0].rq, atol=1e-12)
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,7 @@ import cosserat_fenicsx as cf
 from cosserat_fenicsx import interrupts
 from cosserat_fenicsx.cli import explain_motion
 from cosserat_fenicsx.cli import main as cli
-from cosserat_fenicsx.dynamics.standing import before
+from cosserat_fenicsx.dynamics.initial_equilibrium import before
 from cosserat_fenicsx.results import motion_tables
 from cosserat_fenicsx.scene.signals import Triangle
 
@@ -109,11 +109,11 @@ def test_a_scene_behind_animate(capsys):
 
 
 WORDS = {
-    "flying_spaghetti_2d": ("Motion: 15 s. Steps of 0.02 s, halved where one fails. Every step is saved.", "by Step, steps land on t = 0, 2.5 s",
+    "flying_spaghetti_2d": ("Motion: 15 s. Steps of 0.02 s, halved where one fails. Every step is saved.", "by Step, steps end at t = 0, 2.5 s",
                             "0 support(s): none", "Start: the reference, free of stress, at rest.", "75 unknowns", "Model: planar"),
-    "damped_column": ("Kelvin-Voigt damping, 0.03 s times", "equilibrium at load factor 1 (Force at column.end, constant), at rest; then nothing of the loads remains"),
+    "damped_column": ("Kelvin-Voigt damping, 0.03 s times", "equilibrium at load factor 1 (Force at column.end, constant), at rest; then the loads are removed"),
     "released_column": ("(Force at column.end, Moment at column.end, as they are just before t = 0)", "then the load factor is 1.1"),
-    "whirling_shaft": ("a drag of 10 1/s times the momentum", "rotation by RunUp, steps land on t = 0, 6 s", "Model: spatial"),
+    "whirling_shaft": ("a drag of 10 1/s times the momentum", "rotation by RunUp, steps end at t = 0, 6 s", "Model: spatial"),
 }  # fmt: skip
 
 
@@ -139,7 +139,7 @@ def test_explained_is_what_is_done(cosserat):
     [
         (("run", FLIGHT, "--load-factors", "0:1"), "--load-factors is for an equilibrium path"),
         (("run", DEMO, "--dt", "0.1"), "--dt is for a motion, and this scene is an equilibrium path"),
-        (("run", FLIGHT, "--static"), "depends on time, and statics knows none: expected a vector, or a motion"),
+        (("run", FLIGHT, "--static"), "depends on time, which a static analysis excludes: expected a vector, or a motion"),
         (("run", FLIGHT, "--animate"), "expected a motion, and -o DIR"),
         (("run", FLIGHT, "--animate", "a.avi", "-o", "{tmp}"), "expected a name that ends in .gif or .mp4"),
         (("run", FLIGHT, "--animate", "b/a.gif", "-o", "{tmp}"), "expected a name without folders"),

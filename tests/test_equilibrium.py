@@ -1,12 +1,14 @@
 """Eq. (1) and its rungs as expressions, point by point at random states: against formulas by hand, finite differences,
 and the planar against the spatial."""
 
-from functools import partial
-
 import numpy as np
 import pytest
 import ufl
 from cosserat_fenicsx.forms import determinate, equilibrium, loads, planar, spatial
+from cosserat_fenicsx.forms.equilibrium import VirtualMotion
+from cosserat_fenicsx.forms.law import DiagonalLaw
+from cosserat_fenicsx.forms.point import variation
+from cosserat_fenicsx.forms.rotation import rotation_vector
 
 pytestmark = pytest.mark.serial
 VECTOR = ufl.as_vector
@@ -39,16 +41,15 @@ class Point:
         self.K, self.J = random.uniform(1, 3, (2, 3))
         R_R = quaternion_matrix(random.normal(size=4))
         self.v_R = np.array([0.1, -0.2, 1.1])
-        self.section = equilibrium.Section(
-            *map(VECTOR, (self.K, 1 / self.K, self.J)), ufl.as_matrix(R_R), VECTOR(self.v_R)
-        )
+        self.law = DiagonalLaw(*map(VECTOR, (self.K, 1 / self.K, self.J)))
+        self.section = equilibrium.Section(self.law, ufl.as_matrix(R_R), VECTOR(self.v_R))
         self.R_R = R_R
         self.r_s, self.q, self.q_s = random.normal(size=3), random.normal(size=4), random.normal(size=4)
         self.q /= np.linalg.norm(self.q)
         self.q_s -= (self.q_s @ self.q) * self.q
-        self.test = spatial.Tests(*map(VECTOR, random.normal(size=(2, 3))), 0, *map(VECTOR, random.normal(size=(2, 3))))
+        self.test = VirtualMotion(*map(VECTOR, random.normal(size=(4, 3))))
         self.d = random.normal(size=(3, 3))  # dr', the rotation, its derivative
-        self.direction = spatial.Tests(VECTOR([0] * 3), VECTOR(self.d[1]), 0, VECTOR(self.d[0]), VECTOR(self.d[2]))
+        self.direction = VirtualMotion(VECTOR(self.d[0]), VECTOR(self.d[1]), VECTOR(self.d[0]), VECTOR(self.d[2]))
 
     def motion(self, h=0.0):
         """The motion at h along the direction."""
@@ -60,6 +61,13 @@ class Point:
             lift = np.array([-theta_s @ self.q[1:], *(self.q[0] * theta_s + np.cross(theta_s, self.q[1:]))]) / 2
             q_s = turned(self.q_s, h * theta) + h * lift
         return spatial.motion_of(VECTOR(self.r_s + h * dr_s), VECTOR(q), VECTOR(q_s), VECTOR(q))
+
+    def point(self, h=0.0):
+        """What acts on the rod sees of it, at h along the direction; r changes as r' does."""
+        q = turned(self.q, h * self.d[1]) if h else self.q
+        r, r_s = self.r_s - 0.4 + h * self.d[0], self.r_s + h * self.d[0]
+        U, U_s = (VECTOR([*a, *q]) for a in (r, r_s))
+        return spatial.point_of(U, U_s, rest=None, frame=None)
 
 
 def central(f, h=1e-5):
@@ -76,8 +84,8 @@ def test_laws_and_balance_are_eqs_1_to_5(seed):
     u = p.R_R.T @ (2 * (q[0] * q_s[1:] - q_s[0] * q[1:] - np.cross(q[1:], q_s[1:])))
     n, m = T @ (p.K * (T.T @ p.r_s - p.v_R)), T @ (p.J * u)
     np.testing.assert_allclose(value(motion.R), R, atol=1e-14)
-    np.testing.assert_allclose(value(equilibrium.contact_force(motion, p.section)), n, rtol=1e-13)
-    np.testing.assert_allclose(value(equilibrium.contact_moment(motion, p.section)), m, rtol=1e-13)
+    for found, expected in zip(equilibrium.contact(motion, p.section), (n, m), strict=True):
+        np.testing.assert_allclose(value(found), expected, rtol=1e-13)
     phi, phi_r_s, phi_s = (value(a) for a in (p.test.phi, p.test.phi_r_s, p.test.phi_s))
     expected = n @ phi_r_s + m @ phi_s - np.cross(p.r_s, n) @ phi
     found = equilibrium.displacement(motion, p.section, p.test, lambda a: a)
@@ -87,7 +95,7 @@ def test_laws_and_balance_are_eqs_1_to_5(seed):
 @pytest.mark.parametrize("seed", range(3))
 def test_the_law_read_backwards(seed):
     p = Point(seed)
-    n = equilibrium.contact_force(p.motion(), p.section)
+    n, _ = equilibrium.contact(p.motion(), p.section)
     np.testing.assert_allclose(value(equilibrium.tangent_of_force(n, p.motion(), p.section)), p.r_s, rtol=1e-13)
     np.testing.assert_allclose(value(equilibrium.compatibility(n, p.motion(), p.section)), 0, atol=1e-13)
 
@@ -97,7 +105,7 @@ def test_second_variation_is_the_change_of_the_balance(seed):
     """Where n agrees with the motion; with n known, that of the moments."""
     p = Point(seed)
     expected = central(lambda h: value(equilibrium.displacement(p.motion(h), p.section, p.test, lambda a: a)))
-    n = equilibrium.contact_force(p.motion(), p.section)
+    n, _ = equilibrium.contact(p.motion(), p.section)
     found = value(equilibrium.second_variation(n, p.motion(), p.section, p.test, p.direction))
     np.testing.assert_allclose(found, expected, rtol=1e-8)
     known = VECTOR([0.3, -0.7, 0.5])
@@ -110,17 +118,37 @@ def test_second_variation_is_the_change_of_the_balance(seed):
 def test_loads_that_turn():
     p = Point(4)
     F, arm = VECTOR([0.3, -0.2, 0.9]), VECTOR([0.4, 0.1, -0.6])
-    dead = (loads.force, loads.moment, loads.line_force, loads.line_moment)
-    kinds = [partial(kind, F) for kind in (*dead, loads.follower_force, loads.follower_moment)]
-    for work in (*kinds, partial(loads.eccentric_force, F, arm)):
-        expected = central(lambda h, work=work: value(work(p.test, p.motion(h).R)))
-        found = value(equilibrium.load_variation(work, p.test, p.motion().R, p.direction.phi))
-        np.testing.assert_allclose(found, expected, rtol=1e-8, atol=1e-10)
+    kinds = [(kind, F) for kind in (loads.force, loads.moment, loads.follower_force, loads.follower_moment)]
+    for kind, *numbers in (*kinds, (loads.eccentric_force, F, arm)):
+
+        def work(point, test, kind=kind, numbers=numbers):
+            return kind(point, test, *numbers)
+
+        expected = central(lambda h, work=work: value(work(p.point(h), p.test)))
+        np.testing.assert_allclose(
+            value(variation(work, p.point(), p.test, p.direction)), expected, rtol=1e-8, atol=1e-10
+        )
     turn = quaternion_matrix(p.q)
     expected = np.cross(turn @ value(arm), value(F)) @ value(p.test.phi) + value(F) @ value(p.test.phi_r)
-    np.testing.assert_allclose(value(loads.eccentric_force(F, arm, p.test, p.motion().R)), expected, rtol=1e-13)
+    np.testing.assert_allclose(value(loads.eccentric_force(p.point(), p.test, F, arm)), expected, rtol=1e-13)
     for kind, phi in ((loads.follower_force, p.test.phi_r), (loads.follower_moment, p.test.phi)):
-        np.testing.assert_allclose(value(kind(F, p.test, p.motion().R)), turn @ value(F) @ value(phi), rtol=1e-13)
+        np.testing.assert_allclose(value(kind(p.point(), p.test, F)), turn @ value(F) @ value(phi), rtol=1e-13)
+
+
+def test_what_sees_position_and_rotation_changes_with_both():
+    """The rotation vector, and a force that depends on r and r', in the direction of a small displacement and rotation."""
+    p, stiff = Point(5), VECTOR([0.7, -0.4, 0.2])
+
+    def work(point, test):
+        pull = ufl.dot(point.r, point.r) * ufl.cross(point.r_s, stiff)
+        return ufl.dot(pull, test.phi_r) + ufl.dot(point.theta, test.phi)
+
+    expected = central(lambda h: value(work(p.point(h), p.test)))
+    np.testing.assert_allclose(value(variation(work, p.point(), p.test, p.direction)), expected, rtol=1e-7)
+    for angle in (0.0, 1e-9, 0.05, 3.0, 4.5, 6.2):
+        axis = np.array([0.6, 0.0, 0.8])
+        q = VECTOR([np.cos(angle / 2), *(np.sin(angle / 2) * axis)])
+        np.testing.assert_allclose(value(rotation_vector(q)), angle * axis, rtol=1e-9, atol=1e-15)
 
 
 class PlanePoint:
@@ -131,7 +159,9 @@ class PlanePoint:
         self.K, self.J, angle = random.uniform(1, 3, 3), random.uniform(1, 3, 3), random.uniform(0, 6)
         self.t = np.array([np.cos(angle), np.sin(angle)])
         self.v_R = np.array([0.05, 1.1])
-        self.section = planar.section_of(*map(VECTOR, (self.K, 1 / self.K, self.J, self.t, self.v_R)))
+        self.section = planar.section_of(
+            DiagonalLaw(*map(VECTOR, (self.K, 1 / self.K, self.J))), VECTOR(self.t), VECTOR(self.v_R)
+        )
         self.r_s, self.theta, self.theta_s = random.normal(size=2), random.normal(), random.normal()
         self.motion = planar.motion_of(VECTOR(self.r_s), ufl.as_ufl(self.theta), self.theta_s)
         c, s = np.cos(self.theta / 2), np.sin(self.theta / 2)

@@ -74,17 +74,17 @@ def test_a_smooth_rod_does_not_hide_another():
 
 
 def test_an_interrupted_search_hands_over_what_is_complete(monkeypatch):
-    from cosserat_fenicsx.statics import tracing
+    from cosserat_fenicsx.statics.path import recorder
 
     def stop():
         raise KeyboardInterrupt
 
     _, scene = column()
-    corrected = tracing.Tracing.corrected
+    corrected = recorder.Tracing.corrected
     monkeypatch.setattr(
-        tracing.Tracing,
+        recorder.Tracing,
         "corrected",
-        lambda *arguments: monkeypatch.setattr(tracing, "obey", stop) or corrected(*arguments),
+        lambda *arguments: monkeypatch.setattr(recorder, "obey", stop) or corrected(*arguments),
     )
     with pytest.raises(cf.Interrupted) as stopped:
         cf.solve(scene, np.linspace(0.1, 0.9, 8).tolist())

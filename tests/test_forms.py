@@ -1,13 +1,17 @@
 """The forms themselves: Taylor test of every tangent, balance under rigid motions, and the second variation."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from conftest import column
 from mpi4py import MPI
 
 import cosserat_fenicsx as cf
+from cosserat_fenicsx.models.formulations import DISPLACEMENT, MIXED, MULTIPLIER
+from cosserat_fenicsx.models.formulations.contact_force import OF_MOTION
 from cosserat_fenicsx.models.rodmesh import Layout
-from cosserat_fenicsx.models.shape import Shape
+from cosserat_fenicsx.models.signature import Signature
 from cosserat_fenicsx.models.spatial import SpatialModel
 from cosserat_fenicsx.statics.problem import Problem
 from cosserat_fenicsx.statics.stability import NegativeModes
@@ -15,16 +19,19 @@ from cosserat_fenicsx.statics.stability import NegativeModes
 pytestmark = pytest.mark.serial
 
 
-def problem_of(variant, *, arm=False):
+#: The multiplier formulation with n from the motion: what the carried n goes over to in equilibrium.
+GALERKIN = replace(MULTIPLIER, force=OF_MOTION)
+
+
+def problem_of(formulation, *, arm=False, rigid=False):
     k = column(arm=arm)[0].stiffness
     section = None
-    if variant == "field":
+    if rigid:
         section = cf.Stiffness(shear=(np.inf, np.inf), axial=np.inf, bending=k.bending, torsion=k.torsion)
     rod, scene = column(arm=arm, diameter=2.0, section=section)  # thick: the tangent's parts are of like size
     layout = Layout.of(scene, 3)
-    formulation = "mixed" if variant in ("field", "condensed") else variant
-    shape = Shape.of(scene, layout, formulation=formulation, degree=2)
-    problem = Problem(SpatialModel(MPI.COMM_SELF, shape))
+    signature = Signature.of(scene, layout, formulation=formulation, degree=2)
+    problem = Problem(SpatialModel(MPI.COMM_SELF, signature))
     problem.load(scene, layout)
     return problem
 
@@ -43,10 +50,12 @@ def tangent(problem, x):
 
 
 @pytest.mark.parametrize("arm", [False, True])
-@pytest.mark.parametrize("variant", ["displacement", "field", "multiplier"])
-def test_tangent_is_the_derivative_of_the_residual(variant, arm):
+@pytest.mark.parametrize(
+    ("formulation", "rigid"), [(DISPLACEMENT, False), (GALERKIN, False), (MIXED, True), (MULTIPLIER, True)]
+)
+def test_tangent_is_the_derivative_of_the_residual(formulation, rigid, arm):
     """Taylor: |F(x + h d) - F(x) - h J d| falls with h^2."""
-    problem = problem_of(variant, arm=arm)
+    problem = problem_of(formulation, arm=arm, rigid=rigid)
     random = np.random.default_rng(0)
     x = problem.x.array.copy()
     x += 0.1 * random.normal(size=len(x))
@@ -62,19 +71,20 @@ def test_tangent_is_the_derivative_of_the_residual(variant, arm):
     np.testing.assert_allclose(rates, 2, atol=0.05)
 
 
-def test_condensed_tangent_meets_the_displacement_tangent_at_equilibrium():
+@pytest.mark.parametrize(("carried", "of_motion"), [(MIXED, DISPLACEMENT), (MULTIPLIER, GALERKIN)])
+def test_condensed_tangent_meets_the_displacement_tangent_at_equilibrium(carried, of_motion):
     """Where the carried n agrees with the motion, the mixed-integration-point tangent is the derivative."""
     rod, scene = column()
     path = cf.solve(scene, [0.9], model="spatial", elements=3, degree=2, comm=MPI.COMM_SELF)
     problems = []
-    for formulation in ("mixed", "displacement"):
+    for formulation in (carried, of_motion):
         layout = Layout.of(scene, 3)
-        problem = Problem(SpatialModel(MPI.COMM_SELF, Shape.of(scene, layout, formulation=formulation, degree=2)))
+        problem = Problem(SpatialModel(MPI.COMM_SELF, Signature.of(scene, layout, formulation=formulation, degree=2)))
         problem.load(scene, layout)
         problems.append(problem)
     mixed, plain = problems
     model = mixed.model
-    model.state.x.array[model._nodal] = path._records[0].rq[model._slots]
+    model.state.x.array[model._nodal[:, :7]] = path._records[0].rq[model._slots]
     problem.numbering.from_local(model.state.x.array, problem.x)
     x = problem.x.array.copy()
     for problem in problems:
@@ -89,9 +99,9 @@ def test_condensed_tangent_meets_the_displacement_tangent_at_equilibrium():
     assert A.norm() < 1e-9 * B.norm()
 
 
-@pytest.mark.parametrize("variant", ["condensed", "displacement", "multiplier"])
-def test_a_rigid_motion_strains_nothing(variant):
-    problem = problem_of(variant)
+@pytest.mark.parametrize("formulation", [MIXED, DISPLACEMENT, MULTIPLIER])
+def test_a_rigid_motion_strains_nothing(formulation):
+    problem = problem_of(formulation)
     model = problem.model
     a = np.array([0.3, -0.5, 0.7, 0.4])
     a /= np.linalg.norm(a)
@@ -100,7 +110,7 @@ def test_a_rigid_motion_strains_nothing(variant):
     r = x[model._nodal[:, :3]]
     turned = r + 2 * np.cross(v, np.cross(v, r) + w * r)
     x[model._nodal[:, :3]] = turned + [1.0, 2.0, 3.0]
-    x[model._nodal[:, 3:]] = a
+    x[model._nodal[:, 3:7]] = a
     problem.numbering.from_local(x, problem.x)
     assert np.abs(residual(problem, problem.x.array.copy())).max() < model.round_off
 
@@ -108,12 +118,12 @@ def test_a_rigid_motion_strains_nothing(variant):
 def test_second_variation_counts_what_an_eigensolver_counts():
     rod, scene = column(eccentricity=0.0)
     layout = Layout.of(scene, 4)
-    model = SpatialModel(MPI.COMM_SELF, Shape.of(scene, layout, formulation="mixed", degree=2))
+    model = SpatialModel(MPI.COMM_SELF, Signature.of(scene, layout, formulation="mixed", degree=2))
     problem = Problem(model)
     stability = NegativeModes(problem)
     problem.load(scene, layout)
     stability.load()
-    from cosserat_fenicsx.statics.snes import Newton
+    from cosserat_fenicsx.algebra.newton import Newton
 
     newton = Newton(problem)
     newton.allow(10)

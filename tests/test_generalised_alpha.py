@@ -205,7 +205,7 @@ def test_refusals():
     rod = cf.Rod(cf.Line((0, 0, 0), (2, 0, 0)), STIFF)
     scene = cf.Scene([rod])
     for words, settings in {
-        "simulate.rho_inf = 0.8: expected None, for scheme = 'momentum'": {"rho_inf": 0.8},
+        "simulate.rho_inf = 0.8: expected None, since scheme = 'momentum' has no such parameter": {"rho_inf": 0.8},
         "simulate.rho_inf = 1.2: expected a number from 0 to 1": {"scheme": SCHEME, "rho_inf": 1.2},
         "simulate.rho_inf = -0.1": {"scheme": SCHEME, "rho_inf": -0.1},
         "simulate.rho_inf = '1'": {"scheme": SCHEME, "rho_inf": "1"},

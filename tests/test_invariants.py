@@ -114,12 +114,12 @@ def test_the_way_does_not_matter():
 
 def test_one_problem_serves_every_scene_of_its_shape():
     """Numbers of a first scene must not leak into a second, nor compilation be repeated for it."""
-    from cosserat_fenicsx.statics.solvers import _kept
+    from cosserat_fenicsx.algebra.pool import PROBLEMS
 
     first, scene = column()
     before = cf.solve(scene, [0.9], elements=8).displacement(first.end)
-    misses = _kept.cache_info().misses
+    made = PROBLEMS.made
     other_rod, other = column(length=31.0, diameter=0.3, eccentricity=0.5)
     cf.solve(other, [0.3, 1.2], elements=8)
     np.testing.assert_array_equal(cf.solve(scene, [0.9], elements=8).displacement(first.end), before)
-    assert _kept.cache_info().misses == misses
+    assert PROBLEMS.made == made

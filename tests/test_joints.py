@@ -1,5 +1,7 @@
 """Rods joined: a cut rod is the whole one, forces and moments balance at every joint, releases release."""
 
+from dataclasses import dataclass
+
 import numpy as np
 import pytest
 import ufl
@@ -7,6 +9,7 @@ from mpi4py import MPI
 from scipy.spatial.transform import Rotation
 
 import cosserat_fenicsx as cf
+from cosserat_fenicsx.scene.action import vector
 
 SECTION = cf.Stiffness(shear=(3e3, 5e3), axial=8e3, bending=(1.0, 2.5), torsion=0.7, mass=1.0)
 FORCE = np.array([0.5, 0.9, -0.7])
@@ -183,26 +186,21 @@ force = [0.2, 0, 0]
         file.write_text(file.read_text().replace(new, old))
 
 
-class Pressure:
+@dataclass(frozen=True)
+class Pressure(cf.LineAction):
     """A load of a new kind, and all that it takes: a force along a rod that stays across it."""
 
-    station, unit, follows = None, "force per length", True
+    rod: cf.Rod
+    pressure: float
 
-    def __init__(self, rod, pressure):
-        self.rod, self.pressure = rod, pressure
+    follows = True
 
     @staticmethod
-    def work(f, test, R):
-        return ufl.dot(R * f, test.phi_r)
+    def work(point, test, f):
+        return ufl.dot(point.R * f, test.phi_r)
 
-    def acts_on(self, rod):
-        return rod is self.rod
-
-    def check_rod(self, rod):
-        pass
-
-    def density(self, rod, s):
-        return self.pressure * rod.curve.frame(s)[:, :, 1]
+    def data(self, rod, s):
+        return (vector(self.pressure * rod.curve.frame(s)[:, :, 1], "N/m"),)
 
 
 def test_a_new_kind_of_load_takes_no_change_elsewhere():

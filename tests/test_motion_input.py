@@ -62,7 +62,7 @@ REFUSED = {
     "velocity of NaN": (lambda: moving(cf.InitialVelocity(ROD, lambda s: (0, 0, 1 / s if s else math.nan))), "at s = 0 m"),
     "about with a function": (lambda: cf.InitialVelocity(ROD, lambda s: (0, 0, 0), about=(0, 0, 0)), "InitialVelocity.about"),
     "a support that jumps": (lambda: cf.simulate(cf.Scene([ROD], [cf.Prescribed(ROD.end, (0, 0, 1))]), 1.0), "does not hold at the time 0"),
-    "statics in time": (lambda: cf.solve(LATE_NAN, [1.0]), "the Force depends on time, and statics knows none"),
+    "statics in time": (lambda: cf.solve(LATE_NAN, [1.0]), "the Force depends on time, which a static analysis excludes"),
     "a step longer than the motion": (lambda: cf.simulate(FREE, 1.0, dt=50.0), "simulate.dt = 50.0: expected at most the duration, 1 s"),
     "a number for a vector": (lambda: cf.Sine(5.0, 2.0), "Sine.value = 5.0: expected a vector"),
     "no end of steps": (lambda: cf.simulate(FREE, 1.0, dt=1e-18), "simulate: duration = 1 s and dt = 1e-18 s: expected at most 1e+09 steps"),
@@ -178,9 +178,9 @@ def test_steps_land_on_jumps_and_on_saved_times():
 
 
 def test_a_motion_that_is_lost_keeps_what_it_had(monkeypatch):
-    from cosserat_fenicsx.dynamics import motion
+    from cosserat_fenicsx.algebra.newton import Solved
+    from cosserat_fenicsx.dynamics import time_loop
     from cosserat_fenicsx.dynamics.steppers.momentum import Momentum
-    from cosserat_fenicsx.statics.snes import Solved
 
     whole = Momentum.step
 
@@ -188,7 +188,7 @@ def test_a_motion_that_is_lost_keeps_what_it_had(monkeypatch):
         return whole(self, t, h) if t < 0.45 else Solved(False, 1, "Newton's iterations ran out")
 
     monkeypatch.setattr(Momentum, "step", step)
-    monkeypatch.setattr(motion, "_HALVINGS", 2)
+    monkeypatch.setattr(time_loop, "_HALVINGS", 2)
     with pytest.raises(cf.NotConverged, match="lost at t = 0.5 s, where a step of 0.025 s still fails") as lost:
         cf.simulate(FREE, 1.0, dt=0.1)
     np.testing.assert_allclose(lost.value.path.times, [0, 0.1, 0.2, 0.3, 0.4, 0.5])

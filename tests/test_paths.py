@@ -231,7 +231,7 @@ def test_step_control_bounds():
     with pytest.raises(cf.SceneError, match="StepControl.most_steps = 0"):
         cf.StepControl(most_steps=0)
     _, scene, _ = torsion_pendulum()
-    with pytest.raises(cf.NotConverged, match="3 steps along the path did not lead there"):
+    with pytest.raises(cf.NotConverged, match="3 steps of arc length did not reach it"):
         cf.solve(scene, (0.0, 20.0), elements=4, control="arc", steps=cf.StepControl(most_steps=3))
     path = cf.solve(scene, (0.0, 20.0), elements=4, control="arc", steps=cf.StepControl(largest=1.0))
     assert np.abs(np.diff(path.load_factors)).max() <= 1.0

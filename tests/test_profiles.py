@@ -22,7 +22,7 @@ def row(section, material=STEEL):
 
 def test_one_section():
     rod = cf.Rod(LINE, THICK, STEEL)
-    K, J, mass, _ = rod.stiffness_at(np.array([0.0, 3.0, 10.0]))
+    K, J, mass, *_ = rod.stiffness_at(np.array([0.0, 3.0, 10.0]))
     for i in range(3):
         assert (K[i].tolist(), J[i].tolist(), mass[i]) == row(THICK)
     assert rod.breaks == () and rod.profile.constant and rod.section_at(4.0) is THICK
@@ -39,7 +39,7 @@ def test_pieces(end):
     for side, expected in (("right", [THICK, THIN, THIN, THICK, THICK]), ("left", [THICK, THICK, THIN, THIN, THICK])):
         s = np.array([0.0, 4.0, 5.0, 7.0, 10.0])
         for shift in (0, -1e-14, 1e-14):  # on a jump, but for rounding
-            K, J, mass, _ = rod.stiffness_at(s + shift, side=side)
+            K, J, mass, *_ = rod.stiffness_at(s + shift, side=side)
             for i, section in enumerate(expected):
                 assert (K[i].tolist(), J[i].tolist(), mass[i]) == row(section)
                 assert rod.section_at(s[i] + shift, side=side) is section
@@ -54,7 +54,7 @@ def test_a_section_by_a_function():
 
     rod = cf.Rod(LINE, taper, STEEL)
     s = np.linspace(0, 10, 7)
-    K, J, mass, _ = rod.stiffness_at(s)
+    K, J, mass, *_ = rod.stiffness_at(s)
     np.testing.assert_allclose(K[:, 2], 210e9 * (0.3 - 0.02 * s) * 0.1, rtol=1e-14)
     np.testing.assert_allclose(J[:, 1], 210e9 * 0.1 * (0.3 - 0.02 * s) ** 3 / 12, rtol=1e-14)
     np.testing.assert_allclose(mass, 7850 * (0.3 - 0.02 * s) * 0.1, rtol=1e-14)
@@ -74,8 +74,8 @@ def test_breaks_of_curve_and_section():
 
 def test_weight():
     rod = cf.Rod(LINE, [(4, THICK), (None, THIN)], STEEL)
-    f = cf.Weight((0, 3.0, -9.81)).density(rod, np.array([[1.0, 9.0]]))
-    np.testing.assert_allclose(f, np.outer([row(THICK)[2], row(THIN)[2]], [0, 3.0, -9.81])[None], rtol=1e-15)
+    (density,) = cf.Weight((0, 3.0, -9.81)).data(rod, np.array([1.0, 9.0]))
+    np.testing.assert_allclose(density.value, np.outer([row(THICK)[2], row(THIN)[2]], [0, 3.0, -9.81]), rtol=1e-15)
     massless = cf.Stiffness((1, 1), 1, (1, 1), 1)
     rod = cf.Rod(LINE, [(4, cf.Stiffness((1, 1), 1, (1, 1), 1, mass=2.0)), (None, massless)])
     with pytest.raises(cf.SceneError, match=r"Stiffness.mass = None"):

@@ -40,7 +40,7 @@ def test_damaged_files(tmp_path, monkeypatch, never_ended):
     assert len(cf.resume(folder, flying_in_space()[1])) == len(rows(folder))
     for name in ("checkpoint.npz", "start.npz"):
         (folder / name).unlink()
-    with pytest.raises(cf.SceneError, match="nothing to go on from is left"):
+    with pytest.raises(cf.SceneError, match="no checkpoint can be read"):
         cf.resume(folder, flying_in_space()[1])
     (folder / "motion.json").write_text("{}")
     with pytest.raises(cf.SceneError, match=r"motion.json is damaged"):

@@ -8,6 +8,8 @@ from plane_scenes import SCENES, STEEL, Drawn, thin_cantilever, tree
 
 import cosserat_fenicsx as cf
 
+pytestmark = pytest.mark.few_ranks
+
 
 def same(found, truth, tolerance):
     """Every field of every rod at every point, relative to its size, and to what rounding leaves of it: strains are

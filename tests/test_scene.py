@@ -114,11 +114,10 @@ def test_scene_refused():
         cf.solve([ROD], [1.0])
 
 
-@pytest.mark.parametrize("formulation", ["displacement", "multiplier"])
-def test_infinite_stiffness_needs_the_mixed_formulation(formulation):
+def test_infinite_stiffness_needs_a_contact_force_of_its_own():
     rod, scene = column(section=cf.Stiffness((inf, inf), inf, (1.0, 1.0), 1.0))
     with pytest.raises(cf.SceneError, match="cannot take an infinite stiffness"):
-        cf.solve(scene, [0.5], formulation=formulation)
+        cf.solve(scene, [0.5], formulation="displacement")
 
 
 def test_not_converged_keeps_the_partial_path():
@@ -141,7 +140,7 @@ def test_accuracy_that_cannot_be_met_is_refused(monkeypatch):
 
 
 def test_interruption_keeps_what_is_done():
-    from cosserat_fenicsx.statics.continuation import Continuation
+    from cosserat_fenicsx.statics.path.load_control import Continuation
 
     _, scene = column()
     whole = Continuation._attempt

@@ -90,7 +90,7 @@ def test_a_run_does_not_depend_on_the_one_before():
 
 def test_what_a_scheme_cannot_do_is_said():
     rod = cf.Rod(cf.Line((0, 0, 0), (2, 0, 0)), SECTION, damping=cf.Damping(drag=1))
-    with pytest.raises(cf.SceneError, match="'triple-jump' knows no error of its steps: expected dt"):
+    with pytest.raises(cf.SceneError, match="'triple-jump' has no error estimate: expected dt"):
         cf.simulate(cf.Scene([rod]), 1, scheme="triple-jump")
     with pytest.raises(cf.SceneError, match="steps back in time: expected rods without damping"):
         cf.simulate(cf.Scene([rod]), 1, dt=0.1, scheme="triple-jump")

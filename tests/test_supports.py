@@ -151,8 +151,6 @@ def test_refusals():
         "FollowerForce.force": lambda: cf.FollowerForce(rod.end, "up"),
         "LineForce.rod": lambda: cf.LineForce(rod.end, (0, 0, 1)),
         "loads[0] acts at": lambda: cf.Scene([other], [cf.Clamp(other.start)], [cf.LineForce(rod, (0, 0, 1))]),
-        "knows clamps and rigid joints alone":
-            lambda: solve(rod, [cf.Pin(rod.end)], [across(rod)], formulation="multiplier"),
     }  # fmt: skip
     for words, case in cases.items():
         with pytest.raises(cf.SceneError) as refusal:

@@ -6,7 +6,7 @@ from moving_scenes import drift
 from other_schemes import register
 
 import cosserat_fenicsx as cf
-from cosserat_fenicsx.dynamics import motion
+from cosserat_fenicsx.dynamics import time_loop
 
 pytestmark = pytest.mark.serial
 
@@ -52,7 +52,7 @@ def test_where_trapezoidal_and_midpoint_rules_fail(monkeypatch, factor, dt, lost
     """No step halved. Seen: midpoint lost after 826 steps of 0.02 s; of 0.01 s with forces 8 times as large midpoint after
     292, trapezoidal after 516, on rotation vectors (rho_inf = 1) after 528."""
     register(monkeypatch)
-    monkeypatch.setattr(motion, "_HALVINGS", 0)
+    monkeypatch.setattr(time_loop, "_HALVINGS", 0)
     scene, ends = thin(factor), []
     for settings in lost:
         history, survived = run(scene, 30, dt=dt, **settings)

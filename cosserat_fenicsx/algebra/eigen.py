@@ -1,29 +1,44 @@
-"""Eigenvalues by SLEPc: the only file that knows it."""
+"""Eigenvalues by SLEPc; no other file imports it."""
 
 import numpy as np
 from petsc4py import PETSc
 from slepc4py import SLEPc
 
 from cosserat_fenicsx.algebra import linear
+from cosserat_fenicsx.interrupts import obey
 
 _TOLERANCE = 1e-12
-# Where eigenvalues of the other sign may lie much nearer to zero: their rounding is in those that are asked for.
+# Tolerance for eigenvalues of unsymmetric pencils; and the relative distance from the real axis, and from the matching
+# eigenvalue of the transposed pencil, below which an eigenvalue counts as real and as genuine. Ill-conditioned ones
+# exceed it.
+_UNSYMMETRIC, _REAL = 1e-10, 1e-5
+# Largest dimension of the projected problem, because its dense solution cannot be interrupted.
+_PROJECTED = 400
+# Tolerance where eigenvalues of the other sign may lie much nearer to zero: their rounding limits the accuracy.
 _COARSE = 1e-9
 
 
 class _Inverse:
-    """The inverse of a factored matrix as a matrix."""
+    """The inverse of a factored matrix as a matrix, and as a preconditioner.
+
+    SLEPc calls it in every iteration, and signals to the process are handled there.
+    """
 
     def __init__(self, pc):
         self._pc = pc
 
     def mult(self, mat, x, y):
         """PETSc's name for y = K^-1 x."""
+        obey()
         self._pc.apply(x, y)
+
+    def apply(self, pc, x, y):
+        """PETSc's name for the same as a preconditioner."""
+        self.mult(None, x, y)
 
 
 def nearest_zero(K, pc, count, side=0):
-    """Eigenvalues of a symmetric matrix next to zero, by the factorisation that is at hand.
+    """Eigenvalues of a symmetric matrix next to zero, from an existing factorisation.
 
     Args:
         K: the matrix.
@@ -32,7 +47,7 @@ def nearest_zero(K, pc, count, side=0):
         side: 1 for positive ones, -1 for negative ones, 0 for both.
 
     Returns:
-        (values (n,), vectors): nearest first, n <= count; PETSc vectors of length one.
+        (values (n,), vectors): nearest first, n <= count; PETSc vectors of unit norm.
     """
     inverse = PETSc.Mat().createPython(K.getSizes(), _Inverse(pc), comm=K.comm)
     inverse.setUp()
@@ -49,14 +64,56 @@ def largest_of_pencil(A, B, count):
     """The largest eigenvalues nu of A x = nu B x, A symmetric, B symmetric and positive definite.
 
     Returns:
-        (values (n,), vectors), see `nearest_zero`; the largest first.
+        (values (n,), vectors), see `nearest_zero`; the largest first. Empty if A = 0.
     """
+    if A.norm() == 0:
+        return np.empty(0), []
+    solver, pc = _of_pencil(A, B, linear.factor_second_variation)
+    found = _solve(solver, SLEPc.EPS.ProblemType.GHEP, SLEPc.EPS.Which.LARGEST_REAL, count, A)
+    pc.destroy()
+    return found
+
+
+def real_of_pencil(A, B, count):
+    """Real positive eigenvalues nu of A x = nu B x, both unsymmetric, among the `count` of the largest magnitude.
+
+    Eigenvalues of a non-normal pencil may be artefacts of rounding; those differ between the pencil and its transpose,
+    and are discarded.
+
+    Returns:
+        (values (n,), vectors), the largest first, n <= count; PETSc vectors of unit norm.
+    """
+    (values, vectors), (others, _) = (
+        _unsymmetric(a, b, count) for a, b in ((A, B), (A.copy().transpose(), B.copy().transpose()))
+    )
+    off = [max(abs(value.imag), np.abs(others - value).min(initial=np.inf)) for value in values]
+    real = [k for k, value in enumerate(values) if off[k] <= _REAL * value.real]
+    real.sort(key=lambda k: -values[k].real)
+    return values[real].real, [vectors[k] for k in real]
+
+
+def _unsymmetric(A, B, count):
+    """(values (n,), complex; real or imaginary parts of eigenvectors) of the eigenvalues of largest magnitude."""
+    solver, pc = _of_pencil(A, B, linear.factor_tangent)
+    which = SLEPc.EPS.Which.LARGEST_MAGNITUDE
+    found = _solve(solver, SLEPc.EPS.ProblemType.GNHEP, which, count, A, tolerance=_UNSYMMETRIC)
+    pc.destroy()
+    return found
+
+
+def _of_pencil(A, B, factor):
+    """An eigensolver of A x = nu B x, and the PC with the factors of B that it applies."""
     solver = SLEPc.EPS().create(A.comm)
     solver.setOperators(A, B)
+    pc = PETSc.PC().create(A.comm)
+    pc.setOperators(B)
+    factor(pc, B)
+    pc.setUp()
     ksp = solver.getST().getKSP()
     ksp.setType("preonly")
-    linear.factor_second_variation(ksp.getPC(), B)
-    return _solve(solver, SLEPc.EPS.ProblemType.GHEP, SLEPc.EPS.Which.LARGEST_REAL, count, A)
+    ksp.getPC().setType("python")
+    ksp.getPC().setPythonContext(_Inverse(pc))
+    return solver, pc
 
 
 def largest_of_operator(operator, size, count, known):
@@ -64,11 +121,11 @@ def largest_of_operator(operator, size, count, known):
 
     Args:
         operator: has `mult(mat, x, y)`.
-        size: of its vectors; count: how many are asked for.
-        known: (size, k) eigenvectors of length one that are not looked for.
+        size: of its vectors; count: how many eigenvalues to find.
+        known: (size, k) known eigenvectors of unit norm, which are excluded.
 
     Returns:
-        (values (n,), vectors (size, n) of length one), the largest first, n <= count.
+        (values (n,), vectors (size, n) of unit norm), the largest first, n <= count.
     """
     matrix = PETSc.Mat().createPython([size, size], operator, comm=PETSc.COMM_SELF)
     matrix.setUp()
@@ -90,19 +147,25 @@ def _solve(solver, kind, which, count, like, *, room=None, tolerance=_TOLERANCE)
     solver.setWhichEigenpairs(which)
     size = room or like.getSize()[0]
     count = min(count, size)
-    solver.setDimensions(count, min(size, max(2 * count, count + 15)))
+    projected = min(size, max(2 * count, count + 15), _PROJECTED)
+    solver.setDimensions(count, min(size, max(2 * count, count + 15), count + projected), projected)
     solver.setTolerances(tolerance, 500)
     start = like.createVecRight()
     first, last = start.getOwnershipRange()
-    start.array_w[:] = 1 + np.sin(np.arange(first, last) + 1.0)  # the same at every run and on any number of ranks
+    start.array_w[:] = 1 + np.sin(np.arange(first, last) + 1.0)  # the same in every run and on any number of ranks
     solver.setInitialSpace([start])
-    solver.solve()
+    try:
+        solver.solve()
+    except KeyboardInterrupt:
+        solver.incRef()  # destroying an interrupted solver would raise an error
+        raise
     found = min(solver.getConverged(), count)
-    values, vectors = [], []
+    values, vectors = np.zeros(found, dtype=complex), []
     for i in range(found):
-        vector = like.createVecRight()
-        values.append(solver.getEigenpair(i, vector).real)
+        parts = like.createVecRight(), like.createVecRight()
+        values[i] = solver.getEigenpair(i, *parts)
+        vector = parts[int(values[i].imag < 0)]  # real part for one of a conjugate pair, imaginary part for the other
         vector.normalize()
         vectors.append(vector)
     solver.destroy()
-    return np.array(values), vectors
+    return (values if kind == SLEPc.EPS.ProblemType.GNHEP else values.real), vectors

@@ -1,4 +1,4 @@
-"""What an equilibrium and a step in time have in common: a model's unknowns in PETSc's vectors, added equations, assembly."""
+"""What an equilibrium and a time step have in common: unknowns in PETSc's vectors, constraint equations, assembly."""
 
 import numpy as np
 
@@ -11,17 +11,17 @@ class Equations:
 
     Attributes:
         x, b, A: unknowns, residual, tangent; the model's state follows x.
-        ties: rows of the equations that supports and joints add, or None.
-        tangent: what factors A, see `linear.factor_tangent`.
+        ties: the `TieRows` of the constraint equations of supports and joints, or None.
+        tangent: the kind of factorisation of A, see `linear.factor_tangent`.
     """
 
-    #: what makes `ties` of (model, numbering)
+    #: the class of `ties`, called with (model, numbering)
     ties_class = None
 
     def __init__(self, model):
         self.model, self.numbering = model, model.numbering
         numbering = self.numbering
-        self.ties = self.ties_class(model, numbering) if model.shape.connections.ties else None
+        self.ties = self.ties_class(model, numbering) if model.signature.connections.ties else None
         tied = self.ties.rows if self.ties else np.empty(0, dtype=np.int64)
         self.tangent = self._kind()
         self.A = numbering.matrix(model.cell_dofs, tied[tied >= 0], blocks=self.tangent == "blocks")
@@ -34,18 +34,23 @@ class Equations:
         raise NotImplementedError
 
     def _assemble(self, form, vector):
-        """Put a packed form, or zero for None, into a solver's vector."""
+        """Assemble a packed form into a solver's vector; None gives zero."""
         self._local[:] = 0.0
         if form:
             form.add_to_vector(self._local)
         self.numbering.add_up(self._local, vector)
 
     def set_state(self, x):
-        """Put a vector of unknowns into the model's state, ghosts too."""
+        """Copy a vector of unknowns into the model's state, ghosts included."""
         self.numbering.to_local(x, self._state)
         if self.ties:
             self.ties.see(x)
 
+    def tie_forces(self):
+        """(ties, 2, 6) force and moment, inertial, that every equation of supports and joints exerts on its two
+        stations, on all ranks; zero for the ground."""
+        return self.ties.forces(self.eta) if self.ties else np.empty((0, 2, 6))
+
     def multipliers(self):
-        """Reactions of the added equations, on all ranks."""
+        """Multipliers (reactions) of the constraint equations, on all ranks."""
         return self.ties.everywhere() if self.ties else np.empty(0)

@@ -1,11 +1,11 @@
-"""Which direct solver factors what, and the settings it must not be without."""
+"""The direct solver for each kind of matrix, and the settings that it needs."""
 
 from petsc4py import PETSc
 
 
 def solve_with_tangent(ksp, kind="general"):
-    """How a KSP uses the factors of a tangent: a factorisation that pivots within blocks alone loses digits on slender rods,
-    which two steps of refinement bring back."""
+    """Set how a KSP uses the factors of a tangent: a factorisation that pivots only within blocks loses digits on
+    slender rods, which two steps of iterative refinement recover."""
     ksp.setType("richardson" if kind == "blocks" else "preonly")
     if kind == "blocks":
         ksp.setNormType(PETSc.KSP.NormType.NONE)
@@ -13,12 +13,13 @@ def solve_with_tangent(ksp, kind="general"):
 
 
 def factor_tangent(pc, A, kind="general"):
-    """What solves with a tangent, one process or many.
+    """Set the factorisation of a tangent, serial or parallel.
 
     Args:
-        kind: "general": LU that pivots everywhere, because the diagonal of an added equation, or of a contact force's, may be
-            zero; "blocks": PETSc's own of a matrix stored by blocks, which pivots within those of the nodes (q_a may be
-            zero), a third of the cost; "plain": PETSc's own, which does not pivot; "symmetric": Cholesky with signs.
+        kind: in serial, "general": LU with pivoting over the whole matrix, because the diagonal of a constraint
+            equation, or of a contact force's, may be zero; "blocks": PETSc's LU of a matrix stored in node blocks,
+            which pivots within them (q_a may be zero), at a third of the cost; "plain": PETSc's LU without pivoting;
+            "symmetric": LDL^T. MUMPS in parallel.
     """
     pc.setType("cholesky" if kind == "symmetric" and A.comm.size == 1 else "lu")
     if A.comm.size > 1:
@@ -30,7 +31,7 @@ def factor_tangent(pc, A, kind="general"):
 
 
 def factor_second_variation(pc, K):
-    """A factorisation that tells the number of negative squares."""
+    """Set a factorisation that gives the inertia of the matrix, i.e. its number of negative eigenvalues."""
     if K.comm.size == 1:
         pc.setType("cholesky")
         pc.setFactorOrdering("nd")
@@ -39,15 +40,15 @@ def factor_second_variation(pc, K):
 
 
 def factor_constrained(pc, K, null=0.0):
-    """The same, of a matrix whose diagonal may be zero, because of added equations.
+    """As `factor_second_variation`, for a matrix whose diagonal may be zero because of constraint equations.
 
     Args:
-        null: what pivots must be below to count as zero; 0.0 for rounding, relative to the largest row.
+        null: pivots below this count as zero; 0.0 for a threshold of rounding, relative to the largest row.
     """
     pc.setType("cholesky")
     factor = _mumps(pc, K)
-    factor.setMumpsIcntl(13, 1)  # the root front in one piece, or negative pivots are not all counted
-    factor.setMumpsIcntl(24, 1)  # null pivots are counted apart
+    factor.setMumpsIcntl(13, 1)  # root front not distributed: otherwise some negative pivots are not counted
+    factor.setMumpsIcntl(24, 1)  # null pivots are counted separately
     factor.setMumpsCntl(3, -null)
 
 
@@ -56,5 +57,5 @@ def _mumps(pc, A):
     pc.setFactorSolverType("mumps")
     pc.setFactorSetUpSolverType()
     factor = pc.getFactorMatrix()
-    factor.setMumpsIcntl(14, 200)  # room for fill: too little of it fails without a word
+    factor.setMumpsIcntl(14, 200)  # % extra memory for fill-in: too little fails without a message
     return factor

@@ -1,6 +1,6 @@
-"""Assembly of a compiled form over and over: its coefficients are packed once, and then only those that move.
+"""Repeated assembly of a compiled form: its coefficients are packed once, and then only those that change.
 
-dolfinx packs all coefficients of a form at every assembly, which costs more than the elements of a coarse rod do.
+dolfinx packs all coefficients of a form in every assembly, which costs more than the element kernels of a coarse rod.
 """
 
 import numpy as np
@@ -14,21 +14,21 @@ class Packed:
 
     Args:
         form: a compiled form.
-        moving: the Functions whose numbers change between assemblies.
-        slow: those whose numbers change now and then, and are taken as they are at `catch_up`; all others at `refresh`.
+        moving: the Functions whose values are packed anew in every assembly.
+        slow: those whose values change rarely, and are packed anew by `catch_up`; all others by `refresh`.
     """
 
     def __init__(self, form, moving, slow=()):
         self._kernel = compat.kernel(form)
         self._constants = cpp.fem.pack_constants(self._kernel)
-        self._places = []  # (numbers, key, columns, which number each entry is, whether it is slow)
+        self._places = []  # (values, key, columns, indices of the entries in the values, whether slow)
         for functions, is_slow in ((moving, False), (slow, True)):
             for function in functions:
                 self._find(function.x.array, is_slow)
         self.refresh()
 
     def _find(self, numbers, is_slow):
-        """Where the numbers of a Function are packed: seen by packing their own indices, and then others."""
+        """Find the columns where a Function's values are packed, by packing indices in place of values, twice."""
         kept, index = numbers.copy(), np.arange(len(numbers), dtype=float)
         numbers[:] = index
         first = self._pack()
@@ -46,7 +46,7 @@ class Packed:
         return {key: array.copy() for key, array in cpp.fem.pack_coefficients(self._kernel).items()}
 
     def refresh(self):
-        """Pack everything anew; to be called when a scene's numbers were filled in."""
+        """Pack all coefficients anew; to be called after the values of a scene are filled in."""
         self._coefficients = self._pack()
         views = [
             (numbers, self._coefficients[key][:, run], which, slow) for numbers, key, run, which, slow in self._places
@@ -54,7 +54,7 @@ class Packed:
         self._views, self._slow = ([view[:3] for view in views if view[3] == slow] for slow in (False, True))
 
     def catch_up(self):
-        """Take the numbers of the slow Functions."""
+        """Pack the current values of the slow Functions."""
         for numbers, view, which in self._slow:
             view[...] = numbers[which]
 
@@ -66,9 +66,9 @@ class Packed:
         return self._constants, self._coefficients
 
     def add_to_vector(self, array):
-        """Add a linear form to an array of local numbers, ghosts too."""
+        """Add a linear form to an array of local degrees of freedom, ghosts included."""
         cpp.fem.assemble_vector(array, self._kernel, *self._renew())
 
     def add_to_matrix(self, A):
-        """Add a bilinear form to a PETSc matrix by its own local-to-global map; unknowns it maps to -1 are left out."""
+        """Add a bilinear form to a PETSc matrix by the matrix's local-to-global map; -1 there means to skip."""
         cpp.fem.petsc.assemble_matrix(A, self._kernel, *self._renew(), [])

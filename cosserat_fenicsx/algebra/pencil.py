@@ -1,4 +1,4 @@
-"""The lowest eigenvalues of K x = lambda M x with held x = 0, every copy of them; each rank solves all of it."""
+"""The lowest eigenvalues of K x = lambda M x with held x = 0, with their multiplicity; every rank solves all of it."""
 
 import numpy as np
 from petsc4py import PETSc
@@ -6,19 +6,22 @@ from scipy import sparse
 
 from cosserat_fenicsx.algebra import eigen, linear
 from cosserat_fenicsx.errors import NotConverged
+from cosserat_fenicsx.interrupts import interruptible, obey
 
-# Next to a shift that is so many times larger eigenvalues are one cluster, whose vectors mix.
+# Eigenvalues below this fraction of the shift are not resolved: the solver returns mixtures of their vectors.
 _BLURRED = 1e-5
-# Of the rounding of x^T K x, below which it is zero: it adds up at random, and reaches a fifth of this.
+# Values of x^T K x below this times a bound on their rounding error count as zero; errors reach a fifth of it.
 _SAFETY = 2.0
-# Eigenvalues that differ by less, relatively, are counted together.
+# Eigenvalues with a smaller relative difference are counted as one multiple eigenvalue.
 _TOGETHER = 1e-6
-# How near to a value that is missing a shift is put, relatively.
+# Relative distance of a shift from the missing eigenvalue that it is to find.
 _NEXT = 0.05
-# Of the inertia of turns about a thin rod's axis pivots are honestly small.
+# Pivots below this count as zero; those of rotation about the axis of a thin rod are very small, but not zero.
 _NO_PIVOT = 1e-200
-# Passes, each of which finds at least one vector more, or comes nearer to those that mix.
+# Largest number of passes; each finds at least one more vector, or moves the shift nearer to unresolved ones.
 _PASSES = 100
+# A dense projected problem of more vectors than this takes seconds, and is made interruptible.
+_MANY = 500
 
 
 class Pencil:
@@ -26,7 +29,7 @@ class Pencil:
 
     Args:
         K: (size, size), symmetric, sparse, of scipy.
-        M: symmetric and positive definite, of diagonal blocks (scipy's bsr_matrix).
+        M: symmetric and positive definite, block diagonal (scipy's bsr_matrix).
         held: (equations, size), dense, of full rank.
     """
 
@@ -40,14 +43,14 @@ class Pencil:
         self.count = self.size - len(held)
 
     def lowest(self, count):
-        """The lowest eigenvalues, every copy of them.
+        """The lowest eigenvalues, with their multiplicity.
 
-        What an eigensolver finds next to a shift may lack copies of repeated eigenvalues, or such as are small against the shift:
-        the number of negative squares of K - lambda M tells how many there are below lambda (Sylvester), and what is
-        missing is looked for where these numbers say it lies.
+        An eigensolver may miss copies of repeated eigenvalues, or eigenvalues that are small against the shift. The
+        number of negative eigenvalues of K - lambda M is the number of eigenvalues below lambda (Sylvester's law of
+        inertia); missing ones are located by bisection with this count.
 
         Returns:
-            (values (n,) ascending, vectors (size, n)), n <= count; what is zero to rounding is 0.0.
+            (values (n,) ascending, vectors (size, n)), n <= count; values that are zero to rounding are 0.0.
 
         Raises:
             NotConverged: some were not found.
@@ -75,27 +78,31 @@ class Pencil:
             else:
                 asked = count - len(values)
         raise NotConverged(
-            f"{len(values)} natural frequencies were found, and {asked} more below the highest of them not. Ask for fewer modes, or "
-            "another number of elements."
+            f"{len(values)} natural frequencies were found, and {asked} more below the highest of them not. "
+            "Ask for fewer modes, or another number of elements."
         )
 
     def _nearest(self, shift, count, known):
-        """Eigenvalues next to a shift, and vectors that are orthogonal to those that are known."""
+        """Eigenvalues next to a shift, and their vectors, orthogonal to the known ones."""
         factored = _Factored(self._shifted(shift), self._L, self.size)
         _, vectors = eigen.largest_of_operator(factored, self.size, min(count, self.count - known.shape[1]), known)
         factored.free()
         x = self._unknowns(vectors)
-        values, turn = np.linalg.eigh(x.T @ (self._K @ x))  # more accurate than 1/theta + shift, next to a large shift
-        vectors = vectors @ turn
+
+        def projected():  # more accurate than 1/theta + shift, next to a large shift
+            values, turn = np.linalg.eigh(x.T @ (self._K @ x))
+            return values, vectors @ turn
+
+        values, vectors = interruptible(projected) if vectors.shape[1] > _MANY else projected()
         return np.where(np.abs(values) <= self._rounding(vectors), 0.0, values), vectors
 
     def _rounding(self, vectors):
-        """Of the values of vectors."""
+        """Bound on the rounding error of x^T K x for each of the vectors."""
         x = np.abs(self._unknowns(vectors))
         return _SAFETY * np.finfo(float).eps * np.einsum("ik,ik->k", x, self._K_sizes @ x)
 
     def _missing_next_to(self, values, beyond, rounding):
-        """A shift next to the lowest value below `beyond` that `values` (ascending) lack."""
+        """A shift next to the lowest eigenvalue below `beyond` that is missing in `values` (ascending)."""
         high, low = beyond, -abs(beyond)
         while self._below(low):
             low *= 8
@@ -112,7 +119,7 @@ class Pencil:
         factored = _Factored(self._shifted(value), self._L, self.size)
         negative = factored.negative
         factored.free()
-        return negative - (self.size - self.count)  # every equation that is held adds one
+        return negative - (self.size - self.count)  # every constraint adds one negative eigenvalue
 
     def _shifted(self, shift):
         """[[K - shift M, held^T], [held, 0]]"""
@@ -122,14 +129,14 @@ class Pencil:
         )
 
     def _unknowns(self, vectors):
-        """x of L^T x."""
+        """x from vectors L^T x."""
         blocks = vectors.T.reshape(vectors.shape[1], *self._L.data.shape[:2], 1)
         return np.linalg.solve(self._L.data.transpose(0, 2, 1), blocks).reshape(vectors.shape[1], self.size).T
 
 
 class _Factored:
-    """L^T A L as a matrix, where M = L L^T and A is the part of the inverse of a matrix that belongs to x: of
-    [[K - shift M, held^T], [held, 0]] its eigenvalues are 1/(lambda - shift)."""
+    """L^T A L as a matrix, where M = L L^T and A is the block for x of the inverse of [[K - shift M, held^T], [held,
+    0]]; its eigenvalues are 1/(lambda - shift)."""
 
     def __init__(self, matrix, L, size):
         self._L, self._size = L, size
@@ -143,16 +150,17 @@ class _Factored:
 
     @property
     def negative(self):
-        """The number of negative squares of the matrix."""
+        """The number of negative eigenvalues of the matrix."""
         return self._pc.getFactorMatrix().getInertia()[0]
 
     def mult(self, mat, x, y):
         """PETSc's name for y = L^T A L x."""
+        obey()
         self._force.array_w[:] = 0.0
         self._force.array_w[: self._size] = self._L @ x.array_r
         self._pc.apply(self._force, self._moved)
         y.array_w[:] = self._L.T @ self._moved.array_r[: self._size]
 
     def free(self):
-        """Give the factors back."""
+        """Free the factors."""
         self._pc.destroy()

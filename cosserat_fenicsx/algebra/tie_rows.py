@@ -1,33 +1,42 @@
-"""The equations that supports and joints add, in the rows and columns of a solver's matrix."""
+"""The constraint equations of supports and joints, in the rows and columns of a solver's matrix."""
 
 import numpy as np
 from petsc4py import PETSc
 
 _ADD = PETSc.InsertMode.ADD_VALUES
-#: Stiffness that holds an added equation where only the sign of the second variation is asked for, over that of an element.
+#: Penalty stiffness that replaces a constraint in the second variation, over the stiffness of the elements there.
 _HELD = 1e3
-#: A step of Newton's may be wild: its residual is no number then, and SNES stops there without numpy's warnings.
+#: A diverging Newton step may overflow: the residual is then not a number, which stops SNES; numpy need not warn.
 _WILD = {"invalid": "ignore", "over": "ignore"}
 
 
 class TieRows:
-    """Added equations of one problem; the last rank does their work.
+    """Constraint equations of one problem; the last rank evaluates them.
 
     Args:
-        model: its `rows_of_tied`, `ties`, `tied_motion`, `tie_maps` and `tied_at_rest` are used.
+        model: its `rows_of_tied`, `ties`, `held_forces`, `tied_motion`, `tie_maps` and `tied_at_rest` are used.
         numbering: the problem's `Numbering`.
 
     Attributes:
         rows: (tied nodes, block) solver's numbers, -1 where clamped.
-        seen: the tied nodes' unknowns and the multipliers as last seen; on the last rank.
+        seen: the tied nodes' unknowns and the multipliers, as of the last call of `see`; on the last rank.
     """
 
     def __init__(self, model, numbering):
         self.model, self.numbering = model, numbering
         self.rows = model.rows_of_tied.astype(PETSc.IntType)
+        # unlike a matrix, a vector takes -1 for the place before its first number
+        self._free = np.flatnonzero(self.rows >= 0)
+        self._free_rows = self.rows.ravel()[self._free]
         self._here = numbering.comm.rank == numbering.comm.size - 1
-        links = model.shape.connections
+        links = model.signature.connections
         self._added, self._all = tuple(links.equations), tuple(range(len(links.ties)))
+        self._which = np.array(self._added, dtype=np.intp)
+        place = {vertex: i for i, vertex in enumerate(links.tied)}
+        stations = np.array([(place[a], place.get(b, -1)) for _, a, b in links.ties]).reshape(-1, 2)
+        # of every added equation its row and its two stations among the gradients, and the sign of its reaction
+        rows, ends = np.arange(len(self._added))[:, None], stations[self._which]
+        self._exerted = rows, ends, np.where(ends >= 0, -1.0, 0.0)
         count = numbering.multipliers
         self._multipliers = (numbering.first_multiplier + np.arange(count)).astype(PETSc.IntType)
         self._idle = (numbering.first_multiplier + count + np.arange(numbering.idle)).astype(PETSc.IntType)
@@ -38,7 +47,7 @@ class TieRows:
         self.seen = None
 
     def see(self, x):
-        """Take the tied nodes' values and the multipliers out of a vector."""
+        """Copy the tied nodes' unknowns and the multipliers from a vector."""
         self._scatter.scatter(x, self._work, False, PETSc.ScatterMode.FORWARD)
         if self._here:
             values, nodal = self._work.array_r, self.model.tied_at_rest.copy()
@@ -46,10 +55,10 @@ class TieRows:
             nodal[self.rows >= 0] = values[:free]
             multipliers = np.zeros(len(self._all))
             multipliers[list(self._added)] = values[free:]
-            self.seen, self._added_values = (nodal, multipliers), (None, None)
+            self.seen, self._added_values, self._all_values = (nodal, multipliers), (None, None), (None, None)
 
     def _evaluate(self, eta):
-        """Those that are added, once for residual and tangent."""
+        """Values and derivatives of the equations that are added, evaluated once for residual and tangent."""
         if self._added_values[0] != eta:
             nodal, multipliers = self.seen
             rq = self.model.tied_motion(nodal)
@@ -63,12 +72,24 @@ class TieRows:
         x.assemble()
 
     def everywhere(self):
-        """The multipliers as last seen, on all ranks."""
+        """The multipliers as of the last call of `see`, on all ranks."""
         comm = self.numbering.comm
+        if comm.size == 1:
+            return self.seen[1]
         return comm.bcast(self.seen[1] if self._here else None, root=comm.size - 1)
 
+    def forces(self, eta):
+        """See `Equations.tie_forces`: where the state was last seen."""
+        comm, found = self.numbering.comm, None
+        if self._here:
+            found, (rows, ends, signs) = np.zeros((len(self._all), 2, 6)), self._exerted
+            _, gradient, _ = self._evaluate(eta)
+            forces = gradient[rows, ends] * (signs * self.seen[1][self._which, None])[..., None]
+            found[self._which] = self.model.held_forces(forces)
+        return comm.bcast(found, root=comm.size - 1) if comm.size > 1 else found
+
     def gradients(self):
-        """(ties, tied nodes, 6) of all equations where the nodes are, over (displacement, rotation), on all ranks."""
+        """(ties, tied nodes, 6) gradients of all equations by (displacement, rotation), on all ranks."""
         comm, found = self.numbering.comm, None
         if self._here:
             nodal, multipliers = self.seen
@@ -77,13 +98,13 @@ class TieRows:
 
     @np.errstate(**_WILD)
     def add_residual(self, b, eta):
-        """Add reactions to the rows of the nodes, and the equations in rows of their own."""
+        """Add the reactions to the rows of the nodes, and the constraint equations in the rows of the multipliers."""
         if self._here:
             nodal, multipliers = self.seen
             c, gradient, _ = self._evaluate(eta)
             _, test = self.model.tie_maps(nodal)
             reactions = (multipliers[list(self._added)] @ gradient.reshape(len(c), -1)).reshape(-1, 6)
-            b.setValues(self.rows.ravel(), (test @ reactions[:, :, None]).ravel(), _ADD)
+            b.setValues(self._free_rows, (test @ reactions[:, :, None]).ravel()[self._free], _ADD)
             b.setValues(self._multipliers, c, _ADD)
         b.assemble()
 
@@ -94,7 +115,7 @@ class TieRows:
             return
         of_nodes, reactions, equations = self._derivatives(eta)
         nodes = self.rows.ravel()
-        # in C's order: petsc4py takes the numbers as they lie in memory
+        # in C order: petsc4py ignores strides
         A.setValues(nodes, nodes, np.ascontiguousarray(of_nodes), _ADD)
         A.setValues(nodes, self._multipliers, np.ascontiguousarray(reactions), _ADD)
         A.setValues(self._multipliers, nodes, np.ascontiguousarray(equations), _ADD)
@@ -103,39 +124,60 @@ class TieRows:
                 A.setValue(i, i, value, _ADD)
 
     def _derivatives(self, eta):
-        """Of the reactions by the nodes and by the multipliers, and of the equations by the nodes, as matrices."""
+        """Derivatives of the reactions by nodes and by multipliers, and of the equations by nodes, as matrices."""
         _, gradient, change = self._evaluate(eta)
-        trial, test = self.model.tie_maps(self.seen[0])
-        return (
-            reactions_by_nodes(test, change, trial),
-            reactions_by_multipliers(test, gradient),
-            by_nodes(gradient, trial),
-        )
+        nodal, multipliers = self.seen
+        trial, test = self.model.tie_maps(nodal)
+        of_nodes = reactions_by_nodes(test, change, trial)
+        if self.model.rows_turn:
+            reactions = (multipliers[list(self._added)] @ gradient.reshape(len(gradient), -1)).reshape(-1, 6)
+            places = np.arange(len(of_nodes)).reshape(len(nodal), -1)
+            of_nodes[places[:, :, None], places[:, None, :]] += self.model.turned_reactions(nodal, reactions)
+        return of_nodes, reactions_by_multipliers(test, gradient), by_nodes(gradient, trial)
 
-    def add_second_variation(self, K, rows, axes, eta, *, held=True):
-        """Add what the equations mean for stability: held motions become stiff, reactions turn with the nodes.
+    def add_second_variation(self, K, rows, axes, eta):
+        """Add the geometric stiffness of the reactions, whose directions change with the nodes.
 
-        All of them count, in the plane and out of it, also those that need no equation in a plane.
+        All equations contribute, in the plane and out of it, also those that a plane model does not need.
 
         Args:
             rows: (tied nodes, block) numbers in K.
-            axes: (block, 6) what K's unknowns are as (displacement, rotation).
-            held: False for the second alone.
+            axes: (block, 6) the (displacement, rotation) of each of K's unknowns.
         """
-        if not self._here:
-            return
-        nodal, multipliers = self.seen
-        _, gradient, change = self.model.ties.evaluate(self.model.tied_motion(nodal), eta, multipliers, self._all)
-        local = np.max(gradient**2 * self.model.tied_stiffness, axis=(1, 2))
-        gradient = (gradient @ axes.T).reshape(len(gradient), -1)
-        change = (axes @ (change @ axes.T).reshape(len(rows), 6, -1)).reshape(rows.size, rows.size)
+        if self._here:
+            _, change = self._of_all(eta)
+            self._add(K, rows, axes @ (change @ axes.T).reshape(len(rows), 6, -1))
+
+    def add_springs(self, K, rows, axes, eta, resistance):
+        """Add penalty springs that replace all constraint equations.
+
+        Args:
+            rows, axes: as of `add_second_variation`, which comes first.
+            resistance: (tied nodes, block) stiffness of the elements against these motions of the nodes.
+        """
+        if self._here:
+            gradient = (self._of_all(eta)[0] @ axes.T).reshape(-1, rows.size)
+            stiffness = _HELD * (gradient * gradient * resistance.ravel()).max(axis=1, keepdims=True)
+            self._add(K, rows, gradient.T @ (stiffness * gradient))
+
+    @staticmethod
+    def _add(K, rows, values):
         nodes = rows.ravel().astype(PETSc.IntType)
-        held_by = _HELD * held * gradient.T @ (local[:, None] * gradient)
-        K.setValues(nodes, nodes, np.ascontiguousarray(held_by + 0.5 * (change + change.T)), _ADD)
+        K.setValues(nodes, nodes, values, _ADD)
+
+    def _of_all(self, eta):
+        """Gradients (ties, tied nodes, 6) of all equations, and the symmetric part of the derivative of their
+        reactions, (tied nodes, 6, tied nodes, 6); evaluated once for all parts of the second variation."""
+        if self._all_values[0] != eta:
+            nodal, multipliers = self.seen
+            _, gradient, change = self.model.ties.evaluate(self.model.tied_motion(nodal), eta, multipliers, self._all)
+            self._all_values = eta, (gradient, 0.5 * (change + change.transpose(2, 3, 0, 1)))
+        return self._all_values[1]
 
 
 def reactions_by_nodes(test, change, trial):
-    """The reactions' derivatives, (tied nodes, 6, tied nodes, 6), in rows and columns of the nodes; see `RodModel.tie_maps`."""
+    """The reactions' derivatives, (tied nodes, 6, tied nodes, 6), in rows and columns of the nodes; see
+    `RodModel.tie_maps`."""
     count, size = len(change), len(change) * test.shape[1]
     turned = (test @ change.reshape(count, 6, -1)).reshape(size, count, 6)
     return (turned.swapaxes(0, 1) @ trial).swapaxes(0, 1).reshape(size, -1)

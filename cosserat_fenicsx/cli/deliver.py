@@ -1,4 +1,4 @@
-"""What a command has computed, or what of it was reached, is printed and written."""
+"""Printing and writing of the results of a command, also of partial ones."""
 
 import sys
 import tempfile
@@ -9,10 +9,10 @@ from cosserat_fenicsx.errors import Interrupted, NotConverged, NotStored, SceneE
 
 
 def deliver(computed, options, moving):
-    """Print and write what is computed, or what of it was reached.
+    """Compute, then print and write the result, or the partial result where the computation fails or is interrupted.
 
     Args:
-        computed: -> Path or History.
+        computed: function without arguments that returns a Path or a History.
         options: of the command line.
         moving: whether it is a motion.
 
@@ -24,11 +24,11 @@ def deliver(computed, options, moving):
     out, at = None, _numbers(options.at)
     if options.output:
         out = Path(options.output)
-        _prepare(out)  # before the work, not after it
+        _prepare(out)  # fail before the computation, not after it
     _check_film(options, moving)
     positive("plot", "magnify", options.magnify, "-")
     if at is not None and out is None:
-        say("cosserat: --at is about pictures, which are drawn with -o DIR alone")
+        say("cosserat: --at has no effect without -o DIR, which pictures are written to")
 
     code, trouble = DONE, None
     try:
@@ -42,30 +42,30 @@ def deliver(computed, options, moving):
     except Interrupted as stop:
         path, trouble, code = stop.path, stop, INTERRUPTED
     if path is not None and len(path):
-        station = options.station or _busiest(path)
+        station = options.station or _default_station(path)
         _report(path, station)
         if out is not None:
-            film = options.animate if code != INTERRUPTED else None  # who stops a run does not wait for its film
+            film = options.animate if code != INTERRUPTED else None  # a film would take long after an interruption
             if code == INTERRUPTED:
                 say(
-                    "cosserat: interrupted; what was reached is written, Ctrl-C again leaves out what is not written yet"
+                    "cosserat: interrupted; writing the partial result, Ctrl-C again skips what is not written yet"
                 )
             try:
                 look = {"magnify": options.magnify, "shown": _shown(path, at), "film": film, "speed": options.speed}
                 _write(path, out, station, picture=not options.no_picture, **look)
             except KeyboardInterrupt:
-                trouble, code = "interrupted; what was being drawn or written then is incomplete", INTERRUPTED
+                trouble, code = "interrupted; the file that was being written is incomplete", INTERRUPTED
     if trouble is not None:
         say(f"cosserat: {trouble}")
         if options.folder and not isinstance(trouble, NotConverged | SceneError):
-            say(f"cosserat: `cosserat resume {options.folder}` goes on from there")
+            say(f"cosserat: `cosserat resume {options.folder}` continues from there")
         elif moving and code == INTERRUPTED:
-            say("cosserat: a motion that is run with --folder DIR can be gone on with")
+            say("cosserat: a motion that is run with --folder DIR can be continued by `cosserat resume DIR`")
     return code
 
 
 def _shown(path, at):
-    """Indices of what is nearest to the numbers of --at; None where there are none."""
+    """Indices of the points or times nearest to the numbers of --at; None without --at."""
     if at is None:
         return None
     along = path.along_axis
@@ -76,7 +76,7 @@ def _shown(path, at):
 
 
 def _prepare(out):
-    """Make the output folder, and see that it can be written to."""
+    """Make the output folder, and check that it can be written to."""
     try:
         out.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=out):
@@ -86,7 +86,7 @@ def _prepare(out):
 
 
 def _check_film(options, moving):
-    """Refuse a film that could not be made, before the work."""
+    """Refuse options of a film that cannot be made, before the computation."""
     if options.animate is None:
         return
     if not moving or not options.output:
@@ -98,11 +98,11 @@ def _check_film(options, moving):
     check_name(options.animate)
 
 
-def _busiest(path):
-    """What table and CSV tell of, where no station was asked for."""
-    from cosserat_fenicsx.results.tables import busiest
+def _default_station(path):
+    """The station of table and CSV file where none is requested."""
+    from cosserat_fenicsx.results.tables import most_displaced
 
-    return busiest(path)
+    return most_displaced(path)
 
 
 def _report(path, station):
@@ -113,7 +113,7 @@ def _report(path, station):
 
     text = table(path, station)
     if first_rank():
-        print(text, flush=True)  # before what is said of its end
+        print(text, flush=True)  # before the messages on stderr that follow
 
 
 def _write(path, out, station, *, picture, magnify, shown, film, speed):

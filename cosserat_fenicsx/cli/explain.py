@@ -1,18 +1,19 @@
-"""What would be solved, in plain sentences, without solving it."""
+"""`cosserat explain` of an equilibrium path: the scene, the model and its size in sentences, without solving."""
 
 import dataclasses
 
 import numpy as np
 
+from cosserat_fenicsx.models.choose import choose, fitting
+from cosserat_fenicsx.models.formulations import formulation_of
 from cosserat_fenicsx.models.rodmesh import Layout
-from cosserat_fenicsx.models.shape import Shape
-from cosserat_fenicsx.scene.choose import choose, fitting, force_in_words
+from cosserat_fenicsx.models.signature import Signature
 from cosserat_fenicsx.scene.curves import Line, Spline
+from cosserat_fenicsx.scene.describe import actions_in_words, describe
+from cosserat_fenicsx.scene.magnitudes import check_magnitudes
 from cosserat_fenicsx.scene.sections import Rectangle, Stiffness
-from cosserat_fenicsx.scene.words import describe
 from cosserat_fenicsx.statics.first_mesh import FIRST_ELEMENTS
 from cosserat_fenicsx.statics.solve import check_arguments
-from cosserat_fenicsx.statics.solvers import default_degree
 
 #: What the unknowns of a model are, in a plane (True) or in space.
 _UNKNOWNS = {
@@ -24,7 +25,7 @@ _UNKNOWNS = {
 
 
 def explain(scene, load_factors, settings):
-    """Text on the model of a scene and its size.
+    """Sentences on a scene, the model that would be solved, and its size.
 
     Args:
         scene: a `Scene`.
@@ -33,43 +34,44 @@ def explain(scene, load_factors, settings):
     Raises:
         SceneError: arguments that `solve` would refuse.
     """
-    formulation = settings.get("formulation", "mixed")
+    formulation = formulation_of(settings.get("formulation"))
     elements, tol = settings.get("elements"), settings.get("tol", 1e-6)
-    degree = settings.get("degree", default_degree(formulation))
+    degree = settings.get("degree", formulation.default_degree)
     check_arguments(scene, tol, elements)
+    check_magnitudes(scene, np.abs(load_factors).max())
     follows = settings.get("branch") is not None or settings.get("control") == "arc"
     choice = choose(scene, model=settings.get("model", "auto"), formulation=formulation, degree=degree, follows=follows)
     first = elements or FIRST_ELEMENTS
     layout = Layout.of(scene, first)
 
-    def shape_of(model):
-        return Shape.of(scene, layout, formulation=formulation, degree=degree, model=model)
+    def signature_of(model):
+        return Signature.of(scene, layout, formulation=formulation, degree=degree, model=model)
 
-    shape = shape_of(choice.model)
+    signature = signature_of(choice.model)
     lines = of_the_scene(scene)
-    what = _UNKNOWNS[choice.model, shape.flat]
+    what = _UNKNOWNS[choice.model, signature.flat]
     lines.append(f"Model: {choice.model} ({what}): {'; '.join(choice.why)}.")
     if choice.promoted:
-        lines.append("Should it lose its stability, in its plane or out of it, the spatial model takes over.")
-    costs = (f"{shape_of(name).unknowns} {name}" for name in fitting(scene, formulation=formulation, degree=degree))
+        lines.append("Where it loses its stability, in its plane or out of it, the spatial model takes over.")
+    costs = (f"{signature_of(name).unknowns} {name}" for name in fitting(scene, formulation=formulation, degree=degree))
     lines.append(f"Unknowns on the first mesh by model: {', '.join(costs)}.")
-    words = force_in_words(shape.variant, formulation)
+    words = signature.formulation.words
     lines.append(f"{words[0].upper()}{words[1:]}.")
-    unknowns = shape.unknowns
+    unknowns = signature.unknowns
     if elements:
         lines.append(
             f"Mesh: {elements} element(s) of degree {degree} per rod, as asked: {unknowns} unknowns, no error estimate."
         )
     else:
         lines.append(
-            f"Mesh: elements of degree {degree}, from {first} per rod ({unknowns} unknowns) doubled until two meshes agree "
-            f"to tol = {tol:g}."
+            f"Mesh: elements of degree {degree}, from {first} per rod ({unknowns} unknowns) refined until two meshes "
+            f"agree to tol = {tol:g}."
         )
     if isinstance(load_factors, tuple):
         lines.append(f"Path: load factor {load_factors[0]:g} to {load_factors[1]:g} in steps the solver chooses.")
     else:
         listed = ", ".join(f"{x:g}" for x in np.atleast_1d(load_factors))
-        lines.append(f"Path: load factors {listed}, landed on exactly, with steps between where needed.")
+        lines.append(f"Path: load factors {listed}, reached exactly, with steps between where needed.")
     return "\n".join(lines)
 
 
@@ -83,14 +85,14 @@ def of_the_scene(scene):
         )
     lines.append(
         f"{len(scene.supports)} support(s): {', '.join(describe(x) for x in scene.supports) or 'none'}. "
-        f"{len(scene.loads)} load(s): {', '.join(describe(x) for x in scene.loads) or 'none'}."
+        f"{actions_in_words(scene)}"
         + "".join(f" {joint.first} is joined to {joint.second}{_release(joint)}." for joint in scene.joints)
     )
     return lines
 
 
 def _curve(curve):
-    """A curve with what matters of its shape."""
+    """The type of a curve and the parameter that describes its shape."""
     if isinstance(curve, Spline):
         return f"{'closed ' if curve.closed else ''}Spline through {len(curve.points)} points"
     shape = {"Arc": ("angle", "rad"), "Helix": ("turns", "turns"), "UniformCurvature": ("curvature", "1/m")}
@@ -116,7 +118,7 @@ def _sections(rod):
 
 
 def _release(joint):
-    """What a joint lets go."""
+    """How a joint connects: rigidly, or by a ball or a hinge."""
     if joint.rigid:
         return " rigidly"
     axis = joint.release if joint.release == "all" else "(" + ", ".join(f"{x:.3g}" for x in joint.release) + ")"
@@ -124,7 +126,7 @@ def _release(joint):
 
 
 def _section(section):
-    """A section with its measures."""
+    """The type of a section and its dimensions."""
     given = ((f.name, getattr(section, f.name)) for f in dataclasses.fields(section))
     measures = ", ".join(
         f"{name} {value:g} m" for name, value in given if isinstance(value, float) and "factor" not in name
@@ -133,7 +135,7 @@ def _section(section):
 
 
 def _stiffnesses(rod):
-    """The stiffnesses of a rod, least to largest where they change, and its slenderness."""
+    """The stiffnesses of a rod, from least to largest where they change along it, and its slenderness."""
     low, high = rod.profile.range
 
     def spread(name, i):
@@ -141,14 +143,15 @@ def _stiffnesses(rod):
         return f"{least:.4g}" + (f" to {most:.4g}" if most > least else "")
 
     slender = rod.length * np.sqrt(high.K[2] / max(low.J[:2]))
+    coupled = "; sections couple strains: EI about the principal axes" if rod.profile.coupled else ""
     return (
         f"EI = {spread('J', 0)}, {spread('J', 1)} N m^2, GJ = {spread('J', 2)} N m^2, EA = {spread('K', 2)} N, "
-        f"GA = {spread('K', 0)}, {spread('K', 1)} N; slenderness L sqrt(EA/EI) = {slender:.4g}"
+        f"GA = {spread('K', 0)}, {spread('K', 1)} N; slenderness L sqrt(EA/EI) = {slender:.4g}{coupled}"
     )
 
 
 def _directions(rod):
-    """Where d_1 and d_2 point at the start, which matters to every section that is not round."""
+    """The directions of d_1 and d_2 at the start, which orient sections that are not circular."""
     d1, d2 = (", ".join(f"{x:.3g}" for x in rod.curve.frame(0.0)[:, i] + 0.0) for i in (0, 1))
     at = "" if isinstance(rod.curve, Line) else " at the start"
     if isinstance(rod.section_at(0.0), Rectangle):

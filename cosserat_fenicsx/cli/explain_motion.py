@@ -1,21 +1,22 @@
-"""What would be simulated, in plain sentences, without simulating it."""
+"""`cosserat explain` of a motion: the scene, the model, scheme and steps in sentences, without simulating."""
 
 from cosserat_fenicsx.cli.explain import of_the_scene
+from cosserat_fenicsx.dynamics.initial_equilibrium import before
 from cosserat_fenicsx.dynamics.simulate import DEGREE, ELEMENTS, TOL, pace_of
 from cosserat_fenicsx.dynamics.solvers import chosen_model
-from cosserat_fenicsx.dynamics.standing import before
 from cosserat_fenicsx.dynamics.steppers import SCHEMES
 from cosserat_fenicsx.models.rod_data import check_inertia
 from cosserat_fenicsx.models.rodmesh import Layout
-from cosserat_fenicsx.models.shape import Shape
+from cosserat_fenicsx.models.signature import Signature
+from cosserat_fenicsx.scene.describe import describe
+from cosserat_fenicsx.scene.magnitudes import check_magnitudes
 from cosserat_fenicsx.scene.signals import signals_of
-from cosserat_fenicsx.scene.words import describe
 
 _UNKNOWNS = {"planar": "centreline and angle theta in a plane", "spatial": "centreline r and quaternion q in space"}
 
 
 def explain_motion(scene, settings):
-    """Text on the motion of a scene.
+    """Sentences on a scene and the motion that would be simulated.
 
     Args:
         scene: a `Scene`.
@@ -29,10 +30,11 @@ def explain_motion(scene, settings):
     duration = settings["duration"]
     scene = scene.over(duration)
     check_inertia(scene)
+    check_magnitudes(scene, settings.get("load_factor") or 1.0)
     scheme, start = settings.get("scheme", "momentum"), settings.get("start")
     elements, degree = settings.get("elements", ELEMENTS), settings.get("degree", DEGREE)
     model, why = chosen_model(scene, settings.get("model", "auto"), scheme)
-    shape = Shape.of(scene, Layout.of(scene, elements), formulation="displacement", degree=degree, model=model)
+    signature = Signature.of(scene, Layout.of(scene, elements), formulation="displacement", degree=degree, model=model)
     return "\n".join([
         *of_the_scene(scene),
         *(_inertia(rod) for rod in scene.rods),
@@ -41,7 +43,8 @@ def explain_motion(scene, settings):
         f"Motion: {duration:g} s. {_steps(settings)} {_saved(settings)}",
         f"Scheme: {scheme}, of order {SCHEMES[scheme].order} in time.",
         f"Model: {model} ({_UNKNOWNS[model]}): {why}.",
-        f"Mesh: {elements} element(s) of degree {degree} per rod, {shape.unknowns} unknowns; compare with more elements.",
+        f"Mesh: {elements} element(s) of degree {degree} per rod, {signature.unknowns} unknowns; compare with more "
+        "elements.",
     ])  # fmt: skip
 
 
@@ -64,13 +67,13 @@ def _damping(damping):
 
 
 def _in_time(item):
-    """What depends on time, how, and where steps land."""
+    """The functions of time of a load or support, and the times that steps end at."""
     parts = []
     for field, signal in signals_of(item).items():
         given = signal.function
         name = type(given).__name__ if type(given).__module__.endswith("signals") else "a function of time"
         marks = ", ".join(f"{t:g}" for t in signal.jumps if t >= 0)
-        parts.append(f"{field} by {name}" + (f", steps land on t = {marks} s" if marks else ""))
+        parts.append(f"{field} by {name}" + (f", steps end at t = {marks} s" if marks else ""))
     return f"{describe(item)} depends on time: {'; '.join(parts)}."
 
 
@@ -83,7 +86,7 @@ def _start(scene, start, load_factor):
     loads = ", ".join(describe(x) for x in before(scene).loads) or "prescribed motions"
     as_they_are = "as they are just before t = 0" if scene.moving else "constant"
     then = start if load_factor is None else load_factor
-    after = "then nothing of the loads remains" if then == 0 else f"then the load factor is {then:g}"
+    after = "then the loads are removed" if then == 0 else f"then the load factor is {then:g}"
     return f"Start: the static equilibrium at load factor {start:g} ({loads}, {as_they_are}){velocities}; {after}."
 
 
@@ -91,11 +94,11 @@ def _steps(settings):
     if "dt" in settings:
         return f"Steps of {settings['dt']:g} s, halved where one fails."
     return (
-        "Steps adapt: the errors of single steps may add up to "
-        f"tol = {settings.get('tol', TOL):g} of the longest rod over the whole duration."
+        "Steps adapt: the local errors of all steps may add up to "
+        f"tol = {settings.get('tol', TOL):g} times the longest rod's length."
     )
 
 
 def _saved(settings):
     every = settings.get("save_every")
-    return "Every step is saved." if every is None else f"States are saved every {every:g} s, landed on exactly."
+    return "Every step is saved." if every is None else f"States are saved every {every:g} s exactly."

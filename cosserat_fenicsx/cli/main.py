@@ -1,6 +1,6 @@
 """The command line: run a scene file, explain what would be solved.
 
-Only the standard library is imported until a command has to work, so that --help is instant.
+Modules beyond the standard library are imported by the commands that need them, so that --help is instant.
 """
 
 import sys
@@ -8,7 +8,7 @@ import sys
 from cosserat_fenicsx import interrupts
 from cosserat_fenicsx.cli.deliver import deliver
 from cosserat_fenicsx.cli.options import parser
-from cosserat_fenicsx.cli.say import BAD_INPUT, DONE, NOT_CONVERGED, say
+from cosserat_fenicsx.cli.say import BAD_INPUT, DONE, INTERRUPTED, NOT_CONVERGED, say
 from cosserat_fenicsx.errors import CosseratError, NotConverged, SceneError
 
 
@@ -26,6 +26,9 @@ def main(arguments=None):
     interrupts.listen()
     try:
         return options.do(options)
+    except KeyboardInterrupt:  # of commands without partial results; `deliver` handles paths and motions
+        say("cosserat: interrupted")
+        return INTERRUPTED
     except CosseratError as problem:
         say(f"cosserat: {problem}")
         return BAD_INPUT
@@ -36,7 +39,7 @@ def main(arguments=None):
 
 
 def _settings(options):
-    """The scene and the arguments of `solve`: those of the file, those of the command line over them."""
+    """The scene and the arguments of `solve`: options of the command line replace those of the file."""
     from cosserat_fenicsx.scene.scenefile import read_scene
 
     scene, settings = read_scene(options.scene)
@@ -58,7 +61,9 @@ def _load_factors(text):
     except ValueError:
         values = []
     if not values or (separator == ":" and len(values) != 2):
-        raise SceneError(f"load factors '{text}': expected A:B (the solver chooses its steps) or A,B,... (landed on)")
+        raise SceneError(
+            f"load factors '{text}': expected A:B (the solver chooses its steps) or A,B,... (reached exactly)"
+        )
     return tuple(values) if separator == ":" else values
 
 
@@ -70,7 +75,7 @@ def _run(options):
 
     scene = moving[0] if moving else scene
     if options.station:
-        scene.station(options.station)  # refused before the work
+        scene.station(options.station)  # refused before the computation
     for caution in scene.cautions:
         say(f"cosserat: {caution}")
 
@@ -90,7 +95,7 @@ def _resume(options):
     if options.station:
         from cosserat_fenicsx.dynamics.resuming import read_history
 
-        read_history(options.folder).station(options.station)  # refused before the work
+        read_history(options.folder).station(options.station)  # refused before the computation
 
     def computed():
         from cosserat_fenicsx.dynamics.resuming import resume
@@ -115,7 +120,7 @@ def _modes(options):
 
 
 def _tabulate(options, table_of):
-    """Print a table of the scene; the exit code."""
+    """Print the table of a scene that `table_of` makes; returns the exit code."""
     from cosserat_fenicsx.scene.scenefile import read_scene
 
     scene, _ = read_scene(options.scene)

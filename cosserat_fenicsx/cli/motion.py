@@ -1,4 +1,4 @@
-"""The command line's motions: what `cosserat run` and `cosserat explain` do with a scene that has a duration."""
+"""Motions on the command line: `cosserat run` and `cosserat explain` of a scene with a duration."""
 
 from cosserat_fenicsx.errors import SceneError
 
@@ -11,13 +11,13 @@ _BOTH = ("tol", "elements", "degree", "model")
 
 
 def motion_of(options):
-    """The scene and the arguments of `simulate`, or None where an equilibrium path is asked for.
+    """The scene and the arguments of `simulate`, or None where an equilibrium path is requested.
 
     Args:
-        options: of the command line; they go before what the file says.
+        options: of the command line; they replace the arguments in the file.
 
     Raises:
-        SceneError: a file that cannot be read, or options of the one with the other.
+        SceneError: a file that cannot be read, or an option of a path for a motion or vice versa.
     """
     from cosserat_fenicsx.scene.scenefile import read_motion
 
@@ -47,6 +47,6 @@ def refuse_other(name, moves):
     if moves:
         raise SceneError(f"{option} is for an equilibrium path, and this scene is a motion: expected --static as well")
     raise SceneError(
-        f"{option} is for a motion, and this scene is an equilibrium path: expected a duration too, under [simulate] in the "
-        "file or by --duration, and no --static"
+        f"{option} is for a motion, and this scene is an equilibrium path: expected a duration too, under [simulate] "
+        "in the file or by --duration, and no --static"
     )

@@ -1,4 +1,4 @@
-"""What the command line understands."""
+"""The commands and options of the command line."""
 
 import argparse
 from pathlib import Path
@@ -7,17 +7,17 @@ from cosserat_fenicsx import __version__
 
 
 def parser(do):
-    """Of the command line.
+    """The argument parser.
 
     Args:
-        do: by the names of the commands, what they call with the options.
+        do: {name of a command: function that is called with the options}.
     """
     whole = argparse.ArgumentParser(
         prog="cosserat",
-        description="Geometrically exact rods on FEniCSx: equilibrium path or motion of a scene described in a TOML file; a "
-        "motion where the file has a [simulate] table, or --duration is given.",
-        epilog="Exit codes: 0 done, 1 not converged, 2 bad input, 130 interrupted; after 1 and 130 what was reached is "
-        "printed and written. "
+        description="Geometrically exact rods on FEniCSx: equilibrium path or motion of a scene described in a TOML "
+        "file; a motion where the file has a [simulate] table, or --duration is given.",
+        epilog="Exit codes: 0 done, 1 not converged, 2 bad input, 130 interrupted; after 1 and 130 the partial result "
+        "is printed and written. "
         "In parallel: mpirun -n 2 cosserat run scene.toml",
     )
     whole.add_argument("--version", action="version", version=f"cosserat_fenicsx {__version__}")
@@ -28,14 +28,14 @@ def parser(do):
     motion.add_argument(
         "--folder",
         metavar="DIR",
-        help="write the motion there as it goes; whatever ends it, `cosserat resume DIR` goes on",
+        help="write the motion there during the run; whatever ends it, `cosserat resume DIR` continues it",
     )
     _outputs(run)
     run.set_defaults(do=do["run"])
 
-    resume = commands.add_parser("resume", help="go on with a motion that was run with --folder, to the same digits")
-    resume.add_argument("folder", help="the DIR of --folder; a part of it is a pickle: trust where it comes from")
-    resume.add_argument("--duration", type=float, help="s; a longer one than before")
+    resume = commands.add_parser("resume", help="continue a motion that was run with --folder, to the same digits")
+    resume.add_argument("folder", help="the DIR of --folder; it holds a pickle, so its source must be trusted")
+    resume.add_argument("--duration", type=float, help="s; longer than before")
     _outputs(resume)
     resume.set_defaults(do=do["resume"])
 
@@ -57,25 +57,25 @@ def parser(do):
 
 
 def _outputs(parser):
-    """What is written of a path or a motion."""
+    """Add the options on output files and pictures of a path or a motion."""
     parser.add_argument(
         "-o",
         "--output",
         metavar="DIR",
-        help="write path.xdmf, path.h5, path.csv and rods.png there, of a motion motion.xdmf, .h5, .csv, rods.png and "
-        "energy.png; without it only the table is shown",
+        help="write path.xdmf, path.h5, path.csv and rods.png there, or of a motion motion.xdmf, .h5, .csv, rods.png "
+        "and energy.png; without it only the table is shown",
     )
     parser.add_argument("--no-picture", action="store_true", help="write no pictures")
     parser.add_argument(
-        "--magnify", type=float, default=1.0, help="pictures: draw displacements this many times their size [1]"
+        "--magnify", type=float, default=1.0, help="pictures: factor on displacements [1]"
     )
     parser.add_argument(
         "--station",
         metavar="ROD@S",
-        help="what the table tells of: rod.end, rod@1.5 (m) [the end, or place of a load or support, that moves most]",
+        help="station of the table: rod.end, rod@1.5 (m) [of the ends, loads and supports the one that moves most]",
     )
     parser.add_argument(
-        "--at", metavar="A,B,...", help="pictures: the load factors or times (s) to draw; the nearest that there are"
+        "--at", metavar="A,B,...", help="pictures: the load factors or times (s) to draw; the nearest computed ones"
     )
     parser.add_argument(
         "--animate",
@@ -85,30 +85,33 @@ def _outputs(parser):
         const="motion.gif",
         help="motions: write a film too, .gif or .mp4 [motion.gif]",
     )
-    parser.add_argument("--speed", type=float, help="films: seconds of the motion in one second [1 where that suits]")
+    parser.add_argument(
+        "--speed", type=float, help="films: seconds of the motion per second [1 for motions of 4 to 20 s]"
+    )
 
 
 def _film(name):
-    """The name of a film; without one, --animate takes what comes after it, the scene file too."""
+    """The name of a film; --animate without a name would take the argument after it, such as the scene file."""
     if Path(name).suffix == ".toml":
         raise argparse.ArgumentTypeError(f"{name} is no film: put the scene before --animate")
     return name
 
 
 def _common(parser):
-    """What is solved or simulated; returns the group of a motion's options."""
+    """Add the scene and the options of `solve` and `simulate`; returns the group of a motion's options."""
     parser.add_argument("scene", help="scene file (TOML)")
     parser.add_argument("--load-factors", metavar="A:B | A,B,...",
-                        help="0:1.5 lets the solver choose its steps, 0.5,0.9,1 lands on each; negative ones with =, --load-factors=-1:1")  # fmt: skip
+                        help="0:1.5 lets the solver choose its steps, 0.5,0.9,1 reaches each exactly; negative ones "
+                        "with =, --load-factors=-1:1")  # fmt: skip
     parser.add_argument("--tol", type=float,
-                        help="estimated error of positions over the largest displacement [1e-6]; of a motion that of its steps, "
-                        "over the longest rod's length [1e-3]")  # fmt: skip
+                        help="estimated error of positions over the largest displacement [1e-6]; of a motion that of "
+                        "its steps, over the longest rod's length [1e-3]")  # fmt: skip
     parser.add_argument("--elements", type=int, help="elements per rod; fixes the mesh, no error estimate")
     parser.add_argument("--degree", type=int, help="polynomial degree of r and q, 1 to 4 [4]")
     parser.add_argument("--formulation", help="mixed, displacement or multiplier [mixed]")
     parser.add_argument("--model", help="auto, determinate, planar or spatial [auto]")
     parser.add_argument(
-        "--control", help="auto, load (stop at a limit point) or arc (along the path, never back) [auto]"
+        "--control", help="auto, load (stop at a limit point) or arc (arc length along the path, never back) [auto]"
     )
     parser.add_argument("--branch", type=int, help="1 or -1: leave the path at its first bifurcation")
     parser.add_argument("--static", action="store_true", help="the equilibrium path, whatever [simulate] says")
@@ -118,6 +121,6 @@ def _common(parser):
     motion.add_argument("--scheme", help="momentum, energy, triple-jump or generalised-alpha [momentum]")
     motion.add_argument("--save-every", type=float, help="s between saved states [every step]")
     motion.add_argument(
-        "--start", type=float, help="begin at the equilibrium of this load factor, as things are just before t = 0"
+        "--start", type=float, help="begin at the equilibrium for this load factor of the scene just before t = 0"
     )
     return motion

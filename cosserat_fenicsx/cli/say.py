@@ -1,4 +1,4 @@
-"""What the command line says, once however many processes there are, and its exit codes."""
+"""Messages of the command line, printed by one MPI rank alone, and its exit codes."""
 
 import sys
 
@@ -7,7 +7,7 @@ DONE, NOT_CONVERGED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
 
 
 def first_rank():
-    """True on rank 0, and where MPI was never loaded."""
+    """True on rank 0, and where MPI is not loaded."""
     if "mpi4py" not in sys.modules:
         return True
     from mpi4py import MPI

@@ -1,1 +1,2 @@
-"""Motion: where it starts, what it lands on, steps in time and their length, `simulate`, `resume` and `modes`."""
+"""Motions in time: initial state, times that steps end at, time steppers, step size control; `simulate`, `resume`,
+`modes`."""

@@ -1,8 +1,9 @@
-"""Natural frequencies and modes about a static state, by SLEPc."""
+"""Natural frequencies and modes of small vibrations about a static state."""
 
+import contextlib
 import math
 import numbers
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from mpi4py import MPI
@@ -11,28 +12,31 @@ from scipy import sparse
 from cosserat_fenicsx.algebra.packed import Packed
 from cosserat_fenicsx.algebra.pencil import Pencil
 from cosserat_fenicsx.checks import instance, number, refuse
+from cosserat_fenicsx.element import lobatto_weights
 from cosserat_fenicsx.errors import NotConverged
-from cosserat_fenicsx.models.compiled import lobatto_weights
 from cosserat_fenicsx.models.rod_data import check_inertia, nodal_inertia
 from cosserat_fenicsx.quaternions import directors
 from cosserat_fenicsx.results.on_nodes import OnNodes
+from cosserat_fenicsx.scene.magnitudes import check_magnitudes
 from cosserat_fenicsx.scene.scene import Scene
 from cosserat_fenicsx.scene.statical import without_mechanism
-from cosserat_fenicsx.statics.continuation import StepControl
+from cosserat_fenicsx.statics.circulatory import circulatory_part
 from cosserat_fenicsx.statics.first_mesh import FIRST_ELEMENTS
-from cosserat_fenicsx.statics.follow import Follower
+from cosserat_fenicsx.statics.grading import layers_of
+from cosserat_fenicsx.statics.path.follower import Follower
+from cosserat_fenicsx.statics.path.load_control import StepControl
 from cosserat_fenicsx.statics.refinement import until_two_meshes_agree
 from cosserat_fenicsx.statics.solve import check_arguments
 from cosserat_fenicsx.statics.solvers import solvers_of
 
 _MOST_ELEMENTS = 128
-# Newton iterations from an equilibrium that is held fast to the same one that is not.
+# Newton iterations allowed after the added constraints of a mechanism are removed.
 _CORRECTIONS = 10
-# A mode that displaces less than this, over the longest rod's length times its largest turn, is one of twist.
+# Largest displacement of a mode of pure twist, over its largest rotation times the longest rod's length.
 _TWIST = 1e-6
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Modes(OnNodes):
     """Result of `modes`.
 
@@ -41,28 +45,47 @@ class Modes(OnNodes):
         squares: (n,) omega^2, rad^2/s^2, ascending; below zero the state is unstable; zero for free rigid motions.
         error: (n,) estimated relative error of the squares; NaN where the mesh was given.
         shapes: (n, N, 6) displacements (m) and rotations (rad), inertial, of all nodes of all rods in the scene's
-            order; the largest displacement has length 1, or the largest turn times the longest rod's length, where
+            order; the largest displacement has length 1, or the largest rotation times the longest rod's length where
             nothing is displaced.
-        negative_modes: negative squares of the second variation at that state, as `Path.negative_modes`.
-        elements: of each rod; degree: of the elements.
+        negative_modes: number of negative eigenvalues of the second variation at that state, as `Path.negative_modes`.
+        elements: number of elements of each rod; degree: of the elements.
+        conservative: whether the loads have a potential near that state, for all motions that the supports allow. Where
+            they have none, `squares` are those of the symmetric part of K: the smallest is a lower bound of the real
+            parts of omega^2, but the vibrations differ, and flutter is not detected.
     """
 
-    scene: object = field(repr=False)
+    scene: object
     squares: np.ndarray
     error: np.ndarray
-    shapes: np.ndarray = field(repr=False)
+    shapes: np.ndarray
     negative_modes: int
     elements: tuple
     degree: int
+    conservative: bool
+
+    @property
+    def caution(self):
+        """The limits of the result, in a sentence; "" where the loads have a potential."""
+        if self.conservative:
+            return ""
+        return (
+            "The loads have no potential: these are the vibrations of the symmetric part of the stiffness alone, and "
+            "the structure may flutter, which a motion shows (`simulate`)."
+        )
+
+    def __repr__(self):
+        names = ("squares", "error", "negative_modes", "elements", "degree", "conservative")
+        values = ", ".join(f"{name}={getattr(self, name)!r}" for name in names)
+        return f"<Modes: {values}. {self.caution}>" if self.caution else f"<Modes: {values}>"
 
     @property
     def frequencies(self):
-        """(n,) Hz; 0 for what is unstable."""
+        """(n,) Hz; 0 for unstable modes."""
         return np.sqrt(np.maximum(self.squares, 0.0)) / (2 * math.pi)
 
     @property
     def growth(self):
-        """(n,) 1/s: what is unstable grows as exp(growth t); 0 for what is stable."""
+        """(n,) rates 1/s: unstable modes grow as exp(growth t); 0 for stable modes."""
         return np.sqrt(np.maximum(-self.squares, 0.0))
 
     def mode(self, k, rod=None):
@@ -77,27 +100,27 @@ class Modes(OnNodes):
 def modes(scene, count=1, *, load_factor=0.0, tol=1e-6, elements=None, degree=4, comm=None):
     """Natural frequencies and shapes of small undamped vibrations about a static state.
 
-    Of the second variation in (r, theta) and the inertia of the sections: K x = omega^2 M x, subject to what supports
-    and joints hold. Where moments or follower loads have no potential the symmetric part of K counts, which does not see
-    flutter.
+    K x = omega^2 M x under the constraints of supports and joints, with K the second variation in (r, theta) and M the
+    inertia of the sections. Where the loads have no potential (`Modes.conservative`) the symmetric part of K is used,
+    which does not detect flutter.
 
     Args:
         scene: a `Scene`; every rod needs a mass and inertia. Without a load factor it may be free to move.
-        count: how many, from the smallest square on.
-        load_factor: eta of the state, a point of the path of load control from the unloaded reference. A mechanism must be
-            drawn where its loads keep it, but for strains, such as a rod that hangs on a hinge.
+        count: number of modes, from the smallest square on.
+        load_factor: eta of the state, a point of the path of load control from the unloaded reference. The reference
+            of a mechanism, such as a rod that hangs on a hinge, must be its equilibrium position but for strains.
         tol: relative accuracy of the squares: elements are doubled until two meshes agree to it, unless `elements` is
             given.
         elements: elements per rod; fixes the mesh.
-        degree: 1 to 4.
+        degree: 1 to 4, of r and q.
         comm: MPI communicator; default all ranks. Every rank calls; each solves the whole eigenproblem.
 
     Returns:
-        Modes. It holds fewer than `count` where the mesh has no more.
+        Modes. It holds fewer than `count` where the mesh has fewer degrees of freedom.
 
     Raises:
         SceneError: an argument outside its range, or a rod without inertia.
-        NotConverged: the load factor is not reached, or the accuracy is not met.
+        NotConverged: the load factor or the accuracy is not reached.
     """
     instance("modes", "scene", scene, Scene, "a Scene")
     check_inertia(scene)
@@ -106,14 +129,15 @@ def modes(scene, count=1, *, load_factor=0.0, tol=1e-6, elements=None, degree=4,
         if isinstance(value, bool) or not isinstance(value, numbers.Integral) or value < 1:
             refuse("modes", name, value, "a whole number above zero")
     number("modes", "tol", tol, "a number from 1e-12 to below 1", lambda x: 1e-12 <= x < 1)
-    if load_factor:
+    if load_factor or _permanent(scene):
         check_arguments(without_mechanism(scene), tol, elements)
+        check_magnitudes(scene, load_factor)
     comm = comm or MPI.COMM_WORLD
 
     def apart(fine, coarse):
         return np.abs(fine - coarse) / np.where(fine == 0, np.inf, np.abs(fine))
 
-    (squares, shapes, negative), error, layout = until_two_meshes_agree(
+    (squares, _, shapes, negative, conservative), error, layout = until_two_meshes_agree(
         scene,
         lambda layout: _on_mesh(scene, layout, count, load_factor, degree, comm),
         apart,
@@ -124,47 +148,70 @@ def modes(scene, count=1, *, load_factor=0.0, tol=1e-6, elements=None, degree=4,
         degree=degree,
         advice="a larger tol or fewer modes",
     )
-    return Modes(scene, squares, error, shapes, negative, layout.counts, degree)
+    return Modes(scene, squares, error, shapes, negative, layout.counts, degree, conservative)
 
 
 def _on_mesh(scene, layout, count, load_factor, degree, comm):
-    """Squares (n,), shapes (n, N, 6) and the number of negative modes on one mesh."""
-    problem, stability = _loaded(scene, layout, load_factor, degree, comm)
+    """The result on one mesh.
+
+    Returns:
+        Squares (n,), the lengths of boundary layers or None, shapes (n, N, 6), the number of negative modes, and
+        whether the loads have a potential.
+    """
+    with _loaded(scene, layout, load_factor, degree, comm) as (problem, stability):
+        found = _of_problem(problem, stability, count, load_factor)
+        rq = problem.model.snapshot()[0]
+    with circulatory_part(scene, layout, degree, comm) as circulatory:
+        return *found, circulatory.vanishes(rq, load_factor)
+
+
+def _of_problem(problem, stability, count, load_factor):
     negative = stability.count() if load_factor else 0
     K, rows, held = _stiffness(problem)
-    unit = max(float(rod.profile.range[1].mass) for rod in scene.rods)
+    unit = max(float(rod.profile.range[1].mass) for rod in problem.model.scene.rods)
     M = _mass(problem.model, rows, K.shape[0], unit)
     squares, vectors = Pencil(K, M, held).lowest(count)
-    if (squares == 0).any():  # those below are known then, and rounding has given these a sign
+    if (squares == 0).any():  # `stability` counts these by the sign of their rounding; all negative ones are known here
         negative = np.count_nonzero(squares < 0)
     scales = problem.model.scales
     shapes = np.array([_shape(vector, rows) for vector in vectors.T]).reshape(len(squares), -1, 6)
     shapes[:, :, 3:] /= scales.length
-    return squares * scales.force / (unit * scales.length**2), shapes, negative
+    layers = layers_of(problem.model) if load_factor else None
+    return squares * scales.force / (unit * scales.length**2), layers, shapes, negative
 
 
+@contextlib.contextmanager
 def _loaded(scene, layout, load_factor, degree, comm):
-    """The problem, in equilibrium at a load factor, and its stability.
+    """Context manager that gives the problem, in equilibrium at a load factor, and its `NegativeModes`.
 
-    A mechanism that its loads keep in place has no path from the unloaded state: its equilibrium is the one where it is held
-    fast, from where Newton's method goes on without.
+    A mechanism that its loads stabilise has no path from the unloaded state. Its equilibrium is first computed with
+    added constraints (`without_mechanism`), then corrected by Newton's method without these.
     """
-    held = without_mechanism(scene) if load_factor else scene
-    problem, newton, stability = solvers_of(held, layout, degree=degree, comm=comm)
-    if load_factor:
-        follower = Follower(problem, newton, stability, StepControl(), control="load")
-        if not follower.to(load_factor, abs(load_factor)):
-            _give_up(load_factor, follower.track.failure)
-    if held is not scene:
-        rq, n = problem.model.snapshot()  # on the same mesh
-        problem, newton, stability = solvers_of(scene, layout, degree=degree, comm=comm)
+    loaded = load_factor or _permanent(scene)
+    held = without_mechanism(scene) if loaded else scene
+    with solvers_of(held, layout, degree=degree, comm=comm) as (problem, newton, stability):
+        if loaded:
+            follower = Follower(problem, newton, stability, StepControl(), control="load")
+            if not follower.to(load_factor, abs(load_factor) or 1.0):
+                _give_up(load_factor, follower.track.failure)
+        if held is scene:
+            yield problem, stability
+            return
+        # the initial guess of the problem without added constraints, on the same mesh
+        rq, n = problem.model.snapshot()
+    with solvers_of(scene, layout, degree=degree, comm=comm) as (problem, newton, stability):
+        problem.end_beginning()
         problem.set_load_factor(load_factor)
         problem.begin_at(problem.model.unknowns_of(rq), n[..., :3], np.zeros(len(problem.multipliers())))
         newton.allow(_CORRECTIONS)
         solved = newton.solve()
         if not solved.converged:
             _give_up(load_factor, f"{solved.reason} next to the reference, where the scene is a mechanism")
-    return problem, stability
+        yield problem, stability
+
+
+def _permanent(scene):
+    return any(action.permanent for action in scene.actions)
 
 
 def _give_up(load_factor, why):
@@ -172,7 +219,10 @@ def _give_up(load_factor, why):
 
 
 def _shape(vector, rows):
-    """(N, 6) motion of the nodes, scaled as `Modes.shapes`; the first node that moves farthest does so along a positive axis."""
+    """(N, 6) motion of the nodes, scaled as `Modes.shapes`.
+
+    The sign is such that the largest component of the first node with the largest motion is positive.
+    """
     shape = np.where(rows >= 0, vector[rows], 0.0)
     moved, turned = shape[:, :3], shape[:, 3:]
     part = moved if np.abs(moved).max() > _TWIST * np.abs(turned).max() else turned
@@ -182,19 +232,20 @@ def _shape(vector, rows):
 
 
 def _stiffness(problem):
-    """K (sparse), the numbers of all nodes in it (N, 6), -1 where clamped, and the gradients of what supports and
-    joints hold, (equations, size)."""
+    """K (sparse), the row numbers of all nodes (N, 6), -1 where clamped, and the constraint gradients.
+
+    The gradients (equations, size) are those of the constraints of supports and joints.
+    """
     model = problem.model
     (variation,) = model.second_variations
     tied = variation.tied
     K = variation.numbering.matrix(variation.cell_dofs, tied[tied >= 0])
-    stiff, true = model.data.K_stiff.x.array, model.data.K.x.array
-    kept = stiff.copy()
-    stiff[true > 0] = true[true > 0]  # bounded otherwise, which is enough for signs
+    true = model.section.K
+    model.stiffen(np.where(np.isfinite(true), true, model.bounded_K))  # stability counts bound finite ones as well
     Packed(variation.form, ()).add_to_matrix(K)
-    stiff[:] = kept
+    model.stiffen(model.bounded_K)
     if problem.ties:
-        problem.ties.add_second_variation(K, tied, variation.axes, problem.load_factor, held=False)
+        problem.ties.add_second_variation(K, tied, variation.axes, problem.eta)
     K.assemble()
     size = K.getSize()[0]
     parts = model.comm.allgather(K.getValuesCSR())
@@ -202,14 +253,14 @@ def _stiffness(problem):
     held = np.zeros((0, size + 1))
     if problem.ties:
         gradients = problem.ties.gradients()
-        held = np.zeros((len(gradients), size + 1))  # what is clamped goes to the last column
+        held = np.zeros((len(gradients), size + 1))  # number -1, a clamped component, goes to the last column
         held[:, tied.ravel()] = gradients.reshape(len(gradients), -1)
     return (K + K.T) / 2, model.rows_of_nodes, held[:, :size]
 
 
 def _mass(model, rows, size, unit):
-    """M (sparse, in blocks): one for each node, by the rule that has the nodes as points."""
-    scene, layout, scales, p = model.scene, model.layout, model.scales, model.shape.degree
+    """M over `unit` (sparse, one diagonal 6 x 6 block per node), by Lobatto quadrature with the nodes as points."""
+    scene, layout, scales, p = model.scene, model.layout, model.scales, model.signature.degree
     q = model.snapshot()[0][:, 3:]
     first = 0
     weights, sizes = lobatto_weights(model.nodes), layout.sizes(scene) / scales.length

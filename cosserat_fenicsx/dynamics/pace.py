@@ -1,18 +1,18 @@
-"""How long the steps in time are."""
+"""Step size control: fixed steps, and adaptive ones."""
 
 import math
 
-from cosserat_fenicsx.dynamics.resolution import Resolution, coarse_for
+from cosserat_fenicsx.dynamics.resolution import Resolution, unresolved_by_fixed_steps
 
 
 class Fixed:
-    """Steps of one length, shorter where they have to land on a time.
+    """Steps of one length, shortened so that a whole number of them ends at every `Mark`.
 
     Args:
         dt: s.
 
     Attributes:
-        stuck: whether steps have been too short for so long that there is no end of it.
+        stuck: whether thousands of steps in a row were tiny, so that the motion makes no progress.
     """
 
     def __init__(self, dt):
@@ -21,78 +21,83 @@ class Fixed:
     stuck = False
 
     def length(self, t, left):
-        """The next step from the time t where so much is left to the next time to land on, s."""
+        """The length of the next step (s) from the time t (s), `left` (s) before the next `Mark`."""
         return _even(left, self._dt)
 
     def accepts(self, stepper, h):
-        """Whether a stepper's last step, of length h, stands."""
+        """Whether the last step of a stepper, of length h (s), is accepted."""
         return True
 
     def failed(self, h):
-        """A step of length h failed: whether a shorter one is tried in its place; otherwise it is halved, whatever that gives."""
+        """Newton's method failed in a step of length h (s).
+
+        Returns:
+            True where the step is to be repeated with the shorter `length`; False where it is to be halved, without an
+            error test of the halves.
+        """
         return False
 
-    def watch(self, scene, duration, load_factor, missed):
-        """Look at the loads and the prescribed motions of a scene.
+    def watch(self, scene, duration, load_factor, impulse_error):
+        """Take the loads and the prescribed motions of a scene into account.
 
         Args: as of `Resolution`.
 
         Returns:
-            what to be told of it, sentences.
+            warnings, a list of sentences.
         """
-        told = coarse_for(scene, duration, self._dt)
-        return [told] if told else []
+        warning = unresolved_by_fixed_steps(scene, duration, self._dt)
+        return [warning] if warning else []
 
     def jump(self):
-        """Something jumps here."""
+        """A load jumps at the current time, or a prescribed motion has a kink."""
 
     def memory(self):
-        """What the steps to come depend on, see `Stepper.memory`."""
+        """The state of the control that later steps depend on, see `Stepper.memory`."""
         return {}
 
     def recall(self, memory):
-        """Take back what `memory` gave."""
+        """Restore what `memory` returned."""
 
 
 class Adaptive:
     """Steps whose local errors add up to `tol` over the duration, and that resolve loads and prescribed motions.
 
-    They change where a change pays: each costs a tangent.
+    The length changes only where that saves time: every change costs a new tangent and its factorisation.
 
     Args:
         tol: see `simulate`; duration: s.
     """
 
-    #: the first step after the start or a jump, over the one that would do, and over the duration
-    _FIRST, _SHORTEST = 1 / 8, 1e-4
-    #: share of the error that is allowed that steps aim at; the error over the step goes with the square of the step
-    _AIM = 0.5
-    #: steps stay where the next would be longer by less than the first factor and shorter by less than the second; at once
-    #: they grow by no more than the third and shrink by no more than the fourth
-    _LONGER, _SHORTER, _GROW, _SHRINK = 1.2, 0.9, 4.0, 0.25
+    #: factor on the step after a jump; the first step of a motion over the duration
+    _AFTER_JUMP, _INITIAL = 1 / 8, 1e-4
+    #: share of the allowed local error that steps aim at; the error per unit of time is proportional to h^2
+    _SAFETY = 0.5
+    #: the length is kept where the best one lies between these factors of it; one change is limited to the other two
+    _KEEP_BELOW, _KEEP_ABOVE, _LARGEST_GROWTH, _LARGEST_CUT = 1.2, 0.9, 4.0, 0.25
 
-    #: `error` looks far back, and sees little of what sets in all at once: a step that ends farther from where it was foretold
-    #: than this share of tol is not believed, unless it is shorter than that share of the duration
-    _SURPRISING, _BELIEVED = 0.06, 1e-7
+    #: `Stepper.error` is a difference over many steps, and hardly shows what starts suddenly: a step whose end differs
+    #: from the predictor by more than the first number times tol is rejected, unless it is shorter than the second
+    #: number times the duration
+    _PREDICTION, _ALWAYS_ACCEPTED = 0.06, 1e-7
 
-    #: steps shorter than this share of the duration are tiny, and so many of them in a row too many
+    #: steps shorter than this share of the duration are tiny; more than so many of them in a row are too many
     _TINY, _MANY = 1e-6, 5000
-    #: for so many steps after loads have asked for shorter ones they do not grow
-    _STAY = 24
+    #: number of steps that the length does not grow for after a load has required a shorter one
+    _HOLD = 24
 
     def __init__(self, tol, duration):
         self._duration, self._rate, self._dt, self._longest = (
             duration,
             tol / duration,
-            duration * self._SHORTEST,
+            duration * self._INITIAL,
             duration / 100,
         )
-        self._surprising, self._believed = self._SURPRISING * tol, self._BELIEVED * duration
-        self._tol, self._stay, self._tiny = tol, 0, 0
+        self._largest_prediction_error, self._always_accepted = self._PREDICTION * tol, self._ALWAYS_ACCEPTED * duration
+        self._tol, self._hold, self._tiny = tol, 0, 0
 
-    def watch(self, scene, duration, load_factor, missed):
-        """See `Fixed`: steps are to resolve them."""
-        self._resolution = Resolution(scene, duration, self._tol, load_factor, missed)
+    def watch(self, scene, duration, load_factor, impulse_error):
+        """See `Fixed`: steps will resolve them."""
+        self._resolution = Resolution(scene, duration, self._tol, load_factor, impulse_error)
         return []
 
     @property
@@ -105,7 +110,7 @@ class Adaptive:
         h = _even(left, self._dt)
         resolved = self._resolution.longest(t, h)
         if resolved < h:
-            self._dt, self._stay = resolved, self._STAY
+            self._dt, self._hold = resolved, self._HOLD
             h = _even(left, resolved)
         return h
 
@@ -116,44 +121,45 @@ class Adaptive:
             self._tiny += 1
         elif accepted:
             self._tiny = 0
-        self._stay -= accepted and self._stay > 0
+        self._hold -= accepted and self._hold > 0
         return accepted
 
     def _accepts(self, stepper, h):
-        if h > self._believed and stepper.surprise() > self._surprising:
-            self._dt = self._SHRINK * h
+        if h > self._always_accepted and stepper.prediction_error() > self._largest_prediction_error:
+            self._dt = self._LARGEST_CUT * h
             return False
         error, allowed = stepper.error(), self._rate * h
-        if error is None:  # soon after a jump steps may only grow
+        if error is None:  # the rough estimate from few steps after a jump may only lengthen steps
             error = stepper.error(early=True)
-            if error is None or self._LONGER**2 * error > self._AIM * allowed:
+            if error is None or self._KEEP_BELOW**2 * error > self._SAFETY * allowed:
                 return True
-        factor = min(self._GROW, max(self._SHRINK, math.sqrt(self._AIM * allowed / max(error, 1e-300))))
-        if factor < self._SHORTER:
+        factor = math.sqrt(self._SAFETY * allowed / max(error, 1e-300))
+        factor = min(self._LARGEST_GROWTH, max(self._LARGEST_CUT, factor))
+        if factor < self._KEEP_ABOVE:
             self._dt = min(self._dt, factor * h)
-        elif factor > self._LONGER and not self._stay and h > self._dt / self._LONGER:
+        elif factor > self._KEEP_BELOW and not self._hold and h > self._dt / self._KEEP_BELOW:
             self._dt = min(factor * h, self._longest)
         return error <= 2 * allowed
 
     def failed(self, h):
         """See `Fixed`."""
         self._dt = h / 2
-        return h > self._believed
+        return h > self._always_accepted
 
     def jump(self):
         """See `Fixed`."""
-        self._dt *= self._FIRST
+        self._dt *= self._AFTER_JUMP
 
     def memory(self):
         """See `Fixed`."""
-        return {"dt": self._dt, "stay": self._stay, "tiny": self._tiny, "seen": self._resolution.memory()}
+        return {"dt": self._dt, "stay": self._hold, "tiny": self._tiny, "seen": self._resolution.memory()}
 
     def recall(self, memory):
         """See `Fixed`."""
-        self._dt, self._stay, self._tiny = memory["dt"], memory["stay"], memory["tiny"]
+        self._dt, self._hold, self._tiny = memory["dt"], memory["stay"], memory["tiny"]
         self._resolution.recall(memory["seen"])
 
 
 def _even(left, dt):
-    """A step of dt at most that goes evenly into what is left, but for rounding."""
+    """The largest step, at most dt but for rounding, that a whole number of covers `left`; s."""
     return left / max(1, math.ceil(left / dt - 1e-9))

@@ -1,6 +1,6 @@
-"""`resume`: a motion that was written as it went goes on; `read_history`: it is looked at as far as it is."""
+"""`resume` continues a motion from the folder it was written to; `read_history` reads the states saved there so far."""
 
-import cosserat_fenicsx.compat  # noqa: F401, I001  first: it says in words what of dolfinx is missing
+import cosserat_fenicsx.compat  # noqa: F401, I001  first: its message says what is missing where dolfinx is
 
 import numpy as np
 from mpi4py import MPI
@@ -10,9 +10,10 @@ from cosserat_fenicsx.dynamics.simulate import check_counts, pace_of, positive_t
 from cosserat_fenicsx.dynamics.solvers import solvers_of
 from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.dynamics.marks import marks_of
+from cosserat_fenicsx.models.connections import Connections
 from cosserat_fenicsx.models.rodmesh import Layout
 from cosserat_fenicsx.models.scales import Scales
-from cosserat_fenicsx.dynamics.motion import Motion
+from cosserat_fenicsx.dynamics.time_loop import TimeLoop
 from cosserat_fenicsx.storage.runfolder import RunFolder
 from cosserat_fenicsx.scene.scene import Scene
 from cosserat_fenicsx.results.stored_history import StoredHistory
@@ -21,28 +22,28 @@ from cosserat_fenicsx.results.stored_history import StoredHistory
 def resume(folder, scene=None, *, duration=None, progress=None, comm=None):
     """Continue a motion from the folder that `simulate(..., folder=...)` writes, to the same digits.
 
-    It does not matter what ended the run: a killed process, Ctrl-C, a full disk. All saved states are kept; the run goes on
-    from what its solver remembered, two seconds of its work earlier at most (or fifty times as long as it takes to write
-    that down), and computes what lies between anew. In serial, with the same libraries, every number is the one of a run that
-    was never ended, bit by bit; in parallel to rounding, since MUMPS pivots as it finds its matrix. What comes to an
-    end in the same way again, such as steps that fail however short they are, needs another `simulate`, with
-    `start=` if need be.
+    It does not matter what ended the run: a killed process, Ctrl-C, a full disk. All saved states are kept. The run
+    continues from the last checkpoint of the solver and computes what came after it again. Checkpoints are two seconds
+    of computing time apart, or fifty times as long as it takes to write one, whichever is longer. In serial, with the
+    same libraries, every number is bit by bit that of an uninterrupted run; in parallel it agrees to rounding, since
+    MUMPS chooses its pivots at run time. A motion that fails again in the same way, such as where steps fail however
+    short they are, needs another `simulate`, with `start=` if need be.
 
     Args:
         folder: its name.
-        scene: the `Scene` of the motion; it is compared with what the folder tells of it. None for the folder's own, which is
-            there unless the scene's functions have no name to be found by, such as a lambda. It is a pickle: load no
-            folder that you do not trust, or give the scene.
-        duration: s; None for the one asked for last. In a longer one steps still land on the first end, and errors
-            may grow on at the rate that `tol` set; what was computed in a plane must keep to it.
-        progress, comm: as of `simulate`; as many ranks as there were.
+        scene: the `Scene` of the motion; it is compared with the fingerprint in the folder. None for the scene stored
+            in the folder, which is missing where functions of the scene cannot be pickled, such as a lambda. It is a
+            pickle: load no folder that you do not trust, or give the scene.
+        duration: s; None for the last one requested. With a longer one a step still ends at every earlier end, and the
+            error may grow at the rate that `tol` set before; a motion computed in a plane must stay in it.
+        progress, comm: as of `simulate`; with the same number of ranks.
 
     Returns:
-        History, with all states from the start on; at once where the motion is complete.
+        History with all states from the start; at once where the motion is complete.
 
     Raises:
-        SceneError: no such folder, another scene, a shorter duration, another number of ranks, another process that is at
-            work there, or nothing left to go on from.
+        SceneError: no such folder, another scene, a shorter duration, another number of ranks, another process that
+            computes this motion, or no readable checkpoint.
         NotConverged, Interrupted, NotStored: as of `simulate`.
     """
     comm = comm or MPI.COMM_WORLD
@@ -66,7 +67,7 @@ def resume(folder, scene=None, *, duration=None, progress=None, comm=None):
 
 
 def _check_plane(kept, scene, until):
-    """Refuse what leaves the plane that a motion was computed in."""
+    """Refuse a longer duration in which the scene leaves the plane that the motion was computed in."""
     if kept.told["model"] != "planar":
         return
     before, (after, why) = scene.over(kept.asked["duration"]).plane, scene.over(until).flatness
@@ -74,8 +75,8 @@ def _check_plane(kept, scene, until):
         why = f"{after.words} is then the one that everything keeps to"
     if why:
         raise SceneError(
-            f"resume.duration = {until:g}: {kept.place} was computed in {before.words}, and until then {why}: expected a shorter "
-            "duration, or a motion in space, by another simulate(..., model='spatial')"
+            f"resume.duration = {until:g}: {kept.place} was computed in {before.words}, and until then {why}: expected "
+            "a shorter duration, or a motion in space, by another simulate(..., model='spatial')"
         )
 
 
@@ -83,34 +84,36 @@ def _go_on(kept, scene, until, comm, progress):
     asked, ends = kept.asked, [t for t in kept.durations if t < until]
     marks = marks_of(scene, until, asked["save_every"], ends)
     memory = _memory(kept, _history(kept, scene, comm))
-    looked_at, layout = scene.over(asked["duration"]), Layout.of(scene, asked["elements"])
+    scene_over, layout = scene.over(asked["duration"]), Layout.of(scene, asked["elements"])
     scheme, load_factor = asked["scheme"], asked["load_factor"]
-    problem, stepper = solvers_of(looked_at, layout, asked["degree"], scheme, load_factor, comm, kept.told["model"])
-    alike = np.array_equal(memory["nodes"], problem.model.slots)
-    if not comm.allreduce(alike, op=MPI.LAND):
-        raise SceneError(
-            f"{kept.place}: nodes are numbered otherwise here: expected the release of dolfinx that it was computed with"
-        )
-    history = _history(kept, scene, comm, problem.model.expansion())
-    history.go_on_after(memory["saved"])
-    stepper.rho_inf = asked["rho_inf"]
-    problem.begin()
-    stepper.begin()
-    pace = pace_of(asked["duration"], tol=asked["tol"], dt=asked["dt"], scheme=scheme)
-    pace.watch(scene, asked["duration"], load_factor, stepper.missed)
-    motion = Motion(problem, stepper, pace, history, kept)
-    motion.recall(memory)
-    if until > kept.durations[-1]:
-        kept.extend(until, scene)
-    return motion.over(marks, asked["save_every"] is None, progress)
+    model = kept.told["model"]
+    with solvers_of(scene_over, layout, asked["degree"], scheme, load_factor, comm, model) as (problem, stepper):
+        alike = np.array_equal(memory["nodes"], problem.model.slots)
+        if not comm.allreduce(alike, op=MPI.LAND):
+            raise SceneError(
+                f"{kept.place}: its nodes are numbered differently here: expected the release of dolfinx that it was "
+                "computed with"
+            )
+        history = _history(kept, scene, comm, problem.model.expansion())
+        history.go_on_after(memory["saved"])
+        stepper.rho_inf = asked["rho_inf"]
+        problem.begin()
+        stepper.begin()
+        pace = pace_of(asked["duration"], tol=asked["tol"], dt=asked["dt"], scheme=scheme)
+        pace.watch(scene, asked["duration"], load_factor, stepper.impulse_error)
+        motion = TimeLoop(problem, stepper, pace, history, kept)
+        motion.recall(memory)
+        if until > kept.durations[-1]:
+            kept.extend(until, scene)
+        return motion.over(marks, asked["save_every"] is None, progress)
 
 
 def read_history(folder, scene=None, *, comm=None):
-    """The states that a motion has saved so far; it may still be going on elsewhere.
+    """The states that a motion has saved so far; another process may still be computing it.
 
     Args:
         folder, scene: as of `resume`.
-        comm: MPI communicator, any number of ranks; default all.
+        comm: MPI communicator with any number of ranks; default all.
 
     Returns:
         History.
@@ -123,27 +126,28 @@ def read_history(folder, scene=None, *, comm=None):
 
 
 def _open(folder, scene, comm, duration=None):
-    """The `RunFolder`, and the scene, which is the one of the motion for so long."""
+    """The `RunFolder`, and the scene, checked to be that of the motion up to `duration` (s)."""
     if scene is not None:
         instance("resume", "scene", scene, Scene, "a Scene, or None for the folder's own")
     kept = RunFolder(folder, comm).open()
     last = kept.durations[-1]
     if duration is not None and duration < last:
-        refuse("resume", "duration", duration, f"None or at least {last:g} s, which were asked for")
+        refuse("resume", "duration", duration, f"None or at least {last:g} s, the last duration requested")
     return kept, kept.scene(scene, duration or last)
 
 
 def _history(kept, scene, comm, expand=None):
     layout, scales = Layout.of(scene, kept.asked["elements"]), Scales.of(scene)
-    return StoredHistory.as_told(kept.told, scene, layout, scales, comm, expand).keep_in(kept.place)
+    connections = Connections.of(scene, layout)
+    return StoredHistory.as_told(kept.told, scene, layout, scales, comm, connections, expand).keep_in(kept.place)
 
 
 def _memory(kept, history):
-    """What this rank remembered last with all states before it saved."""
+    """The latest checkpoint of this rank before which all states are saved."""
     for memory in kept.memories():
         if memory["saved"] <= len(history):
             return memory
     raise SceneError(
-        f"{kept.place}: nothing to go on from is left (checkpoint.npz and start.npz are missing or damaged): expected a "
+        f"{kept.place}: no checkpoint can be read (checkpoint.npz and start.npz are missing or damaged): expected a "
         "new run by simulate; read_history shows the states that were saved"
     )

@@ -1,6 +1,6 @@
 """`simulate`: the motion of a scene in time."""
 
-import cosserat_fenicsx.compat  # noqa: F401, I001  first: it says in words what of dolfinx is missing
+import cosserat_fenicsx.compat  # noqa: F401, I001  first: its message says what is missing where dolfinx is
 
 import math
 import numbers
@@ -12,19 +12,20 @@ from cosserat_fenicsx.errors import SceneError, nearest
 from cosserat_fenicsx.results.history import History
 from cosserat_fenicsx.dynamics.marks import marks_of
 from cosserat_fenicsx.models.rodmesh import Layout
-from cosserat_fenicsx.dynamics.motion import Motion
+from cosserat_fenicsx.dynamics.time_loop import TimeLoop
 from cosserat_fenicsx.dynamics.pace import Adaptive, Fixed
 from cosserat_fenicsx.storage.runfolder import RunFolder
+from cosserat_fenicsx.scene.magnitudes import check_magnitudes
 from cosserat_fenicsx.scene.scene import Scene
-from cosserat_fenicsx.dynamics.standing import equilibrium
+from cosserat_fenicsx.dynamics.initial_equilibrium import equilibrium
 from cosserat_fenicsx.dynamics.solvers import chosen_model, solvers_of
 from cosserat_fenicsx.dynamics.start import put_start
 from cosserat_fenicsx.dynamics.steppers import SCHEMES
 from cosserat_fenicsx.results.stored_history import StoredHistory
 
-#: Elements a rod, degree and tolerance where none are asked for.
+#: Default elements per rod, polynomial degree and tolerance.
 ELEMENTS, DEGREE, TOL = 8, 3, 1e-3
-#: More of them are a slip of the pen.
+#: More steps or saved states than these are refused as a mistake.
 MOST_STEPS, MOST_SAVED = 1e9, 1e6
 
 
@@ -46,36 +47,37 @@ def simulate(
     progress=None,
     comm=None,
 ):
-    """Motion of a scene from the time 0 on.
+    """Compute the motion of a scene from the time 0.
 
-    Loads and prescribed motions are those of the scene at every time (`signals`), times `load_factor`; the velocities
-    at the start are the scene's. A scene without supports flies freely.
+    Loads and prescribed motions are those of the scene at every time (`signals`), times `load_factor`; the initial
+    velocities are the scene's. A scene without supports moves freely.
 
     Args:
         scene: a `Scene`; every rod needs a mass and inertia.
         duration: s.
-        tol: what the errors of single steps may add up to over the whole duration, of positions over the longest rod's
-            length and of a tenth of rotations (rad); steps adapt to it, and resolve what loads and prescribed motions do.
-            Default 1e-3, unless `dt` is given. The mesh does not adapt: compare with more `elements`.
-        dt: fixed step, s; shorter where it would step over a jump or a saved time. A step that fails is halved. History.why
-            tells where loads change faster than it can follow.
-        model: "spatial"; "planar" for a scene that moves in a plane; or "auto", the cheaper one that will do.
+        tol: bound on the sum of the local errors of all steps over the duration, of positions over the longest rod's
+            length and of rotations (rad) over 10; steps adapt to it, and resolve loads and prescribed motions. Default
+            1e-3, unless `dt` is given. The mesh does not adapt: compare with more `elements`.
+        dt: fixed step, s; shortened so that steps end at jumps and saved times. A step that fails is halved.
+            History.why warns where loads change faster than such steps resolve.
+        model: "spatial"; "planar" for a scene that moves in a plane; or "auto", the cheapest one that is valid.
         scheme: "momentum" (exact linear and angular momentum, order 2); "triple-jump" (three steps of it, one back in
             time: order 4, for smooth motions without damping, fixed dt); "energy" (exact energy and linear momentum,
-            order 2, in space alone); "generalised-alpha" (dissipates what the steps do not resolve, order 2; what it
-            takes is seen in the balance of the History).
-        rho_inf: of "generalised-alpha": from 0 to 1, by how much a step shrinks what vibrates much faster than the
-            steps; 1 takes nothing (the trapezoidal rule). Default 0.8.
-        save_every: s between saved states, landed on exactly; None saves every step.
+            order 2, spatial model alone); "generalised-alpha" (dissipates unresolved frequencies, order 2; the balance
+            of the History shows the energy dissipated so).
+        rho_inf: of "generalised-alpha": spectral radius at infinite frequency, from 0 to 1: the factor per step on
+            vibrations much faster than the steps; 1 dissipates nothing (the trapezoidal rule). Default 0.8.
+        save_every: s between saved states, steps end there exactly; None saves every step.
         start: None for the reference, a `Path` for its last equilibrium, or (Path, k); rods must be the same objects. A
-            number is the load factor of an equilibrium of the scene as it is just before t = 0 (`standing.before`).
-        load_factor: multiplies all loads and prescribed motions, as in `solve`; None for that of the start where this is
-            a number, otherwise 1.
+            number is the load factor of an equilibrium of the scene just before t = 0 (`initial_equilibrium.before`).
+        load_factor: multiplies all loads and prescribed motions, as in `solve`; None for `start` where that is a
+            number, otherwise 1.
         elements: elements per rod.
-        degree: 1 to 4, of r and q.
-        folder: where the motion is written as it goes, for long runs: the History reads its states from there as they are
-            asked for, and none stays in memory. Whatever ends the run, `resume(folder)` continues it to the same digits.
-            A folder that does not hold a motion yet, which all ranks must see; None keeps the states in memory.
+        degree: polynomial degree of r and q, 1 to 4.
+        folder: folder that states and checkpoints are written to during the run, for long runs: the History reads
+            states from there when they are used, and keeps none in memory. Whatever ends the run, `resume(folder)`
+            continues it to the same digits. It must not hold a motion yet, and all ranks must see it; None keeps the
+            states in memory.
         progress: True, False, or None for a bar on long runs in a terminal.
         comm: MPI communicator; default all ranks. Every rank calls, every rank gets the same History.
 
@@ -83,12 +85,14 @@ def simulate(
         History.
 
     Raises:
-        SceneError: an argument outside its range, a rod without inertia, a start that supports contradict, or a prescribed
-            motion that jumps; a function of time that raises or gives no finite numbers, `.path` then holds the History
-            up to there.
-        NotConverged: a step fails however short it is, or thousands of them stay tiny; `.path` holds the History up to there.
+        SceneError: an argument outside its range, a rod without inertia, a start that supports contradict, or a
+            discontinuous prescribed motion; a function of time that raises or gives no finite numbers, `.path` then
+            holds the History up to there.
+        NotConverged: a step fails however short it is, or thousands of steps in a row are tiny; `.path` holds the
+            History up to there.
         Interrupted: Ctrl-C; `.path` holds the History up to there.
-        NotStored: the folder cannot be written any more, such as on a full disk; `.path` holds the History up to there.
+        NotStored: the folder can no longer be written to, such as on a full disk; `.path` holds the History up to
+            there.
     """
     comm = comm or MPI.COMM_WORLD
     instance("simulate", "scene", scene, Scene, "a Scene")
@@ -100,36 +104,39 @@ def simulate(
                 f"Rod '{rod.name}': an infinite axial or shear stiffness: expected finite ones, for a motion"
             )
     marks = marks_of(scene, duration, save_every)
-    standing = isinstance(start, numbers.Real) and not isinstance(start, bool)
+    from_equilibrium = isinstance(start, numbers.Real) and not isinstance(start, bool)
     if load_factor is None:
-        load_factor = start if standing else 1.0
+        load_factor = start if from_equilibrium else 1.0
     number("simulate", "load_factor", load_factor, "a finite number", math.isfinite)
-    looked_at = scene.over(duration)
+    scene_over = scene.over(duration)
+    check_magnitudes(scene_over, load_factor)
     cautions = []
-    if standing:
-        start = equilibrium(looked_at, start, model=model, elements=elements, degree=degree, comm=comm)
+    if from_equilibrium:
+        start = equilibrium(scene_over, start, model=model, elements=elements, degree=degree, comm=comm)
         if not start.stable[-1]:
-            cautions = ["the equilibrium that it starts from is unstable: rounding decides where it goes"]
-    model, why = chosen_model(looked_at, model, scheme, start)
-    problem, stepper = solvers_of(looked_at, Layout.of(scene, elements), degree, scheme, load_factor, comm, model)
-    stepper.rho_inf = rho_inf
-    cautions += pace.watch(scene, duration, load_factor, stepper.missed)
-    cautions += put_start(problem.model, start)
-    problem.begin()
-    stepper.begin()
-    history = (History if folder is None else StoredHistory).of(problem.model, scheme, [why, *cautions])
-    if folder is not None:
-        asked = {"duration": duration, "tol": tol, "dt": dt, "scheme": scheme, "save_every": save_every,
-                 "load_factor": load_factor, "elements": elements, "degree": degree, "rho_inf": rho_inf}  # fmt: skip
-        folder = RunFolder(folder, comm).make(scene, asked, history)
-    motion = Motion(problem, stepper, pace, history, folder)
-    return motion.over(marks, save_every is None, progress)
+            cautions = ["the equilibrium that it starts from is unstable: rounding errors decide where it goes"]
+    model, why = chosen_model(scene_over, model, scheme, start)
+    layout = Layout.of(scene, elements)
+    with solvers_of(scene_over, layout, degree, scheme, load_factor, comm, model) as (problem, stepper):
+        stepper.rho_inf = rho_inf
+        cautions += pace.watch(scene, duration, load_factor, stepper.impulse_error)
+        cautions += put_start(problem.model, start)
+        problem.begin()
+        stepper.begin()
+        history = (History if folder is None else StoredHistory).of(problem.model, scheme, [why, *cautions])
+        if folder is not None:
+            asked = {"duration": duration, "tol": tol, "dt": dt, "scheme": scheme, "save_every": save_every,
+                     "load_factor": load_factor, "elements": elements, "degree": degree,
+                     "rho_inf": rho_inf}  # fmt: skip
+            folder = RunFolder(folder, comm).make(scene, asked, history)
+        motion = TimeLoop(problem, stepper, pace, history, folder)
+        return motion.over(marks, save_every is None, progress)
 
 
 def pace_of(duration, *, tol=None, dt=None, scheme="momentum", save_every=None, elements=ELEMENTS):
-    """What chooses the steps of `simulate`.
+    """The step size control of `simulate`, `Fixed` or `Adaptive`.
 
-    Args: as `simulate` takes them.
+    Args: those of `simulate`.
 
     Raises:
         SceneError: one of them is outside its range.
@@ -152,7 +159,7 @@ def pace_of(duration, *, tol=None, dt=None, scheme="momentum", save_every=None, 
     if dt is not None:
         return Fixed(dt)
     if not SCHEMES[scheme].adapts:
-        raise SceneError(f"scheme = '{scheme}' knows no error of its steps: expected dt, a fixed step (s)")
+        raise SceneError(f"scheme = '{scheme}' has no error estimate: expected dt, a fixed step (s)")
     tol = TOL if tol is None else tol
     return Adaptive(
         number("simulate", "tol", tol, "a number from 1e-10 to below 1", lambda x: 1e-10 <= x < 1), duration
@@ -160,7 +167,7 @@ def pace_of(duration, *, tol=None, dt=None, scheme="momentum", save_every=None, 
 
 
 def positive_time(name, value, owner="simulate"):
-    """A time that can be divided by another one, s.
+    """A positive time (s), checked, in a range where ratios of two do not overflow.
 
     Raises:
         SceneError: it is something else.
@@ -169,13 +176,13 @@ def positive_time(name, value, owner="simulate"):
 
 
 def check_counts(owner, duration, dt, save_every):
-    """Refuse more steps or saved states than can ever be.
+    """Refuse absurd numbers of steps or of saved states.
 
     Args:
-        owner: for the words; the others as `simulate` takes them, checked.
+        owner: the function that messages name; the others are those of `simulate`, checked.
 
     Raises:
-        SceneError: naming the two that do not go together.
+        SceneError: naming the two arguments that do not fit together.
     """
     for name, apart, most, what in (
         ("dt", dt, MOST_STEPS, "steps"),
@@ -192,5 +199,5 @@ def _rho_inf(scheme, rho_inf):
     if rho_inf is None:
         return known
     if known is None:
-        refuse("simulate", "rho_inf", rho_inf, f"None, for scheme = '{scheme}' has nothing of the kind")
+        refuse("simulate", "rho_inf", rho_inf, f"None, since scheme = '{scheme}' has no such parameter")
     return number("simulate", "rho_inf", rho_inf, "a number from 0 to 1", lambda x: 0 <= x <= 1)

@@ -1,17 +1,17 @@
-"""What moves a scene on one mesh, compiled once and kept."""
+"""The compiled dynamic problem and stepper of a scene on one mesh, cached and used by one caller at a time."""
 
-import functools
+import contextlib
 
-from mpi4py import MPI
-
+from cosserat_fenicsx.algebra.pool import PROBLEMS
 from cosserat_fenicsx.dynamics.start import starts_in
 from cosserat_fenicsx.dynamics.steppers import SCHEMES
-from cosserat_fenicsx.errors import SceneError, nearest
+from cosserat_fenicsx.errors import NotConverged, SceneError, nearest
+from cosserat_fenicsx.models.choose import not_flat
 from cosserat_fenicsx.models.collocated import CollocatedPlanar, CollocatedSpatial
 from cosserat_fenicsx.models.conserving import ConservingSpatial
 from cosserat_fenicsx.models.moving import MovingSpatial
 from cosserat_fenicsx.models.moving_planar import MovingPlanar
-from cosserat_fenicsx.models.shape import Shape
+from cosserat_fenicsx.models.signature import Signature
 
 _MODELS = {
     ("momentum", "spatial"): MovingSpatial,
@@ -23,7 +23,7 @@ _MODELS = {
 
 
 def chosen_model(scene, model, scheme, start=None):
-    """The model's name, and why it is that one.
+    """The model's name, and the reason for its choice.
 
     Args:
         scene, model, scheme: as `simulate` takes them; start: None, a Path or (Path, k).
@@ -35,12 +35,13 @@ def chosen_model(scene, model, scheme, start=None):
     if model not in ("auto", "planar", "spatial"):
         raise SceneError(f"model = {model!r}: {nearest(model, ('auto', 'planar', 'spatial'))}")
     if model == "spatial":
-        return model, "the spatial model was asked for"
-    plane, reason = scene.flatness
+        return model, "the spatial model was requested"
+    plane, reason = scene.plane, not_flat(scene)
+    plane = None if reason else plane
     if plane is not None and not starts_in(scene, plane, start):
         plane, reason = None, "the start leaves the plane of the rods"
     if plane is not None and not flat:
-        plane, reason = None, f"the scheme '{scheme}' knows space alone"
+        plane, reason = None, f"the scheme '{scheme}' has no planar model"
     if plane is not None:
         return "planar", f"everything keeps to {plane.words}"
     if model == "planar":
@@ -48,24 +49,20 @@ def chosen_model(scene, model, scheme, start=None):
     return "spatial", reason
 
 
+@contextlib.contextmanager
 def solvers_of(scene, layout, degree, scheme, load_factor, comm, model):
-    """The loaded problem and stepper of a scene on a mesh."""
-    shape = Shape.of(scene, layout, formulation="displacement", degree=degree, model=model)
-    if comm in (MPI.COMM_WORLD, MPI.COMM_SELF):
-        problem, stepper = _kept(comm == MPI.COMM_SELF, shape, scheme)
-    else:  # a user's communicator may be freed, and its handle given to another
-        problem, stepper = _make(comm, shape, scheme)
-    problem.load(scene, layout, load_factor)
-    return problem, stepper
+    """Context manager that gives the loaded problem and stepper of a scene on a mesh.
+
+    No other caller uses them within the context; afterwards another one may, so that results must not refer to them.
+    """
+    signature = Signature.of(scene, layout, formulation="displacement", degree=degree, model=model)
+    with PROBLEMS.lend((scheme, signature), comm, lambda: _make(comm, signature, scheme), NotConverged) as solvers:
+        solvers[0].load(scene, layout, load_factor)
+        yield solvers
 
 
-def _make(comm, shape, scheme):
+def _make(comm, signature, scheme):
+    """Problem and stepper of a signature."""
     stepper = SCHEMES[scheme]
-    problem = stepper.problem_class(_MODELS[stepper.forms, shape.model](comm, shape))
+    problem = stepper.problem_class(_MODELS[stepper.forms, signature.model](comm, signature))
     return problem, stepper(problem)
-
-
-@functools.lru_cache(maxsize=8)
-def _kept(alone, shape, scheme):
-    """Compiled once, used for every scene of that shape."""
-    return _make(MPI.COMM_SELF if alone else MPI.COMM_WORLD, shape, scheme)

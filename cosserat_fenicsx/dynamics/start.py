@@ -1,4 +1,4 @@
-"""Where a motion starts: at rest as drawn, or from a point of a static path, with the velocities of the scene."""
+"""Initial state of a motion: the reference configuration or a point of a static path, with the scene's velocities."""
 
 import numpy as np
 
@@ -7,15 +7,15 @@ from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.models.connections import ties_of
 from cosserat_fenicsx.results.path import Path
 
-# Positions (lengths) and turns (rad) of a start that supports do not hold are refused above this; velocities relative
-# to the largest.
-_APART = 1e-6
-# Prescribed velocities at the time 0 are differences over this share of the unit of time.
-_AHEAD = 1e-6
-# Slower than this nothing is a shock, dimensionless.
-_SLOW = 1e-9
-# What leaves a plane by less keeps to it.
-_FLAT = 1e-10
+# Largest violation of supports and joints by the initial state: positions over the unit of length, rotations in rad,
+# velocities over the largest one.
+_LARGEST_VIOLATION = 1e-6
+# Interval of the forward difference that gives prescribed velocities, over the unit of time.
+_DIFFERENCE = 1e-6
+# Dimensionless velocities below this are zero.
+_ZERO_VELOCITY = 1e-9
+# Components out of a plane below this, relative to all, are rounding.
+_OUT_OF_PLANE = 1e-10
 
 
 def put_start(model, start):
@@ -26,22 +26,22 @@ def put_start(model, start):
         start: None for the reference, a Path for its last point, or (Path, k).
 
     Returns:
-        what to be told of it, sentences.
+        warnings, a list of sentences.
 
     Raises:
-        SceneError: a start of another scene's rods, or one that supports contradict.
+        SceneError: a start of another scene's rods, or one that violates supports or joints.
     """
     scene, layout = model.scene, model.layout
     rq = _at_rest(model) if start is None else _of_path(model, *_point(start))
-    model.set_motion(model.unknowns_of(rq), np.zeros((sum(layout.counts), model.shape.points, 3)))
+    model.set_motion(model.unknowns_of(rq), np.zeros((sum(layout.counts), model.signature.points, 3)))
     held = rq[model.tied_slots]
     if model.ties:
         c, _, _ = model.ties_at(0.0).evaluate(held, float(model.load_factor.value), np.zeros(len(ties_of(scene))))
         k = int(np.argmax(np.abs(c)))
-        if abs(c[k]) > _APART:
+        if abs(c[k]) > _LARGEST_VIOLATION:
             raise SceneError(
-                f"{_holder(scene, k)} does not hold at the time 0: it is off by {abs(c[k]):.3g} (lengths or rad). Expected motions "
-                "that start where the rods are, such as a RunUp (a Ramp starts with a speed)"
+                f"{_holder(scene, k)} does not hold at the time 0: it is off by {abs(c[k]):.3g} (lengths or rad). "
+                "Expected motions that start where the rods are, such as a RunUp (a Ramp starts with a speed)"
             )
     linear, angular = _velocities(model, rq)
     rates, cautions = np.concatenate([linear, angular], axis=1), []
@@ -49,23 +49,23 @@ def put_start(model, start):
         _check_velocities(model, rq, rates)
     elif model.ties:
         rates = _driven(model, rq, rates)
-        if np.abs(rates).max() > _SLOW:
+        if np.abs(rates).max() > _ZERO_VELOCITY:
             cautions = [
-                "a prescribed motion starts with a speed, and the rods at rest: the shock rings on in contact forces; RunUp starts "
-                "without one, and the scheme 'generalised-alpha' lets it die out"
+                "a prescribed motion starts with a speed while the rods are at rest: contact forces then oscillate "
+                "without decay; a RunUp starts without speed, and the scheme 'generalised-alpha' damps the oscillation"
             ]
     model.set_velocity(rates[:, :3], rates[:, 3:])
     return cautions
 
 
 def starts_in(scene, plane, start):
-    """Whether velocities and the static point of a start keep to a plane."""
+    """Whether the initial velocities of a scene and the static point of a start lie in a `Plane`."""
     e1, e2, normal = np.array(plane.axes)
     for given in scene.velocities:
         s = np.linspace(0, given.rod.length, 33)
         linear, angular = given.at(s, given.rod.curve.position(s))
         off = np.abs(linear @ normal).max(), np.abs(angular @ e1).max(), np.abs(angular @ e2).max()
-        if max(off) > _FLAT * max(np.abs(linear).max(), np.abs(angular).max()):
+        if max(off) > _OUT_OF_PLANE * max(np.abs(linear).max(), np.abs(angular).max()):
             return False
     if start is None:
         return True
@@ -74,7 +74,7 @@ def starts_in(scene, plane, start):
     moved = np.concatenate([path.motion(rod, np.linspace(0, 1, 33), [path[k]])[0] for rod in rods])
     return (
         max(np.abs(moved[:, :3] @ normal).max(), np.abs(moved[:, 4:] @ e1).max(), np.abs(moved[:, 4:] @ e2).max())
-        < _FLAT
+        < _OUT_OF_PLANE
     )
 
 
@@ -87,6 +87,7 @@ def _point(start):
 
 
 def _at_rest(model):
+    """(N, 7) (r, q) at the nodes of a model in the reference configuration."""
     return np.column_stack([model.reference, np.tile([1.0, 0, 0, 0], (len(model.reference), 1))])
 
 
@@ -106,7 +107,7 @@ def _of_path(model, path, k):
 
 
 def _velocities(model, rq):
-    """(N, 3) velocities and angular velocities of all nodes, dimensionless."""
+    """The initial velocities and angular velocities of all nodes, (N, 3) each, dimensionless, inertial."""
     scene, scales = model.scene, model.scales
     linear, angular, first = np.zeros((len(rq), 3)), np.zeros((len(rq), 3)), 0
     for rod, x in zip(scene.rods, model.layout.node_s(model.nodes), strict=True):
@@ -121,8 +122,11 @@ def _velocities(model, rq):
 
 
 def drive(model, t):
-    """Give the nodes that prescribed motions drive the velocities that these have from the time t (s) on, where they have a kink
-    there; see `_driven`. All others stay what they are, up to rounding."""
+    """At a kink of a prescribed motion at the time t (s), give the nodes that it moves its velocity after t; see
+    `_driven`.
+
+    The velocities of all other nodes stay the same, up to rounding.
+    """
     if not model.ties:
         return
     nodal, _ = model.snapshot()
@@ -130,13 +134,17 @@ def drive(model, t):
     rq = np.empty((len(nodal), 7))
     rq[model.tied_slots] = model.tied_motion(nodal[model.tied_slots])
     driven = _driven(model, rq, rates, t)
-    if np.abs(driven - rates).max() > _SLOW * np.abs(rates).max(initial=1.0):
+    if np.abs(driven - rates).max() > _ZERO_VELOCITY * np.abs(rates).max(initial=1.0):
         model.set_velocity(driven[:, :3], driven[:, 3:])
 
 
 def _driven(model, rq, rates, t=0.0):
-    """Velocities, but for the nodes that prescribed motions drive: these take the speed of the motion from the time t (s) on at once.
-    Without that the trapezoidal rule would make velocities and reactions there alternate from step to step for good."""
+    """(N, 6) velocities where the nodes that prescribed motions move have the velocity of the motion after the time t
+    (s).
+
+    Without that the velocities and reactions there would alternate from step to step without decay, by the trapezoidal
+    rule.
+    """
     off, gradient, _ = _off(model, rq, rates, t)
     at = model.tied_slots
     change = np.linalg.lstsq(gradient.reshape(len(off), -1), -off, rcond=None)[0]
@@ -146,34 +154,39 @@ def _driven(model, rq, rates, t=0.0):
 
 
 def _off(model, rq, rates, t=0.0):
-    """How fast the equations of supports and joints change from the time t (s) on with these velocities, their gradient, and how fast
-    by prescribed motions alone."""
+    """Rates of change of the constraints of supports and joints after the time t (s), dimensionless.
+
+    Returns:
+        the rates with velocities `rates` (N, 6); the gradient of the constraints; the rates by prescribed motions
+        alone.
+    """
     eta, now, count = float(model.load_factor.value), rates[model.tied_slots], len(ties_of(model.scene))
     c, gradient, _ = model.ties_at(t).evaluate(rq[model.tied_slots], eta, np.zeros(count))
-    later, _, _ = model.ties_at(t + _AHEAD * model.time).evaluate(rq[model.tied_slots], eta, np.zeros(count))
-    driven = (later - c) / _AHEAD
+    later, _, _ = model.ties_at(t + _DIFFERENCE * model.time).evaluate(rq[model.tied_slots], eta, np.zeros(count))
+    driven = (later - c) / _DIFFERENCE
     return np.einsum("ikb,kb->i", gradient, now) + driven, gradient, driven
 
 
 def _check_velocities(model, rq, rates):
+    """Refuse initial velocities `rates` (N, 6) that supports or joints do not allow."""
     scene, layout = model.scene, model.layout
     size = np.abs(rates).max()
 
     def of(station):
         rod, vertex = layout.vertex(scene, station)
-        nodes = np.array(layout.counts[:rod], dtype=int) * model.shape.degree + 1
-        return rates[int(nodes.sum()) + vertex * model.shape.degree]
+        nodes = np.array(layout.counts[:rod], dtype=int) * model.signature.degree + 1
+        return rates[int(nodes.sum()) + vertex * model.signature.degree]
 
     for i, support in enumerate(scene.supports):
-        if support.clamps and np.abs(of(support.station)).max() > _APART * size:
+        if support.clamps and np.abs(of(support.station)).max() > _LARGEST_VIOLATION * size:
             _against(f"supports[{i}] ({type(support).__name__} at {support.station})")
     for i, joint in enumerate(scene.joints):
-        if joint.rigid and np.abs(of(joint.first) - of(joint.second)).max() > _APART * size:
+        if joint.rigid and np.abs(of(joint.first) - of(joint.second)).max() > _LARGEST_VIOLATION * size:
             _against(f"joints[{i}] ({joint.first} with {joint.second})")
     if model.ties:
         off, _, driven = _off(model, rq, rates)
         k = int(np.argmax(np.abs(off)))
-        if abs(off[k]) > 10 * _APART * max(size, np.abs(driven).max()):
+        if abs(off[k]) > 10 * _LARGEST_VIOLATION * max(size, np.abs(driven).max()):
             _against(_holder(scene, k))
 
 
@@ -182,7 +195,7 @@ def _against(holder):
 
 
 def _holder(scene, k):
-    """The support or joint whose equation is the k-th."""
+    """The name of the support or joint that the k-th constraint belongs to."""
     held = [(f"supports[{i}] ({type(s).__name__} at {s.station})", s) for i, s in enumerate(scene.supports)]
     held += [(f"joints[{i}] ({j.first} with {j.second})", j) for i, j in enumerate(scene.joints) if not j.rigid]
     names = [name for name, item in held for _ in item.ties()]

@@ -1,1 +1,1 @@
-"""One file a rung: a form of `cosserat_fenicsx.forms` put on a mesh, with its spaces, scales and boundary conditions."""
+"""The models: forms of `cosserat_fenicsx.forms` on a mesh, with spaces, scales and boundary conditions."""

@@ -1,4 +1,4 @@
-"""What all rungs share: the mesh, the numbering of unknowns, the numbers of a scene, and what solvers ask for."""
+"""The base of all models: mesh, numbering of unknowns, data of a scene, and what solvers evaluate."""
 
 import math
 from collections import namedtuple
@@ -9,148 +9,173 @@ from mpi4py import MPI
 
 from cosserat_fenicsx import compat
 from cosserat_fenicsx.element import ElementRule
+from cosserat_fenicsx.forms.law import stiffness_for
+from cosserat_fenicsx.models.action_terms import ActionTerms
+from cosserat_fenicsx.models.clamps import Clamps
 from cosserat_fenicsx.models.connections import ties_of
-from cosserat_fenicsx.models.load_terms import LoadTerms
+from cosserat_fenicsx.models.densities import Densities
+from cosserat_fenicsx.models.laws import stretch_values
 from cosserat_fenicsx.models.numbering import Numbering
-from cosserat_fenicsx.models.rod_data import bounded, fill_fields, gauss_function, rod_data, rod_fields
+from cosserat_fenicsx.models.rod_data import bending_lengths, bounded, fill_fields, gauss_function, rod_data, rod_fields
 from cosserat_fenicsx.models.rodmesh import Gather, RodMesh
 from cosserat_fenicsx.models.scales import Scales
 from cosserat_fenicsx.models.ties import Ties
 
-#: One part of the second variation, which decouples from the others: its compiled form, its `Numbering`, the local
-#: numbers of every element of this rank, the numbers of the tied nodes (see `RodModel.rows_of_tied`), what its
-#: components are as (displacement, rotation), (block, 6), inertial; and whether they leave the plane of a planar rung.
+#: One part of the second variation, decoupled from the others: its compiled form, its `Numbering`, the local degrees of
+#: freedom of every element of this rank, the rows of the tied nodes (see `RodModel.rows_of_tied`), the inertial
+#: (displacement, rotation) of each component, (block, 6); and whether they leave the plane of a planar model.
 SecondVariation = namedtuple("SecondVariation", "form numbering cell_dofs tied axes sideways")
 
 
 class RodModel:
-    """Spaces, data and forms of one `Shape`; `load` fills in the numbers of a scene. A rung fills in the rest.
+    """Spaces, data and forms of one `Signature`; `load` fills in the data of a scene. Subclasses are the models.
 
     Attributes:
-        state: dolfinx's unknowns (those of the nodes, and what the variant adds), a Function; clamped nodes included.
+        state: Function of the unknowns (nodal ones, and those that the formulation adds), clamped nodes included.
         before, step: the state before a Newton step and the step, for `advance`.
-        carried: Functions advanced beside the unknowns: n at the Gauss points (condensed variant), or ().
-        carries_force: whether n is more than a function of the motion.
-        takes_motions: whether `set_motion` is known.
-        load_factor: the Constant eta.
+        carried: Functions updated after each Newton step beside the unknowns: n at the Gauss points, or ().
+        carries_force: whether n is not a function of the motion alone.
+        force_nodes: reference coordinates of the nodes of n, where n is an unknown.
+        load_factor: the Constant eta; permanent_factor: that of permanent loads, 1 except while they are applied.
+        actions: the `ActionTerms`, the data of what acts on the rods; densities: their `Densities`.
         forms: the `CompiledForms`.
         numbering: the solver's unknowns.
-        second_variations: the `SecondVariation`s whose negative squares add up; those in (displacement, rotation) of
-            the scene that is loaded have its axes.
+        second_variations: the `SecondVariation`s, whose numbers of negative eigenvalues add up; with the axes of the
+            loaded scene.
         variation_spaces: the spaces of their forms.
         ties: the `Ties` of the scene, or None.
         scales: the `Scales` of the scene that is loaded.
-        axes: (3, 3) rows: the inertial directions that vectors have components along.
-        load_norm: size of the loads that are not in `forms.dead`, at load factor 1.
-        round_off: what rounding alone leaves of the residual's norm.
-        tangent: what factors it, see `linear.factor_tangent`.
-        unknowns: their number, over all ranks.
+        section: its `RodData`.
+        bounded_K: the bounded K that the second variation uses, see `stiffen`.
+        axes: (3, 3) rows: the inertial basis of the components of vectors.
+        load_norm: size of the loads that are not in `forms.dead` and `forms.permanent`, at factors 1.
+        round_off: bound on the rounding error of the residual's norm.
+        tangent: the kind of its factorisation, see `linear.factor_tangent`.
+        unknowns: number of unknowns, over all ranks.
     """
 
-    #: of a rung: its name, the unknowns of a node, how many of them are displacements, and what a change of one of the
-    #: others turns a section by, rad.
-    name, components, moves, turn = "", 0, 0, 1.0
-    #: numbers a Gauss point has for the reference frame and the reference strain, and for the contact force.
+    #: name of the model, unknowns per node, how many of them are displacements, the rotation of a section (rad) per
+    #: unit change of the others, and how many of a node's last unknowns are multipliers.
+    name, components, moves, turn, multipliers = "", 0, 0, 1.0, 0
+    #: components per Gauss point of the reference frame, of the reference strain and of the contact force.
     frame_size, strain_size, force_size = 9, 3, 3
     #: components of a node in each second variation, and whether these leave the plane.
     variations = ()
+    #: whether the rows that reactions work in change with a node's unknowns
+    rows_turn = False
     tangent = "general"
     load_norm = 0.0
+    #: unit of time for velocities, s; not used in statics
+    time = 1.0
 
-    def __init__(self, comm, shape):
-        self.comm, self.shape, self.axes = comm, shape, np.eye(3)
+    def __init__(self, comm, signature):
+        self.comm, self.signature, self.axes = comm, signature, np.eye(3)
         with compat.quiet_compiler():
             self._build()
 
-    # -- what a rung fills in ----------------------------------------------------------------------------------------
-
-    def _elements(self, degree):
-        """Elements beside the nodal one."""
-        if self.shape.variant == "field":
-            return [compat.lagrange(self.mesh, degree - 1, self.force_size, discontinuous=True)]
-        return []
+    # -- for subclasses to define ------------------------------------------------------------------------------------
 
     def _compile(self, spaces):
         """The `CompiledForms`; `spaces` of the second variations."""
         raise NotImplementedError
 
     def _section_data(self, data):
-        """`RodData` as the rung's forms read it."""
+        """`RodData` in the form that the model's forms use."""
         return data
 
     def _at_rest(self):
-        """(N, components) unknowns of all nodes in the reference configuration, the scene's order."""
+        """(N, components) unknowns of all nodes in the reference configuration, in the scene's order."""
         raise NotImplementedError
 
     def _variation_axes(self):
         """`SecondVariation.axes` of each."""
         raise NotImplementedError
 
+    def positions(self):
+        """(n, 3) positions of the local nodes, inertial, from the origin of their structure."""
+        raise NotImplementedError
+
+    def positions_at_rest(self):
+        """The same in the reference configuration."""
+        return self.reference[self._slots]
+
     def tied_motion(self, values):
         """(r, q), (nodes, 7), inertial, from the unknowns of tied nodes, (nodes, components)."""
         raise NotImplementedError
 
-    def tie_maps(self, values):
-        """For added equations: from changes of a tied node's unknowns to (displacement, rotation),
-        (nodes, 6, components), and from (force, moment) to the node's rows, (nodes, components, 6); one for all nodes where
-        these are alike."""
+    def turned_reactions(self, values, reactions):
+        """(nodes, components, components) derivative of fixed reactions (nodes, 6), in a tied node's rows (`tie_maps`),
+        by its unknowns; called where `rows_turn`."""
         raise NotImplementedError
+
+    def tie_maps(self, values):
+        """Matrices from changes of a tied node's unknowns to (displacement, rotation), (nodes, 6, components), and from
+        (force, moment) to the node's rows, (nodes, components, 6); only one where all nodes have the same."""
+        raise NotImplementedError
+
+    def held_forces(self, forces):
+        """What of forces and moments (.., 6), inertial, the equations of the model speak of."""
+        return forces
 
     def unknowns_of(self, rq):
         """The nodes' unknowns (.., N, components) of (r, q) (.., N, 7), the scene's order."""
         raise NotImplementedError
 
     def expansion(self):
-        """A function from load factors (k,) and snapshots' arrays, stacked, to (r, q) (k, N, 7) and (n, m, r')
-        (k, cells, points, 9), dimensionless, inertial. It holds for the scene that is loaded now, also after another
-        one is."""
+        """A function from load factors (k,) and stacked arrays of snapshots to (r, q) (k, N, 7) and (n, m, r') (k,
+        cells, points, 9), dimensionless, inertial. It stays valid for the current scene after another is loaded."""
         raise NotImplementedError
 
     def _without_saddle(self):
-        """What factors the tangent where it has no saddle point to pivot for."""
-        return "general" if self.shape.slender or self.comm.size > 1 else "blocks"
+        """The kind of factorisation where the tangent is no saddle-point matrix, which would need pivoting."""
+        return "general" if self.signature.slender or self.comm.size > 1 else "blocks"
 
     # -- building ----------------------------------------------------------------------------------------------------
 
     def _build(self):
-        shape, p = self.shape, self.shape.degree
-        self.rods = RodMesh(self.comm, shape.counts)
+        signature, p = self.signature, self.signature.degree
+        self.rods = RodMesh(self.comm, signature.counts)
         self.mesh = self.rods.mesh
         element = compat.lagrange(self.mesh, p, self.components)
         self.nodal_space = self.space = compat.function_space(self.mesh, element)
-        others = self._elements(p)
+        force = signature.formulation.force
+        others = force.elements(self.mesh, p, self.force_size)
         if others:
             self.space = compat.function_space(self.mesh, compat.mixed(element, *others))
-            self._force_nodes = compat.element_nodes(compat.function_space(self.mesh, others[0]))
+            self.force_nodes = compat.element_nodes(compat.function_space(self.mesh, others[0]))
         spaces = self.variation_spaces = [
             compat.function_space(self.mesh, compat.lagrange(self.mesh, p, size)) for size, _ in self.variations
         ]
         self.state, self.before, self.step = (fem.Function(self.space) for _ in range(3))
-        self.load_factor = fem.Constant(self.mesh, np.float64(0))
+        self.load_factor, self.permanent_factor = (fem.Constant(self.mesh, np.float64(x)) for x in (0, 1))
         self._number()
-        self.data = rod_fields(self.mesh, shape.points, self.frame_size, self.strain_size)
-        self._loads = LoadTerms(self.rods, shape)
-        self.terms = self._loads.terms
-        condensed = shape.variant == "condensed"
-        self.carried = (gauss_function(self.mesh, shape.points, self.force_size),) if condensed else ()
+        self.data = rod_fields(
+            self.mesh, signature.points, self.frame_size, self.strain_size, coupled=signature.coupled
+        )
+        self.actions, self.evolving, self.densities = ActionTerms(self.rods, signature, self.nodes), [], Densities()
+        self.carried = (gauss_function(self.mesh, signature.points, self.force_size),) if force.carried else ()
         for function in self.carried:
             self._carried_values = function.x.array.reshape(-1, self.force_size)
             self._carried_nodes = compat.cell_nodes(function.function_space).ravel()
-        self.carries_force = shape.variant not in ("displacement", "multiplier")
-        self.takes_motions = shape.variant != "multiplier"
+        self.carries_force = not force.of_motion
         self.forms = self._compile(spaces)
         if self.tangent == "general" and self.space is self.nodal_space and not self.numbering.multipliers:
             self.tangent = self._without_saddle()
+        for term, point in self.evolving:
+            term.compile_evolution(point)
         self.rule = ElementRule(self.nodes, self.forms.gauss, self.forms.weights)
         self._prepare_variations(spaces)
+        self.clamps = Clamps(self)
 
     def _number(self):
-        p, rods, links = self.shape.degree, self.rods, self.shape.connections
+        p, rods, links = self.signature.degree, self.rods, self.signature.connections
         V, size = self.nodal_space, self.components
         self.nodes = np.sort(compat.element_nodes(V))
         self._slots = slots = rods.slots(V, p)
         nodal = np.arange(size * len(slots)).reshape(-1, size)  # node, component -> index into state.x.array
-        self._cell_nodes = cell_nodes = compat.cell_nodes(V)
+        #: (local elements, p + 1) local nodes in dolfinx's order, and the position of each along its element
+        self.cell_nodes = cell_nodes = compat.cell_nodes(V)
+        self.node_order = np.argsort(np.argsort(compat.element_nodes(V)))
         if self.space is not V:
             nodal[cell_nodes] = compat.cell_nodes(self.space)[:, : size * (p + 1)].reshape(-1, p + 1, size)
         self._nodal, self._owned_nodes = nodal, V.dofmap.index_map.size_local
@@ -181,7 +206,7 @@ class RodModel:
         for form, space, (size, sideways) in zip(self.forms.second_variations, spaces, self.variations, strict=True):
             dofs = np.arange(size * len(self._slots)).reshape(-1, size)
             numbering = Numbering(space, dofs, self._owned_nodes, *self._held)
-            cell_dofs = dofs[self._cell_nodes[:owned]].reshape(owned, size * (self.shape.degree + 1))
+            cell_dofs = dofs[self.cell_nodes[:owned]].reshape(owned, size * (self.signature.degree + 1))
             tied = self._rows_of_tied(numbering, dofs)
             self._variations.append(SecondVariation(form, numbering, cell_dofs, tied, None, sideways))
 
@@ -193,13 +218,13 @@ class RodModel:
 
     @property
     def rows_of_tied(self):
-        """(tied nodes, components) solver's numbers of the nodes that added equations speak of, on all ranks; -1 where
-        clamped."""
+        """(tied nodes, components) rows in the solver's vector of the nodes in constraint equations, on all ranks; -1
+        where clamped."""
         return self._rows_of_tied(self.numbering, self._nodal)
 
     @property
     def rows_of_nodes(self):
-        """(N, block) numbers of all nodes in the second variation (of a rung with one part), the scene's order, on all
+        """(N, block) rows of all nodes in the second variation (of a model with one part), in the scene's order, on all
         ranks; -1 where clamped."""
         (part,) = self._variations
         dofs = np.arange(part.numbering.block * len(self._slots)).reshape(-1, part.numbering.block)
@@ -218,27 +243,33 @@ class RodModel:
     # -- the numbers of a scene --------------------------------------------------------------------------------------
 
     def load(self, scene, layout):
-        """Take the numbers of a scene of this shape; the state becomes its reference configuration."""
+        """Fill in the data of a scene of this signature; the state becomes its reference configuration."""
         self.scene, self.layout, self.scales = scene, layout, Scales.of(scene)
         scales, rods = self.scales, self.rods
         rods.place([b * rod.length / scales.length for rod, b in zip(scene.rods, layout.breaks, strict=True)])
-        self.axes = np.array(scene.plane.axes) if self.shape.flat else np.eye(3)
+        self.axes = np.array(scene.plane.axes) if self.signature.flat else np.eye(3)
         self.reference = np.concatenate([
             (rod.curve.position(x * rod.length) - scene.origin(rod)) / scales.length
             for rod, x in zip(scene.rods, layout.node_s(self.nodes), strict=True)
         ])  # fmt: skip
-        self.section = self._section_data(rod_data(scene, layout, scales, self.rule, self.reference))
+        data = rod_data(scene, layout, scales, self.rule, self.reference, coupled=self.signature.coupled)
+        self.section = self._section_data(data)
         sizes = layout.sizes(scene) / scales.length
-        lengths = np.repeat([rod.length / scales.length for rod in scene.rods], layout.counts)
-        stiff = bounded(self.section, self.shape.variant, sizes, lengths)
-        fill_fields(self.data, rods, self.section, stiff)
+        lengths = bending_lengths(data, [rod.length / scales.length for rod in scene.rods], layout.counts)
+        self.bounded_K = bounded(self.section, self.signature.formulation.force.stiff, sizes, lengths)
+        fill_fields(self.data, rods, self.section, self.bounded_K)
         self.round_off = self._round_off(sizes)
-        self._loads.fill(scene, layout, scales, self.rule, self.axes)
         self._rest = self._at_rest()
         self.rest()
+        self.actions.fill(self, self.time)
+        self.densities.load(self)
+        self.clamps.load()
         self.tied_at_rest = self._rest[self.tied_slots]
         self._tie()
-        self._local_stiffness(stiff, sizes)
+
+    def stiffen(self, K):
+        """Set the principal stiffnesses K (elements, points, 3) against stretch and shear in the second variation."""
+        self.rods.fill(self.data.K_stiff, stretch_values(self.section, K))
 
     def rest(self):
         """The state becomes the reference configuration of the scene."""
@@ -248,57 +279,35 @@ class RodModel:
         for function in self.carried:
             function.x.array[:] = 0
 
-    def _local_stiffness(self, stiff, sizes):
-        """What one element resists a displacement and a rotation of each tied node with, (tied nodes, 6)."""
-        links, first = self.shape.connections, self.layout.first_cells
-        bend, K = self.section.J.max(axis=(1, 2)), stiff.max(axis=(1, 2))
-        self.tied_stiffness = np.zeros((len(links.tied), 6))
-        for k, vertex in enumerate(links.tied):
-            for rod, v in (vertex, *(other for other, leader in links.leaders if leader == vertex)):
-                for cell in {first[rod] + max(v - 1, 0), first[rod] + min(v, self.shape.counts[rod] - 1)}:
-                    h = sizes[cell]
-                    local = [K[cell] / h + 12 * bend[cell] / h**3] * 3 + [bend[cell] / h + K[cell] * h] * 3
-                    self.tied_stiffness[k] = np.maximum(self.tied_stiffness[k], local)
-
     def _round_off(self, sizes):
         """|F| cannot fall below its own rounding: strains are differences of r over a node's spacing."""
         stiffest = self.section.K[np.isfinite(self.section.K)].max(initial=0.0)
-        return 4 * np.finfo(float).eps * stiffest * self.shape.degree / sizes.min() * np.sqrt(self.unknowns)
+        return 4 * np.finfo(float).eps * stiffest * self.signature.degree / sizes.min() * np.sqrt(self.unknowns)
 
     def _tie(self):
-        links = self.shape.connections
+        links = self.signature.connections
         place = {vertex: i for i, vertex in enumerate(links.tied)}
         nodes = [(place[a], -1 if b is None else place[b]) for _, a, b in links.ties]
         reference = self.reference[self.tied_slots]
         self.ties = Ties(ties_of(self.scene), nodes, reference, self.scales.length) if nodes else None
 
     def set_motion(self, values, n):
-        """Something to start from, in the scene's order: the nodes' unknowns (N, components), and n at the Gauss points
-        (elements, points, 3), inertial, where the variant keeps it."""
+        """Set the initial guess, in the scene's order: the nodes' unknowns (N, components), and n at the Gauss points
+        (elements, points, 3), inertial, used where n is carried or unknown."""
         self.state.x.array[self._nodal] = values[self._slots]
-        n = n @ self.axes[: self.force_size].T
-        for function in self.carried:
-            self.rods.fill(function, n)
-        if self.shape.variant == "field":
-            p, x = self.shape.degree, self._force_nodes
-            dofs = compat.cell_nodes(self.space)[:, self.components * (p + 1) :]
-            for reverse in (False, True):
-                cells = np.flatnonzero(self.rods.reversed == reverse)
-                along = self.rule.between_gauss(1 - x if reverse else x)
-                values = np.einsum("jg,cgi->cji", along, n[self.rods.cells[cells]])
-                self.state.x.array[dofs[cells]] = values.reshape(len(cells), self.force_size * p)
+        self.signature.formulation.force.put(self, n @ self.axes[: self.force_size].T)
 
-    # -- what solvers and results ask for ----------------------------------------------------------------------------
+    # -- for solvers and results -------------------------------------------------------------------------------------
 
     def advance(self):
-        """Advance the carried fields by `step` from `before`; both must hold their ghosts."""
+        """Update the carried fields by `step` from `before`; both must have up-to-date ghosts."""
         if self.carried:
             values = compat.evaluate(self.forms.advance, self.mesh, self._local_cells)
             self._carried_values[self._carried_nodes] = values.reshape(-1, self.force_size)
 
     def largest(self, change):
-        """Largest move (rod lengths) or turn (rad) in a change of this rank's part of the solver's vector."""
-        squares, moves = np.square(self._of_nodes(change).reshape(-1, self.components)), self.moves
+        """Largest displacement (rod lengths) or rotation (rad) over all ranks, in a change of the solver's vector."""
+        squares, moves = np.square(self.motion_in(change).reshape(-1, self.components - self.multipliers)), self.moves
         turned = squares[:, moves:].sum(axis=1).max(initial=0)
         moved = squares[:, :moves].sum(axis=1).max(initial=0) if moves else 0.0
         local = math.sqrt(max(moved, self.turn**2 * turned))
@@ -306,22 +315,33 @@ class RodModel:
 
     def inner(self, a, b):
         """Inner product of two changes of the nodes' unknowns over all nodes and ranks."""
-        local = float(self._of_nodes(a) @ self._of_nodes(b))
+        local = float(self.motion_in(a) @ self.motion_in(b))
         return self.comm.allreduce(local) if self.comm.size > 1 else local
 
-    def _of_nodes(self, change):
-        """The nodes' part of this rank's part of the solver's vector, node by node."""
-        return change[: self.components * self.numbering.nodes]
+    def motion_in(self, change):
+        """The unknowns without multipliers of this rank's nodes, node by node, from its part of the solver's vector."""
+        nodal = change[: self.components * self.numbering.nodes]
+        if self.multipliers:
+            nodal = nodal.reshape(-1, self.components)[:, : -self.multipliers].ravel()
+        return nodal
+
+    def bounded_stiffness(self):
+        """K in the second variation at the state, (elements, points, 3), in the scene's order, on all ranks."""
+        n = self.snapshot()[1][..., : self.force_size]
+        return np.maximum(self.bounded_K, stiffness_for(np.linalg.norm(n, axis=2, keepdims=True), 1 / self.section.K))
 
     def snapshot(self):
-        """What `expansion` needs: the nodes' unknowns (N, components), and what the Gauss points know
-        (cells, points, k), or None; the scene's order, all ranks, dimensionless."""
+        """The input of `expansion`: the nodes' unknowns (N, components), and the fields at the Gauss points (cells,
+        points, k) or None; in the scene's order, on all ranks, dimensionless."""
         nodal = self._gather_nodes(self.state.x.array[self._nodal[: self._owned_nodes]])
         if self.forms.fields is None:
             return nodal, None
-        points, size = len(self.forms.gauss), self.forms.fields_size
-        values = compat.evaluate(self.forms.fields, self.mesh, self._owned_cells)
-        values = values.reshape(len(self._owned_cells), points, size)
-        reverse = self.rods.reversed[: len(values)]
+        return nodal, self.gathered(self.forms.fields, len(self.forms.gauss), self.forms.fields_size)
+
+    def gathered(self, expression, points, size):
+        """(elements, points, size) values of a compiled expression, in the scene's order, on all ranks."""
+        owned = len(self._owned_cells)
+        values = compat.evaluate(expression, self.mesh, self._owned_cells).reshape(owned, points, size)
+        reverse = self.rods.reversed[:owned]
         values[reverse] = values[reverse][:, ::-1]
-        return nodal, self._gather_cells(values.reshape(len(values), points * size)).reshape(-1, points, size)
+        return self._gather_cells(values.reshape(owned, points * size)).reshape(-1, points, size)

@@ -1,4 +1,4 @@
-"""Models that move by schemes with accelerations: eq. (1) holds at the end of a step."""
+"""Moving models for time schemes with accelerations: eq. (1) holds at the end of a step."""
 
 import numpy as np
 from dolfinx import fem
@@ -14,27 +14,28 @@ _STRAINS = 6
 
 
 class Collocated:
-    """What a moving rung adds for accelerations; it must come first among the bases.
+    """Mixin that adds accelerations to a moving model; it must come first among the bases.
 
-    A step knows its increments D, of the nodes and of the strains at Gauss's points, and its scheme is a matrix: what
-    the rates (v, a, s) are at its end, velocities, accelerations and what else the scheme carries on, in terms of D and
-    of the rates at its beginning. Strains have rates of their own, by the same rule: no rigid motion is damped.
+    The increments D of a step are those of the nodes and of the strains at the Gauss points. The scheme is a matrix
+    that gives the rates (v, a, s) at the end of the step, velocities, accelerations and the scheme's auxiliary rate,
+    from D and the rates at its beginning. Strain rates follow by the same rule from strain increments, so that rigid
+    motions are not damped.
 
     Attributes:
-        by_velocity, by_acceleration: the Constants that D is multiplied by in v and a.
-        known_velocity, known_acceleration, known_strain_rate: Functions, the rest of them.
+        by_velocity, by_acceleration: Constants, the factors of D in v and a.
+        known_velocity, known_acceleration, known_strain_rate: Functions, the parts of the rates that are known.
     """
 
-    #: numbers of a node's velocity
+    #: components of a node's velocity
     rate_size = 0
 
     def _motion_fields(self):
         super()._motion_fields()
         self.by_velocity, self.by_acceleration = (fem.Constant(self.mesh, np.float64(0)) for _ in range(2))
-        element = compat.lagrange(self.mesh, self.shape.degree, self.rate_size)
+        element = compat.lagrange(self.mesh, self.signature.degree, self.rate_size)
         space = compat.function_space(self.mesh, element)
         self.known_velocity, self.known_acceleration = fem.Function(space), fem.Function(space)
-        self.known_strain_rate = gauss_function(self.mesh, self.shape.points, _STRAINS)
+        self.known_strain_rate = gauss_function(self.mesh, self.signature.points, _STRAINS)
         self._gauss_nodes = compat.cell_nodes(self.known_strain_rate.function_space).ravel()
         self._node_rates = np.zeros((2, len(self._slots) * self.rate_size))
         self._strain_rates = np.zeros((3, len(self.known_strain_rate.x.array)))
@@ -62,19 +63,19 @@ class Collocated:
         return self.known_velocity, self.known_acceleration, self.known_strain_rate
 
     def begin_rates(self):
-        """A motion starts with the state and its velocity: strain rates follow, accelerations are not known yet."""
+        """Initialise strain rates from the state and its velocity; accelerations are not known yet, and zero."""
         self._node_rates[:] = self._strain_rates[:] = 0.0
         self.follow_velocities()
 
     def follow_velocities(self):
-        """Strain rates become those of the velocities, where a step begins."""
+        """Set the strain rates at the beginning of a step from the velocities."""
         if self.damped:
             self._strain_rates[0] = self._at_gauss(self._strain_rate)
 
-    def aim(self, ahead):
-        """Take the scheme of the step to come.
+    def take_scheme(self, ahead):
+        """Set the scheme of the next step.
 
-        `start` is where it begins, and so is the state.
+        `start` and the state must be those at its beginning.
 
         Args:
             ahead: (3, 4), rows v, a, s at its end, columns D and v, a, s at its beginning.
@@ -95,7 +96,7 @@ class Collocated:
             self._strain_rates[:] = self._ahead @ (self._at_gauss(self._strain_change), *self._strain_rates)
 
     def take_accelerations(self):
-        """Of the step alone its accelerations count: they are those at its beginning."""
+        """Use only the accelerations of the step, as the initial accelerations at its beginning."""
         a, s = self._node_rates
         rates = self._ahead[1] @ (self._increments(), self._velocities(), a, s)
         if self.damped:
@@ -104,7 +105,7 @@ class Collocated:
             c[:] = 0.0
         a[:], s[:] = rates, 0.0
 
-    # -- what a rung fills in ----------------------------------------------------------------------------------------
+    # -- for subclasses to define ------------------------------------------------------------------------------------
 
     def _increments(self):
         """(nodes * rate_size,) D of the local nodes."""
@@ -115,12 +116,12 @@ class Collocated:
         raise NotImplementedError
 
     def _put_velocities(self, v):
-        """The other way, at the end of the step."""
+        """Set `velocity` from the velocities at the end of the step."""
         raise NotImplementedError
 
 
 class CollocatedSpatial(Collocated, MovingSpatial):
-    """Velocities are r' in time and the angular velocity Om, reference components."""
+    """Velocities are dr/dt and the angular velocity Om in reference components."""
 
     rate_size = 6
 

@@ -1,24 +1,29 @@
-"""What every rung compiles: the measures, the loads, and all forms signed before the first is compiled.
+"""Compilation shared by all models: measures, actions, and forms, all of whose signatures are computed first.
 
-FFCx 0.5 completes the metadata of the integrals that it compiles in place, other forms share them, and a form signed
-later would miss the code cache, which costs a second.
+FFCx 0.5 modifies the metadata of the integrals that it compiles, which other forms share; a signature computed after
+that would differ and miss the code cache, which costs a second.
 """
 
 from collections import namedtuple
 from dataclasses import dataclass
-from functools import partial
+from dataclasses import fields as fields_of
 
 import basix
 import numpy as np
 import ufl
 from dolfinx import fem
 
-from cosserat_fenicsx.forms import equilibrium
+from cosserat_fenicsx.element import lobatto_weights
+from cosserat_fenicsx.forms.point import resultants, variation
 
-#: Integrals over the rods: by Gauss's points, at the nodes of P_p, and at the two ends of every element.
+#: Integrals over the rods with Gauss points, with the nodes of P_p, and with the two ends of every element as points.
 Measures = namedtuple("Measures", "gauss nodes ends")
-#: Virtual work of the loads: dead ones, per unit of load factor, or None; and live ones [(form, integral, work)].
-LoadWork = namedtuple("LoadWork", "dead live")
+#: Virtual work of the actions: forms of the dead ones per unit of the load factor and of the permanent factor, or None;
+#: and a list of `Live` for the others.
+ActionWork = namedtuple("ActionWork", "dead permanent live")
+#: Virtual work that depends on the state: its form, its factor (UFL), its measure, its point, and its integrand, a
+#: function (point, test).
+Live = namedtuple("Live", "form factor measure point work")
 
 
 @dataclass(frozen=True)
@@ -27,46 +32,78 @@ class CompiledForms:
 
     Attributes:
         residual, tangent: of the unknowns, live loads included.
-        dead: virtual work of the loads that do not depend on the motion, per unit of load factor; or None.
-        second_variations: symmetric forms in small displacements and rotations whose negative squares tell stability.
-        fields, fields_size: what the Gauss points know of n, m and r', and how many numbers that is; or None.
+        dead, permanent: virtual work of what does not depend on the motion, per unit of load factor and of the
+            permanent factor; or None.
+        second_variations: symmetric forms in small displacements and rotations; stable if none has negative
+            eigenvalues.
+        fields, fields_size: the components of n, m and r' at the Gauss points, and their number; None and 0 without.
         advance: the next carried n at the Gauss points; or None.
-        force: virtual work of the dead forces alone on a displacement, where statics asks for it; or None.
+        force, permanent_force: virtual work of the dead forces on displacements, for the determinate models; or None.
+        density, node_density: force and moment per length of the distributed actions, at the Gauss points and at the
+            nodes, (6,), components along the model's axes; or None.
         gauss, weights: points in [0, 1] of one element, and their weights.
     """
 
     residual: object
     tangent: object
     dead: object
+    permanent: object
     second_variations: tuple
     fields: object
     fields_size: int
     advance: object
     force: object
+    permanent_force: object
+    density: object
+    node_density: object
     gauss: np.ndarray
     weights: np.ndarray
 
 
-def compile_all(model, residual, tangent, dead, seconds, *, fields=None, advance=None, force=None, compiled=fem.form):
-    """The `CompiledForms` of UFL forms and expressions; of `seconds` the symmetric parts count. `compiled` makes residual
-    and tangent."""
+def compile_all(
+    model, residual, tangent, acting, seconds, *, fields=None, advance=None, forces=None, densities=(None, None),
+    compiled=fem.form,
+):  # fmt: skip
+    """The `CompiledForms` of UFL forms and expressions.
+
+    Args:
+        acting: the `ActionWork`; forces: that of forces on displacements alone, or None.
+        seconds: second variations, whose symmetric parts count.
+        densities: see `action_densities`.
+        compiled: makes residual and tangent.
+    """
     seconds = [0.5 * (second + ufl.adjoint(second)) for second in seconds]
-    for form in (residual, tangent, *seconds, dead, force):
+    forces = forces or ActionWork(None, None, [])
+    for form in (residual, tangent, *seconds, acting.dead, acting.permanent, forces.dead, forces.permanent):
         if form is not None:
             form.signature()
-    points, weights = basix.make_quadrature(basix.CellType.interval, 2 * model.shape.points - 1)
+    points, weights = basix.make_quadrature(basix.CellType.interval, 2 * model.signature.points - 1)
+    at_gauss, at_nodes = densities
     return CompiledForms(
         compiled(residual),
         compiled(tangent),
-        _unless_none(fem.form, dead),
+        _unless_none(fem.form, acting.dead),
+        _unless_none(fem.form, acting.permanent),
         tuple(fem.form(second) for second in seconds),
         _unless_none(lambda a: fem.Expression(a, points), fields),
         0 if fields is None else len(fields),
         _unless_none(lambda a: fem.Expression(a, points), advance),
-        _unless_none(fem.form, force),
+        _unless_none(fem.form, forces.dead),
+        _unless_none(fem.form, forces.permanent),
+        _unless_none(lambda a: fem.Expression(a, points), at_gauss),
+        _unless_none(lambda a: fem.Expression(a, model.nodes[:, None]), at_nodes),
         points[:, 0],
         weights,
     )
+
+
+def compile_single(model, second):
+    """The `CompiledForms` of a model that has only a second variation, unsymmetric, or None."""
+    points, weights = basix.make_quadrature(basix.CellType.interval, 2 * model.signature.points - 1)
+    none = {field.name: None for field in fields_of(CompiledForms)}
+    seconds = (_unless_none(fem.form, second),)
+    given = {"second_variations": seconds, "fields_size": 0, "gauss": points[:, 0], "weights": weights}
+    return CompiledForms(**none | given)
 
 
 def _unless_none(make, a):
@@ -77,19 +114,14 @@ def measures(model):
     """The `Measures` of a model."""
     nodes = model.nodes
     weights = lobatto_weights(nodes)
-    gauss = ufl.dx(domain=model.mesh, metadata={"quadrature_degree": 2 * model.shape.points - 1})
+    gauss = ufl.dx(domain=model.mesh, metadata={"quadrature_degree": 2 * model.signature.points - 1})
     ends = np.array([0.0, 1.0]), np.array([0.5, 0.5])
     return Measures(gauss, _rule(model.mesh, nodes, weights), _rule(model.mesh, *ends))
 
 
-def lobatto_weights(nodes):
-    """Weights of the rule on [0, 1] that has the nodes (n,) as points."""
-    return np.linalg.solve(np.vander(nodes, increasing=True).T, 1 / np.arange(1, len(nodes) + 1))
-
-
 def _rule(mesh, points, weights):
-    # Tuples, and from 1 down to 0: UFL complains of arrays, and FFCx names a rule by three hexadecimal digits of a
-    # hash of its points, in which the Gauss and the Lobatto points of P4 collide.
+    # Tuples because UFL rejects arrays; from 1 down to 0 because FFCx names a rule by three hexadecimal digits of a
+    # hash of its points, in which ascending Gauss and Lobatto points of P4 collide.
     return ufl.dx(
         domain=mesh,
         metadata={
@@ -101,43 +133,67 @@ def _rule(mesh, points, weights):
     )
 
 
-def load_work(model, dx, test, R, unknowns):
-    """The loads' virtual work, sorted into dead and live.
+def action_work(model, dx, test, point_at, unknowns, accepted_at=None, test_at=None):
+    """The `ActionWork` of a model's actions.
 
     Args:
-        dx: the `Measures`; test: test functions; R: the rotation, by names that the rule at the ends may have.
-        unknowns: the Functions that make a load live.
+        dx: the `Measures`; test: a `VirtualMotion`.
+        point_at: function (place of a `TermKind`, rest, frame) -> the `Point` there; see `Point` for the last two.
+        unknowns: Functions; an action whose form contains one of them depends on the state.
+        accepted_at: as `point_at`, for the update of memory at an accepted state; by default the same.
+        test_at: function place -> the `VirtualMotion` there; given where test functions depend on the state.
     """
-    dead, live = [], []
-    for work, place, vectors in model.terms:
-        measure = dx.ends if place == "point" else dx.gauss
-        integrand = work(*vectors, test, R)
+    sums, live = {"load": [], "permanent": []}, []
+    factors = {"load": model.load_factor, "permanent": model.permanent_factor, "full": 1}
+    for term in model.actions.terms:
+        kind = term.kind
+        measure = {"point": dx.ends, "line": dx.gauss, "node": dx.nodes}[kind.place]
+        point = point_at(kind.place, term.rest, term.frame)
+        integrand = term.work(point, test_at(kind.place) if test_at else test)
         if isinstance(integrand, ufl.constantvalue.Zero):
-            continue  # the work of a force where there is no virtual displacement
-        term = integrand * measure
-        if set(unknowns) & set(term.coefficients()):
-            live.append((term, measure, partial(work, *vectors)))
+            continue  # such as a force in a determinate model, or a dashpot in statics
+        form = integrand * measure
+        if set(unknowns) & set(form.coefficients()) or kind.memory or kind.refreshed:
+            live.append(Live(form, factors[kind.scaled], measure, point, term.work))
         else:
-            dead.append(term)
-    return LoadWork(sum(dead) if dead else None, live)
+            sums["load" if kind.scaled == "load" else "permanent"].append(form)
+        if kind.memory and term not in (known for known, _ in model.evolving):
+            model.evolving.append((term, (accepted_at or point_at)(kind.place, term.rest, term.frame)))
+    return ActionWork(*(sum(forms) if forms else None for forms in sums.values()), live)
 
 
-def with_live_loads(model, loads, residual, tangent, derivative):
-    """Residual and tangent with the live loads in them."""
-    for term, _, _ in loads.live:
-        residual -= model.load_factor * term
-        tangent -= model.load_factor * derivative(term)
+def action_densities(model, point_at):
+    """Force and moment per length of all distributed actions, UFL (6,): at the Gauss points, and at the nodes for
+    actions integrated there; None where there are none."""
+    factors = {"load": model.load_factor, "permanent": model.permanent_factor, "full": 1}
+    found = []
+    for place in ("line", "node"):
+        terms = [term for term in model.actions.terms if term.kind.place == place]
+        total = 0
+        for term in terms:
+            force, moment = resultants(term.work, point_at(place, term.rest, term.frame))
+            total += factors[term.kind.scaled] * ufl.as_vector([*force, *moment])
+        found.append(total if terms else None)
+    return tuple(found)
+
+
+def with_live_actions(acting, residual, tangent, derivative):
+    """Residual and tangent with the work of state-dependent actions added."""
+    for live in acting.live:
+        residual -= live.factor * live.form
+        tangent -= live.factor * derivative(live.form)
     return residual, tangent
 
 
-def turned_loads(model, loads, test, R, phi):
-    """What a small inertial rotation phi changes in the work of the live loads, load factor included; or 0."""
-    changes = [equilibrium.load_variation(work, test, R, phi) * measure for _, measure, work in loads.live]
-    return model.load_factor * sum(changes) if changes else 0
+def varied_actions(acting, test, direction):
+    """The derivative of the virtual work of state-dependent actions in a direction of small displacement and rotation,
+    factors included; or 0."""
+    changes = [live.factor * variation(live.work, live.point, test, direction) * live.measure for live in acting.live]
+    return sum(changes) if changes else 0
 
 
 def derivative_in(trial, *functions):
-    """The derivative of a form or an expression in the direction `trial` of Functions that share their numbers."""
+    """The derivative of a form or an expression in the direction `trial`, summed over aliases of one Function."""
 
     def derivative(a):
         names = a.coefficients() if isinstance(a, ufl.Form) else ufl.algorithms.extract_coefficients(a)

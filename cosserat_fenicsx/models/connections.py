@@ -8,14 +8,14 @@ from cosserat_fenicsx.scene.signals import at
 
 @dataclass(frozen=True)
 class Connections:
-    """What decides which nodes have unknowns and which equations are added; vertices are (rod index, element end).
+    """Which nodes have unknowns and which constraint equations are added; vertices are (rod index, element end).
 
     Attributes:
         clamped: vertices without unknowns.
         leaders: pairs (vertex, leader): rigidly joined vertices and the one whose unknowns they share.
         ties: (kind, vertex of a, vertex of b or None) of all scalar equations of supports and joints, in the scene's
             order.
-        equations: indices of those that are added: in a plane only what holds a motion there, and nothing twice.
+        equations: indices of the ties that are added: in a plane only independent ones that constrain motions in it.
     """
 
     clamped: tuple
@@ -48,11 +48,11 @@ class Connections:
 
     @property
     def tied(self):
-        """Vertices that added equations speak of, each once."""
+        """Vertices in constraint equations, each once."""
         return tuple(dict.fromkeys(x for _, a, b in self.ties for x in (a, b) if x is not None))
 
 
 def ties_of(scene, t=0.0):
-    """All scalar equations of supports and joints that are not held node by node, at a time (s)."""
+    """All scalar constraint equations of supports and joints that are not clamps or rigid joints, at a time (s)."""
     held = [*scene.supports, *(joint for joint in scene.joints if not joint.rigid)]
     return [tie for item in held for tie in at(item, t).ties()]

@@ -1,4 +1,4 @@
-"""The spatial rung in motion with exact energy."""
+"""The spatial model in motion, with the energy-conserving scheme."""
 
 import numpy as np
 from dolfinx import fem
@@ -18,7 +18,7 @@ class ConservingSpatial(MovingSpatial):
 
     def _compile(self, spaces):
         self._motion_fields()
-        element = compat.lagrange(self.mesh, self.shape.degree, 9)
+        element = compat.lagrange(self.mesh, self.signature.degree, 9)
         self.turning = fem.Function(compat.function_space(self.mesh, element))
         return compile_conserving(self)
 

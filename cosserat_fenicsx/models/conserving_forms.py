@@ -5,18 +5,24 @@ import ufl
 from cosserat_fenicsx import compat
 from cosserat_fenicsx.forms import energy, inertia
 from cosserat_fenicsx.forms import spatial as eq
-from cosserat_fenicsx.forms.rotation import rotation_matrix
-from cosserat_fenicsx.models.compiled import derivative_in, load_work, measures
-from cosserat_fenicsx.models.moving_forms import SpatialData, compile_motion, parts_of
+from cosserat_fenicsx.forms.rotation import small_rotation
+from cosserat_fenicsx.models.compiled import action_work, derivative_in, measures
+from cosserat_fenicsx.models.moving_forms import (
+    SpatialData,
+    booked,
+    compile_motion,
+    parts_of,
+    virtual_work_of_step,
+)
 
 
 def compile_conserving(model):
-    """The `MotionForms` of a moving spatial model by which energy is exact.
+    """The `MotionForms` of the energy-conserving scheme of a moving spatial model.
 
-    The residual is tested with changes of (r, q), all terms of the step in it but loads; it knows no |q| = 1.
+    Test functions are changes of (r, q). The residual has all terms of the step except loads, and no equation |q| = 1.
     """
     dx, data = measures(model), SpatialData.of(model)
-    named = compat.alias if model.shape.degree == 1 else (lambda function: function)
+    named = compat.alias if model.signature.degree == 1 else (lambda function: function)
     U, U0, V, W = model.state, model.start, model.velocity, model.turning
     nodal, nodal0, rates, turning = named(U), named(U0), named(V), named(W)
     h, section, viscosity, body = model.h, data.section, data.viscosity, data.body
@@ -26,11 +32,11 @@ def compile_conserving(model):
 
     def line(w):
         (_, q), (r_s, q_s) = parts_of(w), parts_of(along(w))
-        return energy.Line(r_s, q, q_s)
+        return energy.Configuration(r_s, q, q_s)
 
     before, after = line(U0), line(U)
     phi, trial = ufl.TestFunction(model.space), ufl.TrialFunction(model.space)
-    test = energy.Tests(*parts_of(phi), *parts_of(along(phi)))
+    test = energy.Variation(*parts_of(phi), *parts_of(along(phi)))
     derivative = derivative_in(trial, *dict.fromkeys((U, nodal)))
 
     (r0, q0), (r1, q1), (r_t, _) = parts_of(nodal0), parts_of(nodal), parts_of(rates)
@@ -41,8 +47,26 @@ def compile_conserving(model):
     residual += model.drag[0] * energy.rate_work(moved, turned, half, body, test) * dx.nodes
     residual += energy.stress_work(before, after, section, viscosity, h, test) * dx.gauss
 
-    loads = load_work(model, dx, eq.tests_of(phi, along(phi)), rotation_matrix(half), {U, nodal})
-    live = sum(term for term, _, _ in loads.live) if loads.live else None
+    def point_at(place, rest, frame):
+        w, w0 = (U, U0) if place == "line" else (nodal, nodal0)
+        r_t, q_t = parts_of((w - w0) / h)
+        middle = (w + w0) / 2
+        omega = small_rotation(q_t, parts_of(middle)[1])
+        return eq.point_of(middle, along(middle), rest=rest, frame=frame, r_t=r_t, omega=omega)
+
+    def end_point(place, rest, frame):
+        w = U if place == "line" else nodal
+        return eq.point_of(w, along(w), rest=rest, frame=frame)
+
+    def of_stress(test):
+        """At a clamped point delta q = phi/2: q is (1, 0, 0, 0) there."""
+        q, q_s = (ufl.as_vector([0, *(a[i] / 2 for i in range(3))]) for a in (test.phi, test.phi_s))
+        varied = energy.Variation(test.phi_r, q, test.phi_r_s, q_s)
+        return energy.stress_work(before, after, section, viscosity, h, varied)
+
+    of_step = virtual_work_of_step(model, of_stress, point_at)
+    acting = action_work(model, dx, eq.tests_of(phi, along(phi)), point_at, {U, nodal}, end_point)
+    live = booked(acting)
     state = eq.state_of(U, along(U), U)
     n, m = inertia.contact(state, section, viscosity, lambda a: ufl.derivative(a, U, V))
     kappa = energy.angular_momentum(q1, spin, body)
@@ -57,4 +81,4 @@ def compile_conserving(model):
         "dissipated": lost,
     }
     fields = ufl.as_vector([*n, *m, *state.r_s])
-    return compile_motion(model, residual, derivative(residual), loads.dead, fields, others)
+    return compile_motion(model, residual, derivative(residual), acting, fields, others, of_step)

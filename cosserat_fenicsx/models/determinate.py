@@ -1,4 +1,4 @@
-"""The determinate rungs: theta in P_p alone in a plane, q alone in space; statics gives n, and r follows."""
+"""The determinate models: unknown theta in a plane, q in space, in P_p; statics gives n, and r follows."""
 
 import numpy as np
 from dolfinx import cpp
@@ -6,6 +6,7 @@ from dolfinx import cpp
 from cosserat_fenicsx import compat
 from cosserat_fenicsx.models.base import RodModel
 from cosserat_fenicsx.models.determinate_forms import compile_in_plane, compile_in_space
+from cosserat_fenicsx.models.laws import moment, strain
 from cosserat_fenicsx.models.planar import PlaneModel, in_space
 from cosserat_fenicsx.models.rod_data import gauss_function
 from cosserat_fenicsx.models.trees import Tree
@@ -18,30 +19,40 @@ class _KnownForce(RodModel):
     name = "determinate"
 
     def _compile(self, spaces):
-        self._displacements = compat.function_space(self.mesh, compat.lagrange(self.mesh, self.shape.degree, 3))
-        self._force = gauss_function(self.mesh, self.shape.points, self.force_size)
-        self._tree = Tree(self.shape)
-        return self._compile_with(self._displacements, spaces[-1], self._force)
+        self._displacements = compat.function_space(self.mesh, compat.lagrange(self.mesh, self.signature.degree, 3))
+        self._force = gauss_function(self.mesh, self.signature.points, self.force_size)
+        lasting = any(kind.scaled != "load" for kind in self.signature.terms)
+        self._permanent = gauss_function(self.mesh, self.signature.points, self.force_size) if lasting else None
+        self._tree = Tree(self.signature)
+        return self._compile_with(self._displacements, spaces[-1], self._force, self._permanent)
 
     def _round_off(self, sizes):
-        """|F| cannot fall below its own rounding; here it holds moments alone."""
-        eps, p = np.finfo(float).eps, self.shape.degree
-        return 4 * eps * self.section.J[..., :2].max() * p / sizes.min() * np.sqrt(self.unknowns)
+        """Bound on the rounding error of |F|, which contains only moments here."""
+        eps, p = np.finfo(float).eps, self.signature.degree
+        J = self.section.J if self.signature.coupled else self.section.J[..., :2]
+        return 4 * eps * J.max() * p / sizes.min() * np.sqrt(self.unknowns)
 
     def load(self, scene, layout):
         """See `RodModel`; statics gives the contact force."""
         super().load(scene, layout)
-        nodal = self._nodal_forces()
-        self.load_norm = float(np.linalg.norm(nodal))
-        self._known = self._tree.forces(nodal, self.rule)
-        self.rods.fill(self._force, self._known)
+        self.load_norm = 0.0
+        self._known = self._take(self.forms.force, self._force)
+        self._lasting = 0.0 if self._permanent is None else self._take(self.forms.permanent_force, self._permanent)
 
-    def _nodal_forces(self):
-        """(N, d) what the dead forces do on the displacements of the nodes, the scene's order, all ranks."""
+    def _take(self, form, function):
+        """The contact force at the Gauss points that balances dead forces; also stored in a Function."""
+        nodal = self._nodal_forces(form)
+        self.load_norm += float(np.linalg.norm(nodal))
+        known = self._tree.forces(nodal, self.rule)
+        self.rods.fill(function, known)
+        return known
+
+    def _nodal_forces(self, form):
+        """(N, d) nodal forces equivalent to the dead forces, in the scene's order, on all ranks."""
         total = np.zeros((len(self.reference), self.force_size))
-        if self.forms.force is None:
+        if form is None:
             return total
-        form = compat.kernel(self.forms.force)
+        form = compat.kernel(form)
         local = np.zeros((len(self._slots), 3))
         cpp.fem.assemble_vector(local.reshape(-1), form, cpp.fem.pack_constants(form), cpp.fem.pack_coefficients(form))
         np.add.at(total, self._slots, local[:, : self.force_size])
@@ -75,8 +86,8 @@ class DeterminateInPlane(_KnownForce, PlaneModel):
     def expansion(self):
         """See `RodModel`."""
         axes, offset, section = self.axes, self._out_of_plane(), self.section
-        known, rule, tree, sizes = self._known, self.rule, self._tree, self._sizes()
-        rest, basis, K_inv = self.reference @ axes[:2].T, rule.basis(rule.gauss), 1 / section.K
+        known, lasting, rule, tree, sizes = self._known, self._lasting, self.rule, self._tree, self._sizes()
+        rest, basis = self.reference @ axes[:2].T, rule.basis(rule.gauss)
 
         def expand(load_factors, nodal, gauss):
             theta = nodal[..., 0]
@@ -86,12 +97,15 @@ class DeterminateInPlane(_KnownForce, PlaneModel):
             t1, t2 = section.R_R[..., 0], section.R_R[..., 1]
             t = np.stack([c * t1 - s * t2, s * t1 + c * t2], axis=-1)
             a = np.stack([-t[..., 1], t[..., 0]], axis=-1)
-            n = np.multiply.outer(load_factors, known)
-            sheared = section.v_R[..., 0] + K_inv[..., 0] * np.einsum("...i,...i", a, n)
-            stretched = section.v_R[..., 1] + K_inv[..., 2] * np.einsum("...i,...i", t, n)
+            n = np.multiply.outer(load_factors, known) + lasting
+            none = np.zeros_like(curvature)
+            material = np.stack([np.einsum("...i,...i", a, n), none, np.einsum("...i,...i", t, n)], axis=-1)
+            bent = np.stack([none, curvature, none], axis=-1)
+            e = strain(section, material, bent)
+            sheared, stretched = section.v_R[..., 0] + e[..., 0], section.v_R[..., 1] + e[..., 2]
             r_s = sheared[..., None] * a + stretched[..., None] * t
             r = tree.positions(r_s * sizes[:, None, None], rest, rule)
-            return in_space(axes, offset, r, theta, n, section.J[..., 1] * curvature, r_s)
+            return in_space(axes, offset, r, theta, n, moment(section, material, bent)[..., 1], r_s)
 
         return expand
 
@@ -115,8 +129,9 @@ class DeterminateInSpace(_KnownForce):
 
     def expansion(self):
         """See `RodModel`."""
-        section, known, rule, tree, sizes = self.section, self._known, self.rule, self._tree, self._sizes()
-        rest, basis, K_inv = self.reference, rule.basis(rule.gauss), 1 / section.K
+        section, known, lasting = self.section, self._known, self._lasting
+        rule, tree, sizes = self.rule, self._tree, self._sizes()
+        rest, basis = self.reference, rule.basis(rule.gauss)
         R_R = section.R_R.reshape(*section.K.shape, 3)
 
         def expand(load_factors, nodal, gauss):
@@ -126,11 +141,11 @@ class DeterminateInSpace(_KnownForce):
             squared = np.einsum("...i,...i", q, q)[..., None]
             R = directors((q / np.sqrt(squared)).reshape(-1, 4)).reshape(*q.shape[:-1], 3, 3)
             T = R @ R_R
-            n = np.multiply.outer(load_factors, known)
-            strain = section.v_R + K_inv * np.einsum("...ij,...i", T, n)
-            r_s = np.einsum("...ij,...j", T, strain)
+            n = np.multiply.outer(load_factors, known) + lasting
             curvature = np.einsum("...ij,...i", R_R, 2 * conjugate_product(q, q_s) / squared)
-            m = np.einsum("...ij,...j", T, section.J * curvature)
+            material = np.einsum("...ij,...i", T, n)
+            r_s = np.einsum("...ij,...j", T, section.v_R + strain(section, material, curvature))
+            m = np.einsum("...ij,...j", T, moment(section, material, curvature))
             r = tree.positions(r_s * sizes[:, None, None], rest, rule)
             return np.concatenate([r, nodal], axis=-1), np.concatenate([n, m, r_s], axis=-1)
 

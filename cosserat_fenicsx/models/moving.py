@@ -1,6 +1,7 @@
-"""Models that move: a rung with inertia, between the two ends of a step in time."""
+"""Models with inertia, between the two ends of a time step."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 from dolfinx import fem
@@ -8,40 +9,46 @@ from mpi4py import MPI
 
 from cosserat_fenicsx import compat
 from cosserat_fenicsx.models.connections import ties_of
+from cosserat_fenicsx.models.laws import law_data, viscous_values
 from cosserat_fenicsx.models.moving_forms import SpatialStep, compile_momentum
-from cosserat_fenicsx.models.rod_data import check_inertia, gauss_function, nodal_inertia, rod_data
+from cosserat_fenicsx.models.rod_data import check_inertia, gauss_function, joined, nodal_inertia, rod_data
+from cosserat_fenicsx.models.scales import Scales
 from cosserat_fenicsx.models.spatial import SpatialModel
+from cosserat_fenicsx.quaternions import cross
 from cosserat_fenicsx.scene.damping import Damping
 
 
 class Moving:
-    """What a rung adds to a `RodModel` to move; it must come first among the bases.
+    """Mixin that adds inertia to a `RodModel`; it must come first among the bases.
 
-    Inertia is integrated with the nodes as points, as |q| = 1 is: the order is that of the elements, every nodal q is a
-    rotation, and momenta belong to nodes.
+    Inertia is integrated with the nodes as points, as |q| = 1 is: the order of convergence is that of the elements,
+    every nodal q is a unit quaternion, and the mass matrix is block diagonal.
 
     Attributes:
         state: unknowns of the nodes at the end of a step; start, velocity: unknowns and their rates at its beginning.
         h: the Constant h, the length of the step.
         time: unit of time, s.
-        damped: whether any section is.
+        damped: whether any rod has damping.
+        viscosity: the Functions of the law of the strain rates, as `laws.law_of` takes them.
     """
 
     variations = ()
-    #: numbers of the inertia of a node's section against turning
+    #: independent components of a section's rotational inertia
     inertia_size = 0
 
     def _motion_fields(self):
-        """The Functions that the forms know beside those of a `RodModel`."""
-        mesh, points = self.mesh, self.shape.points
+        """Make the Functions in forms beside those of a `RodModel`."""
+        mesh, points = self.mesh, self.signature.points
         self.start, self.velocity = fem.Function(self.space), fem.Function(self.space)
         self.h = fem.Constant(mesh, np.float64(1))
         self.mass, self.drag = self._at_element_nodes(1), self._at_element_nodes(1)
         self.inertia = self._at_element_nodes(self.inertia_size)
-        self.Kt, self.Jt = gauss_function(mesh, points, 3), gauss_function(mesh, points, 3)
+        coupled = self.signature.coupled
+        Kt, Jt = (gauss_function(mesh, points, 9 if coupled else 3) for _ in range(2))
+        self.viscosity = Kt, None, Jt, gauss_function(mesh, points, 9) if coupled else None
 
     def _at_element_nodes(self, size):
-        element = compat.lagrange(self.mesh, self.shape.degree, size, discontinuous=True)
+        element = compat.lagrange(self.mesh, self.signature.degree, size, discontinuous=True)
         return fem.Function(compat.function_space(self.mesh, element))
 
     def load(self, scene, layout):
@@ -51,12 +58,11 @@ class Moving:
             SceneError: a rod without mass or inertia.
         """
         check_inertia(scene)
-        super().load(scene, layout)
-        scales = self.scales
-        heaviest = max(float(rod.profile.range[1].mass) for rod in scene.rods)
+        scales, heaviest = Scales.of(scene), max(float(rod.profile.range[1].mass) for rod in scene.rods)
         self.time = math.sqrt(heaviest * scales.length**2 / scales.force)
+        super().load(scene, layout)
         self._origins = np.concatenate([
-            np.tile(scene.origin(rod) / scales.length, (cells * self.shape.degree + 1, 1))
+            np.tile(scene.origin(rod) / scales.length, (cells * self.signature.degree + 1, 1))
             for rod, cells in zip(scene.rods, layout.counts, strict=True)
         ])  # fmt: skip
         mass, J, frames = nodal_inertia(scene, layout, self.nodes)
@@ -69,42 +75,42 @@ class Moving:
         self._damp()
 
     def _damp(self):
-        """Take the viscosity of the rods."""
-        scene, layout, scales = self.scene, self.layout, self.scales
+        """Fill in the viscosity of the rods."""
+        scene, layout, coupled = self.scene, self.layout, self.signature.coupled
         damped = [rod.damping or Damping() for rod in scene.rods]
-        given = [
-            damping.viscosity(rod.stiffness_at(x * rod.length))
+        units = replace(self.scales, force=self.scales.force * self.time)
+        given = joined([
+            law_data(damping.viscosity(rod.stiffness_at(x * rod.length)), units, coupled=coupled)
             for rod, damping, x in zip(scene.rods, damped, layout.inside(self.rule.gauss), strict=True)
-        ]
-        Kt, Jt = (np.concatenate(values) for values in zip(*given, strict=True))
-        bending = scales.moment * scales.length
-        data = rod_data(scene, layout, scales, self.rule, self.reference)
-        data = self._section_data(data._replace(K=Kt / (scales.force * self.time), J=Jt / (bending * self.time)))
-        self.rods.fill(self.Kt, data.K)
-        self.rods.fill(self.Jt, data.J)
+        ])  # fmt: skip
+        data = rod_data(scene, layout, self.scales, self.rule, self.reference, coupled=coupled)
+        data = self._section_data(data._replace(**given._asdict()))
+        for function, values in zip(self.viscosity, viscous_values(data), strict=True):
+            if function is not None:
+                self.rods.fill(function, values)
         self.damped = damped != [Damping()] * len(damped)
 
     def _fill_nodes(self, function, values):
-        """Values (elements, p + 1, k) at the nodes of every element, in the scene's order, into a Function."""
+        """Fill a Function with values (elements, p + 1, k) at the nodes of every element, in the scene's order."""
         local = values[self.rods.cells]
         local[self.rods.reversed] = local[self.rods.reversed][:, ::-1]
         space = function.function_space
         order = np.argsort(np.argsort(compat.element_nodes(space)))
         function.x.array.reshape(-1, values.shape[2])[compat.cell_nodes(space)] = local[:, order]
 
-    # -- what a rung fills in ----------------------------------------------------------------------------------------
+    # -- for subclasses to define ------------------------------------------------------------------------------------
 
     def _section_inertia(self, J, frames):
         """(elements, p + 1, inertia_size) from Jrho about d_1, d_2, d_3 (.., 3) and the frames at rest (.., 3, 3)."""
         raise NotImplementedError
 
     def passed(self):
-        """(local numbers,) the step from `start` to `state` as something that loads do work on: displacements, and
-        small rotations where tests have rotations."""
+        """(local degrees of freedom,) the step from `start` to `state` in the components of the test functions, so that
+        its product with a load vector is work: displacements, and small rotations."""
         raise NotImplementedError
 
     def set_velocity(self, linear, angular):
-        """Take velocities (N, 3) and angular velocities (N, 3) of all nodes, dimensionless, inertial, the scene's order."""
+        """Set velocities and angular velocities (N, 3) of all nodes, dimensionless, inertial, scene's order."""
         raise NotImplementedError
 
     def rates(self):
@@ -113,14 +119,10 @@ class Moving:
         raise NotImplementedError
 
     def _momenta_of(self, p):
-        """Linear and angular momenta, (n, 3) each, inertial, in the rows (n, components) of nodes."""
+        """Linear and angular momenta, (n, 3) each, inertial, from assembled rows (n, components) of nodes."""
         raise NotImplementedError
 
-    def _positions(self):
-        """(n, 3) of the local nodes, inertial, from where their structure starts."""
-        raise NotImplementedError
-
-    # -- what steppers and results ask for ---------------------------------------------------------------------------
+    # -- for time steppers and results -------------------------------------------------------------------------------
 
     @property
     def slots(self):
@@ -129,56 +131,57 @@ class Moving:
 
     @property
     def rate_arrays(self):
-        """The local numbers that tell how fast the state changes."""
+        """The arrays of the rates of the state."""
         return (self.velocity.x.array,)
 
     def accept(self, h):
-        """Take the rates of `state` after a step of length h: the trapezoidal rule."""
+        """Update the rates to those of `state` after a step of length h, by the trapezoidal rule."""
         rates = self.velocity.x.array
         rates[:] = 2 / h * (self.state.x.array - self.start.x.array) - rates
 
     def loads_at(self, t):
-        """Put the loads at the time t (s) into the forms' Functions."""
-        self._loads.at(t)
+        """Fill the forms' Functions with the loads at the time t (s)."""
+        self.actions.at(t)
 
     @property
     def moving_loads(self):
         """The Functions of loads that depend on time."""
-        return self._loads.moving
+        return self.actions.moving
 
     def ties_at(self, t):
         """The `Ties` at the time t (s)."""
         return self.ties.with_numbers_of(ties_of(self.scene, t))
 
     def largest_of(self, change, turns):
-        """Largest move (lengths), or turn (rad) times `turns`, in a change of the local numbers, over all ranks."""
+        """Largest displacement (lengths), or rotation (rad) times `turns`, in a change of the state, over all ranks."""
         nodal = change[self._nodal]
         moved, turned = (np.square(x).sum(axis=1).max(initial=0.0) for x in np.split(nodal, [self.moves], axis=1))
         local = math.sqrt(max(moved, (turns * self.turn) ** 2 * turned))
         return self.comm.allreduce(local, op=MPI.MAX) if self.comm.size > 1 else local
 
     def turned_over(self):
-        """Whether some node turned by half a turn or more in the step, over all ranks: it is then not the one meant."""
+        """Whether a node of any rank rotated by half a turn or more in the step: the solution is then spurious."""
         return False
 
     def snapshot_of_rates(self):
-        """(N, components) `velocity` at the nodes, the scene's order, all ranks, dimensionless."""
+        """(N, components) `velocity` at the nodes, in the scene's order, on all ranks, dimensionless."""
         return self._gather_nodes(self.velocity.x.array[self._nodal[: self._owned_nodes]])
 
     def momenta(self, tested):
         """Linear (3,) and angular momentum (3,) about the inertial origin, over all ranks, dimensionless.
 
         Args:
-            tested: (local numbers,) the assembled `forms.momentum`, contributions of this rank's elements.
+            tested: (local degrees of freedom,) the assembled `forms.momentum`, contributions of this rank's elements.
         """
         linear, angular = self._momenta_of(tested[self._nodal])
-        place = self._positions() + self._origins[self._slots]
-        both = np.concatenate([linear.sum(axis=0), (np.cross(place, linear) + angular).sum(axis=0)])
-        return np.split(self.comm.allreduce(both), 2)
+        place = self.positions() + self._origins[self._slots]
+        both = np.concatenate([linear.sum(axis=0), (cross(place, linear) + angular).sum(axis=0)])
+        both = self.comm.allreduce(both) if self.comm.size > 1 else both
+        return both[:3], both[3:]
 
 
 class MovingSpatial(Moving, SpatialModel):
-    """The spatial rung with inertia."""
+    """The spatial model with inertia."""
 
     variations = ()
     inertia_size = 6
@@ -200,7 +203,7 @@ class MovingSpatial(Moving, SpatialModel):
         return work.ravel()
 
     def turned_over(self):
-        """See `Moving`; -q would do as well as q for |q| = 1."""
+        """See `Moving`; a q of the other sign also satisfies |q| = 1."""
         q, before = (f.x.array[self._nodal[:, 3:]] for f in (self.state, self.start))
         here = bool((np.einsum("ni,ni->n", before, q) <= 0).any())
         return self.comm.allreduce(here, op=MPI.LOR) if self.comm.size > 1 else here
@@ -218,12 +221,9 @@ class MovingSpatial(Moving, SpatialModel):
     def _momenta_of(self, p):
         return p[:, :3], p[:, 4:]
 
-    def _positions(self):
-        return self.state.x.array[self._nodal[:, :3]]
-
 
 def spun(q, omega):
-    """(.., 4) the rates omega q/2 of q (.., 4) that angular velocities omega (.., 3) amount to."""
+    """(.., 4) the rates omega q/2 of q (.., 4) for angular velocities omega (.., 3)."""
     v = q[..., 1:]
     scalar = -np.einsum("...i,...i->...", omega, v)[..., None]
     return np.concatenate([scalar, q[..., :1] * omega + np.cross(omega, v)], axis=-1) / 2

@@ -3,31 +3,37 @@
 from dataclasses import dataclass
 
 import ufl
+from dolfinx import fem
 
 from cosserat_fenicsx import compat
 from cosserat_fenicsx.forms import equilibrium, inertia
 from cosserat_fenicsx.forms import spatial as eq
-from cosserat_fenicsx.forms.rotation import rotation_matrix
+from cosserat_fenicsx.forms.equilibrium import VirtualMotion
+from cosserat_fenicsx.forms.point import AXES, NONE
+from cosserat_fenicsx.forms.rotation import small_rotation
 from cosserat_fenicsx.models.compiled import (
     CompiledForms,
+    action_work,
     compile_all,
     derivative_in,
-    load_work,
     measures,
-    with_live_loads,
+    with_live_actions,
 )
+from cosserat_fenicsx.models.laws import as_matrix, law_of
 
 
 @dataclass(frozen=True)
 class MotionForms(CompiledForms):
-    """What a stepper assembles and evaluates: the residual is that of a step from `start` to `state`.
+    """What a time stepper assembles and evaluates: the residual is that of a step from `start` to `state`.
 
     Attributes:
         residual: without the dead loads, and without the momenta at the start of the step, over h.
-        momentum: momenta of the state and its velocity, tested.
-        live: virtual work of the live loads half way, per unit of load factor; or None. live_tangent: its derivative,
-            where it is no part of the tangent.
-        kinetic, strain: energies of the state; dissipated: what damping takes in the step.
+        momentum: momenta of the state and its velocity times the test functions.
+        live: virtual work of state-dependent actions at the middle of the step, factors included; or None.
+        live_tangent: its derivative, where this is not part of the tangent.
+        kinetic, strain: energies of the state; dissipated: energy dissipated in the step.
+        of_step, of_step_at_nodes: see `virtual_work_of_step`, at Gauss's points and at the nodes of an element; or
+            None.
     """
 
     momentum: object
@@ -36,28 +42,30 @@ class MotionForms(CompiledForms):
     strain: object
     dissipated: object
     live_tangent: object = None
+    of_step: object = None
+    of_step_at_nodes: object = None
 
 
 @dataclass(frozen=True)
 class SpatialData:
-    """The data of a moving spatial model as forms read them."""
+    """The data of a moving spatial model as used in forms; `viscosity` is the law of the strain rates."""
 
     section: equilibrium.Section
-    viscosity: inertia.Viscosity
+    viscosity: object
     body: inertia.Inertia
 
     @classmethod
     def of(cls, model):
-        """Those of a model."""
+        """The data of a model."""
         data, I = model.data, model.inertia
-        R_R = ufl.as_matrix([[data.R_R[3 * i + j] for j in range(3)] for i in range(3)])
         I_R = ufl.as_matrix([[I[0], I[1], I[2]], [I[1], I[3], I[4]], [I[2], I[4], I[5]]])
-        section = equilibrium.Section(data.K, data.K_inv, data.J, R_R, data.v_R)
-        return cls(section, inertia.Viscosity(model.Kt, model.Jt), inertia.Inertia(model.mass[0], I_R))
+        law = law_of(data.K, data.K_inv, data.J, data.G)
+        section = equilibrium.Section(law, as_matrix(data.R_R), data.v_R)
+        return cls(section, law_of(*model.viscosity), inertia.Inertia(model.mass[0], I_R))
 
 
 def along(w):
-    """w', the mesh being the line of arc length."""
+    """w', because the coordinate of the mesh is arc length."""
     return ufl.grad(w)[:, 0]
 
 
@@ -67,19 +75,19 @@ def parts_of(w):
 
 
 class StepForms:
-    """A step of a moving model as its forms read it. A rung fills in what depends on its unknowns.
+    """The UFL expressions of a time step. Subclasses define what depends on the unknowns of a model.
 
     Attributes:
-        state, start, velocity: the Functions; nodal, nodal0, rates: the same by names for rules other than Gauss's.
-        halfway, passed: the average of both ends, and their difference over h, at the nodes.
+        state, start, velocity: the Functions; nodal, nodal0, rates: their aliases for rules other than Gauss's.
+        halfway, passed: the average of both ends of the step, and their difference over h, at the nodes.
         before, after, middle: `Motion`s; section, viscosity: data; test: test functions.
         derivative: that of a form in the direction of the trial function.
     """
 
     def __init__(self, model):
         self.model, self.dx = model, measures(model)
-        # other rules than Gauss's need names of their own where that has one point (compat.alias)
-        named = compat.alias if model.shape.degree == 1 else (lambda function: function)
+        # other rules than Gauss's need aliases where Gauss's has one point (compat.alias)
+        named = compat.alias if model.signature.degree == 1 else (lambda function: function)
         self.state, self.start, self.velocity = U, U0, V = model.state, model.start, model.velocity
         self.nodal, self.nodal0, self.rates = nodal, nodal0, _ = named(U), named(U0), named(V)
         self.halfway, self.passed = (nodal + nodal0) / 2, (nodal - nodal0) / model.h
@@ -89,26 +97,26 @@ class StepForms:
         self.test = self.tests_of(phi)
         self.derivative = derivative_in(trial, *dict.fromkeys((U, nodal)))
 
-    # -- what a rung fills in ----------------------------------------------------------------------------------------
+    # -- for subclasses to define ------------------------------------------------------------------------------------
 
     def _take_data(self):
-        """Set section and viscosity, and what else the rung needs."""
+        """Set section and viscosity, and other data that the model needs."""
         raise NotImplementedError
 
     def motion_of(self, w):
-        """The motion of the unknowns, under Gauss's rule."""
+        """The `Motion` of the unknowns, for Gauss's rule."""
         raise NotImplementedError
 
     def tests_of(self, phi):
         """The test functions of eq. (1)."""
         raise NotImplementedError
 
-    def rotation_of(self, w):
-        """R from the reference."""
+    def point_of(self, w, w_s, w_t, rest, frame):
+        """The `Point` of unknowns, their derivatives along the rod and their rates."""
         raise NotImplementedError
 
     def momentum(self, w, w_t):
-        """Momenta per length of unknowns and their rates, tested."""
+        """Momenta per unit length of unknowns and their rates, times the test functions."""
         raise NotImplementedError
 
     def kinetic(self, w, w_t):
@@ -116,50 +124,96 @@ class StepForms:
         raise NotImplementedError
 
     def constraint(self):
-        """What the residual holds beside the balances, or 0."""
+        """Terms of the residual beside the balances, or 0."""
         return 0
 
     def fields(self, n, m):
-        """The numbers of n, m and r' that are unknown on this rung."""
+        """The components of n, m and r' that do not vanish identically in this model."""
         raise NotImplementedError
 
     # -- forms -------------------------------------------------------------------------------------------------------
 
-    def loads(self, w):
-        """The `LoadWork` where the unknowns turn with w."""
-        return load_work(self.model, self.dx, self.test, self.rotation_of(w), {self.state, self.nodal})
+    def halfway_point(self, place, rest, frame):
+        """The `Point` of the average of both ends of the step, with the average velocity."""
+        w, w0 = (self.state, self.start) if place == "line" else (self.nodal, self.nodal0)
+        return self.point_of((w + w0) / 2, along((w + w0) / 2), (w - w0) / self.model.h, rest, frame)
 
-    def compiled(self, residual, acting, working):
+    def actions(self, point_at):
+        """The `ActionWork` at the points that `point_at` gives."""
+        return action_work(self.model, self.dx, self.test, point_at, {self.state, self.nodal}, self.end_point)
+
+    def end_point(self, place, rest, frame):
+        """The `Point` at the end of the step."""
+        w, w0 = (self.state, self.start) if place == "line" else (self.nodal, self.nodal0)
+        return self.point_of(w, along(w), (w - w0) / self.model.h, rest, frame)
+
+    def compiled(self, residual, acting, working, of_step):
         """`MotionForms` of a residual without loads.
 
         Args:
-            acting: `LoadWork` in the balances; working: the one by which work is booked, half way.
+            of_step: see `virtual_work_of_step`.
+            acting: `ActionWork` in the balances; working: that of which the work is computed, at the middle.
         """
         model, dx, section, viscosity, h = self.model, self.dx, self.section, self.viscosity, self.model.h
-        residual, tangent = with_live_loads(model, acting, residual, self.derivative(residual), self.derivative)
+        residual, tangent = with_live_actions(acting, residual, self.derivative(residual), self.derivative)
         n, m = inertia.contact(self.after, section, viscosity, lambda a: ufl.derivative(a, self.state, self.velocity))
         lost = inertia.viscous_loss(self.before, self.after, section, viscosity, h) * dx.gauss
         lost += 2 * h * model.drag[0] * self.kinetic(self.halfway, self.passed) * dx.nodes
         others = {
             "momentum": self.momentum(self.nodal, self.rates) * dx.nodes,
-            "live": sum(term for term, _, _ in working.live) if working.live else None,
+            "live": booked(working),
             "kinetic": self.kinetic(self.nodal, self.rates) * dx.nodes,
             "strain": inertia.strain_energy(self.after, section) * dx.gauss,
             "dissipated": lost,
         }
-        return compile_motion(model, residual, tangent, acting.dead, self.fields(n, m), others)
+        return compile_motion(model, residual, tangent, acting, self.fields(n, m), others, of_step)
 
 
 def compile_momentum(step, stress=inertia.averaged_stress):
-    """The `MotionForms` of the momentum scheme on the `StepForms` of a rung; `stress` makes the stress of the step."""
+    """The `MotionForms` of the momentum-conserving scheme; `stress` gives the virtual work of the stress."""
     model, dx, h = step.model, step.dx, step.model.h
     residual = 1 / h * step.momentum(step.nodal, 2 * step.passed - step.rates) * dx.nodes
-    residual += stress(step.before, step.after, step.middle, step.section, step.viscosity, h, step.test) * dx.gauss
-    # drag: -drag times the momenta half way, with the velocities (U - U0)/h
+
+    def of_stress(test):
+        return stress(step.before, step.after, step.middle, step.section, step.viscosity, h, test)
+
+    residual += of_stress(step.test) * dx.gauss
+    # drag: -drag times the momenta at the middle of the step, with the velocities (U - U0)/h
     residual += model.drag[0] * step.momentum(step.halfway, step.passed) * dx.nodes
     residual += step.constraint()
-    loads = step.loads(step.halfway)
-    return step.compiled(residual, loads, loads)
+    acting = step.actions(step.halfway_point)
+    return step.compiled(residual, acting, acting, virtual_work_of_step(model, of_stress, step.halfway_point))
+
+
+def virtual_work_of_step(model, stress, point_at):
+    """The virtual work per length of a step's stress, less that of what acts along rods, as what multiplies phi_r, phi,
+    phi_r' and phi' in it: UFL (12,), under Gauss's rule. And of what is integrated at the nodes what multiplies phi_r
+    and phi: (6,).
+
+    Each is None where there is nothing of the kind; both are where nothing is clamped, and nobody asks.
+
+    Args:
+        stress: function of a `VirtualMotion`; point_at: see `action_work`.
+    """
+    if not model.signature.connections.clamped:
+        return None, None
+    factors = {"load": model.load_factor, "permanent": model.permanent_factor, "full": 1}
+    acting = [(term, factors[term.kind.scaled], point_at(term.kind.place, term.rest, term.frame))
+              for term in model.actions.terms]  # fmt: skip
+
+    def less(test, place):
+        return sum(factor * term.work(point, test) for term, factor, point in acting if term.kind.place == place)
+
+    tests = [VirtualMotion(*(axis if k == i else NONE for k in range(4))) for i in range(4) for axis in AXES]
+    at_gauss = ufl.as_vector([stress(test) - less(test, "line") for test in tests])
+    if not any(term.kind.place == "node" for term, _, _ in acting):
+        return at_gauss, None
+    return at_gauss, ufl.as_vector([-less(test, "node") for test in tests[:6]])
+
+
+def booked(acting):
+    """The virtual work of state-dependent actions, factors included; or None."""
+    return sum(live.factor * live.form for live in acting.live) if acting.live else None
 
 
 class SpatialStep(StepForms):
@@ -177,9 +231,10 @@ class SpatialStep(StepForms):
         """See `StepForms`."""
         return eq.tests_of(phi, along(phi))
 
-    def rotation_of(self, w):
+    def point_of(self, w, w_s, w_t, rest, frame):
         """See `StepForms`."""
-        return rotation_matrix(parts_of(w)[1])
+        (_, q), (r_t, q_t) = parts_of(w), parts_of(w_t)
+        return eq.point_of(w, w_s, rest=rest, frame=frame, r_t=r_t, omega=small_rotation(q_t, q))
 
     def momentum(self, w, w_t):
         """See `StepForms`."""
@@ -201,12 +256,17 @@ class SpatialStep(StepForms):
         return ufl.as_vector([*n, *m, *self.after.r_s])
 
 
-def compile_motion(model, residual, tangent, dead, fields, others):
-    """`MotionForms` of UFL forms; all are signed before the first is compiled, see `compiled`."""
+def compile_motion(model, residual, tangent, acting, fields, others, of_step):
+    """`MotionForms` of UFL forms; all signatures are computed before the first is compiled, see `compiled`."""
     others = {name: form for name, form in others.items()}
     for form in others.values():
         if form is not None:
             form.signature()
     made = compat.form_for_speed
-    steady = compile_all(model, residual, tangent, dead, [], fields=fields, compiled=made)
-    return MotionForms(**vars(steady), **{name: form and made(form) for name, form in others.items()})
+    steady = compile_all(model, residual, tangent, acting, [], fields=fields, compiled=made)
+    others = {name: form and made(form) for name, form in others.items()}
+    places = steady.gauss, model.nodes
+    return MotionForms(**vars(steady), **others, **{
+        name: None if a is None else fem.Expression(a, x[:, None])
+        for name, a, x in zip(("of_step", "of_step_at_nodes"), of_step, places, strict=True)
+    })  # fmt: skip

@@ -1,15 +1,17 @@
-"""The planar rung with inertia: a scene that moves in a plane does not pay for space."""
+"""The planar model with inertia, for scenes that move in a plane."""
 
 import numpy as np
 import ufl
 
 from cosserat_fenicsx.errors import SceneError
-from cosserat_fenicsx.forms import inertia
 from cosserat_fenicsx.forms import planar as eq
+from cosserat_fenicsx.models.laws import law_of
 from cosserat_fenicsx.models.moving import Moving
 from cosserat_fenicsx.models.moving_forms import StepForms, along, compile_momentum
 from cosserat_fenicsx.models.planar import PlanarModel
-from cosserat_fenicsx.scene.signals import signals_of
+from cosserat_fenicsx.scene.action import is_axial
+from cosserat_fenicsx.scene.describe import describe
+from cosserat_fenicsx.scene.signals import at, signals_of
 
 _OFF = 1e-9
 
@@ -58,11 +60,15 @@ class MovingPlanar(Moving, PlanarModel):
             SceneError: a load that leaves the plane at this time.
         """
         super().loads_at(t)
-        for work, _, (vectors, *_) in self.terms:
-            given = vectors.x.array.reshape(-1, 3)
-            off = given[:, :2] if "moment" in work.__name__ else given[:, 2]
-            if np.abs(off).max(initial=0.0) > _OFF * np.abs(given).max(initial=0.0):
-                self._refuse(f"a {work.__name__.replace('_', ' ')}", t)
+        for load in self.scene.actions:
+            if not signals_of(load):
+                continue
+            for rod in [load.station.rod] if load.station else filter(load.acts_on, self.scene.rods):
+                for datum in at(load, t).data(rod, np.array([0.0, rod.length])):
+                    given = datum.value.reshape(-1, datum.size) @ self.axes.T if datum.size == 3 else np.zeros((1, 3))
+                    off = given[:, :2] if is_axial(datum.unit) else given[:, 2]
+                    if np.abs(off).max(initial=0.0) > _OFF * np.abs(given).max(initial=0.0):
+                        self._refuse(describe(load), t)
 
     def ties_at(self, t):
         """See `Moving`.
@@ -90,17 +96,14 @@ class MovingPlanar(Moving, PlanarModel):
     def _momenta_of(self, p):
         return p[:, :2] @ self.axes[:2], p[:, 2:] * self.axes[2]
 
-    def _positions(self):
-        return self.state.x.array[self._nodal[:, :2]] @ self.axes[:2] + self._out_of_plane()[self._slots]
-
 
 class PlanarStep(StepForms):
     """See `StepForms`."""
 
     def _take_data(self):
         data = self.model.data
-        self.section = eq.section_of(data.K, data.K_inv, data.J, data.R_R, data.v_R)
-        self.viscosity = inertia.Viscosity(self.model.Kt, self.model.Jt)
+        self.section = eq.section_of(law_of(data.K, data.K_inv, data.J, data.G), data.R_R, data.v_R)
+        self.viscosity = law_of(*self.model.viscosity)
 
     def motion_of(self, w):
         """See `StepForms`."""
@@ -110,9 +113,9 @@ class PlanarStep(StepForms):
         """See `StepForms`."""
         return eq.tests_of(phi, along(phi))
 
-    def rotation_of(self, w):
+    def point_of(self, w, w_s, w_t, rest, frame):
         """See `StepForms`."""
-        return eq.rotation_matrix(w[2])
+        return eq.point_of(w, w_s, rest=rest, frame=frame, r_t=eq.in_plane(w_t), omega=eq.along_normal(w_t[2]))
 
     def momentum(self, w, w_t):
         """See `StepForms`."""

@@ -1,8 +1,9 @@
-"""From dolfinx's numbers to the solver's unknowns.
+"""The map from dolfinx's degrees of freedom to the solver's unknowns.
 
-Clamped nodes have no unknowns, rigidly joined nodes share theirs, and added equations bring multipliers. Rods stay
-separate chains of the mesh, so that no release of dolfinx meets a branching point. A rank's part of the solver's vector holds
-its free nodes, node by node, then its other unknowns (of elements), then, on the last rank, the multipliers.
+Clamped nodes have no unknowns, rigidly joined nodes share theirs, and every constraint equation has a multiplier. Rods
+are separate chains of the mesh, because dolfinx does not support branching interval meshes in all versions. A rank's
+part of the solver's vector contains its free nodes, node by node, then its other unknowns (of elements), then, on the
+last rank, the multipliers.
 """
 
 import numpy as np
@@ -14,18 +15,18 @@ class Numbering:
     """The unknowns on one space.
 
     Args:
-        space: dolfinx's space; `node_dofs` (local nodes, block) says which of its local numbers belong to which node.
-        owned: how many of the local nodes are this rank's.
+        space: dolfinx's space; `node_dofs` (local nodes, block): its local degrees of freedom of every node.
+        owned: number of the local nodes that this rank owns.
         slots: the scene's number of every local node.
         clamped, leaders: slots without unknowns, and {slot: the slot whose unknowns it shares}.
-        multipliers: number of added equations.
+        multipliers: number of constraint equations.
 
     Attributes:
         nodes: free nodes of this rank.
         block: unknowns of a node.
         size: unknowns of this rank, total: of all ranks.
-        rows: solver's number of every local number of the space; -1 where clamped.
-        first_multiplier: solver's number of the first multiplier.
+        rows: index in the solver's vector of every local degree of freedom of the space; -1 where clamped.
+        first_multiplier: index of the first multiplier.
     """
 
     def __init__(self, space, node_dofs, owned, slots, clamped, leaders, multipliers=0):
@@ -38,7 +39,7 @@ class Numbering:
         own = np.zeros(len(slots), dtype=bool)
         own[:owned] = (free & (lead == slots))[:owned]
         self.nodes = int(own.sum())
-        # PETSc inserts node by node only where all sizes are multiples of a node's: idle multipliers fill the last
+        # PETSc inserts node blocks only where all sizes are multiples of the block: unused multipliers pad the last one
         self.idle = -multipliers % self.block if self._blocked else 0
         dofs = dofmap.index_map.size_local * dofmap.index_map_bs
         others = np.setdiff1d(np.arange(dofs), node_dofs[:owned].ravel())
@@ -48,7 +49,7 @@ class Numbering:
         sizes = comm.allgather(self.size)
         first, self.total = sum(sizes[: comm.rank]), sum(sizes)
         self.first, self.first_multiplier = first, self.total - multipliers - self.idle
-        rows = fem.Function(space)  # carries the numbers to the ranks that see them as ghosts
+        rows = fem.Function(space)  # communicates the indices to the ranks that have them as ghosts
         numbers = rows.x.array
         numbers[:] = -1
         chain = np.flatnonzero(own)[np.argsort(slots[own])]  # along the rods
@@ -61,7 +62,7 @@ class Numbering:
         self._connect(own.sum() != free[:owned].sum())
 
     def _share(self, slots, lead, own, node_dofs, leading):
-        """Give every rank the numbers of the nodes that others share."""
+        """Give every rank the indices of the nodes whose unknowns others share."""
         here = {int(slots[i]): self.rows[node_dofs[i]] for i in np.flatnonzero(own) if int(slots[i]) in leading}
         everywhere = {}
         for part in self.comm.allgather(here):
@@ -71,7 +72,7 @@ class Numbering:
                 self.rows[node_dofs[i]] = everywhere[int(lead[i])]
 
     def _connect(self, shared):
-        """How values move between the solver's vector and dolfinx's local numbers."""
+        """Prepare the transfer between the solver's vector and dolfinx's local degrees of freedom."""
         self._free = np.flatnonzero(self.rows >= 0)
         self._of_free = self.rows[self._free]
         mine = (self._of_free >= self.first) & (self._of_free < self.first + self.size)
@@ -91,7 +92,7 @@ class Numbering:
         return vector
 
     def to_local(self, x, numbers):
-        """Put a solver's vector into dolfinx's local numbers, ghosts too; clamped ones stay."""
+        """Copy a solver's vector to dolfinx's local degrees of freedom, ghosts included, clamped ones excluded."""
         if self._serial:
             numbers[self._free] = x.array_r[self._of_free]
         else:
@@ -99,7 +100,7 @@ class Numbering:
             numbers[self._free] = self._local.array_r
 
     def from_local(self, numbers, x):
-        """The other way: take unknowns from local numbers; multipliers become zero."""
+        """Copy local degrees of freedom to a solver's vector; multipliers become zero."""
         array = x.array_w
         array[:] = 0.0
         array[self._of_mine] = numbers[self._mine]
@@ -119,12 +120,12 @@ class Numbering:
             self._scatter.scatter(self._local, b, PETSc.InsertMode.ADD_VALUES, PETSc.ScatterMode.REVERSE)
 
     def matrix(self, cell_dofs, tied, *, blocks=False):
-        """A matrix with room for all elements of this rank and for added equations.
+        """A matrix preallocated for all elements of this rank and for the constraint equations.
 
         Args:
-            cell_dofs: (cells, dofs) local numbers of every element of this rank.
-            tied: solver's numbers (any rank's) of the unknowns that added equations speak of; the same on all ranks.
-            blocks: whether it is to be stored by the blocks of nodes.
+            cell_dofs: (cells, dofs) local degrees of freedom of every element of this rank.
+            tied: indices (of any rank) of the unknowns in constraint equations; the same on all ranks.
+            blocks: whether to store it in node blocks.
         """
         A = PETSc.Mat().create(self.comm)
         A.setType("baij" if blocks else "aij")
@@ -138,12 +139,12 @@ class Numbering:
         else:
             numbers = PETSc.LGMap().create(self.rows, comm=self.comm)
         A.setLGMap(numbers, numbers)
-        # said on every rank: one without rows would take part in other collective calls than the rest
+        # set on every rank: otherwise a rank without rows would make different collective calls
         A.setOption(PETSc.Mat.Option.NEW_NONZERO_ALLOCATION_ERR, True)
         return A
 
     def _room(self, cell_dofs, tied):
-        """Most non-zeros of every row of this rank: on its own columns, and on others'."""
+        """Upper bounds on the non-zeros of every row of this rank: in its own columns, and in those of other ranks."""
         count = np.zeros(len(self.rows))
         wide = np.count_nonzero(self.rows[cell_dofs] >= 0, axis=1)
         np.add.at(count, cell_dofs.ravel(), np.repeat(wide, cell_dofs.shape[1]))

@@ -1,18 +1,19 @@
-"""The planar rung: r in the plane and theta in P_p, dimensionless."""
+"""The planar model: r in the plane and theta in P_p, dimensionless."""
 
 import numpy as np
 
 from cosserat_fenicsx.models.base import RodModel
+from cosserat_fenicsx.models.laws import turned
 from cosserat_fenicsx.models.planar_forms import compile_forms
 
 
 class PlaneModel(RodModel):
-    """What rungs in a plane share: vectors have components along the plane's axes, sections the order (a, e_3, t)."""
+    """Base of planar models: vectors have components along the plane's axes, sections the order (a, e_3, t)."""
 
     frame_size, strain_size, force_size = 2, 2, 2
 
     def _section_data(self, data):
-        """K, J in the order (a, e_3, t), the tangent t_R (2) and the strain v_R = (shear, stretch)."""
+        """The law in the order (a, e_3, t), the tangent t_R (2) and the strain v_R = (shear, stretch)."""
         frames = np.einsum("ab,cgbi->cgai", self.axes, data.R_R.reshape(*data.K.shape[:2], 3, 3))
         first = np.abs(frames[:, :, 2, 0]) > np.abs(frames[:, :, 2, 1])  # d_1 along the normal, otherwise d_2 (or any)
         order = np.where(first[:, :, None], [1, 0, 2], [0, 1, 2])
@@ -20,30 +21,40 @@ class PlaneModel(RodModel):
         r_s = np.einsum("cgai,cgi->cga", frames, data.v_R)
         shear = t[..., 0] * r_s[..., 1] - t[..., 1] * r_s[..., 0]  # a = e_3 x t
         stretch = np.einsum("cga,cga->cg", t, r_s[..., :2])
-        K, J = (np.take_along_axis(values, order, axis=2) for values in (data.K, data.J))
-        return data._replace(K=K, J=J, R_R=t, v_R=np.stack([shear, stretch], axis=2))
+        in_plane = data._replace(R_R=t, v_R=np.stack([shear, stretch], axis=2))
+        if data.G is None:
+            K, J = (np.take_along_axis(values, order, axis=2) for values in (data.K, data.J))
+            return in_plane._replace(K=K, J=J)
+        return turned(in_plane, _to_plane(t) @ frames)
 
     def _angles(self, rq):
         """(.., N) theta of (r, q), (.., N, 7): continuous along each rod, beyond full turns too."""
         half = np.arctan2(rq[..., 4:] @ self.axes[2], rq[..., 3])
-        ends = np.cumsum([0, *(cells * self.shape.degree + 1 for cells in self.shape.counts)])
+        ends = np.cumsum([0, *(cells * self.signature.degree + 1 for cells in self.signature.counts)])
         rods = [np.unwrap(half[..., a:b]) for a, b in zip(ends[:-1], ends[1:], strict=True)]
         return 2 * np.concatenate(rods, axis=-1)
 
     def _out_of_plane(self):
-        """(N, 3) what of the positions stays as it is, inertial."""
+        """(N, 3) the constant component of the positions along the normal, inertial."""
         return np.outer(self.reference @ self.axes[2], self.axes[2])
 
 
+def _to_plane(t):
+    """(.., 3, 3) from components along the plane's axes to those along (a, e_3, t), from the tangents t (.., 2)."""
+    P = np.zeros((*t.shape[:-1], 3, 3))
+    P[..., 0, 0], P[..., 0, 1], P[..., 1, 2], P[..., 2, :2] = -t[..., 1], t[..., 0], 1.0, t
+    return P
+
+
 def in_space(axes, offset, r, theta, n, m, r_s):
-    """From a plane to space.
+    """Results of a planar model as vectors and quaternions in space.
 
     Args:
         axes: (3, 3) rows e_1, e_2, e_3; offset: (N, 3) the constant part of the positions.
         r, theta: at the nodes, (k, N, 2) and (k, N); n, m, r_s: at the Gauss points, (.., 2), (..), (.., 2).
 
     Returns:
-        (r, q) (k, N, 7) and (n, m, r') (.., 9), inertial; q turns on where theta does, beyond full turns.
+        (r, q) (k, N, 7) and (n, m, r') (.., 9), inertial; q is continuous where theta is, beyond full turns too.
     """
     rq = np.concatenate(
         [r @ axes[:2] + offset, np.cos(theta / 2)[..., None], np.sin(theta / 2)[..., None] * axes[2]], axis=-1
@@ -52,16 +63,16 @@ def in_space(axes, offset, r, theta, n, m, r_s):
 
 
 class PlanarModel(PlaneModel):
-    """Scenes in a plane."""
+    """The model for scenes in a plane."""
 
     name, components, moves, turn = "planar", 3, 2, 1.0
     variations = ((3, False), (3, True))
 
     def _compile(self, spaces):
-        return compile_forms(self, spaces[0], *(self.carried or (None,)))
+        return compile_forms(self, spaces[0])
 
     def _without_saddle(self):
-        return "plain" if self.shape.slender or self.comm.size > 1 else "blocks"
+        return "plain" if self.signature.slender or self.comm.size > 1 else "blocks"
 
     def _at_rest(self):
         return np.column_stack([self.reference @ self.axes[:2].T, np.zeros(len(self.reference))])
@@ -72,6 +83,10 @@ class PlanarModel(PlaneModel):
         inside[0, :3], inside[1, :3], inside[2, 3:] = e1, e2, e3
         across[0, :3], across[1, 3:], across[2, 3:] = e3, e1, e2
         return inside, across
+
+    def positions(self):
+        """See `RodModel`."""
+        return self.state.x.array[self._nodal[:, :2]] @ self.axes[:2] + self._out_of_plane()[self._slots]
 
     def tied_motion(self, values):
         """See `RodModel`."""
@@ -86,6 +101,11 @@ class PlanarModel(PlaneModel):
         """See `RodModel`."""
         inside = self._variation_axes()[0]
         return inside.T[None], inside[None]
+
+    def held_forces(self, forces):
+        """See `RodModel`: those in the plane and about its normal."""
+        inside = self._variation_axes()[0]
+        return forces @ inside.T @ inside
 
     def unknowns_of(self, rq):
         """See `RodModel`."""

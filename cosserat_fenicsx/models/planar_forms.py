@@ -1,27 +1,30 @@
 """The forms of `forms/planar.py` on a model's mesh, compiled."""
 
+from functools import partial
+
 import ufl
 
 from cosserat_fenicsx import compat
 from cosserat_fenicsx.forms import equilibrium
 from cosserat_fenicsx.forms import planar as eq
 from cosserat_fenicsx.models.compiled import (
+    action_densities,
+    action_work,
     compile_all,
     derivative_in,
-    load_work,
     measures,
-    turned_loads,
-    with_live_loads,
+    varied_actions,
+    with_live_actions,
 )
+from cosserat_fenicsx.models.laws import law_of, stiff_enough
 
 
-def compile_forms(model, variations, carried_n):
+def compile_forms(model, variations):
     """The `CompiledForms` of a `PlanarModel`; its second variations are the one in the plane and the one out of it.
 
     Args:
-        model: supplies mesh, spaces, data and the load terms.
-        variations: space of three components a node.
-        carried_n: the Function n_k of the condensed variant, else None.
+        model: supplies mesh, spaces, data and the terms of the actions.
+        variations: space of three components per node.
     """
     U, before, step = model.state, model.before, model.step
     U_node = compat.alias(U)
@@ -36,35 +39,30 @@ def compile_forms(model, variations, carried_n):
     def motion_of(u):
         return eq.motion_of(along(u), u[2], along(u)[2])
 
-    section = eq.section_of(data.K, data.K_inv, data.J, data.R_R, data.v_R)
+    section = eq.section_of(law_of(data.K, data.K_inv, data.J, data.G), data.R_R, data.v_R)
     motion = motion_of(U)
     phi, trial = ufl.TestFunction(model.space), ufl.TrialFunction(model.space)
     test = eq.tests_of(phi, along(phi))
     derivative = derivative_in(trial, U, U_node)
-    advance = None
-    if carried_n is None:
-        n = eq.in_plane((U[3], U[4]))
-        internal = equilibrium.mixed(n, motion, section, test, eq.in_plane((phi[3], phi[4])), ds)
-        tangent = derivative(internal)
-    else:
-        n = eq.in_plane(carried_n)
-        internal = equilibrium.displacement(motion, section, test, ds)
-        tangent = equilibrium.carried_force_tangent(n, motion, section, test, ds, derivative)
-        update = equilibrium.carried_force_update(
-            n, motion_of(before), section, lambda a: ufl.derivative(a, before, step)
-        )
-        advance = ufl.as_vector([update[0], update[1]])
+    force = model.signature.formulation.force
+    n, phi_n = (None if a is None else eq.in_plane(a) for a in force.symbols(model, U, phi))
+    along_step = partial(ufl.derivative, coefficient=before, argument=step)
+    weak = force.weak_form(n, phi_n, motion, motion_of(before), section, test, ds, derivative, along_step)
+    advance = None if weak.advance is None else ufl.as_vector([weak.advance[0], weak.advance[1]])
 
-    R_node = eq.rotation_matrix(U_node[2])
-    loads = load_work(model, dx, test, R_node, (U, U_node))
-    residual, tangent = with_live_loads(model, loads, internal, tangent, derivative)
+    def point_at(place, rest, frame):
+        return eq.point_of(*((U, along(U)) if place == "line" else (U_node, along(U_node))), rest=rest, frame=frame)
+
+    acting = action_work(model, dx, test, point_at, (U, U_node))
+    residual, tangent = with_live_actions(acting, weak.internal, weak.tangent, derivative)
 
     psi, w = ufl.TestFunction(variations), ufl.TrialFunction(variations)
-    stiff, seconds = section._replace(K=data.K_stiff), []
+    stiff, seconds = section._replace(law=stiff_enough(weak.n, data)), []
     for tests_of in (eq.tests_of, eq.sideways_tests_of):
         rigid, direction = tests_of(psi, along(psi)), tests_of(w, along(w))
-        second = ds(equilibrium.second_variation(n, motion, stiff, rigid, direction))
-        seconds.append(second - turned_loads(model, loads, rigid, R_node, direction.phi))
-    m = equilibrium.contact_moment(motion, section)
-    fields = ufl.as_vector([n[0], n[1], m[2], motion.r_s[0], motion.r_s[1]])
-    return compile_all(model, residual, tangent, loads.dead, seconds, fields=fields, advance=advance)
+        second = ds(equilibrium.second_variation(weak.n, motion, stiff, rigid, direction))
+        seconds.append(second - varied_actions(acting, rigid, direction))
+    m = equilibrium.contact_moment(weak.n, motion, section)
+    fields = ufl.as_vector([weak.n[0], weak.n[1], m[2], motion.r_s[0], motion.r_s[1]])
+    densities = action_densities(model, point_at)
+    return compile_all(model, residual, tangent, acting, seconds, fields=fields, advance=advance, densities=densities)

@@ -1,4 +1,4 @@
-"""What forms need to know of a scene's rods at the Gauss points: stiffness, reference frame and reference strain."""
+"""The data of a scene's rods at the Gauss points: their law, reference frame and reference strain."""
 
 from collections import namedtuple
 
@@ -7,47 +7,58 @@ from dolfinx import fem
 
 from cosserat_fenicsx import compat
 from cosserat_fenicsx.checks import refuse
+from cosserat_fenicsx.element import lobatto_weights
+from cosserat_fenicsx.models.laws import LawData, field_values, law_data
 
-# EA and GA are bounded where only the sign of the second variation is asked for: more would drown the bending of slender
-# rods and the weak modes of thin blades in rounding. In EI/L^2 of each rod, by variant: what bends in n half waves has its critical
-# load shifted by about (n pi)^2 over the bound, so it is a hundred times higher where rounding leaves room: below the bending
-# stiffness about the weak axis by _ROOM times (element over rod)^2.
-_STIFF = {"condensed": 1e6, "field": 1e5}
+# EA and GA are bounded where only the signs of the second variation's eigenvalues matter: with larger values, rounding
+# errors would exceed the eigenvalues of bending of slender rods and of weak modes of thin blades. The bound is in
+# EI/L^2 of each rod, L by `bending_lengths` (see `ContactForce.stiff`). The critical load of a mode with n half waves
+# changes by about (n pi)^2 over the bound relatively; the bound is therefore up to _HIGHER times higher where rounding
+# permits, i.e. up to _ROOM times the bending stiffness about the weak axis times (element length over rod length)^2.
+# Forms raise it with the contact force (`law.stiffness_for`).
 _HIGHER, _ROOM = 100.0, 1e10
 
-#: Arrays (elements, points, k) in the scene's order, dimensionless: K, J, frames R_R (3 x 3) and strains v_R.
-RodData = namedtuple("RodData", "K J R_R v_R")
+#: Arrays (elements, points, k) in the scene's order, dimensionless: the fields of `LawData`, frames R_R (3 x 3) and
+#: strains v_R.
+RodData = namedtuple("RodData", (*LawData._fields, "R_R", "v_R"))
 
 
-def rod_data(scene, layout, scales, rule, reference):
-    """Stiffness and reference at the Gauss points.
+def rod_data(scene, layout, scales, rule, reference, *, coupled):
+    """Law and reference at the Gauss points.
 
     The reference strain is that of the interpolated curve, so that the discrete rod is free of stress at rest; it
-    differs from (0, 0, 1) by the interpolation error, which costs no order.
+    differs from (0, 0, 1) by the interpolation error, which does not reduce the order of convergence.
 
     Args:
         rule: the `ElementRule`; reference: (nodes, 3) positions at rest over the unit of length.
+        coupled: whether the law couples strains.
     """
     parts, first = [], 0
     for rod, breaks, x in zip(scene.rods, layout.breaks, layout.inside(rule.gauss), strict=True):
         s, shape = x.ravel() * rod.length, x.shape
-        along, frames = rod.stiffness_at(s), rod.curve.frame(s).reshape(*shape, 3, 3)
+        along, frames = rod.stiffness_at(s.reshape(shape)), rod.curve.frame(s).reshape(*shape, 3, 3)
         p, cells = len(rule.nodes) - 1, len(breaks) - 1
         nodes = reference[first + p * np.arange(cells)[:, None] + np.arange(p + 1)]
         first += p * cells + 1
         h = np.diff(breaks) * rod.length / scales.length
         r_s = np.einsum("gj,cji->cgi", rule.slopes, nodes) / h[:, None, None]
         parts.append(RodData(
-            along.K.reshape(*shape, 3) / scales.force,
-            along.J.reshape(*shape, 3) / (scales.moment * scales.length),
+            *law_data(along, scales, coupled=coupled),
             frames.reshape(*shape, 9),
             np.einsum("cgij,cgi->cgj", frames, r_s),
         ))  # fmt: skip
-    return RodData(*(np.concatenate(fields) for fields in zip(*parts, strict=True)))
+    return joined(parts)
 
 
-#: The same as dolfinx Functions; K_inv is zero where K is infinite, K_stiff is bounded. In a plane R_R is the tangent.
-RodFields = namedtuple("RodFields", "K K_inv K_stiff J R_R v_R")
+def joined(parts):
+    """One named tuple of arrays from those of all rods."""
+    fields = (None if field[0] is None else np.concatenate(field) for field in zip(*parts, strict=True))
+    return type(parts[0])(*fields)
+
+
+#: The same as dolfinx Functions, see `laws.field_values`; K_inv is zero where K is infinite, K_stiff is bounded. In a
+#: plane R_R is the tangent.
+RodFields = namedtuple("RodFields", "K K_inv K_stiff J G R_R v_R")
 
 
 def gauss_function(mesh, points, size):
@@ -55,30 +66,44 @@ def gauss_function(mesh, points, size):
     return fem.Function(compat.function_space(mesh, compat.at_quadrature_points(mesh, 2 * points - 1, size)))
 
 
-def rod_fields(mesh, points, frame, strain):
-    """Empty `RodFields` on a mesh, with so many numbers for R_R and for v_R."""
-    return RodFields(*(gauss_function(mesh, points, size) for size in (3, 3, 3, 3, frame, strain)))
+def rod_fields(mesh, points, frame, strain, *, coupled):
+    """Empty `RodFields` with `frame` components of R_R and `strain` of v_R, for a coupled or diagonal law."""
+    law = (9,) * 5 if coupled else (3, 3, 3, 3, 0)
+    return RodFields(*(gauss_function(mesh, points, size) if size else None for size in (*law, frame, strain)))
 
 
-def bounded(data, variant, sizes, lengths):
-    """K where only the sign of the second variation is asked for; sizes of the elements and lengths of their rods, (elements,)."""
+def bending_lengths(data, lengths, counts):
+    """(elements,) length scale of bending of each rod: its length, or that of a radian of its arc if shorter.
+
+    The bending and the shear compliance of a coil of radius R are in proportion to R^2/EI and 1/K, for any length L of
+    its wire: with K = 1e6 EI/L^2 a spring of 40 turns would be 6 % too soft.
+    """
+    tangents, scales = np.split(data.R_R[:, :, 2::3], np.cumsum(counts)[:-1]), []
+    for length, along in zip(lengths, tangents, strict=True):
+        along = along.reshape(-1, 3)
+        turned = np.arccos(np.clip(np.einsum("ki,ki->k", along[1:], along[:-1]), -1.0, 1.0)).sum()
+        scales.append(length / max(1.0, turned))
+    return np.repeat(scales, counts)
+
+
+def bounded(data, stiff, sizes, lengths):
+    """The bounded K of the second variation; sizes of elements and `bending_lengths`, (elements,)."""
     strong, weak = (bend(data.J, axis=2, keepdims=True) for bend in (np.max, np.min))
     lengths, sizes = lengths[:, None, None], sizes[:, None, None]
-    least = _STIFF.get(variant, np.inf) * strong / lengths**2
+    least = stiff * strong / lengths**2
     room = _ROOM * weak * sizes**2 / lengths**4
     return np.minimum(data.K, np.maximum(least, np.minimum(_HIGHER * least, room)))
 
 
 def fill_fields(fields, rods, data, stiff):
     """Put `RodData` and the bounded K into `RodFields`."""
-    finite = np.where(np.isinf(data.K), 0.0, data.K)
-    values = RodFields(finite, 1 / data.K, stiff, data.J, data.R_R, data.v_R)
-    for function, array in zip(fields, values, strict=True):
-        rods.fill(function, array)
+    for function, array in zip(fields, (*field_values(data, stiff), data.R_R, data.v_R), strict=True):
+        if function is not None:
+            rods.fill(function, array)
 
 
 def check_inertia(scene):
-    """Refuse a rod that cannot move.
+    """Raise an error for a rod without inertia.
 
     Raises:
         SceneError: a rod without mass or inertia.
@@ -93,12 +118,22 @@ def check_inertia(scene):
 
 def nodal_inertia(scene, layout, nodes):
     """At the nodes of every element, in the scene's order: mass (elements, p + 1), kg/m, Jrho about d_1, d_2, d_3
-    (elements, p + 1, 3), kg m, and frames at rest (elements, p + 1, 3, 3); on a jump each element has its own side."""
-    parts = []
-    for rod, x in zip(scene.rods, layout.inside(nodes), strict=True):
+    (elements, p + 1, 3), kg m, and frames at rest (elements, p + 1, 3, 3). At a jump each element has the value of its
+    side. Point masses are added to one of the adjacent elements."""
+    parts, weights = [], lobatto_weights(nodes)
+    for i, (rod, x) in enumerate(zip(scene.rods, layout.inside(nodes), strict=True)):
         s = x * rod.length
         after, before = rod.stiffness_at(s, "right"), rod.stiffness_at(s, "left")
         first = np.arange(s.shape[1]) == 0
         mass, J = np.where(first, after.mass, before.mass), np.where(first[:, None], after.inertia, before.inertia)
+        for action in scene.loads:
+            body = action.inertia(rod) if action.station is not None and action.station.rod is rod else None
+            if body is not None:  # divided by the node's quadrature weight, which multiplies it again
+                vertex = layout.vertex(scene, action.station)[1]
+                cell = min(vertex, layout.counts[i] - 1)
+                at = cell, -1 if vertex > cell else 0
+                length = weights[at[1]] * (layout.breaks[i][cell + 1] - layout.breaks[i][cell]) * rod.length
+                mass[at] += body[0] / length
+                J[at] += body[1] / length
         parts.append((mass, J, rod.curve.frame(s.ravel()).reshape(*s.shape, 3, 3)))
     return tuple(np.concatenate(part) for part in zip(*parts, strict=True))

@@ -1,14 +1,23 @@
-"""The mesh of a scene's rods and the bookkeeping from dolfinx's numbering to arc length and back.
+"""The mesh of a scene's rods and the maps between dolfinx's numbering and arc length.
 
-Rods are numbered in the order of the scene, the elements and nodes of each from its start to its end; dolfinx numbers
-them as it likes, turns elements round and spreads them over the ranks. `slot` is the scene's own number of a node.
+Rods are numbered in the order of the scene, the elements and nodes of each from its start to its end ("the scene's
+order"); dolfinx renumbers them, may reverse elements, and distributes them over the ranks. The `slot` of a node is its
+number in the scene's order.
 """
 
+import itertools
+import math
 from dataclasses import dataclass
 
 import numpy as np
 
 from cosserat_fenicsx import compat
+from cosserat_fenicsx.errors import SceneError
+
+#: Largest number of elements of all rods together.
+MOST_ELEMENTS = 100_000
+# Memory per element, GB, of degree 4 in space.
+_GIGABYTES = 1e-4
 
 
 @dataclass(frozen=True)
@@ -23,31 +32,87 @@ class Layout:
 
     @classmethod
     def of(cls, scene, elements):
-        """`elements` per rod, more only where supports, loads, joints and kinks ask for an element end of their own."""
-        return cls._of_pieces(scene, lambda rod, ends: np.maximum(1, np.round(elements * np.diff(ends)).astype(int)))
+        """`elements` per rod, more only where supports, loads, joints and kinks need an element end.
+
+        Raises:
+            SceneError: more than `MOST_ELEMENTS` in all.
+        """
+        most = MOST_ELEMENTS // len(scene.rods)
+        if elements > most:
+            gigabytes = elements * len(scene.rods) * _GIGABYTES
+            raise SceneError(
+                f"elements = {elements} on {len(scene.rods)} rod(s) may take {gigabytes:.2g} GB of memory: "
+                f"expected at most {most} per rod. "
+                "A rod rarely needs more than 100; for the accuracy of a path leave `elements` out and ask for a `tol`."
+            )
+
+        def equal(rod, start, end):
+            return np.linspace(start, end, max(1, round(elements * (end - start))) + 1)
+
+        return cls._of_pieces(scene, equal)
 
     def finer(self, scene, factor):
-        """The layout with `factor` times as many elements, rounded up between any two ends that something asks for."""
+        """The layout with `factor` times as many elements, rounded up in every piece; ratios of lengths stay."""
+        return self.resized(scene, [np.full(count, float(factor)) for count in self.counts])
 
-        def counts(rod, ends):
-            return np.ceil(factor * np.diff(np.searchsorted(self.breaks[rod], ends)) - 1e-9).astype(int)
+    def resized(self, scene, wanted):
+        """The layout with every element replaced by another number of elements.
 
-        return self._of_pieces(scene, counts)
+        Args:
+            wanted: for every rod (elements,) their number, which may be fractional: the sum over a piece is rounded up.
+        """
+
+        def divide(rod, start, end):
+            breaks, first, last = self._piece(rod, start, end)
+            so_far = np.concatenate([[0.0], np.cumsum(wanted[rod][first:last])])
+            count = math.ceil(so_far[-1] - 1e-9)
+            return np.interp(np.linspace(0, so_far[-1], count + 1), so_far, breaks)
+
+        return self._of_pieces(scene, divide)
+
+    def with_short_ends(self, scene, longest):
+        """The layout whose pieces have short elements at their ends, by repeated halving of the end elements.
+
+        Args:
+            longest: for every rod (elements,) how long each may be at the end of a piece, over the rod's length.
+        """
+
+        def divide(rod, start, end):
+            breaks, first, last = self._piece(rod, start, end)
+            halvings = [
+                max(0, math.ceil(math.log2(size / most) - 1e-9))
+                for size, most in zip(np.diff(breaks)[[0, -1]], longest[rod][[first, last - 1]], strict=True)
+            ]
+            if last == first + 1 and any(halvings):
+                breaks = np.array([start, (start + end) / 2, end])
+                halvings = [max(0, number - 1) for number in halvings]
+            near, far = (0.5 ** np.arange(number, 0, -1) for number in halvings)
+            before = start + near * (breaks[1] - start)
+            after = end - far[::-1] * (end - breaks[-2])
+            return np.concatenate([[start], before, breaks[1:-1], after, [end]])
+
+        return self._of_pieces(scene, divide)
+
+    def pieces(self, scene):
+        """For every rod the slices of its elements between neighbouring prescribed element ends."""
+        found = []
+        for i, rod in enumerate(scene.rods):
+            ends = np.searchsorted(self.breaks[i], _fixed_ends(scene, rod))
+            found.append([slice(a, b) for a, b in itertools.pairwise(ends.tolist())])
+        return found
+
+    def _piece(self, rod, start, end):
+        """The element ends of a piece, and the numbers of its first element and of the one after its last."""
+        first, last = np.searchsorted(self.breaks[rod], [start, end])
+        return self.breaks[rod][first : last + 1], int(first), int(last)
 
     @classmethod
-    def _of_pieces(cls, scene, counts):
-        """`counts`: from a rod's index and the ends that something asks for to the equal elements between these."""
+    def _of_pieces(cls, scene, divide):
+        """`divide`: function (index of a rod, start and end of a piece) -> its element ends, including both."""
         breaks = []
         for i, rod in enumerate(scene.rods):
-            stations = {station.s / rod.length for station in scene.stations(rod)}
-            stations |= {s / rod.length for s in rod.breaks}
-            ends = [0.0]
-            for x in sorted(stations | {1.0}):  # stations that all but coincide share an element end
-                if x - ends[-1] > 1e-9:
-                    ends.append(x)
-            ends[-1] = 1.0
-            pieces = zip(ends[:-1], ends[1:], counts(i, ends), strict=True)
-            breaks.append(np.append(np.concatenate([np.linspace(a, b, n + 1)[:-1] for a, b, n in pieces]), 1.0))
+            pieces = [divide(i, a, b)[:-1] for a, b in itertools.pairwise(_fixed_ends(scene, rod))]
+            breaks.append(np.concatenate([*pieces, [1.0]]))
         return cls(tuple(breaks))
 
     @property
@@ -61,7 +126,7 @@ class Layout:
         return np.concatenate([[0], np.cumsum(self.counts)])
 
     def vertex(self, scene, station):
-        """(rod index, element end) of a station that the layout was made for."""
+        """(rod index, element end) of a station of the layout's scene."""
         rod = scene.rods.index(station.rod)
         return rod, int(np.argmin(np.abs(self.breaks[rod] - station.s / station.rod.length)))
 
@@ -78,10 +143,25 @@ class Layout:
         return [np.append((b[:-1, None] + np.diff(b)[:, None] * nodes[None, :-1]).ravel(), 1.0) for b in self.breaks]
 
 
-class RodMesh:
-    """A dolfinx mesh of intervals on the line of reference arc length, one chain per rod, each from its own zero.
+def _fixed_ends(scene, rod):
+    """Element ends prescribed by supports, loads, joints and kinks, over the rod's length, from 0 to 1.
 
-    Derivatives and integrals on it are those along the rods, however these are curved.
+    The part of a rod between two of them is called a piece.
+    """
+    stations = {station.s / rod.length for station in scene.stations(rod)}
+    stations |= {s / rod.length for s in rod.breaks}
+    ends = [0.0]
+    for x in sorted(stations | {1.0}):  # nearly coincident stations share an element end
+        if x - ends[-1] > 1e-9:
+            ends.append(x)
+    ends[-1] = 1.0
+    return ends
+
+
+class RodMesh:
+    """A dolfinx mesh of intervals in reference arc length, one chain per rod, each starting at zero.
+
+    Derivatives and integrals on it are those along the rods, which may be curved.
 
     Args:
         comm: MPI communicator.
@@ -101,12 +181,12 @@ class RodMesh:
         else:
             cells, x = np.empty((0, 2), dtype=np.int64), np.empty((0, 1))
         self.mesh = compat.create_interval_mesh(comm, cells, x)
-        #: the scene's number of every local element, ghosts too; int64 also where a rank has none
+        #: the scene's number of every local element, ghosts included; int64 also where a rank has none
         self.cells = np.asarray(self.mesh.topology.original_cell_index, dtype=np.int64)
         self.cell_rod, self.cell_inner = rods[self.cells], inner[self.cells]
         ends = compat.geometry_dofs(self.mesh)[: len(self.cells)]
         vertices = np.asarray(self.mesh.geometry.input_global_indices, dtype=np.int64)
-        #: True where dolfinx runs an element from its end to its start
+        #: True where dolfinx orients an element from its end to its start
         self.reversed = vertices[ends[:, 0]] != v0[self.cells]
         self._vertex_rod = np.searchsorted(first_vertex, vertices, side="right") - 1
         self._vertex_inner = vertices - first_vertex[self._vertex_rod]

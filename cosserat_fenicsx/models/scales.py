@@ -1,6 +1,8 @@
-"""The package's own units: L, EI/L^2 and EI/L of the longest rod, so that one tolerance serves every scene."""
+"""The units L, EI/L^2 and EI/L of the longest rod, so that one tolerance suits every scene."""
 
 from dataclasses import dataclass
+
+from cosserat_fenicsx.scene.action import powers
 
 
 @dataclass(frozen=True)
@@ -18,11 +20,7 @@ class Scales:
         EI, L = float(rod.profile.range[1].J[:2].max()), rod.length
         return cls(L, EI / L**2, EI / L)
 
-    def of_unit(self, unit):
-        """The scale of a load's vector by the name of its unit."""
-        return {
-            "force": self.force,
-            "moment": self.moment,
-            "length": self.length,
-            "force per length": self.force / self.length,
-        }[unit]
+    def of_unit(self, unit, time=1.0):
+        """The scale of a unit of `scene.action`, for a unit of time (s)."""
+        force, length, times = powers(unit)
+        return self.force**force * self.length**length * time**times

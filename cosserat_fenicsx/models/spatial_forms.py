@@ -1,30 +1,32 @@
 """The forms of `forms/spatial.py` on a model's mesh, compiled."""
 
+from functools import partial
+
 import ufl
 
 from cosserat_fenicsx import compat
 from cosserat_fenicsx.forms import equilibrium
 from cosserat_fenicsx.forms import spatial as eq
-from cosserat_fenicsx.forms.rotation import rotation_matrix
 from cosserat_fenicsx.models.compiled import (
+    action_densities,
+    action_work,
     compile_all,
     derivative_in,
-    load_work,
     measures,
-    turned_loads,
-    with_live_loads,
+    varied_actions,
+    with_live_actions,
 )
+from cosserat_fenicsx.models.laws import as_matrix, law_of, stiff_enough
 
 
-def compile_forms(model, rotations, carried_n):
+def compile_forms(model, rotations):
     """The `CompiledForms` of a `SpatialModel`.
 
     Args:
-        model: supplies mesh, spaces, data and the load terms.
+        model: supplies mesh, spaces, data and the terms of the actions.
         rotations: space of (r, theta) for the second variation.
-        carried_n: the Function n_k of the condensed variant, else None.
     """
-    variant = model.shape.variant
+    formulation = model.signature.formulation
     U, before, step = model.state, model.before, model.step
     U_node = compat.alias(U)
     data, dx = model.data, measures(model)
@@ -32,49 +34,44 @@ def compile_forms(model, rotations, carried_n):
     def ds(a):
         return a * dx.gauss
 
-    def ds_node(a):
-        return a * dx.nodes
-
     def along(w):
         return w.dx(0)  # the mesh is the line of arc length
 
-    R_R = ufl.as_matrix([[data.R_R[3 * i + j] for j in range(3)] for i in range(3)])
-    section = equilibrium.Section(data.K, data.K_inv, data.J, R_R, data.v_R)
+    law = law_of(data.K, data.K_inv, data.J, data.G)
+    section = equilibrium.Section(law, as_matrix(data.R_R), data.v_R)
     state = eq.state_of(U, along(U), U_node)
     phi, trial = ufl.TestFunction(model.space), ufl.TrialFunction(model.space)
-    test = load_test = eq.tests_of(phi, along(phi))
+    test = formulation.unit_length.tests(phi, along(phi), state.q, state.q_s)
     derivative = derivative_in(trial, U, U_node)
 
-    n, m = equilibrium.contact_force(state, section), equilibrium.contact_moment(state, section)
-    advance = None
-    if variant == "field":
-        n = ufl.as_vector([U[i] for i in (7, 8, 9)])
-        phi_n = ufl.as_vector([phi[i] for i in (7, 8, 9)])
-        internal = eq.mixed(n, state, section, test, phi_n, ds, ds_node)
-    elif variant == "multiplier":
-        n, m = eq.multiplier_contact(state, section)
-        load_test = eq.variation_tests_of(phi, state.q_node)
-        lam = data.K[2] * U[7]  # lambda has the size of EA
-        internal = eq.multiplier(lam, phi[7], state, section, ds, lambda a: ufl.derivative(a, U, phi))
-    else:
-        internal = eq.displacement(state, section, test, ds, ds_node)
-    if variant == "condensed":
-        n = carried_n
-        tangent = eq.carried_force_tangent(n, state, section, test, ds, ds_node, derivative)
-        state_before = eq.state_of(before, along(before), before)
-        advance = equilibrium.carried_force_update(n, state_before, section, lambda a: ufl.derivative(a, before, step))
-    else:
-        tangent = derivative(internal)
+    n, phi_n = (None if a is None else ufl.as_vector(a) for a in formulation.force.symbols(model, U, phi))
+    state_before = eq.state_of(before, along(before), before)
+    along_step = partial(ufl.derivative, coefficient=before, argument=step)
+    weak = formulation.force.weak_form(n, phi_n, state, state_before, section, test, ds, derivative, along_step)
+    held = formulation.unit_length.equations(state, test, U_node, phi) * dx.nodes
+    internal, tangent = weak.internal + held, weak.tangent + derivative(held)
 
-    R_node = rotation_matrix(state.q_node)
-    loads = load_work(model, dx, load_test, R_node, (U, U_node))
-    residual, tangent = with_live_loads(model, loads, internal, tangent, derivative)
+    def names_at(place):
+        return (U, along(U)) if place == "line" else (U_node, along(U_node))
 
-    # The second variation in (r, theta) never leaves |q| = 1.
+    def point_at(place, rest, frame):
+        return eq.point_of(*names_at(place), rest=rest, frame=frame)
+
+    def test_at(place):
+        at = eq.state_of(*names_at(place), U_node)
+        return formulation.unit_length.tests(phi, along(phi), at.q, at.q_s)
+
+    acting = action_work(model, dx, test, point_at, (U, U_node), test_at=test_at)
+    residual, tangent = with_live_actions(acting, internal, tangent, derivative)
+
+    # The second variation in (r, theta) satisfies |q| = 1 by construction.
     psi, w = ufl.TestFunction(rotations), ufl.TrialFunction(rotations)
     rigid, direction = eq.rotation_tests_of(psi, along(psi)), eq.rotation_tests_of(w, along(w))
-    stiff = section._replace(K=data.K_stiff) if variant in ("condensed", "field") else section
-    second = ds(equilibrium.second_variation(n, state, stiff, rigid, direction, model.stiffness))
-    second -= turned_loads(model, loads, rigid, R_node, direction.phi)
-    fields = ufl.as_vector([*n, *m, *state.r_s])
-    return compile_all(model, residual, tangent, loads.dead, [second], fields=fields, advance=advance)
+    stiff = section._replace(law=stiff_enough(weak.n, data))
+    second = ds(equilibrium.second_variation(weak.n, state, stiff, rigid, direction, model.stiffness))
+    second -= varied_actions(acting, rigid, direction)
+    fields = ufl.as_vector([*weak.n, *equilibrium.contact_moment(weak.n, state, section), *state.r_s])
+    densities = action_densities(model, point_at)
+    return compile_all(
+        model, residual, tangent, acting, [second], fields=fields, advance=weak.advance, densities=densities
+    )

@@ -1,7 +1,8 @@
-"""The added equations of supports and joints: their values, their reactions and the tangent of both.
+"""The constraint equations of supports and joints: their values, their reactions and the tangent of both.
 
-Every equation c = 0 speaks of the position and the rotation of one or two nodes; its multiplier lambda is the reaction.
-Written in small displacements and small inertial rotations, so that every rung can use them through its own unknowns.
+Every equation c = 0 is a function of the position and the rotation of one or two nodes; its multiplier lambda is the
+reaction. Derivatives are by small displacements and small inertial rotations, which every model maps to its own
+unknowns.
 """
 
 from functools import lru_cache
@@ -27,7 +28,7 @@ class Ties:
         self._kinds = lru_cache(maxsize=None)(self._sorted)
 
     def _sorted(self, which):
-        """Positions in `which` of each kind, with what the kind's equations are made of, as arrays."""
+        """{kind of tie: (indices in `which`, nodes a and b, fields as arrays)}; and the constant gradients."""
         ties, kinds = [self._ties[i] for i in which], {}
         nodes = self._nodes[list(which)]
         for kind in {type(tie) for tie in ties}:
@@ -43,14 +44,14 @@ class Ties:
         return kinds, constant
 
     def with_numbers_of(self, ties):
-        """The same equations with other numbers, those of motions at another time."""
+        """The same equations with other data, those of prescribed motions at another time."""
         return Ties(ties, self._nodes, self._reference, self._length)
 
     def evaluate(self, rq, eta, multipliers, which=None):
         """Values and derivatives at (r, q) (tied nodes, 7) and a load factor.
 
         Args:
-            which: tuple of indices of those that are asked for, None for all; multipliers: theirs.
+            which: tuple of the indices of the equations to evaluate, None for all; multipliers: theirs.
 
         Returns:
             c (ties,); gradients (ties, tied nodes, 6) over (displacement, rotation), which are also the reactions per

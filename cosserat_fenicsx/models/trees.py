@@ -1,29 +1,29 @@
-"""Rods that hang on a clamp as a tree: what hangs beyond an element is what it carries, and where it sits follows."""
+"""Trees of rods with one clamp: contact forces by summation towards it, positions by integration from it."""
 
 import numpy as np
 
 
 class Tree:
-    """The rods of a shape, in order from their clamps outwards.
+    """The rods of a signature, in order from their clamps outwards.
 
     Args:
-        shape: a `Shape` whose rods are trees, each with one clamped point and rigid joints alone.
+        signature: a `Signature` whose rods are trees, each with one clamped point and rigid joints alone.
 
     Attributes:
         cell_nodes: (elements, p + 1) nodes of every element, the scene's order.
     """
 
-    def __init__(self, shape):
-        self._p, self._counts = shape.degree, shape.counts
-        p = shape.degree
-        self._first_cell = np.concatenate([[0], np.cumsum(shape.counts)])
-        self._first_node = self._first_cell * p + np.arange(len(shape.counts) + 1)
-        rod = np.repeat(np.arange(len(shape.counts)), shape.counts)
+    def __init__(self, signature):
+        self._p, self._counts = signature.degree, signature.counts
+        p = signature.degree
+        self._first_cell = np.concatenate([[0], np.cumsum(signature.counts)])
+        self._first_node = self._first_cell * p + np.arange(len(signature.counts) + 1)
+        rod = np.repeat(np.arange(len(signature.counts)), signature.counts)
         self.cell_nodes = (np.arange(self._first_cell[-1]) * p + rod)[:, None] + np.arange(p + 1)
-        self._order = self._walk(shape.connections)
+        self._order = self._walk(signature.connections)
 
     def _walk(self, links):
-        """[(rod, the element end where it is entered, the node of another rod there, or None)], clamps first."""
+        """[(rod, its element end towards the clamp, the node of the previous rod there, or None)], clamps first."""
         points = {vertex: {vertex} for vertex in links.clamped}
         for vertex, leader in links.leaders:
             points.setdefault(leader, {leader}).add(vertex)
@@ -45,7 +45,7 @@ class Tree:
         return int(self._first_node[rod] + vertex * self._p)
 
     def _rods(self, order):
-        """For every rod: its nodes, its elements (slices), the element end where it is entered, the node there."""
+        """For every rod: nodes and elements (slices), its element end towards the clamp, the previous rod's node."""
         for rod, entry, before in order:
             nodes = slice(self._first_node[rod], self._first_node[rod + 1])
             yield nodes, slice(self._first_cell[rod], self._first_cell[rod + 1]), entry, before
@@ -53,8 +53,8 @@ class Tree:
     def forces(self, nodal, rule):
         """The contact force at the Gauss points that balances dead forces.
 
-        The discrete balance (n, l_i') = f_i of an element's nodes but the one towards the clamp, where the sum of all
-        that lies beyond acts at its other end.
+        Solves the discrete balance (n, l_i') = f_i for all nodes of an element except the one towards the clamp; at its
+        other end acts the sum of all forces beyond it.
 
         Args:
             nodal: (N, d) forces on the nodes; rule: the `ElementRule`.

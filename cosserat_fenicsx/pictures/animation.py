@@ -1,4 +1,4 @@
-"""Films of a motion: .gif by Pillow, which matplotlib brings along, .mp4 by ffmpeg."""
+"""Films of a motion: .gif by Pillow, a dependency of matplotlib, .mp4 by ffmpeg."""
 
 import errno
 import math
@@ -17,36 +17,36 @@ from cosserat_fenicsx.pictures.drawing import add_body, at_rest, frame, load_pyv
 from cosserat_fenicsx.progress import Progress
 from cosserat_fenicsx.ranks import on_first
 
-#: Frames per second, width and height in pixels, where none are asked for.
+#: Default frames per second, and width and height in pixels.
 FPS, SIZE = 25, (960, 720)
-# In real time a film lasts so long at least and at most, s, and otherwise so long at most; how many frames it may have.
-_SHORT, _LONG, _ELSE, _MOST = 4.0, 20.0, 10.0, 10_000
-# A .gif's colours from here on are white: a mean of white and nearly white is none, and looks like a stain.
+# Least and largest duration (s) of a film in real time, largest duration (s) of others, and largest number of frames.
+_SHORTEST_REAL_TIME, _LONGEST_REAL_TIME, _LONGEST, _MOST_FRAMES = 4.0, 20.0, 10.0, 10_000
+# Colours of a .gif whose channels are all above this become white: quantisation would give nearly white stains.
 _WHITE = 244
-# Points along a rod.
+# Segments along a rod.
 _PIECES = 100
 
 
 def film(history, file, *, fps=FPS, speed=None, magnify=1.0, size=SIZE, progress=None):
-    """A film of the rods, coloured by bending moment, from a camera that holds the whole motion.
+    """Write a film of the rods, coloured by bending moment; the camera is fixed and shows the whole motion.
 
-    Frames come at a constant rate, whatever times were saved (`between.Between`).
+    Frames come at a constant rate, interpolated between the saved times (`between.Between`).
 
     Args:
         history: a `History` with at least two times.
-        file: .gif or .mp4 (rank 0 writes). A .gif knows hundredths of a second alone: its rate is rounded to these.
+        file: .gif or .mp4 (rank 0 writes). The time between frames of a .gif is rounded to 0.01 s.
         fps: frames per second, 1 to 100.
-        speed: seconds of the motion in a second of the film; None for 1 where the film then takes 4 to 20 s, and
+        speed: seconds of the motion per second of the film; None for 1 where the film then takes 4 to 20 s, and
             otherwise for 1, 2 or 5 times a power of ten.
-        magnify: displacements are drawn this many times their size.
+        magnify: factor on displacements.
         size: (width, height), pixels, even.
-        progress: True, False, or None for a bar where it takes long, in a terminal.
+        progress: True, False, or None for a bar on long runs in a terminal.
 
     Raises:
         SceneError: fewer than two times, another ending, an argument outside its range, or pyvista, Pillow or ffmpeg is
             missing: says what to install.
         OSError: the file cannot be written.
-        KeyboardInterrupt: Ctrl-C; the file ends there.
+        KeyboardInterrupt: Ctrl-C; the film ends with the frames drawn so far.
     """
     file = check_name(file)
     if len(history) < 2:
@@ -63,10 +63,10 @@ def film(history, file, *, fps=FPS, speed=None, magnify=1.0, size=SIZE, progress
 
 
 def check_name(file):
-    """A film's name as a Path; refuses what could not be written.
+    """The name of a film as a Path.
 
     Raises:
-        SceneError: an ending other than .gif and .mp4, or what it needs is missing.
+        SceneError: an ending other than .gif and .mp4, or the program that writes it is missing.
     """
     file = Path(file)
     if file.suffix not in _WRITERS:
@@ -85,19 +85,21 @@ def _pixels(size):
 
 
 def _round_speed(duration):
-    """Real time where that suits the duration (s), or the smallest round number that makes the film short enough."""
-    if _SHORT <= duration <= _LONG:
+    """1 where a film in real time has a suitable duration (s), or the smallest round number that makes it short
+    enough."""
+    if _SHORTEST_REAL_TIME <= duration <= _LONGEST_REAL_TIME:
         return 1.0
-    decade = 10.0 ** math.floor(math.log10(duration / _ELSE))
-    return next(x * decade for x in (1, 2, 5, 10) if duration / (x * decade) <= _ELSE * (1 + 1e-9))
+    decade = 10.0 ** math.floor(math.log10(duration / _LONGEST))
+    return next(x * decade for x in (1, 2, 5, 10) if duration / (x * decade) <= _LONGEST * (1 + 1e-9))
 
 
 def _times(start, duration, speed, fps):
-    """The times of the frames, s, and the end."""
+    """The times (s) of the frames, the last one at the end."""
     step = speed / fps
     count = math.ceil(duration / step - 1e-6)
-    if count > _MOST:
-        refuse("animate", "speed", speed, f"one that needs at most {_MOST} frames, not {count}: more, or fewer fps")
+    if count > _MOST_FRAMES:
+        expected = f"one that needs at most {_MOST_FRAMES} frames, not {count}: more, or fewer fps"
+        refuse("animate", "speed", speed, expected)
     return start + np.append(step * np.arange(count), duration)
 
 
@@ -108,10 +110,10 @@ def _pace_in_words(speed):
 
 
 def _make(history, file, times, fps, speed, magnify, size, progress):
-    """Draw and write, on one rank."""
+    """Draw and write all frames, on one rank."""
     file.parent.mkdir(parents=True, exist_ok=True)
     with open(file, "wb"):
-        pass  # an unwritable place is said here, plainly
+        pass  # raises a plain OSError where the file cannot be written
     stage = _Stage(history, times, magnify, size, _pace_in_words(speed))
     try:
         samples = [stage.at(t) for t in times[:: max(1, len(times) // 6)]]
@@ -129,13 +131,13 @@ def _make(history, file, times, fps, speed, magnify, size, progress):
 
 
 class _Alone:
-    """The one rank that draws."""
+    """Stands for the communicator in `Progress`: one rank draws."""
 
     rank = 0
 
 
 class _Stage:
-    """The drawing that moves: what stays is drawn once."""
+    """The scene of the film: constant parts are drawn once, meshes of the rods are moved for every frame."""
 
     def __init__(self, history, times, magnify, size, pace):
         pyvista = load_pyvista()
@@ -193,7 +195,8 @@ class _Stage:
 
 
 class _Gif:
-    """Frames into a .gif, of the colours of some samples, without dithering: small, and the same bytes every time."""
+    """Writes frames to a .gif with the colours of some sample frames, undithered: small and reproducible byte by
+    byte."""
 
     def __init__(self, file, fps, size, samples):
         self._file, self._pause, self._frames, image = file, round(1000 / fps), [], _pillow()
@@ -228,7 +231,7 @@ def _pillow():
 
 
 class _Mp4:
-    """Frames into a .mp4 (H.264), by a pipe to ffmpeg; nothing in it depends on the time or the machine's name."""
+    """Writes frames to a .mp4 (H.264) by ffmpeg; the file does not depend on the date or the machine's name."""
 
     def __init__(self, file, fps, size, samples):
         command = [_ffmpeg(), "-y", "-loglevel", "error", "-f", "rawvideo", "-pix_fmt", "rgb24",
@@ -236,12 +239,12 @@ class _Mp4:
                    "-crf", "20", "-pix_fmt", "yuv420p", "-movflags", "+faststart", "-fflags", "+bitexact",
                    "-flags:v", "+bitexact", "-map_metadata", "-1", str(file)]  # fmt: skip
         self._file = file
-        # A socket and no pipe: where ffmpeg dies PETSc would end the process for SIGPIPE. A session of its own: Ctrl-C
-        # ends the film, not its writer.
-        self._way, its = socket.socketpair()
-        with its:
+        # A socket instead of a pipe, since PETSc ends the process on the SIGPIPE of a pipe to a dead ffmpeg. A session
+        # of its own, so that Ctrl-C does not kill ffmpeg, which completes the file.
+        self._socket, theirs = socket.socketpair()
+        with theirs:
             self._process = subprocess.Popen(
-                command, stdin=its, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, start_new_session=True
+                command, stdin=theirs, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, start_new_session=True
             )
 
     @staticmethod
@@ -253,7 +256,7 @@ class _Mp4:
 
     def add(self, picture):
         try:
-            self._way.sendall(np.ascontiguousarray(picture), socket.MSG_NOSIGNAL)
+            self._socket.sendall(np.ascontiguousarray(picture), socket.MSG_NOSIGNAL)
         except OSError:
             self._end()
             raise
@@ -262,13 +265,13 @@ class _Mp4:
         if kind is None or issubclass(kind, KeyboardInterrupt):
             self._end()
         else:
-            self._way.close()
+            self._socket.close()
             self._process.kill()
             self._process.wait()
 
     def _end(self):
-        """Wait for ffmpeg, and say why it failed."""
-        self._way.close()
+        """Wait for ffmpeg; raise its message where it failed."""
+        self._socket.close()
         _, said = self._process.communicate()
         if self._process.returncode:
             words = said.decode(errors="replace").strip().splitlines() or ["it gave no reason"]
@@ -276,7 +279,7 @@ class _Mp4:
 
 
 def _ffmpeg():
-    """ffmpeg's name: that of imageio-ffmpeg, else the system's."""
+    """The path of ffmpeg: that of imageio-ffmpeg, else the system's."""
     try:
         from imageio_ffmpeg import get_ffmpeg_exe
 
@@ -285,7 +288,8 @@ def _ffmpeg():
         found = shutil.which("ffmpeg")
     if found is None:
         raise SceneError(
-            "films as .mp4 need ffmpeg: pip install 'cosserat-fenicsx[films]', or apt install ffmpeg; a .gif needs neither"
+            "films as .mp4 need ffmpeg: pip install 'cosserat-fenicsx[films]', or apt install ffmpeg; a .gif needs "
+            "neither"
         )
     return found
 

@@ -1,4 +1,4 @@
-"""The shapes of a motion at any time, between those that were saved."""
+"""Interpolation of a motion between its saved states."""
 
 from functools import lru_cache
 from types import SimpleNamespace
@@ -7,17 +7,18 @@ import numpy as np
 
 from cosserat_fenicsx.pictures.drawing import body_of
 
-# Distances that velocities at both ends of an interval foretell may be off by this share of the largest of them: a
-# turn that is saved six times stays below. Nobody sees an error below the second, in lengths of the longest rod.
-_AGREE, _UNSEEN = 0.1, 2e-3
+# Cubic interpolation is used where the trapezoidal rule on the velocities at both ends of an interval gives the change
+# of position to this relative error (a full turn saved six times does) or to this share of the longest rod, which is
+# invisible.
+_AGREEMENT, _INVISIBLE = 0.1, 2e-3
 
 
 class Between:
-    """A `History` at any of its times.
+    """A `History` at any time of its duration.
 
-    Positions and quaternions are cubic between two saved states, by Hermite from the velocities there: of third order.
-    Where these do not fit the distance, because states were saved too seldom, what is between is straight, and where a
-    section turns by more than half a turn it is the nearest state.
+    Between two saved states, positions and quaternions are cubic Hermite polynomials by the values and velocities
+    there. Where the velocities do not agree with the change of position, because states were saved too seldom,
+    interpolation is linear, and where a section turns by more than half a turn the nearest state is taken.
 
     Args:
         history: a `History` with at least two times.
@@ -25,23 +26,23 @@ class Between:
 
     def __init__(self, history):
         self._history, self._times = history, history.times
-        self._saved = lru_cache(maxsize=2)(self._read)  # a motion that is stored in a file is not to fill the memory
+        self._saved = lru_cache(maxsize=2)(self._read)  # few: all states of a stored motion may exceed the memory
         self._smooth = [self._fits(k) for k in range(len(history) - 1)]
 
     def _read(self, k):
-        """(N, 7) r and q, and their rates, 1/s, of the saved state k."""
+        """r and q of the saved state k, (N, 7), and their rates, (N, 7), 1/s."""
         record = self._history[k]
         rates = record.rates / self._history.time_unit
         return record.rq, np.concatenate([rates[:, :3], _turning(record.rq[:, 3:], rates[:, 3:])], axis=1)
 
     @property
     def smooth(self):
-        """The share of the time where states were saved often enough for the cubics."""
+        """The share of the duration where states were saved often enough for cubic interpolation."""
         steps = np.diff(self._times)
         return float(steps[self._smooth].sum() / steps.sum())
 
     def bodies(self, t, x, magnify=1.0):
-        """The `Body` of every rod at t (s), by arc lengths x (n,) over its length."""
+        """The `Body` of every rod at t (s), at arc lengths x (n,) over its length."""
         k = int(np.clip(np.searchsorted(self._times, t, side="right") - 1, 0, len(self._times) - 2))
         h = self._times[k + 1] - self._times[k]
         z = float(np.clip((t - self._times[k]) / h, 0.0, 1.0))
@@ -57,7 +58,7 @@ class Between:
         return made
 
     def _fits(self, k):
-        """Whether distances agree with velocities between the times k and k + 1."""
+        """Whether the change of position agrees with the velocities between the saved states k and k + 1."""
         h = self._times[k + 1] - self._times[k]
         (one, slope), (two, slope_there) = self._saved(k), self._saved(k + 1)
         moved, before, after = two - one, h * slope, h * slope_there
@@ -65,12 +66,12 @@ class Between:
             off, *sizes = (
                 np.linalg.norm(v[:, part], axis=1).max() for v in ((before + after) / 2 - moved, before, after, moved)
             )
-            if off > _AGREE * max(sizes) + _UNSEEN:
+            if off > _AGREEMENT * max(sizes) + _INVISIBLE:
                 return False
         return True
 
     def _state(self, k, z, h):
-        """(N, 7) r and q at the share z of the interval k, of length h."""
+        """(N, 7) r and q at the share z in [0, 1] of the interval k, of length h (s)."""
         (one, slope), (two, slope_there) = self._saved(k), self._saved(k + 1)
         if self._smooth[k]:
             slopes = z * (1 - z) ** 2 * h * slope - z**2 * (1 - z) * h * slope_there
@@ -81,7 +82,7 @@ class Between:
 
 
 def _turning(q, omega):
-    """dq/dt of quaternions q (.., 4) whose frames turn with omega (.., 3), inertial: (0, omega) q/2."""
+    """dq/dt = (0, omega) q/2 of quaternions q (..., 4) with angular velocities omega (..., 3), inertial."""
     a, v = q[..., :1], q[..., 1:]
     scalar = -np.einsum("...i,...i->...", omega, v)[..., None]
     return np.concatenate([scalar, a * omega + np.cross(omega, v)], axis=-1) / 2

@@ -1,4 +1,4 @@
-"""What pictures and films share: rods as tubes of their sections, axes with units, where the camera stands."""
+"""Shared by pictures and films: surfaces of rods, axes with units, and the camera."""
 
 import math
 import os
@@ -11,22 +11,22 @@ from cosserat_fenicsx.scene.materials import Material
 from cosserat_fenicsx.scene.sections import Circle
 
 _PREFIXES = ((1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "µ"))
-# A rod thinner than this part of the picture is drawn thicker, and the picture says so.
-_THINNEST = 1 / 120
+# Rods whose radius is below this share of the extent of the drawing are drawn thicker, and the picture says so.
+_SMALLEST_RADIUS = 1 / 120
 
 
 def load_pyvista():
     """The module pyvista, ready to draw without a screen.
 
     Raises:
-        SceneError: it is missing, or what it needs of the system.
+        SceneError: pyvista or a system library that it needs is missing.
     """
-    # EGL draws without a screen; VTK would try X first and complain.
+    # EGL draws without a screen; VTK would try X first and print warnings.
     if not os.environ.get("DISPLAY"):
         os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
     try:
         import pyvista
-        import pyvista.plotting  # loads VTK's windows, and so the system's libraries
+        import pyvista.plotting  # loads VTK's windows and the system's libraries, which may be missing
     except ImportError as missing:
         raise SceneError(
             f"pictures need pyvista ({missing}): pip install 'cosserat-fenicsx[pictures]', and on Debian "
@@ -36,13 +36,14 @@ def load_pyvista():
 
 
 def prefix(value):
-    """(scale, SI prefix) to write a value with."""
+    """(scale, SI prefix) that suit a value."""
     return next(((s, p) for s, p in _PREFIXES if abs(value) >= s), (1.0, ""))
 
 
 @dataclass(frozen=True)
 class Body:
-    """A deformed rod: centreline (n, 3), directors (n, 3, 3), outline (n, corners, 2), radius, bending moment (n,)."""
+    """A deformed rod: centreline (n, 3) m, directors (n, 3, 3), outline (n, corners, 2) m, radius m, bending moment
+    (n,) N m."""
 
     line: np.ndarray
     directors: np.ndarray
@@ -52,7 +53,7 @@ class Body:
 
 
 def at_rest(scene):
-    """[(201, 3) m] the centrelines of the reference."""
+    """The centrelines of all rods in the reference, a list of (201, 3), m."""
     return [rod.curve.position(np.linspace(0, rod.length, 201)) for rod in scene.rods]
 
 
@@ -75,7 +76,8 @@ def body_of(rod, x, line, directors, moment, magnify=1.0):
 
 
 def _outlines(rod, s):
-    """(n, corners, 2) corners of the section at arc lengths s, m; all get as many as the richest."""
+    """(n, corners, 2) corners of the sections at arc lengths s (n,), m; all are resampled to the largest number of
+    corners."""
     sections = [rod.section_at(s[0])] * len(s) if rod.profile.constant else [rod.section_at(x, "left") for x in s]
     given = [section.stiffness(rod.material).outline for section in sections]
     drawn = [np.array(x or Circle(0.02 * rod.length).stiffness(Material(E=1.0)).outline) for x in given]
@@ -84,7 +86,7 @@ def _outlines(rod, s):
 
 
 def _resampled(outline, corners):
-    """A closed polygon with another number of corners, evenly along it."""
+    """A closed polygon resampled to another number of corners, evenly spaced along it."""
     closed = np.concatenate([outline, outline[:1]])
     way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(closed, axis=0), axis=1))])
     at = np.linspace(0, way[-1], corners, endpoint=False)
@@ -92,19 +94,22 @@ def _resampled(outline, corners):
 
 
 def thickening(body, size):
-    """How many times its size the section of a `Body` is drawn in a picture of that size, m."""
-    return max(1.0, size * _THINNEST / body.radius)
+    """The factor that the section of a `Body` is enlarged by in a drawing of extent `size`, m."""
+    return max(1.0, size * _SMALLEST_RADIUS / body.radius)
 
 
 def points_of(body, factor):
-    """(n corners, 3) m: where the outline goes, thickened by a factor."""
+    """(n * corners, 3) points of the surface of a `Body`, m, its sections enlarged by a factor."""
     points = body.line[:, None] + factor * np.einsum("nij,ncj->nci", body.directors[:, :, :2], body.outline)
     return points.reshape(-1, 3)
 
 
 def add_body(plotter, pyvista, body, factor, peak, moving=False):
-    """Draw the surface that the outline of a `Body` sweeps, closed at both ends, coloured by bending moment up to
-    `peak`, N m; returns the mesh. Its points may be moved afterwards where it was asked to be `moving`."""
+    """Draw the surface of a `Body`, closed at both ends, coloured by bending moment from 0 to `peak`, N m.
+
+    Returns:
+        The mesh; its points may be changed later where `moving`.
+    """
     corners = body.outline.shape[1]
     rings = np.arange(len(body.line) * corners).reshape(-1, corners)
     right = np.roll(rings, -1, axis=1)
@@ -139,18 +144,18 @@ def add_body(plotter, pyvista, body, factor, peak, moving=False):
 
 
 def frame(plotter, everywhere):
-    """Axes with units around points (n, 3) m, and the camera that holds them all."""
+    """Draw axes with units around points (n, 3), m, and place the camera so that it shows them all."""
     span = np.ptp(everywhere, axis=0)
     bounds, counts = _bounds(everywhere, float(span.max()))
     plotter.show_bounds(
         bounds=bounds, xtitle="x (m)", ytitle="y (m)", ztitle="z (m)", color="black", font_size=8,
         location="outer", fmt="%.4g", use_3d_text=False, **counts,
     )  # fmt: skip
-    _aim(plotter, np.reshape(bounds, (3, 2)), span)
+    _place_camera(plotter, np.reshape(bounds, (3, 2)), span)
 
 
 def _bounds(points, size):
-    """Round limits of the axes, and how many labels each takes."""
+    """Round limits of the axes, and the number of labels on each."""
     step = 10 ** math.floor(math.log10(size / 5))
     step *= next(f for f in (1, 2, 5, 10) if size / (f * step) <= 6)
     low, high = step * np.floor(points.min(axis=0) / step + 1e-9), step * np.ceil(points.max(axis=0) / step - 1e-9)
@@ -162,8 +167,11 @@ def _bounds(points, size):
 
 
 def view_of(span):
-    """Where the camera looks from (3,), what is right and above in the picture, and what is up in space, for a drawing
-    of this span (3,)."""
+    """Directions for a drawing whose extents along x, y and z are `span` (3,).
+
+    Returns:
+        Unit vectors (3,): to the camera, to the right and upwards in the picture; and the upward direction in space.
+    """
     thin = int(np.argmin(span))
     if span[thin] < 0.05 * span.max():
         view = np.zeros(3)
@@ -177,8 +185,8 @@ def view_of(span):
     return view, right, np.cross(view, right), up
 
 
-def _aim(plotter, bounds, span):
-    """Look across the plane of a plane scene, from a corner otherwise, and leave room for labels, title and bar."""
+def _place_camera(plotter, bounds, span):
+    """View a plane scene along its normal, others from a corner, with margins for labels, title and colour bar."""
     view, right, above, up = view_of(span)
     corners = np.array(np.meshgrid(*bounds)).reshape(3, -1).T
     across, high = corners @ right, corners @ above

@@ -1,4 +1,4 @@
-"""A chart of what became of the energy of a motion, by matplotlib."""
+"""A chart of the energies of a motion and of the error of their balance, by matplotlib."""
 
 from pathlib import Path
 
@@ -17,14 +17,14 @@ _CURVES = (
 
 
 def draw(history, file=None):
-    """Energies of a `History` over time above, and below what its ledger fails to account for.
+    """Draw the energies of a `History` over time above, and the error of the energy balance below.
 
     Args:
-        history: at least two times.
-        file: .png, .pdf or what else matplotlib writes (rank 0 writes); None returns the Figure.
+        history: with at least two times.
+        file: .png, .pdf or another format of matplotlib (rank 0 writes); None returns the Figure.
 
     Raises:
-        SceneError: fewer than two times, an ending that is not known, or matplotlib is missing.
+        SceneError: fewer than two times, an unknown ending, or matplotlib is missing.
         OSError: the file cannot be written.
     """
     if len(history) < 2:
@@ -59,7 +59,7 @@ def _figure(history):
             above.plot(history.times, values, style, color=colour, label=label)
     above.set_ylabel("energy (J)")
     above.set_title(f"{history.scene.title or 'Motion'}: energy, scheme {history.scheme}")
-    above.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), frameon=False)  # beside the curves, never over them
+    above.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), frameon=False)  # beside the axes, not over the curves
     below.plot(history.times, history.balance, color="black")
     below.set_ylabel("not accounted\nfor (J)")
     below.set_xlabel("time (s)")

@@ -1,4 +1,4 @@
-"""Pictures: the deformed rods in space by pyvista (off-screen), a path as a chart by matplotlib."""
+"""Pictures: the deformed rods in space by pyvista (off-screen), charts of curves by matplotlib."""
 
 import math
 import textwrap
@@ -11,9 +11,10 @@ from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.pictures.drawing import add_body, at_rest, frame, load_pyvista, swept, thickening, view_of
 from cosserat_fenicsx.ranks import on_first
 
-# Of the picture: how high a label is, how wide a letter, and a displacement that can hardly be seen; letters in its width.
-_HIGH, _WIDE, _HARDLY = 0.035, 0.016, 0.01
-_TITLE = 88
+# As shares of the extent of the drawing: height of a label, width of a letter, smallest visible displacement.
+_LABEL_HEIGHT, _LETTER_WIDTH, _VISIBLE = 0.035, 0.016, 0.01
+# Letters per line of the title.
+_TITLE_WIDTH = 88
 
 
 def rods(path, file=None, points=None, magnify=1.0):
@@ -23,7 +24,7 @@ def rods(path, file=None, points=None, magnify=1.0):
         path: a `Path` with at least one point.
         file: where to write a .png (rank 0 writes); None returns the plotter.
         points: indices of the points to show; None for up to five, evenly spread.
-        magnify: displacements are drawn this many times their size.
+        magnify: factor on displacements.
 
     Returns:
         The pyvista Plotter where `file` is None.
@@ -47,7 +48,7 @@ def rods(path, file=None, points=None, magnify=1.0):
 def _save(plotter, file):
     file.parent.mkdir(parents=True, exist_ok=True)
     with open(file, "wb"):
-        pass  # an unwritable place is said here, plainly
+        pass  # raises a plain OSError where the file cannot be written
     plotter.screenshot(str(file))
     plotter.close()
 
@@ -79,30 +80,30 @@ def _draw(path, points, magnify):
 
 
 def _small(path, shown, size, magnify):
-    """Words where displacements can hardly be seen, and what would show them."""
+    """A note where displacements are too small to be seen, with a factor that shows them; else empty."""
     largest = max(
         np.linalg.norm(path.fields(k, rod)["displacement"], axis=1).max() for k in shown for rod in path.scene.rods
     )
-    if magnify * largest > _HARDLY * size or largest < 1e-12 * size:
+    if magnify * largest > _VISIBLE * size or largest < 1e-12 * size:
         return ""
     decade = 10.0 ** math.floor(math.log10(0.1 * size / largest))
     return f"displacements are at most {largest:.2g} m, magnify={decade:g} (--magnify {decade:g}) shows them"
 
 
 def _note(path, shown, thicker, magnify, small):
-    """The title: what is shown, and what is not to scale."""
+    """The title: the points shown, and what is not to scale."""
     some = "" if len(shown) == len(path) else f" (of {len(path)})"
     values = ", ".join(path.label(k) for k in shown)
     title = f"{path.scene.title or 'Deformed rods'}:"
     shapes = f"shapes at {path.axis}{'s' if len(shown) > 1 else ''} {values}{some}"
-    lines = [f"{title} {shapes}"] if len(title) + len(shapes) < _TITLE else [title, shapes]
+    lines = [f"{title} {shapes}"] if len(title) + len(shapes) < _TITLE_WIDTH else [title, shapes]
     if magnify != 1:
         lines.append(f"(displacements magnified {magnify:g} times)")
     if small:
         lines.append(f"({small})")
     if thicker:
         lines.append(f"(sections drawn {' and '.join(sorted(thicker))} times their size)")
-    return "\n".join(textwrap.fill(line, _TITLE) for line in lines)
+    return "\n".join(textwrap.fill(line, _TITLE_WIDTH) for line in lines)
 
 
 def chart(file, curves, *, xlabel, ylabel, title, ylim=None):
@@ -134,21 +135,23 @@ def chart(file, curves, *, xlabel, ylabel, title, ylim=None):
 
 
 def _spread(path, most=5):
-    """Up to five points, evenly spread along the way of the rods' ends."""
+    """Indices of up to `most` points of a path, evenly spaced by the distance that the rods' ends have moved."""
     ends = np.hstack([path.position(rod.end) for rod in path.scene.rods])
-    ends = np.hstack([ends, 1e-6 * path.scales.length * np.arange(len(path))[:, None]])  # a way even where none moves
+    # a small fictitious motion spaces the points evenly by index where the ends do not move
+    ends = np.hstack([ends, 1e-6 * path.scales.length * np.arange(len(path))[:, None]])
     way = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(ends, axis=0), axis=1)))
     wanted = np.linspace(0, way[-1], most)
     return sorted({int(np.argmin(np.abs(way - w))) for w in wanted})
 
 
 def _label(plotter, path, shown, bodies, span):
-    """Load factor, and a word where a point is unstable, where the shapes lie farthest apart; none over another."""
+    """Label each shape (`path.label`) at the place where the shapes lie farthest apart; labels that overlap are left
+    out."""
     rods, size = path.scene.rods, float(span.max())
     _, right, above, _ = view_of(span)
     spread = [np.ptp([bodies[k, rod].line for k in shown], axis=0).max(axis=1) for rod in rods]
     rod = max(range(len(rods)), key=lambda i: (round(spread[i].max() / size, 6), -i))
-    place = len(spread[rod]) - 1 - int(np.argmax(spread[rod][::-1]))  # the last of equals: an end, not next to it
+    place = len(spread[rod]) - 1 - int(np.argmax(spread[rod][::-1]))  # the last maximum: rather the end than before it
     end = 1 if place == len(spread[rod]) - 1 else -1 if place == 0 else 0
     placed = []
     for k in reversed(shown):
@@ -156,18 +159,21 @@ def _label(plotter, path, shown, bodies, span):
         at = body.line[place] + 0.03 * size * (1 if end else 1.3) * _beyond(body.directors[place, :, 2], end)
         text = path.label(k)
         across, high = at @ right / size, at @ above / size
-        if any(abs(high - y) < _HIGH and abs(across - x) < _WIDE * (len(text) + n) / 2 for x, y, n in placed):
+        if any(
+            abs(high - y) < _LABEL_HEIGHT and abs(across - x) < _LETTER_WIDTH * (len(text) + n) / 2
+            for x, y, n in placed
+        ):
             continue
         placed.append((across, high, len(text)))
         plotter.add_point_labels(
-            [at], [text], font_size=20, text_color="black", shape=None, show_points=False, always_visible=True, bold=False,
-            justification_horizontal="center", justification_vertical="center",
+            [at], [text], font_size=20, text_color="black", shape=None, show_points=False, always_visible=True,
+            bold=False, justification_horizontal="center", justification_vertical="center",
         )  # fmt: skip
 
 
 def _beyond(tangent, end):
-    """Where a label goes: on along the tangent at the end (1), back along it at the start (-1); beside the rod elsewhere (0),
-    upwards if that is possible."""
+    """Unit vector (3,) from the rod to a label: along the tangent beyond the end (1) or before the start (-1) of a rod;
+    across the rod elsewhere (0), upwards where possible."""
     if end:
         return end * tangent
     up = np.array([0.0, 0.0, 1.0]) if abs(tangent[2]) < 0.95 else np.array([1.0, 0.0, 0.0])

@@ -1,1 +1,1 @@
-"""What was found, as arrays with named fields, and its tables and files. No room of a solver is known here."""
+"""Results as arrays with named fields, and their tables and files. This package imports no solver."""

@@ -1,43 +1,40 @@
-"""Paths of one scene on two meshes: how far apart they are, what that says of the finer one's error, and one from the other."""
+"""Comparison of a path on two meshes: error estimates, and transfer of its points to another mesh."""
 
 from collections import namedtuple
 
 import numpy as np
 
-# Positions differ by this much from rounding alone (lengths), at rest too, where nothing is displaced.
+# Differences of positions due to rounding alone, in units of the scales' length; not zero in an undisplaced state.
 _ROUNDING = 1e-14
-# Differences between element ends over those at the ends.
+# Ratios of the largest difference to that at the element ends, above which the superconvergence of the ends is evident.
 _AHEAD, _FAR_AHEAD = 4, 30
-# Least share of the difference of two meshes over the error that is left, where elements lock.
-_LOCKED = 0.05
-# A point whose leading coefficients are smaller than this times another's says something else of the error.
+# Ratio of leading coefficients below which a second, smoother point is sampled, since its error may converge otherwise.
 _SMOOTHER = 0.1
-# Points that are displaced by less than this times the most displaced one say nothing.
+# Points with displacements below this times the largest one of the path are not sampled for their smoothness.
 _SEEN = 1e-3
 
 
 def estimate_error(fine, coarse, before=None):
     """Estimate the error of a path from the same points on the mesh of elements twice as long; sets `fine.error`.
 
-    The difference of the positions, at the coarse nodes and between them, over a share of the gain in accuracy that one
-    more halving brings (2^(p + 1) between the nodes): a quarter of what was seen from the difference `before` to this one, not
-    more than 2^(p - 1); where there was none before, a quarter or a sixteenth of 2^(p + 1), and that only if element ends, whose
-    order is 2 p, are seen to be far ahead, or ahead, of what lies between them: an order must be seen before it is counted on. A
-    spline or a section that is a function of s may hide its order, and counts as ahead at most. Where hardly
-    anything is displaced (a shaft in torsion), relative to the turning of the sections, or to a billionth of the
-    length. Without a contact force of its own (formulation 'displacement') a slender rod's answer also feels the
-    residual's rounding.
+    The error is the difference of the positions, at the coarse nodes and half way between them, over an assumed gain in
+    accuracy. The gain of a halving is asymptotically 2^(p + 1) between the nodes, of which only a part is assumed, once
+    it is confirmed:
+    - with the differences `before` of the previous halving: (their ratio to the present ones - 1)/4, within 1 and
+      2^(p - 1);
+    - without: 2^(p - 1) or 2^(p - 3) if the element ends, whose order is 2 p, are much or moderately more accurate than
+      the rest, else 1. Splines and sections that are functions of s may reduce the order: for these at most 2^(p - 3).
+
+    Differences are relative to the largest displacement; where sections mainly rotate (a shaft in torsion), to their
+    rotation times the radius of gyration; at least to 1e-9 of the length.
 
     Returns:
-        (n,) the differences relative to the largest displacements, to be the `before` of the next halving; and the order of the
-        error in h that this counts on, 1 to p.
+        (n,) the relative differences, `before` of the next halving; and the assumed order of the error in h, 1 to p.
     """
     p = fine.degree
     relative, difference, at_ends = _differences(fine, coarse)
     seen = np.inf if before is None else before / np.maximum(relative, 1e-300)
-    if fine.formulation == "multiplier":  # it locks: what is left may be many times what one more halving brings
-        gain = np.clip(seen - 1, _LOCKED, 1) if before is not None else _LOCKED
-    elif before is None:
+    if before is None:
         ahead, far = difference > _AHEAD * at_ends, difference > _FAR_AHEAD * at_ends
         uniform = all(rod.uniform for rod in fine.scene.rods)
         gain = np.where(far & uniform, 2.0 ** (p - 1), np.where(ahead, max(1.0, 2.0 ** (p - 3)), 1.0))
@@ -50,13 +47,14 @@ def estimate_error(fine, coarse, before=None):
 def carry_error(fine, coarse, factor, order, before=None):
     """Set the error of a path from that of the same points on a mesh of elements less than twice as long.
 
-    It is the coarser mesh's times what is left of it at the order that was counted on there, but one to two times what the
-    difference of the two says at the order that is seen in the differences, less one: the coarser mesh's may be overrated.
+    It is the coarser mesh's error reduced by the assumed order, limited to one to two times the Richardson estimate
+    from the difference of the two meshes, since the coarser mesh's error may be overestimated. The order of the
+    Richardson estimate is the observed one less one.
 
     Args:
-        factor: elements over those of the coarser mesh.
-        order: of the error in h, as `estimate_error` of the coarser mesh counted on.
-        before: the relative differences by which that was halved to, where it was.
+        factor: number of elements over that of the coarser mesh.
+        order: of the error in h, as assumed by `estimate_error` on the coarser mesh.
+        before: relative differences of the coarser mesh from the one before, where its elements were halved; or None.
 
     Returns:
         (n,) the differences relative to the largest displacements.
@@ -67,30 +65,40 @@ def carry_error(fine, coarse, factor, order, before=None):
         if before is None
         else np.clip(np.log2(np.maximum(before, 1e-300) / np.maximum(relative, 1e-300)) - 1, order, fine.degree)
     )
-    left = factor**-seen
-    told = relative * left / (1 - left)
-    fine.set_error(np.clip(coarse.error * factor**-order, told, 2 * told))
+    reduction = factor**-seen
+    estimate = relative * reduction / (1 - reduction)
+    fine.set_error(np.clip(coarse.error * factor**-order, estimate, 2 * estimate))
     return relative
 
 
+def compare(fine, coarse):
+    """(n,) differences of the same points on two meshes, relative to the largest displacements.
+
+    They are no error estimate where the meshes are not nested.
+    """
+    return _differences(fine, coarse)[0]
+
+
 def _differences(fine, coarse):
-    """`_apart` over the largest displacements, and as it is."""
-    sizes = _sizes(fine)
+    """(n,) relative differences, then the two results of `_apart`."""
+    sizes = sizes_of(fine)
     difference, at_ends = _apart(fine, coarse, sizes.turning)
     return np.maximum(difference - _ROUNDING, 0.0) / sizes.largest, difference, at_ends
 
 
 def hardest(path, most=3):
-    """A few points of a path that tell how fine a mesh all of it needs: the one with the largest error, or, where that is not known, the
-    one that is least like a polynomial of lower degree; the most displaced one, the last, and the one that is most like such a
-    polynomial where that says something else. All of them where they are few or the path has events.
+    """Sample points that determine the mesh that a path needs.
+
+    They are the point with the largest error (the largest relative leading coefficients where errors are unknown), the
+    most displaced one, the last, and the smoothest (smallest leading coefficients) where it is much smoother. All
+    points where these are few or the path has events.
 
     Returns:
         (Path of these points, their indices).
     """
-    if len(path) <= most or path.events:  # events have to be found again on every mesh
+    if len(path) <= most or path.events:  # events have to be located on every mesh
         return path, np.arange(len(path))
-    sizes, rough, _ = _sizes(path)
+    sizes, rough, _ = sizes_of(path)
     known = np.isfinite(path.error).all()
     which = {int(np.argmax(path.error if known else rough / sizes)), int(np.argmax(sizes)), len(path) - 1}
     seen = np.flatnonzero(sizes >= _SEEN * sizes.max())
@@ -101,23 +109,23 @@ def hardest(path, most=3):
 
 
 def spread_error(path, few, which, coarse):
-    """Set `path.error` from that of a few of its points on the same mesh.
+    """Set `path.error` from the errors of its sample points on the same mesh.
 
-    The others' errors follow from how far they are from the same points on the coarse mesh that they were first found on: by the
-    power law through the few that lie next in this, in proportion beyond them.
+    The errors of the other points are interpolated over their differences from the same points on a coarser mesh:
+    logarithmically between neighbouring sample points, in proportion outside the range of these.
 
     Args:
-        few: some points of the path, with their errors; which: their indices.
+        few: the sample points, with their errors; which: their indices.
         coarse: the whole path on a coarser mesh.
     """
-    sizes, _, turning = _sizes(path)
+    sizes, _, turning = sizes_of(path)
     apart = np.maximum(_apart(path, coarse, turning)[0] - _ROUNDING, 0.0)
     known, errors = apart[which], few.error * sizes[which]
-    told = (known > 100 * _ROUNDING) & (errors > 0)
+    usable = (known > 100 * _ROUNDING) & (errors > 0)
     error = apart.copy()
-    if told.any():
-        order = np.argsort(known[told])
-        known, errors = known[told][order], np.maximum.accumulate(errors[told][order])
+    if usable.any():
+        order = np.argsort(known[usable])
+        known, errors = known[usable][order], np.maximum.accumulate(errors[usable][order])
         within = np.clip(apart, known[0], known[-1])
         error *= np.exp(np.interp(np.log(within), np.log(known), np.log(errors))) / within
     error /= sizes
@@ -126,12 +134,15 @@ def spread_error(path, few, which, coarse):
 
 
 def _apart(fine, coarse, turning):
-    """Largest distances of the positions on two meshes, at all places and at element ends alone: (points,) both, lengths. Where
-    sections turn more than they move (`_Sizes.turning`), positions are those off the axis too, at the radius of gyration."""
+    """Largest distances of the positions on two meshes, dimensionless: over all places, and over element ends alone.
+
+    Both (points,). Where sections mainly rotate (`_Sizes.turning`), differences of rotations count too, times the
+    radius of gyration.
+    """
     difference, at_ends = np.zeros(len(fine)), np.zeros(len(fine))
     for i, rod in enumerate(fine.scene.rods):
         nodes = coarse.layout.node_s(coarse.rule.nodes)[i]
-        x = np.sort(np.concatenate([nodes, (nodes[:-1] + nodes[1:]) / 2]))
+        x = halfway(nodes)
         ends = np.isin(x, coarse.layout.breaks[i])
         off = coarse.motion(rod, x) - fine.motion(rod, x)
         radius = 2 * _gyration(rod) / fine.scales.length
@@ -142,32 +153,52 @@ def _apart(fine, coarse, turning):
     return difference, at_ends
 
 
+def halfway(places):
+    """Coordinates in ascending order with the midpoints of their intervals."""
+    return np.sort(np.concatenate([places, (places[:-1] + places[1:]) / 2]))
+
+
 _Sizes = namedtuple("_Sizes", "largest leading turning")
 
 
-def _sizes(path):
-    """What errors are relative to, the largest leading coefficient of an element's displacement, both lengths, and whether the
-    turning of the sections is the larger part of the first; (points,) each."""
+def sizes_of(path):
+    """Reference sizes of the points of a path, a `_Sizes` of arrays (points,).
+
+    largest: the displacement that errors are relative to; leading: the largest leading coefficient of an element's
+    displacement, both dimensionless; turning: whether `largest` comes from rotations times the radius of gyration.
+    """
     moved, turned = np.full(len(path), 1e-9), np.zeros(len(path))
-    leading, p = np.zeros(len(path)), path.degree
+    leading = np.zeros(len(path))
     for i, rod in enumerate(path.scene.rods):
         motion = path.motion(rod, path.layout.node_s(path.rule.nodes)[i])
         # |R - 1| = sqrt(8) |sin(angle/2)|
         angle = np.sqrt(8) * np.linalg.norm(motion[:, :, 4:], axis=2).max(axis=1)
         turned = np.maximum(turned, angle * _gyration(rod) / path.scales.length)
         moved = np.maximum(moved, np.linalg.norm(motion[:, :, :3], axis=2).max(axis=1))
-        elements = p * np.arange(path.elements[i])[:, None] + np.arange(p + 1)
-        of_degree_p = np.einsum("j,kcji->kci", path.rule.leading, motion[:, elements, :3])
-        leading = np.maximum(leading, np.linalg.norm(of_degree_p, axis=2).max(axis=1))
+        leading = np.maximum(leading, _of_degree_p(path, motion).max(axis=1))
     return _Sizes(np.maximum(moved, turned), leading, turned > moved)
 
 
+def leading_coefficients(path):
+    """For every rod (points, elements): sizes of the leading coefficients of the displacement, dimensionless."""
+    nodes = path.layout.node_s(path.rule.nodes)
+    return [_of_degree_p(path, path.motion(rod, x)) for rod, x in zip(path.scene.rods, nodes, strict=True)]
+
+
+def _of_degree_p(path, motion):
+    """(points, elements) sizes of the displacement's coefficients of degree p, from the motion of a rod's nodes."""
+    p = path.degree
+    elements = p * np.arange((motion.shape[1] - 1) // p)[:, None] + np.arange(p + 1)
+    of_degree_p = np.einsum("j,kcji->kci", path.rule.leading, motion[:, elements, :3])
+    return np.linalg.norm(of_degree_p, axis=2)
+
+
 def on_mesh(path, layout):
-    """The points of a path on another mesh, as something to start from.
+    """The points of a path interpolated to another mesh, as initial guesses.
 
     Returns:
-        (r, q) at the nodes (points, N, 7) and n at the Gauss points (points, elements, points of one, 3), dimensionless,
-        inertial.
+        (r, q) at the nodes (points, N, 7) and n at the Gauss points (points, elements, Gauss points per element, 3),
+        dimensionless, inertial.
     """
     rule, scene = path.rule, path.scene
     n = np.array([record.gauss_fields[:, :, :3] for record in path])

@@ -6,10 +6,9 @@ from functools import cached_property
 
 import numpy as np
 
-from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.quaternions import directors
-from cosserat_fenicsx.results.path import Path
 from cosserat_fenicsx.results.records import Record
+from cosserat_fenicsx.results.result import Result
 
 #: Energies so far, J, and momenta, kg m/s and kg m^2/s, inertial, the latter about the inertial origin.
 Ledger = namedtuple("Ledger", "kinetic strain work dissipated linear_momentum angular_momentum")
@@ -18,25 +17,28 @@ Ledger = namedtuple("Ledger", "kinetic strain work dissipated linear_momentum an
 @dataclass
 class Instant(Record):
     """A `Record` at a time (s), with velocities and angular velocities of the nodes (N, 6), dimensionless, inertial,
-    the steps taken so far and the `Ledger`."""
+    the steps taken so far, the `Ledger`, and what every clamped point was held with in the last step (points, 6), less
+    what joints exert there. NaN stands for reactions where no step has led to the state."""
 
     time: float = 0.0
     rates: np.ndarray = None
     steps: int = 0
     ledger: Ledger = None
+    clamp_forces: np.ndarray = None
 
 
-class History(Path):
+class History(Result):
     """A motion: its states at the saved times, and what became of energy and momenta.
 
-    All station queries of a `Path` (`position`, `displacement`, `rotation`, `force`, `moment`, `centreline`, `fields`,
-    ...) give one row a time. Contact force and moment include what damping adds. With the `folder` of `simulate` the states
-    lie in a file and are read from there.
+    All station queries (`position`, `displacement`, `rotation`, `force`, `moment`, `centreline`, `fields`, ...) give
+    one row a time. Contact force and moment include what damping adds. With the `folder` of `simulate` the states lie
+    in a file and are read from there.
 
     Attributes:
+        see `Result`;
         times: (n,) s.
         scheme: the scheme's name.
-        steps: (n,) steps taken up to there, iterations: (n,) Newton iterations since the time before.
+        steps: (n,) steps taken up to there.
         kinetic, strain: (n,) energies, J.
         work: (n,) J, what loads and prescribed motions have done since the start.
         dissipated: (n,) J, what damping has taken since the start.
@@ -46,13 +48,12 @@ class History(Path):
 
     axis = "time"
     more_fields = {"velocity": "velocity", "angular_velocity": "angular_velocity"}  # noqa: RUF012
-    load_factors = negative_modes = stable = None  # of a path alone
-    _computed = (*Path._computed, "_all_rates", "_all_gauss")
+    _computed = (*Result._computed, "_all_rates", "_all_gauss")
 
     @classmethod
     def of(cls, model, scheme, why=()):
         """An empty history for the scene that a moving model was loaded with."""
-        history = super().of(model, "displacement", why)
+        history = super().of(model, model.signature.formulation.name, why)
         history.scheme, history._time_unit = scheme, model.time
         return history
 
@@ -100,10 +101,6 @@ class History(Path):
         station = self.station(station)
         return np.einsum("nij,ni->nj", directors(self.rotation(station)) @ station.rod.curve.frame(station.s), angular)
 
-    def reaction(self, support):
-        """Of a `Path` alone: in a motion ask for `force` and `moment` next to the support."""
-        raise SceneError("a History has no reaction of its supports: ask for force and moment at the station")
-
     @property
     def along_axis(self):
         """(n,) s."""
@@ -114,7 +111,7 @@ class History(Path):
         return f"{self.times[k]:.3g} s"
 
     def fields(self, k, rod=None):
-        """As of a `Path`, at time k; with velocity (m/s) and angular_velocity (rad/s), inertial."""
+        """See `Result`, at time k; with velocity (m/s) and angular_velocity (rad/s), inertial."""
         rates = self._records[k].rates[self._rows(rod)[1]] / self._time_unit
         velocity = rates[:, :3] * self.scales.length
         return {**super().fields(k, rod), "velocity": velocity, "angular_velocity": rates[:, 3:]}
@@ -153,6 +150,9 @@ class History(Path):
     def _all_gauss(self):
         """(times, elements, points, 9) n, m and r' at the Gauss points, dimensionless."""
         return np.array([record.gauss_fields for record in self._records])
+
+    def _at_clamp(self, point, joined):
+        return self._stacked("clamp_forces")[:, point]
 
     # n and m at the nodes are those of the polynomials through the Gauss points
 

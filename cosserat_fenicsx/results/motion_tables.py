@@ -3,8 +3,9 @@
 import numpy as np
 from rich.table import Table
 
-from cosserat_fenicsx.results.bearing import largest_in_words
-from cosserat_fenicsx.results.tables import as_text, busiest, station_columns, write_columns
+from cosserat_fenicsx.results.extremes import largest_in_words
+from cosserat_fenicsx.results.reactions import reactions_in_words
+from cosserat_fenicsx.results.tables import as_text, most_displaced, station_columns, write_columns
 
 #: Rows of the table, where more times were saved.
 ROWS = 21
@@ -12,10 +13,12 @@ _ENERGIES = ("kinetic", "strain", "work", "dissipated", "balance")
 
 
 def motion_table(history, station=None, rows=ROWS):
-    """Text: time, motion of a station (default the one that moves most), energies at some times; where all named stations are
-    at the end."""
+    """Text: time, motion of a station and energies at up to `rows` times; final positions of all named stations.
+
+    The default station is that with the largest displacement.
+    """
     shown = np.unique(np.round(np.linspace(0, len(history) - 1, rows)).astype(int))
-    station = history.station(station or busiest(history))
+    station = history.station(station or most_displaced(history))
     moved, speed = history.displacement(station), np.linalg.norm(history.velocity(station), axis=1)
     title = f"{history.scene.title}\n" if history.scene.title else ""
     which = f"{len(shown)} of {len(history)} times" if len(shown) < len(history) else f"{len(history)} times"
@@ -46,12 +49,13 @@ def motion_table(history, station=None, rows=ROWS):
         as_text(table),
         f"t = {history.times[-1]:.6g} s: {'; '.join(ends)}.",
         largest_in_words(history),
+        *reactions_in_words(history),
         f"{history.model} model: {'; '.join(history.why)}.",
     ])  # fmt: skip
 
 
 def _named(scene):
-    """The ends of all rods and what supports, loads and joints name, each place once."""
+    """The ends of all rods and the stations of supports, loads and joints, each place once."""
     places = {}
     for rod in scene.rods:
         for station in (rod.start, *scene.stations(rod), rod.end):

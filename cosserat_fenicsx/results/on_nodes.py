@@ -1,16 +1,16 @@
-"""What all results with numbers at the nodes of a scene's rods have in common."""
+"""Base class of results with values at the nodes of a scene's rods."""
 
 from cosserat_fenicsx.errors import SceneError
 
 
 class OnNodes:
-    """A result on a mesh: it has the `scene`, the `elements` of each rod and their `degree`."""
+    """A result on a mesh; subclasses have the `scene`, the `elements` of each rod and their `degree`."""
 
     def rod(self, rod=None):
-        """A rod of the scene, given as one or by its name; default the first.
+        """A rod of the scene, given as a `Rod` or by its name; default the first.
 
         Raises:
-            SceneError: the scene has none such.
+            SceneError: the scene has no such rod.
         """
         if isinstance(rod, str):
             return self.scene.rod(rod)

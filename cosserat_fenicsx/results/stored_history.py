@@ -1,4 +1,4 @@
-"""A `History` whose states lie in a file, written as they come and read as they are asked for."""
+"""A `History` whose states are stored in a file, written as they are saved and read on demand."""
 
 import numpy as np
 
@@ -10,41 +10,44 @@ from cosserat_fenicsx.storage.instantfile import InstantFile
 
 
 class StoredHistory(History):
-    """See `History`; of its states none stays in memory. The first rank writes them, all ranks read them.
+    """A `History` that keeps no states in memory. Rank 0 writes them, all ranks read them.
 
     Attributes:
-        folder: where it lies, a `pathlib.Path`.
+        folder: the `pathlib.Path` of its folder.
     """
 
     _computed = ()
 
     def told(self):
-        """What it says of itself beside the scene, in words and numbers that `json` keeps."""
+        """Its attributes other than scene and states, as a dict that `json` can store."""
         rule = {name: getattr(self.rule, name).tolist() for name in ("nodes", "gauss", "weights")}
         names = ("model", "degree", "unknowns", "why", "scheme")
         return {name: getattr(self, name) for name in names} | {"time_unit": self._time_unit, "rule": rule}
 
     @classmethod
-    def as_told(cls, told, scene, layout, scales, comm, expand=None):
-        """One that is `told` again, for the scene; `expand` as of a model, where states are still to come."""
+    def as_told(cls, told, scene, layout, scales, comm, connections, expand=None):
+        """A `StoredHistory` from what `told` returned; `expand`: that of the model, if states will be appended."""
         rule = ElementRule(**{name: np.array(values) for name, values in told["rule"].items()})
-        history = cls(scene, layout, scales, rule, comm=comm, rounding=0.0, model=told["model"], formulation="displacement",
-                      degree=told["degree"], unknowns=told["unknowns"], why=told["why"], expand=expand)  # fmt: skip
+        history = cls(scene, layout, scales, rule, comm=comm, model=told["model"], formulation="displacement",
+                      degree=told["degree"], unknowns=told["unknowns"], why=told["why"], connections=connections,
+                      expand=expand)  # fmt: skip
         history.scheme, history._time_unit = told["scheme"], told["time_unit"]
         return history
 
     def keep_in(self, folder):
-        """Where the states lie.
+        """Set the folder of the states, and return the history.
 
         Args:
-            folder: a `pathlib.Path`; what is in it already counts.
+            folder: a `pathlib.Path`; states that it holds already belong to the history.
         """
         self.folder, self._file, self._done = folder, InstantFile(folder / "instants.npy"), 0
         return self
 
     def go_on_after(self, count):
-        """So many states were saved before what is appended from now on; those that are there beyond stay until they are
-        written anew, with the same digits."""
+        """Continue after the first `count` states; later ones in the file remain until they are overwritten.
+
+        A resumed motion reproduces them digit by digit.
+        """
         self._done = count
 
     def append(self, record):
@@ -60,12 +63,12 @@ class StoredHistory(History):
         self._file.look()
 
     def settle(self, write):
-        """Have the states so far, and then what `write()` writes, outlive whatever happens.
+        """Flush the states so far to the disk, and then what `write()` writes, so that they survive a crash.
 
         Raises:
             NotStored: it cannot be written.
         """
-        self._try(lambda: (self._file.settle(), write()), "what a resumed motion goes on from")
+        self._try(lambda: (self._file.settle(), write()), "the state from which a motion resumes")
 
     def _try(self, action, what):
         try:
@@ -73,17 +76,25 @@ class StoredHistory(History):
         except OSError as problem:
             until = f"the states up to t = {self.times[-1]:.6g} s are" if len(self) else "nothing is"
             raise NotStored(
-                f"{self.folder}: {what} cannot be written: {problem.strerror or problem}. Make room; {until} kept there, "
-                f"and cosserat_fenicsx.resume({str(self.folder)!r}), or `cosserat resume {self.folder}`, goes on with it",
+                f"{self.folder}: {what} cannot be written: {problem.strerror or problem}. Make room; {until} kept "
+                f"there, and cosserat_fenicsx.resume({str(self.folder)!r}), or `cosserat resume {self.folder}`, "
+                "continues the motion",
                 self,
             ) from None
 
     def at_points(self, which):
-        """The history of some of its times alone, in memory."""
+        """A `History` in memory of the states at the indices `which`."""
         part = History.__new__(History)
-        vars(part).update(vars(self))
-        part._expanded, part._appended = [self[k] for k in which], []
+        mine = {name: value for name, value in vars(self).items() if name not in ("folder", "_file", "_done")}
+        vars(part).update(mine, _expanded=[self[k] for k in which], _appended=[])
         return part
+
+    def __copy__(self):
+        return self._with([])
+
+    def __getstate__(self):
+        """Pickle the folder instead of the states, which are read from there again."""
+        return {**super().__getstate__(), "folder": self.folder.resolve()}
 
     @property
     def _records(self):
@@ -96,6 +107,7 @@ class StoredHistory(History):
         return np.array(self._file.rows[name]) if len(self) else np.empty(0)
 
     _booked = _array
+    _stacked = property(lambda self: self._file.rows.__getitem__)
     _all_rq = property(lambda self: self._column("rq", 7))
     _all_rates = property(lambda self: self._column("rates", 6))
     _all_gauss = property(lambda self: self._file.rows["gauss_fields"])

@@ -7,19 +7,22 @@ from rich.console import Console
 from rich.table import Table
 
 from cosserat_fenicsx.ranks import on_first
-from cosserat_fenicsx.results.bearing import largest_in_words, reactions_in_words
-from cosserat_fenicsx.scene.words import describe
+from cosserat_fenicsx.results.extremes import largest_in_words
+from cosserat_fenicsx.results.reactions import reactions_in_words
+from cosserat_fenicsx.scene.describe import actions_in_words
 
-# A named station is shown if it moves by this share of what moves most.
-_WORTH_TELLING = 0.2
-# A mode that displaces less than this (its largest displacement or turn is 1) is one of twist.
+# A named station is shown if its displacement is at least this share of the largest one.
+_WORTH_SHOWING = 0.2
+# Largest displacement of a mode of pure twist (the largest displacement or rotation of a mode is 1).
 _TWIST = 1e-6
 
 
 def path_table(path, station=None):
-    """Text: load factor, motion of a station (default the one that moves most), stability, work and estimated error at every
-    point."""
-    station = path.station(station or busiest(path))
+    """Text: load factor, motion of a station, stability, iterations and estimated error at every point.
+
+    The default station is that with the largest displacement.
+    """
+    station = path.station(station or most_displaced(path))
     tip, angle = path.displacement(station), path.rotation_angle(station)
     title = f"{path.scene.title}\n" if path.scene.title else ""
     table = Table(
@@ -27,7 +30,7 @@ def path_table(path, station=None):
         f"{' + '.join(map(str, path.elements))} elements, {path.unknowns} unknowns",
         caption=f"dx, dy, dz, size of the rotation: of {station}. stable: 'no (2)' has two negative modes.\n"
         "iterations: Newton's, since the row above. est. error: of positions, relative to the largest displacement.\n"
-        f"Loads, times the load factor: {', '.join(map(describe, path.scene.loads)) or 'none'}.",
+        f"{actions_in_words(path.scene)}",
     )
     headings = ("load factor", "dx (m)", "dy (m)", "dz (m)", "rotation (rad)", "stable", "iterations", "est. error")
     for heading in headings:
@@ -41,19 +44,24 @@ def path_table(path, station=None):
             str(path.iterations[k]),
             "unknown" if np.isnan(path.error[k]) else f"{path.error[k]:.1e}",
         )
-    lines = [as_text(table), *(f"{event.kind} point at the load factor {event.load_factor:.7g}" if event.kind == "limit"
-                               else f"bifurcation at the load factor {event.load_factor:.7g}" for event in path.events)]  # fmt: skip
+    kinds = {"limit": "limit point", "bifurcation": "bifurcation"}
+    lines = [as_text(table)]
+    lines += [f"{kinds[event.kind]} at the load factor {event.load_factor:.7g}" for event in path.events]
     if not path.left and any(event.kind == "bifurcation" for event in path.events):
         lines.append(
-            "The path goes straight on there; --branch 1 or -1 (branch= in Python) leaves it at the first bifurcation."
+            "The path stays on its branch there; --branch 1 or -1 (branch= in Python) leaves it at the first "
+            "bifurcation."
         )
     return "\n".join(
         [*lines, largest_in_words(path), *reactions_in_words(path), f"{path.model} model: {'; '.join(path.why)}."]
     )
 
 
-def busiest(path):
-    """The end of a rod, or the station of a load or support, that moves most; another place where these hardly move."""
+def most_displaced(path):
+    """The station with the largest displacement among the ends of rods and the stations of loads and supports.
+
+    The node with the largest displacement of all where the displacement of these is much smaller.
+    """
 
     def moves(station):
         return round(float(np.linalg.norm(path.displacement(station), axis=1).max()), 12)
@@ -65,38 +73,42 @@ def busiest(path):
         moved = np.linalg.norm(path.motion(rod, x)[:, :, :3], axis=2).max(axis=0)
         inside.append(rod.at(x[np.argmax(moved)] * rod.length))
     other = max(inside, key=moves)
-    return named if moves(named) >= _WORTH_TELLING * moves(other) else other
+    return named if moves(named) >= _WORTH_SHOWING * moves(other) else other
 
 
 def buckling_table(found):
     """Text: critical load factors by linear buckling, and where each mode moves most."""
     table = Table(
-        title=f"{found.scene.title or 'Linear buckling'}: degree {found.degree}, {' + '.join(map(str, found.elements))} elements",
-        caption="Load factors at which the unloaded state, extrapolated, loses its stability; estimated relative error. A "
-        "structure that bends much before it buckles needs `cosserat run` instead.",
+        title=f"{found.scene.title or 'Linear buckling'}: degree {found.degree}, "
+        f"{' + '.join(map(str, found.elements))} elements",
+        caption="Load factors at which the unloaded state, extrapolated, loses its stability; estimated relative "
+        "error. A structure that bends much before it buckles needs `cosserat run` instead.",
     )
     for heading in ("critical load factor", "est. error", "mode moves most at (m)", "there along"):
         table.add_column(heading, justify="right")
     for k, (eta, error) in enumerate(zip(found.load_factors, found.error, strict=True)):
         table.add_row(f"{eta:.7g}", f"{error:.1e}", *_farthest(found, k))
-    return as_text(table) if len(found.load_factors) else "No buckling under positive load factors."
+    text = as_text(table) if len(found.load_factors) else "No buckling under positive load factors."
+    return f"{text}\n{found.caution}".rstrip()
 
 
 def modes_table(found):
     """Text: natural frequencies, and where each mode moves most."""
     table = Table(
-        title=f"{found.scene.title or 'Natural frequencies'}: degree {found.degree}, {' + '.join(map(str, found.elements))} elements",
-        caption="Estimated relative error of the square of the frequency. 0 Hz: a free motion, or one that grows as exp(growth t).",
+        title=f"{found.scene.title or 'Natural frequencies'}: degree {found.degree}, "
+        f"{' + '.join(map(str, found.elements))} elements",
+        caption="Estimated relative error of the square of the frequency. 0 Hz: a free motion, or one that grows as "
+        "exp(growth t).",
     )
     for heading in ("frequency (Hz)", "growth (1/s)", "est. error", "mode moves most at (m)", "there along"):
         table.add_column(heading, justify="right")
     for k, (frequency, growth, error) in enumerate(zip(found.frequencies, found.growth, found.error, strict=True)):
         table.add_row(f"{frequency:.7g}", f"{growth:.4g}", f"{error:.1e}", *_farthest(found, k))
-    return as_text(table)
+    return f"{as_text(table)}\n{found.caution}".rstrip()
 
 
 def _farthest(found, k):
-    """The station that a mode moves most, and the direction there, inertial; of a mode of twist neither."""
+    """Words for the station with the largest displacement of a mode, and its direction there, inertial."""
     sizes = [(np.linalg.norm(found.mode(k, rod), axis=1), rod) for rod in found.scene.rods]
     size, rod = max(sizes, key=lambda item: item[0].max())
     if size.max() < _TWIST:
@@ -117,16 +129,19 @@ def stability(negative_modes):
 
 def as_text(table):
     """A rich table as plain text, as wide as it needs."""
-    console = Console(width=140, color_system=None)  # mpirun shows the ranks a terminal that there is not
+    console = Console(width=140, color_system=None)  # fixed, since the size of the terminal is unknown under mpirun
     with console.capture() as capture:
         console.print(table)
     return capture.get().rstrip()
 
 
 def write_csv(path, file, station=None):
-    """Load factors, stability, work, error; displacement (m), quaternion, contact force n (N) and moment m (N m) at both
-    ends of every rod, where loads and supports act, and at the station of the table. n and m are what the part beyond
-    exerts: the reaction of a support at the start is their opposite."""
+    """Write load factors, negative modes, iterations and errors of a path, and its columns of stations, as CSV.
+
+    Displacement (m), quaternion, contact force n (N) and moment m (N m) at both ends of every rod, where loads and
+    supports act, and at the station of the table. n and m act from the part of larger s on the part of smaller s: the
+    reaction of a support at the start is their opposite.
+    """
     head = {
         "load_factor": path.load_factors,
         "negative_modes": path.negative_modes,
@@ -140,14 +155,14 @@ def station_columns(path, station=None, more=()):
     """Columns by their names: displacement, quaternion, contact force and moment at the stations of `write_csv`.
 
     Args:
-        station: of the table; default the one that moves most.
+        station: of the table; default the one with the largest displacement.
         more: further quantities, (query, name, names of its components).
     """
-    columns, told = {}, path.station(station or busiest(path))
+    columns, of_table = {}, path.station(station or most_displaced(path))
     quantities = (("displacement", "displacement (m)", "xyz"), ("rotation", "quaternion", "abcd"), *more,
                   ("force", "contact force (N)", "xyz"), ("moment", "contact moment (N m)", "xyz"))  # fmt: skip
     for rod in path.scene.rods:
-        stations = [rod.start, *path.scene.stations(rod), rod.end, *([told] if told.rod is rod else [])]
+        stations = [rod.start, *path.scene.stations(rod), rod.end, *([of_table] if of_table.rod is rod else [])]
         for station in {station.s: station for station in sorted(stations, key=lambda station: station.s)}.values():
             for quantity, name, axes in quantities:
                 values = getattr(path, quantity)(station)

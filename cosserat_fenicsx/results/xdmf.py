@@ -1,8 +1,8 @@
-"""Files: a path as XDMF and HDF5 for ParaView, one of its points in whatever meshio writes.
+"""Files: a path as XDMF and HDF5 for ParaView, or one of its points in a format of meshio.
 
 Written from the results with the system's h5py and with meshio, so that the files are the same for every release of
-dolfinx; every element becomes as many straight lines as its degree. (meshio's own time series refuses a quaternion and
-dolfinx's XDMF crashes or misleads some readers: README, Files.)
+dolfinx; an element of degree p becomes p straight lines. (meshio's own time series does not support quaternions, and
+some readers crash on dolfinx's XDMF or misinterpret it: README, Files.)
 """
 
 from pathlib import Path
@@ -33,11 +33,11 @@ def write(path, file, k=-1):
 
     Args:
         path: a `Path` with at least one point.
-        file: the file's name.
-        k: the point, for other formats than .xdmf.
+        file: the file's name, whose ending sets the format.
+        k: index of the point, for other formats than .xdmf.
 
     Raises:
-        SceneError: an empty path, or an ending that meshio does not know.
+        SceneError: an empty path, or an ending that meshio does not support.
         OSError: the file cannot be written.
     """
     if len(path) == 0:
@@ -54,7 +54,7 @@ def _write(path, file, k):
             known = ".xdmf, .vtu, .vtk, .ply and what else meshio writes"
             raise SceneError(f"{file}: the ending '{file.suffix}' is not known: expected {known}")
         with open(file, "wb"):
-            pass  # an unwritable place is said here, plainly, whatever meshio makes of it
+            pass  # raises a plain OSError here if the file cannot be written
         points, cells, data = mesh_of(path, k)
         meshio.write(file, meshio.Mesh(points, cells, point_data=data))
         return
@@ -62,7 +62,7 @@ def _write(path, file, k):
 
 
 def _write_series(path, file):
-    """Numbers into the .h5 first, the .xdmf that points to them last: what exists can be opened."""
+    """Write the arrays to the .h5 file, then the .xdmf file that refers to them: an existing .xdmf is complete."""
     try:
         import h5py
     except ImportError:
@@ -100,7 +100,7 @@ def _write_series(path, file):
                 grid, "Topology", TopologyType="Polyline", NodesPerElement="2", NumberOfElements=str(len(lines))
             )
             item(topology, "lines", lines)
-            q = data.pop("quaternion")  # some readers know no array of four components
+            q = data.pop("quaternion")  # some readers support no arrays of four components
             for name, array in {
                 "position": points,
                 **data,
@@ -118,7 +118,7 @@ def mesh_of(path, k):
     """Nodes, lines and fields of all rods at point k.
 
     Returns:
-        points (n, 3) m; cells as meshio takes them; dict of arrays (n, ...).
+        points (n, 3), m; cells in meshio's format; dict of arrays (n, ...).
     """
     names = {**FIELDS, **path.more_fields}
     points, lines, data, first = [], [], {name: [] for name in names}, 0

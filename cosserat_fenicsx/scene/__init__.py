@@ -1,1 +1,1 @@
-"""What is to be solved: rods, what holds and loads them, and what that alone says (is it held, is it flat, which model is enough)."""
+"""Scenes: rods, supports, joints and actions, and what follows from these data alone (mechanisms, planes)."""

@@ -1,7 +1,8 @@
 """Reference centrelines with their frames R_R(s) = [d_1R d_2R d_3R]; d_3R is the tangent, s the arc length.
 
-The protocol of a curve: `length`, m; `breaks`, the arc lengths inside it where it is not smooth, m; `uniform`, whether its
-curvature and twist are constant; `position(s)` and `frame(s)`, both exact to round-off, for an arc length or an array of them.
+The interface of a curve: `length`, m; `breaks`, the arc lengths inside it where it is not smooth, m; `uniform`, whether
+its curvature and twist are constant; `position(s)` and `frame(s)`, both exact to round-off, for an arc length or an
+array of them.
 """
 
 import math
@@ -20,8 +21,8 @@ class Line:
 
     Args:
         start, end: inertial points, m.
-        d1: a vector whose part across the line gives d_1R; None for the horizontal across the line, d_2R being the
-            one that points upwards (along z); a vertical line has d_1R = x.
+        d1: a vector whose component normal to the line gives the direction of d_1R; None for a horizontal d_1R such
+            that d_2R points upwards (along z); a vertical line has d_1R = x.
 
     Raises:
         SceneError: points that coincide, or d1 along the line.
@@ -72,7 +73,7 @@ class _Uniform:
         return self._frame @ exponential(np.asarray(s, dtype=float)[..., None] * self._curvature)
 
     def _wind(self, axis, angle, length, frame):
-        """Store a winding about an axis by `angle`, rad, over `length`, with which the frame turns."""
+        """Store a uniform rotation about an axis by `angle`, rad, over `length`, m, of curve and frame."""
         if not length > 1e-12 * np.abs([self.start, self.centre]).max():
             refuse(self, "length", length, "more than the rounding of its start and centre (m)")
         store(self, length=float(length), _frame=frame, _curvature=frame.T @ axis * (angle / length))
@@ -85,9 +86,10 @@ class Arc(_Uniform):
     Args:
         centre: any point of the axis, m.
         start: the curve's first point, off the axis, m.
-        angle: rad, right-handed about the axis; negative turns the other way, 2 pi and more close and wind on.
+        angle: rad, right-handed about the axis, of either sign; 2 pi gives a closed circle, more overlaps it.
         axis: direction of the axis.
-        d1: a vector whose part across the tangent at the start gives d_1R there; None for the direction of the axis.
+        d1: a vector whose component normal to the tangent at the start gives the direction of d_1R there; None for the
+            direction of the axis.
 
     Raises:
         SceneError: no angle, no axis, a start on the axis, or d1 along the tangent.
@@ -114,11 +116,11 @@ class Helix(_Uniform):
     Args:
         centre: any point of the axis, m.
         start: the curve's first point, off the axis, m.
-        turns: number of turns; positive turns right-handed about the axis, negative the other way.
-        pitch: rise along the axis in a turn of either sense, m; negative sinks, 0 stays in its plane.
+        turns: number of turns; positive ones are right-handed about the axis.
+        pitch: advance along the axis per turn of either sense, m; negative against the axis, 0 gives a plane curve.
         axis: direction of the axis.
-        d1: a vector whose part across the tangent at the start gives d_1R there; None for the direction to the axis,
-            the curve's normal.
+        d1: a vector whose component normal to the tangent at the start gives the direction of d_1R there; None for the
+            direction to the axis, the curve's principal normal.
 
     Raises:
         SceneError: no turns, no axis, a start on the axis, or d1 along the tangent.
@@ -182,7 +184,7 @@ def _nonzero(curve, name, value, unit):
 
 
 def _axis_and_arm(curve):
-    """The checked unit axis, the unit vector from it to the start, and the distance between."""
+    """The checked unit axis, the unit vector from it to the start, and their distance, m."""
     for name, unit in (("centre", "m"), ("start", "m"), ("axis", "direction")):
         store(curve, **{name: vector(curve, name, getattr(curve, name), unit)})
     _check_d1(curve)
@@ -193,12 +195,12 @@ def _axis_and_arm(curve):
     axis /= np.linalg.norm(axis)
     arm = np.subtract(curve.start, curve.centre)
     across = arm - np.dot(arm, axis) * axis
-    across -= np.dot(across, axis) * axis  # a long part along the axis leaves rounding the first time
+    across -= np.dot(across, axis) * axis  # twice, against cancellation where the component along the axis is large
     radius = float(np.linalg.norm(across))
     if not radius > 1e-12 * np.abs([curve.start, curve.centre]).max():
         refuse(curve, "start", curve.start, f"a point off the axis through centre = {curve.centre}")
     return axis, across / radius, radius
 
 
-#: Curves by the words of the scene file.
+#: Curves that scene files know.
 CURVES = (Line, Arc, Helix, Spline, UniformCurvature)

@@ -1,4 +1,4 @@
-"""What takes energy from a motion: the material of the sections, and a drag on what moves."""
+"""Damping of rods: viscosity of the material (Kelvin-Voigt), and a drag in proportion to the momentum."""
 
 import math
 from dataclasses import dataclass
@@ -17,10 +17,11 @@ class Damping:
     moment -drag times its momentum and its angular momentum; modes decay as exp(-drag t/2).
 
     Args:
-        time: s: Kt and Jt are `time` times the stiffnesses.
+        time: s; Kt and Jt are `time` times the stiffnesses, and so are the couplings of a `Stiffness.matrix`.
         drag: 1/s.
         Kt: (GAt1, GAt2, EAt), N s, instead of `time` times K.
-        Jt: (EIt1, EIt2, GJt), N m^2 s, instead of `time` times J.
+        Jt: (EIt1, EIt2, GJt), N m^2 s, instead of `time` times J; where either is given, rates of stretch and shear
+            cause no moment and rates of bending and torsion no force.
 
     Raises:
         SceneError: a number below zero, or not three of them.
@@ -44,11 +45,11 @@ class Damping:
 
     @classmethod
     def ratio(cls, ratio, frequencies):
-        """The damping with the same ratio to the critical one at two frequencies: drag/(2 omega) + time omega/2.
+        """The damping with a given damping ratio drag/(2 omega) + time omega/2 at two frequencies.
 
         Args:
-            ratio: in [0, 1).
-            frequencies: two of them, Hz; less in between, more outside.
+            ratio: of the damping to the critical one, in [0, 1).
+            frequencies: two, Hz; the ratio is smaller between them and larger outside.
 
         Raises:
             SceneError: a value outside its range.
@@ -63,11 +64,19 @@ class Damping:
         return cls(time=2 * ratio / (one + two), drag=2 * ratio * one * two / (one + two))
 
     def viscosity(self, stiffnesses):
-        """Kt and Jt (.., 3) where the stiffnesses are K and J (.., 3)."""
-        return tuple(
+        """The viscosities as `Stiffnesses` (times s), from the elastic ones."""
+        Kt, Jt = (
             self.time * values if given is None else np.broadcast_to(given, values.shape)
             for values, given in ((stiffnesses.K, self.Kt), (stiffnesses.J, self.Jt))
         )
+        matrix = stiffnesses.matrix
+        if matrix is not None:
+            matrix = self.time * matrix
+            for given, part in ((self.Kt, slice(0, 3)), (self.Jt, slice(3, 6))):
+                if given is not None:
+                    matrix[..., part, :] = matrix[..., :, part] = 0.0
+                    matrix[..., part, part] = np.diag(given)
+        return stiffnesses._replace(K=Kt, J=Jt, matrix=matrix)
 
 
 def _not_negative(owner, field, value, unit):

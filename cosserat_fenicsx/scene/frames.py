@@ -1,4 +1,4 @@
-"""Rotations and frames in numpy: where the first director of a curve points, and motions of constant curvature."""
+"""Rotations and frames in numpy: the frame at the start of a curve, and curves of constant curvature."""
 
 import math
 
@@ -6,7 +6,7 @@ import numpy as np
 
 from cosserat_fenicsx.checks import refuse
 
-# (theta - sin theta)/theta^3 below theta = 1, where its closed form cancels: coefficients of theta^0, theta^2, ..
+# Taylor coefficients of (theta - sin theta)/theta^3 in theta^2, used below theta = 1, where the closed form cancels.
 _SERIES = np.array([(-1) ** k / math.factorial(2 * k + 3) for k in range(9)])
 
 
@@ -14,7 +14,7 @@ def start_frame(owner, d3, default):
     """The frame [d1 d2 d3] of a unit tangent, (3, 3).
 
     Args:
-        owner: the curve; the part of `owner.d1` across the tangent gives d1.
+        owner: the curve; the component of `owner.d1` normal to the tangent gives the direction of d1.
         default: the direction that is used where `owner.d1` is None.
 
     Raises:
@@ -25,13 +25,13 @@ def start_frame(owner, d3, default):
     if np.linalg.norm(across) <= 1e-6 * np.linalg.norm(given):
         refuse(owner, "d1", owner.d1, "a direction across the tangent at the start")
     d1 = across / np.linalg.norm(across)
-    d1 = d1 - np.dot(d1, d3) * d3  # a direction almost along the tangent loses digits the first time
+    d1 = d1 - np.dot(d1, d3) * d3  # twice, against cancellation where `given` is almost along the tangent
     d1 /= np.linalg.norm(d1)
     return np.column_stack([d1, np.cross(d3, d1), d3])
 
 
 def level_axis(t):
-    """The horizontal direction across t that makes t x d1 point upwards; x for a vertical t."""
+    """The horizontal direction d1 normal to t such that t x d1 points upwards (along z); x for a vertical t."""
     across = np.cross([0.0, 0.0, 1.0], t)
     return across if np.linalg.norm(across) > 1e-6 else np.array([1.0, 0.0, 0.0])
 
@@ -44,7 +44,7 @@ def exponential(w):
 
 
 def carried(w):
-    """The integral of exponential(t w) (0, 0, 1) over t in [0, 1], (..., 3): where a tangent of length 1 arrives."""
+    """The integral of exponential(t w) (0, 0, 1) over t in [0, 1], (..., 3): the chord of a curve of unit length."""
     _, second, third = _factors(w)
     e3 = np.array([0.0, 0.0, 1.0])
     once = np.cross(w, e3)
@@ -61,7 +61,7 @@ def _factors(w):
 
 
 def _skew(w):
-    """The matrices of w x, (..., 3, 3)."""
+    """The skew matrices of w (..., 3): skew(w) v = w x v, (..., 3, 3)."""
     a, b, c = np.moveaxis(w, -1, 0)
     zero = np.zeros_like(a)
     return np.stack([zero, -c, b, c, zero, -a, -b, a, zero], axis=-1).reshape(*np.shape(w)[:-1], 3, 3)

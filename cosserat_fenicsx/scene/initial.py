@@ -1,4 +1,4 @@
-"""What moves at the start of a motion."""
+"""Initial velocities of a motion."""
 
 from dataclasses import dataclass
 
@@ -13,17 +13,17 @@ from cosserat_fenicsx.scene.rod import Rod
 class InitialVelocity:
     """Velocity of a rod at the time 0.
 
-    Two vectors are a rigid motion: the point `about` moves with `linear`, and all sections turn with `angular` about
-    it. Where one of the two is a function of the arc length, each speaks for its section alone.
+    Two vectors define a rigid motion: the point `about` has the velocity `linear`, and the rod rotates about it with
+    `angular`. Where one of them is a function of the arc length, both are the velocities of each section itself.
 
     Args:
         rod: the rod.
-        linear: m/s, inertial; or a function of arc length (m) that gives it.
-        angular: rad/s, inertial; or a function of arc length (m) that gives it.
-        about: m, a point of the rigid motion; None for the rod's start as it lies at the time 0.
+        linear: m/s, inertial; or a function of arc length (m) that returns it.
+        angular: rad/s, inertial; or a function of arc length (m) that returns it.
+        about: m, the reference point of the rigid motion; None for the position of the rod's start at the time 0.
 
     Raises:
-        SceneError: not a rod, no three finite numbers, or a point without a rigid motion.
+        SceneError: not a rod, not three finite numbers, or `about` without a rigid motion.
     """
 
     rod: Rod
@@ -46,11 +46,13 @@ class InitialVelocity:
         return not callable(self.linear) and not callable(self.angular)
 
     def at(self, s, position):
-        """Velocities (n, 3) m/s and angular velocities (n, 3) rad/s, inertial, at arc lengths s (n,), where the rod
-        lies at `position` (n, 3) m.
+        """Velocities (n, 3), m/s, and angular velocities (n, 3), rad/s, inertial.
+
+        Args:
+            s: arc lengths (n,), m; position: of the rod there, (n, 3), m.
 
         Raises:
-            SceneError: a function that gives no three finite numbers; says at which arc length.
+            SceneError: a function that does not return three finite numbers; says at which arc length.
         """
         linear, angular = self._along("linear", "m/s", s), self._along("angular", "rad/s", s)
         if self._rigid:

@@ -1,4 +1,4 @@
-"""What joins rods at stations that touch."""
+"""Joints between stations of rods that touch."""
 
 from dataclasses import dataclass
 
@@ -12,11 +12,11 @@ from cosserat_fenicsx.scene.rod import Station
 
 @dataclass(frozen=True)
 class Joint:
-    """Two stations move as one; a release lets them turn against each other.
+    """Two stations share their position and, unless released, their rotation.
 
     Args:
-        first, second: stations at one place, of two rods, or the two ends of a closed one.
-        release: None for a rigid joint; a direction (inertial, at rest) for a hinge about it that moves with the rods;
+        first, second: stations at one point, of two rods, or the two ends of a closed one.
+        release: None for a rigid joint; the axis of a hinge (inertial, in the reference), which moves with the rods;
             "all" for a ball joint.
 
     Raises:
@@ -51,7 +51,7 @@ class Joint:
         return self.release is None
 
     def ties(self):
-        """The equations that hold at a joint that is not rigid."""
+        """The scalar constraints of a joint that is not rigid."""
         held = ties.same_place(self.first, self.second)
         return held if self.release == "all" else (*held, *ties.same_axis(self.first, self.second, self.release))
 

@@ -1,12 +1,7 @@
-"""What acts on a rod. All loads are multiplied by the load factor.
+"""Loads: forces and moments at points and along rods, and weight; all scaled by the load factor, unless `permanent`.
 
-Force and moment of a load are vectors, or functions of time (`signals`) with `jumps` where these are not smooth;
-vectors and densities are then asked of what `signals.at` makes of it.
-
-A load says where it acts (`station`, or None for a line load), which function of `forms.loads` is its virtual work, and
-the vectors that function takes, each with its unit. A point load gives them once (`vectors(rod)`); a line load says
-which rods it acts on (`acts_on`) and gives a density along them (`density(rod, s)`, shape (n, 3)) of one `unit`. Nothing else in
-the package knows a load by name.
+The force or moment of a load is a vector, or a function of time (`signals`) with `jumps` where it is not smooth; that
+of a distributed load may be a function of the arc length (`along`). Virtual works: forms/loads.py.
 """
 
 from dataclasses import dataclass
@@ -14,17 +9,49 @@ from dataclasses import dataclass
 import numpy as np
 
 from cosserat_fenicsx.checks import instance, refuse, store, vector
+from cosserat_fenicsx.scene import action
+from cosserat_fenicsx.scene.action import LineAction, PointAction
+from cosserat_fenicsx.scene.along import along_or_vector, breaks_of, values_of
 from cosserat_fenicsx.scene.rod import Rod, Station
 from cosserat_fenicsx.scene.signals import vector_or_signal
 
 
+class Load:
+    """An action scaled by the load factor, or, where `permanent`, applied before it; must be the first base of a
+    class."""
+
+    permanent = False
+
+    @property
+    def scaled(self):
+        """See `Action`."""
+        return not self.permanent
+
+    def _check_permanent(self):
+        instance(self, "permanent", self.permanent, bool, "True or False")
+
+
+class PointLoad(Load, PointAction):
+    """A load at a station."""
+
+    def _check(self, field, unit):
+        instance(self, "station", self.station, Station, "a station such as rod.end")
+        store(self, **{field: vector_or_signal(self, field, getattr(self, field), unit, self.jumps)})
+        self._check_permanent()
+
+    def _turned(self, rod, a):
+        """Inertial components in the reference of a vector with material components a."""
+        return rod.curve.frame(self.station.s) @ np.asarray(a)
+
+
 @dataclass(frozen=True)
-class Force:
+class Force(PointLoad):
     """A dead point force.
 
     Args:
         station: where it acts.
         force: N, inertial; it keeps its direction.
+        permanent: it is there in full before the load factor grows.
 
     Raises:
         SceneError: not a station, or not three finite numbers nor a function of time.
@@ -33,25 +60,26 @@ class Force:
     station: Station
     force: object
     jumps: tuple = ()
+    permanent: bool = False
 
     work = "force"
 
     def __post_init__(self):
-        _check_station(self)
-        store(self, force=vector_or_signal(self, "force", self.force, "N", self.jumps))
+        self._check("force", "N")
 
-    def vectors(self, rod):
-        """The vectors of the virtual work, with their units."""
-        return ((self.force, "force"),)
+    def data(self, rod, s):
+        """See `Action`."""
+        return (action.vector(self.force, "N"),)
 
 
 @dataclass(frozen=True)
-class Moment:
+class Moment(PointLoad):
     """A dead point moment.
 
     Args:
         station: where it acts.
         moment: N m, inertial; it keeps its direction.
+        permanent: it is there in full before the load factor grows.
 
     Raises:
         SceneError: not a station, or not three finite numbers nor a function of time.
@@ -60,26 +88,27 @@ class Moment:
     station: Station
     moment: object
     jumps: tuple = ()
+    permanent: bool = False
 
     work = "moment"
 
     def __post_init__(self):
-        _check_station(self)
-        store(self, moment=vector_or_signal(self, "moment", self.moment, "N m", self.jumps))
+        self._check("moment", "N m")
 
-    def vectors(self, rod):
-        """The vectors of the virtual work, with their units."""
-        return ((self.moment, "moment"),)
+    def data(self, rod, s):
+        """See `Action`."""
+        return (action.vector(self.moment, "N m"),)
 
 
 @dataclass(frozen=True)
-class EccentricForce:
+class EccentricForce(PointLoad):
     """A dead point force at the end of a rigid arm that turns with the section.
 
     Args:
         station: where the arm sits.
         force: N, inertial.
         offset: (a1, a2), the arm along d_1 and d_2, m.
+        permanent: it is there in full before the load factor grows.
 
     Raises:
         SceneError: not a station, or numbers that are not finite.
@@ -89,27 +118,27 @@ class EccentricForce:
     force: object
     offset: tuple
     jumps: tuple = ()
+    permanent: bool = False
 
     work = "eccentric_force"
 
     def __post_init__(self):
-        _check_station(self)
-        store(self, force=vector_or_signal(self, "force", self.force, "N", self.jumps))
+        self._check("force", "N")
         store(self, offset=vector(self, "offset", self.offset, "m", size=2))
 
-    def vectors(self, rod):
-        """The vectors of the virtual work, with their units."""
-        arm = rod.curve.frame(self.station.s) @ np.array([*self.offset, 0.0])
-        return ((self.force, "force"), (arm, "length"))
+    def data(self, rod, s):
+        """See `Action`."""
+        return (action.vector(self.force, "N"), action.vector(self._turned(rod, [*self.offset, 0.0]), "m"))
 
 
 @dataclass(frozen=True)
-class FollowerForce:
+class FollowerForce(PointLoad):
     """A point force that turns with the section.
 
     Args:
         station: where it acts.
         force: N, material: along d_1, d_2, d_3 of the moving section.
+        permanent: it is there in full before the load factor grows.
 
     Raises:
         SceneError: not a station, or not three finite numbers nor a function of time.
@@ -118,25 +147,26 @@ class FollowerForce:
     station: Station
     force: object
     jumps: tuple = ()
+    permanent: bool = False
 
     work, follows = "follower_force", True
 
     def __post_init__(self):
-        _check_station(self)
-        store(self, force=vector_or_signal(self, "force", self.force, "N", self.jumps))
+        self._check("force", "N")
 
-    def vectors(self, rod):
-        """The vectors of the virtual work, with their units."""
-        return ((rod.curve.frame(self.station.s) @ self.force, "force"),)
+    def data(self, rod, s):
+        """See `Action`."""
+        return (action.vector(self._turned(rod, self.force), "N"),)
 
 
 @dataclass(frozen=True)
-class FollowerMoment:
+class FollowerMoment(PointLoad):
     """A point moment that turns with the section.
 
     Args:
         station: where it acts.
         moment: N m, material: about d_1, d_2, d_3 of the moving section.
+        permanent: it is there in full before the load factor grows.
 
     Raises:
         SceneError: not a station, or not three finite numbers nor a function of time.
@@ -145,36 +175,38 @@ class FollowerMoment:
     station: Station
     moment: object
     jumps: tuple = ()
+    permanent: bool = False
 
     work, follows = "follower_moment", True
 
     def __post_init__(self):
-        _check_station(self)
-        store(self, moment=vector_or_signal(self, "moment", self.moment, "N m", self.jumps))
+        self._check("moment", "N m")
 
-    def vectors(self, rod):
-        """The vectors of the virtual work, with their units."""
-        return ((rod.curve.frame(self.station.s) @ self.moment, "moment"),)
+    def data(self, rod, s):
+        """See `Action`."""
+        return (action.vector(self._turned(rod, self.moment), "N m"),)
 
 
 @dataclass(frozen=True)
-class Weight:
-    """The weight of every rod of the scene, rho A g per unit of reference length.
+class Weight(Load, LineAction):
+    """The weight of all rods and point masses of the scene; of a rod, rho A g per unit of reference length.
 
     Args:
         gravity: m/s^2, inertial.
+        permanent: it is there in full before the load factor grows.
 
     Raises:
         SceneError: not three finite numbers; a rod without mass (raised by `Scene`).
     """
 
     gravity: tuple = (0.0, 0.0, -9.81)
+    permanent: bool = False
 
-    work, unit = "line_force", "force per length"
-    station = None
+    work, rod = "force", None
 
     def __post_init__(self):
         store(self, gravity=vector(self, "gravity", self.gravity, "m/s^2"))
+        self._check_permanent()
 
     def check_rod(self, rod):
         """Refuse a rod without mass."""
@@ -186,84 +218,96 @@ class Weight:
         """All rods have weight."""
         return True
 
-    def density(self, rod, s):
-        """(n, 3) N/m, inertial, per unit of reference length at the arc lengths s (n,)."""
-        return rod.stiffness_at(s).mass[..., None] * np.asarray(self.gravity)
+    def data(self, rod, s):
+        """See `Action`."""
+        return (action.vector(rod.stiffness_at(s).mass[..., None] * np.asarray(self.gravity), "N/m"),)
+
+    def companions(self, scene):
+        """The weights of the point masses."""
+        masses = [(x, x.inertia(x.station.rod)) for x in scene.loads if x.station is not None]
+        return tuple(
+            Force(x.station, tuple(found[0] * g for g in self.gravity), permanent=self.permanent)
+            for x, found in masses
+            if found is not None
+        )
+
+
+class LineLoad(Load, LineAction):
+    """A dead load along a rod, per unit of reference length."""
+
+    def _check(self, field, unit):
+        instance(self, "rod", self.rod, Rod, "a Rod")
+        given = along_or_vector(self, field, getattr(self, field), self.rod)
+        if given is None:
+            given = vector_or_signal(self, field, getattr(self, field), unit, self.jumps)
+        store(self, **{field: given})
+        self._check_permanent()
 
 
 @dataclass(frozen=True)
-class LineForce:
+class LineForce(LineLoad):
     """A dead force along a rod, per unit of reference length.
 
     Args:
         rod: the rod.
-        force: N/m, inertial.
+        force: N/m, inertial: three numbers, a function of time, or `Along`, `AlongTable`, `AlongPieces` where it
+            changes along the rod.
+        permanent: it is there in full before the load factor grows.
 
     Raises:
-        SceneError: not a rod, or not three finite numbers nor a function of time.
+        SceneError: not a rod, or not three finite numbers nor a function.
     """
 
     rod: Rod
     force: object
     jumps: tuple = ()
+    permanent: bool = False
 
-    work, unit = "line_force", "force per length"
-    station = None
+    work = "force"
 
     def __post_init__(self):
-        instance(self, "rod", self.rod, Rod, "a Rod")
-        store(self, force=vector_or_signal(self, "force", self.force, "N/m", self.jumps))
+        self._check("force", "N/m")
 
-    def check_rod(self, rod):
-        """Any rod will do."""
+    def data(self, rod, s):
+        """See `Action`."""
+        return (action.vector(values_of(self.force, s), "N/m"),)
 
-    def acts_on(self, rod):
-        """Its rod alone."""
-        return rod is self.rod
-
-    def density(self, rod, s):
-        """(n, 3) N/m, inertial, at the arc lengths s (n,)."""
-        return np.broadcast_to(self.force, (len(s), 3))
+    def breaks(self, rod):
+        """See `Action`."""
+        return breaks_of(self.force)
 
 
 @dataclass(frozen=True)
-class LineMoment:
+class LineMoment(LineLoad):
     """A dead moment along a rod, per unit of reference length.
 
     Args:
         rod: the rod.
-        moment: N m/m, inertial.
+        moment: N m/m, inertial; given as the force of a `LineForce`.
+        permanent: it is there in full before the load factor grows.
 
     Raises:
-        SceneError: not a rod, or not three finite numbers nor a function of time.
+        SceneError: not a rod, or not three finite numbers nor a function.
     """
 
     rod: Rod
     moment: object
     jumps: tuple = ()
+    permanent: bool = False
 
-    work, unit = "line_moment", "force"
-    station = None
+    work = "moment"
 
     def __post_init__(self):
-        instance(self, "rod", self.rod, Rod, "a Rod")
-        store(self, moment=vector_or_signal(self, "moment", self.moment, "N m/m", self.jumps))
+        self._check("moment", "N m/m")
 
-    def check_rod(self, rod):
-        """Any rod will do."""
+    def data(self, rod, s):
+        """See `Action`."""
+        return (action.vector(values_of(self.moment, s), "N m/m"),)
 
-    def acts_on(self, rod):
-        """Its rod alone."""
-        return rod is self.rod
-
-    def density(self, rod, s):
-        """(n, 3) N m/m, inertial, at the arc lengths s (n,)."""
-        return np.broadcast_to(self.moment, (len(s), 3))
+    def breaks(self, rod):
+        """See `Action`."""
+        return breaks_of(self.moment)
 
 
-def _check_station(load):
-    instance(load, "station", load.station, Station, "a station such as rod.end")
-
-
-#: Loads by the words of the scene file.
+#: Loads that scene files know.
 LOADS = (Force, Moment, EccentricForce, FollowerForce, FollowerMoment, LineForce, LineMoment, Weight)

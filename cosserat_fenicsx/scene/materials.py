@@ -1,4 +1,4 @@
-"""What a rod is made of."""
+"""Materials of rods."""
 
 from dataclasses import dataclass
 
@@ -12,7 +12,7 @@ class Material:
     Args:
         E: Young's modulus, Pa.
         nu: Poisson's ratio, in (-1, 0.5].
-        density: mass per volume, kg/m^3; needed where a load or a motion asks for mass.
+        density: kg/m^3; required by `Weight` and by motions.
 
     Raises:
         SceneError: a value outside its range.

@@ -1,6 +1,6 @@
-"""Whether a scene moves in a plane: its rods, sections, supports, joints and loads all keep to one.
+"""Whether a scene is plane: its rods, sections, supports, joints and loads are symmetric about one plane.
 
-Then small motions out of the plane decouple from those in it, and (x, z, theta) are all that equilibrium needs.
+Then small motions out of the plane decouple from those in it, and (x, z, theta) suffice as unknowns of an equilibrium.
 """
 
 import math
@@ -8,41 +8,39 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cosserat_fenicsx.scene.action import is_axial
 from cosserat_fenicsx.scene.curves import Line
 from cosserat_fenicsx.scene.signals import at, sample_times
 from cosserat_fenicsx.scene.statical import rows_of
 from cosserat_fenicsx.scene.ties import PositionTie, TurnTie
 
-# A direction lies in a plane, or along its normal, where the sine of the angle between is below this.
-_SLANT = 1e-9
-# Directions that differ by less do not tell the plane by themselves.
-_APART = 1e-6
-# Places along a rod that is not straight or not the same everywhere, in golden steps: no turn of a helix, no twist and no wave
-# of a section repeats at all of them.
+# A direction lies in a plane, or along its normal, where the sine of its angle to it is below this.
+_SMALLEST_ANGLE = 1e-9
+# Directions that differ by less (sine of the angle) are parallel and define no plane; also the tolerance of ranks.
+_PARALLEL = 1e-6
+# Samples along a rod that is curved or not uniform, at multiples of the golden ratio: no periodic curve or section
+# repeats at all of them.
 _SAMPLES, _GOLDEN = 401, (math.sqrt(5) - 1) / 2
-#: Works of loads that keep to a plane if their vectors do.
-_WORKS = {
-    "force", "moment", "eccentric_force", "follower_force", "follower_moment", "line_force", "line_moment",
-}  # fmt: skip
 
 
 @dataclass(frozen=True)
 class Plane:
-    """A plane's directions: rows (e_1, e_2, e_3) of inertial components, right-handed, e_3 the normal."""
+    """The directions of a plane: right-handed unit vectors e_1, e_2, e_3, rows of inertial components, e_3 the
+    normal."""
 
     axes: tuple
 
     @property
     def words(self):
-        """How a person calls it."""
+        """Its name in messages."""
         normal = np.array(self.axes[2])
         for i, name in enumerate(("y-z", "x-z", "x-y")):
-            if abs(abs(normal[i]) - 1) < _SLANT:
+            if abs(abs(normal[i]) - 1) < _SMALLEST_ANGLE:
                 return f"the {name} plane"
         return f"the plane with the normal ({', '.join(f'{x:.4g}' for x in normal)})"
 
     def parts(self, row):
-        """A row over (displacement, rotation) as its parts in the plane (3,) and out of it (3,)."""
+        """Split a row (6,) over (displacement, rotation) into its parts in the plane (3,) and out of it (3,)."""
         e1, e2, e3 = np.array(self.axes)
         moved, turned = row[:3], row[3:]
         return np.array([e1 @ moved, e2 @ moved, e3 @ turned]), np.array([e3 @ moved, e1 @ turned, e2 @ turned])
@@ -61,11 +59,12 @@ def find_plane(scene):
 
 
 class _Leaves(Exception):
-    """What leaves the plane."""
+    """The part of a scene that leaves the plane, in words."""
 
 
 def independent_in(plane, ties):
-    """Indices of the ties that hold a motion in the plane, none of them twice: x, y and z of a place are two there."""
+    """Indices of linearly independent ties among those for motions in the plane: of x, y and z of a point, two
+    remain."""
     groups = {}
     for i, tie in enumerate(ties):
         groups.setdefault((tie.a, tie.b), []).append(i)
@@ -75,7 +74,7 @@ def independent_in(plane, ties):
         for _ in range(3):
             sizes = np.linalg.norm(left, axis=1)
             k = int(np.argmax(sizes))
-            if sizes[k] < _APART:
+            if sizes[k] < _PARALLEL:
                 break
             kept.append(members[k])
             direction = left[k] / sizes[k]
@@ -88,18 +87,18 @@ def _find(scene):
     chords = [rod.curve.position(0.0) - scene.origin(rod) for rod in scene.rods]
     chords = [a for a, rod in zip(chords, scene.rods, strict=True) if np.linalg.norm(a) > 1e-9 * rod.length]
     drawn = _units([*(frame[:, 2] for _, frames in tangents for frame in frames), *chords])
-    acting = [_vectors(scene, i, load) for i, load in enumerate(scene.loads)]
+    acting = [_vectors(scene, load) for load in scene.loads]
     normal = _normal_of(drawn)
     if normal is None:
         normal = _normal_of_a_line(
             drawn[0], [*acting, *(_motions(support, scene.horizon) for support in scene.supports)], scene
         )
     normal = normal * np.sign(normal[np.argmax(np.abs(normal))])
-    if np.abs(drawn @ normal).max() > _SLANT:
+    if np.abs(drawn @ normal).max() > _SMALLEST_ANGLE:
         raise _Leaves("the rods do not lie in one plane")
     for i, (load, (inside, across)) in enumerate(zip(scene.loads, acting, strict=True)):
         bent = [np.linalg.norm(np.cross(v, normal)) for v in _units(across)]
-        if max([*np.abs(_units(inside) @ normal), *bent], default=0.0) > _SLANT:
+        if max([*np.abs(_units(inside) @ normal), *bent], default=0.0) > _SMALLEST_ANGLE:
             what = "does not turn in" if across and not inside else "points out of"
             raise _Leaves(f"load {i + 1} ({_words(load)}) {what} the plane of the rods")
     for rod, (s, frames) in zip(scene.rods, tangents, strict=True):
@@ -112,7 +111,7 @@ def _find(scene):
 
 
 def _sample(rod):
-    """Arc lengths and frames that stand for a rod."""
+    """Arc lengths (n,), m, and frames (n, 3, 3) at samples of a rod."""
     if isinstance(rod.curve, Line) and rod.profile.constant:
         s = np.zeros(1)
     else:
@@ -122,29 +121,36 @@ def _sample(rod):
 
 
 def _units(vectors):
-    """(k, 3) directions of vectors that are not zero."""
+    """(k, 3) unit vectors along those vectors that are not zero."""
     sizes = [np.linalg.norm(v) for v in vectors]
     return np.array([v / size for v, size in zip(vectors, sizes, strict=True) if size > 0]).reshape(-1, 3)
 
 
-def _vectors(scene, i, load):
-    """Vectors that a load asks to be in the plane, and across it."""
-    if load.work not in _WORKS:
-        raise _Leaves(f"load {i + 1} ({_words(load)}) is of a kind that only the spatial model knows")
+def _vectors(scene, load):
+    """The vectors of a load that must lie in the plane, and those that must be normal to it."""
     given = []
     for now in (at(load, t) for t in sample_times(load, scene.horizon)):
         if now.station is not None:
-            given += [(np.asarray(v), unit) for v, unit in now.vectors(now.station.rod)]
+            given += now.data(now.station.rod, np.array([now.station.s]))
             continue
         for rod in scene.rods:
             if now.acts_on(rod):
-                s = np.linspace(0, rod.length, _SAMPLES)
-                given += [(v, "moment" if now.unit == "force" else "force") for v in now.density(rod, s)]
-    return [v for v, unit in given if unit != "moment"], [v for v, unit in given if unit == "moment"]
+                origin = scene.origin(rod)
+                given += [_from(origin, datum) for datum in now.data(rod, np.linspace(0, rod.length, _SAMPLES))]
+    vectors = [datum for datum in given if datum.size == 3]
+    inside, across = (
+        [v for x in vectors if is_axial(x.unit) == axial for v in x.value.reshape(-1, 3)] for axial in (False, True)
+    )
+    return inside, across
+
+
+def _from(origin, datum):
+    """Make positions relative to the origin of their structure, a point of the plane."""
+    return datum._replace(value=datum.value - origin) if datum.unit == "m from origin" else datum
 
 
 def _motions(holder, until):
-    """Displacements and rotation vectors that a support or a joint prescribes, at times that stand for all."""
+    """Displacements and rotation vectors that a support or a joint prescribes, at sample times."""
     moved, turned = [], []
     for ties in (at(holder, t).ties() for t in sample_times(holder, until)):
         moved.append(sum((np.multiply(t.rate, t.direction) for t in ties if isinstance(t, PositionTie)), np.zeros(3)))
@@ -153,21 +159,24 @@ def _motions(holder, until):
 
 
 def _normal_of(directions):
-    """The normal of directions that span a plane; None where they are all but along one line."""
+    """The normal of directions that span a plane; None where all are parallel."""
     _, sizes, right = np.linalg.svd(directions)
-    return right[2] if len(sizes) > 1 and sizes[1] > _APART else None
+    return right[2] if len(sizes) > 1 and sizes[1] > _PARALLEL else None
 
 
 def _normal_of_a_line(tangent, acting, scene):
-    """Where all rods are along one line the first load or prescribed motion that leaves it tells the normal, or else
-    the section, which bends where it is weakest."""
+    """The normal of the plane where all rods lie along one line.
+
+    The first load or prescribed motion that is not along the line defines it; without one, the axis of the smaller
+    bending stiffness of the first section.
+    """
     for inside, across in acting:
         for force in _units(inside):
             normal = np.cross(tangent, force)
-            if np.linalg.norm(normal) > _APART:
+            if np.linalg.norm(normal) > _PARALLEL:
                 return normal / np.linalg.norm(normal)
         for moment in _units(across):
-            if abs(moment @ tangent) < _SLANT:
+            if abs(moment @ tangent) < _SMALLEST_ANGLE:
                 return moment
     rod = scene.rods[0]
     low = rod.profile.range[0]
@@ -175,9 +184,23 @@ def _normal_of_a_line(tangent, acting, scene):
 
 
 def _check_section(rod, s, frames, normal):
-    """One principal axis of every section must be the normal; those of a round one may be taken anywhere."""
+    """Refuse sections that couple motions in the plane with those out of it.
+
+    A principal axis of every section must be the normal, unless bending and shear stiffnesses are isotropic; a
+    stiffness matrix must not couple strains in the plane with those out of it.
+    """
+    if rod.profile.coupled:
+        t = frames[:, :, 2]
+        axes = np.stack([np.cross(normal, t), np.broadcast_to(normal, t.shape), t], axis=1) @ frames
+        for side in ("left", "right"):
+            turn = np.kron(np.eye(2), axes)
+            matrix = turn @ rod.stiffness_at(s, side).matrix @ turn.swapaxes(1, 2)
+            size = np.sqrt(np.einsum("kii->ki", matrix))
+            if (np.abs(matrix) > _SMALLEST_ANGLE * size[:, :, None] * size[:, None, :])[:, 0::2, 1::2].any():
+                raise _Leaves(f"a section of rod '{rod.name}' couples strains in the plane with those out of it")
+        return
     across = np.abs(frames.transpose(0, 2, 1) @ normal)[:, :2]
-    skew = across.min(axis=1) > _SLANT
+    skew = across.min(axis=1) > _SMALLEST_ANGLE
     if not skew.any():
         return
     for side in ("left", "right"):
@@ -188,7 +211,7 @@ def _check_section(rod, s, frames, normal):
 
 
 def _check_supports(scene, plane):
-    """What supports and joints hold must split into motions in the plane and out of it."""
+    """Refuse supports and joints whose constraints do not split into those in the plane and those out of it."""
     for what, holders in (("support", scene.supports), ("joint", [j for j in scene.joints if not j.rigid])):
         for i, holder in enumerate(holders):
             ties = holder.ties()
@@ -196,11 +219,11 @@ def _check_supports(scene, plane):
                 continue
             rows = [rows_of(tie)[0][1] for tie in ties]
             parts = [np.array(x) for x in zip(*(plane.parts(row) for row in rows), strict=True)]
-            apart = sum(np.linalg.matrix_rank(x, tol=_APART) for x in parts)
+            apart = sum(np.linalg.matrix_rank(x, tol=_PARALLEL) for x in parts)
             moved, turned = _motions(holder, scene.horizon)
             normal = np.array(plane.axes[2])
             out = [*np.abs(_units(moved) @ normal), *(np.linalg.norm(np.cross(v, normal)) for v in _units(turned))]
-            if apart > np.linalg.matrix_rank(np.array(rows), tol=_APART) or max(out, default=0.0) > _SLANT:
+            if apart > np.linalg.matrix_rank(np.array(rows), tol=_PARALLEL) or max(out, default=0.0) > _SMALLEST_ANGLE:
                 where = getattr(holder, "station", None) or f"{holder.first} with {holder.second}"
                 name = type(holder).__name__
                 raise _Leaves(

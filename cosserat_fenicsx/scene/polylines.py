@@ -9,7 +9,7 @@ import numpy as np
 
 from cosserat_fenicsx.checks import refuse
 
-# Nearer points than this leave the curvature between them to rounding.
+# Smallest distance of neighbouring points over the extent of all: nearer ones leave the curvature to rounding errors.
 _APART = 1e-7
 
 
@@ -17,8 +17,9 @@ def polyline(owner, field, given, *, closed):
     """The points (n, 3), m, of an array or a file, without repetitions.
 
     Args:
-        owner, field: for the words of a refusal.
-        given: an array, or the path of a file: .csv (three columns, m, a header or none) or what meshio reads.
+        owner, field: named in error messages.
+        given: an array, or the path of a file: .csv (three columns, m, with or without a header) or one that meshio
+            reads.
         closed: whether the last point is joined to the first; it may then repeat it.
 
     Raises:
@@ -81,18 +82,18 @@ def _from_csv(owner, field, file):
 
 
 def _from_mesh(owner, field, file, closed):
-    import meshio  # only where a file asks for it
+    import meshio  # imported here, since few scenes need it
 
     if not file.is_file():
         refuse(owner, field, str(file), "a file that exists")
     try:
         with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()):
             mesh = meshio.read(file)
-    except (Exception, SystemExit) as problem:  # its readers raise what they please, and may end the process
+    except (Exception, SystemExit) as problem:  # its readers may raise anything, even SystemExit
         refuse(owner, field, str(file), f"a .csv file or a mesh file that meshio reads ({problem!r:.120})")
     segments = [cells.data for cells in mesh.cells if cells.type == "line"]
     for cells in mesh.cells:
-        if cells.type == "line3":  # its third node is the middle
+        if cells.type == "line3":  # its third node is the midpoint
             segments.append(cells.data[:, [0, 2, 2, 1]].reshape(-1, 2))
     if not segments:
         refuse(owner, field, str(file), "a file with line cells, which form the polyline")
@@ -103,7 +104,8 @@ def _from_mesh(owner, field, file, closed):
 
 
 def _chain(owner, field, file, segments, closed):
-    """The nodes of segments in the order of the one line they form, from the end whose segment starts there."""
+    """The nodes of segments, ordered along the polyline that they form, from an end that is the first node of a
+    segment."""
     neighbours = {}
     for a, b in segments:
         neighbours.setdefault(a, []).append(b)

@@ -1,4 +1,4 @@
-"""How the section of a rod changes along it: not at all, in pieces, or by a function of the arc length."""
+"""The sections along a rod: one for all, in pieces, or by a function of the arc length."""
 
 from collections import namedtuple
 from dataclasses import dataclass, field
@@ -8,23 +8,50 @@ import numpy as np
 from cosserat_fenicsx.checks import instance, number, refuse, store
 from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.scene.materials import Material
-from cosserat_fenicsx.scene.sections import SECTIONS, Stiffness
+from cosserat_fenicsx.scene.sections import SECTIONS, Stiffness, inverse, representative
 
-#: K (..., 3) = (GA1, GA2, EA), N; J (..., 3) = (EI1, EI2, GJ), N m^2; mass (...) = rho A, kg/m, and inertia (..., 3) =
-#: (Jrho_1, Jrho_2, Jrho_3), kg m, or None where unknown.
-Stiffnesses = namedtuple("Stiffnesses", "K J mass inertia")
+
+class Stiffnesses(namedtuple("Stiffnesses", "K J mass inertia matrix", defaults=(None,))):
+    """Stiffnesses at places along a rod (...).
+
+    Attributes:
+        K: (..., 3) = (GA1, GA2, EA), N.
+        J: (..., 3) = (EI1, EI2, GJ), N m^2.
+        mass: (...) = rho A, kg/m; or None where unknown.
+        inertia: (..., 3) = (Jrho_1, Jrho_2, Jrho_3), kg m; or None where unknown.
+        matrix: (..., 6, 6), see `Stiffness`, where a section of the rod couples strains, else None. With a matrix, K
+            and J are representative stiffnesses, see `sections.representative`.
+    """
+
+    __slots__ = ()
+
+    @property
+    def flexibility(self):
+        """(..., 2, 2) flexibility of bending about d_1 and d_2, without other forces and moments, 1/(N m^2)."""
+        if self.matrix is None:
+            return np.eye(2) / self.J[..., None, :2]
+        return inverse(self.matrix)[..., 3:5, 3:5]
+
+    def strains(self, n, m):
+        """The strains v - v_R and u - u_R, (..., 3) each, for contact forces n and moments m (..., 3), all material."""
+        if self.matrix is None:
+            return n / self.K, m / self.J
+        both = np.einsum("...ij,...j->...i", inverse(self.matrix), np.concatenate([n, m], axis=-1))
+        return both[..., :3], both[..., 3:]
+
 
 _SAMPLES = 33
-_NUMBERS = 10  # of a section
-_UNKNOWN = [np.nan] * _NUMBERS  # what a function gives
+_DIAGONAL = 10  # numbers (GA1, GA2, EA, EI1, EI2, GJ, mass, inertia) of a section; the 36 of its matrix follow
+_NUMBERS = _DIAGONAL + 36
+_UNKNOWN = [np.nan] * _NUMBERS  # stands for a piece given by a function
 
 
 @dataclass(frozen=True, eq=False)
 class Profile:
-    """The sections of a rod, by its arc length.
+    """The sections of a rod as a function of its arc length.
 
     Args:
-        owner: the rod, for the words of refusals and for its `length`.
+        owner: the rod: its name for error messages, and its `length`.
         given: a section; a function from arc length (m) to a section; or a list of pieces (s_end, section or function)
             whose last ends at the rod's length, which may be written None.
         material: as for the rod.
@@ -32,11 +59,12 @@ class Profile:
     Attributes:
         pieces: tuple of (s_end, section or function), ascending, the last s_end the rod's length.
         start: the `Stiffness` at s = 0.
-        range: the least and the largest of every stiffness along the rod, two `Stiffnesses` with K (3,), J (3,), mass ();
-            those of a function are the least and largest of samples.
+        range: the least and the largest of every stiffness along the rod, two `Stiffnesses` with K (3,), J (3,), mass
+            () and no matrix; of a function, those of samples.
+        coupled: whether a section couples strains (of a function: at samples).
 
     Raises:
-        SceneError: pieces that do not ascend to the rod's length, or what is no section, at samples along the rod.
+        SceneError: pieces that do not ascend to the rod's length, or a function that returns no section at a sample.
     """
 
     owner: object = field(repr=False)
@@ -45,6 +73,7 @@ class Profile:
     pieces: tuple = field(init=False)
     start: Stiffness = field(init=False)
     range: tuple = field(init=False)
+    coupled: bool = field(init=False)
 
     def __post_init__(self):
         given = self.given if isinstance(self.given, list | tuple) else [(None, self.given)]
@@ -60,7 +89,11 @@ class Profile:
                 rows.append(self._rows(s, np.full(_SAMPLES, i)))
             before = end
         rows = np.concatenate(rows)
-        store(self, range=(_split(rows.min(axis=0)), _split(rows.max(axis=0))))
+        store(self, coupled=bool(np.isfinite(rows[:, _DIAGONAL:]).any()))
+        if self.coupled and np.isinf(rows[:, :3]).any():
+            expected = "finite stiffnesses along a rod that has a section with a matrix"
+            refuse(f"Rod '{self.owner.name}'", "section", self.given, expected)
+        store(self, range=tuple(_split(bound(rows[:, :_DIAGONAL], axis=0), False) for bound in (np.min, np.max)))
 
     def _check_pieces(self, given):
         L, where = self.owner.length, f"Rod '{self.owner.name}'"
@@ -94,30 +127,31 @@ class Profile:
 
     @property
     def uniform(self):
-        """Whether the section is the same everywhere between the `breaks`."""
+        """Whether the section is constant between the `breaks`."""
         return not any(self._law)
 
     @property
     def constant(self):
-        """Whether the section is the same everywhere."""
+        """Whether the section is constant along the whole rod."""
         return len(self.pieces) == 1 and not self._law[0]
 
     def section(self, s, side):
-        """The section at one arc length."""
+        """The section at an arc length, m; `side` as for `Rod.stiffness_at`."""
         s = float(s)
         return self._piece(s, int(self._index(np.array(s), side)))
 
     def stiffness(self, s, side):
-        """`Stiffnesses` at arc lengths s (...)."""
+        """`Stiffnesses` at arc lengths s (...), m; `side` as for `Rod.stiffness_at`."""
         s = np.asarray(s, dtype=float)
         if self.constant:
-            return _split(np.broadcast_to(self._fixed[0], (*s.shape, _NUMBERS)))
-        return _split(self._rows(s.ravel(), self._index(s, side).ravel()).reshape(*s.shape, _NUMBERS))
+            return _split(np.broadcast_to(self._fixed[0], (*s.shape, _NUMBERS)), self.coupled)
+        rows = self._rows(s.ravel(), self._index(s, side).ravel())
+        return _split(rows.reshape(*s.shape, _NUMBERS), self.coupled)
 
     def _index(self, s, side):
         if side not in ("left", "right"):
             refuse(f"Rod '{self.owner.name}'", "side", side, "'left' or 'right'")
-        within = 1e-9 * self.owner.length * (1 if side == "left" else -1)  # on a jump, but for rounding
+        within = 1e-9 * self.owner.length * (1 if side == "left" else -1)  # tolerance for s at a break
         return np.searchsorted(np.add(self.breaks, within), s, side=side)
 
     def _rows(self, s, index):
@@ -127,7 +161,7 @@ class Profile:
         return rows
 
     def _piece(self, s, index):
-        """The section at s by one of the pieces."""
+        """The section of one of the pieces at s."""
         section = self.pieces[index][1]
         if not _is_law(section):
             return section
@@ -150,9 +184,15 @@ def _is_law(section):
 
 def _row(k):
     mass, inertia = (np.nan if k.mass is None else k.mass), (k.inertia or [np.nan] * 3)
-    return [*k.shear, k.axial, *k.bending, k.torsion, mass, *inertia]
+    if k.matrix is None:
+        return [*k.shear, k.axial, *k.bending, k.torsion, mass, *inertia, *[np.nan] * 36]
+    return [*representative(k.matrix), mass, *inertia, *np.ravel(k.matrix)]
 
 
-def _split(rows):
-    mass, inertia = (None if np.isnan(x).any() else x for x in (rows[..., 6], rows[..., 7:]))
-    return Stiffnesses(rows[..., :3], rows[..., 3:6], mass, inertia)
+def _split(rows, coupled):
+    mass, inertia = (None if np.isnan(x).any() else x for x in (rows[..., 6], rows[..., 7:_DIAGONAL]))
+    if not coupled:
+        return Stiffnesses(rows[..., :3], rows[..., 3:6], mass, inertia)
+    given = rows[..., _DIAGONAL:].reshape(*rows.shape[:-1], 6, 6)
+    matrix = np.where(np.isnan(given), np.eye(6) * rows[..., None, :6], given)
+    return Stiffnesses(rows[..., :3], rows[..., 3:6], mass, inertia, matrix)

@@ -1,4 +1,4 @@
-"""A rod: a curve, a section and a material; and the stations on it that everything else refers to."""
+"""Rods, made of a curve, sections and a material, and the stations on them that supports, loads and joints refer to."""
 
 import itertools
 import math
@@ -20,15 +20,15 @@ _unnamed = itertools.count(1)
 
 @dataclass(frozen=True, eq=False)
 class Rod:
-    """A slender body with its reference centreline, stress-free as drawn.
+    """A slender body with its reference centreline, free of stress in the reference.
 
     Args:
         curve: the reference centreline: `Line`, `Arc`, `Helix`, `Spline` or `UniformCurvature`.
-        section: `Circle`, `Tube`, `Rectangle` or `Stiffness`; or a list of pieces (s_end, section) from the start to the
-            end, s_end in m, the last the rod's length or None for it; or a function from arc length (m) to a section,
-            smooth in s, which may also stand in a piece.
+        section: `Circle`, `Tube`, `Rectangle` or `Stiffness`; or a list of pieces (s_end, section) from the start to
+            the end, s_end in m, the last the rod's length or None for it; or a smooth function from arc length (m) to a
+            section, which a piece may also have.
         material: a `Material`; not needed with `Stiffness`.
-        name: how messages, files and scene files call it.
+        name: its name in messages, results and scene files.
         damping: a `Damping`, for motions; None for none.
 
     Attributes:
@@ -52,7 +52,7 @@ class Rod:
             store(self, name=f"rod{next(_unnamed)}")
         instance(self, "name", self.name, str, "a string")
         if "@" in self.name:
-            refuse(self, "name", self.name, "a name without '@', which parts it from the s of a station")
+            refuse(self, "name", self.name, "a name without '@', which separates it from the s of a station")
         instance(self, "curve", self.curve, CURVES, "a curve such as Line(start, end)")
         if self.material is not None:
             instance(self, "material", self.material, Material, "a Material")
@@ -77,7 +77,7 @@ class Rod:
 
     @property
     def uniform(self):
-        """Whether curvature, twist and section are constant between the `breaks`: no spline, no section that is a function of s."""
+        """Whether curvature, twist and section are constant between the `breaks`: no splines, no functions of s."""
         return self.curve.uniform and self.profile.uniform
 
     def stiffness_at(self, s, side="right"):
@@ -85,14 +85,13 @@ class Rod:
 
         Args:
             s: (...), m, in [0, length].
-            side: "left" or "right": just before or just after s, where the section jumps there.
+            side: "left" or "right": the limit from below or from above where the section jumps at s.
 
         Returns:
-            `Stiffnesses`: K (..., 3) = (GA1, GA2, EA), N; J (..., 3) = (EI1, EI2, GJ), N m^2; mass (...), kg/m, and
-            inertia (..., 3), kg m, about d_1, d_2, d_3, or None where they are not known everywhere.
+            `Stiffnesses`; mass and inertia are None where they are not known everywhere.
 
         Raises:
-            SceneError: a function of s that gives no section there.
+            SceneError: a function of s that returns no section there.
         """
         return self.profile.stiffness(s, side)
 
@@ -136,7 +135,7 @@ def station_named(where, text, rods):
     """The station 'rod.start', 'rod.end' or 'rod@s', s in m.
 
     Args:
-        where: what is named so, for the message; rods: {name: rod}.
+        where: the owner of the text, for error messages; rods: {name: rod}.
 
     Raises:
         SceneError: it is none of these, or no rod has this name, or it lies beyond its rod.
@@ -167,16 +166,17 @@ def station_named(where, text, rods):
 def euler_load(rod):
     """Critical load of the cantilever column, N: pi^2 EI/(2L)^2 with the smaller bending stiffness.
 
-    Where the section changes, the least P with (EI theta')' + P theta = 0, theta(0) = theta'(L) = 0, about either axis
-    (Gauss collocation of theta', exact to about 1e-12 where EI is smooth between the rod's breaks).
+    Where the section changes, the least P with m' + P theta = 0, theta(0) = m(L) = 0 and theta' = F m, F the
+    flexibility of bending (Gauss collocation of theta', exact to about 1e-12 where F is smooth between the rod's
+    breaks).
     """
     if rod.profile.constant:
-        return math.pi**2 * min(rod.stiffness.bending) / (2 * rod.length) ** 2
-    return min(_column_load(rod, axis) for axis in (0, 1))
+        return math.pi**2 * float(rod.profile.range[0].J[:2].min()) / (2 * rod.length) ** 2
+    return _column_load(rod)
 
 
-def _column_load(rod, axis, pieces=4, points=8):
-    """The critical load for bending about d_1 or d_2: the unknowns are theta' at the Gauss points."""
+def _column_load(rod, pieces=4, points=8):
+    """The critical load of a column whose section changes: the unknowns are theta' at the Gauss points."""
     breaks = np.array([0.0, *rod.breaks, rod.length])
     ends = np.append((breaks[:-1, None] + np.diff(breaks)[:, None] * np.arange(pieces) / pieces).ravel(), rod.length)
     rule, half = gauss(points), np.diff(ends) / 2
@@ -186,6 +186,7 @@ def _column_load(rod, axis, pieces=4, points=8):
         np.outer(half, rule.weights).ravel(),
     )
     theta = np.kron(np.tri(len(half), k=-1), np.ones((points, points))) * weights + np.kron(np.diag(half), inner)
-    # P is the least of (int EI theta'^2)/(int theta^2)
-    EI = rod.stiffness_at(s).J[:, axis]
-    return float(1 / np.linalg.norm(np.sqrt(weights)[:, None] * theta / np.sqrt(weights * EI), 2) ** 2)
+    # P is the minimum of (int m . F m)/(int theta^2) with theta' = F m, for both bending directions, which F may couple
+    root = np.linalg.cholesky(rod.stiffness_at(s).flexibility)
+    scaled = (np.sqrt(weights)[:, None] * theta / np.sqrt(weights))[:, None, :, None] * root.swapaxes(0, 1)[None]
+    return float(1 / np.linalg.norm(scaled.reshape(2 * len(s), -1), 2) ** 2)

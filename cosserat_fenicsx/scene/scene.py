@@ -1,4 +1,4 @@
-"""A scene: rods, what joins and holds them and what acts on them. Knows no solver and no mesh."""
+"""A scene: rods, joints, supports and actions, independent of solvers and meshes."""
 
 import copy
 from dataclasses import dataclass
@@ -6,35 +6,37 @@ from functools import cached_property
 
 from cosserat_fenicsx.checks import instance
 from cosserat_fenicsx.errors import SceneError, nearest
+from cosserat_fenicsx.scene.action import Action
 from cosserat_fenicsx.scene.initial import InitialVelocity
 from cosserat_fenicsx.scene.joints import Joint
-from cosserat_fenicsx.scene.loads import LOADS
+from cosserat_fenicsx.scene.magnitudes import magnitudes
 from cosserat_fenicsx.scene.planes import find_plane
 from cosserat_fenicsx.scene.rod import Rod, station_named
 from cosserat_fenicsx.scene.signals import signals_of
 from cosserat_fenicsx.scene.statical import check_held_once, touching
 from cosserat_fenicsx.scene.supports import SUPPORTS
 
-# Young's moduli below this, Pa, are those of gels, or slips of units.
-_GEL = 1e6
+# Young's moduli below this, Pa, are those of gels, or mistakes in units.
+_SOFTEST = 1e6
 
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """Everything a solver needs to know.
+    """The complete input of a solver.
 
     Args:
         rods: the rods.
         supports: `Clamp`, `Pin`, `Hinge`, `Roller`, `Prescribed`.
-        loads: `Force`, `Moment`, `EccentricForce`, `FollowerForce`, `FollowerMoment`, `LineForce`, `LineMoment`,
-            `Weight`; all are multiplied by the load factor.
-        joints: `Joint`s between stations that touch; rods without one stand by themselves.
+        loads: actions on the rods: `Force`, `Moment`, `EccentricForce`, `FollowerForce`, `FollowerMoment`, `LineForce`,
+            `LineMoment`, `Weight`, which are multiplied by the load factor or `permanent`; `Spring`, `Foundation`,
+            `Dashpot`, `Drag`, `PointMass`, `Wall`; or an `Action` of your own.
+        joints: `Joint`s between stations that touch; rods without a joint are independent of each other.
         velocities: `InitialVelocity`s, at most one a rod; rods without one start at rest. For motions alone.
         title: for tables and pictures.
 
     Raises:
-        SceneError: an empty or inconsistent scene, or one that is held twice. (A mechanism may move: statics refuses
-            it.)
+        SceneError: an empty or inconsistent scene, or redundant supports or joints. (Mechanisms are allowed in motions;
+            statics refuses them.)
     """
 
     rods: tuple
@@ -44,7 +46,7 @@ class Scene:
     title: str = ""
     velocities: tuple = ()
 
-    #: s: for how long what depends on time is looked at beforehand
+    #: time (s) up to which functions of time are sampled, see `over`
     horizon = 1.0
 
     def __post_init__(self):
@@ -81,12 +83,11 @@ class Scene:
         object.__setattr__(self, "_leaders", self._find_leaders())
 
     def _check_load(self, field, load):
-        if not hasattr(load, "work") or isinstance(load, type):
-            instance("Scene", field, load, LOADS, "a load such as Force(rod.end, (0, 0, -1))")
+        instance("Scene", field, load, Action, "a load such as Force(rod.end, (0, 0, -1)), or another Action")
         if load.station is not None:
             self._check_rod(field, load.station, load.station.rod)
             return
-        if hasattr(load, "rod"):
+        if load.rod is not None:
             self._check_rod(field, load.rod, load.rod)
         for rod in self.rods:
             if load.acts_on(rod):
@@ -100,7 +101,7 @@ class Scene:
             )
 
     def _find_leaders(self):
-        """For every rod the first rod of the structure it is joined to."""
+        """For every rod the first rod of its structure: the rods connected by joints, directly or indirectly."""
         leaders = {rod: rod for rod in self.rods}
 
         def find(rod):
@@ -118,70 +119,81 @@ class Scene:
         return self._leaders[rod]
 
     def origin(self, rod):
-        """(3,) m: where the structure that a rod belongs to starts. Solvers count positions from there, so that digits
-        are not lost on where a structure stands."""
+        """The start of the structure that a rod belongs to, (3,), m.
+
+        Solvers take positions relative to it, so that a large distance from the inertial origin costs no accuracy.
+        """
         return self._leaders[rod].curve.position(0.0)
 
     def over(self, duration):
-        """The same scene, looked at beforehand for so long (s)."""
+        """A copy of the scene whose `horizon` is the duration (s)."""
         scene = copy.copy(self)
-        scene.__dict__.pop("flatness", None)
+        for name in ("flatness", "magnitudes"):
+            scene.__dict__.pop(name, None)
         object.__setattr__(scene, "horizon", duration)
         return scene
 
     @cached_property
     def flatness(self):
-        """(the `Plane` that everything keeps to, "") or (None, what leaves it, in words)."""
+        """(the `Plane` of a plane scene, "") or (None, why the scene is not plane), see `find_plane`."""
         return find_plane(self)
+
+    @cached_property
+    def magnitudes(self):
+        """The sizes of its loads and prescribed motions, see `magnitudes.check_magnitudes`."""
+        return magnitudes(self)
 
     @property
     def plane(self):
-        """The `Plane` that everything keeps to, or None."""
+        """The `Plane` of a plane scene, or None."""
         return self.flatness[0]
 
     @property
     def moving(self):
-        """Its loads and supports that depend on time."""
+        """The loads and supports that depend on time."""
         return [item for item in (*self.loads, *self.supports) if signals_of(item)]
 
-    def line_loads(self, rod):
-        """The loads that act along a rod."""
-        return [load for load in self.loads if load.station is None and load.acts_on(rod)]
+    @cached_property
+    def actions(self):
+        """The loads, and the actions that they add (`Action.companions`)."""
+        return (*self.loads, *(other for load in self.loads for other in load.companions(self)))
 
     def stations(self, rod):
-        """All stations of a rod that supports, loads and joints name."""
+        """All stations of a rod that supports, loads and joints refer to, and those where its loads are not smooth."""
         named = [x.station for x in (*self.supports, *self.loads) if x.station is not None]
         named += [end for joint in self.joints for end in (joint.first, joint.second)]
+        breaks = {s for load in self.loads if load.station is None and load.acts_on(rod) for s in load.breaks(rod)}
+        named += [rod.at(s) for s in sorted(breaks) if 0 < s < rod.length]
         return [station for station in named if station.rod is rod]
 
     @property
     def cautions(self):
-        """What a user of any answer should know, in sentences."""
+        """Warnings that belong to every result, a list of sentences."""
         return [*self.doubts, *self._following()]
 
     @cached_property
     def doubts(self):
-        """What looks like a slip in the scene, in sentences."""
+        """Warnings about probable mistakes in the scene, sentences."""
         return (*self._softness(), *self._thickness(), *self._unjoined())
 
     @property
     def follows(self):
-        """Whether a load turns with its rod, so that it has no potential."""
+        """Whether there are follower loads, which have no potential."""
         return bool(self._followers)
 
     @property
     def _followers(self):
-        return [load for load in self.loads if getattr(load, "follows", False)]
+        return [load for load in self.loads if load.follows]
 
     def _softness(self):
-        """Young's moduli that may be in other units."""
-        soft = {rod.material.E for rod in self.rods if rod.material is not None and rod.material.E < _GEL}
+        """Warnings about Young's moduli that may be in wrong units."""
+        soft = {rod.material.E for rod in self.rods if rod.material is not None and rod.material.E < _SOFTEST}
         return [
             f"E = {E:g} Pa is softer than rubber: are the units SI (N, m, Pa; steel has 210e9)?" for E in sorted(soft)
         ]
 
     def _thickness(self):
-        """Sections that may be in other units."""
+        """Warnings about dimensions that may be in wrong units."""
         for rod in self.rods:
             section = rod.section_at(0.0)
             across = max(getattr(section, name, 0.0) for name in ("diameter", "outer_diameter", "width", "height"))
@@ -189,21 +201,24 @@ class Scene:
                 yield f"rod '{rod.name}' is {across:g} m across and {rod.length:g} m long: are all lengths in m?"
 
     def _unjoined(self):
-        """Ends of different structures at one point, where not both are held."""
-        held, told = [support.station for support in self.supports], []
+        """Warnings about ends of different structures that lie at one point, unless both have supports."""
+        held, reported = [support.station for support in self.supports], []
         for end, other in touching(self):
-            if not (end in held and other in held) and (other, end) not in told:
-                told.append((end, other))
-                yield f"{end} and {other} lie at one point and are not joined: if they should be, add Joint({end}, {other})"
+            if not (end in held and other in held) and (other, end) not in reported:
+                reported.append((end, other))
+                yield (
+                    f"{end} and {other} lie at one point and are not joined: if they should be, add Joint({end}, "
+                    f"{other})"
+                )
 
     def _following(self):
         if not self.follows:
             return []
         kinds = " and ".join(dict.fromkeys(type(load).__name__ for load in self._followers))
         return [
-            f"{kinds}: a follower load has no potential, so negative modes, which are those of the tangent's symmetric part, do not "
-            "decide on stability: an equilibrium that has some may be stable (Beck's column from pi^2 to 20.05 EI/L^2), one that has "
-            "none may flutter, which statics cannot see; only dynamics can tell"
+            f"{kinds}: a follower load has no potential, so negative modes, which are those of the tangent's symmetric "
+            "part, do not decide on stability: an equilibrium with some may be stable (Beck's column from pi^2 to "
+            "20.05 EI/L^2), one with none may flutter, which only dynamics can show"
         ]
 
     def station(self, name):

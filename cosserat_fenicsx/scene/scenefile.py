@@ -1,4 +1,4 @@
-"""Scene files in TOML: the words are the package's own class and argument names.
+"""Scene files in TOML: their keys and types are the argument and class names of the package.
 
 [[rods]]
 name = "column"
@@ -17,9 +17,10 @@ type = "Force"
 station = "column.end"
 force = [0, 0, -1e5]
 
-# in a motion: force = { type = "Triangle", value = [0, 0, 50], peak = 1.0, end = 2.0 }, or Step, Ramp, RunUp, Sine, Table
+# in a motion: force = { type = "Triangle", value = [0, 0, 50], peak = 1.0, end = 2.0 }, or Step, Ramp, RunUp, Sine,
+# Table
 
-[[velocities]]                    # optional, where a motion starts
+[[velocities]]                    # optional, initial velocities of a motion
 rod = "column"
 angular = [0, 0, 6.28]
 
@@ -42,6 +43,7 @@ import tomllib
 from pathlib import Path
 
 from cosserat_fenicsx.errors import SceneError, nearest
+from cosserat_fenicsx.scene.along import ALONG
 from cosserat_fenicsx.scene.curves import CURVES
 from cosserat_fenicsx.scene.damping import Damping
 from cosserat_fenicsx.scene.initial import InitialVelocity
@@ -54,7 +56,7 @@ from cosserat_fenicsx.scene.sections import SECTIONS
 from cosserat_fenicsx.scene.signals import SIGNALS
 from cosserat_fenicsx.scene.supports import SUPPORTS
 
-#: What [solve] may hold: the arguments of `solve` that are plain values, with their TOML types.
+#: Keys of [solve]: the arguments of `solve` that are plain values, with their TOML types.
 SOLVE_KEYS = {
     "load_factors": (list, str, int, float),
     "model": (str,),
@@ -65,7 +67,7 @@ SOLVE_KEYS = {
     "control": (str,),
     "branch": (int,),
 }
-#: What [simulate] may hold: the arguments of `simulate` that are plain values.
+#: Keys of [simulate]: the arguments of `simulate` that are plain values, with their TOML types.
 SIMULATE_KEYS = {
     **dict.fromkeys(("duration", "tol", "dt", "save_every", "start", "load_factor"), (int, float)),
     **dict.fromkeys(("scheme", "model"), (str,)),
@@ -83,8 +85,8 @@ def read_scene(file):
         (Scene, dict of the [solve] table).
 
     Raises:
-        SceneError: the file is missing or no TOML, a key or a type is unknown (named, with the nearest known one), or a
-            value is not what its field expects.
+        SceneError: the file is missing or not TOML, a key or a type is unknown (named, with the nearest known one), or
+            a value is refused.
     """
     scene, settings, _ = _read(file)
     return scene, settings
@@ -135,7 +137,7 @@ def _scene(tables, folder):
     rods = [_rod(f"rods[{i}]", entry, materials, folder) for i, entry in _entries("rods", tables)]
     stations = {rod.name: rod for rod in rods}
     supports = [_build(f"supports[{i}]", entry, SUPPORTS, stations) for i, entry in _entries("supports", tables)]
-    loads = [_build(f"loads[{i}]", entry, LOADS, stations) for i, entry in _entries("loads", tables)]
+    loads = [_build(f"loads[{i}]", entry, _actions(), stations, folder) for i, entry in _entries("loads", tables)]
     joints = [_build(f"joints[{i}]", entry, (Joint,), stations) for i, entry in _entries("joints", tables)]
     velocities = [
         _build(f"velocities[{i}]", entry, (InitialVelocity,), stations) for i, entry in _entries("velocities", tables)
@@ -149,8 +151,15 @@ def _scene(tables, folder):
     return Scene(rods, supports, loads, joints, title, velocities), *settings
 
 
+def _actions():
+    """The classes that [[loads]] may have: loads, and the public names of the subpackage `actions`."""
+    import cosserat_fenicsx  # imports the modules of its names when they are first used
+
+    return (*LOADS, *(getattr(cosserat_fenicsx, name) for name in cosserat_fenicsx.names_in("actions")))
+
+
 def _settings(name, tables, keys):
-    """A table of arguments, of known names and types."""
+    """A table of arguments with checked names and types."""
     settings = _table(name, tables.get(name, {}))
     _known_keys(f"[{name}]", settings, keys)
     for key, value in settings.items():
@@ -186,7 +195,7 @@ def _rod(where, entry, materials, folder):
 
 
 def _damping(where, entry):
-    """Damping by its numbers, or by { ratio, frequencies }."""
+    """A `Damping` from its arguments, or from { ratio, frequencies }."""
     if "ratio" not in _table(where, entry):
         return _build(where, entry, (Damping,), {})
     _known_keys(f"{where} (by a ratio)", entry, {"ratio", "frequencies"})
@@ -199,7 +208,7 @@ def _damping(where, entry):
 
 
 def _section(where, entry):
-    """A section, or the pieces (s_end, section) of an array of them; the last may do without its `to`."""
+    """A section, or the pieces (s_end, section) from an array of sections, the last with or without `to`."""
     if not isinstance(entry, list):
         return _build(where, entry, SECTIONS, {})
     pieces = []
@@ -212,7 +221,7 @@ def _section(where, entry):
 
 
 def _build(where, entry, classes, rods, folder=None):
-    """An object from a table whose keys are the class's arguments; names of files start at `folder`."""
+    """An object from a table whose keys are the arguments of its class; file names are relative to `folder`."""
     entry = dict(_table(where, entry))
     names = {cls.__name__: cls for cls in classes}
     if "type" not in entry and len(classes) > 1:
@@ -235,7 +244,7 @@ def _build(where, entry, classes, rods, folder=None):
         elif arguments[name].annotation is Rod:
             entry[name] = _known_rod(f"{where}.{name}", entry[name], rods)
         elif isinstance(entry[name], dict):
-            entry[name] = _build(f"{where}.{name}", entry[name], SIGNALS, {})
+            entry[name] = _build(f"{where}.{name}", entry[name], (*SIGNALS, *ALONG), {}, folder)
     try:
         return kind(**entry)
     except SceneError as problem:

@@ -1,6 +1,7 @@
 """Cross-sections: d_1 and d_2 span the section, d_3 is the tangent.
 
-Shear factors: Cowper, J. Appl. Mech. 33 (1966) 335, doi:10.1115/1.3625046; torsion of a rectangle: Saint-Venant's series.
+Shear factors: Cowper, J. Appl. Mech. 33 (1966) 335, doi:10.1115/1.3625046; torsion of a rectangle: Saint-Venant's
+series.
 """
 
 import math
@@ -8,48 +9,106 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cosserat_fenicsx.checks import number, positive, refuse, stiffness, store
+from cosserat_fenicsx.checks import number, positive, refuse, stiffness, store, vector
 
 _ZETA_5 = 1.0369277551433699263  # sum of 1/n^5
+# Asymmetry and smallest eigenvalue of a matrix, scaled to a unit diagonal, that are rounding.
+_ROUNDING = 1e-12
 
 
 @dataclass(frozen=True)
 class Stiffness:
     """A section by its stiffnesses, in the order of the directors d_1, d_2, d_3; needs no material.
 
+    They are given one by one, or as the matrix of a section that couples strains: an anisotropic one, or one whose
+    centroid or shear centre is off the rod's line (see `offset`).
+
     Args:
-        shear: (GA1, GA2) with the shear factors in them, N; infinity means unshearable.
+        shear: (GA1, GA2) including the shear factors, N; infinity means unshearable.
         axial: EA, N; infinity means inextensible.
         bending: (EI1, EI2), about d_1 and about d_2, N m^2; finite.
         torsion: GJ, N m^2; finite.
-        mass: rho A, kg/m, where a load or a motion asks for mass.
-        inertia: (Jrho_1, Jrho_2, Jrho_3), about d_1, d_2 and the tangent d_3, kg m, where a motion asks for them:
-            (rho I_1, rho I_2, rho (I_1 + I_2)) where the density rho is the same all over the section.
-        outline: corners (x1, x2) along d_1 and d_2 of what a picture draws, m; None lets the picture choose.
+        mass: rho A, kg/m; required by `Weight` and by motions.
+        inertia: (Jrho_1, Jrho_2, Jrho_3), about d_1, d_2 and the tangent d_3, kg m; required by motions. It is
+            (rho I_1, rho I_2, rho (I_1 + I_2)) where the density rho is constant. The centre of mass is on the rod's
+            line.
+        outline: corners (x1, x2) along d_1 and d_2 of the section as drawn in pictures, m; None draws a circle.
+        matrix: 6 x 6 numbers, symmetric and positive definite, instead of shear, axial, bending and torsion: rows are
+            the contact force along d_1, d_2, d_3 (N) and the contact moment about them (N m), columns the strains:
+            shear along d_1 and d_2, stretch (1), bending about d_1 and d_2, twist (1/m). The units of its 3 x 3 blocks
+            are N, N m in the first rows, and N m, N m^2 in the last.
 
     Raises:
-        SceneError: a value that is not positive.
+        SceneError: a value that is not positive, a matrix that is not symmetric or not positive definite, or
+            stiffnesses given twice or not at all.
     """
 
-    shear: tuple
-    axial: float
-    bending: tuple
-    torsion: float
+    shear: tuple | None = None
+    axial: float | None = None
+    bending: tuple | None = None
+    torsion: float | None = None
     mass: float | None = None
     outline: tuple | None = None
     inertia: tuple | None = None
+    matrix: tuple | None = None
 
     def __post_init__(self):
-        for field, unit, check in (("shear", "N", stiffness), ("bending", "N m^2", positive)):
-            _check_numbers(self, field, f"two numbers, about or along d_1 and d_2 ({unit})", unit, check, 2)
-        store(self, axial=stiffness(self, "axial", self.axial, "N"))
-        store(self, torsion=positive(self, "torsion", self.torsion, "N m^2"))
+        if self.matrix is None:
+            self._check_stiffnesses()
+        else:
+            for field in ("shear", "axial", "bending", "torsion"):
+                if getattr(self, field) is not None:
+                    refuse(self, field, getattr(self, field), "None beside a matrix, which holds all stiffnesses")
+            store(self, matrix=_checked(self, self.matrix))
         if self.mass is not None:
             store(self, mass=positive(self, "mass", self.mass, "kg/m"))
         if self.inertia is not None:
             _check_numbers(self, "inertia", "three numbers, about d_1, d_2 and d_3 (kg m)", "kg m", positive, 3)
         if self.outline is not None:
             store(self, outline=_corners(self, self.outline))
+
+    def _check_stiffnesses(self):
+        for field, unit, check in (("shear", "N", stiffness), ("bending", "N m^2", positive)):
+            _check_numbers(self, field, f"two numbers, about or along d_1 and d_2 ({unit})", unit, check, 2)
+        store(self, axial=stiffness(self, "axial", self.axial, "N"))
+        store(self, torsion=positive(self, "torsion", self.torsion, "N m^2"))
+
+    @classmethod
+    def offset(
+        cls, shear, axial, bending, torsion, *, centroid=(0.0, 0.0), shear_centre=(0.0, 0.0), angle=0.0, **others
+    ):
+        """A section whose centroid and shear centre are off the rod's line.
+
+        A point (x1, x2) of the section has the strains e + k x (x1, x2, 0), where e and k are those at the line. EA
+        acts on the stretch at the centroid, GA on the shear at the shear centre: the strain energy per length is half
+            of
+        GA1 (e1 - k3 x2)^2 + GA2 (e2 + k3 x1)^2 at the shear centre, EA (e3 + k1 x2 - k2 x1)^2 at the centroid, and
+        EI1 k1^2 + EI2 k2^2 + GJ k3^2; its second derivatives are the matrix.
+
+        Args:
+            shear, axial, bending, torsion: as of `Stiffness`, finite, along and about the principal axes; bending about
+                axes through the centroid.
+            centroid, shear_centre: (x1, x2) along the principal axes, m, from the rod's line.
+            angle: of the first principal axis, from d_1 towards d_2, rad.
+            others: mass, outline and inertia as of `Stiffness`, along d_1 and d_2.
+
+        Raises:
+            SceneError: see `Stiffness`.
+        """
+        given = cls(shear, axial, bending, torsion)
+        for value, field in ((max(given.shear), "shear"), (given.axial, "axial")):
+            number("Stiffness.offset", field, value, "finite numbers (N)", math.isfinite)
+        (c1, c2), (s1, s2) = (
+            vector("Stiffness.offset", field, place, "m", 2)
+            for field, place in (("centroid", centroid), ("shear_centre", shear_centre))
+        )
+        angle = number("Stiffness.offset", "angle", angle, "a number (rad)", math.isfinite)
+        cos, sin = math.cos(angle), math.sin(angle)
+        strains, turn = np.eye(6), np.kron(np.eye(2), [[cos, sin, 0], [-sin, cos, 0], [0, 0, 1]])
+        strains[:3, 3:] = [[0, 0, -s2], [0, 0, s1], [c2, -c1, 0]]
+        strains = strains @ turn  # rotated to the principal axes, then taken at the two points
+        stiffnesses = (*given.shear, given.axial, *given.bending, given.torsion)
+        return cls(matrix=(strains.T * stiffnesses @ strains).tolist(), **others)
 
     def stiffness(self, material=None):
         """The section itself (a material is not needed)."""
@@ -157,6 +216,40 @@ def _check_lengths(section, *fields):
         store(section, shear_factor=k)
 
 
+def _checked(section, matrix):
+    """The checked matrix as a tuple of rows, made exactly symmetric."""
+    expected = "6 x 6 finite numbers, symmetric and positive definite (N, N m and N m^2)"
+    try:
+        M = np.asarray(matrix)
+    except ValueError:
+        refuse(section, "matrix", matrix, expected)
+    if M.shape != (6, 6) or M.dtype.kind not in "iuf" or not np.isfinite(M).all() or not (np.diag(M) > 0).all():
+        refuse(section, "matrix", matrix, expected)
+    size = np.sqrt(np.outer(np.diag(M), np.diag(M)))
+    if (np.abs(M - M.T) > _ROUNDING * size).any() or np.linalg.eigvalsh((M + M.T) / (2 * size))[0] < _ROUNDING:
+        refuse(section, "matrix", matrix, expected)
+    return tuple(map(tuple, ((M + M.T) / 2).tolist()))
+
+
+def inverse(matrix):
+    """Inverses of stiffness matrices (..., 6, 6), scaled first, so that units do not affect the accuracy."""
+    size = np.sqrt(np.einsum("...ii->...i", np.asarray(matrix)))
+    size = size[..., :, None] * size[..., None, :]
+    return np.linalg.inv(matrix / size) / size
+
+
+def representative(matrix):
+    """Representative stiffnesses (GA1, GA2, EA, EI1, EI2, GJ) of a stiffness matrix.
+
+    GA and EA are its diagonal: other strains are zero. EI about the two principal axes of bending (that near d_1 first)
+    and GJ are from the inverse: contact forces and other moments are zero.
+    """
+    flexible = inverse(matrix)
+    small, large = 1 / np.linalg.eigvalsh(flexible[3:5, 3:5])[::-1]
+    bending = (small, large) if flexible[3, 3] >= flexible[4, 4] else (large, small)
+    return *np.diag(matrix)[:3], *bending, 1 / flexible[5, 5]
+
+
 def _corners(section, outline):
     expected = "three or more corners (x1, x2) of finite numbers (m)"
     try:
@@ -189,12 +282,15 @@ def _isotropic(material, A, I, J, k, outline):
 
 
 def _rectangle_torsion(b, h):
-    """Saint-Venant's torsion constant: of the series of tanh(n x)/n^5 in odd n, the part of 1/n^5 is summed exactly."""
+    """Saint-Venant's torsion constant, m^4.
+
+    The series of tanh(n x)/n^5 over odd n is summed as that of 1/n^5, exactly, less that of (1 - tanh(n x))/n^5.
+    """
     long, short = max(b, h), min(b, h)
     x = math.pi * long / (2 * short)
     series = 31 / 32 * _ZETA_5 - sum((1 - math.tanh(n * x)) / n**5 for n in range(1, 15, 2))
     return long * short**3 / 3 * (1 - 192 * short / (math.pi**5 * long) * series)
 
 
-#: Sections by the words of the scene file.
+#: Sections that scene files know.
 SECTIONS = (Circle, Tube, Rectangle, Stiffness)

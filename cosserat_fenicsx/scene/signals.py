@@ -1,8 +1,8 @@
-"""Vectors that depend on time: any function of t, and the usual ones by name.
+"""Vectors that depend on time: any function of t, and the usual ones as classes.
 
-A load or a prescribed motion takes a vector, one of the classes below, or a function of time (s) that gives a vector,
-with `jumps` where it is not smooth: steps in time land on these. What is `straight` between them says so: no step is too long
-to see what it does.
+A load or a prescribed motion takes a vector, one of the classes below, or a function of time (s) that returns a vector,
+with `jumps` at the times where it is not smooth: time steps end there. The attribute `straight` marks functions that
+are linear between their jumps, and resolved by steps of any length.
 """
 
 import dataclasses
@@ -19,7 +19,7 @@ from cosserat_fenicsx.errors import SceneError
 
 @dataclass(frozen=True)
 class Step:
-    """`value` from `start` on, and up to `end`; zero otherwise. Times in s.
+    """`value` from `start` up to `end`, or for ever; zero otherwise. Times in s.
 
     Raises:
         SceneError: numbers that are not finite, or an end that is not after the start.
@@ -46,7 +46,7 @@ class Step:
 
 @dataclass(frozen=True)
 class _FromTo:
-    """What happens between two times, s."""
+    """Base of functions that change between two times, s."""
 
     value: tuple
     start: float = 0.0
@@ -63,7 +63,7 @@ class _FromTo:
 
 @dataclass(frozen=True)
 class Ramp(_FromTo):
-    """Zero up to `start`, in proportion to time from there, `value` from `end` on. Times in s.
+    """Zero up to `start`, linear from there, `value` from `end` on. Times in s.
 
     Raises:
         SceneError: numbers that are not finite, or an end that is not after the start.
@@ -78,8 +78,11 @@ class Ramp(_FromTo):
 
 @dataclass(frozen=True)
 class RunUp(_FromTo):
-    """What runs up to a speed: zero up to `start`, the rate `value` (per s) from `end` on; in between the rate of change
-    of the speed is value/T (1 - cos(2 pi t/T)), T = end - start, so that nothing jerks. Times in s.
+    """A smooth start of a motion with constant speed: zero up to `start`, the rate of change `value` (per s) from `end`
+    on.
+
+    In between the acceleration is value/T (1 - cos(2 pi (t - start)/T)), T = end - start, which is continuous with its
+    first derivative. Times in s.
 
     After Kane, Ryan & Banerjee, J. Guid. Control Dyn. 10 (1987) 139, doi:10.2514/3.20195.
 
@@ -97,7 +100,7 @@ class RunUp(_FromTo):
 
 @dataclass(frozen=True)
 class Triangle:
-    """From zero at `start` to `value` at `peak` and back to zero at `end`, straight; zero otherwise. Times in s.
+    """Linear from zero at `start` to `value` at `peak` and back to zero at `end`; zero otherwise. Times in s.
 
     Raises:
         SceneError: numbers that are not finite, or times that do not ascend.
@@ -126,7 +129,7 @@ class Triangle:
 
 @dataclass(frozen=True)
 class Sine:
-    """`value` times sin(2 pi frequency (t - start) + phase) from `start` on, and up to `end`; zero otherwise.
+    """`value` times sin(2 pi frequency (t - start) + phase) from `start` up to `end`, or for ever; zero otherwise.
 
     Args:
         value: amplitude; frequency: Hz; phase: rad; start, end: s.
@@ -159,7 +162,7 @@ class Sine:
 
 @dataclass(frozen=True)
 class Table:
-    """Straight between the rows of a table; the first and the last value hold before and after it.
+    """Piecewise linear between the rows of a table; constant before the first and after the last.
 
     Args:
         times: (n,) ascending, s; values: (n, 3).
@@ -201,7 +204,7 @@ class Table:
 
     @cached_property
     def _numbers(self):
-        """Arrays: a long table is asked for again and again."""
+        """(times, columns) as arrays, converted once, since long tables are evaluated often."""
         return np.array(self.times, dtype=float), np.array(np.transpose(self.values), dtype=float, order="C")
 
 
@@ -218,7 +221,7 @@ def _times(factor, value):
     return tuple(float(factor) * x for x in value)
 
 
-#: Functions of time by the words of the scene file.
+#: Functions of time that scene files know.
 SIGNALS = (Step, Ramp, RunUp, Triangle, Sine, Table)
 
 
@@ -227,10 +230,10 @@ class Signal:
     """A checked function of time in a field of a load or a support.
 
     Args:
-        owner: the name of its class; field, unit: for the words of refusals.
-        function: of t (s), gives `size` numbers.
+        owner: the name of the class of the load or support; field, unit: for error messages.
+        function: of t (s), returns `size` numbers.
         jumps: times where it is not smooth, s.
-        place: where its load or support acts, in words.
+        place: where its load or support acts, for error messages.
     """
 
     owner: str
@@ -245,12 +248,13 @@ class Signal:
         """The vector at t, s.
 
         Raises:
-            SceneError: not so many finite numbers, or what its function raised; says at which time.
+            SceneError: another number of values, or values that are not finite, or an exception of the function; says
+                at which time.
         """
         when = f"at the time t = {t:g} s" + (f", of the {self.owner} at {self.place}" if self.place else "")
         try:
             given = self.function(t)
-        except Exception as problem:  # a user's function may raise whatever it pleases
+        except Exception as problem:  # a user's function may raise any exception
             raise SceneError(
                 f"{self.owner}.{self.field}: its function raised {type(problem).__name__} ({problem}), {when}"
             ) from problem
@@ -292,14 +296,16 @@ def signals_of(item):
 
 
 def at(item, t):
-    """A load or a support as it is at the time t (s); itself where nothing depends on time."""
+    """A load or a support with its values at the time t (s); unchanged where it does not depend on time."""
     now = {name: signal(t) for name, signal in signals_of(item).items()}
     return dataclasses.replace(item, **now, jumps=()) if now else item
 
 
 def sample_times(item, until):
-    """Times (s) up to `until` that stand for all where a load or a support depends on time: its jumps, between them,
-    and spread over orders of magnitude; the time 0 where it does not."""
+    """Sample times (s) up to `until` for checks of a load or a support that depends on time; else the time 0 alone.
+
+    They are its jumps, the midpoints between them, and times spread logarithmically.
+    """
     signals = signals_of(item)
     if not signals:
         return [0.0]

@@ -1,4 +1,4 @@
-"""Whether a scene's supports and joints hold it: once each, and altogether. Small motions of the reference alone."""
+"""Whether supports and joints are redundant or leave a mechanism, by small motions of the reference."""
 
 import contextlib
 import dataclasses
@@ -11,13 +11,14 @@ from cosserat_fenicsx.scene.joints import Joint
 from cosserat_fenicsx.scene.supports import Clamp
 from cosserat_fenicsx.scene.ties import PositionTie, TurnTie
 
-_SMALL = 1e-9
-# Ends this near, over a rod's length, lie at one point.
-_TOUCH = 1e-6
+# Relative singular values below this are zero.
+_RANK_TOLERANCE = 1e-9
+# Ends nearer than this, over a rod's length, lie at one point.
+_TOUCHING_DISTANCE = 1e-6
 
 
 def rows_of(tie):
-    """What a tie holds of a and of b, as rows over (displacement, small rotation)."""
+    """The gradient of a tie at a and b: ((station, row), ...), rows (6,) over (displacement, small rotation)."""
     if isinstance(tie, PositionTie):
         row = np.r_[tie.direction, 0, 0, 0]
     elif isinstance(tie, TurnTie):
@@ -28,29 +29,29 @@ def rows_of(tie):
 
 
 def _all_rows(scene):
-    """(what holds, [(station, row over six motions)]) for every scalar equation of the scene."""
+    """(support or joint, [(station, row (6,)), ...]) for every scalar constraint of the scene."""
     for support in scene.supports:
         if support.clamps:
             yield from ((support, [(support.station, row)]) for row in np.eye(6))
         yield from ((support, rows_of(tie)) for tie in support.ties())
-    together = _Together()
+    groups = _RigidGroups()
     for joint in scene.joints:
-        if joint.rigid and not together.join(joint.first, joint.second):
-            continue  # a rigid joint that closes a loop of rigid joints says nothing new
+        if joint.rigid and not groups.join(joint.first, joint.second):
+            continue  # a rigid joint that closes a loop of rigid joints adds no constraint
         if joint.rigid:
             yield from ((joint, [(joint.first, row), (joint.second, -row)]) for row in np.eye(6))
         else:
             yield from ((joint, rows_of(tie)) for tie in joint.ties())
 
 
-class _Together:
-    """Stations that rigid joints have made one."""
+class _RigidGroups:
+    """Groups of stations that rigid joints connect."""
 
     def __init__(self):
         self._groups = []
 
     def join(self, *stations):
-        """Join two; False where they were one already."""
+        """Connect two stations; False where they are in one group already."""
         keys = {_key(station) for station in stations}
         if any(keys <= group for group in self._groups):
             return False
@@ -60,16 +61,17 @@ class _Together:
 
 
 def _key(station):
-    """What tells stations apart: nearer ones share an element end."""
+    """A hashable key of a station, equal for stations so near that they share the end of an element."""
     return station.rod, round(station.s / station.rod.length, 9)
 
 
 def check_held_once(scene):
-    """Refuse a scene that something holds twice. The rods between stations are elastic: what acts on one station must
-    not be asked for twice.
+    """Refuse redundant constraints: several that hold the same motion of one station.
+
+    Constraints at different stations of a rod are never redundant, since the rod between them is elastic.
 
     Raises:
-        SceneError: naming the supports and joints at fault.
+        SceneError: naming the redundant supports and joints.
     """
     stations, holders, rows = [], [], []
     for holder, parts in _all_rows(scene):
@@ -88,27 +90,29 @@ def check_held_once(scene):
         for k, values in row.items():
             matrix[i, 6 * k : 6 * k + 6] = values
     left, sizes, _ = np.linalg.svd(matrix)
-    idle = left[:, np.count_nonzero(sizes > _SMALL * sizes[0]) :]
-    guilty = [holder for holder, part in zip(holders, idle, strict=True) if np.abs(part).max(initial=0) > 1e-6]
-    if guilty:
-        names = list(dict.fromkeys(_name(scene, holder) for holder in guilty))
+    dependencies = left[:, np.count_nonzero(sizes > _RANK_TOLERANCE * sizes[0]) :]
+    redundant = [
+        holder for holder, part in zip(holders, dependencies, strict=True) if np.abs(part).max(initial=0) > 1e-6
+    ]
+    if redundant:
+        names = list(dict.fromkeys(_name(scene, holder) for holder in redundant))
         raise SceneError(
-            f"Scene: {' and '.join(names)} hold the same motion twice, or contradict each other: expected each motion of "
-            "a station to be held once"
+            f"Scene: {' and '.join(names)} hold the same motion twice, or contradict each other: expected each motion "
+            "of a station to be held once"
         )
 
 
 def _name(scene, holder):
     for i, support in enumerate(scene.supports):
-        if support is holder:  # another may be equal
+        if support is holder:  # by identity, since equal supports may occur twice
             return f"supports[{i}] ({type(holder).__name__} at {holder.station})"
     (i,) = (i for i, joint in enumerate(scene.joints) if joint is holder)
     return f"joints[{i}] ({holder.first} with {holder.second})"
 
 
-@functools.lru_cache(maxsize=32)  # scenes do not change, and are solved again and again
+@functools.lru_cache(maxsize=32)  # scenes are immutable, and often solved repeatedly
 def check_no_mechanism(scene):
-    """Refuse a scene with rigid motions of the rods that no support and no joint resists.
+    """Refuse a scene with rigid motions of the rods that no support, joint or elastic action resists.
 
     Raises:
         SceneError: naming the motion that is free.
@@ -116,7 +120,8 @@ def check_no_mechanism(scene):
     size = max(rod.length for rod in scene.rods)
     starts = [rod.curve.position(0.0) for rod in scene.rods]
     rows = []
-    for _, parts in _all_rows(scene):
+    elastic = ((action, [held]) for action in scene.loads for held in action.holds(scene))
+    for _, parts in (*_all_rows(scene), *elastic):
         row = np.zeros(6 * len(scene.rods))
         for station, values in parts:
             k = scene.rods.index(station.rod)
@@ -126,7 +131,7 @@ def check_no_mechanism(scene):
         rows.append(row)
     matrix = np.array(rows).reshape(-1, 6 * len(scene.rods))
     _, sizes, right = np.linalg.svd(matrix)
-    held = np.count_nonzero(sizes > _SMALL * sizes.max(initial=0))
+    held = np.count_nonzero(sizes > _RANK_TOLERANCE * sizes.max(initial=0))
     free = right[held:].reshape(-1, len(scene.rods), 6)
     if len(free) == 0:
         return
@@ -146,7 +151,7 @@ def check_no_mechanism(scene):
 
 
 def _or_a_joint(scene, rod):
-    """What else a rod that is free may be missing, in words, where one of its ends lies on another's."""
+    """A hint at a missing joint, where an end of a free rod lies on an end of another; else empty."""
     for end, there in sorted(touching(scene), key=lambda pair: pair[0].s):
         if end.rod is rod:
             return f", or a Joint({end}, {there}), which lie at one point"
@@ -154,23 +159,24 @@ def _or_a_joint(scene, rod):
 
 
 def touching(scene):
-    """Pairs of ends of different structures that lie at one point, each both ways round, in the order of the rods."""
+    """Pairs of ends of different structures that lie at one point, each in both orders, in the order of the rods."""
     ends = [end for rod in scene.rods for end in (rod.start, rod.end)]
     places = np.array([end.rod.curve.position(end.s) for end in ends])
     for end, place in zip(ends, places, strict=True):
-        for j in np.flatnonzero(np.linalg.norm(places - place, axis=1) <= _TOUCH * end.rod.length):
+        for j in np.flatnonzero(np.linalg.norm(places - place, axis=1) <= _TOUCHING_DISTANCE * end.rod.length):
             if scene.leader(end.rod) is not scene.leader(ends[j].rod):
                 yield end, ends[j]
 
 
 def without_mechanism(scene):
-    """A scene itself; or, where it is a mechanism, one whose joints and then supports hold all until it is none any more.
+    """The scene itself; a mechanism with joints, then supports made rigid one by one until it is no mechanism.
 
-    Where the reference of a mechanism is in equilibrium, but for strains, both have the same one: what is held in addition has
-    nothing to hold.
+    Where a mechanism is in equilibrium in its reference, but for strains, the result has the same equilibrium: the
+        added
+    constraints carry no reaction.
 
     Raises:
-        SceneError: nothing can be held.
+        SceneError: it remains a mechanism.
     """
     loose = [("joints", i, Joint(x.first, x.second)) for i, x in enumerate(scene.joints) if not x.rigid]
     loose += [("supports", i, Clamp(x.station)) for i, x in enumerate(scene.supports) if not x.clamps]
@@ -182,12 +188,12 @@ def without_mechanism(scene):
         except SceneError:
             items = list(getattr(held, kind))
             items[i] = fast
-            with contextlib.suppress(SceneError):  # it would be held twice
+            with contextlib.suppress(SceneError):  # the constraint would be redundant
                 held = dataclasses.replace(held, **{kind: items})
     try:
         check_no_mechanism(held)
     except SceneError:
-        check_no_mechanism(scene)  # in its words
+        check_no_mechanism(scene)  # raises with the motion of the given scene
         raise
     return held
 

@@ -1,7 +1,7 @@
-"""What holds a rod.
+"""Supports of rods.
 
-A support either holds a station entirely (`clamps`) or says which scalar equations hold there (`ties`); nothing else in
-the package knows a support by name.
+A support either removes all unknowns of a station (`clamps`) or defines scalar constraints there (`ties`); no other
+part of the package refers to a support by name.
 """
 
 from dataclasses import dataclass
@@ -30,7 +30,7 @@ class Clamp:
         instance(self, "station", self.station, Station, _A_STATION)
 
     def ties(self):
-        """No equations: the station has no unknowns left."""
+        """No constraints: the station has no unknowns left."""
         return ()
 
 
@@ -50,7 +50,7 @@ class Pin:
         instance(self, "station", self.station, Station, _A_STATION)
 
     def ties(self):
-        """The equations that hold."""
+        """The scalar constraints."""
         return ties.same_place(self.station)
 
 
@@ -76,7 +76,7 @@ class Hinge:
         store(self, axis=direction(self, "axis", self.axis))
 
     def ties(self):
-        """The equations that hold."""
+        """The scalar constraints."""
         return (*ties.same_place(self.station), *ties.same_axis(self.station, None, self.axis))
 
 
@@ -102,20 +102,20 @@ class Roller:
         store(self, normal=direction(self, "normal", self.normal))
 
     def ties(self):
-        """The equations that hold."""
+        """The scalar constraints."""
         return (ties.PositionTie(self.station, None, self.normal, 0.0),)
 
 
 @dataclass(frozen=True)
 class Prescribed:
-    """A station is moved, in proportion to the load factor; what is None stays free.
+    """A station is moved, in proportion to the load factor; a motion that is None is free.
 
     Both motions may be functions of time (`signals`), with `jumps` where these are not smooth.
 
     Args:
         station: where.
         displacement: at load factor 1, m, inertial.
-        rotation: rotation vector at load factor 1, rad, inertial: the section is turned by load factor times it.
+        rotation: rotation vector at load factor 1, rad, inertial; the section is rotated by the load factor times it.
 
     Raises:
         SceneError: not a station, numbers that are not finite, or neither of the two.
@@ -140,11 +140,11 @@ class Prescribed:
                 store(self, **{field: vector_or_signal(self, field, value, unit, jumps)})
 
     def ties(self):
-        """The equations that hold; at the time 0 where the motion depends on time."""
+        """The scalar constraints; at the time 0 where the motion depends on time."""
         now = at(self, 0.0)
         moved = () if now.displacement is None else ties.same_place(self.station, None, now.displacement)
         return moved if now.rotation is None else (*moved, *ties.turned(self.station, now.rotation))
 
 
-#: Supports by the words of the scene file.
+#: Supports that scene files know.
 SUPPORTS = (Clamp, Pin, Hinge, Roller, Prescribed)

@@ -1,1 +1,1 @@
-"""Equilibrium: Newton's method, paths with their events and branches, meshes fine enough, `solve` and `buckling`."""
+"""Static equilibrium: paths with their critical points and branches, mesh refinement, `solve` and `buckling`."""

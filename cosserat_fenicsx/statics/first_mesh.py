@@ -1,4 +1,4 @@
-"""The mesh that the search for one that is fine enough begins with."""
+"""The first mesh of the automatic refinement."""
 
 import numpy as np
 
@@ -7,46 +7,65 @@ from cosserat_fenicsx.scene.curves import Line
 
 #: Elements per rod of the first mesh, where the mesh is not given.
 FIRST_ELEMENTS = 4
-# Where a section is a function of s: most elements of the first mesh, and how well it must integrate 1/EI.
-_FINEST_FIRST, _SEEN = 256, 1e-3
-# Chord over arc of a quarter of an element, on an average: that of an arc of one radian.
+# Where a section is a function of s: the rod's length over the shortest element of the first mesh, and the relative
+# accuracy with which that mesh must integrate the flexibilities 1/EI.
+_FINEST_FIRST, _FLEXIBILITY_TOLERANCE = 256, 1e-3
+# Elements are halved where their quadrature error exceeds this share of the largest one.
+_LARGE = 0.1
+# Smallest mean ratio of chord to arc over a quarter of an element: that of a circular arc of one radian.
 _STRAIGHT = 0.958
 
 
 def first_layout(scene, degree):
-    """The first mesh: as fine as the turns of a curve and a section that changes by a function of s ask for, so that nothing
-    falls between its points."""
+    """The first mesh, fine enough to resolve the curvature of the axis and a section that is a function of s.
+
+    A local change of the section then cannot be missed by the quadrature points. Where a section changes in a part of
+    a rod, elements are short only there.
+    """
     layout = Layout.of(scene, FIRST_ELEMENTS)
-    while max(layout.counts) < _FINEST_FIRST and not all(
-        _sees(rod, breaks, degree) for rod, breaks in zip(scene.rods, layout.breaks, strict=True)
-    ):
-        layout = layout.finer(scene, 2)
-    return layout
+    while True:
+        too_long = [_too_long(rod, breaks, degree) for rod, breaks in zip(scene.rods, layout.breaks, strict=True)]
+        if not any(marked.any() for marked in too_long):
+            return layout
+        layout = layout.resized(scene, [np.where(marked, 2.0, 1.0) for marked in too_long])
 
 
-def _sees(rod, breaks, degree):
-    """Whether the quarters of elements are next to straight, and Gauss points on elements integrate the flexibilities 1/EI as
-    well as many more points do: of a section that changes, or that turns about the curve."""
+def _too_long(rod, breaks, degree):
+    """(elements,) of bool: the elements to be halved.
+
+    All of them until their quarters are almost straight. Then, where the section changes along the rod or twists about
+    a curved axis, those in which the Gauss points do not integrate the flexibilities 1/EI, compared with a fine
+    quadrature.
+    """
+    none = np.zeros(len(breaks) - 1, dtype=bool)
+    long_enough = np.diff(breaks) > 1.01 / _FINEST_FIRST
     quarters = (breaks[:-1, None] + np.diff(breaks)[:, None] * np.arange(4) / 4).ravel()
     chords = np.diff(rod.curve.position(np.append(quarters, 1.0) * rod.length), axis=0)
     if np.linalg.norm(chords, axis=1).sum() < _STRAIGHT * rod.length:
-        return False
+        return long_enough
     low, high = rod.profile.range
-    twisted = not isinstance(rod.curve, Line) and low.J[0] != high.J[1]
+    twisted = not isinstance(rod.curve, Line) and (low.J[0] != high.J[1] or rod.profile.coupled)
     if rod.profile.uniform and not twisted:
-        return True
+        return none
     x, weights = np.polynomial.legendre.leggauss(degree)
-    finer = max(8, _FINEST_FIRST // (len(breaks) - 1))
 
-    def integrals(ends):
-        s = ends[:-1, None] + np.diff(ends)[:, None] * (x + 1) / 2
-        flexible = 1 / rod.stiffness_at(s.ravel() * rod.length).J[:, :2]
+    def integrals(starts, sizes):
+        s = starts[:, None] + sizes[:, None] * (x + 1) / 2
+        flexible = rod.stiffness_at(s.ravel() * rod.length).flexibility
         if twisted:  # as tensors of inertial components
             across = rod.curve.frame(s.ravel() * rod.length)[:, :, :2]
-            flexible = np.einsum("kai,ki,kbi->kab", across, flexible, across)
-        return np.einsum("g,cgi,c->ci", weights / 2, flexible.reshape(*s.shape, -1), np.diff(ends))
+            flexible = np.einsum("kai,kij,kbj->kab", across, flexible, across)
+        return np.einsum("g,cgi,c->ci", weights / 2, flexible.reshape(*s.shape, -1), sizes)
 
-    steps = np.arange(finer) / finer
-    fine_ends = np.append((breaks[:-1, None] + np.diff(breaks)[:, None] * steps).ravel(), 1.0)
-    fine = integrals(fine_ends).reshape(len(breaks) - 1, finer, -1).sum(axis=1)
-    return bool((np.abs(integrals(breaks) - fine).sum(axis=0) <= _SEEN * np.abs(fine).sum(axis=0).max()).all())
+    counts = np.maximum(8, np.ceil(_FINEST_FIRST * np.diff(breaks) - 1e-9).astype(int))
+    owner = np.repeat(np.arange(len(counts)), counts)
+    sizes = (np.diff(breaks) / counts)[owner]
+    inner = np.arange(len(owner)) - np.concatenate([[0], np.cumsum(counts)])[owner]
+    parts = integrals(breaks[owner] + inner * sizes, sizes)
+    fine = np.zeros((len(counts), parts.shape[1]))
+    np.add.at(fine, owner, parts)
+    error = np.abs(integrals(breaks[:-1], np.diff(breaks)) - fine)
+    if (error.sum(axis=0) <= _FLEXIBILITY_TOLERANCE * np.abs(fine).sum(axis=0).max()).all():
+        return none
+    error = error.max(axis=1)
+    return long_enough & (error > _LARGE * error.max())

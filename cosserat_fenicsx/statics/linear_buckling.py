@@ -1,8 +1,8 @@
-"""Linear buckling: the load factors at which a stable state, extrapolated, loses its stability."""
+"""Linear buckling: the load factors at which the second variation, extrapolated linearly, becomes singular."""
 
 import math
 import numbers
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from mpi4py import MPI
@@ -11,44 +11,80 @@ from cosserat_fenicsx.algebra import eigen
 from cosserat_fenicsx.checks import number
 from cosserat_fenicsx.errors import NotConverged, SceneError
 from cosserat_fenicsx.results.on_nodes import OnNodes
-from cosserat_fenicsx.statics.continuation import StepControl
+from cosserat_fenicsx.scene.magnitudes import check_magnitudes
+from cosserat_fenicsx.statics.circulatory import circulatory_part
+from cosserat_fenicsx.statics.divergence import static_bifurcations
 from cosserat_fenicsx.statics.first_mesh import FIRST_ELEMENTS
-from cosserat_fenicsx.statics.follow import Follower
+from cosserat_fenicsx.statics.grading import layers_of
+from cosserat_fenicsx.statics.path.follower import Follower
+from cosserat_fenicsx.statics.path.load_control import StepControl
 from cosserat_fenicsx.statics.refinement import until_two_meshes_agree
 from cosserat_fenicsx.statics.solve import check_arguments
 from cosserat_fenicsx.statics.solvers import solvers_of
 from cosserat_fenicsx.statics.stability import oriented
 
 _MOST_ELEMENTS = 256
-# The state is moved by this much of a unit load (EI/L^2, EI/L) to either side for the change of the second variation.
+# Load step of the central difference of the second variation, in the units EI/L^2 and EI/L of the load.
 _STEP = 1e-3
-# What Rayleigh's quotient leaves of the error of bounded stiffnesses, at most.
-_LEFT = 0.1
-# No rod bears more than this, in the same units, nor more than EA or GA: at about GA the pencil has a root under tension.
+# Largest share of the error of bounded stiffnesses that remains after the correction by Rayleigh's quotient.
+_REMAINING = 0.1
+# Largest critical load, in the same units, where EA and GA are infinite. Else these bound it: the shear-flexible column
+# has a spurious root under tension at about GA.
 _HUGE = 1e8
-# Load factors nearer than this to one another are one, with several modes.
+# Load factors that differ by less than this, relative, are one multiple eigenvalue.
 _SAME = 1e-6
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Buckling(OnNodes):
     """Result of `buckling`.
 
     Attributes:
         scene: the scene.
-        load_factors: (n,) critical load factors, ascending from the state they are counted from.
-        modes: (n, N, 3) displacements, inertial, of all nodes of all rods in the scene's order; the largest has length 1.
+        load_factors: (n,) critical load factors, ascending from that of the state.
+        modes: (n, N, 3) displacements, inertial, of all nodes of all rods in the scene's order; the largest has
+            length 1.
         error: (n,) estimated relative error of the load factors; NaN where the mesh was given.
-        elements: of each rod.
+        elements: number of elements of each rod.
         degree: of the elements.
+        conservative: whether the loads have a potential near the state, for all motions that the supports allow. A dead
+            moment has none where its section is free to rotate about two axes, nor has a follower load. Without a
+            potential a structure may flutter below its first static bifurcation, or without one, which linear
+            buckling does not detect.
+        bound: no static bifurcation lies below this load factor, whether conservative or not; infinite where there is
+            none. Where the loads have a potential it is the first of `load_factors`. Where they have none it is the
+            load factor at which the symmetric part of the second variation becomes singular, which is neither an
+            instability nor a bifurcation.
     """
 
-    scene: object = field(repr=False)
+    scene: object
     load_factors: np.ndarray
-    modes: np.ndarray = field(repr=False)
+    modes: np.ndarray
     error: np.ndarray
     elements: tuple
     degree: int
+    conservative: bool
+    bound: float
+
+    @property
+    def caution(self):
+        """The limits of the result, in a sentence; "" where the loads have a potential."""
+        if self.conservative:
+            return ""
+        found = (
+            "the load factors are those of its static bifurcations (divergence) alone"
+            if len(self.load_factors)
+            else "no static bifurcation (divergence) was found"
+        )
+        return (
+            f"The loads have no potential: {found}, and there is none below {self.bound:.7g}. The structure may "
+            "flutter at a lower load, which a motion shows (`simulate`), and linear buckling does not."
+        )
+
+    def __repr__(self):
+        names = ("load_factors", "error", "elements", "degree", "conservative", "bound")
+        values = ", ".join(f"{name}={getattr(self, name)!r}" for name in names)
+        return f"<Buckling: {values}. {self.caution}>" if self.caution else f"<Buckling: {values}>"
 
     def mode(self, k, rod=None):
         """(nodes, 3) the k-th mode at the nodes of a rod (default the first)."""
@@ -58,16 +94,21 @@ class Buckling(OnNodes):
 def buckling(scene, count=1, *, load_factor=0.0, tol=1e-5, elements=None, degree=4, comm=None):
     """Critical load factors and modes by linear buckling.
 
-    K(eta) + lambda dK/deta is singular, with K the second variation at the load factor eta (0: the unloaded
-    reference) and dK/deta its change with the contact force and moment alone, as in textbooks and codes: the rod is
-    prestressed there, but neither bent nor shortened further; shear counts, P (1 + P/GA) = P_Euler of a column. Where a
-    structure bends much before it buckles, as an arch does, this is an estimate, and the events of `solve` are the answer; a
-    straight column's critical load is off by its strain at buckling. From a prestressed state (`load_factor`) near the answer
+    The critical load factors are eta + lambda where K(eta) + lambda dK/deta is singular. K is the second variation at
+    the load factor eta (0: the unloaded reference) and dK/deta its derivative due to the contact force and moment
+    alone (geometric stiffness), as in textbooks and codes: prestress counts, further bending and shortening do not.
+    Shear counts, P (1 + P/GA) = P_Euler of a column. Where a structure bends much before it buckles, as an arch does,
+    this is an estimate, and the events of `solve` are the answer; for a straight column the relative error of the
+    critical load is its axial strain at buckling. From a prestressed state (`load_factor`) close to the critical load
     the estimate is good.
+
+    Loads without a potential make K and dK/deta unsymmetric. The load factors are then the real ones at which the
+    unsymmetric sum is singular (static bifurcations, also called divergence), of which there may be none, as in Beck's
+    column; flutter is not detected. See `Buckling.conservative` and `Buckling.bound`.
 
     Args:
         scene: a `Scene`.
-        count: how many.
+        count: number of critical load factors.
         load_factor: eta, a stable point of the path of load control.
         tol: relative accuracy of the load factors: elements are doubled until two meshes agree to it, unless
             `elements` is given.
@@ -76,23 +117,24 @@ def buckling(scene, count=1, *, load_factor=0.0, tol=1e-5, elements=None, degree
         comm: MPI communicator; default all ranks. Every rank calls.
 
     Returns:
-        Buckling. It holds fewer than `count` load factors where no more lie on the side of positive load, below the smallest EA
-        and GA.
+        Buckling. It holds fewer than `count` load factors where no more are positive (counted from eta) and below the
+        smallest EA and GA; or, without a potential, where the others are rounding error.
 
     Raises:
         SceneError: an argument outside its range.
-        NotConverged: the load factor is not reached, or the structure is unstable there; or the accuracy is not met.
+        NotConverged: the load factor is not reached, the structure is unstable there, or the accuracy is not met.
     """
     check_arguments(scene, tol, elements)
     if isinstance(count, bool) or not isinstance(count, numbers.Integral) or count < 1:
         raise SceneError(f"count = {count!r}: expected a whole number above zero")
     number("buckling", "load_factor", load_factor, "a finite number", math.isfinite)
+    check_magnitudes(scene, max(abs(load_factor), 1.0))
     comm = comm or MPI.COMM_WORLD
 
     def apart(fine, coarse):
         return np.abs(fine - coarse) / np.abs(fine - load_factor)
 
-    (load_factors, modes, softness), error, layout = until_two_meshes_agree(
+    (load_factors, _, modes, softness, conservative), error, layout = until_two_meshes_agree(
         scene,
         lambda layout: _critical(scene, layout, count, load_factor, degree, comm),
         apart,
@@ -103,26 +145,48 @@ def buckling(scene, count=1, *, load_factor=0.0, tol=1e-5, elements=None, degree
         degree=degree,
         advice="a larger tol",
     )
-    error = np.maximum(error, softness)  # which both meshes have in common; NaN stays
+    error = np.maximum(error, softness)  # an error that both meshes share; NaN stays
     if (error > tol).any():
         raise NotConverged(
-            f"the accuracy tol = {tol:g} was not reached: linear buckling bounds the stiffnesses against stretch and shear, which may "
-            f"leave an error of {error.max():.2g}. Ask for a larger tol, or for the events of `solve`."
+            f"the accuracy tol = {tol:g} was not reached: linear buckling bounds the stiffnesses against stretch and "
+            f"shear, which may leave an error of {error.max():.2g}. Ask for a larger tol, or for the events of `solve`."
         )
-    return Buckling(scene, load_factors, modes, error, layout.counts, degree)
+    bound = float(load_factors[0]) if len(load_factors) else math.inf
+    found = slice(0 if conservative else 1, None)  # without a potential the first one is the bound alone
+    return Buckling(scene, load_factors[found], modes, error[found], layout.counts, degree, conservative, bound)
 
 
 def _critical(scene, layout, count, load_factor, degree, comm):
-    """Load factors (n,), modes (n, N, 3), and relative errors (n,) of bounded stiffnesses, on one mesh."""
-    problem, newton, stability = solvers_of(scene, layout, degree=degree, comm=comm)
+    """The result on one mesh.
+
+    Returns:
+        Load factors (n,), the lengths of boundary layers or None, modes (m, N, 3), relative errors (n,) of bounded
+        stiffnesses, and whether the loads have a potential. Then n = m; else n = m + 1, and the bound comes first.
+    """
+    with (
+        solvers_of(scene, layout, degree=degree, comm=comm) as solvers,
+        circulatory_part(scene, layout, degree, comm) as circulatory,
+    ):
+        return _critical_by(*solvers, circulatory, count, load_factor)
+
+
+def _critical_by(problem, newton, stability, circulatory, count, load_factor):
     model = problem.model
     follower = Follower(problem, newton, stability, StepControl(), control="load")
     track = follower.track
+    follower.begin()
     if load_factor and not follower.to(load_factor, abs(load_factor)):
         raise NotConverged(f"no equilibrium was found at the load factor {load_factor:g}: {track.failure}")
     here = track.here
+    layers = layers_of(model) if load_factor else None
     if here.negative_modes:
         raise NotConverged(f"the structure is unstable at the load factor {load_factor:g}: expected a stable state")
+    conservative = circulatory.vanishes(model.snapshot()[0], load_factor or 1.0)
+
+    def skew():
+        """The skew-symmetric part of the second variation at the state; None for loads with a potential."""
+        return None if conservative else circulatory.skew(model.snapshot()[0], problem.load_factor)
+
     slope = track.slope()
     unit = problem.load_derivative(problem.x).norm() or 1.0
     change = _STEP / unit
@@ -132,44 +196,72 @@ def _critical(scene, layout, count, load_factor, degree, comm):
         if not track.at_load(numbers_there, load_factor + step).converged:
             raise NotConverged(f"no equilibrium was found next to the load factor {load_factor:g}: {track.failure}")
         stability.whole.assemble(stress_alone=True)
-        sides.append(stability.whole.K.copy())
-    slack, other = sides
-    slack.axpy(-1.0, other)
-    slack.scale(-0.5 / change)
+        sides.append((stability.whole.K.copy(), skew()))
+    slack, of_skew = (_decrease(*parts, change) for parts in zip(*sides, strict=True))
     track.restore()
     stability.whole.assemble()
-    values, vectors = eigen.largest_of_pencil(slack, stability.whole.K, count + 2)
-    true = model.data.K.x.array
-    softest = comm.allreduce(true[true > 0].min(initial=_HUGE), op=MPI.MIN)  # an infinite one is kept as 0
-    values = values[values * softest > unit]  # others are rounding of zero, or buckle under the opposite load
+    symmetric, modes = _physical(*eigen.largest_of_pencil(slack, stability.whole.K, count + 2), model, unit)
+    if conservative:
+        values, vectors = symmetric, modes
+        critical, corrected = values[:count], np.ones(len(values[:count]), dtype=bool)
+    else:
+        whole = (slack, of_skew), (stability.whole.K, skew())
+        found = static_bifurcations(*whole, count) if len(symmetric) else (symmetric, modes)
+        values, vectors = _physical(*found, model, unit)
+        critical = np.append(symmetric[:1], values)
+        corrected = np.arange(len(critical)) < 1
+    softness = _softness(stability.whole, [*([] if conservative else modes[:1]), *vectors][: len(critical)])
+    # For a symmetric pencil, Rayleigh's quotient without that share of the energy is more accurate.
+    critical = np.where(corrected, 1 + softness, 1.0) / critical
+    softness = np.where(corrected, _REMAINING, 1.0) * softness
+    shapes = np.array([model.shape_of(mode) for mode in _oriented(model, values, vectors)[:count]])
+    nodes = sum(cells * model.signature.degree + 1 for cells in model.layout.counts)
+    return load_factor + critical, layers, shapes.reshape(-1, nodes, 3), softness, conservative
+
+
+def _decrease(ahead, behind, change):
+    """The decrease of a matrix per unit of load factor by a central difference; None where `ahead` is None."""
+    if ahead is None:
+        return None
+    ahead.axpy(-1.0, behind)
+    ahead.scale(-0.5 / change)
+    return ahead
+
+
+def _physical(values, vectors, model, unit):
+    """The eigenvalues (n,), descending, and eigenvectors with critical loads below the axial and shear stiffnesses.
+
+    The others are zero but for rounding, or negative: those of the opposite load.
+    """
+    K = model.section.K
+    values = values[values * K[np.isfinite(K)].min(initial=_HUGE) > unit]
+    return values, vectors[: len(values)]
+
+
+def _oriented(model, values, vectors):
+    """The modes of eigenvalues (n,), descending, those of a multiple eigenvalue `oriented` together."""
     modes, k = [], 0
     while k < len(values):
         same = int(np.count_nonzero(np.abs(values[k:] - values[k]) <= _SAME * values[k]))
         modes += oriented(model, vectors[k : k + same])
         k += same
-    softness = _softness(stability.whole, vectors[: len(values[:count])])
-    shapes = np.array([model.shape_of(mode) for mode in modes[:count]])
-    nodes = sum(cells * degree + 1 for cells in layout.counts)
-    critical = (1 + softness) / values[:count]  # Rayleigh's quotient without that energy
-    return load_factor + critical, shapes.reshape(-1, nodes, 3), _LEFT * softness
+    return modes
 
 
 def _softness(part, vectors):
-    """The share of the energy of modes (n,) in stretch and shear that is there because stiffnesses against them are bounded.
+    """(n,) shares of the modes' energies in stretch and shear that are due to the bounds of these stiffnesses.
 
     Args:
         part: the `Part` of the second variation, assembled at the state.
-        vectors: in its numbers.
+        vectors: modes, PETSc vectors in its numbering.
     """
-    data = part.model.data
-    stiff, true, whole = data.K_stiff.x.array, data.K.x.array, part.K.copy()
-    kept = stiff.copy()
-    excess = np.where(true > 0, 1 - kept / np.where(true > 0, true, 1.0), 1.0)  # an infinite one is kept as 0
-    stiff *= 1 - excess / 2
+    model, whole = part.model, part.K.copy()
+    bound = model.bounded_stiffness()
+    model.stiffen(bound * (2 - bound / model.section.K))  # increases the energy by the excess of bounded stiffnesses
     part.load()
     part.assemble()
-    part.K.aypx(-1.0, whole)
+    part.K.axpy(-1.0, whole)
     energies = [((part.K * v).dot(v), (whole * v).dot(v)) for v in vectors]
-    stiff[:] = kept
+    model.stiffen(model.bounded_K)
     part.load()
-    return np.array([2 * of_excess / of_all for of_excess, of_all in energies])
+    return np.array([of_excess / of_all for of_excess, of_all in energies])

@@ -1,4 +1,4 @@
-"""A compiled model with its PETSc matrix and vectors: made once, used for every load, step and scene of its shape."""
+"""A compiled model with its PETSc matrix and vectors, reused for all loads, steps and scenes of its signature."""
 
 import numpy as np
 from petsc4py import PETSc
@@ -7,20 +7,21 @@ from cosserat_fenicsx.algebra.equations import Equations
 from cosserat_fenicsx.algebra.packed import Packed
 from cosserat_fenicsx.algebra.tie_rows import TieRows
 
-# Of the load factor, for derivatives by differences: the error is its square times that of prescribed rotations.
+# Change of the load factor for central differences, whose error is of second order in that of prescribed rotations.
 _CHANGE = 1e-4
 
 
 class Problem(Equations):
-    """Residual and tangent of a model as PETSc wants them, in the solver's unknowns (`models.numbering`).
+    """Residual and tangent of a model as PETSc matrix and vectors, in the solver's unknowns (`models.numbering`).
 
     Args:
         model: see `models.base.RodModel` for the protocol.
 
     Attributes:
         see `Equations`.
-        load_factor: what all loads and prescribed motions are multiplied by.
-        load_norm: size of the dead loads at load factor 1.
+        load_factor: factor of loads and prescribed motions; while `begins`, the factor of permanent loads.
+        begins: whether permanent loads are still being applied, with a factor from 0 to 1, before all other loads.
+        load_norm: Euclidean norm of the dead loads at load factor 1, dimensionless.
     """
 
     ties_class = TieRows
@@ -28,24 +29,27 @@ class Problem(Equations):
     def __init__(self, model):
         super().__init__(model)
         self.A.setOption(PETSc.Mat.Option.SYMMETRIC, self.tangent == "symmetric")
-        self._dead, *self._difference = (self.numbering.vector() for _ in range(3))
-        moving = (model.state, *model.carried)
+        self._dead, self._permanent, *self._difference = (self.numbering.vector() for _ in range(4))
+        moving = (model.state, *model.carried, *model.actions.refreshed, *model.actions.memory_functions)
         self._residual, self._tangent = Packed(model.forms.residual, moving), Packed(model.forms.tangent, moving)
-        self._loads = None if model.forms.dead is None else Packed(model.forms.dead, ())
+        self._loads, self._permanent_loads = (
+            None if form is None else Packed(form, ()) for form in (model.forms.dead, model.forms.permanent)
+        )
         self._live = [function.x.array for function in model.carried]
         self.load_factor = self.load_norm = 0.0
-        # Written in place: the property's setter costs as much as a residual of few elements.
-        self._eta = model.load_factor.value
-        self._loaded = None
+        # Arrays of the constants, written in place: the setter of `value` costs as much as a residual of few elements.
+        self._eta, self._share = model.load_factor.value, model.permanent_factor.value
+        self._refreshes, self._remembers = bool(model.actions.refreshed), bool(model.actions.memory)
+        self._loaded, self.begins = None, False
 
     def _kind(self):
         return self.model.tangent
 
     def load(self, scene, layout):
-        """Take the numbers of a scene; the state becomes its reference configuration.
+        """Set the data of a scene; the state becomes its reference configuration.
 
         Returns:
-            bool: False where they were the numbers at hand.
+            bool: False where the same data were loaded already.
         """
         model = self.model
         anew = not self._holds(scene, layout)
@@ -54,48 +58,69 @@ class Problem(Equations):
             model.load(scene, layout)
             self._residual.refresh()
             self._tangent.refresh()
-            if self._loads:
-                self._loads.refresh()
-            self._assemble(self._loads, self._dead)
-            self.load_norm = self._dead.norm() + model.load_norm
+            for packed, vector in ((self._loads, self._dead), (self._permanent_loads, self._permanent)):
+                if packed:
+                    packed.refresh()
+                self._assemble(packed, vector)
+            self.load_norm = self._dead.norm() + self._permanent.norm() + model.load_norm
             self._loaded = scene, layout
         else:
             model.rest()
+        self.begins = any(kind.scaled == "permanent" for kind in model.signature.terms)
+        self._eta[...] = 0.0
         self.set_load_factor(0.0)
         self.numbering.from_local(self._state, self.x)
         self.set_state(self.x)
         return anew
 
     def _holds(self, scene, layout):
-        """Whether this very scene is loaded, on this mesh, and nothing in it is a function, or a load of a user's own, that might say
-        something else now."""
+        """Whether this scene is loaded on this mesh and its data cannot have changed.
+
+        User-defined functions and loads may give other values at every call.
+        """
         if self._loaded is None or self._loaded[0] is not scene or not all(rod.uniform for rod in scene.rods):
             return False
-        if not all(type(load).__module__.startswith("cosserat_fenicsx.") for load in scene.loads):
+        if self._remembers or not all(type(load).__module__.startswith("cosserat_fenicsx.") for load in scene.loads):
             return False
         return all(map(np.array_equal, self._loaded[1].breaks, layout.breaks))
 
     def set_load_factor(self, eta):
-        """Multiply all loads and prescribed motions by eta from now on."""
+        """Set the factor of loads and prescribed motions to eta; while `begins`, that of permanent loads."""
         self.load_factor = eta
-        self._eta[...] = eta
+        (self._share if self.begins else self._eta)[...] = eta
+
+    def end_beginning(self):
+        """Set the factor of permanent loads to 1 and the load factor to 0."""
+        self.begins = False
+        self._share[...] = 1.0
+        self.set_load_factor(0.0)
+
+    def commit(self):
+        """Accept the state: path-dependent loads update their history variables."""
+        if self._remembers:
+            self.model.actions.commit()
+
+    @property
+    def eta(self):
+        """The factor of loads and prescribed motions."""
+        return float(self._eta)
 
     def numbers(self):
-        """Everything that says where the problem is, to be kept: this rank's unknowns and carried fields."""
+        """Copies of all arrays that define the state: this rank's unknowns, then the carried fields."""
         return [self.x.array_r.copy(), *(live.copy() for live in self._live)]
 
     def put(self, numbers):
-        """Go back to where `numbers` were taken, or to a combination of such."""
+        """Set the state from what `numbers` returned, or from a linear combination of such."""
         self.x.array_w[:] = numbers[0]
         for live, values in zip(self._live, numbers[1:], strict=True):
             live[:] = values
         self.set_state(self.x)
 
     def begin_at(self, values, n, multipliers):
-        """Start from a motion and contact force that another mesh found.
+        """Set the state from the motion and contact force of a solution on another mesh.
 
         Args:
-            values, n: see `RodModel.set_motion`; multipliers: reactions of added equations.
+            values, n: see `RodModel.set_motion`; multipliers: Lagrange multipliers of the constraint equations.
         """
         self.model.set_motion(values, n)
         self.numbering.from_local(self._state, self.x)
@@ -106,14 +131,21 @@ class Problem(Equations):
     def function(self, snes, x, b):
         """Residual at x for SNES."""
         self.set_state(x)
+        if self._refreshes:
+            self.model.actions.refresh()
         self._assemble(self._residual, b)
-        b.axpy(-self.load_factor, self._dead)
+        eta = self.eta
+        b.axpy(-eta, self._dead)
+        if self._permanent_loads:
+            b.axpy(-float(self._share), self._permanent)
         if self.ties:
-            self.ties.add_residual(b, self.load_factor)
+            self.ties.add_residual(b, eta)
 
     def load_derivative(self, x):
-        """d residual/d load factor at x by a central difference, exact for loads, which are affine in it; a vector that
-        the next call overwrites."""
+        """d residual/d load factor at x by a central difference, which is exact for loads, affine in the load factor.
+
+        The next call overwrites the returned vector.
+        """
         eta = self.load_factor
         change = _CHANGE * max(1.0, abs(eta))
         for vector, ahead in zip(self._difference, (change, -change), strict=True):
@@ -130,5 +162,5 @@ class Problem(Equations):
         P.zeroEntries()
         self._tangent.add_to_matrix(P)
         if self.ties:
-            self.ties.add_tangent(P, self.load_factor)
+            self.ties.add_tangent(P, self.eta)
         P.assemble()

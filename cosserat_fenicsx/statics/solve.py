@@ -1,7 +1,8 @@
-"""`solve`: from a scene to its equilibrium path, on a mesh that is fine enough for the accuracy asked for."""
+"""`solve`: the equilibrium path of a scene, on a mesh that is fine enough for the requested accuracy."""
 
-import cosserat_fenicsx.compat  # noqa: F401, I001  first: it says in words what of dolfinx is missing
+import cosserat_fenicsx.compat  # noqa: F401, I001  first: it explains what is missing of dolfinx
 
+import contextlib
 import itertools
 import math
 import numbers
@@ -11,21 +12,24 @@ import numpy as np
 from mpi4py import MPI
 
 from cosserat_fenicsx.checks import instance
-from cosserat_fenicsx.scene.choose import choose
-from cosserat_fenicsx.statics.continuation import StepControl
+from cosserat_fenicsx.models.choose import choose
+from cosserat_fenicsx.statics.path.load_control import StepControl
 from cosserat_fenicsx.errors import NotConverged, SceneError, nearest
-from cosserat_fenicsx.statics.follow import CONTROLS
+from cosserat_fenicsx.statics.path.follower import CONTROLS
+from cosserat_fenicsx.models.formulations import formulation_of
 from cosserat_fenicsx.models.rodmesh import Layout
 from cosserat_fenicsx.progress import Progress
 from cosserat_fenicsx.statics.first_mesh import first_layout
-from cosserat_fenicsx.statics.solvers import default_degree, solvers_of
+from cosserat_fenicsx.statics.solvers import solvers_of
 from cosserat_fenicsx.statics.refinement import refine
+from cosserat_fenicsx.scene.action import path_dependent
+from cosserat_fenicsx.scene.magnitudes import check_magnitudes
 from cosserat_fenicsx.scene.scene import Scene
 from cosserat_fenicsx.scene.statical import check_no_mechanism
 from cosserat_fenicsx.scene.supports import Prescribed
-from cosserat_fenicsx.statics.tracing import Promoted, Tracing
+from cosserat_fenicsx.statics.path.recorder import Promoted, Tracing
 
-# A prescribed rotation turns by no more than this in a step, rad: a step cannot tell it from one with a full turn more or less.
+# Largest change of a prescribed rotation in one step, rad: rotations that differ by a full turn are indistinguishable.
 _LARGEST_TURN = 1.0
 
 
@@ -50,25 +54,26 @@ def solve(
 
     Args:
         scene: a `Scene`.
-        load_factors: a list or array, landed on exactly in its order; or a pair (a, b), a tuple, between which the
-            solver chooses its steps; or one number.
-        model: "determinate", "planar" or "spatial"; or "auto", the cheapest one that is enough, which goes over to
-            "spatial" where a planar answer buckles sideways. `Path.why` says why.
+        load_factors: a list or array, whose values are reached exactly and in this order; or a tuple (a, b), between
+            which the solver chooses its steps; or one number.
+        model: "determinate", "planar" or "spatial"; or "auto", the cheapest one that suffices, which changes to
+            "spatial" where a planar solution buckles sideways. `Path.why` gives the reasons.
         formulation: "mixed" (default), "displacement" or "multiplier"; see the README.
         tol: largest estimated error of the positions along the rods, relative to the largest displacement of the
-            scene at that load factor. Elements are refined until it is met, unless `elements` is given.
+            scene at that load factor. Elements are refined until the estimate is below it, unless `elements` is given.
         elements: elements per rod; fixes the mesh, and `Path.error` is then not estimated (NaN).
-        degree: 1 to 4, of r and q; default 4 (2 for the other formulations).
-        gauss_points: of an element; default `degree`, which does not lock. More of them lock (README, Formulations).
+        degree: 1 to 4, of r and q; default 4 (2 for "displacement").
+        gauss_points: per element; default `degree`, which does not lock. More of them lock (README, Formulations).
         steps: a `StepControl`.
-        control: "auto" steps the load factor, and goes on in the arc length of the path where that meets a limit point,
-            through snap-through and snap-back, until the requested load factor is reached again. "load" never does:
-            a limit point raises NotConverged. "arc" goes in arc length from the start and never turns round: each
-            requested load factor is the next place along the path that has it.
+        control: "auto": load control, and arc length from a limit point on, through snap-through and snap-back, until
+            the requested load factor is reached again. "load": load control alone; a limit point raises NotConverged.
+            "arc": arc length from the start, always onward: each requested load factor is landed on at the next point
+            of the path that has it.
         branch: 1 or -1 to leave the path at its first bifurcation, along the mode or against it (see `Event.mode`; of
-            two modes at once the first); None to stay on it, stable or not.
-        until: called with the Path after every recorded point; True from it ends the path there. For a pair.
-        progress: True, False, or None for a bar on long runs in a terminal.
+            a double bifurcation the first mode); None to stay on it, stable or not.
+        until: called with the Path after every recorded point; the path ends where it returns True. Only with a tuple
+            (a, b) of load factors.
+        progress: True, False, or None for a progress bar on long runs in a terminal.
         comm: MPI communicator; default all ranks. Every rank calls, every rank gets the same Path.
 
     Returns:
@@ -76,14 +81,15 @@ def solve(
 
     Raises:
         SceneError: an argument outside its range.
-        NotConverged: the path cannot be continued, or the accuracy not be met; `.path` holds what was reached.
-        Interrupted: Ctrl-C; `.path` holds what was reached.
+        NotConverged: the path cannot be continued, or the accuracy is not reached; `.path` holds the points so far.
+        Interrupted: Ctrl-C; `.path` holds the points so far.
     """
     comm = comm or MPI.COMM_WORLD
     targets, free = _targets(load_factors)
-    formulation = "mixed" if formulation is None else formulation
-    degree = default_degree(formulation) if degree is None else degree
+    formulation = formulation_of(formulation)
+    degree = formulation.default_degree if degree is None else degree
     check_arguments(scene, tol, elements)
+    check_magnitudes(scene, max(map(abs, targets)))
     choice = choose(
         scene,
         model=model,
@@ -99,11 +105,14 @@ def solve(
     elif _turn(scene):
         follow["steps"] = replace(steps, largest=min(steps.largest or math.inf, _LARGEST_TURN / _turn(scene)))
 
+    in_order = path_dependent(scene)
+
     def take(choice, bar):
         strayed = []
 
+        @contextlib.contextmanager
         def tracing(layout, *, from_rest=True):
-            solvers = solvers_of(
+            with solvers_of(
                 scene,
                 layout,
                 formulation=formulation,
@@ -111,25 +120,27 @@ def solve(
                 points=gauss_points,
                 comm=comm,
                 model=choice.model,
-            )
-            return Tracing(solvers, formulation, follow, choice, bar, from_rest=from_rest)
+            ) as solvers:
+                yield Tracing(solvers, follow, choice, bar, from_rest=from_rest)
 
         def trace(layout, like=None):
-            """`like`: a path whose points are found again, where the solver chose them."""
-            if like is None or not free or like in strayed:
-                return tracing(layout).along(targets, free, until)
-            if like.control == "load":
-                return tracing(layout).along(like.load_factors.tolist(), False)
-            try:  # load factors that come more than once do not say where the points are
-                return tracing(layout).again(like)
-            except NotConverged:
-                strayed.append(like)
-                raise
+            """Follow the path; `like`: a path on a coarser mesh whose points are reused where the solver chose them."""
+            with tracing(layout) as tracer:
+                if like is None or not free or like in strayed:
+                    return tracer.along(targets, free, until)
+                if like.control == "load" or in_order:
+                    return tracer.along(like.load_factors.tolist(), False)
+                try:  # a load factor may occur several times along the path, so that it does not identify a point
+                    return tracer.again(like)
+                except NotConverged:
+                    strayed.append(like)
+                    raise
 
         def correct(layout, coarse):
-            if coarse.events or coarse.control == "arc" or until or not steps.adaptive:
+            if coarse.events or coarse.control == "arc" or until or not steps.adaptive or in_order:
                 return None
-            return tracing(layout, from_rest=False).corrected(coarse)
+            with tracing(layout, from_rest=False) as tracer:
+                return tracer.corrected(coarse)
 
         if elements is not None:
             return trace(Layout.of(scene, elements))
@@ -145,18 +156,25 @@ def solve(
 
 
 def _not_located(path):
-    """Sentences on negative modes that came or went where no event was found."""
-    if path.model != "spatial" or path.scene.follows:  # in a plane nobody looks for events; and that has been said
+    """Sentences on changes of the number of negative modes with fewer events than there must be."""
+    # Planar models locate no events; under loads without a potential the number need not change at an event.
+    if path.model != "spatial" or path.scene.follows:
         return
     counts = [0, *path.negative_modes.tolist()]
+    left_after = path.events[-1].after if path.left and path.events else None
     for k, (before, after) in enumerate(itertools.pairwise(counts)):
         located = sum(event.after == k - 1 for event in path.events)
-        if min(before, after) >= 0 and abs(after - before) > located:
+        if min(before, after) < 0 or left_after == k - 1:
+            continue
+        change = f"negative modes go from {before} to {after} on the way to the load factor {path.load_factors[k]:.6g}"
+        events = f"{located or 'no'} event{'' if located == 1 else 's'}"
+        if abs(after - before) > located:
             yield (
-                f"negative modes go from {before} to {after} on the way to the load factor {path.load_factors[k]:.6g}, where "
-                f"{located or 'no'} event{'' if located == 1 else 's'} could be located: the path may have gone over to another one, or "
-                "the loads have no potential; try load factors in between"
+                f"{change}, where {events} could be located: the tangent was not found to become singular there. The "
+                "path may have changed to another branch, or the loads have no potential; try load factors in between"
             )
+        elif (located - after + before) % 2:
+            yield f"{change}, where {events} were located: there must be one more; try load factors in between"
 
 
 def _follow_options(steps, control, branch):
@@ -173,13 +191,13 @@ def _follow_options(steps, control, branch):
 
 
 def _check_jumps(scene, targets):
-    """One step cannot tell a prescribed rotation from the same one with a full turn more or less."""
+    """Refuse prescribed rotations by pi or more in one step, which equal smaller ones the other way round."""
     farthest = max(abs(b - a) for a, b in zip([0.0, *targets[:-1]], targets, strict=True))
     turn = farthest * _turn(scene)
     if turn >= math.pi:
         raise SceneError(
-            f"steps = StepControl(adaptive=False): a Prescribed rotation would turn by {turn:.3g} rad in one step: expected load "
-            "factors that turn it by less than pi at a time"
+            f"steps = StepControl(adaptive=False): a Prescribed rotation would turn by {turn:.3g} rad in one step: "
+            "expected load factors that turn it by less than pi at a time"
         )
 
 
@@ -222,12 +240,14 @@ def check_arguments(scene, tol, elements):
         raise SceneError(f"scene is a {type(scene).__name__}: expected a Scene{hint}")
     if not scene.loads and not any(isinstance(support, Prescribed) for support in scene.supports):
         raise SceneError(
-            "Scene.loads is empty: expected at least one load, such as Force(rod.end, (0, 0, -1)), or a Prescribed motion"
+            "Scene.loads is empty: expected at least one load, such as Force(rod.end, (0, 0, -1)), or a Prescribed "
+            "motion"
         )
     for item in scene.moving:
         raise SceneError(
-            f"Scene: the {type(item).__name__} depends on time, and statics knows none: expected a vector, or a motion: "
-            "cf.simulate(scene, duration) in Python, a duration under [simulate] in a scene file, --duration on the command line"
+            f"Scene: the {type(item).__name__} depends on time, which a static analysis excludes: expected a vector, "
+            "or a motion: cf.simulate(scene, duration) in Python, a duration under [simulate] in a scene file, "
+            "--duration on the command line"
         )
     check_no_mechanism(scene)
     if isinstance(tol, bool) or not isinstance(tol, numbers.Real) or not 1e-12 <= tol < 1:

@@ -1,8 +1,8 @@
-"""Stability of an equilibrium by the negative squares of the second variation in (r, theta).
+"""Stability of an equilibrium by the number of negative eigenvalues of the second variation in (r, theta).
 
-The form never leaves |q| = 1, so that a stable state has none, whatever the formulation. A dead moment in space is not
-conservative and makes the tangent unsymmetric; its symmetric part in the rotation variables is what is counted. In a
-plane the second variation falls into two parts, the motions in the plane and those out of it.
+The variations (r, theta) keep |q| = 1, so that a stable state has no negative eigenvalue, whatever the formulation. A
+dead moment in space is not conservative and makes the tangent unsymmetric; the eigenvalues of its symmetric part are
+counted. In a plane model the second variation decouples into motions in the plane and motions out of it.
 """
 
 import numpy as np
@@ -16,14 +16,14 @@ _LARGEST_ROW = PETSc.NormType.NORM_INFINITY
 
 
 class NegativeModes:
-    """Counts negative squares at a problem's state.
+    """Counts the negative eigenvalues of the second variation at a problem's state.
 
     Args:
         problem: a `Problem`; its model carries the second variation, in parts.
 
     Attributes:
         parts: the `Part`s of the second variation.
-        sideways: how many of the negative squares that were counted last lead out of the plane; 0 in space.
+        sideways: of the last count, the number of negative eigenvalues of motions out of the plane; 0 in space.
     """
 
     def __init__(self, problem):
@@ -37,18 +37,19 @@ class NegativeModes:
 
     @property
     def whole(self):
-        """The one part of a rung in space; eigenvalues and modes are asked of it."""
+        """The only part of a spatial model, which computes eigenvalues and modes."""
         (part,) = self.parts
         return part
 
     def count(self, *, neutral=False):
-        """Number of negative squares at the problem's state and load factor.
+        """Number of negative eigenvalues at the problem's state and load factor.
 
         Args:
-            neutral: whether the eigenvalue next to zero is that of a motion that changes nothing, and does not count.
+            neutral: whether the eigenvalue nearest zero belongs to a neutral motion (one that leaves the energy as it
+                is) and is not counted.
 
         Returns:
-            int, or -1 where the second variation is singular to round-off.
+            int, or -1 where the second variation is singular to rounding.
         """
         counts = [part.count(neutral=neutral) for part in self.parts]
         self.sideways = sum(n for n, part in zip(counts, self.parts, strict=True) if part.variation.sideways and n > 0)
@@ -56,7 +57,7 @@ class NegativeModes:
 
 
 class Part:
-    """A part of the second variation that decouples from the others.
+    """A diagonal block of the second variation, decoupled from the other blocks.
 
     Args:
         problem: a `Problem`.
@@ -64,7 +65,7 @@ class Part:
 
     Attributes:
         variation: the model's `SecondVariation`.
-        K: its matrix; pc: the factorisation.
+        K: its matrix; pc: a PETSc preconditioner with the factorisation of K.
     """
 
     def __init__(self, problem, index):
@@ -73,7 +74,13 @@ class Part:
         tied = variation.tied
         self.K = variation.numbering.matrix(variation.cell_dofs, tied[tied >= 0])
         self.K.setOption(PETSc.Mat.Option.SYMMETRIC, True)
-        self._form = Packed(variation.form, (self.model.state, *self.model.carried))
+        first, end = self.K.getOwnershipRange()
+        self._tied_here = np.flatnonzero((tied.ravel() >= first) & (tied.ravel() < end))
+        self._tied_rows = tied.ravel()[self._tied_here] - first
+        self._diagonal = self.K.createVecLeft()
+        actions = self.model.actions
+        moving = (self.model.state, *self.model.carried, *actions.refreshed, *actions.memory_functions)
+        self._form = Packed(variation.form, moving)
         self.pc = PETSc.PC().create(self.model.comm)
         linear.factor_second_variation(self.pc, self.K)
 
@@ -86,7 +93,7 @@ class Part:
         """The second variation at the problem's state and load factor, in K.
 
         Args:
-            stress_alone: leave out what holds whatever the stress: the stiffness of sections, supports and joints.
+            stress_alone: geometric stiffness alone, without the stiffness of sections, supports and joints.
         """
         problem, variation = self.problem, self.variation
         self.K.zeroEntries()
@@ -95,11 +102,20 @@ class Part:
                 self._form.add_to_matrix(self.K)
         else:
             self._form.add_to_matrix(self.K)
-        if problem.ties:
-            problem.ties.add_second_variation(
-                self.K, variation.tied, variation.axes, problem.load_factor, held=not stress_alone
-            )
+        ties, (tied, axes) = problem.ties, (variation.tied, variation.axes)
+        if ties:
+            ties.add_second_variation(self.K, tied, axes, problem.eta)
         self.K.assemble()
+        if ties and not stress_alone:
+            ties.add_springs(self.K, tied, axes, problem.eta, self._resistance())
+            self.K.assemble()
+
+    def _resistance(self):
+        """(tied nodes, block) absolute diagonal entries of K at the nodes with constraints, summed over all ranks."""
+        self.K.getDiagonal(self._diagonal)
+        found = np.zeros(self.variation.tied.shape)
+        found.ravel()[self._tied_here] = np.abs(self._diagonal.array_r[self._tied_rows])
+        return self.model.comm.allreduce(found) if self.model.comm.size > 1 else found
 
     def count(self, *, neutral=False):
         """See `NegativeModes.count`."""
@@ -113,8 +129,8 @@ class Part:
         return -1 if zero else negative
 
     def _nearest(self, count, side=0):
-        """Eigenvalues next to zero, on one side of it or both, and their vectors at the state that was counted last."""
-        if self._zero:  # MUMPS leaves null pivots out of its solutions: the same vectors with all eigenvalues shifted
+        """(eigenvalues nearest zero, their eigenvectors) at the state of the last count; side: 1, -1 or 0 for both."""
+        if self._zero:  # MUMPS drops null pivots from solutions; shifting all eigenvalues leaves the eigenvectors
             self._zero, self._shift = 0, 10 * _ROUNDING * self.K.norm(_LARGEST_ROW)
             self.K.shift(self._shift)
             self.pc.setOperators(self.K)
@@ -123,36 +139,47 @@ class Part:
         return values - self._shift, vectors
 
     def is_neutral(self):
-        """Whether the eigenvalue next to zero is zero to round-off at the problem's state, which was counted last."""
+        """Whether the eigenvalue nearest zero vanishes to rounding at the problem's state, that of the last count."""
         values, _ = self._nearest(2)
         return abs(values[0]) < 1e-3 * abs(values[-1]) and abs(values[0]) < 30 * _ROUNDING * self.K.norm(_LARGEST_ROW)
 
     def eigenvalue(self, j):
-        """The j-th eigenvalue of the second variation at the problem's state, counted from 0 in ascending order; for
-        those next to zero."""
+        """The j-th eigenvalue of the second variation at the problem's state, from 0 in ascending order.
+
+        Only eigenvalues near zero are cheap: all those between it and zero are computed.
+        """
         self.count()
-        above = j - self._negative  # 0: the smallest positive one, -1: the negative one next to zero
+        above = j - self._negative  # 0: the smallest positive one, -1: the negative one nearest zero
         needed, side = (1 + above, 1) if above >= 0 else (-above, -1)
         values = self._nearest(needed, side)[0]
         found = np.sort(np.abs(values[values * side >= 0]))
         if len(found) >= needed:
             return float(side * found[needed - 1])
-        return float(self._nearest(1)[0][0])  # zero to round-off: the count says one sign, this another
+        return float(self._nearest(1)[0][0])  # zero to rounding: factorisation and eigensolver differ in its sign
 
     def modes(self, count, side=0):
-        """The modes of the eigenvalues nearest zero, on one side of it or both, as changes of the unknowns (owned numbers),
-        see `oriented`."""
+        """The modes of the eigenvalues nearest zero, oriented by `oriented`.
+
+        Args:
+            count: number of modes.
+            side: 1 or -1 for positive or negative eigenvalues alone; 0 for both.
+
+        Returns:
+            Changes of the unknowns, arrays over the entries that this rank owns.
+        """
         self.count()
         return oriented(self.model, self._nearest(count, side)[1])
 
 
 def oriented(model, vectors):
-    """Modes of one eigenvalue as changes of the unknowns (owned numbers), without the choice that eigensolvers leave.
+    """Modes of one eigenvalue as changes of the unknowns (owned entries), in a basis independent of the eigensolver.
 
-    They are turned among themselves so that the node that they move farthest moves along the first inertial axis that
-    it can move along, in the positive direction, by the first of them alone; and so on. A single mode gets its sign.
-    The largest displacement of each is 1 (in the model's unit of length).
+    The basis of the eigenspace is rotated so that the node with the largest displacement moves along the first
+    inertial axis possible, in the positive direction, in the first mode alone; likewise for the remaining modes. A
+    single mode gets its sign thereby. The largest displacement of each is 1 (in the model's unit of length).
     """
+    if not vectors:  # the eigensolver has not converged
+        return []
     modes = np.array([model.change_of(vector) for vector in vectors])
     shapes = np.array([model.shape_of(mode) for mode in modes])
     for k in range(len(modes)):

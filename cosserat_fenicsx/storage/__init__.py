@@ -1,1 +1,1 @@
-"""Motions that are written as they go, so that they can be read and gone on with."""
+"""Motions on disk: states and checkpoints are written during the run, so that it can be read and continued."""

@@ -1,6 +1,6 @@
-"""All that a computation needs to go on, in a file that is replaced as a whole: numbers with names, in folders of names.
+"""Checkpoints: the data that a computation is continued from, in a file that is replaced as a whole.
 
-What a solver has to remember is a dict of arrays, numbers and such dicts.
+The data are a dict of arrays, numbers and such dicts; the keys of nested dicts are joined by "/".
 """
 
 import io
@@ -13,14 +13,14 @@ import numpy as np
 
 
 def write(file, memory):
-    """Write a dict of arrays, numbers and dicts as .npz; a file of that name stays whole until the new one is.
+    """Write a dict of arrays, numbers and dicts as .npz; an old file is replaced once the new one is complete.
 
     Raises:
-        OSError: it cannot be written; the file that was there stays.
+        OSError: it cannot be written; the old file stays.
     """
     file = Path(file)
     fresh = file.with_name(file.name + ".new")
-    data = io.BytesIO()  # a disk that is full must not end the writing of an archive half way
+    data = io.BytesIO()  # complete in memory first, so that a full disk does not interrupt the writing of the archive
     np.savez(data, **dict(_flat(memory)))
     try:
         with open(fresh, "wb") as stream:
@@ -34,7 +34,7 @@ def write(file, memory):
 
 
 def read(file):
-    """What was written; None where the file is missing or damaged."""
+    """The dict that was written; None where the file is missing or damaged."""
     try:
         with np.load(file, allow_pickle=False) as stored:
             flat = {name: stored[name] for name in stored.files}

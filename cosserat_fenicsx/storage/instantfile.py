@@ -1,7 +1,7 @@
-"""Saved states of a motion in a file that grows: rows of one length in NumPy's .npy format, read as they are asked for.
+"""Saved states of a motion in a growing file: records of one size in NumPy's .npy format, read when they are used.
 
-A row counts once it is complete. Whatever ends the writing (a killed process, a full disk, a copy that was cut off)
-costs the last row at most, and `numpy.load(file, mmap_mode="r")` opens the rest, with fields by name.
+Only complete rows count. Whatever ends the writing (a killed process, a full disk, an incomplete copy) loses the last
+row at most, and `numpy.load(file, mmap_mode="r")` opens the rest, with fields by name.
 """
 
 import ast
@@ -15,34 +15,47 @@ from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.results.history import Instant, Ledger
 
 _MAGIC = b"\x93NUMPY\x01\x00"
-#: Columns of a row, of an `Instant` and of its `Ledger`, and whether they are whole numbers.
+#: Scalar columns of a row by their types in the file (the scalars of an `Instant`), and its arrays; the fields of its
+#: `Ledger` follow.
 _OF_INSTANT = {"time": "<f8", "load_factor": "<f8", "steps": "<i8", "iterations": "<i8"}
-_ARRAYS = ("rq", "rates", "gauss_fields", "reactions")
+_ARRAYS = ("rq", "rates", "gauss_fields", "reactions", "tie_forces", "clamp_forces")
 
 
 class InstantFile:
-    """The rows of one file, like a list of `Instant`s: those that it had when it was last looked at.
+    """The rows of one file as a sequence of `Instant`s; their number is that at the last `look`.
 
     Args:
-        file: its name; what does not exist has no rows.
+        file: its name; a missing file has no rows.
 
     Raises:
-        SceneError: a file that is none of these.
+        SceneError: a file that does not hold saved states.
     """
 
     def __init__(self, file):
-        self.file, self._dtype, self._rows = Path(file), None, None
+        self.file, self._dtype, self._rows = Path(file).absolute(), None, None
         self.look()
 
+    def __getstate__(self):
+        return {"file": self.file, "rows": len(self)}
+
+    def __setstate__(self, state):
+        self.__init__(state["file"])
+        if len(self) < state["rows"]:
+            raise SceneError(
+                f"{self.file}: expected the {state['rows']} saved states of a motion that was pickled without them, "
+                f"but there are {len(self)}"
+            )
+
     def look(self):
-        """See what there is by now."""
+        """Update the number of rows to those in the file now."""
         size = self.file.stat().st_size if self.file.exists() else 0
         if self._dtype is None and size:
             self._dtype, self._first = _read_header(self.file)
         self._count = max(0, size - self._first) // self._dtype.itemsize if self._dtype else 0
 
     def put(self, k, instant):
-        """Write row k, the first one beyond the end or one that is there; the first one of all makes the file. `look` tells it.
+        """Write row k, an existing one or the next after the last; the first row makes the file. `look` makes it
+        visible.
 
         Raises:
             OSError: it cannot be written; the rows before it stay.
@@ -65,7 +78,7 @@ class InstantFile:
             _write(stream, 0, _header(self._dtype, max(self._count, k + 1)))
 
     def settle(self):
-        """Have the operating system put the rows on the disk, so that they outlive a power cut."""
+        """Flush the rows to the disk (fsync), so that they survive a power failure."""
         if self.file.exists():
             with open(self.file, "rb") as stream:
                 os.fsync(stream.fileno())
@@ -84,8 +97,7 @@ class InstantFile:
 
     @property
     def rows(self):
-        """(n,) the rows of now as they lie in the file, with a field for each column: nothing is read before it is
-        looked at."""
+        """(n,) structured array of the rows, memory-mapped: data are read from the file when they are used."""
         if self._rows is None or len(self._rows) != self._count:
             shape = (self._count,)
             self._rows = (
@@ -112,7 +124,7 @@ def _dtype_of(instant):
 
 
 def _write(stream, place, data):
-    """All of it: the system may take less at once."""
+    """Write all data, in several calls where the system writes less at once."""
     data = memoryview(data)
     while data:
         done = os.pwrite(stream.fileno(), data, place)
@@ -120,7 +132,7 @@ def _write(stream, place, data):
 
 
 def _header(dtype, count):
-    """The header of a .npy file of that many rows; always of one length, so that it can be written anew."""
+    """The header of a .npy file of `count` rows, of the same length for every count, so that it can be overwritten."""
 
     def text(n):
         return repr({"descr": dtype.descr, "fortran_order": False, "shape": (n,)}).encode()
@@ -142,5 +154,6 @@ def _read_header(file):
         return np.dtype(columns), len(start) + inside
     except (ValueError, SyntaxError, struct.error, KeyError, TypeError) as problem:
         raise SceneError(
-            f"{file} is damaged ({problem}): expected saved states; without the file, cosserat_fenicsx.resume computes them anew"
+            f"{file} is damaged ({problem}): expected saved states; without the file, cosserat_fenicsx.resume computes "
+            "them again"
         ) from None

@@ -1,9 +1,9 @@
-"""The folder of a motion that is written as it goes: what was asked for, its states, and what it goes on from.
+"""The folder that a motion is written to during the run: its arguments, its saved states and its checkpoints.
 
-motion.json    what was asked for and what it is computed with, in words and numbers
+motion.json    the arguments of `simulate`, versions, and the fingerprint of the scene
 scene.pickle   the scene, where it can be pickled
 instants.npy   the saved states, see `instantfile`
-start.npz, checkpoint.npz   what the solver remembered at the start, and seconds ago, of every rank
+start.npz, checkpoint.npz   the data of all ranks that the solver continues from: at the start, and the latest
 """
 
 import fcntl
@@ -17,12 +17,12 @@ from cosserat_fenicsx import __version__
 from cosserat_fenicsx.checks import instance
 from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.ranks import on_first
-from cosserat_fenicsx.scene.likeness import difference, likeness, likeness_at, times_ahead
 from cosserat_fenicsx.storage import checkpoints
+from cosserat_fenicsx.storage.fingerprint import difference, fingerprint, fingerprint_at, times_ahead
 
-#: s between checkpoints; and how many times longer than it takes to write one they are apart, at least.
+#: Least time between checkpoints: in s, and as a multiple of the time that it takes to write one.
 APART, SELDOM = 2.0, 50
-_FORMAT = 1
+_FORMAT = 2
 _HEAD, _SCENE, _START, _LATEST = "motion.json", "scene.pickle", "start.npz", "checkpoint.npz"
 
 
@@ -33,12 +33,12 @@ class RunFolder:
         place: its name; comm: MPI communicator.
 
     Raises:
-        SceneError: no name.
+        SceneError: `place` is not a name.
 
     Attributes:
         place: a `pathlib.Path`.
-        asked: the arguments of `simulate`; told: what a `History` says of itself.
-        durations: s, that of `simulate`, and longer ones that were asked for later; ranks: their number.
+        asked: the arguments of `simulate`; told: the description of the `History`, see `History.told`.
+        durations: s, that of `simulate` and those of later continuations, ascending; ranks: number of MPI ranks.
     """
 
     def __init__(self, place, comm):
@@ -46,11 +46,11 @@ class RunFolder:
         self.place, self.comm, self._lock = Path(place), comm, None
 
     def make(self, scene, asked, history):
-        """A new one.
+        """Make the folder for a new motion.
 
         Args:
             scene: the scene; asked: the arguments of `simulate`, plain values.
-            history: the empty `StoredHistory` that is to lie in it.
+            history: the empty `StoredHistory` whose states will be written there.
 
         Raises:
             SceneError: the folder holds a motion already, or cannot be made.
@@ -62,7 +62,7 @@ class RunFolder:
             "asked": asked,
             "durations": [asked["duration"]],
             "told": history.told(),
-            "scene": likeness(scene, asked["duration"]),
+            "scene": fingerprint(scene, asked["duration"]),
             "ahead": _ahead(scene, asked["duration"]),
         }
         self._on_first(lambda: self._make(scene, _text(head)))
@@ -72,26 +72,26 @@ class RunFolder:
 
     def _make(self, scene, head):
         place = self.place
-        if (place / _HEAD).exists() and (place / _START).exists():  # else its process was killed before the first step
+        if (place / _HEAD).exists() and (place / _START).exists():  # without both, it was killed before the first step
             raise SceneError(
-                f"simulate.folder = {str(place)!r}: it holds a motion already: expected another name, or that it is removed "
-                f"first; cosserat_fenicsx.resume({str(place)!r}), or `cosserat resume {place}`, goes on with it"
+                f"simulate.folder = {str(place)!r}: it holds a motion already: expected another name, or that it is "
+                f"removed first; cosserat_fenicsx.resume({str(place)!r}), or `cosserat resume {place}`, continues it"
             )
         place.mkdir(parents=True, exist_ok=True)
         for name in ("instants.npy", _SCENE, _START, _LATEST):
             (place / name).unlink(missing_ok=True)
         try:
             (place / _SCENE).write_bytes(pickle.dumps(scene))
-        except (pickle.PicklingError, AttributeError, TypeError):  # functions without a name to be found by
+        except (pickle.PicklingError, AttributeError, TypeError):  # such as lambdas and local functions
             (place / _SCENE).unlink(missing_ok=True)
         (place / _HEAD).write_text(head, encoding="utf-8")
         self._hold()
 
     def open(self):
-        """One that is there.
+        """Read an existing folder.
 
         Raises:
-            SceneError: there is no motion in it.
+            SceneError: it holds no motion.
         """
         try:
             head = json.loads((self.place / _HEAD).read_text(encoding="utf-8"))
@@ -100,10 +100,11 @@ class RunFolder:
                     f"{self.place}: its format is {head['format']}: expected {_FORMAT}, that of this release"
                 )
             self.asked, self.told, self.durations = (head[name] for name in ("asked", "told", "durations"))
-            self.ranks, self._likeness, self._head = head["ranks"], head["scene"], head
+            self.ranks, self._fingerprint, self._head = head["ranks"], head["scene"], head
         except OSError as problem:
             raise SceneError(
-                f"{self.place}: no motion was found there ({_HEAD}: {problem.strerror}): expected a folder that simulate(..., folder=...) wrote"
+                f"{self.place}: no motion was found there ({_HEAD}: {problem.strerror}): expected a folder that "
+                "simulate(..., folder=...) wrote"
             ) from None
         except (ValueError, KeyError, TypeError) as problem:
             raise SceneError(f"{self.place / _HEAD} is damaged ({problem!r})") from None
@@ -111,19 +112,19 @@ class RunFolder:
         return self
 
     def scene(self, given, until):
-        """The scene of the motion: the one that is given, or the one in the folder.
+        """The scene of the motion: the given one, or the one stored in the folder.
 
         Args:
-            given: a `Scene` or None; until: s: for how long it must be the one of the motion.
+            given: a `Scene` or None; until: time (s) up to which it must agree with the fingerprint.
 
         Raises:
-            SceneError: none can be had, or it is another one.
+            SceneError: no scene is given or stored, or it disagrees with the fingerprint.
         """
         scene = given if given is not None else self._stored_scene()
         ahead = [(t, told) for t, told in self._head.get("ahead", ()) if self.durations[-1] < t <= until]
-        given, expected = likeness_at(scene, [t for t, _ in ahead]), dict(self._likeness)
+        given, expected = fingerprint_at(scene, [t for t, _ in ahead]), dict(self._fingerprint)
         for duration in self.durations:
-            given |= likeness(scene, duration)
+            given |= fingerprint(scene, duration)
         for _, told in ahead:
             expected |= told
         differs = difference(json.loads(_text(given)), expected)
@@ -135,15 +136,15 @@ class RunFolder:
         try:
             return pickle.loads((self.place / _SCENE).read_bytes())
         except FileNotFoundError:
-            why = "the folder does not hold it, since its functions (a lambda, perhaps) have no name to be found by"
-        except Exception as problem:  # whatever a module that is not there, or a damaged file, brings about
+            why = "the folder does not hold it, since its functions (a lambda, perhaps) cannot be pickled"
+        except Exception as problem:  # unpickling a damaged file, or with a missing module, may raise anything
             why = f"the folder's own cannot be loaded here ({type(problem).__name__}: {problem})"
         raise SceneError(f"resume.scene = None: expected the scene of {self.place}, because {why}")
 
     def extend(self, duration, scene):
-        """A longer duration is asked for, of the scene of the motion."""
-        self.durations.append(duration)  # and with it to the head
-        self._likeness |= likeness(scene, duration)
+        """Record a longer duration (s) of the motion, with the scene's fingerprint up to there."""
+        self.durations.append(duration)  # this list is also in self._head
+        self._fingerprint |= fingerprint(scene, duration)
         self._head["ahead"] = _ahead(scene, duration)
 
         def rewrite():
@@ -153,18 +154,18 @@ class RunFolder:
 
         self._on_first(rewrite)
 
-    # -- what a motion goes on from ----------------------------------------------------------------------------------
+    # -- locks and checkpoints ---------------------------------------------------------------------------------------
 
     def hold(self):
-        """Keep other processes from writing here.
+        """Lock the folder, so that no other process writes to it.
 
         Raises:
-            SceneError: one does.
+            SceneError: another process has locked it.
         """
         self._on_first(self._hold)
 
     def _hold(self):
-        self._lock = os.open(self.place, os.O_RDONLY)  # the folder itself: its files may be replaced
+        self._lock = os.open(self.place, os.O_RDONLY)  # locks the folder itself, since its files may be replaced
         try:
             fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
@@ -176,23 +177,23 @@ class RunFolder:
             pass  # a file system without locks
 
     def release(self):
-        """Let other processes write here."""
+        """Unlock the folder."""
         if self._lock is not None:
             os.close(self._lock)
             self._lock = None
 
     @property
     def due(self):
-        """Whether it is time for a checkpoint: the same on all ranks. When these are made does not change a digit."""
+        """Whether it is time for a checkpoint, the same on all ranks. Checkpoints do not influence the motion."""
         now = self._last is None or time.monotonic() - self._last > self._apart
         return self.comm.bcast(now) if self.comm.size > 1 else now
 
     def keep(self, memory, history):
-        """Write what a resumed motion goes on from; the first time also as what to start from anew.
+        """Write a checkpoint; the first one is also kept as that of the start.
 
         Args:
-            memory: of this rank, see `checkpoints`.
-            history: its `StoredHistory`, which is made safe first.
+            memory: the data of this rank, see `checkpoints`.
+            history: the `StoredHistory`, whose states are flushed to the disk first.
 
         Raises:
             NotStored: it cannot be written.
@@ -209,7 +210,7 @@ class RunFolder:
             checkpoints.write(self.place / _START, parts)
 
     def memories(self):
-        """What this rank remembered, the latest first; those that cannot be read are left out."""
+        """The readable checkpoints of this rank, the latest first."""
         for name in (_LATEST, _START):
             parts = checkpoints.read(self.place / name)
             if parts is not None and str(self.comm.rank) in parts:
@@ -220,15 +221,16 @@ class RunFolder:
             on_first(self.comm, action)
         except OSError as problem:
             raise SceneError(
-                f"simulate.folder = {str(self.place)!r}: {problem.strerror or problem}: expected a folder that can be written to"
+                f"simulate.folder = {str(self.place)!r}: {problem.strerror or problem}: expected a folder that can be "
+                "written to"
             ) from None
 
 
 def _ahead(scene, duration):
-    """[(time, likeness)] after a duration, where a scene depends on time."""
-    told = ((t, likeness_at(scene, [t])) for t in times_ahead(duration))
+    """[(time, fingerprint at that time)] after a duration, s; empty where the scene does not depend on time."""
+    told = ((t, fingerprint_at(scene, [t])) for t in times_ahead(duration))
     return [(t, values) for t, values in told if values]
 
 
 def _text(head):
-    return json.dumps(head, indent=1, default=lambda number: number.item())  # those of NumPy
+    return json.dumps(head, indent=1, default=lambda number: number.item())  # NumPy's numbers

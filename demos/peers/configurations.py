@@ -46,7 +46,7 @@ def _own(problem):
     fixed = [
         {"model": rung, "formulation": formulation, "degree": degree, "elements": elements}
         for rung, formulation in pairs
-        for degree in ((2,) if formulation == "multiplier" and problem != "single" else (1, 2, 3, 4))
+        for degree in (1, 2, 3, 4)
         for elements in _MESHES
     ]
     return fixed + [{"model": rung, "tol": tol} for rung in ("auto", "spatial") for tol in (1e-3, 1e-5, 1e-7)]

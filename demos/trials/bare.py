@@ -3,6 +3,7 @@
 What a short script does: assemble, fix the clamp's rows, give PETSc's SNES its head. The rows may be put into N and N m first.
 """
 
+from contextlib import ExitStack
 from dataclasses import dataclass
 from types import SimpleNamespace
 
@@ -15,6 +16,7 @@ from dolfinx.fem import petsc as fem_petsc
 from petsc4py import PETSc
 
 from cosserat_fenicsx import compat
+from cosserat_fenicsx.models.laws import as_matrix, law_of
 from cosserat_fenicsx.models.rodmesh import Layout
 from cosserat_fenicsx.statics import solvers
 from trials import problems
@@ -43,7 +45,9 @@ class Loop:
                  formulation="displacement", degree=2, points=None, elements=8, predict=False, weak=False):  # fmt: skip
         _, scene = problems.scene_of(problem)
         layout = Layout.of(scene, elements)
-        loaded, _, _ = solvers.solvers_of(scene, layout, formulation=formulation, degree=degree, points=points)
+        self._lease = ExitStack()  # never closed: the problem is this loop's for good
+        lent = solvers.solvers_of(scene, layout, formulation=formulation, degree=degree, points=points)
+        loaded, _, _ = self._lease.enter_context(lent)
         self.problem, self.model = problem, loaded.model
         self.forms = weakly_unit(self.model) if weak else self.model.forms
         forms, nodal, slots = self.model.forms, self.model._nodal, self.model._slots
@@ -138,14 +142,14 @@ def weakly_unit(model):
     """Residual and tangent of eq. (1) as it reads: |q|^2 = 1 is tested with the Gauss points of the rest, not at the nodes."""
     U, data = model.state, model.data
     w, trial = ufl.TestFunction(model.space), ufl.TrialFunction(model.space)
-    R_R = ufl.as_matrix([[data.R_R[3 * i + j] for j in range(3)] for i in range(3)])
-    section = equilibrium.Section(data.K, data.K_inv, data.J, R_R, data.v_R)
-    rule = ufl.dx(domain=model.mesh, metadata={"quadrature_degree": 2 * model.shape.points - 1})
+    section = equilibrium.Section(law_of(data.K, data.K_inv, data.J, data.G), as_matrix(data.R_R), data.v_R)
+    rule = ufl.dx(domain=model.mesh, metadata={"quadrature_degree": 2 * model.signature.points - 1})
 
     def ds(a):
         return a * rule
 
-    residual = eq.displacement(eq.state_of(U, U.dx(0), U), section, eq.tests_of(w, w.dx(0)), ds, ds)
+    state, test = eq.state_of(U, U.dx(0), U), eq.tests_of(w, w.dx(0))
+    residual = equilibrium.displacement(state, section, test, ds) + ds(eq.unit_quaternion(state, test))
     with compat.quiet_compiler():
         return SimpleNamespace(
             residual=fem.form(residual), tangent=fem.form(ufl.derivative(residual, U, trial)), dead=model.forms.dead

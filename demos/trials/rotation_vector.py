@@ -11,6 +11,7 @@ import basix
 import numpy as np
 import ufl
 from cosserat_fenicsx.forms import equilibrium
+from cosserat_fenicsx.forms.law import DiagonalLaw
 from cosserat_fenicsx.forms.spatial import rotation_tests_of
 from dolfinx import fem
 from dolfinx.fem import petsc as fem_petsc
@@ -68,7 +69,7 @@ class Rod:
         numbers = [min(problem[key] / unit, NEXT_TO_INFINITE) for key in ("GA", "GA", "EA")]
         bending = [1.0, 1.0, problem["GJ"] / problem["EI"]]
         K, K_inv, J = (fem.Constant(mesh, np.array(a)) for a in (numbers, 1 / np.array(numbers), bending))
-        section = equilibrium.Section(K, K_inv, J, reference, ufl.as_vector([0, 0, 1]))
+        section = equilibrium.Section(DiagonalLaw(K, K_inv, J), reference, ufl.as_vector([0, 0, 1]))
         w = ufl.TestFunction(space)
         test = rotation_tests_of(w, w.dx(0))
         residual = equilibrium.displacement(motion, section, test, lambda a: a * rule)

@@ -1,4 +1,4 @@
-"""Schemes: how a motion goes from t to t + h. A new scheme is one file here, and its forms."""
+"""Time integration schemes: one step from t to t + h. A new scheme is one file here, and its forms."""
 
 from cosserat_fenicsx.dynamics.steppers.energy import Energy
 from cosserat_fenicsx.dynamics.steppers.generalised_alpha import GeneralisedAlpha

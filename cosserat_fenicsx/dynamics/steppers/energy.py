@@ -1,8 +1,9 @@
-"""Exact energy, and linear momentum; angular momentum to the second order (forms/energy.py).
+"""The scheme with exact energy and linear momentum; angular momentum to second order (forms/energy.py).
 
-The form is tested with changes of (r, q). At every node those of q are made of a rotation phi, delta q = phi q_m/2,
-which is perpendicular to q_m: so |q| = 1, the fourth equation of the node, needs no multiplier, and loads and supports
-act as in the other schemes.
+The test functions of the form are variations of (r, q). At every node the variation of q is that by a small rotation
+phi, delta q = phi q_m/2 with q_m the mean of q over the step, which is perpendicular to q_m. So three equations belong
+to the rotation, |q| = 1 is the fourth equation of the node and needs no multiplier, and loads and supports act as in
+the other schemes.
 """
 
 import numpy as np
@@ -17,7 +18,7 @@ _SAME = PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN
 
 
 class TurnedStepProblem(StepProblem):
-    """See `StepProblem`: the rows of q are turned to those of a rotation, at every node."""
+    """See `StepProblem`: the rows of q of every node are transformed to those of a rotation, and |q|^2 = 1 is added."""
 
     def __init__(self, model):
         super().__init__(model)
@@ -44,13 +45,13 @@ class TurnedStepProblem(StepProblem):
             self._live_matrix = numbering.matrix(model.cell_dofs, np.empty(0, dtype=np.int64))
 
     def _kind(self):
-        return "general"  # a product of matrices is not stored by blocks
+        return "general"  # PETSc does not store a product of matrices in blocks
 
     def _ends(self):
         return (*super()._ends(), self.model.turning)
 
     def _fill(self, matrix, blocks, others, mode=PETSc.InsertMode.INSERT_VALUES):
-        """Blocks (nodes, 4, 4) for the q of the nodes, `others` on the rest of the diagonal."""
+        """Put blocks (nodes, 4, 4) at the rows and columns of q of the nodes, `others` on the rest of the diagonal."""
         values = np.concatenate([np.full((len(blocks), 3), others), blocks.reshape(-1, 16)], axis=1).ravel()
         rest = np.full(self.numbering.size - 7 * self._nodes, others)
         matrix.setValuesCSR(self._rows, self._columns, np.concatenate([values, rest]), mode)
@@ -67,12 +68,12 @@ class TurnedStepProblem(StepProblem):
         """(nodes, 4) q of the free nodes of this rank."""
         return x.array_r[: 7 * self._nodes].reshape(-1, 7)[:, 3:]
 
-    def aim(self, t, h):
+    def begin_step(self, t, h):
         """See `StepProblem`."""
         self._q_start = self._of_nodes(self.x).copy()
-        super().aim(t, h)
+        super().begin_step(t, h)
         self._known.set(0.0)
-        self._known.axpy(self.load_factor, self._loads)
+        self._known.axpy(1.0, self._loads)
 
     def _put_stresses(self, x, b):
         """See `StepProblem`."""
@@ -84,7 +85,7 @@ class TurnedStepProblem(StepProblem):
         rows[:, 0] = np.einsum("ni,ni->n", q, q) - 1
         if self._live:
             self._assemble(self._live, self._vector)
-            b.axpy(-self.load_factor, self._vector)
+            b.axpy(-1.0, self._vector)
 
     def jacobian(self, snes, x, A, P):
         """See `StepProblem`."""
@@ -107,14 +108,14 @@ class TurnedStepProblem(StepProblem):
             self._live_tangent.catch_up()
             self._live_tangent.add_to_matrix(self._live_matrix)
             self._live_matrix.assemble()
-            P.axpy(-self.load_factor, self._live_matrix, _SAME)
+            P.axpy(-1.0, self._live_matrix, _SAME)
         if self.ties:
             self.ties.add_tangent(P, self.load_factor)
         P.assemble()
 
 
 def _turning(q):
-    """(nodes, 3, 4): rows of a rotation from those of q, the transpose of phi -> phi q/2."""
+    """(nodes, 3, 4): maps residuals of q to those of a rotation: the transpose of phi -> phi q/2."""
     v = q[:, 1:]
     turning = np.zeros((len(q), 3, 4))
     turning[:, :, 0] = -v
@@ -126,7 +127,7 @@ def _turning(q):
 
 
 def _turning_of(R):
-    """(nodes, 3, 4): the derivative of `_turning`((q_0 + q)/2) R by q."""
+    """(nodes, 3, 4): the derivative of `_turning`((q_0 + q)/2) R with respect to q, for residuals R (nodes, 4) of q."""
     v = R[:, 1:]
     change = np.zeros((len(R), 3, 4))
     change[:, :, 0] = v
@@ -141,4 +142,4 @@ class Energy(OneStep):
     """See `protocol.Stepper`."""
 
     forms, problem_class = "energy", TurnedStepProblem
-    coarseness = 4.0  # averaged directors are shorter than one
+    error_ratio = 4.0  # the error is larger since averaged directors are shorter than one

@@ -1,33 +1,34 @@
-"""Dissipation of unresolved modes: the generalised-alpha scheme, order 2, on rotations as they are.
+"""Dissipation of unresolved modes: the generalised-alpha scheme, order 2, on the rotation group.
 
-Eq. (1) holds at the end of every step; an acceleration b beside the true one, a, carries velocities and positions on
-(Arnold & Bruels, Multibody Syst. Dyn. 18 (2007) 185, doi:10.1007/s11044-007-9084-0, and with rotation vectors as
-increments Bruels & Cardona, J. Comput. Nonlinear Dyn. 5 (2010) 031002, doi:10.1115/1.4001370):
+Eq. (1) holds at the end of every step; velocities and positions are integrated by an auxiliary acceleration b beside
+the true one, a (Arnold & Bruels, Multibody Syst. Dyn. 18 (2007) 185, doi:10.1007/s11044-007-9084-0, and with rotation
+vectors as increments Bruels & Cardona, J. Comput. Nonlinear Dyn. 5 (2010) 031002, doi:10.1115/1.4001370):
 
     (1 - alpha_m) b_1 + alpha_m b_0 = (1 - alpha_f) a_1 + alpha_f a_0
     D = h v_0 + h^2 ((1/2 - beta) b_0 + beta b_1),   v_1 = v_0 + h ((1 - gamma) b_0 + gamma b_1)
 
-where D is r_1 - r_0 and the rotation vector from q_0 to q_1. The numbers are those of Chung & Hulbert (J. Appl. Mech. 60
-(1993) 371): what vibrates much faster than the steps shrinks by rho_inf a step. With rho_inf = 1 it is the trapezoidal rule.
+where D is r_1 - r_0 and the rotation vector from q_0 to q_1. The coefficients are those of Chung & Hulbert (J. Appl.
+Mech. 60 (1993) 371): vibrations much faster than the steps are multiplied by rho_inf a step. With rho_inf = 1 it is the
+trapezoidal rule.
 """
 
 from typing import NamedTuple
 
 import numpy as np
 
+from cosserat_fenicsx.algebra.newton import Solved
 from cosserat_fenicsx.dynamics.steppers.moving_ties import MovingTies
 from cosserat_fenicsx.dynamics.steppers.one_step import OneStep
 from cosserat_fenicsx.dynamics.steppers.step_problem import StepProblem
-from cosserat_fenicsx.statics.snes import Solved
 
-# Loads at the end of a step are asked for so much of it earlier: before a jump that is there.
-_BEFORE = 1e-6
-# Accelerations at a start are those of a step so much shorter than the first.
-_SHORTER = 0.1
+# Loads at the end of a step are evaluated this share of it earlier, before a jump at the end.
+_BEFORE_END = 1e-6
+# Initial accelerations are those at the end of a trial step of this share of the first one.
+_TRIAL_STEP = 0.1
 
 
 class Rule(NamedTuple):
-    """The numbers of the scheme."""
+    """The coefficients of the scheme."""
 
     alpha_m: float
     alpha_f: float
@@ -36,12 +37,15 @@ class Rule(NamedTuple):
 
     @classmethod
     def of(cls, rho_inf):
-        """Those of Chung & Hulbert."""
+        """The coefficients of Chung & Hulbert."""
         alpha_m, alpha_f = (2 * rho_inf - 1) / (rho_inf + 1), rho_inf / (rho_inf + 1)
         return cls(alpha_m, alpha_f, (1 + alpha_f - alpha_m) ** 2 / 4, 0.5 + alpha_f - alpha_m)
 
     def ahead(self, h):
-        """(3, 4) for `Collocated.aim`, with s = (b - a)/h, which holds on when h changes."""
+        """(3, 4): v, a and s = (b - a)/h at the end of a step as combinations of D, v, a and s at its start.
+
+        For `Collocated.take_scheme`; s stays valid when h changes.
+        """
         D, v0, a0, s0 = np.eye(4)
         b0 = a0 + h * s0
         b1 = (D - h * v0) / (self.beta * h**2) - (0.5 / self.beta - 1) * b0
@@ -51,16 +55,16 @@ class Rule(NamedTuple):
 
     @property
     def leading_error(self):
-        """Of positions over h^3 times their third derivative, in a step."""
+        """The local error of positions over h^3 times their third derivative."""
         return abs((self.alpha_m - self.alpha_f) / 2 + self.beta - 1 / 6)
 
 
-# A step in which nothing of the accelerations before it is left.
-_FIRST = Rule(0.0, 0.0, 0.5, 1.0)
+# The coefficients of a step that does not depend on the accelerations before it.
+_TRIAL_RULE = Rule(0.0, 0.0, 0.5, 1.0)
 
 
 class EndTies(MovingTies):
-    """Equations of supports and joints whose reactions act where these hold, at the end of a step."""
+    """Constraints of supports and joints whose reactions act at the end of a step, where the constraints hold."""
 
     share = 1.0
 
@@ -72,16 +76,16 @@ class EndTies(MovingTies):
             self._reactions_before = self.seen[1]
 
     def forget(self):
-        """The step begun last has failed: reactions are those before it."""
+        """The current step has failed: restore the reactions before it."""
         if self._here:
             self.seen = self.seen[0], self._reactions_before
 
     def shift(self, values):
-        """In this step the equations are to have these values instead of zero; see `values`."""
+        """Require these values of the constraints instead of zero in this step; see `values`."""
         self._shift = values
 
     def values(self, ties, eta):
-        """Those of the added equations where the nodes are now, for `ties` of another time; 0 on all but the last rank."""
+        """Values of the constraints at the current state, for `ties` of another time; 0 on all but the last rank."""
         if not self._here:
             return 0.0
         nodal, multipliers = self.seen
@@ -96,10 +100,10 @@ class EndTies(MovingTies):
 
 
 class CollocationProblem(StepProblem):
-    """See `StepProblem`: eq. (1) at the end of a step, on a model with accelerations.
+    """See `StepProblem`: eq. (1) at the end of a step, for a model with accelerations.
 
     Attributes:
-        rule: the `Rule` of the steps to come.
+        rule: the `Rule` of the next steps.
     """
 
     ties_class = EndTies
@@ -107,30 +111,38 @@ class CollocationProblem(StepProblem):
     def _ends(self):
         return (*super()._ends(), *self.model.known)
 
-    def aim(self, t, h):
+    def begin_step(self, t, h):
         """See `StepProblem`."""
         model = self.model
         self.h, self._middle = h / model.time, t + h / 2
         model.h.value = self.h
         self._start[:] = self._state
-        model.aim(self.rule.ahead(self.h))
-        self._take_loads(t + (1 - _BEFORE) * h)
+        model.take_scheme(self.rule.ahead(self.h))
+        self._end = t + (1 - _BEFORE_END) * h
+        self._take_loads(self._end)
         self._known.set(0.0)
-        self._known.axpy(self.load_factor, self._loads)
+        self._known.axpy(1.0, self._loads)
         if self.ties:
             self.ties.begin(model.ties_at(t + h))
 
     def work(self):
-        """See `StepProblem`: by loads half way, and the reactions of both ends."""
+        """See `StepProblem`: by loads at mid-step, and the mean of the reactions at both ends."""
         self._take_loads(self._middle)
         return super().work()
 
-    def free_velocities(self, t, h):
-        """In the step from t to t + h, s, supports and joints are to take velocities as they are.
+    def clamp_forces(self):
+        """See `StepProblem`: at the end of the step."""
+        if self.model.clamps.count:
+            self._take_loads(self._end)
+        return super().clamp_forces()
 
-        Equations c may then grow as they do at the start: by its value and first derivative there, from three points
-        of the straight way ahead. Velocities that a scheme has left not quite as supports want them, or that a kink of
-        a prescribed motion contradicts, would otherwise count as accelerations.
+    def free_velocities(self, t, h):
+        """Let supports and joints keep the current velocities in the step from t to t + h, s, instead of correcting
+        them.
+
+        The constraints c at the end get the value c(t) + h c'(t), by three points of uniform motion, instead of 0.
+        Small violations by the velocities, left by the scheme or by a kink of a prescribed motion, would otherwise
+        cause large accelerations.
         """
         if not self.ties:
             return
@@ -143,10 +155,10 @@ class CollocationProblem(StepProblem):
 
 
 class GeneralisedAlpha(OneStep):
-    """See `protocol.Stepper`. Numerical dissipation is no part of `dissipated`: the balance of the ledger shows it."""
+    """See `protocol.Stepper`. `dissipated` excludes numerical dissipation, which the energy balance shows."""
 
-    forms, problem_class, rho_inf, keeps_kinks = "collocation", CollocationProblem, 0.8, False
-    missed = 1 / 12  # loads act as they are at the ends
+    forms, problem_class, rho_inf, kinks_persist = "collocation", CollocationProblem, 0.8, False
+    impulse_error = 1 / 12  # loads are evaluated at the ends of steps
 
     def begin(self):
         """See `Stepper`."""
@@ -156,11 +168,11 @@ class GeneralisedAlpha(OneStep):
     def jump(self):
         """See `Stepper`."""
         super().jump()
-        self.bend()
+        self.kink()
 
-    def bend(self):
-        """See `Stepper`: the acceleration that carries the motion on lags behind, and momenta would not be constant at once where
-        loads end."""
+    def kink(self):
+        """See `Stepper`: the auxiliary acceleration b lags behind a, and momenta would vary for some steps after loads
+        end."""
         self._accelerations_known = False
 
     def step(self, t, h):
@@ -169,7 +181,7 @@ class GeneralisedAlpha(OneStep):
         if self.problem.ties and self._h is not None and abs(h - self._h) > 1e-9 * abs(h):
             self._settle(t)
         if not self._accelerations_known:
-            found = self._accelerate(t, _SHORTER * h)
+            found = self._accelerate(t, _TRIAL_STEP * h)
             if not found.converged:
                 return found
             iterations = found.iterations
@@ -180,21 +192,21 @@ class GeneralisedAlpha(OneStep):
         return Solved(solved.converged, iterations + solved.iterations, solved.reason)
 
     def _settle(self, t):
-        """Steps of another length are to come: what supports and joints hold gets the velocity that they give it.
+        """Before the step length changes, correct velocities to those that supports and joints require.
 
-        After a step of length h that velocity is off by the order h^2, and over a shorter step that would be an acceleration
-        to make up for it, the larger the shorter the step is.
+        After a step of length h they are off by O(h^2); correcting that within a shorter step would take an
+        acceleration that grows as the step shrinks.
         """
         self.drive(t)
         self._start[:] = self._state
         self.problem.model.follow_velocities()
-        self.bend()
+        self.kink()
 
     def _accelerate(self, t, h):
-        """Find accelerations and reactions at the time t by a step of length h, which is taken back."""
+        """Find accelerations and reactions at the time t by a trial step of length h, which is undone."""
         problem, model = self.problem, self.problem.model
-        problem.rule, problem.fresh, self._h = _FIRST, True, None
-        problem.aim(t, h)
+        problem.rule, problem.fresh, self._h = _TRIAL_RULE, True, None
+        problem.begin_step(t, h)
         problem.free_velocities(t, h)
         solved = self._newton.solve([self._start + problem.h * self._velocity])
         self._accelerations_known = solved.converged

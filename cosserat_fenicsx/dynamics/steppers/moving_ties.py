@@ -1,4 +1,4 @@
-"""Equations of supports and joints in a step of time: they hold at its end, their reactions act half way."""
+"""Constraints of supports and joints in a time step: they hold at its end, their reactions act at mid-step."""
 
 import numpy as np
 
@@ -6,16 +6,16 @@ from cosserat_fenicsx.algebra.tie_rows import TieRows, by_nodes, reactions_by_mu
 
 
 class MovingTies(TieRows):
-    """See `TieRows`. Reactions along directions half way keep the order 2, and turning what they hold takes no work.
+    """See `TieRows`. Reactions along the directions at mid-step keep the order 2, and do no work in a rigid rotation.
 
     Attributes:
-        share: of the end of the step in where reactions act.
+        share: where in the step reactions act: 0 at its start, 1 at its end.
     """
 
     share = 0.5
 
     def begin(self, ties):
-        """A step starts at what was seen last; `ties` are those of its end."""
+        """Start a step at the current state; `ties` are the constraints at its end."""
         self._ties_at_end = ties
         if self._here:
             self._start = self.seen[0].copy()
@@ -41,7 +41,7 @@ class MovingTies(TieRows):
         return reactions_by_nodes(test, change, self.share * trial), reactions_by_multipliers(test, gradient), equations
 
     def make_room(self, A):
-        """Put zeros where `add_tangent` will add."""
+        """Reserve the matrix entries that `add_tangent` will add to."""
         if self._here:
             tied, added = self.rows[self.rows >= 0], self._multipliers
             for rows, columns in ((tied, tied), (tied, added), (added, tied)):
@@ -50,7 +50,7 @@ class MovingTies(TieRows):
                 A.setValue(i, i, 0.0, addv=True)
 
     def work(self, eta):
-        """What the reactions did on the structure in the step; on the last rank, else 0."""
+        """Work of the reactions on the structure in the step, dimensionless; on the last rank, else 0."""
         if not self._here:
             return 0.0
         _, gradient, _ = self._evaluate(eta)
@@ -59,5 +59,5 @@ class MovingTies(TieRows):
         return -float(np.einsum("ikb,kb,i->", gradient, passed, self._reactions()[list(self._added)]))
 
     def _reactions(self):
-        """The multipliers that did the work of the step."""
+        """The multipliers that `work` takes."""
         return self.seen[1]

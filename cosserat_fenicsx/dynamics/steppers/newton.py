@@ -1,11 +1,11 @@
-"""Newton's method for a step in time: full steps with a tangent that is kept while it serves, over many steps of time.
+"""Newton's method for a time step: full increments, with a factorised tangent that is reused over many time steps.
 
-An iteration with a kept tangent is one residual and one back-substitution, a tenth of one with a fresh tangent on a fine
-mesh. PETSc's SNES would ask for one more residual a step, and for norms that are not looked at. (Broyden's updates of
-the kept tangent were tried: as many iterations, and dearer ones.)
+An iteration with an old tangent costs one residual and one back-substitution: on a fine mesh a tenth of one with a new
+tangent. PETSc's SNES would evaluate one more residual a step, and norms that are not used. (Broyden's updates of the
+old tangent were tried: as many iterations, and more expensive ones.)
 
-Only the increments of the nodes' unknowns are tested: contact forces and reactions have rounding of their own, and the
-residual of a stiff rod has a floor.
+Convergence is tested on the increments of the nodal unknowns alone: contact forces and reactions have larger rounding
+errors, and the residual of a stiff rod cannot fall below its rounding.
 """
 
 import math
@@ -13,17 +13,19 @@ import math
 from petsc4py import PETSc
 
 from cosserat_fenicsx.algebra import linear
-from cosserat_fenicsx.statics.snes import EXTERNAL, Solved
+from cosserat_fenicsx.algebra.newton import EXTERNAL, Solved
 
-#: Newton stops when what remains after an increment, by its contraction, is below the first number times the motion in the
-#: step (root mean square, units L, 1), for velocities, and with them momenta, are off by so much; or below the second,
-#: the rounding of positions. A stiff rod's may be larger: where increments below the third shrink no more, that is the end.
+#: Newton's method stops when the remaining error, estimated from the contraction of the increments, is below the first
+#: number times the motion in the step (root mean square, units L, 1), since that is the relative error of velocities
+#: and momenta; or below the second, the rounding of positions. The rounding of a stiff rod may be larger: increments
+#: below the third that no longer shrink have converged, too.
 INCREMENT, SMALLEST, ROUNDING = 1e-12, 2e-16, 1e-10
-# What increments shrink by with a fresh tangent.
-_FRESH = 3e-4
-# For so many steps each begins with a fresh tangent after one that did not outlive its step.
-_ANEW = 8
-_MOST, _HUGE = 15, 10.0
+# Contraction of increments with a new tangent, as measured.
+_NEW_TANGENT_RATE = 3e-4
+# Number of steps that each start with a new tangent after a tangent served for one step only.
+_STEPS_WITH_NEW_TANGENTS = 8
+# Iterations, and dimensionless increment, that are taken as divergence.
+_MOST_ITERATIONS, _DIVERGED = 15, 10.0
 
 
 class StepNewton:
@@ -36,29 +38,33 @@ class StepNewton:
     def __init__(self, problem):
         self.problem = problem
         numbering = problem.numbering
-        self._motions = numbering.nodes * numbering.block
+        self._motions = numbering.nodes * numbering.block  # nodal unknowns of this rank
         self._comm = problem.model.comm
         motions = self._comm.allreduce(self._motions)
         self._root = math.sqrt(motions)
-        self._price = motions / (50 + 0.055 * motions)  # of a tangent, in iterations, as measured
+        self._price = motions / (50 + 0.055 * motions)  # cost of a new tangent, in iterations, as measured
         self._step = numbering.vector()
         self._make_ksp()
         self.forget()
 
     def forget(self):
-        """Go on as if nothing had been solved so far: with a fresh tangent, and without what was learnt of kept ones."""
+        """Discard the tangent and the statistics of its reuse, as before the first step."""
         self.problem.fresh = True
+        # cost of the tangent and its iterations; steps it has served; steps left that start with a new tangent
         self._spent = self._served = self._anew = 0
 
     def _make_ksp(self):
         self._ksp = ksp = PETSc.KSP().create(self._comm)
-        ksp.setType("preonly")  # Newton's iterations bring back the digits that a factorisation loses
+        ksp.setType("preonly")  # Newton's iterations correct the rounding errors of the factorisation
         ksp.setOperators(self.problem.A)
         linear.factor_tangent(ksp.getPC(), self.problem.A, self.problem.tangent)
 
     def solve(self, guesses):
-        """Newton from local numbers of the state, with the tangent at hand, and with a fresh one where that fails, also from the
-        other guesses: sections that turn far in a step are hard to foretell.
+        """Newton's method from the first guess with the current tangent; where that fails, from every guess with a new
+        one.
+
+        Args:
+            guesses: predictors of the state, local arrays, the best first. Extrapolations of large rotations can fail.
 
         Returns:
             Solved.
@@ -91,19 +97,20 @@ class StepNewton:
             found = "a section turned by half a turn or more in one step"
         converged = found == "converged"
         self._spent, self._served = self._spent + len(steps), self._served + 1
-        if self._served == 1 and lived == 1 and not began_fresh:  # the tangent did not outlive its step
-            self._anew = _ANEW
-        # anew, too, where this step cost more than the average so far
+        if self._served == 1 and lived == 1 and not began_fresh:  # the last tangent served for one step only
+            self._anew = _STEPS_WITH_NEW_TANGENTS
+        # a new tangent, too, where this step took more iterations than the mean cost per step of the current one
         problem.fresh = not converged or self._anew > 0 or len(steps) * self._served > self._spent
         self._anew -= problem.fresh and self._anew > 0
         return Solved(converged, len(steps), found)
 
     def _size(self, moved):
+        """The root mean square of nodal unknowns over all ranks."""
         square = float(moved @ moved)
         return math.sqrt(self._comm.allreduce(square) if self._comm.size > 1 else square) / self._root
 
     def _solve(self):
-        """The increment for the residual; False where the tangent is singular."""
+        """Solve for the increment; False where the tangent is singular."""
         problem, ksp = self.problem, self._ksp
         if problem.fresh:
             problem.jacobian(None, problem.x, problem.A, problem.A)
@@ -111,7 +118,7 @@ class StepNewton:
             self._spent, self._served = self._price, 0
         try:
             ksp.solve(problem.b, self._step)
-        except PETSc.Error as error:  # PETSc counts solutions begun and not ended, up to two
+        except PETSc.Error as error:  # a failed solve leaves the KSP unusable: it is made again
             if error.ierr != EXTERNAL:
                 raise
             self._make_ksp()
@@ -119,12 +126,12 @@ class StepNewton:
         return ksp.getConvergedReason() >= 0
 
     def _outcome(self, steps):
-        """Why Newton stops after the last increment, in words; None where it goes on."""
+        """Why the iteration stops after the last increment, in words; None where it continues."""
         step = self._size(self._step.array_r[: self._motions])
         steps.append(step)
         if not math.isfinite(step):
             return "the residual is not a number"
-        if step > _HUGE:
+        if step > _DIVERGED:
             return "Newton's steps grew without bound"
         rate = step / steps[-2] if len(steps) > 1 else 1.0
         if (
@@ -133,17 +140,18 @@ class StepNewton:
             or (step <= ROUNDING and rate > 0.5 and len(steps) > 1)
         ):
             return "converged"
-        if len(steps) >= _MOST:
+        if len(steps) >= _MOST_ITERATIONS:
             return "Newton's iterations ran out"
         if len(steps) > 1:
             left = math.log(self._enough / step)
-            self.problem.fresh = rate > 0.9 or left / math.log(rate) > self._price + left / math.log(_FRESH)
+            with_new = self._price + left / math.log(_NEW_TANGENT_RATE)  # cost until convergence, in iterations
+            self.problem.fresh = rate > 0.9 or left / math.log(rate) > with_new
         return None
 
     def memory(self):
-        """What decides when the kept tangent is made anew, see `Stepper.memory`."""
+        """The statistics that decide when the tangent is renewed, see `Stepper.memory`."""
         return {"spent": self._spent, "served": self._served, "anew": self._anew}
 
     def recall(self, memory):
-        """Take back what `memory` gave."""
+        """Restore what `memory` returned."""
         self._spent, self._served, self._anew = memory["spent"], memory["served"], memory["anew"]

@@ -1,30 +1,30 @@
-"""Schemes of one implicit step, order 2: velocities by the trapezoidal rule, whatever the forms conserve."""
+"""Base of the implicit one-step schemes of order 2: velocities by the trapezoidal rule, whatever the forms conserve."""
 
 import numpy as np
 
 from cosserat_fenicsx.dynamics.start import drive
 from cosserat_fenicsx.dynamics.steppers.newton import StepNewton
 
-# Error estimates look back over three times so many steps: what changes within a few steps is not resolved, but small.
-_APART = 8
-#: What an error of 1 rad counts as, in lengths.
-TURNS = 0.1
+# The error estimate takes four states, so many steps apart: this averages out unresolved, small vibrations.
+_STRIDE = 8
+#: Weight of rotations (rad) in error norms, relative to positions over the unit of length.
+ROTATION_WEIGHT = 0.1
 
 
 class OneStep:
     """See `protocol.Stepper`."""
 
-    order, adapts, rho_inf, keeps_kinks = 2, True, None, True
-    missed = 1 / 24  # loads act as they are half way
-    #: error of a step over that of the trapezoidal rule, as measured
-    coarseness = 1.0
+    order, adapts, rho_inf, kinks_persist = 2, True, None, True
+    impulse_error = 1 / 24  # loads are evaluated at mid-step
+    #: local error over that of the trapezoidal rule, as measured
+    error_ratio = 1.0
 
     def __init__(self, problem):
         self.problem, self._newton = problem, StepNewton(problem)
         model = problem.model
         self._comm = model.comm
         self._state, self._start, self._velocity = (f.x.array for f in (model.state, model.start, model.velocity))
-        self._rates = model.rate_arrays
+        self._rates = (*model.rate_arrays, *model.actions.memory)
 
     def begin(self):
         """See `Stepper`."""
@@ -35,7 +35,7 @@ class OneStep:
 
     def jump(self):
         """See `Stepper`."""
-        self._past = []  # (h, state before, rates before, work and dissipation before) of the last steps
+        self._past = []  # of the last steps: (h, state, rates, (work, dissipated)) at their starts
 
     def drive(self, t):
         """See `Stepper`."""
@@ -43,15 +43,15 @@ class OneStep:
         drive(self.problem.model, t)
         self.work += self.problem.energies()[0] - kinetic
 
-    def bend(self):
-        """See `Stepper`: no scheme of one step looks at what was before, but to begin Newton's method."""
+    def kink(self):
+        """See `Stepper`: a one-step scheme takes earlier states for its predictor alone."""
 
     def step(self, t, h):
         """See `Stepper`."""
         problem = self.problem
         if self._h is None or abs(h - self._h) > 1e-9 * abs(h):
             problem.fresh, self._h = True, h
-        problem.aim(t, h)
+        problem.begin_step(t, h)
         unit = problem.h
         guesses = self._predicted(unit)
         solved = self._newton.solve(guesses)
@@ -60,45 +60,49 @@ class OneStep:
             problem.begin()
             return solved
         self._past = [
-            *self._past[1 - 3 * _APART :],
+            *self._past[1 - 3 * _STRIDE :],
             (unit, self._start.copy(), [rate.copy() for rate in self._rates], (self.work, self.dissipated)),
         ]
-        self._foretold = guesses[0]
+        self._predictor = guesses[0]
         self.work += problem.work()
         self.dissipated += problem.dissipated()
         problem.model.accept(unit)
+        problem.model.actions.commit()
         return solved
 
     def _predicted(self, h):
-        """States at the end of the step by extrapolations, the one first that would have foretold the last step best."""
+        """Predictors of the state at the end of the step: extrapolations of several orders.
+
+        First comes the order whose extrapolation of the last step was closest to its result.
+        """
         now = (h, self._start, self._velocity)
         known = [(step, state, rates[0]) for step, state, rates, _ in self._past[-3:]]
         guesses = _extrapolated([*known, now])
         if len(known) < 3:
             return guesses[::-1]
-        missed = np.array([np.square(guess - self._start).sum() for guess in _extrapolated(known)])
-        order = np.argsort(self._comm.allreduce(missed) if self._comm.size > 1 else missed)
+        errors = np.array([np.square(guess - self._start).sum() for guess in _extrapolated(known)])
+        order = np.argsort(self._comm.allreduce(errors) if self._comm.size > 1 else errors)
         return [guesses[k] for k in order]
 
     def error(self, early=False):
-        """See `Stepper`: h^3/12 times the third derivative of the cubic through four states, the last of them that of now.
+        """See `Stepper`: h^3/12 times the third derivative of the cubic through four states, the last one the current.
 
-        Positions alone, since velocities carry what fast waves leave; those are not resolved, and small.
+        Of positions alone: differences of velocities are dominated by fast waves, which are not resolved, and small.
         """
-        apart = min(_APART, len(self._past) // 3) if early else _APART
-        past = self._past[-3 * apart :]
-        if not apart or len(past) < 3 * apart:
+        stride = min(_STRIDE, len(self._past) // 3) if early else _STRIDE
+        past = self._past[-3 * stride :]
+        if not stride or len(past) < 3 * stride:
             return None
         steps = np.array([h for h, *_ in past])
-        states = [state for _, state, *_ in past[::apart]] + [self._state]
-        times = np.concatenate([[0.0], np.cumsum(steps)])[::apart]
+        states = [state for _, state, *_ in past[::stride]] + [self._state]
+        times = np.concatenate([[0.0], np.cumsum(steps)])[::stride]
         weights = [1 / np.prod([a - b for b in times if b != a]) for a in times]
         third = sum(w * x for w, x in zip(weights, states, strict=True))  # a sixth of the derivative
-        return self.coarseness * 0.5 * steps[-1] ** 3 * self.problem.model.largest_of(third, TURNS)
+        return self.error_ratio * 0.5 * steps[-1] ** 3 * self.problem.model.largest_of(third, ROTATION_WEIGHT)
 
-    def surprise(self):
+    def prediction_error(self):
         """See `Stepper`."""
-        return self.problem.model.largest_of(self._state - self._foretold, TURNS)
+        return self.problem.model.largest_of(self._state - self._predictor, ROTATION_WEIGHT)
 
     def undo(self):
         """See `Stepper`."""
@@ -147,16 +151,19 @@ def _numbered(arrays):
 
 
 def _extrapolated(steps):
-    """States at the end of the last of some steps (h, state and velocity at its beginning), by its velocity alone, and
-    by the velocities of one and of two steps before too."""
+    """Extrapolations of the state to the end of the last of one to three steps, of orders 1 to the number of steps.
+
+    Args:
+        steps: (h, state, velocity) of each step, at its start.
+    """
     (h, state, velocity), *earlier = steps[::-1]
     guesses = [state + h * velocity]
     if earlier:
         (h1, _, velocity1), *earlier = earlier
-        risen = (velocity - velocity1) / h1
-        guesses.append(guesses[-1] + 0.5 * h**2 * risen)
+        acceleration = (velocity - velocity1) / h1
+        guesses.append(guesses[-1] + 0.5 * h**2 * acceleration)
         if earlier:
             h2, _, velocity2 = earlier[0]
-            bent = (risen - (velocity1 - velocity2) / h2) / (h1 + h2)
-            guesses.append(guesses[-1] + 0.5 * h**2 * (h + h1) * bent)
+            change = (acceleration - (velocity1 - velocity2) / h2) / (h1 + h2)  # half the rate of the acceleration
+            guesses.append(guesses[-1] + 0.5 * h**2 * (h + h1) * change)
     return guesses

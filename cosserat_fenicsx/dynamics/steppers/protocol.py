@@ -1,66 +1,69 @@
-"""What `dynamics` asks of a scheme."""
+"""The interface of a time integration scheme."""
 
 from typing import Protocol
 
 
 class Stepper(Protocol):
-    """A scheme at work on a `StepProblem`; made once for a shape, used for every scene of it.
+    """A scheme with the `StepProblem` that it solves; made once for a signature, used for every scene of it.
 
     Attributes:
-        order: of the error in the step h.
-        forms: the name of the discretisation that its models must have; problem_class: what it solves, a `StepProblem`.
-        keeps_kinks: whether a kink of a prescribed motion would make its velocities alternate for good.
-        adapts: whether `error` and `undo` are known.
-        rho_inf: by how much a step shrinks what vibrates much faster than the steps, where that can be set; else None.
-        missed: impulse that steps h miss of a load, over h^2 times how much its rate of change rises meanwhile.
-        work, dissipated: dimensionless, since `begin`: what loads and supports have done, and what damping has taken.
+        order: of the global error in the step h.
+        forms: the name of the discretisation that its models must have; problem_class: the class of its `StepProblem`.
+        kinks_persist: whether velocities alternate from step to step without decay after a kink of a prescribed motion.
+        adapts: whether it has `error` and `undo`.
+        rho_inf: spectral radius at infinite frequency where that can be set, else None.
+        impulse_error: error of a load's impulse over steps h, divided by h^2 times the change of the load's rate.
+        work, dissipated: work of loads and supports, and energy dissipated by damping, since `begin`; dimensionless.
     """
 
     order: int
-    keeps_kinks: bool
+    kinks_persist: bool
     adapts: bool
     rho_inf: float | None
-    missed: float
+    impulse_error: float
     forms: str
     problem_class: type
     work: float
     dissipated: float
 
     def begin(self):
-        """A motion starts where the problem's model is."""
+        """Start a motion from the current state of the problem's model."""
 
     def jump(self):
-        """Something jumps here: what was before does not foretell what comes."""
+        """Accelerations or velocities jump at the current time: earlier states serve no extrapolation any more."""
 
     def drive(self, t):
-        """See `start.drive`, t in s; the kinetic energy that it gives or takes is work of the supports."""
+        """See `start.drive`, t in s; the change of kinetic energy counts as work of the supports."""
 
-    def bend(self):
-        """A load bends here without a jump: rates of change of accelerations do."""
+    def kink(self):
+        """The slope of a load jumps at the current time, not its value: the rate of the acceleration jumps."""
 
     def step(self, t, h):
-        """Go from the time t to t + h, s.
+        """Step from the time t to t + h, s.
 
         Returns:
-            `Solved`. The problem's x and the model's state and velocity are those of t + h; where it has not
-            converged, all is as it was at t.
+            `Solved`. Where it has converged, the problem's x and the model's state and velocity are those of t + h;
+            otherwise they are as they were at t.
         """
 
     def error(self, early=False):
-        """Estimated local error of the last step, of positions (lengths) and rotations (rad); None where too few steps
-        are known since the start or a jump. `early`: also from few steps; what waves do in them then counts too."""
+        """Estimated local error of the last step, of positions (over the unit of length) and rotations (rad over 10).
 
-    def surprise(self):
-        """How far the last step ended from where the steps before foretold it, as `error` measures it."""
+        None where too few steps have been made since the start or a jump. With `early` few steps suffice; fast waves,
+        which they do not average out, then count too.
+        """
+
+    def prediction_error(self):
+        """Difference between the end of the last step and the predictor, in the norm of `error`."""
 
     def undo(self):
-        """Take the last step back."""
+        """Return to the state before the last step."""
 
     def memory(self):
-        """All that the steps to come depend on beside the scene and the time: arrays, numbers, and dicts of them.
+        """All that later steps depend on beside the scene and the time: arrays, numbers, and dicts of them.
 
-        With the problem's own (`StepProblem.memory`): a motion that goes on from it has the same digits.
+        It includes the problem's own (`StepProblem.memory`): a motion continued from it has the same digits.
         """
 
     def recall(self, memory):
-        """Take back what `memory` gave, after `begin`, on the same scene."""
+        """Restore what `memory` returned, after `begin`, on the same scene."""

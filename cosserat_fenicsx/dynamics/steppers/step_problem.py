@@ -1,5 +1,6 @@
-"""One step of a moving model as PETSc wants it: residual and tangent in the solver's unknowns."""
+"""One time step of a moving model for PETSc: residual and tangent in the solver's unknowns."""
 
+import numpy as np
 from dolfinx import fem
 
 from cosserat_fenicsx.algebra.equations import Equations
@@ -14,10 +15,10 @@ class StepProblem(Equations):
         model: see `models.moving.Moving` for the protocol.
 
     Attributes:
-        see `Equations`; x is at the end of the step.
-        fresh: whether the tangent is made anew when it is next asked for, or the one at hand serves on.
+        see `Equations`; x is the state at the end of the step.
+        fresh: whether `jacobian` assembles a new tangent when it is next called, or keeps the current one.
         h: the length of the step, dimensionless.
-        load_factor: what all loads and prescribed motions are multiplied by.
+        load_factor: multiplies all loads and prescribed motions.
     """
 
     ties_class = MovingTies
@@ -32,31 +33,33 @@ class StepProblem(Equations):
         return "general" if self.ties or self.model.comm.size > 1 else "blocks"
 
     def _ends(self):
-        """The Functions that change from step to step, the state first: it alone changes within one."""
+        """The Functions that change from step to step; only the first, the state, changes within a step."""
         return self.model.state, self.model.start, self.model.velocity
 
     def load(self, scene, layout, load_factor=1.0):
-        """Take the numbers of a scene; the state becomes its reference configuration, at rest, at the time 0."""
+        """Load the data of a scene; the state becomes its reference configuration, at rest, at the time 0."""
         model = self.model
         model.load(scene, layout)
         self.load_factor = model.load_factor.value = load_factor
         self._pack()
-        self._assemble(self._dead, self._loads)
-        self._begun = False  # reactions of another scene are no guess
+        self._assemble_loads()
+        self._begun = False  # the reactions of another scene are no initial guess
         self.begin()
 
     def _pack(self):
-        """Take the numbers of a scene into all forms; what changes in time is looked up anew at every assembly."""
+        """Pack the constants and coefficients of a scene for all forms; those that change in time are updated later."""
         forms, moving, (state, *beginning) = self.model.forms, tuple(self.model.moving_loads), self._ends()
         self._residual, self._tangent, self._live = (
             None if form is None else Packed(form, (state,), (*beginning, *moving))
             for form in (forms.residual, forms.tangent, forms.live)
         )
         self._momentum = Packed(forms.momentum, self._ends())
-        self._dead = None if forms.dead is None else Packed(forms.dead, moving)
+        self._dead, self._permanent = (
+            None if form is None else Packed(form, moving) for form in (forms.dead, forms.permanent)
+        )
 
     def begin(self):
-        """Take the model's state and velocity as the start of what follows."""
+        """Take the model's state and velocity as the start of the next step."""
         multipliers = self.ties.everywhere() if self.ties and self._begun else None
         self.numbering.from_local(self._state, self.x)
         if multipliers is not None:
@@ -65,8 +68,8 @@ class StepProblem(Equations):
         self._start[:] = self._state
         self.fresh = self._begun = True
 
-    def aim(self, t, h):
-        """The next step goes from the time t (s), where the state is, to t + h."""
+    def begin_step(self, t, h):
+        """Prepare the step from the time t (s), that of the current state, to t + h."""
         model = self.model
         self.h = model.h.value = h / model.time
         self._start[:] = self._state
@@ -74,21 +77,30 @@ class StepProblem(Equations):
         self._assemble(self._momentum, self._momenta)
         self._known.set(0.0)
         self._known.axpy(model.time / h, self._momenta)
-        self._known.axpy(self.load_factor, self._loads)
+        self._known.axpy(1.0, self._loads)
         if self.ties:
             self.ties.begin(model.ties_at(t + h))
 
     def _take_loads(self, t):
-        """Loads as they are at the time t (s), and whatever else does not change within a step."""
+        """Evaluate the loads at the time t (s), and update all other data that are constant within a step."""
+        self._acting_at = t
         if self.model.moving_loads:
             self.model.loads_at(t)
-            self._assemble(self._dead, self._loads)
+            self._assemble_loads()
         self._residual.catch_up()
         if self._live:
             self._live.catch_up()
 
+    def _assemble_loads(self):
+        """Assemble the loads that do not depend on the state, times the load factor, or unscaled where permanent."""
+        self._assemble(self._dead, self._loads)
+        self._loads.scale(self.load_factor)
+        if self._permanent:
+            self._assemble(self._permanent, self._vector)
+            self._loads.axpy(1.0, self._vector)
+
     def guess(self, values):
-        """Start Newton from local numbers of the state; reactions stay what they were."""
+        """Set the initial guess of Newton's method to local values of the state; reactions are kept."""
         multipliers = self.ties.everywhere() if self.ties else None
         self.numbering.from_local(values, self.x)
         if self.ties:
@@ -103,11 +115,11 @@ class StepProblem(Equations):
             self.ties.add_residual(b, self.load_factor)
 
     def _put_stresses(self, x, b):
-        """What of the residual depends on the state, but for added equations, into b."""
+        """Assemble into b the part of the residual that depends on the state, without the constraints."""
         self._assemble(self._residual, b)
 
     def jacobian(self, snes, x, A, P):
-        """Tangent at the state that `function` was last called with; kept where it is not to be fresh."""
+        """Tangent at the state that `function` was last called with; the old one is kept unless `fresh`."""
         if not self.fresh:
             return
         self.fresh = False
@@ -119,14 +131,14 @@ class StepProblem(Equations):
         P.assemble()
 
     def work(self):
-        """What loads and supports did in the step from `start` to the state, dimensionless, over all ranks."""
+        """Work of loads and supports in the step from `start` to the state, dimensionless, over all ranks."""
         model, eta, done = self.model, self.load_factor, 0.0
         if self._live or self._loads.norm() > 0:
             self.numbering.from_local(model.passed(), self._vector)
-            done = eta * self._loads.dot(self._vector)
+            done = self._loads.dot(self._vector)
         if self._live:
             self._assemble(self._live, self._known)
-            done += eta * self._known.dot(self._vector)
+            done += self._known.dot(self._vector)
         if self.ties:
             done += model.comm.allreduce(self.ties.work(eta))
         return done
@@ -138,7 +150,7 @@ class StepProblem(Equations):
         return self.model.momenta(self._local)
 
     def dissipated(self):
-        """What damping took in the step from `start` to the state, dimensionless, over all ranks; zero without damping."""
+        """Energy dissipated by damping in the step from `start` to the state, dimensionless, over all ranks."""
         return self._scalar(self.model.forms.dissipated) if self.model.damped else 0.0
 
     def energies(self):
@@ -148,8 +160,21 @@ class StepProblem(Equations):
     def _scalar(self, form):
         return self.model.comm.allreduce(fem.assemble_scalar(form))
 
+    @property
+    def eta(self):
+        """The load factor."""
+        return self.load_factor
+
+    def clamp_forces(self):
+        """(points, 6) what every clamped point was held with in the step that was taken last, less what joints exert
+        there; on all ranks."""
+        clamps = self.model.clamps
+        if not clamps.count:
+            return np.empty((0, 6))
+        return clamps.of_step() - clamps.loads(self.load_factor, self._acting_at)
+
     def memory(self):
-        """This rank's part of what the steps to come depend on; of a tangent that is kept, its entries."""
+        """This rank's part of the data that later steps depend on, with the entries of a tangent that is kept."""
         kept = {"x": self.x.array_r.copy(), "state": self._state.copy(), "fresh": bool(self.fresh)}
         if not self.fresh:
             rows, columns, values = self.A.getValuesCSR()
@@ -157,7 +182,7 @@ class StepProblem(Equations):
         return kept
 
     def recall(self, memory):
-        """Take back what `memory` gave."""
+        """Restore what `memory` returned."""
         self._state[:] = memory["state"]
         self.x.array_w[:] = memory["x"]
         self.set_state(self.x)

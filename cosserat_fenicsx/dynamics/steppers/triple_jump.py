@@ -1,13 +1,13 @@
 """Fourth order by three steps of the default scheme, one of them back in time.
 
 A symmetric scheme of order 2 gains two orders by steps gamma h, (1 - 2 gamma) h, gamma h with gamma = 1/(2 - 2^(1/3))
-(Yoshida, Phys. Lett. A 150 (1990) 262, doi:10.1016/0375-9601(90)90092-3). Momenta stay exact. Loads are asked for half
-way in each of the three, inside the step; prescribed motions also a third of a step beyond both ends.
+(Yoshida, Phys. Lett. A 150 (1990) 262, doi:10.1016/0375-9601(90)90092-3). Momenta stay exact. Loads are evaluated in
+the middle of each of the three, inside the step; prescribed motions also about a third of a step beyond both ends.
 """
 
+from cosserat_fenicsx.algebra.newton import Solved
 from cosserat_fenicsx.dynamics.steppers.momentum import Momentum
 from cosserat_fenicsx.errors import SceneError
-from cosserat_fenicsx.statics.snes import Solved
 
 _GAMMA = 1 / (2 - 2 ** (1 / 3))
 
@@ -15,8 +15,8 @@ _GAMMA = 1 / (2 - 2 ** (1 / 3))
 class TripleJump:
     """See `protocol.Stepper`."""
 
-    order, adapts, rho_inf, keeps_kinks = 4, False, None, True
-    forms, problem_class, missed = Momentum.forms, Momentum.problem_class, Momentum.missed
+    order, adapts, rho_inf, kinks_persist = 4, False, None, True
+    forms, problem_class, impulse_error = Momentum.forms, Momentum.problem_class, Momentum.impulse_error
 
     def __init__(self, problem):
         self.problem, self._inner = problem, Momentum(problem)
@@ -28,7 +28,7 @@ class TripleJump:
         """See `Stepper`.
 
         Raises:
-            SceneError: a rod with damping, which would grow without bound back in time.
+            SceneError: a rod with damping, which would make the motion grow without bound back in time.
         """
         if self.problem.model.damped:
             raise SceneError(
@@ -44,9 +44,9 @@ class TripleJump:
         """See `Stepper`."""
         self._inner.drive(t)
 
-    def bend(self):
+    def kink(self):
         """See `Stepper`."""
-        self._inner.bend()
+        self._inner.kink()
 
     def step(self, t, h):
         """See `Stepper`."""

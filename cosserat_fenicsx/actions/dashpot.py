@@ -1,0 +1,58 @@
+"""Viscous dampers at a station."""
+
+from dataclasses import dataclass
+
+import ufl
+
+from cosserat_fenicsx.actions.directed import Directed, store_coefficients
+from cosserat_fenicsx.checks import instance
+from cosserat_fenicsx.scene.action import PointAction, scalar
+from cosserat_fenicsx.scene.rod import Station
+
+
+@dataclass(frozen=True)
+class Dashpot(Directed, PointAction):
+    """A linear dashpot between a station and the ground: the force -b v and the moment -d omega. None at rest.
+
+    The energy it dissipates is counted as work of the loads in the energy balance of a motion. It is not multiplied by
+    the load factor.
+
+    Args:
+        station: where.
+        damping: b, N s/m; 0 for none.
+        rotational: d, N m s/rad; 0 for none.
+        direction: None where b resists velocities in every direction; or the only direction that it resists, inertial.
+
+    Raises:
+        SceneError: not a station, numbers that are negative or both 0, or no direction.
+    """
+
+    station: Station
+    damping: float = 0.0
+    rotational: float = 0.0
+    direction: tuple | None = None
+
+    scaled = False
+
+    @property
+    def works(self):
+        """See `Directed`."""
+        return _alike, _along
+
+    def __post_init__(self):
+        instance(self, "station", self.station, Station, "a station such as rod.end")
+        units = {"damping": "N s/m", "rotational": "N m s/rad"}
+        store_coefficients(self, units, "a damping (N s/m), or a rotational one (N m s/rad)")
+        self._store_direction()
+
+    def data(self, rod, s):
+        """See `Action`."""
+        return self._with_direction(scalar(self.damping, "N s/m"), scalar(self.rotational, "N m s/rad"))
+
+
+def _alike(point, test, b, d):
+    return -b * ufl.dot(point.r_t, test.phi_r) - d * ufl.dot(point.omega, test.phi)
+
+
+def _along(point, test, b, d, n):
+    return -b * ufl.dot(point.r_t, n) * ufl.dot(n, test.phi_r) - d * ufl.dot(point.omega, test.phi)

@@ -1,0 +1,69 @@
+"""The wall of a straight hole, without friction."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import ufl
+
+from cosserat_fenicsx.checks import direction, instance, positive, store, vector
+from cosserat_fenicsx.scene import action
+from cosserat_fenicsx.scene.action import LineAction
+from cosserat_fenicsx.scene.rod import Rod
+
+# Distances from the axis below this fraction of the clearance are replaced by it: the radial direction is undefined on
+# the axis, and there is no contact there.
+_ON_AXIS = 1e-6
+
+
+@dataclass(frozen=True)
+class Wall(LineAction):
+    """A frictionless cylindrical wall that confines a rod's centreline by a penalty: a force kp max(rho - clearance, 0)
+    per unit of reference length towards the straight axis, rho the distance from it.
+
+    It is integrated with the nodes as quadrature points, which resolves contact pressures best. It is not multiplied by
+    the load factor.
+
+    Args:
+        rod: the rod.
+        point: a point of the axis, m, inertial; direction: that of the axis.
+        clearance: radius of the hole minus that of the rod, m.
+        stiffness: kp, N/m^2. The penetration is the force per unit length over kp; rock and steel have 1e9 and more.
+
+    Raises:
+        SceneError: not a rod, no direction, or numbers that are not positive.
+    """
+
+    rod: Rod
+    point: tuple
+    direction: tuple
+    clearance: float
+    stiffness: float = 1e9
+
+    scaled, at_nodes = False, True
+
+    def __post_init__(self):
+        instance(self, "rod", self.rod, Rod, "a Rod")
+        store(
+            self, point=vector(self, "point", self.point, "m"), direction=direction(self, "direction", self.direction)
+        )
+        store(self, clearance=positive(self, "clearance", self.clearance, "m"))
+        store(self, stiffness=positive(self, "stiffness", self.stiffness, "N/m^2"))
+
+    def data(self, rod, s):
+        """See `Action`."""
+        axis = action.vector(self.point, "m from origin"), action.vector(self.direction, "1")
+        return (*axis, action.scalar(self.clearance, "m"), action.scalar(self.stiffness, "N/m^2"))
+
+    def holds(self, scene):
+        """See `Action`: it confines the rod across the axis."""
+        across = np.linalg.svd(np.array([self.direction]))[2][1:]
+        return [(station, np.r_[row, 0, 0, 0]) for station in (self.rod.start, self.rod.end) for row in across]
+
+    @staticmethod
+    def work(point, test, a, t, clearance, kp):
+        """See `Action`."""
+        d = point.r - a
+        away = d - ufl.dot(d, t) * t
+        rho = ufl.sqrt(ufl.max_value(ufl.dot(away, away), (_ON_AXIS * clearance) ** 2))
+        pressure = kp * ufl.max_value(rho - clearance, 0)
+        return -pressure / rho * ufl.dot(away, test.phi_r)

@@ -1,0 +1,77 @@
+"""A pool of compiled problems: each is used by one caller at a time, and kept for the next one that fits."""
+
+import contextlib
+import threading
+
+from mpi4py import MPI
+
+#: Largest number of idle problems kept for each communicator; the least recently used one is dropped first.
+MOST_IDLE = 24
+
+
+class ProblemPool:
+    """Owns compiled problems and lends them.
+
+    A problem that is lent belongs to its caller alone until it is given back: a call inside another one (from `until`,
+    from a force as a function of time, from another thread) gets a problem of its own. All ranks of a communicator must
+    borrow and return in the same order, which they do if every rank makes the same calls. Each communicator has a
+    separate limit: what one rank does on its own must not decide what all ranks have to create collectively.
+
+    Args:
+        most_idle: largest number of idle problems kept for each communicator.
+
+    Attributes:
+        made: how many problems were made so far.
+    """
+
+    def __init__(self, most_idle=MOST_IDLE):
+        self._lock, self._most_idle, self.made = threading.Lock(), most_idle, 0
+        self._idle_of_all, self._idle_of_one = [], []  # (key, problem), the one used last at the end
+
+    @contextlib.contextmanager
+    def lend(self, key, comm, make, outcomes=()):
+        """A context whose value is a problem that nobody else uses within it.
+
+        Args:
+            key: hashable; a problem fits if its key is equal.
+            comm: MPI communicator of the problem. Problems on a communicator created by the user are not kept, since
+                the user may free it.
+            make: called for a problem where none that fits is idle.
+            outcomes: exceptions that leave a problem usable. After any other it is dropped, since it may be half way
+                through an assembly or a solution.
+        """
+        idle = self._idle_on(comm)
+        problem = self._take(idle, key)
+        if problem is None:
+            problem = make()
+        try:
+            yield problem
+        except outcomes:
+            self._give_back(idle, key, problem)
+            raise
+        self._give_back(idle, key, problem)
+
+    def _idle_on(self, comm):
+        """The list of idle problems on a communicator; None for one created by the user."""
+        if comm == MPI.COMM_WORLD:
+            return self._idle_of_all
+        return self._idle_of_one if comm == MPI.COMM_SELF else None
+
+    def _take(self, idle, key):
+        with self._lock:
+            for i in reversed(range(len(idle or ()))):
+                if idle[i][0] == key:
+                    return idle.pop(i)[1]
+            self.made += 1
+        return None
+
+    def _give_back(self, idle, key, problem):
+        if idle is None:
+            return
+        with self._lock:
+            idle.append((key, problem))
+            del idle[: max(0, len(idle) - self._most_idle)]
+
+
+#: Where `solve`, `simulate`, `buckling` and `modes` borrow their problems.
+PROBLEMS = ProblemPool()

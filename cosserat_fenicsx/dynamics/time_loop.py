@@ -1,0 +1,165 @@
+"""The loop over time: steps that end at marks, halving of steps that fail, saved states and checkpoints."""
+
+import itertools
+
+import numpy as np
+
+from cosserat_fenicsx.errors import Interrupted, NotConverged, SceneError
+from cosserat_fenicsx.interrupts import obey
+from cosserat_fenicsx.progress import Progress
+from cosserat_fenicsx.results.history import Instant, Ledger
+
+# Number of times that a failing step is halved before the motion is given up.
+_HALVINGS = 12
+
+
+class TimeLoop:
+    """The computation of a motion, with its saved states and checkpoints.
+
+    Args:
+        problem: a `StepProblem`; stepper: see `steppers.protocol`; pace: the step size control, see `pace`.
+        history: the `History` that states are appended to.
+        folder: the `RunFolder` that states and checkpoints are written to, or None.
+    """
+
+    def __init__(self, problem, stepper, pace, history, folder):
+        self.problem, self.model, self._stepper, self._pace = problem, problem.model, stepper, pace
+        self.history, self._folder = history, folder
+        self._t = self._first = self._h = 0.0
+        self._count = self._steps = self._iterations = self._saved = 0
+
+    def memory(self):
+        """All that a motion needs to be continued from between two steps, see `Stepper.memory`."""
+        names = ("_t", "_first", "_h", "_count", "_steps", "_iterations", "_saved")
+        counts = {name.removeprefix("_"): getattr(self, name) for name in names}
+        return {**counts, "pace": self._pace.memory(), "stepper": self._stepper.memory(), "nodes": self.model.slots}
+
+    def recall(self, memory):
+        """Restore what `memory` returned."""
+        for name in ("t", "first", "h", "count", "steps", "iterations", "saved"):
+            setattr(self, f"_{name}", memory[name])
+        self._pace.recall(memory.get("pace", {}))
+        self._stepper.recall(memory["stepper"])
+
+    def over(self, marks, save_all, progress):
+        """Compute the motion from its current time to the last of the `Mark`s.
+
+        Args:
+            marks: `Mark`s, the first at the start; save_all: whether every step is saved; progress: see `simulate`.
+
+        Returns:
+            the history.
+        """
+        comm, model = self.model.comm, self.model
+        try:
+            with Progress([marks[-1].time], progress, comm, "t (s) =") as bar:
+                bar.start(f"{model.name}, {model.unknowns} unknowns")
+                bar.reached(self._t)
+                self._keep()
+                if not self._saved:
+                    self._save(self._t, stepped=False)
+                for mark, after in itertools.pairwise(marks):
+                    self._between(mark, after, save_all, bar)
+                self._keep()
+        except KeyboardInterrupt:
+            raise Interrupted(self.history) from None
+        except SceneError as problem:  # a function of time that raises, or gives no finite numbers, after the start
+            problem.path = self.history
+            raise
+        finally:
+            if self._folder:
+                self._folder.release()
+        return self.history
+
+    def _between(self, mark, after, save_all, bar):
+        begin, end = mark.time, after.time
+        if end <= self._t:  # a continued motion is past this interval
+            return
+        if self._t <= begin:
+            if mark.jump:
+                if begin > 0 and self._stepper.kinks_persist:
+                    self._stepper.drive(begin)
+                self._stepper.jump()
+                self._pace.jump()
+            elif mark.kink:
+                self._stepper.kink()
+            self._t = self._first = begin
+            self._count, self._h = 0, 0.0
+        nothing = 1e-9 * (end - begin)
+        while self._t < end:
+            obey()
+            if self._pace.stuck:
+                self._lose(
+                    self._t,
+                    f"steps of {self._h:.3g} s do not get longer again: something oscillates or jumps faster than the "
+                    "tolerance allows to resolve. Try a fixed dt, a larger tol, damping, scheme='generalised-alpha', "
+                    "or `jumps` where a load is not smooth.",
+                )
+            wanted = self._pace.length(self._t, end - self._t)
+            if abs(wanted - self._h) > 1e-9 * wanted:  # times are count * h, so that rounding does not accumulate
+                self._first, self._count, self._h = self._t, 0, wanted
+            if not self._advance(self._t, self._h):
+                continue
+            self._count += 1
+            t = self._first + self._count * self._h
+            self._t = end if end - t <= nothing else t
+            bar.reached(self._t)
+            if save_all or (after.saved and self._t == end):
+                self._save(self._t)
+            if self._folder and self._folder.due:
+                self._keep()
+
+    def _keep(self):
+        if self._folder:
+            self._folder.keep(self.memory(), self.history)
+
+    def _advance(self, t, h, halvings=0):
+        """Step from t by h (s), in halves where that fails; False where a shorter step is to be tried instead."""
+        solved = self._stepper.step(t, h)
+        self._iterations += solved.iterations
+        if solved.converged:
+            if not halvings and not self._pace.accepts(self._stepper, h):
+                self._stepper.undo()
+                return False
+            self._steps += 1
+            return True
+        if not halvings and self._pace.failed(h):
+            return False
+        if halvings == _HALVINGS:
+            self._lose(
+                t,
+                f"a step of {h:.3g} s still fails: {solved.reason}. Try a smaller dt or tol, more elements, or "
+                "damping.",
+            )
+        self._advance(t, h / 2, halvings + 1)
+        self._advance(t + h / 2, h / 2, halvings + 1)
+        return True
+
+    def _lose(self, t, why):
+        if self.history[-1].time < t:
+            self._save(t, stepped=False)
+        raise NotConverged(f"the motion was lost at t = {t:.6g} s, where {why}", self.history)
+
+    def _save(self, t, stepped=True):
+        """Save the state at the time t; `stepped`: whether a step that was accepted has just led there."""
+        model, problem, stepper = self.model, self.problem, self._stepper
+        scales = model.scales
+        momentum, energy = scales.force * model.time, scales.force * scales.length
+        nodal, gauss = model.snapshot()
+        linear, angular = problem.momenta()
+        ledger = Ledger(
+            *(energy * x for x in (*problem.energies(), stepper.work, stepper.dissipated)),
+            momentum * linear,
+            momentum * scales.length * angular,
+        )
+        rates = model.rates()(nodal, model.snapshot_of_rates())
+        iterations, self._iterations = self._iterations, 0
+        self._saved += 1
+        if stepped:
+            ties, clamps = problem.tie_forces(), problem.clamp_forces()
+        else:
+            ties = np.full((len(model.signature.connections.ties), 2, 6), np.nan)
+            clamps = np.full((model.clamps.count, 6), np.nan)
+        held = {"tie_forces": ties, "clamp_forces": clamps}
+        self.history.append(Instant(problem.load_factor, nodal, gauss, 0, iterations, problem.multipliers(), time=t,
+                                    rates=rates, steps=self._steps, ledger=ledger, **held))  # fmt: skip

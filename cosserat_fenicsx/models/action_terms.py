@@ -1,0 +1,224 @@
+"""The Functions that hold the data of a scene's actions on a mesh, one term for each kind of virtual work."""
+
+import numpy as np
+import ufl
+from dolfinx import fem
+
+from cosserat_fenicsx import compat
+from cosserat_fenicsx.models.rod_data import gauss_function
+from cosserat_fenicsx.models.signature import place_actions
+from cosserat_fenicsx.scene.signals import at, signals_of
+
+# Points of an element, in [0, 1], that are closer than this are the same.
+_SAME = 1e-9
+
+
+class ActionTerms:
+    """The terms of a signature.
+
+    Args:
+        rods: the `RodMesh`; signature: the `Signature`; nodes: reference coordinates of an element's nodes, ascending.
+
+    Attributes:
+        terms: the `Term`s.
+    """
+
+    def __init__(self, rods, signature, nodes):
+        self.terms = [Term(rods, signature, nodes, kind) for kind in signature.terms]
+
+    def fill(self, model, time=1.0):
+        """Fill the Functions with the data of the model's scene at the time 0.
+
+        Args:
+            model: a `RodModel`; time: its unit of time, s.
+        """
+        placed = place_actions(model.scene, model.layout)
+        for term, (_, members) in zip(self.terms, placed, strict=True):
+            term.fill(model, members, time)
+
+    def at(self, t):
+        """Fill the Functions with the data at the time t (s)."""
+        for term in self.terms:
+            if term.moves:
+                term.put(t)
+
+    @property
+    def moving(self):
+        """The Functions that depend on time."""
+        return [function for term in self.terms if term.moves for function in term.data]
+
+    @property
+    def refreshed(self):
+        """The Functions that are updated with the state in every Newton iteration."""
+        return [function for term in self.terms if term.kind.refreshed for function in term.data]
+
+    def refresh(self):
+        """Update the data that depend on the position, at the model's state."""
+        for term in self.terms:
+            if term.kind.refreshed:
+                term.refresh()
+
+    @property
+    def memory_functions(self):
+        """The Functions of the actions' memory (history variables)."""
+        return [function for term in self.terms for function in term.memory]
+
+    @property
+    def memory(self):
+        """The arrays of the actions' memory."""
+        return [function.x.array for function in self.memory_functions]
+
+    def commit(self):
+        """Update the actions' memory to the state, which has been accepted."""
+        for term in self.terms:
+            if term.memory:
+                term.commit()
+
+
+class Term:
+    """Actions of one kind: a virtual work, and the Functions of its data.
+
+    Attributes:
+        kind: the `signature.TermKind`.
+        weight: Function: 1 where distributed actions act; 2 over the element length at the station of a point action,
+            because the end-point rule gives each end half that length; 0 elsewhere.
+        data, memory: Functions of the data, and of the memory (history variables).
+        moves: whether something in it depends on time.
+    """
+
+    def __init__(self, rods, signature, nodes, kind):
+        self.kind, self._rods, self._nodes, self._signature = kind, rods, nodes, signature
+        self.weight = self._function(1)
+        self.data = [self._function(size) for size in kind.sizes]
+        self.memory = [self._function(size) for size in kind.memory]
+        self._rest = self._frame = self._evolution = None
+
+    def _function(self, size):
+        mesh, place = self._rods.mesh, self.kind.place
+        if place == "line":
+            return gauss_function(mesh, self._signature.points, size)
+        degree = 1 if place == "point" else self._signature.degree
+        return fem.Function(compat.function_space(mesh, compat.lagrange(mesh, degree, size, discontinuous=True)))
+
+    # -- UFL ---------------------------------------------------------------------------------------------------------
+
+    def rest(self):
+        """Position at rest; its Function is made at the first call."""
+        self._rest = self._rest or self._function(3)
+        return self._rest
+
+    def frame(self):
+        """Directors at rest as the columns of a matrix; its Function is made at the first call."""
+        self._frame = self._frame or self._function(9)
+        return ufl.as_matrix([[self._frame[3 * i + j] for j in range(3)] for i in range(3)])
+
+    @property
+    def numbers(self):
+        """Data and memory as UFL scalars and vectors."""
+        sizes = (*self.kind.sizes, *self.kind.memory)
+        return [f if size == 3 else f[0] for f, size in zip((*self.data, *self.memory), sizes, strict=True)]
+
+    def work(self, point, test):
+        """The virtual work, weighted, per unit of the measure."""
+        return self.weight[0] * self.kind.work(point, test, *self.numbers)
+
+    def compile_evolution(self, point):
+        """Compile the update of the memory."""
+        changed = [x for a in self.kind.evolve(point, *self.numbers) for x in (a if a.ufl_shape else [a])]
+        self._evolution = fem.Expression(ufl.as_vector(changed), self._dof_places[:, None])
+
+    # -- numbers -----------------------------------------------------------------------------------------------------
+
+    @property
+    def _dof_places(self):
+        """Reference coordinates of the degrees of freedom of an element, in dolfinx's order."""
+        return self._gauss if self.kind.place == "line" else compat.element_nodes(self.weight.function_space)
+
+    @property
+    def _gauss(self):
+        return np.polynomial.legendre.leggauss(self._signature.points)[0] / 2 + 0.5
+
+    def fill(self, model, members, time):
+        """Fill in the data of actions.
+
+        Args:
+            model: loaded with their scene; members: (action, index of its rod, element end or None) of each; time: s.
+        """
+        self._model, self._time = model, time
+        scene, layout, rods, x = model.scene, model.layout, self._rods, self._dof_places
+        numbers = compat.cell_nodes(self.weight.function_space)  # the same for all Functions of this term
+        first, cells = layout.first_cells, rods.cells
+        begin, size = np.concatenate([b[:-1] for b in layout.breaks]), layout.sizes(scene)
+        lengths = np.array([rod.length for rod in scene.rods])
+        along = np.where(rods.reversed[:, None], 1 - x, x)
+        s = (begin[cells] * lengths[rods.cell_rod])[:, None] + size[cells][:, None] * along
+        weight = np.zeros(self.weight.x.array.shape)
+        self._where = []  # (action, rod, rows of the values, arc lengths, mask over elements and points)
+        for action, rod, vertex in members:
+            here = np.broadcast_to((rods.cell_rod == rod)[:, None], s.shape)
+            value = 1.0
+            if vertex is not None:
+                inner = min(vertex, layout.counts[rod] - 1)
+                here = here & (rods.cell_inner == inner)[:, None] & (np.abs(along - (vertex - inner)) < _SAME)
+                value = 2 * model.scales.length / size[first[rod] + inner]
+            weight[numbers[here]] = value
+            self._where.append((action, scene.rods[rod], numbers[here], s[here], here))
+        self.weight.x.array[:] = weight
+        self.moves = any(signals_of(action) for action, _, _ in members)
+        for k, function in enumerate((*self.data, *self.memory)):
+            # data of one member also where none acts, so that no virtual work divides by zero there
+            action, rod = self._where[0][:2]
+            datum = (*at(action, 0.0).data(rod, np.zeros(1)), *action.memory)[k]
+            function.x.array.reshape(-1, datum.size)[:] = self._scaled(datum, rod)
+        self.put(0.0)
+        for k, function in enumerate(self.memory):
+            for action, rod, rows, _, _ in self._where:
+                function.x.array.reshape(-1, action.memory[k].size)[rows] = self._scaled(action.memory[k], rod)
+        if self._rest is not None:
+            self._rest.x.array.reshape(-1, 3)[numbers] = self._interpolated(model.positions_at_rest()) @ model.axes.T
+        if self._frame is not None:
+            for i, rod in enumerate(scene.rods):
+                here = rods.cell_rod == i
+                frames = model.axes @ rod.curve.frame(s[here].ravel())
+                self._frame.x.array.reshape(-1, 9)[numbers[here].ravel()] = frames.reshape(-1, 9)
+
+    def put(self, t):
+        """Fill in the data at the time t, s."""
+        for action, rod, rows, s, _ in self._where:
+            if len(rows):
+                self._take(at(action, t).data(rod, s), rod, rows)
+
+    def _take(self, data, rod, rows):
+        for function, datum in zip(self.data, data, strict=True):
+            function.x.array.reshape(-1, datum.size)[rows] = self._scaled(datum, rod)
+
+    def _scaled(self, datum, rod):
+        """The value of a `Datum`, dimensionless, vectors along the model's axes."""
+        value, model = datum.value, self._model
+        if datum.unit == "m from origin":
+            value = value - model.scene.origin(rod)
+        value = value / model.scales.of_unit(datum.unit, self._time)
+        return value @ model.axes.T if datum.size == 3 else value
+
+    def _interpolated(self, nodal):
+        """(local elements, points of one, k) interpolated from nodal values (local nodes, k)."""
+        model = self._model
+        basis = model.rule.basis(self._dof_places)[:, model.node_order]
+        return np.einsum("qj,cji->cqi", basis, nodal[model.cell_nodes])
+
+    def refresh(self):
+        """Fill in the actions' data at the positions of the model's state."""
+        model = self._model
+        r = self._interpolated(model.positions())
+        for action, rod, rows, s, here in self._where:
+            if len(rows):
+                place = r[here] * model.scales.length + model.scene.origin(rod)
+                self._take(action.refreshed(rod, s, place), rod, rows)
+
+    def commit(self):
+        """Store the memory evaluated at the state."""
+        values = compat.evaluate(self._evolution, self._rods.mesh, np.arange(len(self._rods.cells), dtype=np.int32))
+        sizes = self.kind.memory
+        values = values.reshape(len(self._rods.cells), -1, sum(sizes))
+        for function, part in zip(self.memory, np.split(values, np.cumsum(sizes)[:-1], axis=2), strict=True):
+            function.x.array.reshape(-1, part.shape[2])[compat.cell_nodes(function.function_space)] = part

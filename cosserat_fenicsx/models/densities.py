@@ -1,0 +1,37 @@
+"""Force and moment per length of the distributed actions, from which results compute contact forces at element ends."""
+
+
+class Densities:
+    """The densities of the actions of a model's current scene."""
+
+    def load(self, model):
+        """Prepare for the model's scene. Dead densities are evaluated once, per unit of each of the two factors."""
+        self._model, self._dead = model, None
+        if model.forms.density is None or model.signature.lives_along_rods:
+            return
+        factors = model.load_factor, model.permanent_factor
+        before = [float(factor.value) for factor in factors]
+        self._dead = []
+        for i in range(2):
+            for j, factor in enumerate(factors):
+                factor.value = float(i == j)
+            self._dead.append(self._at(model.forms.density, len(model.forms.gauss)))
+        for factor, value in zip(factors, before, strict=True):
+            factor.value = value
+
+    def here(self):
+        """The densities at the model's state, inertial, dimensionless, (elements, points, 6) each or None: at the Gauss
+        points, and at the nodes for actions integrated there."""
+        model, at_gauss = self._model, None
+        if self._dead is not None:
+            factors = (float(factor.value) for factor in (model.load_factor, model.permanent_factor))
+            at_gauss = sum(factor * of_unit for factor, of_unit in zip(factors, self._dead, strict=True))
+        elif model.forms.density is not None:
+            at_gauss = self._at(model.forms.density, len(model.forms.gauss))
+        if model.forms.node_density is None:
+            return at_gauss, None
+        return at_gauss, self._at(model.forms.node_density, len(model.nodes))
+
+    def _at(self, expression, points):
+        values = self._model.gathered(expression, points, 6).reshape(-1, points, 2, 3)
+        return (values @ self._model.axes).reshape(-1, points, 6)

@@ -1,0 +1,143 @@
+"""The properties of a scene that determine the compiled code and the mesh."""
+
+import numbers
+from collections import namedtuple
+from dataclasses import dataclass
+
+import numpy as np
+
+from cosserat_fenicsx.errors import SceneError
+from cosserat_fenicsx.models.connections import Connections
+from cosserat_fenicsx.models.formulations import formulation_of
+from cosserat_fenicsx.models.formulations.formulation import Formulation
+from cosserat_fenicsx.models.traits import traits_of, work_of
+from cosserat_fenicsx.scene.signals import at
+
+#: Unknowns of a node, and numbers of a contact force, by the model's name and whether it is that of a plane.
+_SIZES = {
+    ("spatial", False): (7, 3),
+    ("planar", True): (3, 2),
+    ("determinate", True): (1, 0),
+    ("determinate", False): (4, 0),
+}
+# Largest value of `_rounding` for a factorisation that pivots only within nodes.
+_ROOM_FOR_BLOCKS = 1e-4
+
+
+@dataclass(frozen=True)
+class Signature:
+    """What determines the compiled code and the mesh; scenes with equal signatures can use the same model.
+
+    Attributes:
+        model: "spatial", "planar" or "determinate".
+        flat: whether the model is planar; "determinate" exists in a plane and in space.
+        counts: elements of each rod.
+        degree: polynomial degree p of the nodal unknowns.
+        formulation: the `Formulation`.
+        points: Gauss points per element.
+        terms: the `TermKind`s of the actions; a kind is repeated for actions that act at the same place.
+        connections: where supports and joints act.
+        slender: whether rounding rules out a factorisation that pivots only within nodes.
+        coupled: whether a section couples strains, so that the law is one of full matrices.
+    """
+
+    model: str
+    flat: bool
+    counts: tuple
+    degree: int
+    formulation: Formulation
+    points: int
+    terms: tuple
+    connections: Connections
+    slender: bool
+    coupled: bool
+
+    @classmethod
+    def of(cls, scene, layout, *, formulation, degree, points=None, model="spatial"):
+        """The signature of a scene on a layout, for an admissible model; `formulation` is a `Formulation` or its name.
+
+        Raises:
+            SceneError: an unknown formulation, a degree outside 1..4, or an infinite stiffness that the formulation
+                does not allow.
+        """
+        formulation = formulation_of(formulation)
+        if isinstance(degree, bool) or not isinstance(degree, numbers.Integral) or not 1 <= degree <= 4:
+            raise SceneError(f"degree = {degree!r}: expected 1, 2, 3 or 4")
+        if points is not None and (
+            isinstance(points, bool) or not isinstance(points, numbers.Integral) or not 1 <= points <= 12
+        ):
+            raise SceneError(f"gauss_points = {points!r}: expected a whole number from 1 to 12")
+        infinite = any(np.isinf(rod.profile.range[1].K).any() for rod in scene.rods)
+        # On a fine mesh of a very slender rod, rounding errors of the condensed tangent reach the bending stiffness.
+        rounding = _rounding(scene, layout, degree)
+        formulation = formulation.for_stiffness(infinite, rounding)
+        if model == "determinate":
+            formulation = formulation.with_known_force()
+        terms = tuple(kind for kind, _ in place_actions(scene, layout))
+        plane = None if model == "spatial" else scene.plane
+        connections = Connections.of(scene, layout, plane)
+        counts, slender = layout.counts, rounding > _ROOM_FOR_BLOCKS
+        coupled = any(rod.profile.coupled for rod in scene.rods)
+        return cls(
+            model, plane is not None, counts, degree, formulation, points or degree, terms, connections, slender,
+            coupled,
+        )  # fmt: skip
+
+    @property
+    def lives_along_rods(self):
+        """Whether something along rods may depend on the state."""
+        return any(kind.place != "point" and not kind.dead for kind in self.terms)
+
+    @property
+    def unknowns(self):
+        """Number of unknowns, without making a mesh."""
+        cells, links = sum(self.counts), self.connections
+        nodes = cells * self.degree + len(self.counts) - len(links.clamped) - len(links.leaders)
+        node, force = _SIZES[self.model, self.flat]
+        if self.model == "spatial":
+            node += self.formulation.unit_length.unknowns
+        others = force * self.degree * cells if self.formulation.force.unknown else 0
+        return node * nodes + others + len(links.equations)
+
+
+def _rounding(scene, layout, degree):
+    """Rounding error of the largest entries of the condensed tangent over the bending stiffness at nodal spacing."""
+    return max(
+        np.finfo(float).eps * rod.profile.range[1].K.max() * rod.length**2 / rod.profile.range[0].J[:2].min()
+        * (cells * degree) ** 2
+        for rod, cells in zip(scene.rods, layout.counts, strict=True)
+    )  # fmt: skip
+
+
+#: A kind of action: its virtual work, where it is integrated ("point", "line" at Gauss points, or "node"), the sizes of
+#: its data and of its memory, its factor ("load" factor, "permanent" factor, or 1: "full"), its `Action.evolve`,
+#: whether its data depend on the position, and whether it is independent of the state (`traits.Traits`).
+TermKind = namedtuple("TermKind", "work place sizes memory scaled evolve refreshed dead")
+
+
+def place_actions(scene, layout):
+    """Terms of the actions: [(`TermKind`, [(action, rod index, vertex or None)])], actions of one kind share a term if
+    they act at different places."""
+    terms = []
+    for action in scene.actions:
+        work = work_of(action)
+        if work is None:
+            continue
+        if action.station is not None:
+            places, place = [layout.vertex(scene, action.station)], "point"
+        else:
+            places = [(rod, None) for rod, which in enumerate(scene.rods) if action.acts_on(which)]
+            place = "node" if action.at_nodes else "line"
+        data = at(action, 0.0).data(scene.rods[places[0][0]], np.zeros(1))
+        scaled = "load" if action.scaled else "permanent" if action.permanent else "full"
+        sizes, memory = (tuple(datum.size for datum in data) for data in (data, action.memory))
+        kind = TermKind(work, place, sizes, memory, scaled, action.evolve, action.refreshed is not None,
+                        traits_of(action, scene.rods).dead)  # fmt: skip
+        for known, members in terms:
+            if known == kind and not {(rod, vertex) for _, rod, vertex in members} & set(places):
+                break
+        else:
+            members = []
+            terms.append((kind, members))
+        members.extend((action, *where) for where in places)
+    return sorted(terms, key=lambda term: (term[0].work.__qualname__, term[0].place, term[0].scaled))

@@ -1,0 +1,77 @@
+"""The largest contact forces and moments over a path or a motion, in words too."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from cosserat_fenicsx.quaternions import directors
+from cosserat_fenicsx.results.on_nodes import OnNodes
+
+# Places looked at in an element, for each degree of its polynomials.
+_PLACES = 6
+# Less than this share of what it stands beside is rounding.
+_ROUNDING = 1e-6
+_UNITS = {"bending moment": "N m", "twisting moment": "N m", "shear force": "N", "tension": "N", "compression": "N"}
+
+
+@dataclass(frozen=True)
+class Largest:
+    """The largest of a quantity: its size (N m or N), its station, and the point of the path."""
+
+    size: float
+    station: object
+    point: int
+
+
+class Extremes(OnNodes):
+    """The largest contact forces and moments of a path or a motion."""
+
+    def largest(self):
+        """{quantity: `Largest`} over all points and places of a path or a motion, both sides of a jump and between the
+        nodes; on the mesh there is, which `tol` does not speak of. What is zero everywhere but for rounding is left
+        out.
+
+        With the tangent t = d3: bending |m - (m.t) t|, twisting |m.t|, shear |n - (n.t) t|, tension n.t, compression
+        -n.t.
+        """
+        found = dict.fromkeys(_UNITS, Largest(0.0, None, 0))
+        inside = np.linspace(0, 1, _PLACES * self.degree + 1)
+        basis = self.rule.basis(inside)
+        places = []
+        for i, rod in enumerate(self.scene.rods):
+            breaks = self.layout.breaks[i]
+            s = ((breaks[:-1, None] + np.diff(breaks)[:, None] * inside) * rod.length).ravel()
+            nodes = np.arange(self.elements[i])[:, None] * self.degree + np.arange(self.degree + 1)
+            places.append((rod, s, rod.curve.frame(s)[:, :, 2], self._rows(rod)[1], self._cells(i), nodes))
+        for k in range(len(self)):
+            contact, rq = self._contact_of(k), self[k].rq
+            for rod, s, d3, rows, cells, nodes in places:
+                n, m = np.split(np.einsum("qj,cjk->cqk", basis, contact[cells]).reshape(-1, 6), 2, axis=1)
+                q = np.einsum("qj,cjk->cqk", basis, rq[rows, 3:][nodes]).reshape(-1, 4)
+                t = np.einsum("nij,nj->ni", directors(q / np.linalg.norm(q, axis=1, keepdims=True)), d3)
+                axial, twist = np.einsum("ni,ni->n", n, t), np.einsum("ni,ni->n", m, t)
+                force, moment = self.scales.force, self.scales.moment
+                sizes = (
+                    moment * np.linalg.norm(m - twist[:, None] * t, axis=1),
+                    moment * np.abs(twist),
+                    force * np.linalg.norm(n - axial[:, None] * t, axis=1),
+                    force * axial,
+                    -force * axial,
+                )
+                for what, size in zip(_UNITS, sizes, strict=True):
+                    place = int(np.argmax(size >= size.max() - _ROUNDING * abs(size.max())))  # the first of many alike
+                    if size[place] > (1 + _ROUNDING) * found[what].size:
+                        found[what] = Largest(float(size[place]), rod.at(s[place]), k)
+        most = {unit: max(x.size for what, x in found.items() if _UNITS[what] == unit) for unit in ("N m", "N")}
+        return {what: x for what, x in found.items() if x.size > _ROUNDING * most[_UNITS[what]]}
+
+
+def largest_in_words(path):
+    """`Extremes.largest` as a sentence."""
+    where = "time" if path.axis == "time" else path.axis
+    unit = " s" if path.axis == "time" else ""
+    told = [
+        f"{what} {x.size:.4g} {_UNITS[what]} ({x.station}, {where} {path.along_axis[x.point]:.4g}{unit})"
+        for what, x in path.largest().items()
+    ]
+    return f"Largest, on this mesh (tol speaks of positions): {'; '.join(told) or 'no contact force or moment'}."

@@ -1,0 +1,104 @@
+"""Where a solution needs short elements: in boundary layers of bending, and where two meshes differ most."""
+
+import numpy as np
+
+from cosserat_fenicsx.quaternions import conjugate_product, directors
+from cosserat_fenicsx.results.accuracy import halfway, sizes_of
+
+# Largest length of an element where a boundary layer may begin, over the length of that layer.
+_COARSE = 4.0
+
+
+def layer_lengths(scene, scales, layout, rule, n):
+    """Lengths sqrt(EI/|n|) of boundary layers, over which bending decays beside a support or a load, per element.
+
+    Args:
+        layout, rule: of the mesh.
+        n: (states, elements, points, 3) contact forces at the Gauss points, dimensionless, all rods one after another.
+
+    Returns:
+        For every rod (elements,), over the length of the rod; None where all elements are short compared with these.
+    """
+    force = np.sqrt(3) * np.abs(n).max(initial=0.0) * scales.force
+    if all(
+        force * (np.diff(breaks).max() * rod.length / _COARSE) ** 2 <= rod.profile.range[0].J[:2].min()
+        for rod, breaks in zip(scene.rods, layout.breaks, strict=True)
+    ):
+        return None
+    lengths, first = [], 0
+    largest = np.sqrt(np.square(n).sum(axis=3).max(axis=(0, 2))) * scales.force
+    for rod, x in zip(scene.rods, layout.inside(rule.gauss), strict=True):
+        forces = largest[first : first + len(x)]
+        first += len(x)
+        bending = rod.stiffness_at(x.ravel() * rod.length).J[:, :2].min(axis=1).reshape(x.shape).min(axis=1)
+        lengths.append(np.sqrt(bending / np.maximum(forces, 1e-300)) / rod.length)
+    return lengths
+
+
+def of_path(path):
+    """`layer_lengths` of the largest contact forces over all points of a path."""
+    n = np.array([record.gauss_fields for record in path])[..., :3]
+    return layer_lengths(path.scene, path.scales, path.layout, path.rule, n)
+
+
+def unresolved(scene, layout, lengths):
+    """Whether elements at the end of a piece are too long for the boundary layers that may begin there."""
+    for breaks, pieces, layers in zip(layout.breaks, layout.pieces(scene), lengths, strict=True):
+        sizes = np.diff(breaks)
+        at_ends = np.unique([k for piece in pieces for k in (piece.start, piece.stop - 1)])
+        if (sizes[at_ends] > _COARSE * layers[at_ends]).any():
+            return True
+    return False
+
+
+def element_differences(fine, coarse):
+    """The contribution of each element to the difference of the positions on two meshes.
+
+    It is the largest of three: the difference within the element, relative to the line between its ends; that of the
+    relative displacement of its ends; and that of their relative rotation times a lever arm. The lever arm is the
+    length over which the rest of the rod follows this rotation: the rod's length, or sqrt(EI/|n|) under tension.
+
+    Args:
+        fine, coarse: Paths with the same points; every element of `fine` lies within one of `coarse`.
+
+    Returns:
+        For every rod (elements of the coarse mesh,): maximum over all points, relative to their largest displacements.
+    """
+    sizes = sizes_of(fine).largest
+    n = np.array([record.gauss_fields[:, :, :3] for record in coarse])
+    forces = np.sqrt(np.square(n).sum(axis=3).max(axis=2))
+    found, first, p, scales = [], 0, fine.degree, fine.scales
+    for i, rod in enumerate(fine.scene.rods):
+        nodes, count = coarse.layout.node_s(coarse.rule.nodes)[i], coarse.elements[i]
+        x = halfway(nodes)
+        moved = [path.motion(rod, x) for path in (coarse, fine)]
+        inside = 2 * p * np.arange(count)[:, None] + np.arange(2 * p + 1)
+        off = (moved[0] - moved[1])[:, inside, :3]
+        along = halfway(coarse.rule.nodes)[:, None]
+        off -= off[:, :, :1] * (1 - along) + off[:, :, -1:] * along
+        ends = x[:: 2 * p]
+        rest = rod.curve.position(ends * rod.length) / scales.length
+        deformed = [_deformation(m[:, :: 2 * p], rest) for m in moved]
+        past, turned = (np.linalg.norm(a - b, axis=2) for a, b in zip(*deformed, strict=True))
+        bending = rod.profile.range[1].J[:2].max() / (scales.moment * scales.length)
+        lever = 1 / np.sqrt((scales.length / rod.length) ** 2 + forces[:, first : first + count] / bending)
+        first += count
+        differences = np.maximum(np.linalg.norm(off, axis=3).max(axis=2), np.maximum(past, lever * turned))
+        found.append((differences / sizes[:, None]).max(axis=0))
+    return found
+
+
+def _deformation(motion, rest):
+    """Relative displacements of the ends of elements, in the frame half way between, and their relative rotations.
+
+    Args:
+        motion: (points, ends, 7) displacements and unit quaternions; rest: (ends, 3) reference positions.
+
+    Returns:
+        Two arrays (points, elements, 3), the second twice the vector parts of quaternions.
+    """
+    q = motion[:, :, 3:]
+    half_way = (q[:, :-1] + q[:, 1:]).reshape(-1, 4)
+    frames = directors(half_way / np.linalg.norm(half_way, axis=1, keepdims=True)).reshape(len(q), -1, 3, 3)
+    past = np.einsum("kcij,kci->kcj", frames, np.diff(motion[:, :, :3] + rest, axis=1))
+    return past, 2 * conjugate_product(q[:, :-1], q[:, 1:])

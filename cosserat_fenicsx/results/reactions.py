@@ -1,0 +1,97 @@
+"""What supports hold their rods with."""
+
+import numpy as np
+
+from cosserat_fenicsx.errors import SceneError
+from cosserat_fenicsx.results.on_nodes import OnNodes
+from cosserat_fenicsx.scene.describe import describe
+
+# Less than this share of what it stands beside is rounding.
+_ROUNDING = 1e-6
+
+
+class Reactions(OnNodes):
+    """Reactions of a result, from the residual of the equations that it solves."""
+
+    def reaction(self, support):
+        """What a support exerts on its rod in every state: the multipliers of its equations, or at a clamp, which has
+        no
+        equations, what is missing in the balance of its node: the internal force of all rods that are joined there,
+            less what
+        acts there and what other supports and joints exert.
+
+        Args:
+            support: one of the scene's (`result.scene.supports`).
+
+        Returns:
+            force (n, 3), N, and moment (n, 3) about the station, N m, both inertial.
+
+            Of a motion they balance loads and momenta over the step that led to a saved state. With "momentum" and
+            "energy" they are those of the middle of this step, with "triple-jump" those of the middle of the last of
+            its three; with "generalised-alpha" those at its end. NaN where no step led to the state: at the start, and
+            where a motion was lost.
+
+        Raises:
+            SceneError: it is no support of the scene; or a clamp where an action remembers, which may exert anything.
+        """
+        which = [i for i, x in enumerate(self.scene.supports) if x is support]
+        if not which:
+            raise SceneError(f"{support!r} is no support of this result's scene: expected one of its `scene.supports`")
+        exerted = self._of_clamp(support) if support.clamps else self._of_equations(which[0])
+        force, moment = np.split(exerted, 2, axis=1)
+        return force * self.scales.force, moment * self.scales.moment
+
+    def _of_equations(self, which):
+        """(n, 6) dimensionless, of a support that adds equations."""
+        first = sum(len(support.ties()) for support in self.scene.supports[:which])
+        own = slice(first, first + len(self.scene.supports[which].ties()))
+        return self._stacked("tie_forces")[:, own, 0].sum(axis=1)
+
+    def _of_clamp(self, clamp):
+        """(n, 6) dimensionless."""
+        links = self._connections
+        leaders = dict(links.leaders)
+        vertex = self.layout.vertex(self.scene, clamp.station)
+        point = leaders.get(vertex, vertex)
+        joined = [point, *(vertex for vertex, leader in links.leaders if leader == point)]
+        for action in self.scene.actions:
+            if action.memory and action.station and self.layout.vertex(self.scene, action.station) in joined:
+                raise SceneError(f"{describe(action)} remembers: what {describe(clamp)} exerts beside it is not told")
+        exerted = self._at_clamp(links.clamped.index(point), joined)
+        tie_forces = self._stacked("tie_forces")
+        for i, (_, *stations) in enumerate(links.ties):
+            for k, station in enumerate(stations):
+                if station == point:
+                    exerted = exerted - tie_forces[:, i, k]
+        return exerted
+
+    def _at_clamp(self, point, joined):
+        """(n, 6) internal force and moment less those of what acts there, dimensionless.
+
+        Args:
+            point: number of the clamped point; joined: (rod, element end) of all rods that share it.
+        """
+        raise NotImplementedError
+
+
+def reactions_in_words(result):
+    """What every support holds with in the last state, a sentence each."""
+    contact = result._contact_of(len(result) - 1)
+    n = np.linalg.norm(contact[..., :3], axis=-1).max() * result.scales.force
+    m = np.linalg.norm(contact[..., 3:], axis=-1).max() * result.scales.moment
+    at = result.along_axis[-1]
+    when = f"at the {result.axis} {at:.6g}" if result.axis != "time" else f"in the step that ends at t = {at:.6g} s"
+    for support in result.scene.supports:
+        try:
+            force, moment = (values[-1] for values in result.reaction(support))
+        except SceneError as unknown:
+            yield f"{unknown}."
+            continue
+        if np.isfinite(force).all():
+            yield f"{describe(support)} holds with {_vector(force, n)} N and {_vector(moment, m)} N m {when}."
+
+
+def _vector(a, beside):
+    """Components in words; those that are rounding beside each other or a number as 0."""
+    least = _ROUNDING * max(np.abs(a).max(), beside)
+    return f"({', '.join(f'{x:.6g}' if abs(x) > least else '0' for x in a)})"

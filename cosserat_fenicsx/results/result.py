@@ -1,0 +1,212 @@
+"""What an equilibrium path and a motion have in common: all that is asked of states on the rods of a scene."""
+
+from functools import cached_property
+
+import numpy as np
+
+from cosserat_fenicsx.checks import instance
+from cosserat_fenicsx.quaternions import directors
+from cosserat_fenicsx.results.extremes import Extremes
+from cosserat_fenicsx.results.reactions import Reactions
+from cosserat_fenicsx.results.recovery import at_nodes
+from cosserat_fenicsx.results.states import States
+from cosserat_fenicsx.scene.rod import Station
+
+
+class Result(Extremes, Reactions, States):
+    """A sequence of states of a scene, in SI units where it is asked, dimensionless inside. It can be copied and
+    pickled, see `States`.
+
+    Attributes:
+        scene: the scene it belongs to.
+        model, formulation, degree, elements, unknowns: what it was computed with (`elements`: of each rod).
+        why: sentences that say why.
+        comm: the ranks that solved it; each holds all of it, the first writes files and pictures.
+        iterations: (n,) Newton iterations spent since the state before, rejected steps included.
+
+    Station queries take a `Station` or its name as in scene files ("column.end", "column@5.0"), and return one row a
+    state, in inertial components unless they say material.
+    """
+
+    def station(self, station):
+        """The `Station` that a query means.
+
+        Raises:
+            SceneError: it is neither a station nor the name of one.
+        """
+        if isinstance(station, str):
+            return self.scene.station(station)
+        return instance(type(self).__name__, "station", station, Station, "a station such as rod.end, or its name")
+
+    def position(self, station):
+        """(n, 3) m, inertial."""
+        station = self.station(station)
+        return self.displacement(station) + station.rod.curve.position(station.s)
+
+    def displacement(self, station):
+        """(n, 3) m, inertial, from the reference."""
+        return self._at(station, self._all_rq[:, :, :3], self._rest) * self.scales.length
+
+    def rotation(self, station):
+        """(n, 4) unit quaternion (scalar first) from the reference to the current section; its sign is continuous
+        from point to point and along the rod."""
+        q = self._at(station, self._all_rq[:, :, 3:])
+        return q / np.linalg.norm(q, axis=1, keepdims=True)
+
+    def rotation_angle(self, station):
+        """(n,) rad: angle of `rotation`, in [0, 2 pi]: q is continuous from point to point, so it folds at 2 pi and not
+        at pi."""
+        q = self.rotation(station)
+        half = np.arctan2(np.linalg.norm(q[:, 1:], axis=1), q[:, 0])
+        return 2 * half
+
+    def force(self, station):
+        """(n, 3) contact force n, N, inertial: what the part beyond (larger s) exerts on the part before. At a
+        station with a point load, the value just before it; at rod.start the value just after."""
+        return self._contact_at(station)[:, :3] * self.scales.force
+
+    def moment(self, station):
+        """(n, 3) contact moment m, N m, inertial; sides as in `force`."""
+        return self._contact_at(station)[:, 3:] * self.scales.moment
+
+    def centreline(self, k=-1, rod=None):
+        """(nodes, 3) m, inertial: the nodes of a rod (default the first) at point k."""
+        return self.fields(k, rod)["position"]
+
+    def fields(self, k, rod=None):
+        """Everything at the nodes of a rod, given as one or by its name (default the first), at point k.
+
+        Returns:
+            dict of arrays (nodes, ...): s (m), position, displacement (m), quaternion, d1, d2, d3, force (N), moment
+            (N m), all inertial; strain (v - v_R: shear 1, shear 2, stretch) and curvature (u - u_R: bending 1,
+            bending 2, twist; 1/m), both material; bending_moment (N m, its size).
+        """
+        rod = self.rod(rod)
+        i, rows = self._rows(rod)
+        s = self.layout.node_s(self.rule.nodes)[i] * rod.length
+        record = self._records[k]
+        contact = at_nodes(self._contact_of(k)[self._cells(i)])
+        displacement = (record.rq[rows, :3] - self._rest[rows]) * self.scales.length
+        q = record.rq[rows, 3:] / np.linalg.norm(record.rq[rows, 3:], axis=1, keepdims=True)
+        d = directors(q) @ rod.curve.frame(s)
+        n, m = contact[:, :3] * self.scales.force, contact[:, 3:] * self.scales.moment
+        n_material, m_material = np.einsum("kij,ki->kj", d, n), np.einsum("kij,ki->kj", d, m)
+        # like n and m, on a jump those of the element before
+        strain, curvature = rod.stiffness_at(s, "left").strains(n_material, m_material)
+        return {
+            "s": s,
+            "position": rod.curve.position(s) + displacement,
+            "displacement": displacement,
+            "quaternion": q,
+            "d1": d[:, :, 0],
+            "d2": d[:, :, 1],
+            "d3": d[:, :, 2],
+            "force": n,
+            "moment": m,
+            "strain": strain,
+            "curvature": curvature,
+            "bending_moment": np.linalg.norm(m_material[:, :2], axis=1),
+        }
+
+    def largest_displacement(self):
+        """(n,) m: the largest over all nodes."""
+        return np.array(
+            [max(np.linalg.norm(self.fields(k, rod)["displacement"], axis=1).max() for rod in self.scene.rods)
+             for k in range(len(self))]
+        )  # fmt: skip
+
+    @cached_property
+    def _all_rq(self):
+        """(points, nodes, 7) r and q, dimensionless."""
+        return np.array([record.rq for record in self._records]).reshape(len(self), -1, 7)
+
+    @cached_property
+    def _rest(self):
+        """(nodes, 3) positions at rest, dimensionless, from where each structure starts."""
+        return np.concatenate([
+            (rod.curve.position(x * rod.length) - self.scene.origin(rod)) / self.scales.length
+            for rod, x in zip(self.scene.rods, self.layout.node_s(self.rule.nodes), strict=True)
+        ])  # fmt: skip
+
+    def _contact_at(self, station):
+        """(points, 6) n and m at a station, dimensionless."""
+        station = self.station(station)
+        i, _ = self._rows(station.rod)
+        cell, weights = self.rule.locate(self.layout.breaks[i], station.s / station.rod.length)
+        return np.einsum("j,njk->nk", weights, self._contact_in(self._cells(i).start + cell))
+
+    def _contact_of(self, k):
+        """(elements, nodes of one, 6) n and m at point k, dimensionless: two-valued where a load sits between
+        elements."""
+        raise NotImplementedError
+
+    def _contact_in(self, cell):
+        """(points, nodes of one, 6) n and m in one element, dimensionless."""
+        raise NotImplementedError
+
+    def _cells(self, i):
+        """Slice of the elements of the i-th rod."""
+        first = sum(self.elements[:i])
+        return slice(first, first + self.elements[i])
+
+    def _at(self, station, values, rest=None):
+        """Values (points, nodes, k), less those at rest (nodes, k), at a station, by the element's polynomial."""
+        station = self.station(station)
+        i, rows = self._rows(station.rod)
+        cell, weights = self.rule.locate(self.layout.breaks[i], station.s / station.rod.length)
+        first = rows.start + cell * self.degree
+        nodes = slice(first, first + self.degree + 1)
+        return np.einsum("j,njk->nk", weights, values[:, nodes] if rest is None else values[:, nodes] - rest[nodes])
+
+    def sample(self, k, rod, x):
+        """Between the nodes, by the elements' polynomials, at point k.
+
+        Args:
+            k: the point, or a `Record`.
+            rod: the rod.
+            x: arc lengths (n,) over the rod's length, in [0, 1].
+
+        Returns:
+            positions (n, 3), m, and directors (n, 3, 3) as columns, both inertial.
+        """
+        moved = self.motion(rod, x, [k if hasattr(k, "rq") else self._records[k]])[0]
+        s, q = np.asarray(x) * rod.length, moved[:, 3:]
+        return rod.curve.position(s) + moved[:, :3] * self.scales.length, directors(q) @ rod.curve.frame(s)
+
+    def motion(self, rod, x, records=None):
+        """(points, n, 7) displacement over `scales.length` and unit quaternion at arc lengths x (n,) over the rod's
+        length."""
+        i, rows = self._rows(rod)
+        cells, weights = self.rule.locate_all(self.layout.breaks[i], x)
+        nodes = cells[:, None] * self.degree + np.arange(self.degree + 1)
+        nodal = np.array([record.rq[rows] for record in (self._records if records is None else records)])
+        nodal[:, :, :3] -= self._rest[rows]
+        moved = np.einsum("kj,nkjc->nkc", weights, nodal[:, nodes])
+        moved[:, :, 3:] /= np.linalg.norm(moved[:, :, 3:], axis=2, keepdims=True)
+        return moved
+
+    # -- files and pictures ------------------------------------------------------------------------------------------
+
+    def write(self, file, k=-1):
+        """Write all points as .xdmf (its time axis: the load factor, or the time), or point k as .vtu, .vtk or what
+        else meshio writes.
+
+        Raises:
+            OSError: the file cannot be written.
+            SceneError: a format that is not known.
+        """
+        from cosserat_fenicsx.results import xdmf
+
+        xdmf.write(self, file, k)
+
+    def plot(self, file=None, points=None, *, magnify=1.0):
+        """Picture of the deformed rods, coloured by bending moment, at some points (default up to five).
+
+        Args:
+            file: a .png; None returns the pyvista plotter.
+            points: indices of points of a path, or of times.
+            magnify: displacements are drawn this many times their size.
+        """
+        from cosserat_fenicsx.pictures import plot
+
+        return plot.rods(self, file, points, magnify)

@@ -1,0 +1,136 @@
+"""A sequence of states of a scene: how they are added, looked up, copied and pickled."""
+
+import copy
+import pickle
+
+import numpy as np
+from mpi4py import MPI
+
+from cosserat_fenicsx.results.on_nodes import OnNodes
+from cosserat_fenicsx.scene.describe import unpicklable
+
+
+class States(OnNodes):
+    """What `Result` keeps its states in. It can be copied and pickled.
+
+    A deep copy shares the scene, which does not change, so that stations of its rods serve both. What was pickled
+    belongs to the process that loads it, which writes its files, and has a scene of its own: its stations are those of
+    `result.rod(name)`, or names.
+    """
+
+    #: what tells the states apart, in words; fields that files hold beside those of `xdmf.FIELDS`
+    axis, more_fields = "", {}
+    #: what is computed once, until a state is added
+    _computed = ("_all_rq",)
+
+    def __init__(self, scene, layout, scales, rule, *, comm, model, formulation, degree, unknowns, why, connections,
+                 expand):  # fmt: skip
+        self.scene, self.layout, self.scales, self.rule, self.comm = scene, layout, scales, rule, comm
+        self.model, self.formulation, self.degree, self.unknowns = model, formulation, degree, unknowns
+        self.elements, self.why, self._connections = layout.counts, why, connections
+        self._expand, self._expanded, self._appended = expand, [], []
+
+    @classmethod
+    def of(cls, model, formulation, why=()):
+        """An empty one for the scene that a model was loaded with; `why` are sentences on the choice of the model."""
+        return cls(
+            model.scene,
+            model.layout,
+            model.scales,
+            model.rule,
+            comm=model.comm,
+            model=model.name,
+            formulation=formulation,
+            degree=model.signature.degree,
+            unknowns=model.unknowns,
+            why=[*why, *model.scene.cautions],
+            connections=model.signature.connections,
+            expand=model.expansion(),
+        )
+
+    def append(self, record):
+        """Add a state that was solved."""
+        self._appended.append(record)
+        self._forget()
+
+    def _forget(self):
+        for name in self._computed:
+            self.__dict__.pop(name, None)
+
+    @property
+    def _records(self):
+        """All records, in space."""
+        if self._appended:
+            new, self._appended = self._appended, []
+            gauss = None if new[0].gauss_fields is None else np.array([x.gauss_fields for x in new])
+            etas = np.array([x.load_factor for x in new])
+            rq, fields = self._expand(etas, np.array([x.rq for x in new]), gauss)
+            for x, x.rq, x.gauss_fields in zip(new, rq, fields, strict=True):
+                self._expanded.append(x)
+        return self._expanded
+
+    def __len__(self):
+        return len(self._expanded) + len(self._appended)
+
+    def __getitem__(self, k):
+        """State k as it was solved: a `Record`."""
+        return self._records[k]
+
+    def at_points(self, which):
+        """The result of some of its states alone.
+
+        Args:
+            which: their indices.
+        """
+        return self._with([self[k] for k in which])
+
+    def _with(self, records):
+        """The same with other states."""
+        part = object.__new__(type(self))
+        vars(part).update(vars(self))
+        part._forget()
+        part._expanded, part._appended = records, []
+        return part
+
+    def _array(self, name):
+        return np.array([getattr(record, name) for record in (*self._expanded, *self._appended)])
+
+    def _stacked(self, name):
+        """(states, ..) arrays of all records."""
+        return np.array([getattr(record, name) for record in self._records])
+
+    iterations = property(lambda self: self._array("iterations").astype(int))
+
+    @property
+    def along_axis(self):
+        """(n,) what tells the states apart."""
+        raise NotImplementedError
+
+    def label(self, k):
+        """What a picture writes beside state k."""
+        raise NotImplementedError
+
+    # -- copies ------------------------------------------------------------------------------------------------------
+
+    def __copy__(self):
+        return self._with(list(self._records))
+
+    def __deepcopy__(self, memo):
+        memo |= {id(shared): shared for shared in (self.scene, self.comm)}
+        other = memo[id(self)] = copy.copy(self)
+        vars(other).update({name: copy.deepcopy(value, memo) for name, value in vars(other).items()})
+        return other
+
+    def __getstate__(self):
+        """Plain data: without the communicator, and without the model's functions, since all states are in space."""
+        names = unpicklable(self.scene)
+        if names:
+            raise pickle.PicklingError(
+                f"a {type(self).__name__} cannot be pickled where its scene cannot: {names}. Functions must have a "
+                "name at the top of a module to be found by: expected no lambda and no function within a function"
+            )
+        plain = vars(copy.copy(self))
+        return {name: value for name, value in plain.items() if name not in ("comm", "_expand", "_rest")}
+
+    def __setstate__(self, state):
+        vars(self).update(state, comm=MPI.COMM_SELF, _expand=None)

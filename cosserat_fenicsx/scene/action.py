@@ -1,0 +1,145 @@
+"""Actions on rods: the interface of loads, springs, dashpots and walls to models, solvers and time steppers.
+
+An action defines where it acts, the data of its virtual work there, and the virtual work itself, a UFL function of
+`forms.point.Point` (position, rotation, velocities), a virtual motion and these data. Everything else is derived from
+that: tangents and second variations by differentiation, whether it is dead or depends on the state, whether its force
+is statically known, whether it lies in a plane. No solver, stepper or model refers to an action by name.
+"""
+
+from collections import namedtuple
+
+import numpy as np
+
+#: A scalar (size 1) or a vector (size 3, inertial) in a virtual work: value (size,), or (n, size) along a rod.
+Datum = namedtuple("Datum", "value unit size")
+
+# Powers of force, length and time of each unit; whether a vector with this unit is axial, like a moment: in a plane
+# motion it is normal to the plane. "m from origin" marks positions, which models measure from `Scene.origin`.
+_UNITS = {
+    "1": (0, 0, 0, False),
+    "m": (0, 1, 0, False),
+    "m from origin": (0, 1, 0, False),
+    "m/s": (0, 1, -1, False),
+    "rad/s": (0, 0, -1, True),
+    "N": (1, 0, 0, False),
+    "N m": (1, 1, 0, True),
+    "N/m": (1, -1, 0, False),
+    "N m/m": (1, 0, 0, True),
+    "N/m^2": (1, -2, 0, False),
+    "N m/rad": (1, 1, 0, True),
+    "N s/m": (1, -1, 1, False),
+    "N m s/rad": (1, 1, 1, True),
+    "N s/m^2": (1, -2, 1, False),
+    "N s^2/m^3": (1, -3, 2, False),
+}
+#: The units that data may have.
+UNITS = tuple(_UNITS)
+
+
+def vector(value, unit):
+    """A `Datum` of three inertial components, (3,) or (n, 3)."""
+    return Datum(np.asarray(value, dtype=float), _known(unit), 3)
+
+
+def scalar(value, unit):
+    """A `Datum` of one number, or (n,) along a rod."""
+    return Datum(np.asarray(value, dtype=float)[..., None], _known(unit), 1)
+
+
+def powers(unit):
+    """(force, length, time) powers of a unit."""
+    return _UNITS[unit][:3]
+
+
+def is_axial(unit):
+    """Whether a vector with this unit is axial, like a moment: in a plane motion it is normal to the plane."""
+    return _UNITS[unit][3]
+
+
+def _known(unit):
+    if unit not in _UNITS:
+        raise ValueError(f"unit {unit!r}: expected one of {', '.join(UNITS)}")
+    return unit
+
+
+class Action:
+    """Base of loads, springs, dashpots and walls.
+
+    A class of your own is a `PointAction` with a `station`, or a `LineAction` with a `rod`: a frozen dataclass with a
+    method `data` and a static method `work`, in UFL.
+
+    Attributes:
+        station: the `Station` it acts at; None for a distributed action (`acts_on`). rod: the rod it acts along, or
+            None.
+        at_nodes: of a distributed action: it is integrated with the nodes as quadrature points (Gauss-Lobatto) instead
+            of Gauss points, as contact requires.
+        scaled: whether it is multiplied by the load factor. False: it acts in full from the start.
+        permanent: of an action that is not scaled: it grows from zero before the load factor does, such as a weight.
+        follows: whether it depends on the rotation and has no potential.
+        work: a static method (point, virtual motion, *data) -> UFL, or the name of a function in `forms.loads`: the
+            virtual work at a point, per reference length of a distributed action. None for an action with inertia
+            alone.
+        memory: internal variables, kept from one accepted state to the next: `Datum`s of their initial values, passed
+            to `work` after `data`.
+        evolve: a static method (point, *data, *memory) -> a list of UFL expressions, the new values of the memory.
+    """
+
+    at_nodes, scaled, permanent, follows, memory, evolve = False, True, False, False, (), None
+
+    def acts_on(self, rod):
+        """Whether it acts along a rod."""
+        return rod is self.rod
+
+    def data(self, rod, s):
+        """The `Datum`s in `work`, at arc lengths s (n,) of a rod, m."""
+        return ()
+
+    def breaks(self, rod):
+        """Arc lengths (m) where a distributed action is not smooth: elements end there."""
+        return ()
+
+    def check_rod(self, rod):
+        """Refuse a rod that it cannot act along.
+
+        Raises:
+            SceneError: naming the property that the rod lacks.
+        """
+
+    def inertia(self, rod):
+        """Mass (kg) and moments of inertia about d_1, d_2, d_3 (kg m^2, (3,)) that it adds at its station; or None."""
+        return None
+
+    def holds(self, scene):
+        """The rigid motions that it resists elastically, so that they are no mechanism.
+
+        Returns:
+            [(station, row)], rows (6,) over (displacement, small rotation), inertial.
+        """
+        return ()
+
+    def companions(self, scene):
+        """Actions that it adds to a scene, such as the weight of its point masses."""
+        return ()
+
+    # Actions whose data depend on the position of the rod, such as the nearest point of a curved axis.
+
+    refreshed = None
+    """A method (rod, s (n,), r (n, 3)) -> the `Datum`s of `data` for a rod whose points are at r (m, inertial): where
+    it is not None, it is evaluated at every iteration of Newton's method; its derivative by r is not in the tangent."""
+
+
+class PointAction(Action):
+    """An action at a `station`; see `Action`."""
+
+    rod = None
+
+
+class LineAction(Action):
+    """An action along a `rod`, per unit of reference length; see `Action`."""
+
+    station = None
+
+
+def path_dependent(scene):
+    """Whether an action of a scene has a memory, so that states must be computed in order."""
+    return any(action.memory for action in scene.actions)

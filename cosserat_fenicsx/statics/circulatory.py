@@ -1,0 +1,96 @@
+"""Whether loads have a potential, and the skew-symmetric part of the second variation where they have none."""
+
+import contextlib
+
+import numpy as np
+from mpi4py import MPI
+from petsc4py import PETSc
+from scipy import sparse
+
+from cosserat_fenicsx.algebra.packed import Packed
+from cosserat_fenicsx.algebra.pool import PROBLEMS
+from cosserat_fenicsx.errors import NotConverged
+from cosserat_fenicsx.models.circulatory import CirculatoryModel
+from cosserat_fenicsx.models.signature import Signature
+
+# Relative size below which d omega counts as zero: rounding error over the terms that cancel in it.
+_ROUNDING = 1e-10
+
+
+@contextlib.contextmanager
+def circulatory_part(scene, layout, degree, comm):
+    """Context manager that gives the `CirculatoryPart` of a scene on a mesh; collective over the communicator."""
+    signature = Signature.of(scene, layout, formulation="mixed", degree=degree)
+    key = ("circulatory", signature)
+    with PROBLEMS.lend(key, comm, lambda: CirculatoryModel(comm, signature), NotConverged) as model:
+        model.load(scene, layout)
+        yield CirculatoryPart(model)
+
+
+def conservative_along(path):
+    """Whether the loads have a potential in the neighbourhood of every point of a path; each rank computes it alone."""
+    with circulatory_part(path.scene, path.layout, path.degree, MPI.COMM_SELF) as part:
+        return all(part.vanishes(record.rq, record.load_factor) for record in path)
+
+
+class CirculatoryPart:
+    """Exterior derivative d omega of the virtual work omega of a scene's loads, see `models.circulatory`.
+
+    Matrices have the numbering of the spatial model's second variation.
+
+    Args:
+        model: a loaded `CirculatoryModel`.
+    """
+
+    def __init__(self, model):
+        self._model = model
+        (self._variation,) = model.second_variations
+        self._form = self._variation.form and Packed(self._variation.form, ())
+
+    def skew(self, rq, load_factor):
+        """The skew-symmetric part of the second variation, a PETSc matrix, dimensionless.
+
+        Args:
+            rq: (N, 7) positions and quaternions (r, q) of all nodes, dimensionless.
+            load_factor: the load factor.
+        """
+        skew = self._assembled(rq, load_factor)
+        skew.axpy(-1.0, skew.copy().transpose(), PETSc.Mat.Structure.DIFFERENT)
+        skew.scale(-0.5)
+        return skew
+
+    def _assembled(self, rq, load_factor):
+        """The matrix of the bilinear form h of `models.circulatory`: d omega(w, psi) = h(w, psi) - h(psi, w)."""
+        model, variation = self._model, self._variation
+        model.take(rq, load_factor)
+        tied = variation.tied
+        matrix = variation.numbering.matrix(variation.cell_dofs, tied[tied >= 0])
+        if self._form:
+            self._form.refresh()
+            self._form.add_to_matrix(matrix)
+        matrix.assemble()
+        return matrix
+
+    def vanishes(self, rq, load_factor):
+        """Whether the loads have a potential in the neighbourhood of a state, for all motions that the supports allow.
+
+        Arguments as of `skew`. False for loads that depend on the history of the motion.
+        """
+        if self._model.remembers:
+            return False
+        if not self._form:
+            return True
+        matrix = self._assembled(rq, load_factor)
+        total = matrix.getSize()[0]
+        parts = self._model.comm.allgather(matrix.getValuesCSR())
+        h = sparse.vstack([sparse.csr_matrix((v, j, i), shape=(len(i) - 1, total)) for i, j, v in parts])
+        held = np.zeros((0, total))
+        gradients = self._model.held(rq, load_factor)
+        if len(gradients):
+            held = np.zeros((len(gradients), total + 1))  # number -1, a clamped component, goes to the last column
+            held[:, self._variation.tied.ravel()] = gradients.reshape(len(gradients), -1)
+            held = held[:, :total]
+        held = sparse.csr_matrix(held)
+        solve = sparse.csr_matrix(np.linalg.pinv((held @ held.T).toarray(), rcond=_ROUNDING))
+        allowed = sparse.identity(total) - held.T @ solve @ held
+        return bool(abs(allowed @ (h - h.T) @ allowed).max() <= _ROUNDING * abs(h).max())

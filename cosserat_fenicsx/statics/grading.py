@@ -1,0 +1,79 @@
+"""Graded meshes: short elements in boundary layers, and element lengths that equidistribute the error."""
+
+import math
+
+import numpy as np
+
+from cosserat_fenicsx.results.accuracy import leading_coefficients
+from cosserat_fenicsx.results.indicators import element_differences, layer_lengths, unresolved
+
+# Largest length of an element where a boundary layer may begin, over the length of that layer.
+_RESOLVED = 2.0
+# Smallest length of an element over that of its rod.
+_SHORTEST = 1e-6
+# A mesh is graded only if that needs less than this share of the elements of uniform refinement, and uniform
+# refinement needs at least so many elements.
+_WORTH, _MANY = 0.5, 32
+# Bounds of the number of elements that replace one element.
+_FEWEST, _MOST = 0.5, 4.0
+
+
+def layers_of(model):
+    """`layer_lengths` at the state of a model in space."""
+    _, fields = model.snapshot()
+    return layer_lengths(model.scene, model.scales, model.layout, model.rule, fields[None, :, :, :3])
+
+
+def with_layers(scene, layout, lengths):
+    """The layout with elements that resolve boundary layers at the ends of its pieces; None where it resolves them.
+
+    Args:
+        lengths: what `results.indicators.layer_lengths` returns; None where no element is too long.
+    """
+    if lengths is None:
+        return None
+    lengths = [np.maximum(layers, _SHORTEST) for layers in lengths]
+    if not unresolved(scene, layout, lengths):
+        return None
+    return layout.with_short_ends(scene, [_RESOLVED * layers for layers in lengths])
+
+
+def balanced(fine, coarse, above):
+    """A layout that, with all elements halved, has the target error, equidistributed over the elements.
+
+    None where uniform refinement does as well.
+
+    Args:
+        fine, coarse: Paths with the same points; the mesh of `fine` is that of `coarse` with all elements halved.
+        above: the estimated error of `fine` over the target error.
+    """
+    layout, order = coarse.layout, coarse.degree + 1
+    if sum(fine.elements) * above ** (1 / order) < _MANY:
+        return None
+    rough = np.concatenate([found.max(axis=0) for found in leading_coefficients(fine)])
+    if _even(rough ** (1 / coarse.degree)):
+        return None
+    differences = element_differences(fine, coarse)
+    largest = max(found.max() for found in differences)
+    if largest == 0:
+        return None
+    wanted = [(above * found / largest) ** (1 / order) for found in differences]
+    wanted = [np.clip(number, _FEWEST, _MOST) for number in wanted]
+    if _even(np.concatenate(wanted)):
+        return None
+    for number, pieces in zip(wanted, layout.pieces(coarse.scene), strict=True):
+        for piece in pieces:
+            total = number[piece].sum()
+            number[piece] *= _round_up(total) / total
+    return layout.resized(coarse.scene, wanted)
+
+
+def _even(numbers):
+    """Whether the mean of the numbers of elements is close to their maximum, so that grading saves little."""
+    return numbers.mean() > _WORTH * numbers.max()
+
+
+def _round_up(number):
+    """The least of 1, 2, 3, 4, 5, 6, 7, 8, 10, 12, 14, 16, 20 ... not below a number, so that scenes share meshes."""
+    step = 2 ** max(0, math.ceil(math.log2(number) - 1e-9) - 3)
+    return step * math.ceil(number / step - 1e-9)

@@ -1,0 +1,1 @@
+"""Continuation of an equilibrium path: load control, arc length, critical points and branches, and its record."""

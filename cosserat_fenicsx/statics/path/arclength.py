@@ -1,0 +1,224 @@
+"""Continuation in the arc length of the path: past limit points, through snap-through and snap-back.
+
+The unknowns are (x, eta); the corrector stays in the plane through the predictor, perpendicular to the predicted step
+(pseudo-arc-length: Keller, in: Applications of Bifurcation Theory, 1977, 359). The metric of arc length sums (r, q) and
+eta with a weight such that both count equally where the path is stiffest so far; elsewhere (r, q) dominate, so that the
+path is smooth in its arc length at limit points too.
+"""
+
+import itertools
+import math
+
+from cosserat_fenicsx.interrupts import obey
+from cosserat_fenicsx.statics.path.events import Lost
+from cosserat_fenicsx.statics.path.track import FAR, INTENDED, growth_of, through
+
+# Largest distance of the corrected point from the predictor over the length of the step; the second applies where the
+# number of negative modes changes without a limit point: the step may have changed to another branch.
+_BEND, _SURE = 0.4, 0.1
+# A closed path is recognised by a step that passes its first point at a distance below this times the step's length.
+_BESIDE = 0.1
+# Smallest first step, over the length of the path from the unloaded state.
+_FIRST = 0.02
+
+
+class ArcLength:
+    """Advances a track in steps of arc length.
+
+    Args:
+        track: a `Track`.
+        control: a `StepControl`.
+        locator: a `Locator` that finds the critical points and the target between two points.
+    """
+
+    def __init__(self, track, control, locator):
+        self.track, self.control, self._locator = track, control, locator
+        self._step = None
+
+    def to(self, target, *, first=None, slope=None, on_step=None, on_event=None):
+        """Advance to the next point of the path with the load factor `target`, solved at exactly that load factor.
+
+        Args:
+            target: load factor.
+            first, slope: the first `PathPoint` on a branch, and dx/d eta there; None to stay on the path.
+            on_step: called with every accepted `PathPoint`, the last one included.
+            on_event: called with every `Crossing` on the way; the continuation ends there where it returns True.
+
+        Returns:
+            bool: False where the steps became too small or too many; the track's `failure` gives the reason.
+        """
+        track = self.track
+        if first is None:
+            self._set_out(target)
+        else:
+            self._branch_off(first, slope)
+        begin, steps = first, 0
+        for _ in range(self.control.most_steps):
+            branching, point, first = first is not None, first or self._attempt(), None
+            if point is not None:
+                try:
+                    look = self._locator.between
+                    landing, crossings = look(track.here, point, target, self._weight, probe=not branching)
+                except Lost as lost:
+                    track.failure = "the critical points within a step could not be resolved"
+                    if branching:
+                        return track.restore()
+                    self._step = self._length(track.here, point)
+                    point = self._shorten(lost.args[0])
+            if point is None:
+                if self._step < self.control.smallest * self._scale:
+                    return False
+                continue
+            begin, steps = begin or point, steps + 1
+            if steps > 3 and self._passes(begin, track.here, point):
+                track.failure = "the path is closed: it returned to an earlier point without reaching that load factor"
+                return track.restore()
+            for crossing in crossings:
+                if on_event and on_event(crossing):
+                    track.restore()
+                    return True
+            self._accept(landing or point, point)
+            if on_step:
+                on_step(track.here)
+            if landing is not None:
+                return True
+        track.failure = f"{self.control.most_steps} steps of arc length did not reach it (StepControl.most_steps)"
+        return track.restore()
+
+    def _accept(self, point, end):
+        """Accept a point, within the step from the last point to `end` or at its end."""
+        track = self.track
+        track.put(point.numbers, point.load_factor)
+        if len(track.history) > 1 and self._length(track.here, point) < 0.05 * self._length(track.here, end):
+            track.history.pop()  # the predictor interpolates, which needs points that are not too close
+        track.keep(point)
+
+    def _set_out(self, target):
+        """Choose weight, direction and first step at the last point."""
+        track = self.track
+        here = track.here
+        track.restore()
+        slope = track.slope()
+        self._weigh(slope)
+        if len(track.history) == 1:  # towards the target
+            change = self.control.first or abs(target - here.load_factor) / 10 or 0.1
+            self._step = self._scale = change * math.sqrt(track.product(slope, slope) + self._weight)
+            track.set_tangent(here, slope, 0 * slope, math.copysign(1.0, target - here.load_factor), self._weight)
+            return
+        before = track.history[-2]
+        moved, change = here.numbers[0] - before.numbers[0], here.load_factor - before.load_factor
+        track.set_tangent(here, slope, moved, change, self._weight)
+        last = self._length(before, here)
+        self._scale = self._length(track.origin, here) or last
+        self._step = min(max(last, _FIRST * self._scale), 0.1 * self._scale)
+
+    def _branch_off(self, first, slope):
+        """Choose weight, direction and first step where the last point is a bifurcation."""
+        track = self.track
+        here = track.here
+        self._weigh(slope)
+        moved, change = first.numbers[0] - here.numbers[0], first.load_factor - here.load_factor
+        track.set_tangent(first, slope, moved, change, self._weight)
+        here.rise = 0.0
+        self._step = self._scale = self._length(here, first)
+
+    def _weigh(self, slope):
+        """Choose the weight of the load factor in the metric."""
+        track = self.track
+        moved = track.here.numbers[0] - track.origin.numbers[0]
+        change = track.here.load_factor - track.origin.load_factor
+        local = track.square(slope)
+        self._weight = min(local, track.square(moved) / change**2) if change else local
+        self._weight = self._weight or 1.0
+
+    def _weigh_less(self):
+        """Reduce the weight of the load factor where the path is stiffer than before.
+
+        Else the load factor dominates the metric, and a limit point is a sharp bend of the path.
+        """
+        track = self.track
+        here, weight = track.here, self._weight
+        if not here.rise:
+            return
+        local = track.product(here.along, here.along) / here.rise**2
+        if 0 < local < weight:
+            shrunk = math.sqrt(2 * local / (local + weight))
+            self._weight = local
+            here.rise, here.along = here.rise / shrunk, here.along / shrunk
+            self._step *= shrunk
+            self._scale *= shrunk
+
+    def _passes(self, place, a, b):
+        """Whether the step from a to b passes through an earlier point of the path, in the path's direction there."""
+        track, w = self.track, self._weight
+        chord, change = b.numbers[0] - a.numbers[0], b.load_factor - a.load_factor
+        moved, gain = place.numbers[0] - a.numbers[0], place.load_factor - a.load_factor
+        size = track.product(chord, chord) + w * change**2
+        along = track.product(moved, chord) + w * gain * change
+        beside = track.product(moved, moved) + w * gain**2 - along**2 / size
+        onward = track.product(place.along, chord) + w * place.rise * change
+        return 0 <= along < size and beside < (_BESIDE**2) * size and onward > 0
+
+    def _length(self, a, b):
+        moved, change = b.numbers[0] - a.numbers[0], b.load_factor - a.load_factor
+        return math.sqrt(self.track.product(moved, moved) + self._weight * change**2)
+
+    def _predict(self, step):
+        """Predictor (numbers, load factor) at the arc length `step` from the last point.
+
+        A polynomial through the last points with the tangent at the last one; carried fields (n) without the tangent.
+        """
+        history = self.track.history
+        here = history[-1]
+        lengths = [self._length(a, b) for a, b in itertools.pairwise(history)]
+        places = [-sum(lengths[i:]) for i in range(len(lengths))]
+        numbers, _ = through(history, [*places, 0.0], step)
+        numbers[0] = here.numbers[0] + step * here.along
+        eta = here.load_factor + step * here.rise
+        for i, (place, point) in enumerate(zip(places, history, strict=False)):
+            weight = (step / place) ** 2
+            weight *= math.prod((step - other) / (place - other) for j, other in enumerate(places) if j != i)
+            numbers[0] += weight * (point.numbers[0] - here.numbers[0] - place * here.along)
+            eta += weight * (point.load_factor - here.load_factor - place * here.rise)
+        return numbers, eta
+
+    def _attempt(self):
+        """One step: predictor, corrector, checks. A `PathPoint`, not yet accepted; None where the step is reduced."""
+        obey()
+        self._weigh_less()
+        track = self.track
+        here = track.here
+        predicted, eta = self._predict(self._step)
+        bound = self.control.largest
+        if bound and abs(eta - here.load_factor) > bound:
+            self._step *= 0.9 * bound / abs(eta - here.load_factor)
+            predicted, eta = self._predict(self._step)
+        increment = predicted[0] - here.numbers[0]
+        change = eta - here.load_factor
+        length = math.sqrt(track.product(increment, increment) + self._weight * change**2)
+        solved = track.on_plane(predicted, eta, increment, self._weight * change)
+        if not solved.converged:
+            return self._shorten()
+        numbers, found = track.problem.numbers(), track.problem.load_factor
+        if bound and abs(found - here.load_factor) > bound:
+            return self._shorten(0.9 * bound / abs(found - here.load_factor))
+        off = track.distance(numbers, predicted)
+        correction = numbers[0] - predicted[0]
+        bend = math.sqrt(track.product(correction, correction) + self._weight * (found - eta) ** 2) / length
+        order = len(track.history) + 1
+        if off > FAR or bend > _BEND:
+            track.failure = "the path bends too sharply"
+            return self._shorten()
+        point = track.point(solved)
+        moved, change = numbers[0] - here.numbers[0], found - here.load_factor
+        track.set_tangent(point, track.slope_found(), moved, change, self._weight)
+        if point.negative_modes != here.negative_modes and point.rise * here.rise > 0 and bend > _SURE:
+            track.failure = "the step crossed a point where stability changes"
+            return self._shorten()
+        growth = growth_of(max(off, INTENDED / _SURE * bend), order, solved.iterations)
+        self._step = max(self._step, length * growth) if growth >= 1 else length * growth
+        return point
+
+    def _shorten(self, share=0.5):
+        self._step *= share
+        self.track.restore()

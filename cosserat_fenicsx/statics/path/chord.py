@@ -1,0 +1,190 @@
+"""The segment of a path between two neighbouring points, interpolated and searched.
+
+The coordinate of a point of the segment is its projection on the chord, 0 at the point a and 1 at b. The point at a
+coordinate is found by Newton's method in the plane perpendicular to the chord there, which works at limit points too.
+"""
+
+import itertools
+import math
+
+import numpy as np
+
+from cosserat_fenicsx.statics.path.track import through
+
+# Relative accuracy of the load factor at which a search ends, and its largest number of iterations.
+_FINE, _MOST = 1e-8, 25
+# Coordinates at which a step is checked for negative modes that appear and vanish within it.
+_PROBES = (1 / 3, 2 / 3)
+# Number of iterations after which the bracket of a root is bisected instead of interpolated.
+_OFTEN = 6
+# Smallest distance of the coordinates of two interpolation points.
+_APART = 1e-5
+# Offsets of the coordinate, tried in turn until Newton's method converges.
+_ASIDE = (0.0, 1e-3, -1e-3, 1e-2, -1e-2)
+
+
+class Chord:
+    """The segment of a path between two points, with the points computed on it so far.
+
+    Args:
+        track: the `Track`, which stands at a.
+        a, b: the `PathPoint`s.
+        weight: of the load factor in the metric.
+    """
+
+    def __init__(self, track, a, b, weight):
+        self.track, self._weight = track, weight
+        self.known = [(0.0, a), (1.0, b)]
+        self.normal, self.change = b.numbers[0] - a.numbers[0], b.load_factor - a.load_factor
+        self._before = {}
+        if len(track.history) > 1:  # the point before a, for the curvature
+            point = track.history[-2]
+            moved, change = point.numbers[0] - a.numbers[0], point.load_factor - a.load_factor
+            place = (track.product(moved, self.normal) + weight * change * self.change) / (
+                track.product(self.normal, self.normal) + weight * self.change**2
+            )
+            if -5 < place < -0.2:
+                self._before = {place: point}
+
+    @classmethod
+    def balanced(cls, track, a, b):
+        """A `Chord` with the weight that gives the unknowns and the load factor equal shares in its length."""
+        moved, change = b.numbers[0] - a.numbers[0], b.load_factor - a.load_factor
+        return cls(track, a, b, (track.square(moved) / change**2 if change else 0.0) or 1.0)
+
+    def _near(self, place):
+        """Up to four known coordinates nearest to a coordinate, and their points."""
+        known = {**self._before, **dict(self.known)}
+        places = _nearest(known, place)
+        return places, [known[at] for at in places]
+
+    def guess(self, place):
+        """(numbers, load factor) at a coordinate by the polynomial through the nearest known points."""
+        places, points = self._near(place)
+        return through(points, places, place)
+
+    def load_factor(self, place):
+        """The load factor of `guess` alone."""
+        places, points = self._near(place)
+        weights = [math.prod((place - b) / (a - b) for b in places if b != a) for a in places]
+        return float(np.dot(weights, [point.load_factor for point in points]))
+
+    def at(self, place):
+        """(coordinate, `PathPoint`) of the path at or close to a coordinate; None where Newton's method fails.
+
+        Bordered solves lose accuracy very close to a singular tangent; there a point slightly beside it is taken.
+        """
+        for aside in _ASIDE:
+            point = self._point(place + aside)
+            if point is not None:
+                return place + aside, point
+        return None
+
+    def _point(self, place):
+        track = self.track
+        solved = track.on_plane(*self.guess(place), self.normal, self._weight * self.change)
+        if not solved.converged:
+            return None
+        slope = track.slope_found()
+        point = track.point(solved)
+        track.set_tangent(point, slope, self.normal, self.change, self._weight)
+        self.known = sorted([*self.known, (place, point)], key=lambda item: item[0])
+        return point
+
+    def comes_and_goes(self):
+        """A coordinate where the number of negative modes is outside the range of its end values, or not monotonic.
+
+        It is counted at interpolated states; None where it is monotonic along the segment.
+        """
+        track = self.track
+        counts = [self.known[0][1].negative_modes]
+        for place in _PROBES:
+            track.put(*self.guess(place))
+            counts.append(track.stability.count(neutral=track.neutral is not None))
+        counts.append(self.known[-1][1].negative_modes)
+        changes = np.diff(counts)
+        if min(counts) < 0 or (changes >= 0).all() or (changes <= 0).all():
+            return None
+        return _PROBES[int(np.flatnonzero(changes)[0])]
+
+    def neighbours(self, place):
+        """The nearest known points below and above a coordinate."""
+        low = [point for at, point in self.known if at <= place]
+        high = [point for at, point in self.known if at > place]
+        return (low or high)[-1], (high or low)[0]
+
+    def root(self, value, near=None):
+        """The coordinate where a function of the path's points changes its sign; None where it does not.
+
+        Args:
+            value: the function, of a `PathPoint`.
+            near: expected coordinate of the root; then only the nearest known points and the ends are used.
+
+        The root of the polynomial through the nearest values, among them those of the bracket, is iterated until two
+        successive load factors agree. The equilibrium at the last root is not solved for, since its tangent would be
+        singular. A root close to a known point is accepted if the sign changes within a narrow bracket there. Otherwise
+        (next to a kink of the function), and every few iterations, the bracket is bisected.
+        """
+        known = dict(self.known)
+        places = known if near is None else {0.0, 1.0, *_nearest(known, near)}
+        values = {at: value(known[at]) for at in sorted(places)}
+        changes = [(a, b) for a, b in itertools.pairwise(values) if values[a] * values[b] <= 0]
+        if not changes:
+            return None
+        middle = 0.5 if near is None else near
+        low, high = min(changes, key=lambda ends: abs(ends[0] + ends[1] - 2 * middle))
+        place, estimate, halve = middle, None, False
+        for k in range(1, _MOST):
+            places = _nearest(values, place, always=(low, high))
+            place = _zero(places, [values[at] for at in places], low, high)
+            eta = self.load_factor(place)
+            settled = estimate is not None and abs(eta - estimate) <= _FINE * max(abs(eta), abs(self.change))
+            known = min(abs(place - at) for at in values) < _APART
+            if settled or (known and high - low < 4 * _APART):
+                break
+            estimate, look = eta, place
+            if halve or k % _OFTEN == 0:
+                look, halve = (low + high) / 2, False
+            elif known:
+                look, halve = place + math.copysign(2 * _APART, low + high - 2 * place), True
+            found = self.at(look)
+            if found is None:
+                break
+            values[found[0]] = value(found[1])
+            if values[found[0]] == 0 or not math.isfinite(values[found[0]]):  # singular to the last digit
+                break
+            if values[found[0]] * values[low] > 0:
+                low = max(low, found[0])
+            else:
+                high = min(high, found[0])
+            halve = halve and high - low > 4 * _APART
+        return place
+
+
+def _nearest(places, place, always=()):
+    """The coordinates `always`, and up to four others nearest to a coordinate, at least `_APART` from one another."""
+    chosen = list(always)
+    for at in sorted(places, key=lambda at: abs(at - place)):
+        if len(chosen) < 4 + len(always) and all(abs(at - other) >= _APART for other in chosen):
+            chosen.append(at)
+    return chosen
+
+
+def zero_of(function, low, high):
+    """A zero of a function in [low, high]; the end with the smaller value where there is no change of sign."""
+    a, b = function(low), function(high)
+    if a * b > 0:
+        return low if abs(a) < abs(b) else high
+    from scipy.optimize import brentq  # imported here since it takes a quarter of a second and most runs do not need it
+
+    return brentq(function, low, high, xtol=1e-15)
+
+
+def _zero(places, values, low, high):
+    """The root in [low, high] of the polynomial through values at coordinates."""
+
+    def polynomial(at):
+        return float(sum(v * math.prod((at - b) / (a - b) for b in places if b != a)
+                         for a, v in zip(places, values, strict=True)))  # fmt: skip
+
+    return zero_of(polynomial, low, high)

@@ -1,0 +1,254 @@
+"""Critical points between two neighbouring points of a path (limit points, bifurcations), and a requested load factor.
+
+At a limit point the load factor has an extremum, and the null vector of the tangent is the direction of the path. At a
+bifurcation the load factor is monotonic, and the null vector is another motion. A change in the number of negative
+modes indicates a critical point. But the second variation that is counted has bounded stiffnesses, and under loads
+without a potential it is the symmetric part of the tangent alone. So an event is listed only if the stiffness of the
+tangent against the mode changes its sign between the two points and is negligible at the point that is located.
+"""
+
+import itertools
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from cosserat_fenicsx.statics.path.chord import Chord, zero_of
+from cosserat_fenicsx.statics.path.track import PathPoint
+
+# Two eigenvalues vanish at the same point where one is below this times its size at the ends of the chord while the
+# other vanishes.
+_SAME = 1e-5
+# Largest number of iterations for a requested load factor.
+_MOST = 25
+# Largest residual of an event, see `Crossing`.
+_SINGULAR = 1e-5
+# Two events are the same where the cosine of their null vectors is above the first number and their coordinates on the
+# chord differ by less than the second.
+_ALIKE, _ONE_PLACE = 0.7, 1e-2
+
+
+@dataclass(frozen=True, eq=False)
+class Crossing:
+    """A limit point or bifurcation that was located.
+
+    Attributes:
+        kind: "limit" or "bifurcation".
+        point: the `PathPoint`, interpolated between its neighbours.
+        place: coordinate on the chord from the point before (0) to the point after (1).
+        direction: a change of the unknowns (entries that this rank owns): the tangent of the path at a limit point,
+            the mode at a bifurcation.
+        residual: see `Event`.
+        null: (nodes, 6) the null vector, see `BorderedNewton.response`.
+        partner: the direction of a second mode at the same load factor; None where there is none.
+    """
+
+    kind: str
+    point: PathPoint
+    place: float
+    direction: np.ndarray
+    residual: float
+    null: np.ndarray
+    partner: np.ndarray | None = None
+
+
+class Lost(Exception):
+    """A step is too long to resolve the critical points within it; the argument is the share of the step to keep."""
+
+
+class Locator:
+    """Finds limit points, bifurcations and requested load factors between two points.
+
+    Args:
+        track: the `Track`.
+    """
+
+    def __init__(self, track):
+        self.track = track
+
+    def between(self, a, b, target, weight, *, probe=True):
+        """The critical points and the requested load factor between two points.
+
+        Args:
+            a, b: the `PathPoint`s; the last accepted point of the track is a.
+            target: load factor.
+            weight: of the load factor in the metric.
+            probe: whether to check for negative modes that appear and vanish between them.
+
+        Returns:
+            (landing, crossings): the first `PathPoint` with the load factor `target` after a, or None; the `Crossing`s
+            up to there, in the order of the path.
+
+        Raises:
+            Lost: the point at `target` was not found, or negative modes appear and vanish between a and b.
+        """
+        chord = Chord(self.track, a, b, weight)
+        place = chord.comes_and_goes() if probe else None
+        if place is not None:
+            raise Lost(place)
+        limits = self.limits(chord)
+        ends = [(0.0, a), *((limit.place, limit.point) for limit in limits), (1.0, b)]
+        landing = place = None
+        for (low, before), (high, after) in itertools.pairwise(ends):
+            if (before.load_factor - target) * (after.load_factor - target) < 0 or after.load_factor == target:
+                place, landing = self._land(chord, low, high, before, after, target)
+                break
+        crossings = self.crossings(chord, limits)
+        if landing is not None:
+            crossings = [crossing for crossing in crossings if crossing.place <= place]
+        return landing, crossings
+
+    def crossings(self, chord, limits=None):
+        """All `Crossing`s of a `Chord`, in order; `limits`: its limit points where they are known."""
+        limits = self.limits(chord) if limits is None else limits
+        found = [*limits, *self.bifurcations(chord, limits)]
+        return _in_order([crossing for crossing in found if crossing.residual <= _SINGULAR])
+
+    def limits(self, chord):
+        """[the `Crossing` at the extremum of the load factor], whatever its residual; an empty list without one."""
+        (_, a), (_, b) = chord.known[0], chord.known[-1]
+        if a.rise * b.rise >= 0:
+            return []
+        place = chord.root(lambda point: point.rise)
+        direction = chord.neighbours(place)[0].along
+        return self._singular("limit", chord, place, [direction])
+
+    def bifurcations(self, chord, limits=()):
+        """The `Crossing`s where the tangent becomes singular away from limit points."""
+        counts = [point.negative_modes for _, point in (chord.known[0], chord.known[-1])]
+        if min(counts) < 0:  # singular to rounding at one of the two
+            return []
+        candidates = self._by_tangent if self.track.without_potential else self._by_count
+        found = []
+        for near, point, modes in candidates(chord, sorted(counts), limits):
+            if not modes:  # rounding hides them
+                continue
+            place = chord.root(self._stiffness_against(self.track.motion_at(point, modes[0])), near)
+            if place is not None:
+                here = self._singular("bifurcation", chord, place, modes)
+                found += [x for x in here if x.residual <= _SINGULAR and not self._known(x, (*limits, *found))]
+        return _in_order(found)
+
+    def _stiffness_against(self, motion):
+        return lambda point: self.track.response(point.numbers, point.load_factor, motion)[0]
+
+    def _known(self, crossing, others):
+        """Whether one of other `Crossing`s has the same null vector at the same point."""
+        near = [other for other in others if abs(other.place - crossing.place) < _ONE_PLACE]
+        return any(abs(self.track.work(other.null, crossing.null)) > _ALIKE for other in near)
+
+    def _by_count(self, chord, counts, limits):
+        """(coordinate, `PathPoint`, modes) of the eigenvalues of the second variation that change their sign.
+
+        Their number is that by which the negative modes change; those of limit points are left out.
+        """
+        first, last = counts
+        if last - first == len(limits):
+            return []
+        found, j = [], first
+        while j < last:
+            place, point, together = self._vanishing(chord, j, last)
+            found.append((place, point, together))
+            j += together
+        for limit in limits:  # the nearest zero of an eigenvalue is that of the limit point
+            if found:
+                found.remove(min(found, key=lambda item: abs(item[0] - limit.place)))
+        return [(place, point, self._modes(chord, place, point, together)) for place, point, together in found]
+
+    def _by_tangent(self, chord, counts, limits):
+        """(None, `PathPoint`, [mode]) for each negative mode at one end.
+
+        Under loads without a potential the tangent can be singular only where its symmetric part is indefinite, but
+        it generally is not where that part becomes singular.
+        """
+        if not counts[-1]:
+            return []
+        end = max(chord.known[0][1], chord.known[-1][1], key=lambda point: point.negative_modes)
+        self.track.put(end.numbers, end.load_factor)
+        return [(None, end, [mode]) for mode in self.track.stability.whole.modes(counts[-1], side=-1)]
+
+    def _singular(self, kind, chord, place, directions):
+        """The `Crossing`s at a coordinate, one for each direction (a change of the unknowns, owned entries)."""
+        track, found = self.track, []
+        numbers, eta = chord.guess(place)
+        before, after = chord.neighbours(place)
+        point = PathPoint(eta, numbers, min(before.negative_modes, after.negative_modes), 0)
+        partners = directions[::-1] if len(directions) == 2 else [None] * len(directions)
+        for direction, partner in zip(directions, partners, strict=True):
+            motion = track.motion_at(before, direction)
+            at_rest, _ = track.response(track.origin.numbers, track.origin.load_factor, motion)
+            resistance, null = track.response(numbers, eta, motion)
+            residual = abs(resistance / at_rest) if at_rest else math.inf
+            found.append(Crossing(kind, point, place, direction, residual, null, partner))
+        return found
+
+    def _modes(self, chord, place, point, together):
+        """The modes whose eigenvalues change sign at a coordinate.
+
+        In a structure with a very soft member other eigenvalues may be as close to zero. Then the mode is taken from
+        the neighbouring point where its eigenvalue is negative.
+        """
+        track, stability = self.track, self.track.stability.whole
+        track.put(point.numbers, point.load_factor)
+        modes = stability.modes(together)
+        unstable = max(chord.neighbours(place), key=lambda known: known.negative_modes)
+        if together == 1 and unstable.negative_modes > point.negative_modes:
+            track.put(unstable.numbers, unstable.load_factor)
+            negative = stability.modes(1, side=-1)
+            if not modes or not negative:
+                return modes or negative
+            if track.product(negative[0], modes[0]) ** 2 < 0.25 * track.square(negative[0]) * track.square(modes[0]):
+                return negative
+        return modes
+
+    def _vanishing(self, chord, j, last):
+        """Where the j-th eigenvalue vanishes: (coordinate, `PathPoint`, number of eigenvalues that vanish there).
+
+        Eigenvalues are numbered in ascending order; those from number `last` on are not considered.
+        """
+        track = self.track
+
+        def eigenvalue(point, j=j):
+            track.put(point.numbers, point.load_factor)
+            return track.stability.whole.eigenvalue(j)
+
+        place = chord.root(eigenvalue)
+        place = 0.5 if place is None else place  # rounding hides the change of sign
+        numbers, eta = chord.guess(place)
+        negative = min(point.negative_modes for _, point in (chord.known[0], chord.known[-1]))
+        point = PathPoint(eta, numbers, negative, 0)
+        together = 1
+        while j + together < last:
+            ends = max(abs(eigenvalue(end, j + together)) for _, end in (chord.known[0], chord.known[-1]))
+            if abs(eigenvalue(point, j + together)) > _SAME * ends:
+                break
+            together += 1
+        return place, point, together
+
+    def _land(self, chord, low, high, before, after, target):
+        """(coordinate, `PathPoint`) at the load factor `target` between two coordinates, by Newton's method."""
+        track = self.track
+        for _ in range(_MOST):
+            place = zero_of(lambda at: chord.load_factor(at) - target, low, high)
+            predicted, _ = chord.guess(place)
+            solved = track.at_load(predicted, target)
+            if solved.converged:
+                numbers = track.problem.numbers()
+                ends = track.distance(before.numbers, after.numbers)
+                if track.distance(numbers, predicted) <= 0.2 * ends:
+                    return place, track.point(solved)
+            found = chord.at(place)
+            if found is None:
+                break
+            place, point = found
+            if point.load_factor == target:
+                return place, point
+            if (point.load_factor - target) * (after.load_factor - target) < 0:
+                low, before = place, point
+            else:
+                high, after = place, point
+        raise Lost(0.5)
+
+
+def _in_order(crossings):
+    return sorted(crossings, key=lambda crossing: crossing.place)

@@ -1,0 +1,166 @@
+"""Continuation of an equilibrium path: load control where it works, else arc length; on request onto a branch."""
+
+from dataclasses import replace
+
+from cosserat_fenicsx.errors import NotConverged
+from cosserat_fenicsx.statics.path.arclength import ArcLength
+from cosserat_fenicsx.statics.path.chord import Chord
+from cosserat_fenicsx.statics.path.events import Locator
+from cosserat_fenicsx.statics.path.load_control import Continuation
+from cosserat_fenicsx.statics.path.track import INTENDED, Track
+
+#: Control parameters of the continuation, see `solve`.
+CONTROLS = ("auto", "load", "arc")
+# Number of rejected steps of load control after which arc length takes over.
+_PATIENCE = 4
+# Largest number of halvings of the first step onto a branch.
+_TRIES = 8
+
+
+class Follower:
+    """Advances along the path from one requested load factor to the next.
+
+    Args:
+        problem: a loaded `Problem`.
+        newton, stability: the problem's Newton solver and its `NegativeModes`.
+        steps: a `StepControl`.
+        control: "auto", "load" or "arc".
+        branch: 1 or -1 to leave the path at the first bifurcation; 0 to stay on it.
+        on_event: called with every `Crossing`.
+        from_rest: see `Track`.
+
+    Attributes:
+        track: the `Track`.
+        locator: its `Locator`.
+        fork: the `Crossing` at which the path is left for a branch, once it is located; left: whether it was left.
+        used: "arc" once arc length was used, else "load".
+    """
+
+    def __init__(self, problem, newton, stability, steps, *, control="auto", branch=0, on_event=None, from_rest=True):
+        most = steps.max_iterations or (10 if problem.model.carries_force else 30)
+        self.track = Track(problem, newton, stability, most, from_rest=from_rest)
+        self._steps, self._control, self._branch, self._on_event = steps, control, branch, on_event
+        self._sign = branch
+        self.locator = Locator(self.track)
+        self._load = Continuation(self.track, steps, self._watch)
+        self._arc = ArcLength(self.track, steps, self.locator)
+        self._auto = control == "auto" and steps.adaptive
+        self.fork, self.left, self.used = None, False, "load"
+        self._begun = False
+
+    @property
+    def smallest(self):
+        """The smallest step of the load factor that was allowed on the way to the last target."""
+        return self._load.smallest
+
+    def begin(self):
+        """Apply the permanent loads in steps and solve for the equilibrium at load factor 0; once, at the first call.
+
+        Raises:
+            NotConverged: no equilibrium was found.
+        """
+        problem, track = self.track.problem, self.track
+        kinds = problem.model.signature.terms if not self._begun else ()
+        self._begun = True
+        if problem.begins:
+            if track.history:
+                steps = replace(self._steps, first=None, largest=None, adaptive=True)
+                if not Continuation(track, steps).to(1.0, 1.0):
+                    share = track.here.load_factor
+                    raise NotConverged(
+                        f"no equilibrium under the permanent loads was found beyond {share:.3g} of them: "
+                        f"{track.failure}"
+                    )
+            problem.end_beginning()
+            if track.history:
+                track.begin_here()
+        if track.history and any(kind.scaled == "full" for kind in kinds):
+            if not track.at_load(track.here.numbers, 0.0).converged:
+                raise NotConverged(f"no equilibrium was found at the load factor 0: {track.failure}")
+            track.begin_here()
+
+    def to(self, target, way, *, on_step=None):
+        """Advance to the load factor `target`, which is reached exactly.
+
+        Args:
+            target: load factor.
+            way: range of the load factor over the whole path, to which steps of the load factor are relative.
+            on_step: called with every accepted `PathPoint`.
+
+        Returns:
+            bool: False where the path could not be continued; `track.failure` gives the reason, and the state is that
+            of `track.here`.
+        """
+        self.begin()
+        track, here = self.track, self.track.here
+        done = self._advance(target, way, on_step)
+        if self.fork and not self.left:
+            self.left, self._branch, self.used = True, 0, "arc"
+            first = self._onto(self.fork)
+            if first is not None:
+                slope = track.slope_found()
+                done = self._arc.to(target, first=first, slope=slope, on_step=on_step, on_event=self._meet)
+        if not done and self._auto and track.here is here:  # arc length made no step: load control down to its smallest
+            return self._load.to(target, way, on_step=on_step)
+        if done and self.used == "arc" and len(track.history) > 1:
+            before, here = track.history[-2:]
+            self._load.step = abs(here.load_factor - before.load_factor) or None
+        return done
+
+    def to_fork(self, target, way):
+        """Advance towards a load factor up to the first bifurcation; whether one was found."""
+        self.begin()
+        self._advance(target, way, None)
+        return self.fork is not None
+
+    def _advance(self, target, way, on_step):
+        """Advance to the load factor; False where the path fails or is to be left for a branch before."""
+        if self._control != "arc":
+            done = self._load.to(target, way, on_step=on_step, patience=_PATIENCE if self._auto else None)
+            if done or not self._auto or (self.fork and not self.left):
+                return done
+        self.used = "arc"
+        return self._arc.to(target, on_step=on_step, on_event=self._meet)
+
+    def _meet(self, crossing):
+        """Report a `Crossing`; True where the path is to be left there."""
+        if self._on_event:
+            self._on_event(crossing)
+        if self._branch and crossing.kind == "bifurcation":
+            self.fork = crossing
+        return self.fork is not None and not self.left
+
+    def _watch(self, a, b):
+        """Report the bifurcations within a step of load control; False to leave the path there."""
+        looks = a.negative_modes != b.negative_modes or (b.negative_modes > 0 and self.track.without_potential)
+        if not (looks and (self._on_event or self._branch)):
+            return True
+        crossings = self.locator.bifurcations(Chord.balanced(self.track, a, b))
+        self.track.put(b.numbers, b.load_factor)
+        return not any(self._meet(crossing) for crossing in crossings)
+
+    def _onto(self, fork):
+        """The first `PathPoint` on the branch at a bifurcation, or None where none is found.
+
+        The point is displaced along the mode, and corrected in the plane perpendicular to the mode.
+        """
+        track = self.track
+        base = fork.point
+        track.history = [base]
+        size = INTENDED / track.model.largest(fork.direction)
+        for _ in range(_TRIES):
+            guess = [values.copy() for values in base.numbers]
+            guess[0] += self._sign * size * fork.direction
+            solved = track.on_plane(guess, base.load_factor, fork.direction, 0.0)
+            if solved.converged:
+                numbers = track.problem.numbers()
+                if track.distance(numbers, guess) < 0.5 * track.distance(guess, base.numbers):
+                    point = track.point(solved)
+                    if fork.partner is not None and track.stability.whole.is_neutral():
+                        track.neutral = fork.partner
+                        point.negative_modes = track.stability.count(neutral=True)
+                    return point
+            size /= 2
+        track.failure = "no branch was found at the bifurcation"
+        track.restore()
+        return None

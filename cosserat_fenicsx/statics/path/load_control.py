@@ -1,0 +1,233 @@
+"""Continuation in the load factor: adaptive steps, predictors, and checks against changes of branch.
+
+A slender rod has several equilibria under one load, and Newton's method from the straight state often converges to an
+unstable one (the eccentric column jumps to the opposite side in one step at eta = 1.1). So a step is accepted only if
+Newton's method converged near the predictor, not against its direction, and if no new negative mode appeared. A
+negative mode that appears in steps of a thousandth of the way too is one of the path, which has lost its stability.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from cosserat_fenicsx.checks import number, refuse
+from cosserat_fenicsx.errors import NotConverged
+from cosserat_fenicsx.interrupts import obey
+from cosserat_fenicsx.statics.path.track import FAR, INTENDED, NOTHING, Track, growth_of, through
+
+# Distance from the predictor (rad, rod lengths) below which direction and length of a step are not checked.
+_SLIGHT = 1e-3
+# Distance from the predictor, over the predicted increment, above which a step may have jumped over a limit point.
+_LEAP = 2.0
+# Number of rejected steps from the first point after which the step is limited by the stiffness there.
+_FIRST_REJECTIONS = 3
+# Largest distance from the predictor, over the step's length, at which the number of negative modes may change; the
+# second once steps are below a thousandth of the way: the path is smooth there, so that it crosses a bifurcation
+# without a change of branch.
+_SMOOTH, _NEAR = 0.01, 0.3
+
+
+@dataclass(frozen=True)
+class StepControl:
+    """How the load factor is stepped between the requested values.
+
+    Args:
+        first: first step of the load factor; None for a tenth of the way to the farthest requested value. Where it is
+            rejected a few times, it is limited by the tangent stiffness at the first point.
+        smallest: smallest step over the farthest requested value, in (0, 1); the continuation fails where a smaller
+            one would be needed. Where the structure is very soft at the first point, smaller steps are allowed.
+        largest: largest step of the load factor; None for no bound.
+        adaptive: False takes each requested value in one step, without checks of the branch; the negative modes of the
+            points are counted all the same.
+        max_iterations: Newton iterations allowed in a step; None for 10, or 30 for the formulation "displacement",
+            which needs more of them.
+        most_steps: steps of arc length allowed for one requested load factor, which may lie far along the path, or not
+            on it at all.
+
+    Raises:
+        SceneError: a value outside its range.
+    """
+
+    first: float | None = None
+    smallest: float = 1e-6
+    largest: float | None = None
+    adaptive: bool = True
+    max_iterations: int | None = None
+    most_steps: int = 1000
+
+    def __post_init__(self):
+        for name in ("first", "largest"):
+            if getattr(self, name) is not None:
+                number(self, name, getattr(self, name), "a positive load factor", lambda x: 0 < x < np.inf)
+        number(self, "smallest", self.smallest, "a number in (0, 1)", lambda x: 0 < x < 1)
+        if not isinstance(self.adaptive, bool):
+            refuse(self, "adaptive", self.adaptive, "True or False")
+        for name in ("max_iterations", "most_steps"):
+            value = getattr(self, name)
+            left_open = name == "max_iterations" and value is None
+            if not left_open and (not isinstance(value, int) or isinstance(value, bool) or value < 1):
+                refuse(self, name, value, "a whole number above zero")
+
+
+class Continuation:
+    """Advances a track by load control.
+
+    Args:
+        track: a `Track`.
+        control: a `StepControl`.
+        watch: called as watch(a, b) with the two points of a step, before b is accepted; False ends the continuation
+            at a.
+
+    Attributes:
+        step: the next step of the load factor; None where it is still to be chosen.
+        smallest: the smallest step of the load factor that is tried.
+    """
+
+    def __init__(self, track: Track, control: StepControl, watch=None):
+        self.track, self.control, self._watch = track, control, watch
+        self.step, self._shrink, self.smallest = None, 0.5, 0.0
+
+    def to(self, target, way, *, on_step=None, patience=None):
+        """Advance to the load factor `target`, which is reached exactly.
+
+        Args:
+            target: load factor.
+            way: range of the load factor over the whole path, to which steps are relative.
+            on_step: called with every accepted `PathPoint`.
+            patience: number of rejected steps, without two successive accepted ones between, after which to stop;
+                None to go on to the `StepControl`'s smallest step.
+
+        Returns:
+            bool: False where too many steps were rejected, the steps became too small or `watch` returned False; the
+            track's `failure` gives the reason, and its state is that of `here`.
+        """
+        control, track = self.control, self.track
+        if not control.adaptive:
+            return self._attempt(target, guard=False, on_step=on_step)
+        self.step = self.step or control.first or way / 10
+        self.smallest = control.smallest * way
+        self._refused, rejections, last_accepted, first = False, 0, False, len(track.history) == 1
+        while track.here.load_factor != target:
+            left = target - track.here.load_factor
+            step = min(self.step, control.largest or np.inf)
+            if abs(left) <= min(1.2 * step, control.largest or np.inf):
+                goal = target
+            elif abs(left) < 2 * step:
+                goal = track.here.load_factor + left / 2
+            else:
+                goal = track.here.load_factor + np.copysign(step, left)
+            taken = abs(goal - track.here.load_factor)
+            # A new negative mode counts as one of the path itself once the step is this small.
+            if self._attempt(goal, guard=taken > 1e-3 * way, on_step=on_step):
+                rejections, last_accepted, first = 0 if last_accepted else rejections, True, False
+            else:
+                rejections, last_accepted = rejections + 1, False
+                self.step = taken * self._shrink
+                if first and rejections == _FIRST_REJECTIONS:
+                    rejections, first, linear = 0, False, self._linear_step()
+                    self.step, self.smallest = min(self.step, linear), min(self.smallest, control.smallest * linear)
+                if self._refused or self.step < self.smallest or rejections == patience:
+                    self.step = None
+                    return False
+        return True
+
+    def _linear_step(self):
+        """The step of the load factor that moves or rotates the linearised structure by INTENDED; infinite where its
+        tangent is singular.
+
+        The first step must be of that order where the structure is very soft, as a straight wire is against bending.
+        """
+        track = self.track
+        try:
+            moved = track.model.largest(track.slope())
+        except NotConverged:
+            return math.inf
+        return INTENDED / moved if moved else math.inf
+
+    def _attempt(self, eta, *, guard, on_step):
+        """One step: predictor, corrector, checks. Accepts it (True) or restores the last point (False)."""
+        obey()
+        track, adaptive = self.track, self.control.adaptive
+        here = track.here
+        predicted = self._predict(eta) if adaptive else here.numbers
+        solved = track.at_load(predicted, eta)
+        self._shrink = 0.5
+        if not solved.converged:
+            return track.restore()
+        numbers = track.problem.numbers()
+        off = track.distance(numbers, predicted)
+        if adaptive and off > _SLIGHT and not self._near(numbers, predicted, off, eta):
+            return track.restore()
+        point = track.point(solved)
+        changed = point.negative_modes != here.negative_modes
+        if adaptive and changed and not self._smooth(numbers[0], predicted[0], _SMOOTH if guard else _NEAR):
+            track.failure = "the step crossed a point where stability changes"
+            return track.restore()
+        if adaptive and self._watch and not self._watch(here, point):
+            self._refused = True
+            return track.restore()
+        taken = abs(eta - here.load_factor)
+        track.keep(point)
+        if adaptive:
+            growth = growth_of(off, min(len(track.history) - 1, 3), solved.iterations)
+            self.step = max(self.step, taken * growth) if growth >= 1 else taken * growth
+        if on_step:
+            on_step(point)
+        return True
+
+    def _smooth(self, found, predicted, share):
+        """Whether the corrected point is closer to the predictor than a share of the step's length."""
+        track = self.track
+        move, off = found - track.here.numbers[0], found - predicted
+        return track.product(off, off) <= share**2 * track.product(move, move) + NOTHING**2
+
+    def _near(self, found, predicted, off, eta):
+        """Whether a step whose corrected point differs from the predictor is still one along the path.
+
+        Args:
+            found, predicted: numbers of the corrected point and of the predictor; off: their distance.
+            eta: load factor of the step.
+        """
+        track = self.track
+        if off > FAR:
+            track.failure = "the equilibrium jumped away from the path"
+            self._shrink = min(max((INTENDED / off) ** (1 / len(track.history)), 0.1), 0.5)
+            return False
+        here = track.here.numbers
+        move, increment = found[0] - here[0], predicted[0] - here[0]
+        size = track.product(increment, increment)
+        if len(track.history) > 1:
+            # The mirrored branch of a nearly perfect pitchfork is stable about a section's stiff axis, so that neither
+            # the distance nor the number of negative modes reveals it.
+            if track.product(move, increment) <= 0 < size:
+                track.failure = "the equilibrium lies opposite to the direction of the path"
+                return False
+            if track.product(move - increment, move - increment) <= _LEAP**2 * size:
+                return True
+        if self._jumped(move, eta - track.here.load_factor):
+            track.failure = "the equilibrium jumped away from the path's direction"
+            return False
+        return True
+
+    def _jumped(self, move, change):
+        """Whether a step is longer than twice the mean slope of its two ends times the change of the load factor.
+
+        Then it has jumped over a limit point to another part of the path.
+        """
+        track = self.track
+        end, eta = track.problem.numbers(), track.problem.load_factor
+        slopes = track.slope()
+        track.restore()
+        slopes += track.slope()
+        track.put(end, eta)
+        return track.product(slopes, slopes) * change**2 < track.product(move, move)
+
+    def _predict(self, eta):
+        """Predictor: numbers at eta by the polynomial through the last points (constant, secant, quadratic)."""
+        known = self.track.history
+        places = [point.load_factor for point in known]
+        if len(set(places)) < len(places):  # the path returned to a load factor: use its last point there
+            latest = dict(zip(places, known, strict=True))
+            places, known = list(latest), list(latest.values())
+        return through(known, places, eta)[0]

@@ -1,0 +1,304 @@
+"""One path on one mesh, recorded: by continuation, or point by point from the same path on a coarser mesh."""
+
+import dataclasses
+import itertools
+
+import numpy as np
+
+from cosserat_fenicsx.errors import Interrupted, NotConverged
+from cosserat_fenicsx.interrupts import obey
+from cosserat_fenicsx.results.accuracy import on_mesh
+from cosserat_fenicsx.results.path import Path
+from cosserat_fenicsx.results.records import Event, Record
+from cosserat_fenicsx.statics.circulatory import conservative_along
+from cosserat_fenicsx.statics.path.chord import Chord
+from cosserat_fenicsx.statics.path.follower import Follower
+from cosserat_fenicsx.statics.path.track import NOTHING
+
+# Loads over EA, about the axial strain that they cause, above which a mistake in the units is suggested.
+_ENORMOUS = 1.0
+# Factor from `StepControl.smallest` to the value advised where no first step was accepted.
+_SHORTER = 1e-3
+# Largest |n| h^2/EI at which an element of length h resolves boundary layers, of length sqrt(EI/|n|).
+_RESOLVED = 100.0
+# Largest ratio of the load factors at which two meshes find negative modes, for the finding to be confirmed.
+_ALIKE = 1.5
+# Bounds for a point corrected from a coarser mesh: Newton iterations, and motion (lengths, rad).
+_CORRECTIONS, _NEAR = 6, 0.1
+# Largest distance of a point from the same one on a coarser mesh, over that of the latter's two neighbours.
+_ASIDE = 0.3
+
+
+class _Enough(Exception):
+    """The user's `until` returned True."""
+
+
+class Promoted(Exception):
+    """A planar solution that has to be continued with the spatial model.
+
+    Args:
+        reason: a sentence for `Path.why`.
+        between: the two load factors between which negative modes appeared, where the mesh is too coarse to be sure of
+            them; else None.
+    """
+
+    def __init__(self, reason, between=None):
+        super().__init__(reason)
+        self.reason, self.between = reason, between
+
+    def agrees(self, before):
+        """Whether the exception on the mesh before (None where none was raised) confirms the negative modes.
+
+        On a mesh that does not resolve the contact force, its directions at the Gauss points are wrong: a taut wire
+        then seems to buckle, at a load factor that grows with mesh refinement.
+        """
+        if self.between is None:
+            return True
+        if before is None or before.between is None:
+            return False
+        (a, b), (c, d) = (sorted(map(abs, found.between)) for found in (self, before))
+        return max(a, c) <= _ALIKE * min(b, d)
+
+
+class Tracing:
+    """Computes and records a `Path`.
+
+    Args:
+        solvers: the loaded `Problem`, its Newton solver and its `NegativeModes`.
+        follow: arguments of `Follower`.
+        choice: the `Choice` of the model.
+        bar: a `Progress`.
+        from_rest: whether the path starts at the unloaded state; False where it is only `corrected`.
+    """
+
+    def __init__(self, solvers, follow, choice, bar, *, from_rest=True):
+        self.problem, _, self.stability = solvers
+        self.model, self._options, self._choice, self._bar = self.problem.model, follow, choice, bar
+        why = [*choice.why, self.model.signature.formulation.words]
+        self.path = Path.of(self.model, why, conservative_along)
+        if choice.model == "spatial":
+            self._follower = Follower(*solvers, on_event=self._meet, from_rest=from_rest, **follow)
+        else:  # planar models: load control without events; the spatial model takes over where more is needed
+            self._follower = Follower(*solvers, from_rest=from_rest, **{**follow, "control": "load"})
+        self.track = self._follower.track
+        self._counted, self._until, self._stable_at = 0, None, 0.0
+        bar.start(f"{self.path.model}, {self.model.unknowns} unknowns")
+
+    def _meet(self, crossing):
+        shape = self.model.shape_of(crossing.direction)
+        size = np.linalg.norm(shape, axis=1).max()
+        event = Event(
+            crossing.kind, crossing.point.load_factor, shape / (size or 1.0), len(self.path) - 1, crossing.residual
+        )
+        self.path.events.append(event)
+
+    def _watch(self, point):
+        self._bar.at(point)
+        if self._choice.promoted and point.negative_modes:
+            where = f"before the load factor {point.load_factor:.4g}"
+            if self.problem.model.scene.follows:
+                reason = f"negative modes appear {where}, and the spatial model continues the path"
+            elif self.stability.sideways:
+                reason = (
+                    f"in its plane the scene buckles sideways {where}, "
+                    "where motions out of the plane lose their stability"
+                )
+            else:
+                in_plane = " in its plane" if self.model.signature.flat else ""
+                reason = f"it loses its stability{in_plane} {where}, and the spatial model continues the path"
+            raise Promoted(reason, None if self._resolved() else (self._stable_at, point.load_factor))
+        self._stable_at = point.load_factor
+
+    def _resolved(self):
+        """Whether elements are short enough for the boundary layers of the contact force at the state."""
+        model = self.model
+        nodal, gauss = model.snapshot()
+        eta = np.array([self.problem.load_factor])
+        _, fields = model.expansion()(eta, nodal[None], None if gauss is None else gauss[None])
+        n = np.linalg.norm(fields[0, ..., :3], axis=2).max(axis=1)
+        sizes = self.path.layout.sizes(model.scene) / model.scales.length
+        return bool((n * sizes**2 < _RESOLVED * model.section.J.max(axis=(1, 2))).all())
+
+    def _record(self, point):
+        track = self.track
+        iterations, self._counted = track.iterations - self._counted, track.iterations
+        self.path.append(Record(point.load_factor, *self.model.snapshot(), point.negative_modes, iterations,
+                                self.problem.multipliers(), track.neutral is not None,
+                                self.model.densities.here(), self.problem.tie_forces(),
+                                self.model.clamps.loads(point.load_factor)))  # fmt: skip
+        if self._until and self._until(self.path):
+            raise _Enough
+
+    def along(self, targets, free, until=None):
+        """Continue the path over the load factors.
+
+        Args:
+            targets: load factors, reached exactly and in this order.
+            free: whether every step from the first to the second is recorded.
+            until: see `solve`.
+
+        Raises:
+            NotConverged, Interrupted: with the path so far.
+        """
+        track = self.track
+        way = max(abs(eta) for eta in targets) or 1.0
+        try:
+            self._follower.begin()
+            for k, target in enumerate(targets):
+                between = free and k == 1
+                self._until = until if between else None
+                on_step = (lambda point: (self._watch(point), self._record(point))) if between else self._watch
+                at_start = k == 0 and track.here.load_factor == target
+                if not (at_start or self._follower.to(target, way, on_step=on_step)):
+                    here = track.here.load_factor
+                    if self._choice.promoted and self._options["control"] == "auto":
+                        raise Promoted(f"load control ends at the load factor {here:.4g}, because {track.failure}")
+                    raise NotConverged(
+                        f"no equilibrium was found beyond the load factor {here:.6g} on the way to {target:g}: "
+                        f"{track.failure}. {self._advice(here, abs(target) * self.problem.load_norm)}",
+                        self.path,
+                    )
+                if not between:
+                    self._record(track.here)
+        except _Enough:
+            pass
+        except NotConverged as failure:
+            failure.path = self.path if failure.path is None else failure.path
+            raise
+        except KeyboardInterrupt:
+            raise Interrupted(self.path) from None
+        finally:
+            self.path.control, self.path.left = self._follower.used, self._follower.left
+        return self.path
+
+    def _advice(self, here, load):
+        if not self._options["steps"].adaptive:
+            return "Allow adaptive steps, or ask for load factors in between."
+        strain = load / self.model.section.K.max()
+        if strain > _ENORMOUS:
+            return (
+                f"The loads are {strain:.1e} times EA there, which no rod bears: "
+                "are the units those of SI (N, m, Pa)?"
+            )
+        where = "Try"
+        if len(self.track.history) == 1 and self._options["control"] == "arc":
+            where = "Try control='auto',"
+        elif len(self.track.history) == 1:
+            shorter = _SHORTER * self._options["steps"].smallest
+            where = (
+                f"Try a first step below {self._follower.smallest:.1g}, by steps=StepControl(smallest={shorter:.1g}),"
+            )
+        if here and self._options["control"] == "load":
+            where = "There may be a limit point, which load control cannot pass (control='auto' can); otherwise try"
+        return f"{where} load factors in between, more elements, or {self.model.signature.formulation.advice}."
+
+    def corrected(self, coarse):
+        """The points of a path on a coarser mesh, corrected on this mesh by Newton's method at their load factors.
+
+        None where one fails to converge, moves too far or changes its number of negative modes.
+
+        Raises:
+            Interrupted: with the path so far.
+        """
+        problem, track, path = self.problem, self.track, self.path
+        self._follower.begin()
+        track.max_iterations = _CORRECTIONS
+        try:
+            for point, values, n in self._starts(coarse):
+                obey()
+                problem.begin_at(values, n, point.reactions)
+                start = problem.numbers()
+                solved = track.at_load(start, point.load_factor)
+                if not solved.converged or track.distance(problem.numbers(), start) > _NEAR:
+                    return None
+                found = track.point(solved)
+                if found.negative_modes != point.negative_modes:
+                    return None
+                self._record(found)
+                self._bar.at(point)
+        except KeyboardInterrupt:
+            raise Interrupted(path) from None
+        return path
+
+    def _starts(self, coarse):
+        """(point, values, n) for each point of a path on a coarser mesh: the arguments of `Problem.begin_at`."""
+        rq, n = on_mesh(coarse, self.path.layout)
+        return zip(coarse, self.model.unknowns_of(rq), n, strict=True)
+
+    def again(self, coarse):
+        """The points of a path on a coarser mesh, corrected on this mesh.
+
+        Each is solved in the plane through its coarse state, perpendicular to the path; the two ends at their load
+        factors.
+
+        Raises:
+            NotConverged: one of them was not found.
+        """
+        self._follower.begin()
+        problem, track, last = self.problem, self.track, len(coarse) - 1
+        guesses = []
+        for point, values, n in self._starts(coarse):
+            problem.begin_at(values, n, point.reactions)
+            guesses.append((problem.numbers(), point.load_factor))
+        weight = min(filter(None, (self._balance(a, b) for a, b in itertools.pairwise(guesses))), default=1.0)
+        before, left = None, self._to_fork(coarse) if coarse.left else -1
+        try:
+            for k in range(last + 1):
+                obey()
+                (ahead, eta_ahead), (behind, eta_behind) = guesses[min(k + 1, last)], guesses[max(k - 1, 0)]
+                normal, change = ahead[0] - behind[0], eta_ahead - eta_behind
+                if k == 0 and guesses[0][1] == 0:
+                    point = track.origin
+                    track.put(point.numbers, 0.0)
+                else:
+                    still = k in (0, last) or not track.square(normal)
+                    point = self._found(*guesses[k], normal, weight * change, coarse[k].neutral, at_load=still)
+                track.set_tangent(point, track.slope(), normal, change, weight)
+                if before is not None and k > left + 1:  # nothing changes sign in the step onto a branch
+                    for crossing in self._follower.locator.crossings(Chord(track, before, point, weight)):
+                        self._meet(crossing)
+                track.keep(point)
+                track.restore()
+                self._record(point)
+                self._bar.at(point)
+                before = point
+        except KeyboardInterrupt:
+            raise Interrupted(self.path) from None
+        self.path.control, self.path.left = "arc", coarse.left
+        return self.path
+
+    def _balance(self, a, b):
+        """The weight that gives load factor and unknowns equal shares in the distance of two guesses; 0 without one."""
+        moved, change = b[0][0] - a[0][0], b[1] - a[1]
+        return self.track.square(moved) / change**2 if change else 0.0
+
+    def _to_fork(self, coarse):
+        """Locate the events up to the bifurcation where the path was left; index of the last point before that."""
+        known = list(itertools.takewhile(lambda event: event.kind != "bifurcation", coarse.events))
+        known.append(coarse.events[len(known)])
+        target, way = float(coarse.load_factors[-1]), float(np.abs(coarse.load_factors).max())
+        found = self._follower.to_fork(target, way)
+        if not found or len(self.path.events) != len(known):
+            raise NotConverged("the bifurcation was not found on a finer mesh", self.path)
+        events = zip(self.path.events, known, strict=True)
+        self.path.events = [dataclasses.replace(event, after=other.after) for event, other in events]
+        self.track.history = [self.track.origin]
+        return known[-1].after
+
+    def _found(self, guess, eta, normal, weight, neutral, *, at_load):
+        """The `PathPoint` next to a guess, at its load factor or in the plane through it."""
+        track = self.track
+        track.put(guess, eta)
+        track.neutral = self._neutral() if neutral else None
+        solved = track.at_load(guess, eta) if at_load else track.on_plane(guess, eta, normal, weight)
+        off = self.problem.numbers()[0] - guess[0]
+        if solved.converged and track.product(off, off) <= _ASIDE**2 * track.product(normal, normal) + NOTHING**2:
+            return track.point(solved)
+        reason = "it converged too far from the coarse one" if solved.converged else track.failure
+        raise NotConverged(f"a point of the path was not found on a finer mesh: {reason}", self.path)
+
+    def _neutral(self):
+        """The neutral motion at the state: the eigenvector of the second variation nearest zero, normalised."""
+        self.stability.count()
+        (motion,) = self.stability.whole.modes(1)
+        return motion / np.sqrt(self.track.product(motion, motion))

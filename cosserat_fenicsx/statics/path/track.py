@@ -1,0 +1,229 @@
+"""The current position of a continuation on an equilibrium path, and the correctors that find its next point."""
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from cosserat_fenicsx.algebra.newton import Newton
+from cosserat_fenicsx.statics.stability import NegativeModes
+
+#: Largest distance of the corrected point of a step from the predictor (rad, rod lengths), and the distance that step
+#: control aims at.
+FAR, INTENDED = 0.5, 0.1
+#: Motions below this are rounding (rad, rod lengths): an inextensible column does not move until it buckles.
+NOTHING = 1e-8
+# Newton iterations of a step beyond which the next step does not grow, and from which on it is halved.
+_EASY, _HARD = 5, 9
+
+
+@dataclass(eq=False)
+class PathPoint:
+    """A converged point of a path.
+
+    Attributes:
+        load_factor: eta.
+        numbers: see `Problem.numbers`; the first array holds the unknowns that this rank owns.
+        negative_modes: see `NegativeModes.count`.
+        iterations: Newton iterations of its solution.
+        rise: d eta/d arc, positive where the load factor grows along the path; None where it was not computed.
+        along: owned entries of dx/d arc; None where it was not computed.
+    """
+
+    load_factor: float
+    numbers: list = field(repr=False)
+    negative_modes: int
+    iterations: int
+    rise: float | None = None
+    along: np.ndarray | None = field(default=None, repr=False)
+
+
+class Track:
+    """The state of a loaded problem on its path.
+
+    Args:
+        problem: a loaded `Problem`.
+        newton, stability: the problem's Newton solver and its `NegativeModes`.
+        max_iterations: Newton iterations allowed in a step.
+        from_rest: whether the path begins at the problem's state, the unloaded one.
+
+    Attributes:
+        origin: the first `PathPoint` of the path.
+        history: the last points, at most three.
+        iterations: Newton iterations so far, those of rejected steps included.
+        failure: the reason why the last step was rejected, in words.
+        neutral: owned entries of a neutral motion, which leaves the energy unchanged (such as the rotation of a buckled
+            round column about its axis), or None.
+    """
+
+    def __init__(self, problem, newton: Newton, stability: NegativeModes, max_iterations, *, from_rest=True):
+        self.problem, self.model = problem, problem.model
+        self.newton, self.stability, self.max_iterations = newton, stability, max_iterations
+        self.iterations, self.failure, self.neutral = 0, "", None
+        self.origin, self.history = None, []
+        if from_rest:
+            self.begin_here()
+
+    def begin_here(self):
+        """Begin the path at the problem's state and load factor."""
+        self.origin = PathPoint(self.problem.load_factor, self.problem.numbers(), self.stability.count(), 0)
+        self.history = [self.origin]
+
+    @property
+    def here(self):
+        """The last accepted point."""
+        return self.history[-1]
+
+    def keep(self, point):
+        """Accept a point, the problem's state; path-dependent loads update their history variables."""
+        self.problem.commit()
+        self.history = [*self.history[-2:], point]
+
+    def put(self, numbers, load_factor):
+        """Set the problem's state, which need not be an equilibrium, and load factor."""
+        self.problem.set_load_factor(load_factor)
+        self.problem.put(numbers)
+
+    def restore(self):
+        """Return to the last accepted point. Always False, the result of a rejected step."""
+        self.put(self.here.numbers, self.here.load_factor)
+        return False
+
+    # -- equilibria --------------------------------------------------------------------------------------------------
+
+    def at_load(self, numbers, eta):
+        """Newton's method from `numbers` at a fixed load factor; returns a `Solved` and sets `failure`."""
+        if self.neutral is not None:
+            return self.on_plane(numbers, eta, None, 0.0)
+        self.put(numbers, eta)
+        return self._solve(self.newton)
+
+    def on_plane(self, numbers, eta, normal, weight):
+        """Newton's method from (numbers, eta) in the plane <normal, dx> + weight d eta = 0 through them.
+
+        Both x and eta are unknowns. Returns a `Solved` and sets `failure`.
+        """
+        self.put(numbers, eta)
+        self.newton.bordered.stay_in_plane(normal, weight, self.neutral)
+        solved = self._solve(self.newton.bordered)
+        if solved.converged:
+            self.neutral = self.newton.bordered.neutral
+        return solved
+
+    def _solve(self, newton):
+        newton.allow(self.max_iterations)
+        solved = newton.solve()
+        self.iterations += solved.iterations
+        if not solved.converged:
+            self.failure = solved.reason
+        return solved
+
+    def slope(self):
+        """Owned entries of dx/d eta at the state."""
+        return self.newton.bordered.slope_here(self.neutral)
+
+    def slope_found(self):
+        """Owned entries of dx/d eta at the point that `on_plane` has found."""
+        return self.newton.bordered.slope
+
+    def point(self, solved):
+        """The state as a `PathPoint`, with its negative modes."""
+        negative = self.stability.count(neutral=self.neutral is not None)
+        return PathPoint(self.problem.load_factor, self.problem.numbers(), negative, solved.iterations)
+
+    def set_tangent(self, point, slope, moved, change, weight):
+        """Set the unit tangent (`along`, `rise`) of a point from dx/d eta, oriented along an increment of the path.
+
+        Args:
+            point: a `PathPoint`.
+            slope: dx/d eta there.
+            moved, change: increments of the unknowns and of the load factor.
+            weight: of the load factor in the metric.
+        """
+        along = self.product(slope, moved) + weight * change
+        size = math.sqrt(self.product(slope, slope) + weight)
+        point.rise = math.copysign(1.0, along) / size
+        point.along = point.rise * slope
+
+    # -- where the tangent is singular ---------------------------------------------------------------------------------
+
+    def motion_at(self, point, change):
+        """(nodes, 6) displacements and rotations of a change of the unknowns (owned entries) at a `PathPoint`.
+
+        See `BorderedNewton.motion_of`. The component along the neutral motion is removed.
+        """
+        self.put(point.numbers, point.load_factor)
+        bordered = self.newton.bordered
+        motion = bordered.motion_of(change)
+        if self.neutral is None:
+            return motion
+        neutral = bordered.motion_of(self.neutral)
+        return motion - self.work(motion, neutral) * neutral
+
+    def response(self, numbers, load_factor, motion):
+        """(stiffness of the tangent at a state against a motion, null vector): see `BorderedNewton.response`."""
+        self.put(numbers, load_factor)
+        return self.newton.bordered.response(motion)
+
+    def work(self, a, b):
+        """Inner product of two motions of the nodes."""
+        return self.newton.bordered.work(a, b)
+
+    @property
+    def without_potential(self):
+        """Whether the tangent is unsymmetric; then the negative modes are those of its symmetric part."""
+        return self.model.scene.follows
+
+    # -- between and beyond points -------------------------------------------------------------------------------------
+
+    def distance(self, a, b):
+        """Largest difference of r (lengths) and of the rotation (rad, about twice that of q), over all ranks."""
+        return self.model.largest(a[0] - b[0])
+
+    def square(self, a):
+        """`product` of a change with itself; zero below rounding."""
+        square = self.product(a, a)
+        return square if square > NOTHING**2 else 0.0
+
+    def product(self, a, b):
+        """Inner product of two changes of the unknowns (owned entries), over all ranks."""
+        return self.model.inner(a, b)
+
+
+def through(points, places, at):
+    """Lagrange interpolation of points of a path.
+
+    Args:
+        points: up to four `PathPoint`s.
+        places: their coordinates along the path, all different.
+        at: coordinate at which to evaluate.
+
+    Returns:
+        (numbers, load factor).
+    """
+    weights = []  # Lagrange's
+    for a in places:
+        weight = 1.0
+        for b in places:
+            if b != a:
+                weight *= (at - b) / (a - b)
+        weights.append(weight)
+    numbers = [weights[0] * values for values in points[0].numbers]
+    for weight, point in zip(weights[1:], points[1:], strict=True):
+        for total, values in zip(numbers, point.numbers, strict=True):
+            total += weight * values
+    return numbers, float(np.dot(weights, [point.load_factor for point in points]))
+
+
+def growth_of(off, order, iterations):
+    """Factor from a step's length to that of the next one.
+
+    Args:
+        off: distance of the corrected point from the predictor, rad or rod lengths.
+        order: of the predictor's error in the length of the step.
+        iterations: Newton iterations of the step.
+    """
+    growth = min(max((INTENDED / max(off, 1e-12)) ** (1 / order), 0.5), 2.0)
+    if iterations >= _HARD:
+        return 0.5
+    return min(growth, 1.0) if iterations > _EASY else growth

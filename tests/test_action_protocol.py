@@ -1,0 +1,250 @@
+"""The protocol of what acts on rods: permanent loads, loads along rods, memory, data that follow the position, what UFL tells."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+import ufl
+
+import cosserat_fenicsx as cf
+from cosserat_fenicsx.models.traits import traits_of
+from cosserat_fenicsx.scene import action
+
+pytestmark = pytest.mark.few_ranks
+
+SECTION = cf.Stiffness((1e6, 1e6), 1e6, (1.0, 1.0), 0.8, mass=1.0, inertia=(1e-8, 1e-8, 2e-8))
+ROD = cf.Rod(cf.Line((0, 0, 0), (1.0, 0, 0)), SECTION, name="beam")
+
+
+def test_permanent_loads_come_first():
+    """Weight first, then the end force; the path begins under the weight, and ends where both together would."""
+    weight = cf.LineForce(ROD, (0, 0, -2.0), permanent=True)
+    scene = cf.Scene([ROD], [cf.Clamp(ROD.start)], [weight, cf.Force(ROD.end, (0, 1.5, 1.0))])
+    both = cf.Scene([ROD], [cf.Clamp(ROD.start)], [cf.LineForce(ROD, (0, 0, -2.0)), cf.Force(ROD.end, (0, 1.5, 1.0))])
+    alone = cf.Scene([ROD], [cf.Clamp(ROD.start)], [cf.LineForce(ROD, (0, 0, -2.0))])
+    for options in ({"elements": 4}, {"tol": 1e-6}, {"elements": 4, "model": "spatial"}):
+        path = cf.solve(scene, [0.0, 1.0], **options)
+        together = cf.solve(both, [1.0], **options).displacement(ROD.end)[-1]
+        np.testing.assert_allclose(path.displacement(ROD.end)[1], together, atol=2e-7)
+        np.testing.assert_allclose(
+            path.displacement(ROD.end)[0], cf.solve(alone, [1.0], **options).displacement(ROD.end)[0], atol=2e-7
+        )
+        np.testing.assert_allclose(path.force(ROD.start), [(0, 0, -2.0), (0, 1.5, -1.0)], atol=1e-7)
+    assert path.model == "spatial" and "determinate" in cf.solve(scene, [1.0]).model
+
+
+def test_loads_that_change_along_a_rod(tmp_path):
+    """A triangular load q s/L on a cantilever: 11 q L^4/(120 EI), by a function, a table, a file; and pieces."""
+    q = 1e-3
+    (tmp_path / "load.csv").write_text(f"# s, fx, fy, fz\n0, 0, 0, 0\n1.0, 0, 0, {q}\n")
+    kinds = [
+        cf.Along(lambda s: (0, 0, q * s)),
+        cf.AlongTable([0, 1.0], [(0, 0, 0), (0, 0, q)]),
+        cf.AlongTable(tmp_path / "load.csv"),
+    ]
+    for force in kinds:
+        path = cf.solve(cf.Scene([ROD], [cf.Clamp(ROD.start)], [cf.LineForce(ROD, force)]), [1.0], elements=2)
+        assert path.displacement(ROD.end)[0, 2] == pytest.approx(11 * q / 120, rel=1e-5)
+        np.testing.assert_allclose(path.force(ROD.at(0.5))[0, 2], q * (1 - 0.25) / 2, rtol=1e-9)
+    half = cf.LineForce(ROD, cf.AlongPieces([(0.3, (0, 0, 0)), (0.7, (0, 0, q))]))
+    path = cf.solve(cf.Scene([ROD], [cf.Clamp(ROD.start)], [half]), [1.0], elements=2)
+    assert path.moment(ROD.start)[0, 1] == pytest.approx(-q * 0.4 * 0.5, rel=1e-9)
+    for bad in (lambda: cf.Along(3), lambda: cf.AlongTable([1, 0], [(0, 0, 0)] * 2), lambda: cf.AlongPieces([(0.0, (0, 0, 1))]),
+                lambda: cf.AlongTable("no.csv"), lambda: cf.LineForce(ROD, cf.Along(lambda s: 1 / 0))):  # fmt: skip
+        with pytest.raises(cf.SceneError):
+            bad()
+
+
+@dataclass(frozen=True)
+class Slider(cf.PointAction):
+    """A spring k that slips at the force limit: what it remembers is how far it has slipped (along x)."""
+
+    station: object
+    stiffness: float
+    limit: float
+
+    scaled = False
+    memory = (action.scalar(0.0, "m"),)
+
+    def data(self, rod, s):
+        return (action.scalar(self.stiffness, "N/m"), action.scalar(self.limit, "N"), action.vector((1.0, 0, 0), "1"))
+
+    @staticmethod
+    def _force(point, k, limit, along, slipped):
+        return ufl.max_value(ufl.min_value(k * (ufl.dot(point.u, along) - slipped), limit), -limit)
+
+    @staticmethod
+    def work(point, test, k, limit, along, slipped):
+        return -Slider._force(point, k, limit, along, slipped) * ufl.dot(along, test.phi_r)
+
+    @staticmethod
+    def evolve(point, k, limit, along, slipped):
+        return [ufl.dot(point.u, along) - Slider._force(point, k, limit, along, slipped) / k]
+
+
+def test_an_action_that_remembers():
+    """A rod and a slider in parallel, pulled to and fro: the hysteresis of an elastic, ideally plastic element in closed form."""
+    EA, k, limit = 100.0, 50.0, 1.0
+    rod = cf.Rod(cf.Line((0, 0, 0), (1.0, 0, 0)), cf.Stiffness((EA, EA), EA, (1.0, 1.0), 1.0, mass=1.0))
+    scene = cf.Scene([rod], [cf.Clamp(rod.start)], [Slider(rod.end, k, limit), cf.Force(rod.end, (4.0, 0, 0))])
+    factors = [0.5, 1.0, 0.5, 0.0, -0.5, -1.0, 0.0, 1.0]
+    slipped, expected = 0.0, []
+    for eta in factors:
+        F = 4.0 * eta
+        u = (F + k * slipped) / (EA + k)
+        for sign in (1, -1):
+            if sign * k * (u - slipped) > limit:
+                u = (F - sign * limit) / EA
+                slipped = u - sign * limit / k
+        expected.append(u)
+    for options in ({"elements": 2}, {"tol": 1e-6}, {"elements": 2, "model": "spatial"}):
+        path = cf.solve(scene, factors, **options)
+        np.testing.assert_allclose(path.displacement(rod.end)[:, 0], expected, rtol=1e-9)
+    assert abs(expected[3]) > 1e-3  # something is left when the force is gone
+
+
+@dataclass(frozen=True)
+class RoundWall(cf.LineAction):
+    """A wall around a circular axis, whose nearest point is looked up at every iteration."""
+
+    rod: object
+    radius: float
+    clearance: float
+    stiffness: float
+
+    scaled, at_nodes = False, True
+
+    def data(self, rod, s):
+        return self.refreshed(rod, s, rod.curve.position(s))
+
+    def refreshed(self, rod, s, r):
+        out = r / np.linalg.norm(r, axis=1, keepdims=True)
+        return (
+            action.vector(self.radius * out, "m from origin"),
+            action.vector(np.cross((0, 1.0, 0), out), "1"),
+            action.scalar(np.full(len(r), self.clearance), "m"),
+            action.scalar(np.full(len(r), self.stiffness), "N/m^2"),
+        )
+
+    work = staticmethod(cf.Wall.work)
+
+
+@dataclass(frozen=True)
+class Pressure(cf.LineAction):
+    """A force that stays across a rod."""
+
+    rod: object
+    pressure: float
+
+    follows = True
+    work = staticmethod(lambda point, test, f: ufl.dot(point.R * f, test.phi_r))
+
+    def data(self, rod, s):
+        return (
+            action.vector(
+                self.pressure * rod.curve.position(s) / np.linalg.norm(rod.curve.position(s), axis=1)[:, None], "N/m"
+            ),
+        )
+
+
+def test_data_that_follow_the_position():
+    """A quarter of a ring blown up by a pressure p against a round wall: p - EA u/R^2 = kp (u - clearance) while u << R."""
+    R, c, EA, p, kp = 10.0, 1e-4, 90.0, 1e-4, 2.0
+    section = cf.Stiffness((50.0, 50.0), EA, (1.0, 1.0), 0.7)
+    rod = cf.Rod(cf.Arc((0, 0, 0), (R, 0, 0), np.pi / 2, axis=(0, 1.0, 0)), section)
+    guides = [
+        guide
+        for station, tangent in ((rod.start, (0, 0, 1.0)), (rod.end, (1.0, 0, 0)))
+        for guide in (
+            cf.Roller(station, tangent),
+            cf.Roller(station, (0, 1.0, 0)),
+            cf.Prescribed(station, rotation=(0, 0, 0)),
+        )
+    ]
+    scene = cf.Scene([rod], guides, [Pressure(rod, p), RoundWall(rod, R, c, kp)])
+    for model in ("planar", "spatial"):
+        path = cf.solve(scene, [1.0], elements=8, model=model)
+        u = (p + kp * c) / (kp + EA / R**2)
+        assert u > c
+        for s in (0.0, 0.3, 0.5):
+            place = path.position(rod.at(s * rod.length))[0]
+            assert np.linalg.norm(place) - R == pytest.approx(u, rel=1e-4)
+
+
+def test_what_ufl_tells():
+    station = ROD.end
+    told = {
+        cf.Force(station, (0, 0, 1)): (True, True, False, True),
+        cf.Moment(station, (0, 1, 0)): (True, True, False, True),
+        cf.EccentricForce(station, (0, 0, 1), (0.1, 0)): (False, True, False, True),
+        cf.FollowerForce(station, (0, 0, 1)): (False, False, False, True),
+        cf.FollowerMoment(station, (0, 0, 1)): (False, True, False, True),
+        cf.LineForce(ROD, (0, 0, 1)): (True, True, False, True),
+        cf.Weight(): (True, True, False, True),
+        cf.Foundation(ROD, 1.0): (False, False, False, True),
+        cf.Spring(station, 1.0, 1.0): (False, False, False, True),
+        cf.Dashpot(station, 1.0): (False, False, True, True),
+        cf.Drag(ROD, 1.0): (False, False, True, True),
+        cf.Wall(ROD, (0, 0, 0), (1, 0, 0), 0.1): (False, False, False, True),
+        cf.PointMass(station, 1.0): (True, True, False, True),
+    }
+    for load, expected in told.items():
+        traits = traits_of(load, [ROD])
+        assert (traits.dead, traits.known_force, traits.rates, traits.flat) == expected, load
+
+    @dataclass(frozen=True)
+    class Own(cf.PointAction):
+        station: object
+        work = staticmethod(lambda point, test, F: ufl.dot(F, test.phi_r))
+
+        def data(self, rod, s):
+            return (action.vector((0, 0, 1.0), "N"),)
+
+    scene = cf.Scene([ROD], [cf.Clamp(ROD.start)], [Own(station)])
+    assert cf.solve(scene, [0.1], elements=2).model == "determinate"  # a dead force of one's own is a dead force
+
+    @dataclass(frozen=True)
+    class Sideways(cf.PointAction):
+        station: object
+        work = staticmethod(lambda point, test: point.u[0] * test.phi_r[1] + 0.1 * test.phi_r[0])
+
+    scene = cf.Scene([ROD], [cf.Clamp(ROD.start)], [Sideways(station), cf.Force(station, (0, 0, 0.1))])
+    path = cf.solve(scene, [0.1], elements=2)
+    assert path.model == "spatial" and any("Sideways" in why for why in path.why)
+    assert not traits_of(Sideways(station), [ROD]).turns
+
+
+def test_actions_in_scene_files(tmp_path):
+    (tmp_path / "load.csv").write_text("0, 0, 0, 0\n1.0, 0, 0, 1e-3\n")
+    (tmp_path / "scene.toml").write_text("""
+[[rods]]
+name = "beam"
+curve = { type = "Line", start = [0, 0, 0], end = [1, 0, 0] }
+section = { type = "Stiffness", shear = [1e6, 1e6], axial = 1e6, bending = [1.0, 1.0], torsion = 1.0, mass = 1.0 }
+[[supports]]
+type = "Clamp"
+station = "beam.start"
+[[loads]]
+type = "LineForce"
+rod = "beam"
+force = { type = "AlongTable", s = "load.csv" }
+permanent = true
+[[loads]]
+type = "Spring"
+station = "beam.end"
+stiffness = 10.0
+[[loads]]
+type = "Force"
+station = "beam.end"
+force = [0, 0, 0.01]
+""")
+    scene, _ = cf.read_scene(tmp_path / "scene.toml")
+    beam = scene.rods[0]
+    path = cf.solve(scene, [0.0, 1.0], elements=4)
+    # the end moves by (11 q/120 + F/3)/(1 + k/3)
+    np.testing.assert_allclose(
+        path.displacement(beam.end)[:, 2], [(11e-3 / 120 + f / 3) / (1 + 10 / 3) for f in (0, 0.01)], rtol=1e-4
+    )
+    with pytest.raises(cf.SceneError, match="did you mean 'Spring'"):
+        (tmp_path / "wrong.toml").write_text((tmp_path / "scene.toml").read_text().replace('"Spring"', '"Sprig"'))
+        cf.read_scene(tmp_path / "wrong.toml")
