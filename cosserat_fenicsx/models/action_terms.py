@@ -185,8 +185,9 @@ class Term:
     def put(self, t):
         """Fill in the data at the time t, s."""
         for action, rod, rows, s, _ in self._where:
+            now = at(action, t)  # on all ranks: a user's function of time may call what communicates
             if len(rows):
-                self._take(at(action, t).data(rod, s), rod, rows)
+                self._take(now.data(rod, s), rod, rows)
 
     def _take(self, data, rod, rows):
         for function, datum in zip(self.data, data, strict=True):
