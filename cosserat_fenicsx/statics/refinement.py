@@ -216,12 +216,13 @@ def until_two_meshes_agree(scene, on_mesh, apart, tol, *, first, most, elements,
         degree, advice: for error messages.
 
     Returns:
-        (what `on_mesh` returned, relative differences (n,) or NaN, layout).
+        (what `on_mesh` returned, estimated relative errors (n,) or NaN, layout).
 
     Raises:
         NotConverged: the accuracy is not reached.
     """
     layout, coarse, best, worse = Layout.of(scene, elements or first), None, math.inf, 0
+    before = None  # relative differences of the halving before
     while True:
         obey()
         found = on_mesh(layout)
@@ -229,7 +230,7 @@ def until_two_meshes_agree(scene, on_mesh, apart, tol, *, first, most, elements,
         error = np.full(len(numbers), np.nan)
         layered = None if elements else with_layers(scene, layout, lengths)
         if layered is not None:
-            coarse, layout = None, layered
+            coarse, before, layout = None, None, layered
             continue
         if coarse is not None and len(coarse) != len(numbers) and max(layout.counts) >= most:
             raise NotConverged(
@@ -247,9 +248,32 @@ def until_two_meshes_agree(scene, on_mesh, apart, tol, *, first, most, elements,
                     f"per rod: the estimated error stays at {min(reached, best):.2g}. Ask for {advice}."
                 )
             best = min(best, reached)
-        if elements or best <= tol:
+        if elements:
             return found, error, layout
-        coarse, layout = numbers, layout.finer(scene, 2)
+        if best <= tol:
+            if before is None:
+                before = _difference_before(scene, on_mesh, apart, coarse, coarse_layout)
+            return found, error if before is None else error / _gain(before, error, degree), layout
+        before = None if np.isnan(error).any() or not len(error) else error
+        coarse, coarse_layout, layout = numbers, layout, layout.finer(scene, 2)
+
+
+def _difference_before(scene, on_mesh, apart, numbers, layout):
+    """Relative differences (n,) of the numbers on a mesh to those on one with half as many elements; None where that
+    one is too coarse to be solved or to have as many."""
+    try:
+        coarse = on_mesh(layout.finer(scene, 0.5))[0]
+    except NotConverged:
+        return None
+    return apart(numbers, coarse) if len(coarse) == len(numbers) else None
+
+
+def _gain(before, error, degree):
+    """(n,) the assumed gain in accuracy of a halving, from the differences of two halvings.
+
+    Eigenvalues converge with the order 2 p, a gain of 2^(2 p); a part of the gain that is observed is assumed.
+    """
+    return np.clip((before / np.maximum(error, 1e-300) - 1) / 4, 1, 2.0 ** (2 * degree - 2))
 
 
 def _rounding_hides(tol, rounding, elements, formulation):
