@@ -156,8 +156,9 @@ def _solve(solver, kind, which, count, like, *, room=None, tolerance=_TOLERANCE)
     solver.setInitialSpace([start])
     try:
         solver.solve()
-    except KeyboardInterrupt:
+    except (KeyboardInterrupt, PETSc.Error):
         solver.incRef()  # destroying an interrupted solver would raise an error
+        obey()  # recent releases of petsc4py replace an exception of a callback by one of their own
         raise
     found = min(solver.getConverged(), count)
     values, vectors = np.zeros(found, dtype=complex), []
