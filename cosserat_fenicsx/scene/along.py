@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from cosserat_fenicsx.checks import number, refuse, vector
+from cosserat_fenicsx.checks import call, number, refuse, vector
 from cosserat_fenicsx.errors import SceneError
 
 # Elements end at the rows of tables of up to this length; for longer ones the error estimate resolves the kinks.
@@ -40,12 +40,7 @@ class Along:
         """
         values = []
         for x in np.asarray(s, dtype=float).tolist():
-            try:
-                given = self.function(x)
-            except Exception as problem:  # a user's function may raise any exception
-                raise SceneError(
-                    f"Along.function raised {type(problem).__name__} ({problem}) at s = {x:g} m"
-                ) from problem
+            given = call(self.function, x, "Along.function", f" at s = {x:g} m")
             values.append(vector("Along", f"function({x:g})", given, "per length"))
         return np.array(values).reshape(-1, 3)
 
@@ -105,7 +100,7 @@ class AlongPieces:
     """Piecewise constant.
 
     Args:
-        pieces: (s_end, vector) from the start of the rod, s_end in m; after the last it is zero.
+        pieces: (s_end, vector) in order from the start of the rod, s_end in m; after the last it is zero.
 
     Raises:
         SceneError: ends that do not ascend, or vectors that are not three finite numbers.

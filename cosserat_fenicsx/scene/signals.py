@@ -13,7 +13,7 @@ from functools import cached_property
 
 import numpy as np
 
-from cosserat_fenicsx.checks import number, refuse, vector
+from cosserat_fenicsx.checks import call, number, refuse, vector
 from cosserat_fenicsx.errors import SceneError
 
 
@@ -252,12 +252,7 @@ class Signal:
                 at which time.
         """
         when = f"at the time t = {t:g} s" + (f", of the {self.owner} at {self.place}" if self.place else "")
-        try:
-            given = self.function(t)
-        except Exception as problem:  # a user's function may raise any exception
-            raise SceneError(
-                f"{self.owner}.{self.field}: its function raised {type(problem).__name__} ({problem}), {when}"
-            ) from problem
+        given = call(self.function, t, f"{self.owner}.{self.field}: its function", f", {when}")
         try:
             return vector(self.owner, self.field, given, self.unit, self.size)
         except SceneError as problem:
