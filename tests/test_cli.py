@@ -49,14 +49,14 @@ def test_run_prints_a_table_and_writes_files(tmp_path):
     assert done.stderr == ""
 
 
-def test_the_table_tells_of_a_station_and_what_the_support_holds_with():
+def test_the_table_shows_a_station_and_the_reaction():
     """Reactions against the equilibrium of the whole column: the force, and its moment about the foot."""
     from cosserat_fenicsx import euler_load, read_scene
 
     done = cosserat("run", DEMO, "--load-factors", "0.9", "--station", "column@10")
     assert done.returncode == 0 and "rotation: of column@10." in done.stdout, done.stderr
     P = 0.9 * euler_load(read_scene(DEMO)[0].rods[0])
-    force, moment = re.search(r"Clamp at column.start holds with \((.*?)\) N and \((.*?)\) N m", done.stdout).groups()
+    force, moment = re.search(r"Clamp at column.start exerts \((.*?)\) N and \((.*?)\) N m", done.stdout).groups()
     assert [float(x) for x in force.split(", ")] == pytest.approx([0, 0, P], rel=1e-5)
     assert [float(x) for x in moment.split(", ")] == pytest.approx([0, -P * (0.2 + 2.200615447827733), 0], rel=1e-5)
     assert re.search(r"bending moment [\d.e+]+ N m \(column.start, load factor 0.9\)", done.stdout)

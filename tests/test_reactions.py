@@ -130,7 +130,7 @@ def test_balance_of_a_tree(model, flat):
 def test_tables_tell_reactions():
     path = cf.solve(frame(), [1.0], elements=3, model="spatial")
     told = list(reactions_in_words(path))
-    assert [sentence.split(" holds with")[0] for sentence in told] == [
+    assert [sentence.split(" exerts")[0] for sentence in told] == [
         "Roller at b.end", "Clamp at a.start", "Prescribed at c.end", "Hinge at b@1"
     ]  # fmt: skip
     assert told[0].endswith("and (0, 0, 0) N m at the load factor 1.")
