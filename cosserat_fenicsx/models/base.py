@@ -61,7 +61,7 @@ class RodModel:
     frame_size, strain_size, force_size = 9, 3, 3
     #: components of a node in each second variation, and whether these leave the plane.
     variations = ()
-    #: whether the rows that reactions work in change with a node's unknowns
+    #: whether the map from reactions to a node's residual rows depends on the node's unknowns
     rows_turn = False
     tangent = "general"
     load_norm = 0.0
@@ -114,7 +114,7 @@ class RodModel:
         raise NotImplementedError
 
     def held_forces(self, forces):
-        """What of forces and moments (.., 6), inertial, the equations of the model speak of."""
+        """Forces and moments (.., 6), inertial, with zero for components that the model's equations do not contain."""
         return forces
 
     def unknowns_of(self, rq):
@@ -280,7 +280,7 @@ class RodModel:
             function.x.array[:] = 0
 
     def _round_off(self, sizes):
-        """|F| cannot fall below its own rounding: strains are differences of r over a node's spacing."""
+        """Bound on the rounding error of |F|: strains are differences of r over the spacing of the nodes."""
         stiffest = self.section.K[np.isfinite(self.section.K)].max(initial=0.0)
         return 4 * np.finfo(float).eps * stiffest * self.signature.degree / sizes.min() * np.sqrt(self.unknowns)
 
