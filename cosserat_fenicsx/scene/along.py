@@ -45,7 +45,7 @@ class Along:
         return np.array(values).reshape(-1, 3)
 
     def check(self, length):
-        """Evaluate it at samples along a rod of a length, m; raises SceneError as a call does."""
+        """Evaluate it at samples in [0, length], m; raises SceneError as a call does."""
         self(np.linspace(0, length, _SAMPLES))
 
 
@@ -58,7 +58,7 @@ class AlongTable:
         values: (n, 3), inertial; None with a file.
 
     Raises:
-        SceneError: arc lengths that do not ascend, not one vector for each, or a file that cannot be read.
+        SceneError: arc lengths that do not ascend, not one vector per arc length, or a file that cannot be read.
     """
 
     s: object = field(metadata={"file": True})
@@ -90,7 +90,7 @@ class AlongTable:
         return np.column_stack([np.interp(s, self.s, column) for column in zip(*self.values, strict=True)])
 
     def check(self, length):
-        """Refuse a table that lies outside a rod of a length, m."""
+        """Refuse a table without an arc length in [0, length], m."""
         if self.s[-1] < 0 or self.s[0] > length:
             refuse(self, "s", self.s, f"arc lengths along the rod, from 0 to {length:g} m")
 
@@ -135,7 +135,7 @@ class AlongPieces:
         """Pieces fit any length."""
 
 
-#: Functions of the arc length that scene files know; and all of them.
+#: Functions of the arc length in scene files, and all functions of the arc length.
 ALONG = (AlongTable, AlongPieces)
 FUNCTIONS_ALONG = (Along, *ALONG)
 

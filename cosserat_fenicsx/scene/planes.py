@@ -59,11 +59,11 @@ def find_plane(scene):
 
 
 class _Leaves(Exception):
-    """The part of a scene that leaves the plane, in words."""
+    """The message names the part of a scene that leaves the plane."""
 
 
 def independent_in(plane, ties):
-    """Indices of linearly independent ties among those for motions in the plane: of x, y and z of a point, two
+    """Indices of linearly independent ties among those for motions in the plane: for a point held in x, y and z two
     remain."""
     groups = {}
     for i, tie in enumerate(ties):

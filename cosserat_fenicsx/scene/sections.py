@@ -80,10 +80,9 @@ class Stiffness:
         """A section whose centroid and shear centre are off the rod's line.
 
         A point (x1, x2) of the section has the strains e + k x (x1, x2, 0), where e and k are those at the line. EA
-        acts on the stretch at the centroid, GA on the shear at the shear centre: the strain energy per length is half
-            of
-        GA1 (e1 - k3 x2)^2 + GA2 (e2 + k3 x1)^2 at the shear centre, EA (e3 + k1 x2 - k2 x1)^2 at the centroid, and
-        EI1 k1^2 + EI2 k2^2 + GJ k3^2; its second derivatives are the matrix.
+        acts on the stretch at the centroid, GA on the shear at the shear centre. The strain energy per length is half
+        the sum of GA1 (e1 - k3 x2)^2 + GA2 (e2 + k3 x1)^2 at the shear centre, EA (e3 + k1 x2 - k2 x1)^2 at the
+        centroid, and EI1 k1^2 + EI2 k2^2 + GJ k3^2; its second derivatives are the matrix.
 
         Args:
             shear, axial, bending, torsion: as of `Stiffness`, finite, along and about the principal axes; bending about
