@@ -139,7 +139,10 @@ def test_explained_is_what_is_done(cosserat):
     [
         (("run", FLIGHT, "--load-factors", "0:1"), "--load-factors is for an equilibrium path"),
         (("run", DEMO, "--dt", "0.1"), "--dt is for a motion, and this scene is an equilibrium path"),
-        (("run", FLIGHT, "--static"), "depends on time, which a static analysis excludes: expected a vector, or a motion"),
+        (
+            ("run", FLIGHT, "--static"),
+            "depends on time, which a static analysis excludes: expected a vector, or a motion",
+        ),
         (("run", FLIGHT, "--animate"), "expected a motion, and -o DIR"),
         (("run", FLIGHT, "--animate", "a.avi", "-o", "{tmp}"), "expected a name that ends in .gif or .mp4"),
         (("run", FLIGHT, "--animate", "b/a.gif", "-o", "{tmp}"), "expected a name without folders"),

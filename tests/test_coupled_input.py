@@ -58,11 +58,15 @@ def test_offset_is_the_energy_of_two_points():
     """Strains of points of the section as e + k x (x1, x2, 0), against the matrix."""
     shear, axial, bending, torsion = (2.0, 3.0), 7.0, (1.0, 4.0), 0.5
     centroid, shear_centre, angle = (0.2, -0.3), (-0.1, 0.4), 0.7
-    section = cf.Stiffness.offset(shear, axial, bending, torsion, centroid=centroid, shear_centre=shear_centre, angle=angle)
+    section = cf.Stiffness.offset(
+        shear, axial, bending, torsion, centroid=centroid, shear_centre=shear_centre, angle=angle
+    )
     e, k = np.random.default_rng(0).normal(size=(2, 3))
     axes = np.array([[np.cos(angle), np.sin(angle), 0], [-np.sin(angle), np.cos(angle), 0], [0, 0, 1]])
     stretched, sheared = (axes @ e + np.cross(axes @ k, [*place, 0]) for place in (centroid, shear_centre))
-    expected = np.dot(shear, sheared[:2] ** 2) + axial * stretched[2] ** 2 + np.dot([*bending, torsion], (axes @ k) ** 2)
+    expected = (
+        np.dot(shear, sheared[:2] ** 2) + axial * stretched[2] ** 2 + np.dot([*bending, torsion], (axes @ k) ** 2)
+    )
     both = np.array([*e, *k])
     assert both @ np.array(section.matrix) @ both == pytest.approx(expected, rel=1e-13)
     plain = cf.Stiffness.offset(shear, axial, bending, torsion)
@@ -102,13 +106,18 @@ def test_a_matrix_keeps_to_a_plane_if_it_couples_nothing_with_what_leaves_it():
         np.testing.assert_allclose(path.fields(-1)[name], space.fields(-1)[name], atol=1e-8, err_msg=name)
     for section in (in_plane((0.05, 0.01)), in_plane((0.05, 0), angle=0.1), in_plane((0, 0), shear_centre=(0, 0.02))):
         path = cf.solve(scene(section)[1], [0.1], elements=4)
-        assert path.model == "spatial" and any("couples strains in the plane with those out of it" in x for x in path.why)
+        assert path.model == "spatial" and any(
+            "couples strains in the plane with those out of it" in x for x in path.why
+        )
 
 
 def test_determinate_rungs_agree_with_space():
     """In a plane that is not one of the coordinates', and in space."""
     turn = np.array([np.cos(0.4), np.sin(0.4), 0])
-    for section, model, along in ((in_plane((0.05, 0)), "planar", turn), (in_plane((0.03, 0.04), angle=0.2), "spatial", turn)):
+    for section, model, along in (
+        (in_plane((0.05, 0)), "planar", turn),
+        (in_plane((0.03, 0.04), angle=0.2), "spatial", turn),
+    ):
         rod = cf.Rod(cf.Line((0, 0, 0), (0, 0, 1.0), d1=turn), section, name="rod")
         loads = [cf.Force(rod.end, 2.0 * along - [0, 0, 1.5]), cf.EccentricForce(rod.end, (0, 0, 1.0), (0.1, 0))]
         dead = cf.Scene([rod], [cf.Clamp(rod.start)], loads)

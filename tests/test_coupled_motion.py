@@ -36,7 +36,9 @@ def test_frequencies_of_a_rope_that_couples_stretch_and_twist():
 @STEADY
 def test_frequencies_of_turned_principal_axes():
     one, two = (
-        cf.modes(cf.Scene([rod], [cf.Clamp(rod.start)], [cf.Force(rod.end, (0.1, 0.2, -0.3))]), 6, load_factor=1.0).frequencies
+        cf.modes(
+            cf.Scene([rod], [cf.Clamp(rod.start)], [cf.Force(rod.end, (0.1, 0.2, -0.3))]), 6, load_factor=1.0
+        ).frequencies
         for rod in turned_and_plain(**MOVING)
     )
     np.testing.assert_allclose(one, two, rtol=1e-9)
@@ -128,7 +130,8 @@ def test_a_plane_motion_of_a_coupled_section_is_one_in_space():
     scene = cf.Scene([rod], [cf.Clamp(rod.start)], [cf.Force(rod.end, cf.Triangle((2.0, 0, 3.0), 0, 0.1, 0.2))])
     for scheme in ("momentum", "generalised-alpha"):
         flat, space = (
-            cf.simulate(scene, 0.3, dt=0.02, elements=3, degree=2, scheme=scheme, model=model) for model in ("auto", "spatial")
+            cf.simulate(scene, 0.3, dt=0.02, elements=3, degree=2, scheme=scheme, model=model)
+            for model in ("auto", "spatial")
         )
         assert flat.model == "planar"
         np.testing.assert_allclose(flat.displacement(rod.end), space.displacement(rod.end), atol=1e-4)

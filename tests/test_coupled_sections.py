@@ -43,7 +43,9 @@ def exponential(k, s):
     return np.eye(3) + t * axis + (1 - c) * axis @ axis, whole
 
 
-@pytest.mark.parametrize(("model", "formulation"), [("determinate", "mixed"), ("spatial", "mixed"), ("spatial", "displacement")])
+@pytest.mark.parametrize(
+    ("model", "formulation"), [("determinate", "mixed"), ("spatial", "mixed"), ("spatial", "displacement")]
+)
 def test_a_moment_along_an_eigenvector_bends_to_a_helix(model, formulation):
     """m = S k with S k along k: k and m are constant, and so is the stretch and shear -G k that goes with them."""
     M = random_matrix()
@@ -109,7 +111,9 @@ def offset_and_shifted(P):
         yield rod, cf.Scene([rod], [cf.Clamp(rod.start)], acting)
 
 
-@pytest.mark.parametrize(("model", "formulation"), [("determinate", "mixed"), ("spatial", "mixed"), ("spatial", "displacement")])
+@pytest.mark.parametrize(
+    ("model", "formulation"), [("determinate", "mixed"), ("spatial", "mixed"), ("spatial", "displacement")]
+)
 def test_a_line_off_the_centroid_is_a_shifted_rod(model, formulation):
     """At large displacements too; Newton's method with n carried takes the same iterations."""
     (rod, scene), (shifted, other) = offset_and_shifted((0.4, 0.2, -2.2))
@@ -150,7 +154,9 @@ def test_critical_loads_of_turned_principal_axes():
         assert cf.euler_load(rod) == pytest.approx(np.pi**2 * 1.0 / (2 * L) ** 2)
         scene = cf.Scene([rod], [cf.Clamp(rod.start)], [cf.Force(rod.end, (0, 0, -1.0))])
         found = cf.buckling(scene, count=count).load_factors
-        expected = [np.pi**2 * EI * (2 * n - 1) ** 2 / (2 * L) ** 2 for n, EI in ((1, 1.0), (1, 2.5), (2, 1.0), (2, 2.5))]
+        expected = [
+            np.pi**2 * EI * (2 * n - 1) ** 2 / (2 * L) ** 2 for n, EI in ((1, 1.0), (1, 2.5), (2, 1.0), (2, 2.5))
+        ]
         if rod.profile.coupled:
             coupled = found
     np.testing.assert_allclose(coupled, found, rtol=1e-6)

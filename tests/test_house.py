@@ -67,7 +67,16 @@ ROOMS = {
 }
 #: Files that put a scene's model, its solvers and its results together; the other solvers know no rung, no scene, no result.
 FITTERS = {
-    "statics": {"circulatory", "first_mesh", "grading", "linear_buckling", "refinement", "solve", "solvers", "path/recorder"},
+    "statics": {
+        "circulatory",
+        "first_mesh",
+        "grading",
+        "linear_buckling",
+        "refinement",
+        "solve",
+        "solvers",
+        "path/recorder",
+    },
     "dynamics": {
         "time_loop",
         "natural_modes",

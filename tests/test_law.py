@@ -52,7 +52,9 @@ class CoupledPoint(Point):
     def motion(self, h=0.0):
         """In numbers, which UFL evaluates faster."""
         exact = super().motion(h)
-        return equilibrium.Motion(VECTOR(value(exact.r_s)), ufl.as_matrix(value(exact.R)), VECTOR(value(exact.curvature)))
+        return equilibrium.Motion(
+            VECTOR(value(exact.r_s)), ufl.as_matrix(value(exact.R)), VECTOR(value(exact.curvature))
+        )
 
 
 def as_it_is(a):
@@ -154,9 +156,7 @@ def test_carried_force_is_the_mixed_step_condensed():
 @pytest.mark.parametrize("seed", range(2))
 def test_diagonal_law_is_a_special_matrix(seed):
     p = CoupledPoint(seed)
-    p.section, matrix = (
-        p.section._replace(law=here) for here in (p.law, law_by_hand(np.diag([*p.K, *p.J]), Numeric))
-    )
+    p.section, matrix = (p.section._replace(law=here) for here in (p.law, law_by_hand(np.diag([*p.K, *p.J]), Numeric)))
     n, motion = VECTOR([0.3, -0.7, 0.5]), p.motion()
     test = determinate.tests_of(p.test.phi, p.test.phi_s)
     for form in (

@@ -25,7 +25,11 @@ SECTION = cf.Stiffness(shear=(3e3, 5e3), axial=8e3, bending=(1.0, 2.5), torsion=
 
 def bow():
     """A bent and twisted rod of length 1 that lies askew in space."""
-    return cf.Rod(cf.UniformCurvature(1.0, (0.4, 0.9, 0.5), start=(3.0, 1.0, -2.0), frame=(0.1, -0.5, 0.7, -0.5)), SECTION, name="bow")
+    return cf.Rod(
+        cf.UniformCurvature(1.0, (0.4, 0.9, 0.5), start=(3.0, 1.0, -2.0), frame=(0.1, -0.5, 0.7, -0.5)),
+        SECTION,
+        name="bow",
+    )
 
 
 def supported(*supports):
@@ -87,7 +91,8 @@ def test_every_support_joint_and_load_as_mixed_has_them(name):
     """Both tend to the same rod; P4 on 8 elements leaves less than 1e-8 at element ends, where the order is 2p."""
     scene = SCENES[name]()
     paths = [
-        cf.solve(scene, [0.5, 1.0], model="spatial", formulation=f, degree=4, elements=8) for f in ("mixed", "multiplier")
+        cf.solve(scene, [0.5, 1.0], model="spatial", formulation=f, degree=4, elements=8)
+        for f in ("mixed", "multiplier")
     ]
     for rod in scene.rods:
         one, other = (path.fields(-1, rod) for path in paths)
@@ -223,7 +228,9 @@ def test_meshes_are_refined_from_coarser_ones():
 def test_infinite_and_very_large_stiffnesses_make_the_force_an_unknown():
     k = column()[0].stiffness
     rod, scene = column(section=cf.Stiffness((np.inf, np.inf), np.inf, k.bending, k.torsion))
-    mixed, path = (cf.solve(scene, [0.9, 1.5], model="spatial", formulation=f, elements=8) for f in ("mixed", "multiplier"))
+    mixed, path = (
+        cf.solve(scene, [0.9, 1.5], model="spatial", formulation=f, elements=8) for f in ("mixed", "multiplier")
+    )
     np.testing.assert_allclose(path.displacement(rod.end), mixed.displacement(rod.end), rtol=1e-9, atol=1e-12)
     assert path.stable.all() and any("an unknown (formulation 'multiplier')" in why for why in path.why)
 

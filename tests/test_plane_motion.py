@@ -75,5 +75,7 @@ def test_the_choice_of_the_model():
     out = cf.Scene([rod], velocities=[cf.InitialVelocity(rod, (0, 0, 1), (0, 0, 1))], loads=flat.loads)
     assert cf.simulate(out, 0.1, dt=0.1).why[0] == "the start leaves the plane of the rods"
     kick = cf.Force(rod.end, lambda t: (1, 0, 1.0 if 0.4499 < t < 0.4501 else 0))  # too short to be seen beforehand
-    with pytest.raises(cf.SceneError, match="Force at spaghetti.end leaves the plane at t = 0.45 s: expected model = 'spatial'"):
+    with pytest.raises(
+        cf.SceneError, match="Force at spaghetti.end leaves the plane at t = 0.45 s: expected model = 'spatial'"
+    ):
         cf.simulate(cf.Scene([rod], loads=[*flat.loads, kick]), 0.6, dt=0.3)

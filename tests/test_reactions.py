@@ -48,7 +48,9 @@ def off_balance(path):
     """What is left of the sums of reactions and loads, over the sums of their sizes; the largest of all points."""
     worst = 0.0
     for k, eta in enumerate(path.load_factors):
-        held = [wrench(path.position(x.station)[k], *(part[k] for part in path.reaction(x))) for x in path.scene.supports]
+        held = [
+            wrench(path.position(x.station)[k], *(part[k] for part in path.reaction(x))) for x in path.scene.supports
+        ]
         everything = np.array([*held, *(of_load(path, x, k, eta) for x in path.scene.loads)])
         force, moment = np.split(everything, 2, axis=1)
         for part in (force, moment):

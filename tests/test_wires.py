@@ -44,9 +44,7 @@ def test_what_is_advised_helps(control):
         assert "Try control='auto'" in str(refused.value)
         return
     assert "by steps=StepControl(smallest=0.0005)" in str(refused.value)
-    path = cf.solve(
-        scene, [1.0], model="spatial", elements=16, steps=cf.StepControl(smallest=0.0005), control=control
-    )
+    path = cf.solve(scene, [1.0], model="spatial", elements=16, steps=cf.StepControl(smallest=0.0005), control=control)
     assert path.stable.all()
 
 

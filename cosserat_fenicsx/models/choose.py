@@ -152,4 +152,3 @@ def _reasons(name, scene):
     clamp = "one clamp" if len(scene.supports) == 1 else f"one clamp on each of {len(scene.supports)} structures"
     known = f"{clamp} and dead loads: statics gives the contact force"
     return [known, where] if plane is None else [where, known]
-
