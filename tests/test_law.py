@@ -29,7 +29,7 @@ def law_by_hand(M, kind=law.CoupledLaw):
 
 
 class Numeric(law.CoupledLaw):
-    """The same, its values in numbers at once: UFL evaluates nested expressions slowly."""
+    """The same, evaluated to numbers at once: UFL evaluates nested expressions slowly."""
 
     def force(self, e, k):
         return VECTOR(value(super().force(VECTOR(value(e)), VECTOR(value(k)))))
@@ -75,7 +75,7 @@ def test_law_is_the_matrix_and_its_partial_inverse(seed):
 
 @pytest.mark.parametrize("seed", range(3))
 def test_numbers_of_a_matrix_make_its_law(seed):
-    """Also with components along other axes, and with K bounded: then A alone is smaller."""
+    """Also with components along other axes, and with K bounded, which changes A alone."""
     M = random_matrix(seed)
     P, _ = np.linalg.qr(np.random.default_rng(seed).normal(size=(3, 3)))
     along = Stiffnesses(np.zeros((1, 1, 3)), np.zeros((1, 1, 3)), None, None, M[None, None])
@@ -121,7 +121,8 @@ def test_coupled_second_variation_is_the_change_of_the_balance(seed):
 
 
 def test_carried_force_is_the_mixed_step_condensed():
-    """For any carried n: dn solves the linear compatibility, and the tangent is the change of the mixed balance with it."""
+    """For any carried n: dn solves the linearised compatibility, and the
+    tangent is the change of the mixed balance with it."""
     p, h, random = CoupledPoint(5), ufl.variable(ufl.as_ufl(1.0)), np.random.default_rng(5)
     section = p.section._replace(law=law_by_hand(p.matrix))
     start = p.motion()
