@@ -1,9 +1,9 @@
 """The paper's verification problem: a steel column, clamped below, under a dead force eta P_cr and the moment of its
-eccentricity e = L/100. Delta at eta = 0.9 is 2.20062 m; the secant formula, eq. (8), says 3.8 % more.
+eccentricity e = L/100. Delta at eta = 0.9 is 2.20062 m; the secant formula, eq. (8), gives 3.8 % more.
 
     mpirun -n 2 python demos/eccentric_cantilever.py
 
-Leaves in out/: cantilever.xdmf and .h5 (every point, for ParaView), figure.png (delta against eta), rod.png.
+Writes to out/: cantilever.xdmf and .h5 (every point, for ParaView), figure.png (delta against eta), rod.png.
 """
 
 import sys
@@ -47,7 +47,7 @@ def exact(rod, eta):
 
 
 def report(rod, path):
-    """The table: this package beside the exact rod and eq. (8)."""
+    """Print the table: this package, the exact rod and eq. (8)."""
     table = Table(title=f"{path.scene.title}: {path.model} model, {path.unknowns} unknowns")
     for heading in ("eta", "delta (m)", "exact delta (m)", "eq. (8) (m)", "relative error", "iterations", "stable"):
         table.add_column(heading, justify="right")

@@ -1,4 +1,4 @@
-"""The Markdown table of the speed-accuracy measurement: times at named accuracies, and the ratios that were asked for."""
+"""The Markdown table of speed against accuracy: times at given accuracies, and the required ratios."""
 
 import statistics
 
@@ -7,7 +7,7 @@ from peers.environments import OWN
 from peers.problems import TITLES
 
 ACCURACIES = (1e-3, 1e-5, 1e-7)
-#: (what is asked, own rows, the peers' rows, {accuracy: largest ratio of times}).
+#: (requirement, rows of this package, rows of the peers, {accuracy: largest ratio of times}).
 ASKED = (
     ("planar sweep against the fastest peer", "any", "any", {1e-3: 1 / 2, 1e-5: 1 / 3, 1e-7: 1 / 5}),
     ("sweep forced to spatial against the fastest spatial peer", "spatial", "spatial", {1e-3: 1 / 5, 1e-5: 1 / 40, 1e-7: 1 / 40}),
@@ -34,13 +34,13 @@ def others(rows, spatial=None):
 
 
 def cheapest(rows, accuracy):
-    """The row that is at least so accurate in the least time, or None."""
+    """The fastest row with at least this accuracy, or None."""
     good = [row for row in rows if row["error"] <= accuracy]
     return min(good, key=median, default=None)
 
 
 def called(row):
-    """A configuration in words."""
+    """A configuration as text."""
     c = row["configuration"]
     mesh = (
         f"P{c['degree']}, {c['elements']} elements"
@@ -59,7 +59,7 @@ def milliseconds(seconds):
 
 
 def ratios(rows):
-    """[(what is asked, accuracy, own row, peer's row, ratio or None, asked ratio)]."""
+    """[(requirement, accuracy, this package's row, peer's row, ratio or None, required ratio)]."""
     sweep, found = answered(rows, "sweep"), []
     spatial = {"any": None, "spatial": True, "planar": False}
     for words, ours, theirs, asked in ASKED:
@@ -122,7 +122,7 @@ def _times(rows):
 
 
 def _stopped(rows):
-    """Solvers that gave no answer at all to a problem, with one of the reasons."""
+    """Solvers without any answer to a problem, with one of the reasons."""
     lines = []
     for problem, title in TITLES.items():
         for peer, name in sorted({(r["peer"], r["kind"]) for r in rows if r["problem"] == problem}):

@@ -1,4 +1,4 @@
-"""The chart of Figure 3: the whole path, the part below eta = 1 where the models part, and by how much they do."""
+"""The chart of Figure 3: the whole path, the part below eta = 1, and the differences of the models."""
 
 from pathlib import Path
 
@@ -68,7 +68,7 @@ def _curves(axes, curves):
 
 
 def _differences(axes, curves):
-    """How far every model is from the exact rod under the same load, in percent."""
+    """Difference of every model from the exact rod under the same load, in percent."""
     below = np.linspace(0.02, 0.999, 400)
     eq_8, beam = analytic.secant_delta(below, Column().eccentricity), curves["corotational"]
     axes.semilogy(below, _percent(eq_8, exact(below)), color="tab:red", ls="--")
@@ -115,7 +115,7 @@ def _elements(name):
 
 
 def _limit_points(axes, found):
-    """Numbers at the stars."""
+    """Label the limit points (stars) with numbers."""
     for name, place in (("1", (0.03, 0.72)), ("2", (0.17, 1.15)), (str(MANY), (0.33, 1.6))):
         top = found[name]["limit_point"]
         words = f"limit point, {_elements(name)}:\n" rf"$\eta$ = {top['eta']:.3f}, $\delta$ = {top['delta']:.2f} m"

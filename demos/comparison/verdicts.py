@@ -1,4 +1,4 @@
-"""The table under Figure 3: what the paper says, and what was found, point by point."""
+"""The table under Figure 3: statements of the paper and the results here, point by point."""
 
 import machine
 import numpy as np
@@ -25,7 +25,7 @@ def table(data):
 
 
 def percent(ratio):
-    """A relative difference in words: +3.8 %."""
+    """A relative difference as text: +3.8 %."""
     return f"{100 * ratio:+.2g} %" if abs(ratio) >= 1e-5 else f"{ratio:+.0e}"
 
 
@@ -44,7 +44,7 @@ def eq_8():
 
 
 def load(curves):
-    """One load or two."""
+    """The constant tip moment against the force on an arm."""
     etas = [eta for eta in (0.9, 1.0, 1.5) if eta in curves["arm"]["eta"]]
     found = "; ".join(f"at {eta:g} {at(curves['mixed'], eta):.5f} m and {at(curves['arm'], eta):.5f} m "
                       f"({percent(at(curves['arm'], eta) / at(curves['mixed'], eta) - 1)})" for eta in etas)  # fmt: skip
@@ -53,7 +53,7 @@ def load(curves):
 
 
 def rod(curves):
-    """The two formulations and the truth."""
+    """The two formulations against the exact rod."""
     mixed, other = curves["mixed"], curves["displacement"]
     apart = np.abs(np.array(mixed["delta"]) / np.array(other["delta"]) - 1).max()
     return "Cosserat rod, eq. (1)", "one of its five curves", (
@@ -69,7 +69,7 @@ def orders(beam):
 
 
 def beam(curves):
-    """The built-in beam's part."""
+    """The co-rotational beam."""
     found = curves["corotational"]
     errors, order = orders(found)
     k = found["eta"].index(0.9)
@@ -80,7 +80,7 @@ def beam(curves):
 
 
 def solids(curves):
-    """3D elasticity against its like, and what else may be compared with it."""
+    """3D elasticity against the rod under the same load, and other comparisons with it."""
     found = curves["solid"]
     etas = [eta for eta in (0.5, 0.9, 1.0, 1.5, 2.0) if eta in found["eta"]]
     arm, moment = exact(etas, arm=True), exact(etas)
@@ -112,7 +112,7 @@ def solids(curves):
 
 
 def mcre(curves):
-    """The reconstruction's limit points."""
+    """The limit points of the reconstructed MCRE."""
     found = curves["mcre"]["elements"]
     points = ", ".join(f"{curve['limit_point']['eta']:.3f} with {n}" for n, curve in found.items() if n != "limit")
     many, end = found[str(MANY)]["limit_point"], found["limit"]["limit_point"]
@@ -126,7 +126,7 @@ def mcre(curves):
 
 
 def largest(curves):
-    """The top of the rod's curve."""
+    """The largest displacement of the rod."""
     rod = curves["mixed"]
     k = int(np.argmax(rod["delta"]))
     return (

@@ -1,4 +1,4 @@
-"""The trials: what is tried, what right means, and how a method's answers become a cell."""
+"""The trials: the problem, the criterion, and the cell for a method's answers."""
 
 from dataclasses import dataclass, replace
 from functools import cache
@@ -16,11 +16,11 @@ _FLUTTER = 20.05095
 
 @dataclass(frozen=True)
 class Trial:
-    """A row of the map.
+    """A row of the table.
 
     Attributes:
         key, title: its name, in short and for the reader.
-        tried: what is tried and what right means, a sentence or two.
+        tried: the problem and the criterion, in a sentence or two.
         run: from a method to a `Cell`; raises what the method raises.
     """
 
@@ -31,7 +31,7 @@ class Trial:
 
 
 def _column(etas, judged_from, limit=1e-2, jump=False, **more):
-    """delta of the column, judged from a load factor on."""
+    """delta of the column, whose error counts from a load factor on."""
 
     def run(method):
         problem = problems.column(etas, **more)
@@ -43,13 +43,13 @@ def _column(etas, judged_from, limit=1e-2, jump=False, **more):
 
 
 def _delta_error(problem, answer):
-    """At the load factors that there are answers for: all of them, or the last."""
+    """The error at the load factors of the answer: all of them, or the last."""
     error = np.abs(answer.tip[:, 1] / problems.column_truth(problem)[-len(answer.tip) :, 1] - 1)
     return np.where(np.isnan(error), np.inf, error)
 
 
 def _tips(answer, truth, problem):
-    """Largest distance of the tips from the truth, in lengths."""
+    """Largest error of the tips' positions over the length."""
     both = min(len(answer.tip), len(truth))
     error = np.linalg.norm(answer.tip[-both:] - truth[-both:], axis=1) / problem["length"]
     return float(np.where(np.isnan(error), np.inf, error).max())
@@ -91,7 +91,7 @@ def _limit_point(method):
 
 
 def _locking(method):
-    """Few elements on a straight rod and on an arc, a thousand times longer than thick."""
+    """Locking: few elements on a straight rod and on an arc, a thousand times longer than thick."""
     straight = {**problems.column([0.5], 1e3), "coarse": True}
     answer = method.solve(straight)
     errors, notes = [_delta_error(straight, answer).max()], []
@@ -133,7 +133,7 @@ def _units(method):
 
 
 def _numerics(key, limit=1e-4):
-    """What concerns loops on PETSc: the method knows what the trial is to it."""
+    """Trials of loops on PETSc, which the method defines in `numerics`."""
 
     def run(method):
         problem, answer, value, unit = method.numerics(key)
@@ -145,14 +145,14 @@ def _numerics(key, limit=1e-4):
 
 
 def _flutter(method):
-    """Its word on stability, by load factor, against Beck's: stable up to flutter."""
+    """Its statement on stability at each load factor against Beck's column, which is stable up to flutter."""
     problem = problems.beck()
     answer, unit = method.solve(problem), "flutter load"
     loads = np.array(problem["load_factors"])
     wrong = (loads < _FLUTTER) != answer.stable
     if not wrong.any():
         return Cell(RIGHT, loads[-1] / _FLUTTER, unit, answer.said)
-    # each wrong word must be taken back by one of its own
+    # a wrong statement must come with a warning of its own
     missed, feared = wrong & answer.stable, wrong & ~answer.stable
     excused = all(
         words in answer.said for words, which in (("flutter", missed), ("may be stable", feared)) if which.any()
@@ -234,10 +234,10 @@ BY_KEY = {trial.key: trial for trial in TRIALS}
 
 
 def _quick(trial):
-    """The same trial with less to do, for a minute's run and for tests."""
+    """The same trial with fewer steps, for quick runs and tests."""
     less = {"ten": _rolled(4, 8, 1e-2, mesh=16)}
     return replace(trial, run=less[trial.key]) if trial.key in less else trial
 
 
-#: The trials of the quick map, where few of the ten turns stand for those of "roll" as well.
+#: The trials of the quick table, without "roll", since the quick "ten" is as short as that.
 QUICK = tuple(_quick(trial) for trial in TRIALS if trial.key != "roll")

@@ -1,4 +1,4 @@
-"""The map as a picture: a colour, a mark and a number in every cell."""
+"""The table as a picture: a colour, a mark and a number in every cell."""
 
 from pathlib import Path
 
@@ -8,7 +8,7 @@ from trials import catalogue, methods
 from trials.cells import MISSING, NOT, RIGHT, SAID, SILENT, STOPPED, Cell
 from trials.table import MARKS
 
-#: Light to dark in the order of harm, so that a print without colour reads the same.
+#: From light to dark in the order of severity, so that a print without colours can be read.
 _COLOURS = {
     RIGHT: "#d4efc5",
     SAID: "#fbe08c",
@@ -75,7 +75,7 @@ def _cell(axes, i, j, cell):
 
 
 def _groups(axes, columns):
-    """Who the columns belong to, above their heads."""
+    """Groups of columns, above their headings."""
     kinds = [0 if method.own else 2 if hasattr(method, "end") else 1 for method in columns]
     for kind, words in enumerate(_GROUPS):
         members = [i for i, each in enumerate(kinds) if each == kind]

@@ -1,11 +1,11 @@
-"""The map as a Markdown table: a row a trial, a column a method, a legend, a sentence a trial."""
+"""The table in Markdown: a row per trial, a column per method, a legend, and a sentence on each trial."""
 
 import machine
 
 from trials import catalogue, methods
 from trials.cells import MISSING, NOT, RIGHT, SAID, SILENT, STOPPED
 
-#: What stands before a cell's number; the picture draws the same.
+#: Marks in front of a cell's number, also used in the picture.
 MARKS = {RIGHT: "\N{CHECK MARK}", SAID: "!", STOPPED: "\N{BLACK SQUARE}", SILENT: "\N{BALLOT X}", NOT: "", MISSING: ""}
 MEANINGS = {
     RIGHT: "the answer is right, as the trial means it",
