@@ -71,10 +71,13 @@ def draw(rod, path, file):
     eta = np.concatenate([np.linspace(0.005, 0.9, 60), np.linspace(0.905, path.load_factors[-1], 120)])
     below = np.linspace(0, 0.999, 400)
     curves = [
-        (below, analytic.secant_delta(below, ECCENTRICITY), "secant formula, eq. (8), pole at 1", {"color": "tab:red", "ls": "--"}),
-        (eta, analytic.elastica(eta, ECCENTRICITY, L).delta, "elastica (inextensible)", {"color": "tab:orange", "lw": 5, "alpha": 0.4}),
+        (below, analytic.secant_delta(below, ECCENTRICITY), "secant formula, eq. (8), pole at 1",
+         {"color": "tab:red", "ls": "--"}),
+        (eta, analytic.elastica(eta, ECCENTRICITY, L).delta, "elastica (inextensible)",
+         {"color": "tab:orange", "lw": 5, "alpha": 0.4}),
         (eta, exact(rod, eta).delta, "exact rod (extensible, shearable)", {"color": "black", "lw": 1}),
-        (path.load_factors, path.displacement(rod.end)[:, 0], "cosserat_fenicsx", {"color": "tab:blue", "marker": "o", "ls": ""}),
+        (path.load_factors, path.displacement(rod.end)[:, 0], "cosserat_fenicsx",
+         {"color": "tab:blue", "marker": "o", "ls": ""}),
     ]  # fmt: skip
     plot.chart(
         file,

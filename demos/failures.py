@@ -37,7 +37,8 @@ class Store:
     def __init__(self, file, quick, fresh):
         self.file = file
         file.parent.mkdir(parents=True, exist_ok=True)
-        self.data = {"complete": False, "quick": quick, "machine": machine.record(), "sources": _fingerprint(), "seed": None,
+        self.data = {"complete": False, "quick": quick, "machine": machine.record(), "sources": _fingerprint(),
+                     "seed": None,
                      "programs": {}, "methods": [], "trials": [], "cells": {}}  # fmt: skip
         before = None if fresh else self._before()
         if before:
@@ -118,7 +119,8 @@ def main(out="out", quick=False, fresh=False):
     print(words)
     silent = [key for key, cell in store.data["cells"].items() if Cell.of(cell).verdict == SILENT]
     print(
-        f"\n{len(store.data['cells'])} cells, {len(silent)} silently wrong; written to {out}/: {stem}.png, {stem}.md, {stem}.json",
+        f"\n{len(store.data['cells'])} cells, {len(silent)} silently wrong; written to {out}/: {stem}.png, {stem}.md,"
+        f" {stem}.json",
         file=sys.stderr,
     )
     return store.data

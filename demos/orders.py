@@ -110,8 +110,8 @@ def time_table(steps):
     """(lines of the table, {(scene, scheme): {query: the finest order in dt}})."""
     (rod, swinging), (b, driven) = pinned(), chain()
     text = (
-        f"Relative changes at the end from {steps[-2]} to {steps[-1]} steps, and the orders in dt observed from {steps[0]} steps "
-        "on (2 P2 elements a rod):"
+        f"Relative changes at the end from {steps[-2]} to {steps[-1]} steps, and the orders in dt observed from"
+        f" {steps[0]} steps on (2 P2 elements a rod):"
     )
     head = "| scene | scheme | position | rotation | velocity | angular velocity |"
     lines, observed = [text, "", head, "|---|---|---|---|---|---|"], {}
@@ -134,8 +134,9 @@ def space_table(meshes, fine):
     other, reference = (at_ends(rod, scene, n, 4) for n in fine)
     floor = _ABOVE * np.abs(other - reference).max()
     text = (
-        f"Largest errors of positions over the length and of q at element ends, rod between pins, {_DURATION / _DT:.0f} steps of "
-        f"the momentum scheme, and the orders in h between the meshes (*: below {floor:.0e}, where rounding takes part):"
+        f"Largest errors of positions over the length and of q at element ends, rod between pins, {_DURATION / _DT:.0f}"
+        f" steps of the momentum scheme, and the orders in h between the meshes (*: below {floor:.0e}, where rounding"
+        " takes part):"
     )
     lines = [text, "", "| degree p | elements | errors | orders | 2p |", "|---|---|---|---|---|"]
     observed = {}

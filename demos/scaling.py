@@ -79,19 +79,25 @@ def main(sizes=SIZES, out="out"):
     unknowns, step, count, memory, blocks = rows.T
     of_blocks = blocks.astype(bool)
     lines = [
-        f"{compat.version()}; medians, processor time, one process. Memory is the process's largest, everything loaded.",
+        (
+            f"{compat.version()}; medians, processor time, one process. Memory is the process's largest, everything"
+            " loaded."
+        ),
         "",
         "| unknowns | factored | Newton step (ms) | us an unknown | count of negative modes (ms) | memory (MB) |",
         "|---|---|---|---|---|---|",
         *(
-            f"| {n:.0f} | {'by blocks' if b else 'pivoting'} | {1e3 * a:.3f} | {1e6 * a / n:.2f} | {1e3 * c:.3f} | {m:.0f} |"
+            f"| {n:.0f} | {'by blocks' if b else 'pivoting'} | {1e3 * a:.3f} | {1e6 * a / n:.2f} | {1e3 * c:.3f} |"
+            f" {m:.0f} |"
             for n, a, c, m, b in rows
         ),
         "",
-        f"Exponents, least squares: step by blocks {exponent(unknowns[of_blocks], step[of_blocks]):.3f}, pivoting "
-        f"{exponent(unknowns[~of_blocks], step[~of_blocks]):.3f}, all rows {exponent(unknowns, step):.3f}; count "
-        f"{exponent(unknowns, count):.3f}; memory above the smallest, pivoting "
-        f"{exponent(unknowns[~of_blocks], memory[~of_blocks] - memory[0]):.3f}.",
+        (
+            f"Exponents, least squares: step by blocks {exponent(unknowns[of_blocks], step[of_blocks]):.3f}, pivoting "
+            f"{exponent(unknowns[~of_blocks], step[~of_blocks]):.3f}, all rows {exponent(unknowns, step):.3f}; count "
+            f"{exponent(unknowns, count):.3f}; memory above the smallest, pivoting "
+            f"{exponent(unknowns[~of_blocks], memory[~of_blocks] - memory[0]):.3f}."
+        ),
     ]
     text = "\n".join(lines)
     Path(out).mkdir(parents=True, exist_ok=True)

@@ -55,7 +55,10 @@ def main(runs=7, duration=5.0, out="out"):
         [(seconds, iterations, History)], one of each kind.
     """
     lines = [
-        f"{in_words(record())}. Medians of {runs} run(s) of {duration:g} s, steps of {1e3 * DT:g} ms, {ELEMENTS} P{DEGREE} elements.",
+        (
+            f"{in_words(record())}. Medians of {runs} run(s) of {duration:g} s, steps of {1e3 * DT:g} ms, {ELEMENTS}"
+            f" P{DEGREE} elements."
+        ),
         "",
         "| model | scheme | unknowns | iterations a step | processor seconds a simulated second |",
         "|---|---|---|---|---|",

@@ -229,7 +229,8 @@ def main(out="out", quick=False, fresh=False, peers=PEERS, names=None, wanted=No
     print(text)
     told = Counter(row["failed"] is not None for row in rows)
     print(
-        f"\n{told[False]} configurations answered, {told[True]} did not; written: {found.file}, {stem}.md, {', '.join(pictures)}"
+        f"\n{told[False]} configurations answered, {told[True]} did not; written: {found.file}, {stem}.md,"
+        f" {', '.join(pictures)}"
     )
     return found
 

@@ -108,9 +108,11 @@ def _chart(rows, title, problem, file):
     axes.set_ylabel("processor time of one warm answer, one thread")
     axes.set_title(title)
     axes.grid(which="major", alpha=0.4)
-    axes.annotate("better: faster,\nmore accurate", (0.015, 0.02), (0.09, 0.10), xycoords="axes fraction", textcoords="axes fraction",
+    axes.annotate("better: faster,\nmore accurate", (0.015, 0.02), (0.09, 0.10), xycoords="axes fraction",
+                  textcoords="axes fraction",
                   fontsize=10, arrowprops={"arrowstyle": "->"})  # fmt: skip
-    axes.text(0.99, 0.01, "small dots: every mesh, degree and formulation measured; lines: the best of each; dashed: peers in space", fontsize=8,
+    axes.text(0.99, 0.01, "small dots: every mesh, degree and formulation measured; lines: the best of each; dashed: "
+                          "peers in space", fontsize=8,
               transform=axes.transAxes, ha="right", color="0.3")  # fmt: skip
     figure.legend(*axes.get_legend_handles_labels(), loc="outside lower center", ncols=3, fontsize=8.5, frameon=False)
     figure.savefig(file, dpi=130)

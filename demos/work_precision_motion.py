@@ -61,9 +61,18 @@ def text(found, rows):
     lines = [
         f"{in_words(found.about['machine'])}. Random seed of the order {found.about['seed']}.",
         "",
-        f"Processor time of one thread, warm, medians of up to {found.about['samples']} samples (of {least} or more in the first table), peers in alternation. What is timed: here the whole",
-        "call of `simulate` in space, and the query of the ends; for Exudyn `SolveDynamic`, its model built before. The error is",
-        "the distance of the ends from their true places, over the length of a rod; mesh and step the best measured of each.",
+        (
+            f"Processor time of one thread, warm, medians of up to {found.about['samples']} samples (of {least} or more"
+            " in the first table), peers in alternation. What is timed: here the whole"
+        ),
+        (
+            "call of `simulate` in space, and the query of the ends; for Exudyn `SolveDynamic`, its model built before."
+            " The error is"
+        ),
+        (
+            "the distance of the ends from their true places, over the length of a rod; mesh and step the best measured"
+            " of each."
+        ),
         *(f"\n{peer} is missing: {why}" for peer, why in found.missing.items()),
         "",
         "| problem | error | here | Exudyn | ratio | asked at most | |",
@@ -84,7 +93,8 @@ def text(found, rows):
             lines.append(f"| {title} | {name} | {cells} | {min(row['error'] for row in members):.0e} |")
     failed = [row for row in rows if row["failed"]]
     if failed:
-        lines += ["", f"Without an answer: {len(failed)} configurations, such as {called(failed[0])} ({failed[0]['failed'][:80]})."]  # fmt: skip
+        lines += ["", f"Without an answer: {len(failed)} configurations, such as {called(failed[0])} "
+                      f"({failed[0]['failed'][:80]})."]  # fmt: skip
     return "\n".join(lines)
 
 

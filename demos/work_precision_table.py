@@ -10,7 +10,8 @@ ACCURACIES = (1e-3, 1e-5, 1e-7)
 #: (requirement, rows of this package, rows of the peers, {accuracy: largest ratio of times}).
 ASKED = (
     ("planar sweep against the fastest peer", "any", "any", {1e-3: 1 / 2, 1e-5: 1 / 3, 1e-7: 1 / 5}),
-    ("sweep forced to spatial against the fastest spatial peer", "spatial", "spatial", {1e-3: 1 / 5, 1e-5: 1 / 40, 1e-7: 1 / 40}),
+    ("sweep forced to spatial against the fastest spatial peer", "spatial", "spatial",
+     {1e-3: 1 / 5, 1e-5: 1 / 40, 1e-7: 1 / 40}),
     ("sweep forced to spatial against the fastest planar peer", "spatial", "planar", {1e-5: 1.0, 1e-7: 1.0}),
 )  # fmt: skip
 
@@ -85,10 +86,22 @@ def _head(found):
     lines = [
         f"{in_words(found.about['machine'])}. Peers: {told or 'none'}. Random seed of the order {found.about['seed']}.",
         "",
-        f"Processor time of one thread, warm, medians of {found.about['samples']} samples (some of what takes over 0.5 s of fewer), peers in alternation. What is timed: here the",
-        "whole call of `solve` and the tip's position, with the stability count (a scene that was solved before is at hand); for Exudyn `SolveStatic`, for OpenSeesPy the",
-        "analysis (the model of both is built before and not counted); for PyElastica the whole relaxation; for CalculiX the whole program. Time at an accuracy: the cheapest configuration measured whose error,",
-        "against the truth of its own mechanical model, is below it. The error is that of delta, largest over the load factors, on the eccentric",
+        (
+            f"Processor time of one thread, warm, medians of {found.about['samples']} samples (some of what takes over"
+            " 0.5 s of fewer), peers in alternation. What is timed: here the"
+        ),
+        (
+            "whole call of `solve` and the tip's position, with the stability count (a scene that was solved before is"
+            " at hand); for Exudyn `SolveStatic`, for OpenSeesPy the"
+        ),
+        (
+            "analysis (the model of both is built before and not counted); for PyElastica the whole relaxation; for"
+            " CalculiX the whole program. Time at an accuracy: the cheapest configuration measured whose error,"
+        ),
+        (
+            "against the truth of its own mechanical model, is below it. The error is that of delta, largest over the"
+            " load factors, on the eccentric"
+        ),
         "cantilever, and of the position of the tip, over its displacement, elsewhere.",
     ]
     missing = [f"- {peer} is missing: {why}" for peer, why in found.missing.items()]
@@ -129,7 +142,8 @@ def _stopped(rows):
             mine = [r for r in rows if (r["problem"], r["peer"], r["kind"]) == (problem, peer, name)]
             failed = [r for r in mine if r["failed"]]
             if failed:
-                lines.append(f"- {title}: {peer}, {name}: no answer from {len(failed)} of {len(mine)} configurations (\"{failed[-1]['failed'][:100]}\").")  # fmt: skip
+                lines.append(f"- {title}: {peer}, {name}: no answer from {len(failed)} of {len(mine)} configurations "
+                             f"(\"{failed[-1]['failed'][:100]}\").")  # fmt: skip
     return ["Without an answer:", "", *lines, ""] if lines else []
 
 

@@ -84,7 +84,8 @@ def _rod(problem, n, density):
     normals = np.tile([[0.0], [0.0], [1.0]], n)
     given["directors"] = np.stack([normals, np.cross(tangents, normals, axis=0), tangents])
     rod = ea.CosseratRod.straight_rod(
-        n, given["position"][:, 0], tangents[:, 0], normals[:, 0], size * n, math.sqrt(problem["area"] / math.pi), density,
+        n, given["position"][:, 0], tangents[:, 0], normals[:, 0], size * n, math.sqrt(problem["area"] / math.pi),
+        density,
         youngs_modulus=problem["EA"] / problem["area"], shear_modulus=problem["GA"] / problem["area"], **given,
     )  # fmt: skip
     shear = np.diag([problem["GA"], problem["GA"], problem["EA"]])

@@ -165,8 +165,8 @@ class Bare:
     key: str = "bare"
     title: str = "bare loop on\ndolfinx, PETSc"
     what: str = (
-        "a short loop on PETSc's SNES over this package's own form of eq. (1), degree 2, 8 elements, one habit at a time that the package avoids; "
-        "no count of negative modes"
+        "a short loop on PETSc's SNES over this package's own form of eq. (1), degree 2, 8 elements, one habit at a"
+        " time that the package avoids; no count of negative modes"
     )
     spatial: bool = True
     own: bool = False
@@ -184,11 +184,13 @@ class Bare:
         infinite = key == "lu"
         problem = problems.column([0.9], 1e3 if key == "residual" else 1e2, infinite=infinite)
         options, etas, note = {
-            "residual": ({"relative": 1e-6, "in_si": True, "predict": True}, (0.3, 0.6, 0.9), "rtol 1e-6, three steps with a secant predictor"),
+            "residual": ({"relative": 1e-6, "in_si": True, "predict": True}, (0.3, 0.6, 0.9),
+                         "rtol 1e-6, three steps with a secant predictor"),
             "line_search": ({"line_search": None}, (0.9,), ""),
             "clamp": (
                 {"held": (0, 1, 2, 4, 5, 6), "weak": True}, (0.1, 0.3, 0.5, 0.7, 0.9),
-                "|q| = 1 weakly, in five steps: q_a of the clamp drifts; where |q| = 1 is asked for at the nodes, as this package does, it stays",
+                "|q| = 1 weakly, in five steps: q_a of the clamp drifts; where |q| = 1 is asked for at the nodes, as "
+                "this package does, it stays",
             ),
             "lu": ({"solver": "petsc", "formulation": "mixed"}, (0.9,), ""),
             "quadrature": ({"points": 3, "elements": 4}, (0.9,), "4 elements of degree 2, 3 Gauss points"),

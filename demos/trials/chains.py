@@ -241,7 +241,9 @@ def _mcre(length, axial, shear):
 
 CHAINS = (
     ChainMethod("corotational", "co-rotational\nbeam",
-                f"Figure 3's planar two-node co-rotational Timoshenko beam, {ELEMENTS} elements, load control, halving steps", _beam),
+                f"Figure 3's planar two-node co-rotational Timoshenko beam, {ELEMENTS} elements, load control, halving "
+                "steps", _beam),
     ChainMethod("mcre", "MCRE (re-\nconstruction)",
-                f"Figure 3's reconstruction of the Modified Cosserat Rod Element: truncated rotations, {ELEMENTS} elements", _mcre),
+                f"Figure 3's reconstruction of the Modified Cosserat Rod Element: truncated rotations, {ELEMENTS} "
+                "elements", _mcre),
 )  # fmt: skip

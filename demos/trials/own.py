@@ -160,7 +160,8 @@ def _reached(failure):
 
 
 OWN = (
-    Own("default", "default\ncf.solve", "`cosserat_fenicsx.solve(scene, load_factors)`, no options: it chooses model, degree and mesh", {}),
+    Own("default", "default\ncf.solve",
+        "`cosserat_fenicsx.solve(scene, load_factors)`, no options: it chooses model, degree and mesh", {}),
     Own("determinate", "rung\ndeterminate", 'model="determinate"', {"model": "determinate"}),
     Own("planar", "rung\nplanar", 'model="planar"', {"model": "planar"}, spatial=False),
     Own("mixed", "rung spatial,\nmixed", 'model="spatial", formulation="mixed"', {"model": "spatial"}),

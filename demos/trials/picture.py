@@ -97,6 +97,8 @@ def _legend(figure, data):
         hatch = {"hatch": "///", "edgecolor": "#c3d9f0"} if verdict == STOPPED else {"edgecolor": "grey"}
         handles.append(Patch(facecolor=_COLOURS[verdict], label=f"{mark}{words}", **hatch))
     figure.legend(handles=handles, loc="outside lower center", ncols=6, frameon=False, fontsize=9, title=(
-        "Numbers are relative errors, or errors over the length; in the rows of the limit point and the follower load, the load over the limit "
-        "or flutter load; in that of\nthe line search, Newton iterations. What each row tries, and what right means there, is in failures.md. "
+        "Numbers are relative errors, or errors over the length; in the rows of the limit point and the follower load, "
+        "the load over the limit "
+        "or flutter load; in that of\nthe line search, Newton iterations. What each row tries, and what right means "
+        "there, is in failures.md. "
         + machine.in_words(data["machine"]) + "."), title_fontsize=8.5)  # fmt: skip

@@ -70,7 +70,8 @@ class Program:
         """An `Answer`."""
         for need in {"history", "guided", "follower"} & set(problem):
             if need not in self._can:
-                raise NotForIt({"history": "its runner loads in proportion", "guided": "its runner clamps one end alone",
+                raise NotForIt({"history": "its runner loads in proportion",
+                                "guided": "its runner clamps one end alone",
                                 "follower": "its runner has dead loads"}[need])  # fmt: skip
         plain = "turn" not in problem
         problem = _as_it_takes(problem, "free" in self._can, "turned clamp" in self._can)
@@ -143,9 +144,12 @@ PROGRAMS = (
             {"element": "spatial CBDI", "elements": 48, "tol": 1e-8, "substeps": 4, "inner": 1e-16}, 8,
             ("free", "history", "guided", "residual", "turned clamp"),
             "OpenSeesPy 3.7.1.2, force-based frames with curvature-based displacements, co-rotational"),
-    Program("PyElastica", {"element": "spatial rod", "elements": 20, "tol": 1e-6}, {"element": "spatial rod", "elements": 20, "tol": 1e-6}, 8,
-            ("free", "relaxes"), "PyElastica 1.0.0, an explicit dynamic rod under the whole load, damped until it rests; 20 elements, 0.35 % of error at "
+    Program("PyElastica", {"element": "spatial rod", "elements": 20, "tol": 1e-6},
+            {"element": "spatial rod", "elements": 20, "tol": 1e-6}, 8,
+            ("free", "relaxes"), "PyElastica 1.0.0, an explicit dynamic rod under the whole load, damped until it "
+                                 "rests; 20 elements, 0.35 % of error at "
             "eta = 1 (12 have 1.06 %): more than the time allows for thinner rods", 25.0),
-    Program("CalculiX", {"element": "spatial B32R", "elements": 32, "tol": 1e-5}, {"element": "spatial B32R", "elements": 32, "tol": 1e-5}, 8,
+    Program("CalculiX", {"element": "spatial B32R", "elements": 32, "tol": 1e-5},
+            {"element": "spatial B32R", "elements": 32, "tol": 1e-5}, 8,
             (), "CalculiX 2.20, quadratic beams that become solids (B32R)"),
 )  # fmt: skip

@@ -149,7 +149,10 @@ class RotationVector:
 
     key: str = "rotation_vector"
     title: str = "rotation vector,\nincremental"
-    what: str = "a rod in space with two-node elements and incremental rotation vectors, 32 elements, one Gauss point each; one Newton solution a load factor"
+    what: str = (
+        "a rod in space with two-node elements and incremental rotation vectors, 32 elements, one Gauss point each; one"
+        " Newton solution a load factor"
+    )
     spatial: bool = True
     own: bool = False
     turn: tuple = (0.8, -0.6, 0.88)

@@ -9,8 +9,13 @@ from trials.cells import MISSING, NOT, RIGHT, SAID, SILENT, STOPPED
 MARKS = {RIGHT: "\N{CHECK MARK}", SAID: "!", STOPPED: "\N{BLACK SQUARE}", SILENT: "\N{BALLOT X}", NOT: "", MISSING: ""}
 MEANINGS = {
     RIGHT: "the answer is right, as the trial means it",
-    SAID: "the answer is wrong, and the method itself says that it is not to be trusted (unstable, no number, a warning)",
-    STOPPED: "no answer: the method gave up, and said so, or had none in the time that the map gives it; the number is the load factor that it reached",
+    SAID: (
+        "the answer is wrong, and the method itself says that it is not to be trusted (unstable, no number, a warning)"
+    ),
+    STOPPED: (
+        "no answer: the method gave up, and said so, or had none in the time that the map gives it; the number is the"
+        " load factor that it reached"
+    ),
     SILENT: "an answer is returned as if it were right, and it is wrong",
     NOT: "the method does not have what the trial asks for",
     MISSING: "the program is not installed here (`make work-precision` installs it)",

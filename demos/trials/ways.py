@@ -10,7 +10,10 @@ from trials import problems
 from trials.cells import Stopped, judged
 
 #: Largest difference of the final states, over the length.
-SAME = "to 1e-6 of the length, or a difference that vanishes with the mesh and is a tenth at most of what twice the elements change"
+SAME = (
+    "to 1e-6 of the length, or a difference that vanishes with the mesh and is a tenth at most of what twice the"
+    " elements change"
+)
 
 
 def steps(method):
