@@ -58,8 +58,8 @@ def leaves(kind):
     [
         ("force", "load 3 (Force at column@10) points out of the plane of the rods"),
         ("moment", "load 3 (Moment at column@10) does not turn in the plane of the rods"),
-        ("support", "support 2 (Roller at column.end) holds or moves what is askew to the plane of the rods"),
-        ("section", "a section of rod 'column' has its principal axes (EI) askew to the plane"),
+        ("support", "support 2 (Roller at column.end) constrains motions oblique to the plane of the rods"),
+        ("section", "a section of rod 'column' has its principal axes (EI) oblique to the plane"),
     ],
 )
 def test_what_leaves_the_plane_is_named(kind, words):
@@ -96,4 +96,4 @@ def test_a_helix_is_in_no_plane(turns):
     assert scene.plane is None and "do not lie in one plane" in scene.flatness[1]
     twisted = cf.Rod(cf.UniformCurvature(1.0, (0, 0, turns * np.pi)), cf.Stiffness((1e3, 1e3), 1e3, (1.0, 5.0), 0.7))
     scene = cf.Scene([twisted], [cf.Clamp(twisted.start)], [cf.Force(twisted.end, (1.0, 0, 0))])
-    assert "askew to the plane" in scene.flatness[1]
+    assert "oblique to the plane" in scene.flatness[1]

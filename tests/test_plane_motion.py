@@ -41,7 +41,7 @@ def test_a_plane_flight():
     _, scene = flying_in_a_plane()
     history = cf.simulate(scene, 5, dt=0.025)
     free = history.times >= 2.5
-    assert history.model == "planar" and history.why[0] == "everything keeps to the x-y plane"
+    assert history.model == "planar" and history.why[0] == "the whole scene moves in the x-y plane"
     assert drift(history.linear_momentum[free]) < 1e-11 and drift(history.angular_momentum[free]) < 1e-11
     assert np.ptp(history.energy[free]) < 2e-3 * history.energy[-1]
     fast = cf.simulate(scene, 2.5, dt=0.025, scheme="triple-jump")

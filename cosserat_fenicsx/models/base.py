@@ -33,11 +33,11 @@ class RodModel:
     Attributes:
         state: Function of the unknowns (nodal ones, and those that the formulation adds), clamped nodes included.
         before, step: the state before a Newton step and the step, for `advance`.
-        carried: Functions updated after each Newton step beside the unknowns: n at the Gauss points, or ().
+        carried: Functions updated after each Newton step together with the unknowns: n at the Gauss points, or ().
         carries_force: whether n is not a function of the motion alone.
         force_nodes: reference coordinates of the nodes of n, where n is an unknown.
         load_factor: the Constant eta; permanent_factor: that of permanent loads, 1 except while they are applied.
-        actions: the `ActionTerms`, the data of what acts on the rods; densities: their `Densities`.
+        actions: the `ActionTerms` with the data of all actions; densities: their `Densities`.
         forms: the `CompiledForms`.
         numbering: the solver's unknowns.
         second_variations: the `SecondVariation`s, whose numbers of negative eigenvalues add up; with the axes of the

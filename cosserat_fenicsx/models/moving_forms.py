@@ -123,7 +123,7 @@ class StepForms:
         raise NotImplementedError
 
     def constraint(self):
-        """Terms of the residual beside the balances, or 0."""
+        """Terms of the residual in addition to the balances, or 0."""
         return 0
 
     def fields(self, n, m):
