@@ -90,7 +90,7 @@ class AlongTable:
         return np.column_stack([np.interp(s, self.s, column) for column in zip(*self.values, strict=True)])
 
     def check(self, length):
-        """Refuse a table without an arc length in [0, length], m."""
+        """Refuse a table whose range does not overlap [0, length], m."""
         if self.s[-1] < 0 or self.s[0] > length:
             refuse(self, "s", self.s, f"arc lengths along the rod, from 0 to {length:g} m")
 
