@@ -86,9 +86,9 @@ _HOME = {
 __all__ = sorted(_HOME)
 
 
-def names_in(room):
+def names_in(subpackage):
     """The public names defined in a subpackage."""
-    return [name for name, home in _HOME.items() if home and home.startswith(f"{room}.")]
+    return [name for name, home in _HOME.items() if home and home.startswith(f"{subpackage}.")]
 
 
 def __getattr__(name):

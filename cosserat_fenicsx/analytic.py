@@ -14,7 +14,7 @@ import numpy as np
 from scipy.optimize import brentq
 from scipy.special import elliprd, elliprf, roots_legendre
 
-from cosserat_fenicsx.checks import instance, number, positive, refuse, stiffness, vector
+from cosserat_fenicsx.checks import finite_array, instance, number, positive, refuse, stiffness, vector
 from cosserat_fenicsx.errors import NotConverged
 
 
@@ -285,13 +285,11 @@ class _Rod:
 
 def _load_factors(owner, field, value):
     """A float array of finite numbers, none negative."""
-    try:
-        array = np.asarray(value)
-    except ValueError:  # rows of different lengths
-        array = np.asarray(None)
-    if array.dtype.kind not in "iuf" or not np.isfinite(array).all() or (array < 0).any():
-        refuse(owner, field, value, "finite numbers, none negative")
-    return array.astype(float)
+    expected = "finite numbers, none negative"
+    array = finite_array(owner, field, value, expected)
+    if (array < 0).any():
+        refuse(owner, field, value, expected)
+    return array
 
 
 def _as_tip(tips, shape, length):

@@ -31,16 +31,36 @@ def stiffness(owner, field, value, unit):
     return number(owner, field, value, f"a positive number or infinity ({unit})", lambda x: x > 0)
 
 
-def vector(owner, field, value, unit, size=3):
-    """A tuple of `size` finite numbers."""
-    expected = f"{size} finite numbers ({unit})"
+def finite_array(owner, field, value, expected):
+    """`value` as an array of floats where it is one of finite numbers, of any shape; refused otherwise."""
     try:
         array = np.asarray(value)
     except ValueError:
         refuse(owner, field, value, expected)
-    if array.shape != (size,) or array.dtype.kind not in "iuf" or not np.isfinite(array).all():
+    if array.dtype.kind not in "iuf" or not np.isfinite(array).all():
         refuse(owner, field, value, expected)
-    return tuple(array.astype(float).tolist())
+    return array.astype(float)
+
+
+def vector(owner, field, value, unit, size=3):
+    """A tuple of `size` finite numbers."""
+    expected = f"{size} finite numbers ({unit})"
+    array = finite_array(owner, field, value, expected)
+    if array.shape != (size,):
+        refuse(owner, field, value, expected)
+    return tuple(array.tolist())
+
+
+def call(function, x, name, where):
+    """function(x) of a function that the user wrote; whatever it raises becomes a SceneError.
+
+    Args:
+        name, where: begin and end of the message.
+    """
+    try:
+        return function(x)
+    except Exception as problem:  # a user's function may raise any exception
+        raise SceneError(f"{name} raised {type(problem).__name__} ({problem}){where}") from problem
 
 
 def direction(owner, field, value):

@@ -3,9 +3,10 @@
     python demos/choice.py           every demo scene (about 3 minutes)
     python demos/choice.py --quick   one scene, few meshes
 
-By hand: every model that a scene fits, degrees 2 to 4, 1, 2, 3, 4, 6, 8 .. elements a rod, with the error known beforehand from a
-fine mesh, so that the cheapest one below the tolerance can be picked; it estimates nothing. Times are processor times of
-`solve`, warm, medians of alternating runs. Errors are those of the positions along the rods, over the largest displacement, as `path.error`.
+By hand: every model valid for the scene, degrees 2 to 4, and 1, 2, 3, 4, 6, 8 .. elements per rod. Their errors are
+known from a fine mesh, so that the cheapest one below the tolerance can be picked, without an error estimate. Times are
+processor times of `solve`, warm, medians of alternating runs. Errors are those of positions along the rods over the
+largest displacement, as `path.error`.
 """
 
 import argparse
@@ -51,7 +52,7 @@ def timed(solve):
 def compare(scene, etas, tol, runs, counts=COUNTS):
     """Rows (name, model, degree, elements, unknowns, seconds, error, estimate): "auto", then the best by hand.
 
-    The third answer is the ratio of their times, the median of alternating runs.
+    Also returns the ratio of their times, the median of alternating runs.
     """
 
     def auto():
@@ -64,7 +65,7 @@ def compare(scene, etas, tol, runs, counts=COUNTS):
     best = None
     for model in fitting(scene):
         if chosen.model == "spatial" and model != "spatial":
-            continue  # a plane answer was found not to be enough
+            continue  # the planar model was promoted to the spatial one
         for degree in (2, 3, 4):
             for elements in counts:
 
@@ -82,7 +83,7 @@ def compare(scene, etas, tol, runs, counts=COUNTS):
                 if seconds > _HOPELESS * best[0]:
                     break
     _, by_hand, path = best
-    auto()  # the many meshes by hand have driven its own out of what `solve` keeps loaded
+    auto()  # again warm: the many meshes by hand may have displaced its problem from the pool
     samples = np.array([(timed(auto)[0], timed(by_hand)[0]) for _ in range(runs)])
     rows = [
         (name, p.model, p.degree, max(p.elements), p.unknowns, seconds, error(p, truth), float(p.error.max()))
@@ -92,7 +93,7 @@ def compare(scene, etas, tol, runs, counts=COUNTS):
 
 
 def load_factors_of(options):
-    """A scene file's load factors, those of a range in ten steps."""
+    """The load factors of a scene file; a range in ten steps."""
     if isinstance(options, str):
         return np.linspace(*map(float, options.split(":")), 11)[1:].tolist()
     return list(options)

@@ -1,9 +1,9 @@
 """The paper's verification problem: a steel column, clamped below, under a dead force eta P_cr and the moment of its
-eccentricity e = L/100. Delta at eta = 0.9 is 2.20062 m; the secant formula, eq. (8), says 3.8 % more.
+eccentricity e = L/100. Delta at eta = 0.9 is 2.20062 m; the secant formula, eq. (8), gives 3.8 % more.
 
     mpirun -n 2 python demos/eccentric_cantilever.py
 
-Leaves in out/: cantilever.xdmf and .h5 (every point, for ParaView), figure.png (delta against eta), rod.png.
+Writes to out/: cantilever.xdmf and .h5 (every point, for ParaView), figure.png (delta against eta), rod.png.
 """
 
 import sys
@@ -47,7 +47,7 @@ def exact(rod, eta):
 
 
 def report(rod, path):
-    """The table: this package beside the exact rod and eq. (8)."""
+    """Print the table: this package, the exact rod and eq. (8)."""
     table = Table(title=f"{path.scene.title}: {path.model} model, {path.unknowns} unknowns")
     for heading in ("eta", "delta (m)", "exact delta (m)", "eq. (8) (m)", "relative error", "iterations", "stable"):
         table.add_column(heading, justify="right")
@@ -71,10 +71,13 @@ def draw(rod, path, file):
     eta = np.concatenate([np.linspace(0.005, 0.9, 60), np.linspace(0.905, path.load_factors[-1], 120)])
     below = np.linspace(0, 0.999, 400)
     curves = [
-        (below, analytic.secant_delta(below, ECCENTRICITY), "secant formula, eq. (8), pole at 1", {"color": "tab:red", "ls": "--"}),
-        (eta, analytic.elastica(eta, ECCENTRICITY, L).delta, "elastica (inextensible)", {"color": "tab:orange", "lw": 5, "alpha": 0.4}),
+        (below, analytic.secant_delta(below, ECCENTRICITY), "secant formula, eq. (8), pole at 1",
+         {"color": "tab:red", "ls": "--"}),
+        (eta, analytic.elastica(eta, ECCENTRICITY, L).delta, "elastica (inextensible)",
+         {"color": "tab:orange", "lw": 5, "alpha": 0.4}),
         (eta, exact(rod, eta).delta, "exact rod (extensible, shearable)", {"color": "black", "lw": 1}),
-        (path.load_factors, path.displacement(rod.end)[:, 0], "cosserat_fenicsx", {"color": "tab:blue", "marker": "o", "ls": ""}),
+        (path.load_factors, path.displacement(rod.end)[:, 0], "cosserat_fenicsx",
+         {"color": "tab:blue", "marker": "o", "ls": ""}),
     ]  # fmt: skip
     plot.chart(
         file,

@@ -1,11 +1,11 @@
-"""Where methods fail: a map of methods against trials, each cell a number and a verdict (`make failures`).
+"""Where methods fail: a table of methods and trials, each cell a number and a verdict (`make failures`).
 
-    python demos/failures.py            at most a quarter of an hour; leaves in out/: failures.json, failures.md, failures.png
-    python demos/failures.py --quick    this package and what is written for comparison, on fewer steps; at most a minute
-    python demos/failures.py --fresh    from the start, whatever an earlier run has left
+    python demos/failures.py            at most 15 minutes; writes to out/: failures.json, failures.md, failures.png
+    python demos/failures.py --quick    this package and the comparison models, with fewer steps; at most a minute
+    python demos/failures.py --fresh    from the start, without results of an earlier run
 
-A run that is broken off keeps its cells; the same command goes on from them. Programs that are not installed are shown as such:
-`make work-precision` installs them.
+An interrupted run keeps its cells; the same command continues from them. Programs that are not installed are shown as
+such: `make work-precision` installs them.
 """
 
 import hashlib
@@ -26,18 +26,19 @@ ROOT = Path(__file__).resolve().parents[1]
 
 
 class Store:
-    """The file of the cells, whole after every cell.
+    """The file of the cells, rewritten after every cell.
 
     Args:
         file: out/failures.json.
-        quick: whether it is the quick map.
-        fresh: begin anew, whatever is there.
+        quick: whether it is the quick table.
+        fresh: whether to ignore an existing file.
     """
 
     def __init__(self, file, quick, fresh):
         self.file = file
         file.parent.mkdir(parents=True, exist_ok=True)
-        self.data = {"complete": False, "quick": quick, "machine": machine.record(), "sources": _fingerprint(), "seed": None,
+        self.data = {"complete": False, "quick": quick, "machine": machine.record(), "sources": _fingerprint(),
+                     "seed": None,
                      "programs": {}, "methods": [], "trials": [], "cells": {}}  # fmt: skip
         before = None if fresh else self._before()
         if before:
@@ -46,7 +47,7 @@ class Store:
             print(f"goes on from {file}: {len(kept)} cells kept", file=sys.stderr)
 
     def _before(self):
-        """What a run that was broken off has left, if this one can continue it."""
+        """The results of an interrupted run, if this one can continue it."""
         try:
             before = json.loads(self.file.read_text(encoding="utf-8"))
             same = all(before[key] == self.data[key] for key in ("quick", "sources")) and not before["complete"]
@@ -56,14 +57,14 @@ class Store:
             return None
 
     def save(self):
-        """Write the file; a process that is killed leaves the old one or the new one."""
+        """Replace the file in one step, so that a killed process leaves a complete one."""
         new = self.file.with_suffix(".new")
         new.write_text(json.dumps(self.data, indent=1) + "\n", encoding="utf-8")
         os.replace(new, self.file)
 
 
 def _fingerprint():
-    """Of all that the cells depend on here."""
+    """Hash of all files that the cells depend on."""
     files = sorted([*ROOT.glob("cosserat_fenicsx/**/*.py"), *ROOT.glob("forms/*.py"), *ROOT.glob("demos/trials/*.py"),
                     *ROOT.glob("demos/comparison/*.py"), *ROOT.glob("demos/peers/*.py")])  # fmt: skip
     drawn = {ROOT / "demos" / "trials" / name for name in ("table.py", "picture.py")}
@@ -71,7 +72,7 @@ def _fingerprint():
 
 
 def compute(store, columns, rows):
-    """All cells that are not there yet."""
+    """Compute all missing cells."""
     data = store.data
     data["methods"], data["trials"] = [method.key for method in columns], [trial.key for trial in rows]
     todo = [(trial, method) for method in columns for trial in rows if f"{trial.key}/{method.key}" not in data["cells"]]
@@ -118,7 +119,8 @@ def main(out="out", quick=False, fresh=False):
     print(words)
     silent = [key for key, cell in store.data["cells"].items() if Cell.of(cell).verdict == SILENT]
     print(
-        f"\n{len(store.data['cells'])} cells, {len(silent)} silently wrong; written to {out}/: {stem}.png, {stem}.md, {stem}.json",
+        f"\n{len(store.data['cells'])} cells, {len(silent)} silently wrong; written to {out}/: {stem}.png, {stem}.md,"
+        f" {stem}.json",
         file=sys.stderr,
     )
     return store.data

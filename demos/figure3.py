@@ -1,11 +1,11 @@
-"""Figure 3 of the paper, whole: delta against eta from 0 to 2 for every model of the eccentrically compressed column.
+"""Figure 3 of the paper: delta against eta from 0 to 2 for every model of the eccentrically compressed column.
 
-    python demos/figure3.py            about four minutes; leaves in out/: figure3.png, figure3.md, figure3.json
-    python demos/figure3.py --quick    coarse meshes, for a look or a test
-    python demos/figure3.py --fresh    from the start, whatever an earlier run has left
+    python demos/figure3.py            about four minutes; writes to out/: figure3.png, figure3.md, figure3.json
+    python demos/figure3.py --quick    coarse meshes, for a test
+    python demos/figure3.py --fresh    from the start, without results of an earlier run
 
-A run that is broken off keeps every curve and every point of the solid that it has, in figure3.json and figure3-*.npz; the same command
-goes on from there.
+An interrupted run keeps all curves and points of the solid so far, in figure3.json and figure3-*.npz; the same command
+continues from there.
 """
 
 import json
@@ -23,12 +23,12 @@ from unfinished import command
 
 
 class Store:
-    """The file of the curves: written whole after every curve and every point of the solid.
+    """The file of the curves, rewritten after every curve and every point of the solid.
 
     Args:
         folder: where figure3.json is, or will be.
-        settings: a file of other settings, of other releases or of a finished run is not continued.
-        fresh: continue none.
+        settings: a file with other settings or releases, or of a finished run, is not continued.
+        fresh: whether to ignore an existing file.
     """
 
     def __init__(self, folder, settings, fresh=False):
@@ -46,7 +46,7 @@ class Store:
                 name.unlink()
 
     def _before(self):
-        """What a run that was broken off has left, if this one can continue it."""
+        """The results of an interrupted run, if this one can continue it."""
         try:
             before = json.loads(self.file.read_text(encoding="utf-8"))
             same = before["settings"] == self.data["settings"] and not before["complete"]
@@ -56,25 +56,25 @@ class Store:
             return None
 
     def curve(self, name, compute, words):
-        """The curve `name`: kept from before, or computed, timed and kept."""
+        """The curve `name`: from an earlier run, or computed, timed and stored."""
         kept = self.data["curves"].get(name)
         if not (kept and kept["complete"]):
             self.put(name, curves.timed(words, compute), complete=True)
         return self.data["curves"][name]
 
     def put(self, name, curve, complete=False):
-        """Keep a curve, or what there is of it."""
+        """Store a curve, or a part of it."""
         self.data["curves"][name] = {**curve, "complete": complete}
         self.save()
 
     def save(self):
-        """Write the file; a process that is killed leaves the old one or the new one."""
+        """Replace the file in one step, so that a killed process leaves a complete one."""
         new = self.file.with_suffix(".new")
         new.write_text(json.dumps(self.data, indent=1) + "\n", encoding="utf-8")
         os.replace(new, self.file)
 
     def part_of(self, name):
-        """The unfinished curve `name` and the last points of its path: (dict, list of Point), (None, []) where there is none."""
+        """The unfinished curve `name` and the last points of its path: (dict, list of Point), or (None, [])."""
         kept, states = self.data["curves"].get(name), self._states(name)
         if kept is None or not states.exists():
             return None, []
@@ -85,7 +85,7 @@ class Store:
         return {key: value for key, value in kept.items() if key != "complete"}, points
 
     def keep_part(self, name, curve, points):
-        """Keep an unfinished curve and the last points of its path."""
+        """Store an unfinished curve and the last points of its path."""
         new = self._states(name).with_suffix(".new.npz")
         np.savez(new, eta=[p.eta for p in points], x=[p.x for p in points])
         os.replace(new, self._states(name))
@@ -95,7 +95,7 @@ class Store:
         return self.folder / f"figure3-{name}.npz"
 
     def finish(self):
-        """All curves are there: the next run starts anew."""
+        """Mark the file as finished: the next run starts anew."""
         self.data["complete"] = True
         self.save()
         for name in self.folder.glob("figure3-*.npz"):
@@ -103,7 +103,7 @@ class Store:
 
 
 def _plain(settings):
-    """As JSON gives it back."""
+    """The settings as JSON returns them."""
     return json.loads(json.dumps(settings))
 
 

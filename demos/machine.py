@@ -1,4 +1,4 @@
-"""What measurements are recorded with: the machine, the releases, the day."""
+"""The machine, the releases and the date that are recorded with measurements."""
 
 import datetime
 import os
@@ -9,7 +9,7 @@ from cosserat_fenicsx import compat
 
 
 def record():
-    """Where and with what something was measured, as a dict of words that JSON can hold.
+    """The conditions of a measurement, as a dict of strings and numbers for JSON.
 
     Returns:
         date (UTC, ISO 8601), cpu (model), cores (that this process may use), platform, and the releases by the names

@@ -1,11 +1,11 @@
-"""Seven motions, each a scene file in demos/motions/, a picture and a number that must come out.
+"""Seven motions, each a scene file in demos/motions/, with a picture and a number that is checked.
 
     python demos/motion.py                          all of them
     mpirun -n 2 python demos/motion.py spin_up      one, on two processes
-    python demos/motion.py --quick                  shorter and without pictures, where a number allows it
-    python demos/motion.py --film spin_up           and its film, spin_up.gif
+    python demos/motion.py --quick                  without pictures, and shorter where the check allows it
+    python demos/motion.py --film spin_up           also writes a film, spin_up.gif
 
-Leaves in out/: NAME.png (shapes over time and the way of a station, the curve that the number is read from, energies).
+Writes to out/: NAME.png (shapes over time and the track of a station, the curve with the number, energies).
 """
 
 import argparse
@@ -27,7 +27,7 @@ from cosserat_fenicsx.dynamics.initial_equilibrium import before
 from cosserat_fenicsx.results.tables import as_text
 
 SCENES = Path(__file__).parent / "motions"
-#: A number, what it should be and from where, and how far it may be off (absolute).
+#: A number, its expected value and the source of that, and the allowed deviation (absolute).
 Check = namedtuple("Check", "what found expected allowed source")
 
 
@@ -60,7 +60,7 @@ def right_angle_cantilever(history):
 
 
 def spin_up(history):
-    """What the centrifugal force stretches the spinning blade by: rho A omega^2 L^3/(3 EA)."""
+    """The stretch of the spinning blade by the centrifugal force: rho A omega^2 L^3/(3 EA)."""
     tip, turn = history.scene.rod("blade").end, history.scene.supports[0].rotation
     angle = np.array([turn(t)[2] for t in history.times])
     x, y, _ = history.position(tip).T
@@ -72,12 +72,12 @@ def spin_up(history):
 
 
 def damped_column(history):
-    """How fast the motion dies away: tau omega^2/2, omega from `cf.modes`."""
+    """The decay rate of the amplitude: tau omega^2/2, omega from `cf.modes`."""
     rod = history.scene.rod("column")
     omega = 2 * math.pi * cf.modes(before(history.scene), 1).frequencies[0]
     t, x = history.times, history.displacement(rod.end)[:, 0]
     tops, heights = _tops(t, x)
-    late = tops > 2 * math.pi / omega  # the higher modes are gone after a period
+    late = tops > 2 * math.pi / omega  # the higher modes have decayed after a period
     rate, height = np.polyfit(tops[late], np.log(heights[late]), 1)
     expected = rod.damping.time * omega**2 / 2
     check = Check("rate of decay (1/s)", -rate, expected, 1e-2 * expected, "tau omega^2/2")
@@ -89,7 +89,7 @@ def damped_column(history):
 def whirling_shaft(history):
     """The speed of the largest whirl in the run-up, against Jeffcott's rotor with the first frequency of `cf.modes`.
 
-    It comes after the critical speed: at 60 rad/s^2 the whirl has no time to grow.
+    It is above the critical speed, since at 60 rad/s^2 the whirl needs time to grow.
     """
     shaft, drive = history.scene.rod("shaft"), history.scene.supports[0].rotation
     omega = 2 * math.pi * cf.modes(before(history.scene), 1).frequencies[0]
@@ -97,7 +97,7 @@ def whirling_shaft(history):
     r = np.linalg.norm(history.displacement(middle)[:, 1:], axis=1)
     speed = history.angular_velocity(shaft.start)[:, 0]
     stiffness = 768 / 7 * shaft.stiffness.bending[0] / shaft.length**3  # clamped and pinned, at the middle
-    eccentricity = 1e-3 * omega**2 / stiffness  # times the disc's 1 kg over the mass that moves with it
+    eccentricity = 1e-3 * omega**2 / stiffness  # times the disc's mass of 1 kg over the effective mass
     rotor = _jeffcott(history.times, omega, shaft.damping.drag, lambda t: drive(t)[0], eccentricity)
     found, expected = _tops(speed, r), _tops(speed, rotor)
     largest = [tops[np.argmax(sizes)] for tops, sizes in (found, expected)]
@@ -122,7 +122,8 @@ def _jeffcott(times, omega, drag, angle, eccentricity):
 
 
 def released_column(history):
-    """The energy that the buckled column held, which stays: the work of a slow load up to it, by the exact rod."""
+    """The conserved energy of the released column: the work of a
+    slowly growing load up to the start, by the exact rod."""
     rod, eta = history.scene.rod("column"), history[0].load_factor
     P, e, k = float(cf.euler_load(rod)), 0.2, rod.stiffness
     held = _stored(eta, lambda x: _yielded(x, P, e, rod.length, k))
@@ -134,20 +135,21 @@ def released_column(history):
 
 
 def _yielded(eta, P, e, length, k):
-    """What the force P and the moment P e would do at the load factors eta, per unit of these: shortening and turn, J."""
+    """The work of the force P and the moment P e on the displacements
+    at load factors eta, J: shortening and rotation."""
     tip = analytic.reissner(eta, e, length, bending=k.bending[1], axial=k.axial, shear=k.shear[0])
     return P * (tip.shortening + e * tip.tip_rotation)
 
 
 def _stored(eta, yielded):
-    """eta A(eta) less the integral of A from 0: by Gauss, in parts, since A turns up sharply at 1."""
+    """eta A(eta) minus the integral of A from 0, by Gauss quadrature in parts, since A rises steeply at 1."""
     x, w = np.polynomial.legendre.leggauss(12)
     marks = np.append(np.arange(0, eta, 0.05), eta)
     whole = sum((b - a) / 2 * (w @ yielded((a + b) / 2 + (b - a) / 2 * x)) for a, b in pairwise(marks))
     return float(eta * yielded(eta) - whole)
 
 
-#: Demos, and what makes them quick.
+#: Demos, with their settings in quick runs.
 DEMOS = {
     flying_spaghetti_2d: {},
     flying_spaghetti_3d: {},
@@ -160,7 +162,7 @@ DEMOS = {
 
 
 def _momentum(history):
-    """What the loads give and free flight keeps."""
+    """The momenta that the loads produce, constant in free flight."""
     momentum = history.angular_momentum
     shown = np.abs(momentum).max(axis=0) > 1e-6 * np.abs(momentum).max()
     lines = [(axis, history.times, momentum[:, i]) for i, axis in enumerate("xyz") if shown[i]]
@@ -168,7 +170,7 @@ def _momentum(history):
 
 
 def _tops(t, x):
-    """Times and sizes of the extremes of x, by parabolas through three points."""
+    """Times and values of the extrema of x, by parabolas through three points."""
     size = np.abs(x)
     k = np.flatnonzero((size[1:-1] > size[:-2]) & (size[1:-1] >= size[2:])) + 1
     a, b, c = size[k - 1], size[k], size[k + 1]
@@ -177,13 +179,13 @@ def _tops(t, x):
 
 
 def run(demo, out=None, *, quick=False, film=False):
-    """Simulate a demo, and draw it where there is a folder to draw into.
+    """Simulate a demo, and draw it if a folder is given.
 
     Args:
         demo: one of `DEMOS`.
         out: a folder, or None.
         quick: shorter.
-        film: also NAME.gif.
+        film: whether to write NAME.gif.
 
     Returns:
         (History, Check).
@@ -201,7 +203,7 @@ def run(demo, out=None, *, quick=False, film=False):
 
 
 def main(names=(), out="out", *, quick=False, film=False):
-    """Run demos, print what came out, and say whether all numbers did.
+    """Run demos, and print their numbers and whether all are right.
 
     Args:
         names: of demos; none for all.

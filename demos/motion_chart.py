@@ -5,12 +5,12 @@ from pathlib import Path
 
 import numpy as np
 
-#: What the first panel shows: axes ("xy", "xz" or "xyz"), the station whose way is drawn, up to which time (s) or None,
-#: and whether the axes have scales of their own.
+#: The first panel: axes ("xy", "xz" or "xyz"), the station whose track is drawn, the last time (s) or None, and whether
+#: the axes have different scales.
 Shapes = namedtuple("Shapes", "axes station until stretched", defaults=(None, False))
 #: The second panel: axes with units, and lines (label, x, y[, style]).
 Curve = namedtuple("Curve", "xlabel ylabel lines")
-# Superposed shapes.
+# Number of superposed shapes.
 _SHAPES = 16
 
 

@@ -1,12 +1,13 @@
-"""The orders of motions in the time step and in the mesh, observed.
+"""The observed orders of convergence of motions in the time step and in the mesh.
 
     python demos/orders.py             writes out/orders.md
     python demos/orders.py --quick     fewer steps and elements
 
-In time: what positions and rotations, velocities and angular velocities at the end change by where the steps are halved,
-on two scenes: a rod that swings between two pins, and a chain with all that may disturb a scheme. In space: errors at
-three element ends against a fine mesh, all with the same steps; the rod between pins is smooth up to its ends, as if it
-went on beyond them. Changes and errors that rounding may have a part in are marked * and count for no order.
+In time: changes of positions and rotations, velocities and angular velocities at the end when the steps are halved, for
+two scenes: a rod that swings between two pins, and a chain with joint, damping, prescribed motion and follower loads.
+In
+space: errors at three element ends against a fine mesh, all with the same steps; the motion of the rod between pins is
+smooth up to its ends. Changes and errors that may be affected by rounding are marked * and not used for orders.
 """
 
 import argparse
@@ -23,7 +24,7 @@ SCHEMES = {"momentum": 2, "energy": 2, "generalised-alpha": 2, "triple-jump": 4}
 STEPS, QUICK_STEPS = (40, 80, 160, 320, 640), (40, 80, 160)
 MESHES = {1: (8, 16, 32, 64), 2: (8, 16, 32, 64), 3: (4, 8, 16, 24), 4: (4, 8, 12)}
 QUICK_MESHES = {1: (16, 32), 2: (16, 32), 3: (8, 12), 4: (4, 8)}
-# Rounding: of changes in time, relative; in space, so many times what two fine meshes differ by.
+# Rounding errors: of changes in time, relative; in space, as a multiple of the difference of two fine meshes.
 _ROUNDING, _ABOVE = 1e-10, 20
 _DURATION, _DT = 0.4, 0.05
 
@@ -45,7 +46,8 @@ def pinned():
 
 
 def chain():
-    """Two soft damped rods on a ball joint, turned at the root, under forces that vary and turn: (last rod, scene)."""
+    """Two soft damped rods with a ball joint, rotated at the root,
+    under loads that vary and follow: (last rod, scene)."""
     section = cf.Stiffness((100, 100), 100, (500, 500), 500, mass=1.0, inertia=(10, 10, 20))
     damping = cf.Damping(time=0.02, drag=0.1)
     a = cf.Rod(cf.Line((0, 0, 0), (6, 0, 0)), section, name="a", damping=damping)
@@ -60,7 +62,7 @@ def chain():
 
 
 def in_time(scene, station, duration, scheme, steps):
-    """{query: (changes where steps are halved, relative; orders between them, nan where rounding takes part)}."""
+    """{query: (relative changes when steps are halved; orders between them, nan where affected by rounding)}."""
     runs = [
         cf.simulate(
             scene, duration, dt=duration / n, elements=2, degree=2, scheme=scheme, save_every=duration, model="spatial"
@@ -89,13 +91,13 @@ def at_ends(rod, scene, elements, degree):
 
 
 def orders(errors, counts, floor):
-    """Orders between errors that go with numbers of steps or elements; nan where one of both is below a floor."""
+    """Orders between errors for numbers of steps or elements; nan where one of two errors is below `floor`."""
     observed = np.log(errors[:-1] / errors[1:]) / np.log(np.divide(counts[1:], counts[:-1]))
     return np.where(np.minimum(errors[:-1], errors[1:]) > floor, observed, math.nan)
 
 
 def last(observed):
-    """The order between the finest two that rounding has no part in."""
+    """The order of the finest two that are not affected by rounding."""
     return float(observed[np.isfinite(observed)][-1])
 
 
@@ -108,15 +110,15 @@ def time_table(steps):
     """(lines of the table, {(scene, scheme): {query: the finest order in dt}})."""
     (rod, swinging), (b, driven) = pinned(), chain()
     text = (
-        f"Relative changes at the end from {steps[-2]} to {steps[-1]} steps, and the orders in dt observed from {steps[0]} steps "
-        "on (2 P2 elements a rod):"
+        f"Relative changes at the end from {steps[-2]} to {steps[-1]} steps, and the orders in dt observed from"
+        f" {steps[0]} steps on (2 P2 elements a rod):"
     )
     head = "| scene | scheme | position | rotation | velocity | angular velocity |"
     lines, observed = [text, "", head, "|---|---|---|---|---|---|"], {}
     for name, scene, station, duration in (("pinned", swinging, rod.at(0.5), 0.4), ("chain", driven, b.end, 2.0)):
         for scheme in SCHEMES:
             if (name, scheme) == ("chain", "triple-jump"):
-                continue  # it takes no damping
+                continue  # it does not allow damping
             found = in_time(scene, station, duration, scheme, steps)
             observed[name, scheme] = {query: last(ways) for query, (_, ways) in found.items()}
             row = " | ".join(f"{changes[-1]:.1e} ({words(ways)})" for changes, ways in found.values())
@@ -126,13 +128,15 @@ def time_table(steps):
 
 
 def space_table(meshes, fine):
-    """(lines of the table, {degree: the finest order in h}); two fine meshes of degree 4 tell the truth and its rounding."""
+    """(lines of the table, {degree: the finest order in h}); two fine
+    meshes of degree 4 give reference and rounding."""
     rod, scene = pinned()
     other, reference = (at_ends(rod, scene, n, 4) for n in fine)
     floor = _ABOVE * np.abs(other - reference).max()
     text = (
-        f"Largest errors of positions over the length and of q at element ends, rod between pins, {_DURATION / _DT:.0f} steps of "
-        f"the momentum scheme, and the orders in h between the meshes (*: below {floor:.0e}, where rounding takes part):"
+        f"Largest errors of positions over the length and of q at element ends, rod between pins, {_DURATION / _DT:.0f}"
+        f" steps of the momentum scheme, and the orders in h between the meshes (*: below {floor:.0e}, where rounding"
+        " takes part):"
     )
     lines = [text, "", "| degree p | elements | errors | orders | 2p |", "|---|---|---|---|---|"]
     observed = {}
@@ -149,7 +153,7 @@ def main(quick=False, out="out"):
     """Print the tables, write them to out/orders.md.
 
     Returns:
-        {(scene, scheme): {query: order in dt}} and {degree: order in h}, of the finest two that count.
+        {(scene, scheme): {query: order in dt}} and {degree: order in h}, of the finest two that are used.
     """
     in_dt, temporal = time_table(QUICK_STEPS if quick else STEPS)
     in_h, spatial = space_table(QUICK_MESHES if quick else MESHES, (12, 16) if quick else (24, 32))

@@ -1,11 +1,11 @@
-"""What the public face costs above the bare dolfinx and PETSc calls it makes: a sweep of 31 points, eta = 0.05 .. 1.5.
+"""Overhead of `solve` over the dolfinx and PETSc calls that it makes: a sweep of 31 points, eta = 0.05 .. 1.5.
 
     python demos/overhead.py            medians of 15 alternating runs, processor time
-    python demos/overhead.py --quick    one run each, to see that both give the same digits
+    python demos/overhead.py --quick    one run each, to check that both give the same digits
 
 The bare loop takes the same predicted starts and Newton iterations: residual and tangent assembled, KLU, the update of
-the carried contact force. The stability count (one more assembly and a factorisation a point) is what the package adds
-on purpose; the loop is timed without it and with it.
+the carried contact force. The stability count (one more assembly and factorisation per point) is an addition of the
+package; the loop is timed without it and with it.
 """
 
 import argparse
@@ -27,7 +27,7 @@ MESHES = ((2, 8), (3, 8), (3, 4))  # degree, elements
 
 
 class BareLoop:
-    """The calls themselves, on the model that `solve` has compiled, with a matrix and vectors of its own."""
+    """The bare calls, on the model that `solve` has compiled, with a separate matrix and vectors."""
 
     def __init__(self, model, path):
         self.model, self.iterations = model, path.iterations
@@ -94,8 +94,8 @@ class BareLoop:
 
 
 def compare(degree, elements, runs):
-    """Median processor times (s) of the public face, the bare loop, the bare loop with the stability count; medians of
-    the ratios run by run of the first to the others; the largest difference (m); Newton iterations."""
+    """Median processor times (s) of `solve`, of the bare loop, and of that with the stability count; medians of the
+    ratios of the first to the others in each run; the largest difference (m); Newton iterations."""
     rod, scene = column()
 
     def public():
@@ -126,12 +126,15 @@ def main(runs=15, out="out"):
     """Print the table and write it to out/overhead.md.
 
     Returns:
-        Ratios to the bare loop, ratios to the one with the stability count, differences (m), one of each a mesh.
+        Ratios to the bare loop, ratios to the one with the stability count, differences (m), one per mesh.
     """
     lines = [
         f"{compat.version()}; medians of {runs} run(s), processor time, one process.",
         "",
-        "| degree, elements | Newton iterations | `cf.solve` (ms) | bare loop (ms) | ratio | with stability (ms) | ratio |",
+        (
+            "| degree, elements | Newton iterations | `cf.solve` (ms) | bare loop (ms) | ratio | with stability (ms) |"
+            " ratio |"
+        ),
         "|---|---|---|---|---|---|---|",
     ]
     results = []

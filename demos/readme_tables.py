@@ -1,4 +1,5 @@
-"""Put the tables that `make tables`, `make figure3` and their like have left in out/ between their markers in README.md."""
+"""Put the tables that `make tables`, `make figure3` and their like
+have left in out/ between their markers in README.md."""
 
 import re
 from pathlib import Path
@@ -18,7 +19,7 @@ TABLES = (
 
 
 def main(out="out"):
-    """Replace what stands between <!-- name --> and <!-- /name --> by out/name.md, where there is one."""
+    """Replace the text between <!-- name --> and <!-- /name --> by out/name.md, where this exists."""
     text = README.read_text(encoding="utf-8")
     for name in TABLES:
         file = Path(out) / f"{name}.md"

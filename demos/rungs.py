@@ -1,11 +1,11 @@
-"""What the cheapest sufficient model saves: every scene by every model that it fits, at the same mesh.
+"""Time saved by the cheapest valid model: every scene with every valid model, on the same mesh.
 
     python demos/rungs.py            medians of 9 alternating runs, processor time, warm
-    python demos/rungs.py --quick    one run each, to see that the models agree
+    python demos/rungs.py --quick    one run each, to check that the models agree
 
-Time is that of `solve` and of asking for the tip's position; the ratio is to the spatial model, run by run. The error
-is that of the tip, largest over the path, relative to its displacement: against the exact rod
-(`cosserat_fenicsx.analytic`) where there is one, else against the spatial model on four times as many elements.
+Times are those of `solve` and the query of the tip's position; ratios are to the spatial model in the same run. The
+error is that of the tip, the largest over the path, relative to its displacement, against the exact rod
+(`cosserat_fenicsx.analytic`) if available, otherwise against the spatial model on four times as many elements.
 """
 
 import argparse
@@ -40,7 +40,7 @@ def elastica():
 
 
 def self_weight():
-    """A steel wire of 3 m and 4 mm, clamped level, under its weight."""
+    """A steel wire of 3 m and 4 mm, clamped horizontally, under its weight."""
     rod = cf.Rod(cf.Line((0, 0, 0), (3.0, 0, 0)), cf.Circle(0.004), STEEL, name="wire")
     return cf.Scene([rod], [cf.Clamp(rod.start)], [cf.Weight()]), rod.end, np.linspace(0.1, 1, 10), None
 

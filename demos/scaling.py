@@ -1,11 +1,12 @@
-"""How processor time and memory of a Newton step grow with the number of unknowns, 1e2 .. 1e6, on the spatial rung.
+"""Processor time and memory of a Newton step against the number of unknowns, 1e2 .. 1e6, with the spatial model.
 
     python demos/scaling.py             to 1e6 unknowns; writes out/scaling.md
     python demos/scaling.py --quick     to 1e4
 
-Each size runs in a process of its own: a thick cantilever under a small force across, degree 4, one Newton step (residual,
-tangent, factorisation, solution, update of n) repeated from rest, and one count of negative modes; medians. Small matrices are
-factored by blocks of nodes, which is cheaper, large ones with pivots everywhere (`Signature.slender`): exponents are told of each.
+Each size runs in a separate process: a thick cantilever under a small transverse force, degree 4, one Newton step
+(residual, tangent, factorisation, solution, update of n) repeated from rest, and one count of negative modes; medians.
+Small matrices are factored by node blocks, which is cheaper, large ones with full pivoting (`Signature.slender`):
+exponents are given for each kind.
 """
 
 import argparse
@@ -29,8 +30,8 @@ _DEGREE = 4
 
 
 def measure(elements):
-    """Unknowns, seconds of a Newton step, seconds of a count of negative modes, largest memory of this process (MB), and whether
-    the tangent is factored by blocks."""
+    """Number of unknowns, time of a Newton step (s), time of a count of negative modes (s), largest memory of this
+    process (MB), and whether the tangent is factored by blocks."""
     _, scene = column()
     layout = Layout.of(scene, elements)
     with solvers.solvers_of(scene, layout, degree=_DEGREE) as (problem, newton, stability):
@@ -56,7 +57,7 @@ def measure(elements):
 
 
 def exponent(x, y):
-    """Of y = c x^exponent, by least squares through some points; nan where there are not two of them with y > 0."""
+    """The exponent in y = c x^exponent by least squares; nan with fewer than two points with y > 0."""
     some = y > 0
     return float(np.polyfit(np.log(x[some]), np.log(y[some]), 1)[0]) if some.sum() > 1 else float("nan")
 
@@ -78,19 +79,25 @@ def main(sizes=SIZES, out="out"):
     unknowns, step, count, memory, blocks = rows.T
     of_blocks = blocks.astype(bool)
     lines = [
-        f"{compat.version()}; medians, processor time, one process. Memory is the process's largest, everything loaded.",
+        (
+            f"{compat.version()}; medians, processor time, one process. Memory is the process's largest, everything"
+            " loaded."
+        ),
         "",
         "| unknowns | factored | Newton step (ms) | us an unknown | count of negative modes (ms) | memory (MB) |",
         "|---|---|---|---|---|---|",
         *(
-            f"| {n:.0f} | {'by blocks' if b else 'pivoting'} | {1e3 * a:.3f} | {1e6 * a / n:.2f} | {1e3 * c:.3f} | {m:.0f} |"
+            f"| {n:.0f} | {'by blocks' if b else 'pivoting'} | {1e3 * a:.3f} | {1e6 * a / n:.2f} | {1e3 * c:.3f} |"
+            f" {m:.0f} |"
             for n, a, c, m, b in rows
         ),
         "",
-        f"Exponents, least squares: step by blocks {exponent(unknowns[of_blocks], step[of_blocks]):.3f}, pivoting "
-        f"{exponent(unknowns[~of_blocks], step[~of_blocks]):.3f}, all rows {exponent(unknowns, step):.3f}; count "
-        f"{exponent(unknowns, count):.3f}; memory above the smallest, pivoting "
-        f"{exponent(unknowns[~of_blocks], memory[~of_blocks] - memory[0]):.3f}.",
+        (
+            f"Exponents, least squares: step by blocks {exponent(unknowns[of_blocks], step[of_blocks]):.3f}, pivoting "
+            f"{exponent(unknowns[~of_blocks], step[~of_blocks]):.3f}, all rows {exponent(unknowns, step):.3f}; count "
+            f"{exponent(unknowns, count):.3f}; memory above the smallest, pivoting "
+            f"{exponent(unknowns[~of_blocks], memory[~of_blocks] - memory[0]):.3f}."
+        ),
     ]
     text = "\n".join(lines)
     Path(out).mkdir(parents=True, exist_ok=True)

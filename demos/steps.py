@@ -1,10 +1,11 @@
-"""What a simulated second costs: a kilometre of drill-pipe hangs and is pulled to and fro, 200 P2 elements, steps of 5 ms.
+"""Computing time of a simulated second: a hanging drill-pipe of 1 km, moved up and down, 200 P2 elements, steps of 5
+ms.
 
     python demos/steps.py            medians of 7 runs of 5 s, processor time; writes out/steps.md
     python demos/steps.py --quick    one run of 0.2 s
 
-Forms are compiled and the pipe hangs in equilibrium before the clock starts; the whole call of `simulate` counts, with
-the ledger of energies and the state saved every second.
+Forms are compiled and the initial equilibrium is computed before; the time is that of the whole call of `simulate`,
+with the energy balance and the state saved every second.
 """
 
 import argparse
@@ -22,7 +23,7 @@ KINDS = (("spatial", "momentum"), ("planar", "momentum"), ("spatial", "energy"))
 
 
 def pipe():
-    """The pipe (5 in x 4.276 in), its scene, and the equilibrium that it starts from, by the model's name."""
+    """The pipe (5 in x 4.276 in), its scene, and the initial equilibrium, by the model's name."""
     steel = cf.Material(E=210e9, nu=0.3, density=7850.0)
     rod = cf.Rod(cf.Line((0, 0, 0), (0, 0, 1000.0)), cf.Tube(0.127, 0.1086), steel, name="pipe")
     held, weight = [cf.Clamp(rod.end)], cf.Weight((0, 0, -9.81))
@@ -35,7 +36,7 @@ def pipe():
 
 
 def measure(model, scheme, runs, duration):
-    """Median processor time (s) of a simulated second, iterations of a step, and the last `History`."""
+    """Median processor time (s) per simulated second, iterations per step, and the last `History`."""
     _, scene, hanging = pipe()
     settings = {"dt": DT, "elements": ELEMENTS, "degree": DEGREE, "model": model, "scheme": scheme, "save_every": 1.0}
     start, seconds = hanging(model), []
@@ -54,7 +55,10 @@ def main(runs=7, duration=5.0, out="out"):
         [(seconds, iterations, History)], one of each kind.
     """
     lines = [
-        f"{in_words(record())}. Medians of {runs} run(s) of {duration:g} s, steps of {1e3 * DT:g} ms, {ELEMENTS} P{DEGREE} elements.",
+        (
+            f"{in_words(record())}. Medians of {runs} run(s) of {duration:g} s, steps of {1e3 * DT:g} ms, {ELEMENTS}"
+            f" P{DEGREE} elements."
+        ),
         "",
         "| model | scheme | unknowns | iterations a step | processor seconds a simulated second |",
         "|---|---|---|---|---|",

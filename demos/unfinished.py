@@ -1,15 +1,15 @@
-"""The command line of a demo that keeps what is done when it is broken off."""
+"""The command line of a demo that can be interrupted and continued."""
 
 import argparse
 import sys
 
 
 def command(main, about, quick):
-    """Run `main(quick=, fresh=, out=)` as the command line says.
+    """Run `main(quick=, fresh=, out=)` with the options of the command line.
 
     Args:
-        main: goes on from what an earlier run has left in `out`, unless it is to be `fresh`.
-        about: the demo's docstring; quick: what its quick mode is.
+        main: continues an earlier run from its files in `out`, unless `fresh`.
+        about: the demo's docstring; quick: description of its quick mode.
     """
     parser = argparse.ArgumentParser(description=about, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--quick", action="store_true", help=quick)

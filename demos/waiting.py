@@ -1,4 +1,4 @@
-"""What a person waits: whole processes from the start to the answer, with warm and with empty caches."""
+"""Waiting times: whole processes from the start to the answer, with warm and with empty caches."""
 
 import json
 import math
@@ -24,9 +24,9 @@ def waits(started, rows):
     """[{who, what, caches, processor, wall, failed}], s.
 
     Here `cosserat run` on the paper's cantilever, to the printed table. For a peer its process, which imports, builds
-    and solves the sweep (or the single answer, where it has none of the sweep) at an error below 1e-5, or 1e-3, or 1e-2,
-    as it can. Cold: with the folders empty where compiled forms (here) or functions (numba's) are kept; the others compile
-    nothing and have no cold start of their own.
+    and solves the sweep (or the single answer, where it has none of the sweep) at an error below 1e-5, or 1e-3, or
+    1e-2, the smallest that it reaches. Cold: with empty caches of compiled forms (here) or functions (numba); the
+    others compile nothing and have no separate cold start.
     """
     found = []
     for name, peer in started.items():

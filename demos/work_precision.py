@@ -1,16 +1,15 @@
 """Speed against accuracy: this package and its peers on the same problems, one chart each (`make work-precision`).
 
-    python demos/work_precision.py            all of it, at most half an hour; goes on where it was broken off
-    python demos/work_precision.py --fresh    forgets the samples that are there
+    python demos/work_precision.py            everything, at most half an hour; continues an interrupted run
+    python demos/work_precision.py --fresh    discards existing samples
     python demos/work_precision.py --problems sweep
-    python demos/work_precision.py --quick    a few configurations, at most a minute, nothing is installed
+    python demos/work_precision.py --quick    a few configurations, at most a minute; nothing is installed
 
-Leaves in out/: work_precision.json (every sample), work_precision.md (the table), work_precision_*.png.
+Writes to out/: work_precision.json (every sample), work_precision.md (the table), work_precision_*.png.
 
-Every peer is a process of its own, in an environment of its own, on one thread. A sample is processor time of the
-process around one warm solution from the unloaded state; a first round asks every configuration for three samples (slow ones
-for one), later ones for the rest, in an order that changes from round to round, so that peers alternate, until a
-configuration has five. A number is their median.
+Every peer runs in a separate process and environment, on one thread. A sample is the processor time of one warm
+solution from the unloaded state. The first round takes three samples of every configuration (one of slow ones), later
+rounds the others, in a changing order, so that peers alternate, until a configuration has five. Results are medians.
 """
 
 import argparse
@@ -30,7 +29,7 @@ from peers.process import Peer
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 from waiting import waits
 
-SAMPLES, SEED = 5, 2026  # at least so many of a row
+SAMPLES, SEED = 5, 2026  # smallest number of samples of a row; of the random order
 #: Time limits of a request, s: here it may compile a form; the last two compile, relax or are whole programs.
 LIMITS = {OWN: 40.0, "Exudyn": 4.0, "OpenSeesPy": 4.0, "PyElastica": 20.0, "CalculiX": 20.0}
 SLOW_PEERS = ("PyElastica", "CalculiX")
@@ -39,18 +38,19 @@ SLOW = 0.5  # s: from here on there is no warm-up run, and no repetition where t
 BUDGET = 20 * 60.0  # s of measuring; a round that would begin later is left out, and the table says so
 
 
-#: What is measured: peers, problems, how their errors are told, the configurations of a peer, what these are called, how
+#: What is measured: peers, problems, how their errors are told, the configurations of a peer, what these are called,
+#: how
 #: many samples are taken first of one that may be slow, and whether all fast ones of this package get all samples.
 Panel = namedtuple("Panel", "peers problems error configurations kind model first whole")
 STATICS = Panel(PEERS, problems, error, configurations, kind, model, 3, True)
 
 
 class Record:
-    """What was measured so far, in a file that is whole at any time.
+    """The measurements so far, in a file that is complete at any time.
 
     Args:
         file: out/work_precision.json.
-        fresh: begin anew.
+        fresh: whether to ignore an existing file.
         panel: default STATICS.
     """
 
@@ -68,7 +68,7 @@ class Record:
         prints = {peer: fingerprint(peer) for peer in self.panel.peers}
         if not same or any(row["fingerprint"] != prints[row["peer"]] for row in before["samples"]):
             print(f"{self.file}: from another machine or other sources, so all is measured anew", flush=True)
-            return  # what is compared belongs to one run
+            return  # compared samples must be of one run
         for row in before["samples"]:
             self.rows[self.key(row["problem"], row["peer"], row["configuration"])] = row
         self.spent, self.versions = before["spent_s"], before["versions"]
@@ -78,7 +78,7 @@ class Record:
         return json.dumps([problem, peer, configuration], sort_keys=True)
 
     def row(self, problem, peer, configuration):
-        """The row of a configuration, made where there is none."""
+        """The row of a configuration, added if missing."""
         key = self.key(problem, peer, configuration)
         if key not in self.rows:
             name, spatial = self.panel.kind(peer, configuration)
@@ -103,7 +103,7 @@ class Record:
 
 
 def start(peers, install, found):
-    """The peers' processes by name; what is missing is noted and left out."""
+    """The peers' processes by name; peers that are missing are recorded and left out."""
     started = {}
     for name in peers:
         print(f"{name}: environment ...", flush=True)
@@ -117,7 +117,7 @@ def start(peers, install, found):
 
 
 def sample(peer, row, found, wanted, limits):
-    """More samples of a row, or why there are none."""
+    """Take more samples of a row, or record why this failed."""
     problem = found.panel.problems()[row["problem"]]
     slow = bool(row["seconds"]) and min(row["seconds"]) > SLOW
     cold = row["peer"] in SLOW_PEERS
@@ -128,7 +128,7 @@ def sample(peer, row, found, wanted, limits):
     answer = peer.ask(problem, row["configuration"], **visit, limit=limits[peer.name])
     found.spent += time.monotonic() - began
     if "failed" in answer:
-        row["failed"] = None if row["seconds"] else answer["failed"]  # just beyond the time limit this time
+        row["failed"] = None if row["seconds"] else answer["failed"]  # a single sample just beyond the time limit
     else:
         row["seconds"] += answer["seconds"]
         row["error"] = found.panel.error(row["problem"], row["model"], answer["tip"])
@@ -138,10 +138,11 @@ def sample(peer, row, found, wanted, limits):
 
 
 def worth(row, rows, whole):
-    """Whether another sample can matter: not where the same element, or this package, is clearly better elsewhere.
+    """Whether more samples are useful: not if another row of the same kind is clearly better.
 
-    If `whole`, all of this package's rows below SLOW are repeated. Otherwise a row is not repeated that another of its kind (of its
-    peer, where it is slow) beats in error and by half in time; its point in the chart then has fewer samples.
+    If `whole`, all of this package's rows below SLOW are repeated. Otherwise a row is not repeated if another of its
+    kind (of its peer, if it is slow) has a smaller error and half the time; its point in the chart then has fewer
+    samples.
     """
     if row["failed"] or not row["seconds"]:
         return not row["failed"]
@@ -156,7 +157,7 @@ def worth(row, rows, whole):
 
 
 def measure(started, names, found, *, quick, wanted, limits, budget):
-    """Rounds of samples, until every row has `wanted` of them or the time is spent."""
+    """Rounds of samples, until every row has `wanted` of them or the time limit is reached."""
     rows = [
         found.row(name, peer, configuration)
         for peer in started
@@ -165,7 +166,7 @@ def measure(started, names, found, *, quick, wanted, limits, budget):
     ]
     columns = TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn()
     with Progress(*columns) as bar:
-        for name in names:  # one after the other, so that all of a chart is measured at one time
+        for name in names:  # one after the other, so that all points of a chart are measured at about the same time
             here = [row for row in rows if row["problem"] == name]
             like = {peer: [row for row in here if row["peer"] == peer] for peer in started}
             for number in range(wanted):
@@ -179,11 +180,11 @@ def measure(started, names, found, *, quick, wanted, limits, budget):
 
 
 def _round(todo, like, started, found, wanted, limits, bar, name):
-    """Samples of every row that is still worth it."""
+    """Samples of every row for which more are useful."""
     task, told = bar.add_task(name, total=len(todo)), time.monotonic()
     for i, row in enumerate(todo):
         bar.update(task, description=f"{name}: {row['peer']}", completed=i)
-        if not bar.console.is_terminal and time.monotonic() - told > 30:  # a bar that nobody sees
+        if not bar.console.is_terminal and time.monotonic() - told > 30:  # lines instead of the bar
             told = time.monotonic()
             print(f"{name}: {i} of {len(todo)}", flush=True)
         if worth(row, like[row["peer"]], found.panel.whole):
@@ -228,7 +229,8 @@ def main(out="out", quick=False, fresh=False, peers=PEERS, names=None, wanted=No
     print(text)
     told = Counter(row["failed"] is not None for row in rows)
     print(
-        f"\n{told[False]} configurations answered, {told[True]} did not; written: {found.file}, {stem}.md, {', '.join(pictures)}"
+        f"\n{told[False]} configurations answered, {told[True]} did not; written: {found.file}, {stem}.md,"
+        f" {', '.join(pictures)}"
     )
     return found
 

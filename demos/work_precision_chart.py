@@ -1,4 +1,4 @@
-"""The charts of speed against accuracy: one a problem, and one of what a person waits."""
+"""The charts of speed against accuracy, one per problem, and one of waiting times."""
 
 import statistics
 from pathlib import Path
@@ -13,7 +13,7 @@ from peers.environments import OWN
 from peers.problems import TITLES
 from work_precision_table import answered, median
 
-#: (problem, file, subtitle, whether only the spatial ones of the own models are shown).
+#: (problem, file, subtitle, whether only the spatial model of this package is shown).
 _VIEWS = (
     ("sweep", "sweep", "every model that the plane problem allows", False),
     ("sweep", "sweep_spatial", "forced into space; peers that stay in the plane are shown too", True),
@@ -26,7 +26,7 @@ _VIEWS = (
 _OURS = {"determinate": "#08519c", "planar": "#3182bd", "spatial": "#31a354", "auto": "black"}
 _THEIRS = {"Exudyn": "#d95f02", "OpenSeesPy": "#b2182b", "PyElastica": "#7570b3", "CalculiX": "#8c6d31"}
 _MARKS = "osD^vP"
-_ROUND_OFF = 1e-14  # errors below are shown here
+_ROUND_OFF = 1e-14  # smaller errors are shown at this value
 _BETTER = 0.9
 _ELEMENTS = {"elastic": "elasticBeamColumn", "CBDI": "forceBeamColumnCBDI", "EP": "Euler parameters"}
 
@@ -48,7 +48,8 @@ def draw(found, rows, out, stem):
 
 
 def frontier(rows):
-    """Rows that no other beats in both error and time, the most accurate first; a slightly smaller error is none."""
+    """Rows that no other beats in both error and time, the most
+    accurate first; slightly smaller errors do not count."""
     best = []
     for row in sorted(rows, key=lambda row: (median(row), row["error"])):
         if not best or max(row["error"], _ROUND_OFF) < _BETTER * best[-1]["error"]:
@@ -57,7 +58,7 @@ def frontier(rows):
 
 
 def _groups(rows):
-    """{label: (colour, marker, line style, rows)}, this package first; an own rung is one line, whatever formulation."""
+    """{label: (colour, marker, line style, rows)}, this package first, with one line per model for all formulations."""
     groups = {}
     for row in rows:
         ours = row["peer"] == OWN
@@ -79,7 +80,7 @@ def _groups(rows):
 
 
 def _in_full(element):
-    """An element by the name that its solver gives it."""
+    """The name of an element in its solver."""
     return " ".join(_ELEMENTS.get(word, word) for word in element.split())
 
 
@@ -95,7 +96,7 @@ def _chart(rows, title, problem, file):
     axes.set_yscale("log")
     axes.set_xlim(0.4 * min(_points(rows)[0]), 2.0)
     times = _points(rows)[1]
-    axes.set_ylim(0.3 * min(times), 2 * max(times))  # below: room for the words
+    axes.set_ylim(0.3 * min(times), 2 * max(times))  # with space for the text at the bottom
     axes.yaxis.set_major_formatter(lambda seconds, _: f"{seconds:g} s" if seconds >= 1 else f"{1e3 * seconds:g} ms")
     measured = (
         r"of the tip displacement $\delta$"
@@ -107,9 +108,11 @@ def _chart(rows, title, problem, file):
     axes.set_ylabel("processor time of one warm answer, one thread")
     axes.set_title(title)
     axes.grid(which="major", alpha=0.4)
-    axes.annotate("better: faster,\nmore accurate", (0.015, 0.02), (0.09, 0.10), xycoords="axes fraction", textcoords="axes fraction",
+    axes.annotate("better: faster,\nmore accurate", (0.015, 0.02), (0.09, 0.10), xycoords="axes fraction",
+                  textcoords="axes fraction",
                   fontsize=10, arrowprops={"arrowstyle": "->"})  # fmt: skip
-    axes.text(0.99, 0.01, "small dots: every mesh, degree and formulation measured; lines: the best of each; dashed: peers in space", fontsize=8,
+    axes.text(0.99, 0.01, "small dots: every mesh, degree and formulation measured; lines: the best of each; dashed: "
+                          "peers in space", fontsize=8,
               transform=axes.transAxes, ha="right", color="0.3")  # fmt: skip
     figure.legend(*axes.get_legend_handles_labels(), loc="outside lower center", ncols=3, fontsize=8.5, frameon=False)
     figure.savefig(file, dpi=130)

@@ -1,12 +1,12 @@
 """Speed against accuracy in motion: the schemes of this package and Exudyn's geometrically exact rods, one chart.
 
-    python demos/work_precision_motion.py            all of it, some six minutes; goes on where it was broken off
-    python demos/work_precision_motion.py --fresh    forgets the samples that are there
-    python demos/work_precision_motion.py --quick    a few configurations, nothing is installed
+    python demos/work_precision_motion.py            everything, about six minutes; continues an interrupted run
+    python demos/work_precision_motion.py --fresh    discards existing samples
+    python demos/work_precision_motion.py --quick    a few configurations; nothing is installed
 
-Leaves in out/: work_precision_motion.json (every sample), .md (the table), .png (the chart). How it is measured:
-`work_precision`. The error is the distance of the ends of the rods at the end from where they should be, over the length
-of a rod (peers/motions.py).
+Writes to out/: work_precision_motion.json (every sample), .md (the table), .png (the chart). For the measurement see
+`work_precision`. The error is that of the final positions of the rods' ends, over the length of a rod
+(peers/motions.py).
 """
 
 import argparse
@@ -29,16 +29,16 @@ PANEL = Panel(
     motions.PEERS, motions.problems, motions.error, motions.configurations, motions.kind, motions.model, 1, False
 )
 ACCURACIES = (1e-2, 1e-3, 1e-4)
-ASKED_AT, ASKED = 1e-3, 1 / 2  # the error of the ratio that was asked for, and how large it may be
-BUDGET = 270.0  # s of measuring; a round that would begin later is left out
+ASKED_AT, ASKED = 1e-3, 1 / 2  # the error at which times are compared, and the largest ratio of times allowed
+BUDGET = 270.0  # s of measurement; rounds that would begin later are left out
 LIMIT, QUICK_LIMIT = 40.0, 5.0  # s, of a request: here it may compile a form; of all peers in a quick run
 _COLOURS = {"momentum": "#08519c", "energy": "#31a354", "triple-jump": "#7570b3"}
-_OTHERS = ("#1b9e77", "#e7298a", "#666666")  # of schemes that come later
+_OTHERS = ("#1b9e77", "#e7298a", "#666666")  # for additional schemes
 _THEIRS = {"LG": "#d95f02", "EP": "#b2182b"}
 
 
 def called(row):
-    """A configuration in words."""
+    """A configuration as text."""
     c = row["configuration"]
     step = f"steps of {1e3 * c['dt']:g} ms" if "dt" in c else f"tol {c['tol']:g}"
     if row["peer"] == OWN:
@@ -47,7 +47,8 @@ def called(row):
 
 
 def ratio(rows, problem):
-    """The cheapest own and peer's row of an error of ASKED_AT, each or None, and the ratio of their times, or None."""
+    """The cheapest rows of this package and of the peer with an error up to
+    ASKED_AT, or None, and the ratio of their times, or None."""
     here = answered(rows, problem)
     mine, theirs = (cheapest([r for r in here if (r["peer"] == OWN) == own], ASKED_AT) for own in (True, False))
     return mine, theirs, median(mine) / median(theirs) if mine and theirs else None
@@ -60,9 +61,18 @@ def text(found, rows):
     lines = [
         f"{in_words(found.about['machine'])}. Random seed of the order {found.about['seed']}.",
         "",
-        f"Processor time of one thread, warm, medians of up to {found.about['samples']} samples (of {least} or more in the first table), peers in alternation. What is timed: here the whole",
-        "call of `simulate` in space, and the query of the ends; for Exudyn `SolveDynamic`, its model built before. The error is",
-        "the distance of the ends from their true places, over the length of a rod; mesh and step the best measured of each.",
+        (
+            f"Processor time of one thread, warm, medians of up to {found.about['samples']} samples (of {least} or more"
+            " in the first table), peers in alternation. What is timed: here the whole"
+        ),
+        (
+            "call of `simulate` in space, and the query of the ends; for Exudyn `SolveDynamic`, its model built before."
+            " The error is"
+        ),
+        (
+            "the distance of the ends from their true places, over the length of a rod; mesh and step the best measured"
+            " of each."
+        ),
         *(f"\n{peer} is missing: {why}" for peer, why in found.missing.items()),
         "",
         "| problem | error | here | Exudyn | ratio | asked at most | |",
@@ -83,7 +93,8 @@ def text(found, rows):
             lines.append(f"| {title} | {name} | {cells} | {min(row['error'] for row in members):.0e} |")
     failed = [row for row in rows if row["failed"]]
     if failed:
-        lines += ["", f"Without an answer: {len(failed)} configurations, such as {called(failed[0])} ({failed[0]['failed'][:80]})."]  # fmt: skip
+        lines += ["", f"Without an answer: {len(failed)} configurations, such as {called(failed[0])} "
+                      f"({failed[0]['failed'][:80]})."]  # fmt: skip
     return "\n".join(lines)
 
 
@@ -96,7 +107,7 @@ def _groups(rows):
 
 
 def draw(rows, file):
-    """The chart: one panel a problem."""
+    """The chart, one panel per problem."""
     figure, panels = plt.subplots(1, len(motions.TITLES), figsize=(12.5, 6.2), layout="constrained", sharey=True)
     seen = {}
     for axes, (problem, title) in zip(panels, motions.TITLES.items(), strict=True):
@@ -140,7 +151,7 @@ def main(out="out", quick=False, fresh=False, peers=motions.PEERS, wanted=None):
     """Measure, write the JSON, the table and the chart.
 
     Args:
-        out: folder; quick: few configurations, nothing is installed; fresh: forget earlier samples; peers: which;
+        out: folder; quick: few configurations, nothing is installed; fresh: discard earlier samples; peers: which;
         wanted: samples of every configuration, at least.
 
     Returns:

@@ -1,4 +1,4 @@
-"""The Markdown table of the speed-accuracy measurement: times at named accuracies, and the ratios that were asked for."""
+"""The Markdown table of speed against accuracy: times at given accuracies, and the required ratios."""
 
 import statistics
 
@@ -7,10 +7,11 @@ from peers.environments import OWN
 from peers.problems import TITLES
 
 ACCURACIES = (1e-3, 1e-5, 1e-7)
-#: (what is asked, own rows, the peers' rows, {accuracy: largest ratio of times}).
+#: (requirement, rows of this package, rows of the peers, {accuracy: largest ratio of times}).
 ASKED = (
     ("planar sweep against the fastest peer", "any", "any", {1e-3: 1 / 2, 1e-5: 1 / 3, 1e-7: 1 / 5}),
-    ("sweep forced to spatial against the fastest spatial peer", "spatial", "spatial", {1e-3: 1 / 5, 1e-5: 1 / 40, 1e-7: 1 / 40}),
+    ("sweep forced to spatial against the fastest spatial peer", "spatial", "spatial",
+     {1e-3: 1 / 5, 1e-5: 1 / 40, 1e-7: 1 / 40}),
     ("sweep forced to spatial against the fastest planar peer", "spatial", "planar", {1e-5: 1.0, 1e-7: 1.0}),
 )  # fmt: skip
 
@@ -34,13 +35,13 @@ def others(rows, spatial=None):
 
 
 def cheapest(rows, accuracy):
-    """The row that is at least so accurate in the least time, or None."""
+    """The fastest row with at least this accuracy, or None."""
     good = [row for row in rows if row["error"] <= accuracy]
     return min(good, key=median, default=None)
 
 
 def called(row):
-    """A configuration in words."""
+    """A configuration as text."""
     c = row["configuration"]
     mesh = (
         f"P{c['degree']}, {c['elements']} elements"
@@ -59,7 +60,7 @@ def milliseconds(seconds):
 
 
 def ratios(rows):
-    """[(what is asked, accuracy, own row, peer's row, ratio or None, asked ratio)]."""
+    """[(requirement, accuracy, this package's row, peer's row, ratio or None, required ratio)]."""
     sweep, found = answered(rows, "sweep"), []
     spatial = {"any": None, "spatial": True, "planar": False}
     for words, ours, theirs, asked in ASKED:
@@ -85,10 +86,22 @@ def _head(found):
     lines = [
         f"{in_words(found.about['machine'])}. Peers: {told or 'none'}. Random seed of the order {found.about['seed']}.",
         "",
-        f"Processor time of one thread, warm, medians of {found.about['samples']} samples (some of what takes over 0.5 s of fewer), peers in alternation. What is timed: here the",
-        "whole call of `solve` and the tip's position, with the stability count (a scene that was solved before is at hand); for Exudyn `SolveStatic`, for OpenSeesPy the",
-        "analysis (the model of both is built before and not counted); for PyElastica the whole relaxation; for CalculiX the whole program. Time at an accuracy: the cheapest configuration measured whose error,",
-        "against the truth of its own mechanical model, is below it. The error is that of delta, largest over the load factors, on the eccentric",
+        (
+            f"Processor time of one thread, warm, medians of {found.about['samples']} samples (some of what takes over"
+            " 0.5 s of fewer), peers in alternation. What is timed: here the"
+        ),
+        (
+            "whole call of `solve` and the tip's position, with the stability count (a scene that was solved before is"
+            " at hand); for Exudyn `SolveStatic`, for OpenSeesPy the"
+        ),
+        (
+            "analysis (the model of both is built before and not counted); for PyElastica the whole relaxation; for"
+            " CalculiX the whole program. Time at an accuracy: the cheapest configuration measured whose error,"
+        ),
+        (
+            "against the truth of its own mechanical model, is below it. The error is that of delta, largest over the"
+            " load factors, on the eccentric"
+        ),
         "cantilever, and of the position of the tip, over its displacement, elsewhere.",
     ]
     missing = [f"- {peer} is missing: {why}" for peer, why in found.missing.items()]
@@ -122,14 +135,15 @@ def _times(rows):
 
 
 def _stopped(rows):
-    """Solvers that gave no answer at all to a problem, with one of the reasons."""
+    """Solvers without any answer to a problem, with one of the reasons."""
     lines = []
     for problem, title in TITLES.items():
         for peer, name in sorted({(r["peer"], r["kind"]) for r in rows if r["problem"] == problem}):
             mine = [r for r in rows if (r["problem"], r["peer"], r["kind"]) == (problem, peer, name)]
             failed = [r for r in mine if r["failed"]]
             if failed:
-                lines.append(f"- {title}: {peer}, {name}: no answer from {len(failed)} of {len(mine)} configurations (\"{failed[-1]['failed'][:100]}\").")  # fmt: skip
+                lines.append(f"- {title}: {peer}, {name}: no answer from {len(failed)} of {len(mine)} configurations "
+                             f"(\"{failed[-1]['failed'][:100]}\").")  # fmt: skip
     return ["Without an answer:", "", *lines, ""] if lines else []
 
 

@@ -60,7 +60,7 @@ def euler_tensor(I_R):
 
 
 def kinetic_energy(r_t, W, inertia):
-    """Per length."""
+    """Kinetic energy per unit length."""
     return (inertia.mass * ufl.dot(r_t, r_t) + ufl.inner(W * euler_tensor(inertia.I_R), W)) / 2
 
 
@@ -71,7 +71,7 @@ def rate_work(rate, W_rate, q_m, inertia, test):
 
 
 def angular_momentum(q, W, inertia):
-    """Per length, inertial: the axial vector of W E R^T twice, sum over a, b of E_ab R_a x W_b."""
+    """Per length, inertial: twice the axial vector of W E R^T, the sum over a, b of E_ab R_a x W_b."""
     B = directors(q) * euler_tensor(inertia.I_R) * W.T
     return ufl.as_vector([B[1, 2] - B[2, 1], B[2, 0] - B[0, 2], B[0, 1] - B[1, 0]])
 
@@ -89,7 +89,7 @@ def stress_work(before, after, section, viscosity, h, test):
 
 
 def strain_energy(line, section):
-    """Per length."""
+    """Strain energy per unit length."""
     return law.energy(section.law, *strains(line, section))
 
 

@@ -6,8 +6,9 @@ section, I_R = R_R diag(Jrho) R_R^T.
 
 A step goes from `before` to `after` in the time h, with the trapezoidal rule for the velocities of the nodes,
 r_t1 = 2 (r_1 - r_0)/h - r_t0 and the same for q. Stress is that of the averaged strains on the directors of the
-averaged configuration, `middle`. With the test functions a and a x r_m, a constant, the step then gives the exact
-balances of linear and angular momentum, since r_m x (r_t1 - r_t0) = (r x r_t)_1 - (r x r_t)_0 for any directors.
+averaged configuration, `middle`. With a constant vector a, the test functions phi_r = a, and phi_r = a x r_m with
+phi = a, then give the exact balances of linear and angular momentum, whatever the directors, since
+r_m x (r_t1 - r_t0) = (r x r_t)_1 - (r x r_t)_0.
 """
 
 from collections import namedtuple
@@ -37,12 +38,12 @@ def momentum(r_t, kappa, inertia, test):
 
 
 def kinetic_energy(r_t, Om, inertia):
-    """Per length."""
+    """Kinetic energy per unit length."""
     return (inertia.mass * ufl.dot(r_t, r_t) + ufl.dot(Om, inertia.I_R * Om)) / 2
 
 
 def strain_energy(motion, section):
-    """Per length."""
+    """Strain energy per unit length."""
     return law.energy(section.law, *strains(motion, section))
 
 

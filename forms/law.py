@@ -3,8 +3,9 @@
 All components are material: the strains e = v - v_R and k = u - u_R, the contact force n and the contact moment m. A
 law is three linear functions, which apply to values of strain and stress and to their changes alike:
 
-    force(e, k) n from the strains moment(n, k) m where the contact force is known strain(n, k) e where the contact
-    force is known
+    force(e, k)    n from the strains
+    moment(n, k)   m from n and k
+    strain(n, k)   e from n and k
 
 The last two are the law partly inverted, as the mixed formulation and the determinate models need it.
 """

@@ -1,9 +1,9 @@
-"""An independent truth for one rod in space: the strong form, clamped at s = 0, under dead loads, on any reference.
+"""An independent reference solution for one rod in space: the strong form, clamped at s = 0, under dead loads.
 
 The path from the unloaded state is followed by arc length in the clamp's moment and the load factor (shooting with
 DOP853 at 1e-7, derivatives by complex steps), its end is shot again at 1e-13, and scipy's solve_bvp (collocation)
-solves the same equations from there. What the last two differ by is the accuracy that is reported; where it is worse
-than was demanded, nothing is returned.
+solves the same equations from there. The difference of the last two is the reported accuracy; if it is worse than
+requested, nothing is returned.
 """
 
 from dataclasses import dataclass, field
@@ -17,11 +17,11 @@ __all__ = ["Equilibrium", "NoTruth", "Problem", "at", "equilibrium", "follow", "
 
 @dataclass
 class Equilibrium:
-    """What was found, and how far it may be believed.
+    """The solution and its accuracy.
 
     accuracy: largest difference of r over L (and of q) between shooting and solve_bvp; nodes, rms: of solve_bvp.
     folds: limit points that the path from the unloaded state passed; crossings: steps of 1e-5 or less in which the
-    determinant of the tangent changed its sign or negative modes came or went, limit points among them. index: negative
+    determinant of the tangent or the number of negative modes changed, limit points included. index: number of negative
     modes of the (symmetric part of the) second variation; None under a line moment.
     """
 
@@ -38,11 +38,11 @@ class Equilibrium:
 
     @property
     def verdict(self):
-        """In words, how sure it is that careful load stepping from the unloaded state arrives here.
+        """Text: how certain it is that load control with small steps from the unloaded state arrives here.
 
         "connected": the path met no singular tangent and ends stable; "connected, indefinite": the same, but a dead
-        moment makes the symmetric part indefinite, which decides nothing; "beyond a bifurcation" or "beyond a limit
-        point": other equilibria are as good an answer; "near a clamp moment": no path was followed.
+        moment makes the symmetric part indefinite, which says nothing about stability; "beyond a bifurcation" or
+        "beyond a limit point": other equilibria are also valid; "near a clamp moment": no path was followed.
         """
         if len(self.path) == 1:
             return "near a clamp moment"
@@ -110,7 +110,7 @@ def follow(problem, most=400, rtol=1e-7):
         if found is not None:
             new, D, iterations = found
             after = tangent(D, t)
-            # a step that turns sharply, or is corrected by much of its length, may have left the branch
+            # a step that turns sharply, or whose correction is a large part of its length, may have left the branch
             if after @ t < 0.9 or np.linalg.norm(new - guess) > 0.2 * size + 1e-9 or new[3] > 1:
                 found = None
         if found is None:
@@ -119,7 +119,7 @@ def follow(problem, most=400, rtol=1e-7):
         fold = after[3] * t[3] < 0
         kind = (np.sign(np.linalg.det(D[:, :3])), index(problem, new, rtol) if problem.conservative else 0)
         if kind != character and not fold and size > 1e-5:
-            # a bifurcation, or a neighbour of one that bends away and was jumped across: only short steps tell
+            # a bifurcation, or a jump between two branches close to one: only short steps distinguish these
             ds = 0.5 * size
             continue
         folds, crossings = folds + int(fold), crossings + int(kind != character)
@@ -153,7 +153,7 @@ def at(problem, clamp_moment, path=None, folds=0, crossings=0, tol=1e-10, nodes=
         ends,
         x,
         shot.sol(x),
-        tol=100 * tol,  # of the residual; what is solved for is two orders better
+        tol=100 * tol,  # of the residual; the solution is two orders more accurate
         bc_tol=0.01 * tol,
         max_nodes=nodes,
     )
@@ -178,6 +178,10 @@ def at(problem, clamp_moment, path=None, folds=0, crossings=0, tol=1e-10, nodes=
 
 
 def equilibrium(problem, tol=1e-10):
-    """Where the branch of the unloaded state first comes to full load; NoTruth where it does not, or not to tol."""
+    """The first state at full load on the branch of the unloaded state.
+
+    Raises:
+        NoTruth: the branch does not reach full load, or not to the accuracy tol.
+    """
     path, folds, crossings = follow(problem)
     return at(problem, path[-1][:3] * problem.units["moment"], path, folds, crossings, tol)

@@ -11,14 +11,16 @@ from scipy.optimize import minimize_scalar
 
 
 def singular_values(twist, torsion):
-    """Of the derivative of (closure, rotation of the end) by (n, m) of the start; R = EI = 1, GJ = torsion; rad.
+    """Singular values of the derivative of (closure, rotation of the end) by (n, m) at the start; R = EI = 1, GJ =
+    torsion; rad.
 
-    One of them is always 0: the ring turns about its tangent while its sections hold, as a round rod lets it.
+    One of them is always 0: a ring of round section can rotate about its tangent everywhere without a change of energy.
     """
     tau = twist / (2 * np.pi)
     y = np.zeros((13, 6), complex)
     y[3] = 1.0
-    # begins at 0 along x, curved about z: n = GJ tau e_z keeps the torque GJ tau d3 in balance as it turns
+    # starts at 0 along x, curved about z: n = GJ tau e_z balances the torque GJ tau d3, whose direction changes along
+    # the ring
     y[7:10] = np.array([0, 0, torsion * tau])[:, None]
     y[10:13] = np.array([torsion * tau, 0, 1.0])[:, None]
     y[7:13] += 1j * STEP * np.eye(6)

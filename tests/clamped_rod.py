@@ -1,6 +1,6 @@
 """One rod of any reference shape, clamped at s = 0, under dead loads: its strong form, shot; its negative modes.
 
-Dead loads make n(s) known, so the unknowns are (r, q, m). Shares nothing with the package. What solves it is bvp.py.
+Dead loads make n(s) known, so the unknowns are (r, q, m). Independent of the package. The solver is bvp.py.
 
 Stability: the number of conjugate points (Morse's index theorem) of the symmetric part of the second variation, which
 for forces is the number of negative modes of the energy.
@@ -16,7 +16,7 @@ START = np.r_[0, 0, 0, 1, 0, 0, 0].astype(float)  # r and q at the clamp
 
 
 class NoTruth(Exception):
-    """The strong form was not solved to what was demanded; nothing is returned then."""
+    """The strong form was not solved to the requested accuracy."""
 
 
 def matrix(q):
@@ -31,7 +31,7 @@ def matrix(q):
 
 
 def cross(a, b):
-    """a x b of arrays (3, k) or (3, 1); numpy's own costs more than the rest of the right-hand side."""
+    """a x b of arrays (3, k) or (3, 1); numpy.cross takes longer than the rest of the right-hand side."""
     return np.array([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
 
 
@@ -113,7 +113,7 @@ class Problem:
         def slope(x, flat):
             return self.slope(np.array([x]), flat.reshape(shape), eta).ravel()
 
-        # the largest step is for the complex derivatives: too small to be seen by the control of the error
+        # step size bounded for the complex derivatives: they are too small to influence the error control
         how = dict(method="DOP853", rtol=rtol, atol=rtol, max_step=1 / 12, dense_output=dense)
         done = solve_ivp(slope, span, y.ravel(), **how)
         if not done.success:
@@ -134,9 +134,9 @@ class Problem:
 def index(problem, z, rtol=1e-8):
     """Negative modes of the second variation at z: conjugate points, counted from the free end to the clamp.
 
-    Fields of rotations theta and moments p = dm - theta x m/2, canonical on the rotation group, turn round as the
-    unitary W = (theta - i p)(theta + i p)^-1; a conjugate point is an eigenvalue -1. At L only the symmetric part of
-    the loads' stiffness enters (a dead moment has a skew part too).
+    Rotations theta and moments p = dm - theta x m/2 are canonical on the rotation group. They define the unitary matrix
+    W = (theta - i p)(theta + i p)^-1; a conjugate point is where it has the eigenvalue -1. At L only the symmetric part
+    of the loads' stiffness enters (a dead moment has a skew part too).
     """
     y = np.zeros((10, 1))
     y[:7, 0], y[7:10, 0] = START, z[:3]
@@ -159,7 +159,7 @@ def index(problem, z, rtol=1e-8):
     W = (theta - 1j * p) @ np.linalg.inv(theta + 1j * p)
     if np.abs(W @ np.swapaxes(W, 1, 2).conj() - np.eye(3)).max() > 1e-3:
         raise NoTruth("the fields of the second variation are not canonical")
-    # what the phases turned in all, less what they still stand at: the rest went through -1
+    # the total rotation of the phases minus their final values: the rest passed through -1
     phases = np.angle(np.linalg.eigvals(W[[0, -1]])).sum(axis=1)
     turned = np.diff(np.unwrap(np.angle(np.linalg.det(W)))[[0, -1]])[0]
     count = (turned - np.diff(phases)[0]) / (2 * np.pi)

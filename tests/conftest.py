@@ -1,4 +1,4 @@
-"""Fixtures, and what a suite under mpirun needs: one rank that talks, and no rank that waits for a failed one."""
+"""Fixtures, and support of mpirun: only one rank reports, and no rank waits for one that has failed."""
 
 import json
 import os
@@ -42,7 +42,7 @@ def pytest_runtest_makereport(item, call):
 
 @pytest.fixture
 def tmp_path_all(tmp_path):
-    """One temporary folder that all ranks share."""
+    """A temporary folder that all ranks share."""
     return Path(COMM.bcast(str(tmp_path)))
 
 
@@ -67,7 +67,7 @@ def reference():
 
 @pytest.fixture(scope="session")
 def never_ended(tmp_path_factory):
-    """The folder of a case that ran in one go."""
+    """The folder of a case that was computed without interruption."""
     from ended_motions import run
 
     folder, made = tmp_path_factory.mktemp("whole"), {}

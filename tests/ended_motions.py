@@ -1,4 +1,4 @@
-"""Motions that are written as they go, and what ends them."""
+"""Motions that are written to a folder, and ways to end them early."""
 
 import os
 import signal
@@ -25,11 +25,11 @@ CASES = {
 
 
 class Stopped(Exception):
-    """What ends a run here."""
+    """Raised to end a run."""
 
 
 def stop_at(monkeypatch, step, apart):
-    """The next run ends in the middle of that step, by `Stopped`; `apart` seconds between checkpoints."""
+    """Make the next run raise `Stopped` in the middle of a step; `apart`: seconds between checkpoints."""
     accept, taken = Moving.accept, []
 
     def accept_or_stop(self, h):
@@ -50,7 +50,7 @@ def run(case, folder=None):
 
 
 def rows(folder):
-    """The saved states, as anybody reads them."""
+    """The saved states, read with numpy alone."""
     return np.load(folder / "instants.npy", mmap_mode="r")
 
 
@@ -62,7 +62,7 @@ def assert_same(one, other):
 
 
 def part_of(case, folder, monkeypatch, step=25, apart=0.02):
-    """A run that was stopped; its scene."""
+    """Run a case until it is stopped; returns its scene."""
     stop_at(monkeypatch, step, apart)
     with pytest.raises(Stopped):
         run(case, folder)
@@ -70,7 +70,7 @@ def part_of(case, folder, monkeypatch, step=25, apart=0.02):
 
 
 def kill_in(case, step, folder):
-    """In a process of its own: run a case, and be killed in the middle of a step."""
+    """In a separate process: run a case that is killed in the middle of a step."""
     accept, taken = Moving.accept, []
 
     def accept_or_die(self, h):

@@ -1,4 +1,4 @@
-"""Scenes of the literature that move: the flying spaghetti in space and in a plane, the right-angle cantilever."""
+"""Motions from the literature: the flying spaghetti in space and in a plane, the right-angle cantilever."""
 
 import numpy as np
 

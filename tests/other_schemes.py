@@ -1,6 +1,6 @@
-"""Two rules of thumb for a step in time, to be compared with: what stiff thin rods do to them is why they are no schemes.
+"""Two simple time integration rules for comparison; they fail on stiff thin rods, so the package does not offer them.
 
-Both have the velocities, the momenta and the constraint of the momentum scheme, and a stress of their own.
+Both have the velocities, the momenta and the constraint of the momentum scheme, but another stress.
 """
 
 from cosserat_fenicsx.forms.equilibrium import balance, contact
@@ -27,7 +27,7 @@ def trapezoidal(before, after, middle, section, viscosity, h, test):
 
 
 def register(monkeypatch):
-    """Let `simulate` know them as the schemes "midpoint" and "trapezoidal", in space, undamped."""
+    """Register them with `simulate` as the schemes "midpoint" and "trapezoidal", in space, undamped."""
     for stress in (midpoint, trapezoidal):
         name = stress.__name__
 

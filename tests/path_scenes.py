@@ -1,4 +1,4 @@
-"""Scenes whose paths turn, with limit points known from elsewhere."""
+"""Scenes whose paths have limit points, with independently computed values of these."""
 
 import numpy as np
 from scipy.optimize import brentq
@@ -7,9 +7,11 @@ import cosserat_fenicsx as cf
 
 
 def torsion_pendulum(torsion=1.0, offset=1.2):
-    """A shaft twisted by a moment and a couple of dead forces on arms that turn with its end: (rod, scene, load of a twist).
+    """A shaft twisted by a moment and by two opposite dead forces on arms that turn with its end: (rod, scene, load of
+    a twist).
 
-    GJ theta/L = eta (offset - sin(theta)): the shaft stays straight, the twist grows for ever, and the load factor swings.
+    GJ theta/L = eta (offset - sin(theta)): the shaft stays straight, the twist grows without bound, and the load factor
+    oscillates.
     """
     section = cf.Stiffness(shear=(1e5, 1e5), axial=1e5, bending=(300.0, 300.0), torsion=torsion)
     rod = cf.Rod(cf.Line((0, 0, 0), (0, 0, 1.0)), section)
@@ -31,7 +33,7 @@ def pendulum_limits(load, offset=1.2):
 
 
 #: Belytschko & Glaum's arch, its symmetric path by shooting of the strong form: limit points, and where the skew mode
-#: comes and goes on the unstable part (load, N).
+#: appears and vanishes on the unstable part (load, N).
 ARCH_LIMITS = (34.07283194209858, 14.274637425687207)
 ARCH_BIFURCATIONS = (26.9394647, 21.8990593)
 

@@ -1,6 +1,7 @@
-"""A truth for frames and arches in a plane: the strong form shot leg by leg (DOP853) and followed by arc length.
+"""A reference solution for frames and arches in a plane: the strong form by shooting leg by leg (DOP853) and arc
+length.
 
-Shares nothing with the package; solve_bvp solves the same frame once more, all legs at once, as a second opinion.
+Independent of the package; solve_bvp solves the same frame, all legs at once, as a check.
 State y (4, k), one column for each direction of a complex derivative: x, y, theta (of the tangent, from x), m. Along a
 leg n (2, k) is constant; a load F at its end takes F from it: n+ = n- - F. Any consistent units.
 """
@@ -35,7 +36,7 @@ class Leg:
 
 @dataclass(frozen=True)
 class Frame:
-    """Legs one after the other, each foot (x, y, theta) clamped, or pinned (the angle is then the one at rest)."""
+    """A chain of legs between two feet (x, y, theta), each clamped or pinned (theta is then the angle at rest)."""
 
     section: Section
     legs: tuple
@@ -68,8 +69,7 @@ class Frame:
                 method="DOP853",
                 rtol=rtol,
                 atol=rtol,
-                max_step=abs(leg.length)
-                / 12,  # for the complex derivatives, which the control of the error does not see
+                max_step=abs(leg.length) / 12,  # for the complex derivatives, which do not influence the error control
                 dense_output=dense,
             )
             solutions.append(done)
@@ -109,7 +109,8 @@ class Frame:
         return Point(z, t * np.sign(t @ point.t), np.sign(np.linalg.det(D[:, :-1])))
 
     def follow(self, ds, until, most=400, rtol=1e-9):
-        """Points of the path from the unloaded state, ds apart or less where it turns, until until(point)."""
+        """Points of the path from the unloaded state, ds apart or less
+        where it is curved, until until(point) is true."""
         z = np.zeros(self.unknowns)
         hinges = [sum(leg.turn for leg in self.legs[:i]) for i, leg in enumerate(self.legs) if leg.hinge]
         z[3:-1] = self.start[2] + np.array(hinges)
@@ -152,7 +153,7 @@ class Frame:
         return np.array([done.y[:, -1] for done in solutions])
 
     def collocate(self, point, leg, component, tol=1e-9):
-        """The load factor that solve_bvp finds where component (x 0, y 1) of the end of a leg is the point's own."""
+        """The load factor by solve_bvp at which a component (0: x, 1: y) of the end of a leg is that of the point."""
         solutions = self.shoot(point.z[:, None], dense=True)[1]
         s = np.linspace(0, 1, 101)
         guess = np.vstack([done.sol(s * one.length) for done, one in zip(solutions, self.legs, strict=True)])

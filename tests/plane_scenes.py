@@ -1,4 +1,4 @@
-"""Scenes in a plane that need not be aligned with the axes, for the rungs to agree on."""
+"""Plane scenes, in planes that need not be aligned with the axes, to compare the models."""
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -9,7 +9,7 @@ STEEL = cf.Material(E=210e9, nu=0.3, density=7850.0)
 
 
 class Drawn:
-    """A plane to draw in: (x, z) and a depth; seed None is the x-z plane itself."""
+    """A plane with coordinates (x, z) and a depth; seed None is the x-z plane itself."""
 
     def __init__(self, seed=None):
         self.turn = np.eye(3) if seed is None else Rotation.random(random_state=seed).as_matrix()
@@ -106,7 +106,7 @@ def rigid_cantilever(plane):
 
 
 def swinging_pair(plane):
-    """Two separate clamped rods, one of them tapering and with a flat section, a closed ring of springs beside."""
+    """Two separate clamped rods, one of them tapering and with a flat section, and a closed ring on springs."""
     taper = cf.Rod(cf.Line(plane.point(0, 0, 0), plane.point(1, 0, 0), d1=plane.vector(0, 0, 1)),
                    lambda s: cf.Rectangle(0.02 - 0.01 * s, 0.03), STEEL, name="taper")  # fmt: skip
     other = cf.Rod(cf.Line(plane.point(0, 3, 1), plane.point(1, 3, 1)), cf.Circle(0.02), STEEL, name="other")
@@ -119,7 +119,8 @@ def swinging_pair(plane):
 
 
 def thin_cantilever(stiff=(1e6, 1e6), axial=1e6):
-    """P L^2/sqrt(EI GJ) = 4.0126 (Timoshenko & Gere) at load factor 1, the load along the stiff way."""
+    """P L^2/sqrt(EI GJ) = 4.0126 (Timoshenko & Gere) at load factor
+    1, the load in the plane of the larger stiffness."""
     section = cf.Stiffness(bending=(1e5, 1.0), torsion=0.7, shear=stiff, axial=axial)
     rod = cf.Rod(cf.Line((0, 0, 0), (0, 0, 1.0)), section)
     return rod, cf.Scene([rod], [cf.Clamp(rod.start)], [cf.Force(rod.end, (0, 4.0126 * np.sqrt(0.7), 0))])

@@ -1,5 +1,6 @@
-"""The package against the independent truth of bvp.py on random scenes: is the error below what was asked for, and what does
-the estimate say? As a script: python tests/random_comparison.py [how many] [first seed] (make random).
+"""The package against the independent solutions of bvp.py on random scenes: true errors, tolerances and estimates.
+
+As a script: python tests/random_comparison.py [how many] [first seed] (make random).
 """
 
 import sys
@@ -29,8 +30,8 @@ def compare(drawn, tolerances=TOLERANCES):
     """One scene.
 
     Returns:
-        (verdict of the truth, [(tol, what happened, true error, estimate, seconds of processor time)]). Where several
-        equilibria exist, the truth is the one nearest to what the package found, and "other branch" is what happened.
+        (verdict of the reference, [(tol, outcome, true error, estimate, seconds of processor time)]). Where several
+        equilibria exist, the reference is the one nearest to the package's result, and the outcome is "other branch".
     """
     rod, scene = drawn.scene()
     problem, rows = drawn.problem(), []
@@ -66,18 +67,18 @@ def main(count=200, first=0):
         verdict, rows = compare(drawn)
         for tol, said, error, estimate, spent in rows:
             right = error <= max(tol, 1e-10)
-            kinds[
-                f"{verdict.split(':')[0]} | {said.split(':')[0]} | {'right' if right else 'wrong' if error == error else '-'}"
-            ] += 1
+            outcome = "right" if right else "wrong" if error == error else "-"
+            kinds[f"{verdict.split(':')[0]} | {said.split(':')[0]} | {outcome}"] += 1
             if error > 1e-10:
                 ratios.append(estimate / error)
-            print(f"{drawn.seed:4d} {drawn.slenderness:7.0f} {verdict}: {tol:.0e} {error:.1e} {estimate:.1e} {spent:.2f} {said}",
-                  flush=True)  # fmt: skip
+            numbers = f"{tol:.0e} {error:.1e} {estimate:.1e} {spent:.2f}"
+            print(f"{drawn.seed:4d} {drawn.slenderness:7.0f} {verdict}: {numbers} {said}", flush=True)
     for kind, number in kinds.most_common():
         print(f"{number:5d}  {kind}")
     if ratios:
         print(
-            f"estimate over true error: least {min(ratios):.2g}, median {np.median(ratios):.2g}, largest {max(ratios):.2g}"
+            f"estimate over true error: least {min(ratios):.2g}, median {np.median(ratios):.2g}, largest"
+            f" {max(ratios):.2g}"
         )
 
 

@@ -1,6 +1,6 @@
-"""Random scenes of one clamped rod in space, as plain numbers: for the package, and for the truth in bvp.py.
+"""Random scenes of one clamped rod in space, as plain numbers: for the package, and for the reference in bvp.py.
 
-As a script it solves them all by bvp.py and prints what was found: python tests/random_scenes.py [how many] [first].
+As a script it solves them by bvp.py and prints the results: python tests/random_scenes.py [how many] [first].
 """
 
 import sys
@@ -74,7 +74,7 @@ class RandomScene:
 
 
 def draw(seed):
-    """One scene. EI is the smaller bending stiffness; numbers that were drawn are rounded to what a file would hold."""
+    """One scene. EI is the smaller bending stiffness; random numbers are rounded to few digits, as in a file."""
     rng = np.random.default_rng(20250 + seed)
 
     def direction():

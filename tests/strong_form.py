@@ -1,6 +1,6 @@
-"""An independent truth for spatial scenes: the strong form of one straight, clamped rod, shot from clamp to free end.
+"""An independent reference for spatial scenes: the strong form of one straight, clamped rod, by shooting.
 
-Shares nothing with the package: scipy's DOP853 at 1e-12 on (r, q, n, m) in material laws (2)-(3), dimensional.
+By scipy's DOP853 at 1e-12 on (r, q, n, m) with the laws (2)-(3), in SI units.
 """
 
 import numpy as np
@@ -28,7 +28,7 @@ def shoot(length, frame, K, J, density, loads, steps=10):
         loads: list of (s, force (3,), moment (3,), arm (a1, a2)), dead, at s in (0, length].
 
     Returns:
-        A function s -> dict(r, q, n, m, strain, curvature), r from the clamp; on a load the value before it.
+        A function s -> dict(r, q, n, m, strain, curvature), r from the clamp; at a load the values before it.
     """
     K, J, density = np.array(K), np.array(J), np.array(density)
     breaks = sorted({0.0, length} | {load[0] for load in loads})

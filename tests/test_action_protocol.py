@@ -1,4 +1,5 @@
-"""The protocol of what acts on rods: permanent loads, loads along rods, memory, data that follow the position, what UFL tells."""
+"""The protocol of actions: permanent loads, loads along rods, memory,
+data that depend on the position, traits found from UFL."""
 
 from dataclasses import dataclass
 
@@ -17,7 +18,8 @@ ROD = cf.Rod(cf.Line((0, 0, 0), (1.0, 0, 0)), SECTION, name="beam")
 
 
 def test_permanent_loads_come_first():
-    """Weight first, then the end force; the path begins under the weight, and ends where both together would."""
+    """Weight first, then the end force: the path begins under the
+    weight, and ends where both applied together would."""
     weight = cf.LineForce(ROD, (0, 0, -2.0), permanent=True)
     scene = cf.Scene([ROD], [cf.Clamp(ROD.start)], [weight, cf.Force(ROD.end, (0, 1.5, 1.0))])
     both = cf.Scene([ROD], [cf.Clamp(ROD.start)], [cf.LineForce(ROD, (0, 0, -2.0)), cf.Force(ROD.end, (0, 1.5, 1.0))])
@@ -49,7 +51,8 @@ def test_loads_that_change_along_a_rod(tmp_path):
     half = cf.LineForce(ROD, cf.AlongPieces([(0.3, (0, 0, 0)), (0.7, (0, 0, q))]))
     path = cf.solve(cf.Scene([ROD], [cf.Clamp(ROD.start)], [half]), [1.0], elements=2)
     assert path.moment(ROD.start)[0, 1] == pytest.approx(-q * 0.4 * 0.5, rel=1e-9)
-    for bad in (lambda: cf.Along(3), lambda: cf.AlongTable([1, 0], [(0, 0, 0)] * 2), lambda: cf.AlongPieces([(0.0, (0, 0, 1))]),
+    for bad in (lambda: cf.Along(3), lambda: cf.AlongTable([1, 0], [(0, 0, 0)] * 2),
+                lambda: cf.AlongPieces([(0.0, (0, 0, 1))]),
                 lambda: cf.AlongTable("no.csv"), lambda: cf.LineForce(ROD, cf.Along(lambda s: 1 / 0))):  # fmt: skip
         with pytest.raises(cf.SceneError):
             bad()
@@ -57,7 +60,7 @@ def test_loads_that_change_along_a_rod(tmp_path):
 
 @dataclass(frozen=True)
 class Slider(cf.PointAction):
-    """A spring k that slips at the force limit: what it remembers is how far it has slipped (along x)."""
+    """A spring k that slips at the force limit; its memory is the distance slipped (along x)."""
 
     station: object
     stiffness: float
@@ -83,7 +86,8 @@ class Slider(cf.PointAction):
 
 
 def test_an_action_that_remembers():
-    """A rod and a slider in parallel, pulled to and fro: the hysteresis of an elastic, ideally plastic element in closed form."""
+    """A rod and a slider in parallel under cyclic load: the hysteresis of
+    an elastic, ideally plastic element in closed form."""
     EA, k, limit = 100.0, 50.0, 1.0
     rod = cf.Rod(cf.Line((0, 0, 0), (1.0, 0, 0)), cf.Stiffness((EA, EA), EA, (1.0, 1.0), 1.0, mass=1.0))
     scene = cf.Scene([rod], [cf.Clamp(rod.start)], [Slider(rod.end, k, limit), cf.Force(rod.end, (4.0, 0, 0))])
@@ -100,12 +104,12 @@ def test_an_action_that_remembers():
     for options in ({"elements": 2}, {"tol": 1e-6}, {"elements": 2, "model": "spatial"}):
         path = cf.solve(scene, factors, **options)
         np.testing.assert_allclose(path.displacement(rod.end)[:, 0], expected, rtol=1e-9)
-    assert abs(expected[3]) > 1e-3  # something is left when the force is gone
+    assert abs(expected[3]) > 1e-3  # a displacement remains after unloading
 
 
 @dataclass(frozen=True)
 class RoundWall(cf.LineAction):
-    """A wall around a circular axis, whose nearest point is looked up at every iteration."""
+    """A wall around a circular axis, whose nearest point is computed at every iteration."""
 
     rod: object
     radius: float
@@ -131,7 +135,7 @@ class RoundWall(cf.LineAction):
 
 @dataclass(frozen=True)
 class Pressure(cf.LineAction):
-    """A force that stays across a rod."""
+    """A force that stays normal to a rod."""
 
     rod: object
     pressure: float
@@ -148,7 +152,8 @@ class Pressure(cf.LineAction):
 
 
 def test_data_that_follow_the_position():
-    """A quarter of a ring blown up by a pressure p against a round wall: p - EA u/R^2 = kp (u - clearance) while u << R."""
+    """A quarter of a ring, expanded by a pressure p against a round
+    wall: p - EA u/R^2 = kp (u - clearance) for u << R."""
     R, c, EA, p, kp = 10.0, 1e-4, 90.0, 1e-4, 2.0
     section = cf.Stiffness((50.0, 50.0), EA, (1.0, 1.0), 0.7)
     rod = cf.Rod(cf.Arc((0, 0, 0), (R, 0, 0), np.pi / 2, axis=(0, 1.0, 0)), section)
@@ -201,7 +206,7 @@ def test_what_ufl_tells():
             return (action.vector((0, 0, 1.0), "N"),)
 
     scene = cf.Scene([ROD], [cf.Clamp(ROD.start)], [Own(station)])
-    assert cf.solve(scene, [0.1], elements=2).model == "determinate"  # a dead force of one's own is a dead force
+    assert cf.solve(scene, [0.1], elements=2).model == "determinate"  # a user-defined dead force is recognised as dead
 
     @dataclass(frozen=True)
     class Sideways(cf.PointAction):

@@ -1,4 +1,4 @@
-"""What acts on rods and sees their state: closed forms for each kind, and that the protocol tells what it must."""
+"""Actions that depend on the state: closed forms for each kind, and the traits that the protocol finds."""
 
 import json
 import math
@@ -17,8 +17,8 @@ ROD = cf.Rod(cf.Line((0, 0, 0), (1.0, 0, 0)), SECTION, name="beam")
 
 
 def test_a_beam_on_an_elastic_bed():
-    """Hetenyi, Beams on Elastic Foundation (1946): a long beam under a force P at its middle sinks by P lambda/(2 k),
-    lambda = (k/4EI)^(1/4), and its moment there is P/(4 lambda)."""
+    """Hetenyi, Beams on Elastic Foundation (1946): the deflection of a long beam under a force P at its middle is
+    P lambda/(2 k) there, lambda = (k/4EI)^(1/4), and its moment P/(4 lambda)."""
     k, P, L = 4.0 * 1e4, 1e-3, 4.0
     lam = (k / (4 * EI)) ** 0.25
     rod = cf.Rod(cf.Line((-L / 2, 0, 0), (L / 2, 0, 0)), SECTION)
@@ -31,18 +31,20 @@ def test_a_beam_on_an_elastic_bed():
             assert w == pytest.approx(P * lam / (2 * k), rel=2e-4), name  # shear: EI lambda^2/GA
             assert abs(m) == pytest.approx(P / (4 * lam), rel=2e-4)
             assert abs(path.moment(rod.at(L / 2 + math.pi / (4 * lam)))[0, 1]) < 1e-3 * abs(m)  # changes its sign there
-            # the bed's forces and what the clamp holds with are the load: the contact force jumps by P at the middle
+            # foundation and clamp together carry the load: the contact force jumps by P at the middle
             jump = path.force(rod.at(L / 2 + 1e-9))[0, 2] - path.force(rod.at(L / 2))[0, 2]
             assert jump == pytest.approx(-P, rel=1e-6)
     assert cf.solve(scene, [1.0], elements=4).model == "planar"
 
 
 def test_springs_hold_a_rod_and_each_model_agrees():
-    """A rigid-like rod on a rotational spring and a lateral spring: c theta + k L sin(theta) L cos(theta) = M for the exact one."""
+    """A nearly rigid rod on a rotational and a lateral spring; for a
+    rigid one c theta + k L sin(theta) L cos(theta) = M."""
     stiff = cf.Stiffness(shear=(1e7, 1e7), axial=1e7, bending=(1e6, 1e6), torsion=1e6, mass=1.0)
     rod = cf.Rod(cf.Line((0, 0, 0), (1.0, 0, 0)), stiff)
     c, k, M = 3.0, 2.0, 6.0
-    scene = cf.Scene([rod], [cf.Pin(rod.start)], [cf.Spring(rod.start, rotational=c), cf.Spring(rod.end, k, direction=(0, 0, 1)),
+    scene = cf.Scene([rod], [cf.Pin(rod.start)],
+                     [cf.Spring(rod.start, rotational=c), cf.Spring(rod.end, k, direction=(0, 0, 1)),
                                                   cf.Moment(rod.end, (0, -M, 0))])  # fmt: skip
     found = {}
     for model in ("planar", "spatial"):
@@ -58,7 +60,7 @@ def test_springs_hold_a_rod_and_each_model_agrees():
 
 
 def test_a_spring_beyond_half_a_turn():
-    """The moment of a rotational spring grows in proportion to the angle in every model, past pi."""
+    """The moment of a rotational spring stays proportional to the angle beyond pi, in every model."""
     stiff = cf.Stiffness(shear=(1e7, 1e7), axial=1e7, bending=(1e6, 1e6), torsion=1e6)
     rod = cf.Rod(cf.Line((0, 0, 0), (1.0, 0, 0)), stiff)
     scene = cf.Scene(
@@ -116,14 +118,15 @@ def test_a_falling_rod_reaches_its_terminal_speed(scheme):
 @pytest.mark.parametrize("scheme", ["momentum", "generalised-alpha"])
 @pytest.mark.parametrize("model", ["planar", "spatial"])
 def test_a_dashpot_stops_a_free_rod(scheme, model):
-    """A rod that slides along itself against a dashpot b: v = v_0 exp(-b t/m); and one that spins in its plane against d."""
+    """A rod that moves along its axis against a dashpot b, v = v_0
+    exp(-b t/m); and one that spins in its plane against d."""
     b = 3.0
     velocity = cf.InitialVelocity(ROD, linear=(1.0, 0, 0))
     scene = cf.Scene([ROD], loads=[cf.Dashpot(ROD.at(0.5), b)], velocities=[velocity])
     options = {"dt": 2e-3, "elements": 2, "degree": 2, "save_every": 0.25, "scheme": scheme, "model": model}
     history = cf.simulate(scene, 0.5, **options)
     total = history.linear_momentum[:, 0]
-    np.testing.assert_allclose(total, np.exp(-b * history.times), rtol=2e-2)  # waves of the stretch run in it
+    np.testing.assert_allclose(total, np.exp(-b * history.times), rtol=2e-2)  # axial waves travel in it
     spin = cf.InitialVelocity(ROD, angular=(0, 0, 1.0), about=(0.5, 0, 0))
     scene = cf.Scene([ROD], loads=[cf.Dashpot(ROD.at(0.5), rotational=0.4)], velocities=[spin])
     history = cf.simulate(scene, 0.05, **{**options, "save_every": 0.05})
@@ -144,7 +147,8 @@ def wall_forces(path):
 
 @pytest.mark.parametrize("case", [1, 3])
 def test_a_bottom_hole_assembly_lies_on_the_wall(case):
-    """Pipe in a straight inclined hole: bit force and tangency length by an independent Kirchhoff rod with finite rotations."""
+    """Pipe in a straight inclined hole: bit force and tangency length by
+    an independent Kirchhoff rod at finite rotations."""
     given = TANGENCY[case]
     truth, r = given["exact_kirchhoff"], given["clearance"]
     inclination, L = math.radians(given["inclination_deg"]), 24.0
@@ -154,9 +158,10 @@ def test_a_bottom_hole_assembly_lies_on_the_wall(case):
     rod = cf.Rod(cf.Line((0, r, 0), (L, r, 0), d1=(0, 1, 0)), pipe)
     w = given["w"]
     gravity = np.array([-w * math.cos(inclination), w * math.sin(inclination), 0.0])
-    supports = [cf.Prescribed(rod.start, displacement=(0, -r, 0)), cf.Roller(rod.end, (0, 1, 0)), cf.Roller(rod.end, (0, 0, 1)),
+    supports = [cf.Prescribed(rod.start, displacement=(0, -r, 0)), cf.Roller(rod.end, (0, 1, 0)),
+                cf.Roller(rod.end, (0, 0, 1)),
                 cf.Prescribed(rod.end, rotation=(0, 0, 0))]  # fmt: skip
-    top = given["WOB"] - w * math.cos(inclination) * L  # what is left of the thrust at the top
+    top = given["WOB"] - w * math.cos(inclination) * L  # the axial thrust that remains at the top
     loads = [
         cf.LineForce(rod, tuple(gravity), permanent=True),
         cf.Force(rod.end, (-top, 0, 0), permanent=True),
@@ -166,13 +171,13 @@ def test_a_bottom_hole_assembly_lies_on_the_wall(case):
     bit = path.force(rod.start)[0]
     assert abs(bit[1]) == pytest.approx(truth["bit_side_force"], rel=1e-4)
     assert abs(bit[0]) == pytest.approx(given["WOB"], rel=1e-6, abs=1e-3)
-    # two moments of the wall's pressure give the concentrated force P at a, then w sin(inc) per metre up to the top
+    # force and moment of the wall's pressure: the concentrated force P at a, then w sin(inc) per metre up to the top
     forces, places = wall_forces(path)
     forces, places = (
         np.append(forces, -path.force(rod.end)[0, 1]),
         np.append(places, L),
-    )  # the roller lies on the wall too
-    # the end that does not turn holds it with a moment beside these forces
+    )  # the roller also touches the wall
+    # the end that does not rotate adds a moment to these forces
     q, F, S = w * math.sin(inclination), forces.sum(), forces @ places - abs(path.moment(rod.end)[0, 2])
     a = (-(F - q * L) + math.sqrt((F - q * L) ** 2 - 2 * q * (q * L**2 / 2 - S))) / q
     assert a == pytest.approx(truth["arc_length_to_tangency"], rel=1e-4)
@@ -181,7 +186,8 @@ def test_a_bottom_hole_assembly_lies_on_the_wall(case):
 
 
 def test_a_column_on_an_elastic_bed_buckles_in_waves():
-    """Timoshenko & Gere, Theory of Elastic Stability (1961), 2.10: P = pi^2 EI/L^2 (m^2 + k L^4/(m^2 pi^4 EI)), least over m."""
+    """Timoshenko & Gere, Theory of Elastic Stability (1961), 2.10: P =
+    pi^2 EI/L^2 (m^2 + k L^4/(m^2 pi^4 EI)), least over m."""
     k, slim = 16 * math.pi**4 * 0.9, cf.Stiffness((1e8, 1e8), 1e8, (EI, 100.0), 50.0)
     rod = cf.Rod(cf.Line((0, 0, 0), (1.0, 0, 0)), slim)
     supports = [cf.Hinge(rod.start, (0, 1, 0)), cf.Roller(rod.end, (0, 0, 1)), cf.Roller(rod.end, (0, 1, 0))]

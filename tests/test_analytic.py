@@ -44,7 +44,7 @@ def test_eccentric_cantilever(model, field):
 
 
 def test_turning_arm():
-    """Nine digits of the file (at eta = 1.5 eight: it rounds 15.76237478 to 15.762375)."""
+    """To the nine digits of the file (eight at eta = 1.5, where it rounds 15.76237478 to 15.762375)."""
     known = [point for point in POINTS if point["eccentric_arm_delta"] is not None]
     tip = reissner([point["eta"] for point in known], ECCENTRICITY, LENGTH, **STIFFNESS, arm=True)
     np.testing.assert_allclose(tip.delta, [point["eccentric_arm_delta"] for point in known], rtol=2e-8)

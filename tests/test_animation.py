@@ -1,4 +1,4 @@
-"""Films: constant rate, named time scale, the same bytes again, words where something is missing."""
+"""Films: constant frame rate, time scale in the title, reproducible bytes, messages where something is missing."""
 
 import subprocess
 import sys
@@ -18,12 +18,12 @@ SMALL = {"size": (320, 240), "fps": 4, "speed": 1}
 
 @pytest.fixture(scope="module")
 def flight():
-    """The end of the flight in space, steps kept where they fell."""
+    """The end of the flight in space, every step saved."""
     return cf.simulate(flying_in_space()[1], 2, tol=1e-3)
 
 
 def test_between_saved_states_the_error_is_of_third_order():
-    """Saved half as often, eight times as far off, against every step."""
+    """With half as many saved states the error is eight times as large, compared with all steps."""
     rod, scene = flying_in_space()
     every, x, errors = cf.simulate(scene, 2, dt=0.0125), np.linspace(0, 1, 11), []
     for often in (0.1, 0.05):
@@ -118,7 +118,7 @@ def test_an_ffmpeg_that_fails_is_quoted(flight, tmp_path, monkeypatch):
 
 
 def test_ctrl_c_ends_the_film(flight, tmp_path, monkeypatch):
-    """The file holds what was drawn."""
+    """The file contains the frames drawn so far."""
     from PIL import Image
 
     drawn, at = [], animation._Stage.at
@@ -136,7 +136,10 @@ def test_ctrl_c_ends_the_film(flight, tmp_path, monkeypatch):
 
 
 def test_nothing_is_loaded_before_it_is_needed():
-    code = "import sys, cosserat_fenicsx.pictures.animation; print({'pyvista', 'PIL', 'imageio_ffmpeg', 'matplotlib'} & set(sys.modules))"
+    code = (
+        "import sys, cosserat_fenicsx.pictures.animation; print({'pyvista', 'PIL', 'imageio_ffmpeg', 'matplotlib'} &"
+        " set(sys.modules))"
+    )
     root = Path(__file__).parent.parent
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, encoding="utf-8", cwd=root)
     assert done.stdout.strip() == "set()", done.stderr

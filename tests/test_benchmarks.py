@@ -1,4 +1,5 @@
-"""Published problems of statics against independently computed numbers (tests/reference/statics.json, make_statics.py)."""
+"""Published problems of statics against independently computed
+numbers (tests/reference/statics.json, make_statics.py)."""
 
 import json
 from pathlib import Path
@@ -13,7 +14,7 @@ import cosserat_fenicsx as cf
 from cosserat_fenicsx.results.accuracy import on_mesh
 from cosserat_fenicsx.statics import solvers
 
-pytestmark = pytest.mark.serial  # the truths are scipy's and slow
+pytestmark = pytest.mark.serial  # the references are computed by scipy and slow
 TRUTH = json.loads((Path(__file__).parent / "reference" / "statics.json").read_text(encoding="utf-8"))
 RIGID = (np.inf, np.inf)
 
@@ -42,7 +43,7 @@ def test_elastica():
 
 @pytest.mark.parametrize("value", TRUTH["bend_45"]["values"], ids=lambda v: f"{v['section']}, {v['load']}")
 def test_45_degree_bend(value):
-    """Bathe & Bolourchi 1979; tol 1e-7, and what is not at element ends too is within it."""
+    """Bathe & Bolourchi 1979; tol 1e-7 holds between element ends too."""
     rod = cf.Rod(
         cf.Arc((0, 100.0, 0), (0, 0, 0), np.pi / 4),
         cf.Stiffness((value["GA"],) * 2, 1e7, (1e7 / 12,) * 2, value["GJ"]),
@@ -54,7 +55,7 @@ def test_45_degree_bend(value):
 
 
 def test_helical_roll_up():
-    """Ibrahimbegovic 1997: ten turns with a force across."""
+    """Ibrahimbegovic 1997: ten turns under an end moment and a force normal to their plane."""
     rod = cf.Rod(cf.Line((0, 0, 0), (10.0, 0, 0)), cf.Stiffness((1e4, 1e4), 1e4, (1e2, 1e2), 1e2))
     scene = held(rod, cf.Force(rod.end, (0, 0, 50.0)), cf.Moment(rod.end, (0, 0, 200 * np.pi)))
     values = TRUTH["helical_roll_up"]["values"]
@@ -98,7 +99,7 @@ def test_hinged_frame():
 
 
 def test_path_independence():
-    """One load in one step, in 8, 10 or 160, by way of its double or of its opposite: one state to round-off."""
+    """A load in 1, 8, 10 or 160 steps, or by way of twice or minus the load: one state to round-off."""
     rod = cf.Rod(cf.UniformCurvature(1.0, (0.8, -0.5, 1.0)), cf.Stiffness((1e3, 2e3), 3e3, (1.0, 2.0), 0.8))
     scene = held(rod, cf.Force(rod.end, (0.7, 1.0, -0.8)), cf.Moment(rod.end, (0.5, -0.4, 0.6)))
     ways = [[1.0], np.arange(1, 9) / 8, np.arange(1, 11) / 10, np.arange(1, 161) / 160, [2.0, 1.0], [-1.0, 1.0]]
@@ -129,7 +130,7 @@ def test_order_of_loads_does_not_matter():
     "drawn", [*random_scenes.scenes(10, first=20), random_scenes.draw(5097)], ids=lambda drawn: str(drawn.seed)
 )
 def test_random_scenes(drawn):
-    """`make random` does 200 of them; the tangent of the last is inexact for its soft motions, by rounding."""
+    """`make random` solves 200 of them. The last is so slender that rounding makes its tangent inexact for bending."""
     verdict, rows = random_comparison.compare(drawn)
     assert verdict.startswith("connected")
     for tol, said, error, estimate, _ in rows:

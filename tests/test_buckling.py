@@ -16,7 +16,8 @@ def sheared(euler, GA):
 
 @pytest.mark.parametrize("EA, GA", [(np.inf, 20.0), (1e3, 400.0), (20.0, 20.0)])
 def test_shear_counts(EA, GA):
-    """And where EA is infinite the events of `solve` agree; from a loaded state the estimate nears them."""
+    """Against P (1 + P/GA) = P_Euler. For infinite EA `solve` finds the same events;
+    from a prestressed state the estimate comes closer to its events."""
     rod = cf.Rod(cf.Line((0, 0, 0), (0, 0, 1.0)), cf.Stiffness((GA, GA), EA, (1.0, 2.0), 1.0))
     scene = cf.Scene([rod], [cf.Clamp(rod.start)], [cf.Force(rod.end, (0, 0, -1.0))])
     found = cf.buckling(scene, tol=1e-6)
@@ -72,7 +73,7 @@ def test_from_a_prestressed_state_it_nears_the_bifurcation():
 
 @pytest.mark.parametrize("stiff", [dict(shear=(1e6, 1e6), axial=1e6), dict(shear=(np.inf, np.inf), axial=np.inf)])
 def test_lateral_buckling(stiff):
-    """P L^2/sqrt(EI GJ) = 4.0126 (Timoshenko & Gere); the other way round the load is as large."""
+    """P L^2/sqrt(EI GJ) = 4.0126 (Timoshenko & Gere), for either direction of the load."""
     section = cf.Stiffness(bending=(1e4, 1.0), torsion=0.7, **stiff)
     rod = cf.Rod(cf.Line((0, 0, 0), (0, 0, 1.0)), section)
     for sign in (1, -1):
@@ -89,7 +90,7 @@ def test_self_weight():
 
 
 def test_supports_by_equations():
-    """Euler's pinned column and the propped one (4.4934)^2 EI/L^2; a hinge turns with what it holds."""
+    """Euler's pinned column, and the propped one, (4.4934)^2 EI/L^2, held by a hinge and rollers."""
     section = cf.Stiffness((1e6, 1e6), 1e6, (1.0, 4.0), 1.0)
     rod = cf.Rod(cf.Line((0, 0, 0), (0, 0, 1.0), d1=(1, 0, 0)), section)
     axis = (1, 0, 0)  # bending about d1 = x is the weak one

@@ -1,4 +1,4 @@
-"""The paper's eccentric cantilever through the public face, against numbers computed without this package."""
+"""The paper's eccentric cantilever through the public interface, against numbers computed without this package."""
 
 import numpy as np
 import pytest
@@ -33,7 +33,7 @@ def test_turning_arm(reference):
 
 @pytest.mark.parametrize("eta", [2.0, 4.0, 9.0])
 def test_turning_arm_far_beyond(eta):
-    """Where the reference file has no number: the package's own quadrature of the strong form."""
+    """Beyond the reference file: against `analytic`, a quadrature of the strong form."""
     rod, scene = column(arm=True)
     k = rod.stiffness
     exact = cf.analytic.reissner(eta, 0.2, 20.0, bending=k.bending[1], axial=k.axial, shear=k.shear[0], arm=True)
@@ -74,7 +74,8 @@ def test_one_jump_is_refused_or_called_unstable(eta, formulation):
 
 
 def test_a_jump_to_the_wrong_side_says_unstable():
-    """The mixed formulation does converge to delta/L = -0.151 at eta = 1.1 in one step: it must not pass for an answer."""
+    """In one step to eta = 1.1 the mixed formulation converges to
+    delta/L = -0.151; the result must be marked as unstable."""
     rod, scene = column()
     path = cf.solve(scene, [1.1], elements=8, steps=cf.StepControl(adaptive=False))
     assert path.displacement(rod.end)[0, 0] / 20 == pytest.approx(-0.15125, abs=1e-4)
@@ -117,7 +118,8 @@ def test_landing_again_lower_and_at_zero_retraces_the_path():
 
 
 def test_hanging_and_standing_under_its_own_weight():
-    """Stretch rho g L^2/(2E) under its weight, and a standing rod's contact force at its foot."""
+    """The stretch rho g L^2/(2E) of a hanging rod under its weight, and
+    the contact force at the foot of a standing one."""
     steel = cf.Material(E=210e9, nu=0.3, density=7850.0)
     rod = cf.Rod(cf.Line((0, 0, 0), (0, 0, -20.0)), cf.Circle(0.2), steel)
     path = cf.solve(cf.Scene([rod], [cf.Clamp(rod.start)], [cf.Weight()]), [1.0], elements=4)

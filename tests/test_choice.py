@@ -1,4 +1,4 @@
-"""The cheapest model that is enough is taken, it says why, and what buckles sideways is promoted."""
+"""The cheapest valid model is chosen, with reasons; planar solutions that buckle sideways are continued in space."""
 
 import numpy as np
 import pytest
@@ -7,7 +7,7 @@ from plane_scenes import STEEL, Drawn, hinged_arch, lee_frame, thin_cantilever
 
 import cosserat_fenicsx as cf
 
-pytestmark = pytest.mark.serial  # the choice knows no ranks
+pytestmark = pytest.mark.serial  # the choice does not depend on ranks
 
 
 def test_what_buckles_sideways_is_promoted():
@@ -22,7 +22,8 @@ def test_what_buckles_sideways_is_promoted():
 
 
 def test_what_buckles_in_its_plane_is_promoted_too():
-    """A flat strip that is wide across the plane loses its stability in the plane alone: space knows events and branches."""
+    """A flat strip that is wide across the plane buckles in its
+    plane: the spatial model locates events and branches."""
     section = cf.Stiffness((1e6, 1e6), 1e6, (50.0, 1.0), 30.0)  # bends about d2, the normal
     rod = cf.Rod(cf.Line((0, 0, 0), (0, 0, 1.0), d1=(1, 0, 0)), section)
     scene = cf.Scene([rod], [cf.Clamp(rod.start)], [cf.Force(rod.end, (0, 0, -(np.pi**2) / 4))])
@@ -57,8 +58,8 @@ def leaves(kind):
     [
         ("force", "load 3 (Force at column@10) points out of the plane of the rods"),
         ("moment", "load 3 (Moment at column@10) does not turn in the plane of the rods"),
-        ("support", "support 2 (Roller at column.end) holds or moves what is askew to the plane of the rods"),
-        ("section", "a section of rod 'column' has its principal axes (EI) askew to the plane"),
+        ("support", "support 2 (Roller at column.end) constrains motions oblique to the plane of the rods"),
+        ("section", "a section of rod 'column' has its principal axes (EI) oblique to the plane"),
     ],
 )
 def test_what_leaves_the_plane_is_named(kind, words):
@@ -89,10 +90,10 @@ def test_why_not_determinate():
 
 @pytest.mark.parametrize("turns", [8, 16, 32])
 def test_a_helix_is_in_no_plane(turns):
-    """However its turns fall on the places that are looked at."""
+    """Whatever the positions of its turns relative to the sampling points."""
     rod = cf.Rod(cf.Helix((0, 0, 0), (0.1, 0, 0), turns, 0.05), cf.Stiffness((1e3, 1e3), 1e3, (1.0, 1.0), 0.7))
     scene = cf.Scene([rod], [cf.Clamp(rod.start)], [cf.Force(rod.end, (0, 0, 0.05))])
     assert scene.plane is None and "do not lie in one plane" in scene.flatness[1]
     twisted = cf.Rod(cf.UniformCurvature(1.0, (0, 0, turns * np.pi)), cf.Stiffness((1e3, 1e3), 1e3, (1.0, 5.0), 0.7))
     scene = cf.Scene([twisted], [cf.Clamp(twisted.start)], [cf.Force(twisted.end, (1.0, 0, 0))])
-    assert "askew to the plane" in scene.flatness[1]
+    assert "oblique to the plane" in scene.flatness[1]

@@ -1,4 +1,4 @@
-"""The command line as a person meets it: output, exit codes, no tracebacks."""
+"""The command line: output, exit codes, no tracebacks."""
 
 import csv
 import os
@@ -18,7 +18,7 @@ DEMO = ROOT / "demos" / "eccentric_cantilever.toml"
 
 
 def cosserat(*arguments, **environment):
-    """Run the command line in a process of its own."""
+    """Run the command line in a separate process."""
     return subprocess.run(
         [sys.executable, "-m", "cosserat_fenicsx.cli.main", *map(str, arguments)],
         capture_output=True,
@@ -29,7 +29,10 @@ def cosserat(*arguments, **environment):
 
 
 def test_help_and_version_load_nothing_heavy():
-    code = "import sys, cosserat_fenicsx.cli.main; print({'numpy', 'dolfinx', 'petsc4py', 'mpi4py', 'pyvista'} & set(sys.modules))"
+    code = (
+        "import sys, cosserat_fenicsx.cli.main; print({'numpy', 'dolfinx', 'petsc4py', 'mpi4py', 'pyvista'} &"
+        " set(sys.modules))"
+    )
     loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=ROOT)
     assert loaded.stdout.strip() == "set()", loaded.stderr
     help_ = cosserat("--help")
@@ -49,14 +52,14 @@ def test_run_prints_a_table_and_writes_files(tmp_path):
     assert done.stderr == ""
 
 
-def test_the_table_tells_of_a_station_and_what_the_support_holds_with():
+def test_the_table_shows_a_station_and_the_reaction():
     """Reactions against the equilibrium of the whole column: the force, and its moment about the foot."""
     from cosserat_fenicsx import euler_load, read_scene
 
     done = cosserat("run", DEMO, "--load-factors", "0.9", "--station", "column@10")
     assert done.returncode == 0 and "rotation: of column@10." in done.stdout, done.stderr
     P = 0.9 * euler_load(read_scene(DEMO)[0].rods[0])
-    force, moment = re.search(r"Clamp at column.start holds with \((.*?)\) N and \((.*?)\) N m", done.stdout).groups()
+    force, moment = re.search(r"Clamp at column.start exerts \((.*?)\) N and \((.*?)\) N m", done.stdout).groups()
     assert [float(x) for x in force.split(", ")] == pytest.approx([0, 0, P], rel=1e-5)
     assert [float(x) for x in moment.split(", ")] == pytest.approx([0, -P * (0.2 + 2.200615447827733), 0], rel=1e-5)
     assert re.search(r"bending moment [\d.e+]+ N m \(column.start, load factor 0.9\)", done.stdout)
@@ -64,7 +67,7 @@ def test_the_table_tells_of_a_station_and_what_the_support_holds_with():
 
 
 def test_pictures_are_asked_for(tmp_path):
-    """Which points, how much larger; where displacements can hardly be seen the picture says what would show them."""
+    """Options for points and magnification; the picture suggests a magnification where displacements are invisible."""
     from cosserat_fenicsx import read_scene, solve
     from cosserat_fenicsx.pictures import plot
 
@@ -92,7 +95,8 @@ def test_explain():
     assert told.returncode == 0, told.stderr
     for words in (
         "length 20 m", "Clamp at column.start", "tol = 1e-06",
-        "Model: determinate (the angle theta along the rods alone): all rods and loads lie in the x-z plane; one clamp and",
+        "Model: determinate (the angle theta along the rods alone): all rods and loads lie in the x-z plane; one clamp "
+        "and",
         "16 determinate, 48 planar, 112 spatial",
     ):  # fmt: skip
         assert words in told.stdout
@@ -145,7 +149,7 @@ def test_unwritable_folder(tmp_path):
 
 
 def test_dolfinx_missing(tmp_path):
-    """A module of that name that cannot be imported stands for a machine without it."""
+    """A dummy module that cannot be imported takes its place."""
     (tmp_path / "dolfinx.py").write_text("raise ImportError('No module named dolfinx')")
     refused = cosserat("run", DEMO, PYTHONPATH=str(tmp_path))
     assert refused.returncode == 2
@@ -164,7 +168,7 @@ def test_petsc_for_complex_numbers():
 
 
 def test_a_second_process_compiles_nothing(tmp_path):
-    """The names in the code cache must not depend on what was compiled before."""
+    """The names in the code cache must not depend on the forms compiled before."""
     counts = []
     for _ in range(2):
         done = cosserat(
@@ -176,7 +180,7 @@ def test_a_second_process_compiles_nothing(tmp_path):
 
 
 def test_ctrl_c_keeps_what_is_done(tmp_path):
-    """SIGINT in the middle of a long list: table, files, exit code."""
+    """SIGINT in the middle of a long list of load factors: table, files, exit code."""
     scene = tmp_path / "scene.toml"
     head, _, _ = DEMO.read_text(encoding="utf-8").partition("[solve]")
     scene.write_text(
@@ -194,7 +198,7 @@ def test_ctrl_c_keeps_what_is_done(tmp_path):
 
 @pytest.mark.parametrize("scene", sorted(DEMO.parent.glob("*.toml")), ids=lambda file: file.stem)
 def test_every_demo_scene(scene, tmp_path):
-    """explain, run and buckling; what is promised of the bend and of Lee's frame comes out."""
+    """explain, run and buckling; the bend and Lee's frame give the values stated in their files."""
     told = cosserat("explain", scene)
     assert told.returncode == 0 and "Model: " in told.stdout, told.stderr
     done = cosserat("run", scene, "--tol", "1e-4", "-o", tmp_path, "--no-picture")
@@ -216,7 +220,7 @@ def test_buckling():
 
 
 def test_modes(capsys):
-    """Frequencies are those of `modes`; the table says where a mode moves, and which way."""
+    """Frequencies are those of `modes`; the table gives place and direction of the largest displacement."""
     from cosserat_fenicsx import modes, read_scene
     from cosserat_fenicsx.cli import main as cli
 

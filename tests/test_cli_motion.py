@@ -1,4 +1,4 @@
-"""Motions on the command line, and in scene files: table, files, words, what is refused."""
+"""Motions on the command line, and in scene files: table, files, explanations, refusals."""
 
 import csv
 import math
@@ -24,8 +24,8 @@ SHORT = ("--duration", "1", "--dt", "0.05")
 
 @pytest.fixture
 def cosserat(capsys, monkeypatch):
-    """The command line in this process: exit code, what it prints, what it complains of."""
-    monkeypatch.setattr(interrupts, "listen", lambda: None)  # the signals are pytest's
+    """The command line in this process: exit code, stdout, stderr."""
+    monkeypatch.setattr(interrupts, "listen", lambda: None)  # signals belong to pytest
 
     def command(*arguments):
         code = cli.main([str(x) for x in arguments])
@@ -77,7 +77,7 @@ def test_the_table_picks_rows_and_the_csv_keeps_all(tmp_path):
 
 
 def test_a_motion_that_is_written_as_it_goes(tmp_path, cosserat):
-    """`--folder` and `resume`: the table is that of one run."""
+    """`--folder` and `resume` give the table of an uninterrupted run."""
     options = ("--dt", "0.05", "--elements", "2", "--degree", "2")
     assert cosserat("run", FLIGHT, "--duration", "0.5", *options, "--folder", tmp_path / "a")[0] == 0
     code, said, trouble = cosserat("resume", tmp_path / "a", "--duration", "1", "--at", "7", "-o", tmp_path / "out")
@@ -109,11 +109,17 @@ def test_a_scene_behind_animate(capsys):
 
 
 WORDS = {
-    "flying_spaghetti_2d": ("Motion: 15 s. Steps of 0.02 s, halved where one fails. Every step is saved.", "by Step, steps end at t = 0, 2.5 s",
-                            "0 support(s): none", "Start: the reference, free of stress, at rest.", "75 unknowns", "Model: planar"),
-    "damped_column": ("Kelvin-Voigt damping, 0.03 s times", "equilibrium at load factor 1 (Force at column.end, constant), at rest; then the loads are removed"),
-    "released_column": ("(Force at column.end, Moment at column.end, as they are just before t = 0)", "then the load factor is 1.1"),
-    "whirling_shaft": ("a drag of 10 1/s times the momentum", "rotation by RunUp, steps end at t = 0, 6 s", "Model: spatial"),
+    "flying_spaghetti_2d": ("Motion: 15 s. Steps of 0.02 s, halved where one fails. Every step is saved.",
+                            "by Step, steps end at t = 0, 2.5 s",
+                            "0 support(s): none", "Start: the reference, free of stress, at rest.", "75 unknowns",
+                            "Model: planar"),
+    "damped_column": ("Kelvin-Voigt damping, 0.03 s times",
+                      "equilibrium at load factor 1 (Force at column.end, constant), at rest; "
+                      "then the loads are removed"),
+    "released_column": ("(Force at column.end, Moment at column.end, as they are just before t = 0)",
+                        "then the load factor is 1.1"),
+    "whirling_shaft": ("a drag of 10 1/s times the momentum", "rotation by RunUp, steps end at t = 0, 6 s",
+                       "Model: spatial"),
 }  # fmt: skip
 
 
@@ -139,7 +145,10 @@ def test_explained_is_what_is_done(cosserat):
     [
         (("run", FLIGHT, "--load-factors", "0:1"), "--load-factors is for an equilibrium path"),
         (("run", DEMO, "--dt", "0.1"), "--dt is for a motion, and this scene is an equilibrium path"),
-        (("run", FLIGHT, "--static"), "depends on time, which a static analysis excludes: expected a vector, or a motion"),
+        (
+            ("run", FLIGHT, "--static"),
+            "depends on time, which a static analysis excludes: expected a vector, or a motion",
+        ),
         (("run", FLIGHT, "--animate"), "expected a motion, and -o DIR"),
         (("run", FLIGHT, "--animate", "a.avi", "-o", "{tmp}"), "expected a name that ends in .gif or .mp4"),
         (("run", FLIGHT, "--animate", "b/a.gif", "-o", "{tmp}"), "expected a name without folders"),
@@ -164,7 +173,8 @@ def test_damping_by_a_ratio(tmp_path):
         return cf.read_motion(file)[0].rods[0].damping
 
     assert damped("{ ratio = 0.02, frequencies = [1, 10] }") == cf.Damping.ratio(0.02, (1.0, 10.0))
-    for by, words in (("{ ratio = 0.02 }", "'frequencies' is missing"), ("{ ratio = 2, frequencies = [1, 2] }", "damping: Damping.ratio"),
+    for by, words in (("{ ratio = 0.02 }", "'frequencies' is missing"),
+                      ("{ ratio = 2, frequencies = [1, 2] }", "damping: Damping.ratio"),
                       ("{ ratio = 0.1, frequencies = [1, 2], time = 1 }", "unknown key 'time'")):  # fmt: skip
         with pytest.raises(cf.SceneError) as refusal:
             damped(by)
@@ -197,7 +207,7 @@ def test_a_static_scene_has_no_motion_and_may_be_given_one(cosserat):
 
 
 def test_what_a_start_takes_from_loads_in_time():
-    """Loads as they are just before t = 0: steps from 0 on are not there yet, those up to 0 let go."""
+    """Loads just before t = 0: a Step from 0 on does not act yet, one up to 0 still acts and is then released."""
     section = cf.Stiffness((1e5, 1e5), 1e5, (1e3, 1e3), 1e3, mass=2.0, inertia=(0.1, 0.1, 0.2))
     rod = cf.Rod(cf.Line((0, 0, 0), (2, 0, 0)), section)
     v = (0.0, 0.0, -5.0)
@@ -205,7 +215,8 @@ def test_what_a_start_takes_from_loads_in_time():
     def scene(signal):
         return cf.Scene([rod], [cf.Clamp(rod.start)], [cf.Force(rod.end, signal)])
 
-    for signal, factor in ((cf.Step(v), 0), (cf.Step(v, -1, 0), 1), (cf.Ramp(v), 0), (cf.Ramp(v, -1, 1), 0.5), (cf.Table((0, 1), (v, v)), 1)):  # fmt: skip
+    for signal, factor in ((cf.Step(v), 0), (cf.Step(v, -1, 0), 1), (cf.Ramp(v), 0), (cf.Ramp(v, -1, 1), 0.5),
+                           (cf.Table((0, 1), (v, v)), 1)):  # fmt: skip
         np.testing.assert_allclose(before(scene(signal)).loads[0].force, np.multiply(factor, v))
     released = cf.simulate(scene(cf.Step(v, -1, 0)), 0.2, dt=0.01, start=2.0, elements=2, degree=2)
     path = cf.solve(scene(v), [2.0], elements=2, degree=2, model="planar")
@@ -218,7 +229,7 @@ def test_what_a_start_takes_from_loads_in_time():
 
 
 def test_a_run_up():
-    """Its speed rises without a jerk, and its angle is what the speed adds up to."""
+    """Its acceleration is continuous, and its angle is the integral of its speed."""
     run = cf.RunUp((0, 0, 6.0), 1.0, 16.0)
     t = np.linspace(0, 20, 20001)
     angle = np.array([run(x)[2] for x in t])

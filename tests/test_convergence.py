@@ -32,7 +32,7 @@ def test_tip_converges_with_order_2p(degree, formulation, reference):
 @pytest.mark.parametrize("formulation", ["displacement", "multiplier"])
 @pytest.mark.serial
 def test_more_gauss_points_lock(formulation, reference):
-    """P2 at 8 elements, eta = 0.9: 3e-5 with two points; with three points the rod is too stiff by a fifteenth."""
+    """P2 on 8 elements, eta = 0.9: an error of 3e-5 with two Gauss points, of a fifteenth with three."""
     rod, scene = column()
     exact = reference[0.9]["reissner"]["delta"]
 
@@ -46,7 +46,7 @@ def test_more_gauss_points_lock(formulation, reference):
 
 @pytest.mark.parametrize("degree, elements, formulation", [(2, 8, "mixed"), (3, 8, "mixed"), (2, 8, "multiplier")])
 def test_same_error_at_every_slenderness(degree, elements, formulation):
-    """L/d from 1e2 to 1e5 and infinite EA, GA: the same relative error of delta within a factor 2."""
+    """L/d from 1e2 to 1e5 and infinite EA, GA: relative errors of delta within a factor of 2 of each other."""
     errors = []
     for slenderness in (1e2, 1e3, 1e4, 1e5, np.inf):
         rod, scene = column(diameter=20.0 / slenderness if np.isfinite(slenderness) else 0.2)

@@ -1,4 +1,4 @@
-"""Paths and histories are copied and pickled; what was pickled holds no communicator and no function of a model."""
+"""Copies and pickles of paths and histories; a pickle contains no communicator and no function of a model."""
 
 import copy
 import math
@@ -41,7 +41,7 @@ def assert_same(one, other, names, station):
 
 @pytest.mark.parametrize("model", ["determinate", "planar", "spatial"])
 def test_path(model):
-    """Also on the way: what `until` copies is complete, and the path goes on."""
+    """Also during the computation: a copy made in `until` is complete, and the path continues."""
     rod, scene = column()
     seen = []
 
@@ -108,7 +108,7 @@ def test_files_of_what_was_pickled(tmp_path):
 
 
 def test_what_cannot_be_pickled_is_named():
-    """A deep copy asks for nothing of the kind."""
+    """A deep copy does not need to pickle."""
     _, scene = swinging(lambda t: (0, 0, math.sin(t)))
     history = moved(scene)
     with pytest.raises(pickle.PicklingError, match=r"a History cannot be pickled .* loads\[0\] \(Force at rod.end\)"):
@@ -123,7 +123,7 @@ def test_what_cannot_be_pickled_is_named():
 
 
 def test_a_history_is_no_start():
-    """Its velocities would be lost without a word."""
+    """It is refused, because its velocities would be lost silently."""
     _, scene = swinging()
     with pytest.raises(cf.SceneError, match="expected a load factor, a Path"):
         moved(scene, start=moved(scene))

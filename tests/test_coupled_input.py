@@ -1,4 +1,4 @@
-"""What a section's matrix may be, which plane it keeps to, and how files and reports tell it."""
+"""Sections with a matrix: valid input, symmetry planes, scene files and explanations."""
 
 import numpy as np
 import pytest
@@ -55,14 +55,18 @@ def test_units_do_not_decide_what_is_positive_definite():
 
 
 def test_offset_is_the_energy_of_two_points():
-    """Strains of points of the section as e + k x (x1, x2, 0), against the matrix."""
+    """The energy of the strains e + k x (x1, x2, 0) at centroid and shear centre, against the matrix."""
     shear, axial, bending, torsion = (2.0, 3.0), 7.0, (1.0, 4.0), 0.5
     centroid, shear_centre, angle = (0.2, -0.3), (-0.1, 0.4), 0.7
-    section = cf.Stiffness.offset(shear, axial, bending, torsion, centroid=centroid, shear_centre=shear_centre, angle=angle)
+    section = cf.Stiffness.offset(
+        shear, axial, bending, torsion, centroid=centroid, shear_centre=shear_centre, angle=angle
+    )
     e, k = np.random.default_rng(0).normal(size=(2, 3))
     axes = np.array([[np.cos(angle), np.sin(angle), 0], [-np.sin(angle), np.cos(angle), 0], [0, 0, 1]])
     stretched, sheared = (axes @ e + np.cross(axes @ k, [*place, 0]) for place in (centroid, shear_centre))
-    expected = np.dot(shear, sheared[:2] ** 2) + axial * stretched[2] ** 2 + np.dot([*bending, torsion], (axes @ k) ** 2)
+    expected = (
+        np.dot(shear, sheared[:2] ** 2) + axial * stretched[2] ** 2 + np.dot([*bending, torsion], (axes @ k) ** 2)
+    )
     both = np.array([*e, *k])
     assert both @ np.array(section.matrix) @ both == pytest.approx(expected, rel=1e-13)
     plain = cf.Stiffness.offset(shear, axial, bending, torsion)
@@ -70,7 +74,7 @@ def test_offset_is_the_energy_of_two_points():
 
 
 def test_stiffnesses_that_stand_for_a_matrix():
-    """Bending about the principal axes, whatever else is coupled; n and m from the strains and back."""
+    """Bending about the principal axes, for any coupling; n and m from the strains and back."""
     rod = cf.Rod(LINE, cf.Stiffness.offset((2.0, 3.0), 7.0, (4.0, 1.0), 0.5, angle=0.3, mass=2.0))
     at = rod.stiffness_at(np.array([0.2, 0.8]))
     np.testing.assert_allclose(at.J, [[4.0, 1.0, 0.5]] * 2)
@@ -102,13 +106,18 @@ def test_a_matrix_keeps_to_a_plane_if_it_couples_nothing_with_what_leaves_it():
         np.testing.assert_allclose(path.fields(-1)[name], space.fields(-1)[name], atol=1e-8, err_msg=name)
     for section in (in_plane((0.05, 0.01)), in_plane((0.05, 0), angle=0.1), in_plane((0, 0), shear_centre=(0, 0.02))):
         path = cf.solve(scene(section)[1], [0.1], elements=4)
-        assert path.model == "spatial" and any("couples strains in the plane with those out of it" in x for x in path.why)
+        assert path.model == "spatial" and any(
+            "couples strains in the plane with those out of it" in x for x in path.why
+        )
 
 
 def test_determinate_rungs_agree_with_space():
-    """In a plane that is not one of the coordinates', and in space."""
+    """In a plane that is not a coordinate plane, and in space."""
     turn = np.array([np.cos(0.4), np.sin(0.4), 0])
-    for section, model, along in ((in_plane((0.05, 0)), "planar", turn), (in_plane((0.03, 0.04), angle=0.2), "spatial", turn)):
+    for section, model, along in (
+        (in_plane((0.05, 0)), "planar", turn),
+        (in_plane((0.03, 0.04), angle=0.2), "spatial", turn),
+    ):
         rod = cf.Rod(cf.Line((0, 0, 0), (0, 0, 1.0), d1=turn), section, name="rod")
         loads = [cf.Force(rod.end, 2.0 * along - [0, 0, 1.5]), cf.EccentricForce(rod.end, (0, 0, 1.0), (0.1, 0))]
         dead = cf.Scene([rod], [cf.Clamp(rod.start)], loads)
@@ -151,7 +160,7 @@ def test_a_stored_motion_knows_its_matrix():
 
 
 def test_the_first_mesh_sees_axes_that_turn_along_the_rod():
-    """As of a rod whose directors do: stiffnesses along the principal axes are the same everywhere."""
+    """The same first mesh as for a rod whose directors rotate instead, with constant principal stiffnesses."""
     rate = 40 * np.pi
 
     def twisted(s):

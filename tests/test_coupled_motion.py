@@ -1,4 +1,4 @@
-"""Sections that couple strains in motion: frequencies in closed form, and every scheme against turned directors."""
+"""Motions with sections that couple strains: frequencies in closed form, and every scheme against rotated directors."""
 
 import numpy as np
 import pytest
@@ -12,7 +12,7 @@ MOVING = dict(mass=1.0, inertia=(1e-3, 1e-3, 2e-3))
 STEADY = pytest.mark.serial
 
 
-#: Of a rope: how stretch and twist are resisted, and its mass.
+#: A rope: stiffnesses against stretch and twist, their coupling, and its mass.
 WAVES = np.array([[90.0, 4.0], [4.0, 0.8]])
 ROPE = dict(mass=1.5, inertia=(0.01, 0.01, 0.02))
 
@@ -25,7 +25,7 @@ def rope():
 
 @STEADY
 def test_frequencies_of_a_rope_that_couples_stretch_and_twist():
-    """Waves of both travel with the speeds c of det [[EA - mass c^2, C], [C, GJ - Jrho_3 c^2]] = 0; f = c/4L."""
+    """Coupled waves have the speeds c with det [[EA - mass c^2, C], [C, GJ - Jrho_3 c^2]] = 0; f = c/4L."""
     rod = straight(cf.Stiffness(matrix=rope(), **ROPE))
     modes = cf.modes(cf.Scene([rod], [cf.Clamp(rod.start)]), 4, tol=1e-6)
     squares = np.linalg.eigvals(np.diag([1 / ROPE["mass"], 1 / ROPE["inertia"][2]]) @ WAVES)
@@ -36,14 +36,16 @@ def test_frequencies_of_a_rope_that_couples_stretch_and_twist():
 @STEADY
 def test_frequencies_of_turned_principal_axes():
     one, two = (
-        cf.modes(cf.Scene([rod], [cf.Clamp(rod.start)], [cf.Force(rod.end, (0.1, 0.2, -0.3))]), 6, load_factor=1.0).frequencies
+        cf.modes(
+            cf.Scene([rod], [cf.Clamp(rod.start)], [cf.Force(rod.end, (0.1, 0.2, -0.3))]), 6, load_factor=1.0
+        ).frequencies
         for rod in turned_and_plain(**MOVING)
     )
     np.testing.assert_allclose(one, two, rtol=1e-9)
 
 
 def whirl(rod):
-    """A load in all directions that stops, drag, and viscosity in proportion to the stiffness."""
+    """A load with components in all directions that ends, drag, and viscosity proportional to the stiffness."""
     load = cf.Force(rod.end, cf.Triangle((0.5, 0.8, 0.4), 0, 0.1, 0.2))
     turning = cf.Moment(rod.end, cf.Step((0.1, -0.2, 0.1), end=0.15))
     return cf.Scene([rod], [cf.Clamp(rod.start)], [load, turning])
@@ -56,7 +58,7 @@ def damped(**damping):
 
 @pytest.mark.parametrize("scheme", ["momentum", "energy", "generalised-alpha"])
 def test_turned_principal_axes_move_as_turned_directors(scheme):
-    """To rounding, with energies and what damping takes."""
+    """To rounding, energies and dissipation included."""
     a, b = (
         cf.simulate(whirl(rod), 0.4, dt=0.02, elements=3, degree=2, scheme=scheme, model="spatial")
         for rod in damped(time=0.02, drag=0.1)
@@ -73,7 +75,7 @@ def test_turned_principal_axes_move_as_turned_directors(scheme):
 
 @STEADY
 def test_a_section_of_its_own_viscosity():
-    """Kt and Jt are along d_1, d_2 and d_3: in proportion to a matrix only by `time`."""
+    """Kt and Jt are along d_1, d_2 and d_3; a viscosity proportional to the matrix is given by `time`."""
     rod = straight(cf.Stiffness.offset((30.0, 30.0), 80.0, (1.0, 1.0), 0.7, centroid=(0.05, 0), **MOVING))
     M, time = np.array(rod.section.matrix), 0.03
     at = rod.stiffness_at(np.array([0.5]))
@@ -93,7 +95,7 @@ def off_centroid(**damping):
 
 @STEADY
 def test_energy_is_exact_and_momentum_too():
-    """A free rod, flung and left alone."""
+    """A free rod with initial velocities and no load."""
     rod = off_centroid()
     load = cf.Force(rod.end, cf.Triangle((2.0, 1.0, 3.0), 0, 0.1, 0.2))
     for scheme in ("energy", "momentum"):
@@ -108,7 +110,7 @@ def test_energy_is_exact_and_momentum_too():
 
 @STEADY
 def test_a_mode_of_a_rope_decays_as_it_should():
-    """Viscosity in proportion to the matrix: the energy falls by exp(-time omega^2 t), whatever the mode."""
+    """Viscosity proportional to the matrix: the energy of every mode decays as exp(-time omega^2 t)."""
     speeds, shapes = np.linalg.eig(np.diag([1 / ROPE["mass"], 1 / ROPE["inertia"][2]]) @ WAVES)
     for square, shape in zip(speeds, shapes.T, strict=True):
         omega = np.sqrt(square) * np.pi / (2 * L)
@@ -128,7 +130,8 @@ def test_a_plane_motion_of_a_coupled_section_is_one_in_space():
     scene = cf.Scene([rod], [cf.Clamp(rod.start)], [cf.Force(rod.end, cf.Triangle((2.0, 0, 3.0), 0, 0.1, 0.2))])
     for scheme in ("momentum", "generalised-alpha"):
         flat, space = (
-            cf.simulate(scene, 0.3, dt=0.02, elements=3, degree=2, scheme=scheme, model=model) for model in ("auto", "spatial")
+            cf.simulate(scene, 0.3, dt=0.02, elements=3, degree=2, scheme=scheme, model=model)
+            for model in ("auto", "spatial")
         )
         assert flat.model == "planar"
         np.testing.assert_allclose(flat.displacement(rod.end), space.displacement(rod.end), atol=1e-4)

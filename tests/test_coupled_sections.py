@@ -1,4 +1,4 @@
-"""Sections that couple strains, given by a 6 x 6 matrix: closed forms, and the same rod described in another way."""
+"""Sections that couple strains, by a 6 x 6 matrix: closed forms, and equivalent descriptions of one rod."""
 
 import numpy as np
 import pytest
@@ -9,12 +9,12 @@ pytestmark = pytest.mark.few_ranks
 
 L = 1.3
 ANGLE = 0.6
-#: Principal stiffnesses, and how a section has them along turned axes or along turned directors.
+#: Principal stiffnesses of a section with rotated principal axes, or with rotated directors.
 PRINCIPAL = dict(shear=(3e3, 5e3), axial=8e3, bending=(1.0, 2.5), torsion=0.7)
 
 
 def random_matrix(seed=0):
-    """Couples every strain with every other, in the proportions of a rod with a thickness of a tenth of its length."""
+    """A matrix that couples all strains, with the magnitudes of a rod whose thickness is a tenth of its length."""
     random = np.random.default_rng(seed)
     root = random.normal(size=(6, 6))
     size = np.sqrt([3e2, 5e2, 8e2, 1.0, 2.5, 0.7])
@@ -28,7 +28,7 @@ def straight(section, **more):
 
 
 def turned_and_plain(**more):
-    """One rod twice: its matrix is that of turned principal axes, or its directors are these axes."""
+    """One rod described twice: by the matrix of rotated principal axes, or with directors along these axes."""
     d1 = (np.cos(ANGLE), np.sin(ANGLE), 0)
     yield straight(cf.Stiffness.offset(**PRINCIPAL, angle=ANGLE, **more))
     yield straight(cf.Stiffness(**PRINCIPAL, **more), d1=d1)
@@ -43,9 +43,11 @@ def exponential(k, s):
     return np.eye(3) + t * axis + (1 - c) * axis @ axis, whole
 
 
-@pytest.mark.parametrize(("model", "formulation"), [("determinate", "mixed"), ("spatial", "mixed"), ("spatial", "displacement")])
+@pytest.mark.parametrize(
+    ("model", "formulation"), [("determinate", "mixed"), ("spatial", "mixed"), ("spatial", "displacement")]
+)
 def test_a_moment_along_an_eigenvector_bends_to_a_helix(model, formulation):
-    """m = S k with S k along k: k and m are constant, and so is the stretch and shear -G k that goes with them."""
+    """m = S k with S k along k: k and m are constant, and so are the stretch and shear -G k."""
     M = random_matrix()
     rod = straight(cf.Stiffness(matrix=M))
     compliance = np.linalg.inv(M)
@@ -66,7 +68,7 @@ def test_a_moment_along_an_eigenvector_bends_to_a_helix(model, formulation):
 
 
 def test_small_bending_twists_and_shears():
-    """Linear theory: curvature and strain are linear in s, the tip's displacement and rotation their integrals."""
+    """Linear theory: curvature and strain are linear in s; displacement and rotation of the tip are their integrals."""
     M = random_matrix(1)
     C = np.linalg.inv(M)
     rod = straight(cf.Stiffness(matrix=M))
@@ -85,7 +87,7 @@ def test_small_bending_twists_and_shears():
 
 
 def test_a_rope_unwinds_under_tension():
-    """n3 = EA e + c k, m3 = c e + GJ k; its end is free to turn or held, by a Roller or by a moment."""
+    """n3 = EA e + c k, m3 = c e + GJ k; its end is free to rotate, or held by a support or by a moment."""
     EA, GJ, c, F = 900.0, 0.8, 12.0, 40.0
     M = np.diag([400.0, 400.0, EA, 1.5, 1.5, GJ])
     M[2, 5] = M[5, 2] = c
@@ -100,7 +102,8 @@ def test_a_rope_unwinds_under_tension():
 
 
 def offset_and_shifted(P):
-    """A rod drawn at a distance from its centroid and shear centre, and one drawn through them, its load on an arm."""
+    """A rod whose line is off its centroid and shear centre, and one
+    whose line passes through them, its load on an arm."""
     place = np.array([0.03, -0.05])
     one = straight(cf.Stiffness.offset(**PRINCIPAL, centroid=place, shear_centre=place))
     two = cf.Rod(cf.Line((*place, 0), (*place, L)), cf.Stiffness(**PRINCIPAL), name="rod")
@@ -109,9 +112,11 @@ def offset_and_shifted(P):
         yield rod, cf.Scene([rod], [cf.Clamp(rod.start)], acting)
 
 
-@pytest.mark.parametrize(("model", "formulation"), [("determinate", "mixed"), ("spatial", "mixed"), ("spatial", "displacement")])
+@pytest.mark.parametrize(
+    ("model", "formulation"), [("determinate", "mixed"), ("spatial", "mixed"), ("spatial", "displacement")]
+)
 def test_a_line_off_the_centroid_is_a_shifted_rod(model, formulation):
-    """At large displacements too; Newton's method with n carried takes the same iterations."""
+    """Also at large displacements; Newton's method with n carried takes the same iterations."""
     (rod, scene), (shifted, other) = offset_and_shifted((0.4, 0.2, -2.2))
     etas = [0.5, 1.0, 1.5]
     a, b = (cf.solve(x, etas, model=model, formulation=formulation, elements=12, degree=4) for x in (scene, other))
@@ -150,7 +155,9 @@ def test_critical_loads_of_turned_principal_axes():
         assert cf.euler_load(rod) == pytest.approx(np.pi**2 * 1.0 / (2 * L) ** 2)
         scene = cf.Scene([rod], [cf.Clamp(rod.start)], [cf.Force(rod.end, (0, 0, -1.0))])
         found = cf.buckling(scene, count=count).load_factors
-        expected = [np.pi**2 * EI * (2 * n - 1) ** 2 / (2 * L) ** 2 for n, EI in ((1, 1.0), (1, 2.5), (2, 1.0), (2, 2.5))]
+        expected = [
+            np.pi**2 * EI * (2 * n - 1) ** 2 / (2 * L) ** 2 for n, EI in ((1, 1.0), (1, 2.5), (2, 1.0), (2, 2.5))
+        ]
         if rod.profile.coupled:
             coupled = found
     np.testing.assert_allclose(coupled, found, rtol=1e-6)
@@ -197,7 +204,7 @@ def test_rotating_the_scene_turns_the_answer():
 
 @pytest.mark.parametrize("model", ["determinate", "spatial"])
 def test_negative_modes_of_a_column_off_its_line(model):
-    """Pressed through its centroid it stays straight, however far its line is; it buckles about both axes."""
+    """Compressed through its centroid it stays straight, for any offset of its line; it buckles about both axes."""
     place = (0.03, -0.05)
     section = cf.Stiffness.offset((3e3, 5e3), 8e3, (1.0, 2.5), 0.7, centroid=place, shear_centre=place, angle=ANGLE)
     rod = straight(section)
@@ -212,7 +219,7 @@ def test_negative_modes_of_a_column_off_its_line(model):
 
 @pytest.mark.parametrize("tension", [1e4, 1e7])
 def test_a_taut_wire_off_its_line_has_no_negative_modes(tension):
-    """T L^2/EI far above what bounds K in the second variation otherwise."""
+    """T L^2/EI is far above the usual bound of K in the second variation."""
     slender = dict(shear=(4e11, 4e11), axial=1e12, bending=(1.0, 2.5), torsion=0.7)
     section = cf.Stiffness.offset(**slender, centroid=(1e-6, 2e-6), shear_centre=(3e-6, 0), angle=ANGLE)
     rod = straight(section)

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 import cosserat_fenicsx as cf
 
-pytestmark = pytest.mark.serial  # no ranks in it
+pytestmark = pytest.mark.serial  # independent of ranks
 
 BEND = [(0, 0, 0), (1.0, 0.2, 0.1), (1.8, 1.1, 0.7), (2.0, 2.3, 0.4), (1.2, 3.0, -0.9), (0.1, 3.1, -1.0)]
 RING = [(1.0, 0, 0), (0.8, 0.9, 0.5), (-0.3, 1.2, -0.2), (-1.1, 0.1, 0.6), (-0.2, -1.3, 0.3)]
@@ -106,7 +106,7 @@ def test_a_ring_closes():
 
 
 def test_a_flat_arc_keeps_its_digits():
-    """A metre of a circle of a million metres: the rise is s^2/(2 R), to nine digits where it is 5e-7 m."""
+    """A metre of a circle with R = 1e6 m: its rise s^2/(2 R) of 5e-7 m has nine correct digits."""
     arc = cf.Arc((0, 1e6, 0), (0, 0, 0), 1e-6)
     np.testing.assert_allclose(arc.position(1.0), (1.0, 5e-7, 0), rtol=1e-9)
 
@@ -129,7 +129,7 @@ def test_helix(turns, pitch):
 
 @pytest.mark.parametrize("size", [0.0, 1e-12, 1e-3, 0.9, 1.0, 1.1, 30.0])
 def test_uniform_curvature(size):
-    """Any part of the curve is the same curve from there, whatever the angle; and u is its curvature."""
+    """Any part of the curve is congruent to its beginning, for any angle; and its curvature is u."""
     u = size * np.array([2.0, -1, 2]) / 3
     whole = cf.UniformCurvature(2.0, u, (1, 2, 3), (0.5, 0.5, -0.5, 0.5))
     np.testing.assert_allclose(whole.frame(0.0), [[0, -1, 0], [0, 0, -1], [1, 0, 0]], **NEAR)
@@ -213,7 +213,7 @@ def test_a_plane_spline_keeps_its_normal():
 
 @pytest.mark.parametrize("name", ["closed spline", "closed spline of three points"])
 def test_a_closed_spline_closes(name):
-    """Position, tangent and frame; what the frame must turn for that is an even twist."""
+    """Position, tangent and frame agree at both ends; the twist that this takes is uniform."""
     spline = CURVES[name]
     np.testing.assert_allclose(spline.position(spline.length), spline.position(0.0), **NEAR)
     np.testing.assert_allclose(spline.frame(spline.length), spline.frame(0.0), **NEAR)
@@ -248,8 +248,10 @@ def test_a_rigid_motion_of_the_input_moves_the_curve():
 
     quaternion = Rotation.from_matrix(Q).as_quat()[[3, 0, 1, 2]]
     pairs = [
-        (cf.Arc((1, 0, 0), (3, 0, 1), 1.7, (0, 1, 1), d1), cf.Arc(*moved((1, 0, 0), (3, 0, 1)), 1.7, Q @ (0, 1, 1), Q @ d1)),
-        (cf.Helix((1, 0, 0), (3, 0, 1), 2, -1, (0, 1, 1)), cf.Helix(*moved((1, 0, 0), (3, 0, 1)), 2, -1, Q @ (0, 1, 1))),
+        (cf.Arc((1, 0, 0), (3, 0, 1), 1.7, (0, 1, 1), d1),
+         cf.Arc(*moved((1, 0, 0), (3, 0, 1)), 1.7, Q @ (0, 1, 1), Q @ d1)),
+        (cf.Helix((1, 0, 0), (3, 0, 1), 2, -1, (0, 1, 1)),
+         cf.Helix(*moved((1, 0, 0), (3, 0, 1)), 2, -1, Q @ (0, 1, 1))),
         (cf.UniformCurvature(2, (1, 2, 3)), cf.UniformCurvature(2, (1, 2, 3), shift, quaternion)),
         (cf.Spline(BEND, d1), cf.Spline(moved(*BEND), Q @ d1)),
         (cf.Spline(RING, d1, closed=True), cf.Spline(moved(*RING), Q @ d1, closed=True)),
@@ -280,21 +282,27 @@ def test_thousands_of_points():
 
 nan, inf = math.nan, math.inf
 REFUSED = {
-    "arc of no angle": (lambda: cf.Arc((0, 0, 0), (1, 0, 0), 0.0), "Arc.angle = 0.0: expected a finite number other than 0"),
+    "arc of no angle": (lambda: cf.Arc((0, 0, 0), (1, 0, 0), 0.0),
+                        "Arc.angle = 0.0: expected a finite number other than 0"),
     "arc of infinite angle": (lambda: cf.Arc((0, 0, 0), (1, 0, 0), inf), "Arc.angle = inf"),
-    "arc of no radius": (lambda: cf.Arc((0, 0, 0), (0, 0, 1), 1.0), "Arc.start = (0.0, 0.0, 1.0): expected a point off the axis"),
+    "arc of no radius": (lambda: cf.Arc((0, 0, 0), (0, 0, 1), 1.0),
+                         "Arc.start = (0.0, 0.0, 1.0): expected a point off the axis"),
     "arc too short": (lambda: cf.Arc((0, 0, 0), (1, 0, 0), 1e-14), "Arc.length = 1e-14"),
     "arc of no axis": (lambda: cf.Arc((0, 0, 0), (1, 0, 0), 1.0, axis=(0, 0, 0)), "Arc.axis = (0.0, 0.0, 0.0)"),
-    "arc, NaN": (lambda: cf.Arc((0, nan, 0), (1, 0, 0), 1.0), "Arc.centre = (0, nan, 0): expected 3 finite numbers (m)"),
-    "arc, d1 along": (lambda: cf.Arc((0, 0, 0), (1, 0, 0), 1.0, d1=(0, 2, 0)), "Arc.d1 = (0.0, 2.0, 0.0): expected a direction across"),
+    "arc, NaN": (lambda: cf.Arc((0, nan, 0), (1, 0, 0), 1.0),
+                 "Arc.centre = (0, nan, 0): expected 3 finite numbers (m)"),
+    "arc, d1 along": (lambda: cf.Arc((0, 0, 0), (1, 0, 0), 1.0, d1=(0, 2, 0)),
+                      "Arc.d1 = (0.0, 2.0, 0.0): expected a direction across"),
     "helix of no turns": (lambda: cf.Helix((0, 0, 0), (1, 0, 0), 0, 1.0), "Helix.turns = 0"),
     "helix, pitch": (lambda: cf.Helix((0, 0, 0), (1, 0, 0), 1, nan), "Helix.pitch = nan"),
     "helix of no radius": (lambda: cf.Helix((0, 0, 0), (0, 0, 0), 1, 1.0), "Helix.start"),
     "helix, d1": (lambda: cf.Helix((0, 0, 0), (1, 0, 0), 1, 1.0, d1="x"), "Helix.d1 = 'x'"),
     "uniform of no length": (lambda: cf.UniformCurvature(0, (0, 0, 0)), "UniformCurvature.length = 0"),
     "uniform, curvature": (lambda: cf.UniformCurvature(1, (0, inf, 0)), "UniformCurvature.curvature = (0, inf, 0)"),
-    "uniform, no quaternion": (lambda: cf.UniformCurvature(1, (0, 0, 0), frame=(1, 0, 0)), "UniformCurvature.frame = (1, 0, 0): expected 4"),
-    "uniform, quaternion of length 2": (lambda: cf.UniformCurvature(1, (0, 0, 0), frame=(2, 0, 0, 0)), "expected a quaternion of length 1"),
+    "uniform, no quaternion": (lambda: cf.UniformCurvature(1, (0, 0, 0), frame=(1, 0, 0)),
+                               "UniformCurvature.frame = (1, 0, 0): expected 4"),
+    "uniform, quaternion of length 2": (lambda: cf.UniformCurvature(1, (0, 0, 0), frame=(2, 0, 0, 0)),
+                                        "expected a quaternion of length 1"),
 }  # fmt: skip
 
 

@@ -1,4 +1,4 @@
-"""Damping takes what it should, and nothing from a rigid motion."""
+"""Damping dissipates the exact energy, and none in a rigid motion."""
 
 import math
 
@@ -15,7 +15,8 @@ BEAM = 1.8751040687119611
 MODES = {
     "axial": (math.pi / (2 * L) * math.sqrt(1e5 / 2), lambda s: (math.sin(math.pi * s / (2 * L)), 0, 0), None),
     "torsion": (math.pi / (2 * L) * math.sqrt(15 / 2e-4), None, lambda s: (math.sin(math.pi * s / (2 * L)), 0, 0)),
-    "bending": (BEAM**2 * math.sqrt(20 / (2 * L**4)), lambda s: (0, cantilever(BEAM * s / L), 0), lambda s: (0, 0, slope(BEAM * s / L))),
+    "bending": (BEAM**2 * math.sqrt(20 / (2 * L**4)), lambda s: (0, cantilever(BEAM * s / L), 0),
+                lambda s: (0, 0, slope(BEAM * s / L))),
 }  # fmt: skip
 
 
@@ -65,7 +66,7 @@ def test_a_section_may_have_its_own_viscosity():
 
 
 def test_a_rigid_spin_is_not_damped():
-    """After the first stretch has died away: 20 turns without loss."""
+    """After the initial axial vibration has decayed: 20 turns without loss of energy."""
     rod = cf.Rod(cf.Line((0, 0, 0), (L, 0, 0)), SECTION, damping=cf.Damping(time=2e-3))
     scene = cf.Scene([rod], velocities=[cf.InitialVelocity(rod, angular=(0, 2 * math.pi, 0))])
     history = cf.simulate(scene, 25, dt=1 / 40, elements=2, save_every=1)

@@ -1,4 +1,4 @@
-"""The demos run, under mpirun too, and give the number that they promise."""
+"""The demos run, under mpirun too, and give the numbers that they state."""
 
 import sys
 from pathlib import Path
@@ -34,7 +34,7 @@ def test_eccentric_cantilever(tmp_path_all, capsys):
 
 @pytest.mark.serial
 def test_motion_quick(capsys):
-    """All seven."""
+    """All seven motions."""
     import motion
 
     for check, off in motion.main(out=None, quick=True):
@@ -44,7 +44,7 @@ def test_motion_quick(capsys):
 
 
 def test_motion(tmp_path_all, capsys):
-    """The shortest, with its picture, on any number of processes."""
+    """The shortest motion, with its picture, on any number of processes."""
     import motion
 
     ((check, off),) = motion.main(["released_column"], tmp_path_all, quick=True)
@@ -60,7 +60,7 @@ def test_motion(tmp_path_all, capsys):
 
 @pytest.mark.serial
 def test_overhead_quick(tmp_path):
-    """The bare loop and the public face give the same digits; what it costs is for the command to say."""
+    """The bare loop and `solve` give the same digits; times are not tested."""
     import overhead
 
     _, _, difference = overhead.main(runs=1, out=tmp_path)
@@ -77,7 +77,7 @@ def test_accuracy_quick(tmp_path):
 
 @pytest.mark.serial
 def test_rungs_quick(tmp_path):
-    """Every model that a scene fits gives the same tip; the cheaper ones have fewer unknowns."""
+    """All models valid for a scene give the same tip; cheaper ones have fewer unknowns."""
     import rungs
 
     scenes = [(rungs.eccentric_cantilever, ((3, 4), None)), (rungs.lee_frame, ((4, 8),)), (rungs.spring, ((4, 24),))]
@@ -89,19 +89,21 @@ def test_rungs_quick(tmp_path):
 
 @pytest.mark.serial
 def test_choice_quick(tmp_path):
-    """What is chosen is as accurate as its error bar says, and so is what was picked by hand."""
+    """The automatic choice and the choice by hand are as accurate as requested."""
     import choice
 
     found = choice.main(runs=1, out=tmp_path, scenes=choice.SCENES[:1], counts=(2, 4, 8))
     (rows, ratio) = found["eccentric_cantilever"]
     (_, model, *_, error, estimate), (_, by_hand, *_, picked, _) = rows
-    assert model == "determinate" and by_hand in ("determinate", "planar") and ratio > 0  # the clock picks by hand
+    assert (
+        model == "determinate" and by_hand in ("determinate", "planar") and ratio > 0
+    )  # the measured time decides which one by hand
     assert error <= estimate <= 1e-6 and picked <= 1e-6
 
 
 @pytest.mark.serial
 def test_scaling_quick(tmp_path):
-    """The sizes are what they say; what they cost is for the command to say."""
+    """The numbers of unknowns; times are not tested."""
     import scaling
 
     rows = scaling.main(sizes=(4, 16, 64), out=tmp_path)
@@ -110,7 +112,7 @@ def test_scaling_quick(tmp_path):
 
 @pytest.mark.serial
 def test_steps_quick(tmp_path):
-    """The models and schemes move alike; a kept tangent serves most of the steps. What it costs is for the command to say."""
+    """Models and schemes give the same motion; most steps reuse a tangent. Times are not tested."""
     import steps
 
     found = steps.main(runs=1, duration=0.2, out=tmp_path)

@@ -1,5 +1,5 @@
-"""Eq. (1) and its rungs as expressions, point by point at random states: against formulas by hand, finite differences,
-and the planar against the spatial."""
+"""Eq. (1) and its models as expressions, point by point at random states: against formulas by hand, against finite
+differences, and the planar against the spatial model."""
 
 import numpy as np
 import pytest
@@ -63,7 +63,7 @@ class Point:
         return spatial.motion_of(VECTOR(self.r_s + h * dr_s), VECTOR(q), VECTOR(q_s), VECTOR(q))
 
     def point(self, h=0.0):
-        """What acts on the rod sees of it, at h along the direction; r changes as r' does."""
+        """The `Point` for the virtual work of actions, at h along the direction; r changes as r' does."""
         q = turned(self.q, h * self.d[1]) if h else self.q
         r, r_s = self.r_s - 0.4 + h * self.d[0], self.r_s + h * self.d[0]
         U, U_s = (VECTOR([*a, *q]) for a in (r, r_s))
@@ -136,7 +136,8 @@ def test_loads_that_turn():
 
 
 def test_what_sees_position_and_rotation_changes_with_both():
-    """The rotation vector, and a force that depends on r and r', in the direction of a small displacement and rotation."""
+    """The rotation vector, and a force that depends on r and r', in
+    the direction of a small displacement and rotation."""
     p, stiff = Point(5), VECTOR([0.7, -0.4, 0.2])
 
     def work(point, test):
@@ -152,7 +153,7 @@ def test_what_sees_position_and_rotation_changes_with_both():
 
 
 class PlanePoint:
-    """A point of a rod in a plane, as the planar rung and as the spatial one see it."""
+    """A point of a rod in a plane, for the planar and for the spatial model."""
 
     def __init__(self, seed):
         random = np.random.default_rng(seed)

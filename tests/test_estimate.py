@@ -1,4 +1,4 @@
-"""The error bar of a whole path, found at a few of its points, holds at all of them and is no fable."""
+"""The estimated error of a path, computed at a few of its points, holds at all of them and is not far too large."""
 
 from pathlib import Path
 
@@ -9,7 +9,7 @@ from conftest import column
 import cosserat_fenicsx as cf
 from cosserat_fenicsx.scene.scenefile import read_scene
 
-pytestmark = pytest.mark.serial  # estimates know no ranks
+pytestmark = pytest.mark.serial  # estimates do not depend on ranks
 DEMOS = Path(__file__).parent.parent / "demos"
 _PLACES = np.linspace(0, 1, 101)
 
@@ -49,14 +49,15 @@ def test_every_point_of_a_path(scene, etas, tol):
     "etas", [(0.0, 1.0), [0.0, 0.5, 1.0], np.linspace(-1, 1, 9), [1e-12, 1e-3, 0.3, 0.6, 1.0]], ids=str
 )
 def test_points_without_load(etas):
-    """Where nothing moves there is no error to speak of."""
+    """Where nothing moves the estimated error is negligible."""
     rod, scene = column()
     path = cf.solve(scene, etas if isinstance(etas, tuple) else list(etas))
     assert path.error.max() <= 1e-6 and max(path.elements) <= 16
 
 
 def test_a_smooth_rod_does_not_hide_another():
-    """A long beam under a line load, whose quartic is met exactly, beside a short arc that is pulled straight."""
+    """A long beam under a line load, whose deflection P4 represents
+    exactly, next to a short arc that is pulled straight."""
 
     def stiff(bending):
         return cf.Stiffness((1e6, 1e6), 1e6, (bending, bending), bending)

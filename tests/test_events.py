@@ -1,4 +1,5 @@
-"""Events lie between their points, where the tangent is singular; each is of one kind, and found on two meshes."""
+"""Events lie between neighbouring points, where the tangent is
+singular; each has one kind and is found on two meshes."""
 
 import dataclasses
 from pathlib import Path
@@ -23,7 +24,7 @@ def lees_frame_with_a_follower():
 
 
 def spring():
-    """Sixteen turns, clamped, pressed together by a fifth of their height and farther."""
+    """A clamped spring of sixteen turns, compressed by a fifth of its height and more."""
     rod = cf.Rod(cf.Helix((0, 0, 0), (0.05, 0, 0), 16, 0.05), cf.Circle(0.005), cf.Material(E=200e9, nu=0.3))
     pressed = cf.Prescribed(rod.end, displacement=(0, 0, -0.8), rotation=(0, 0, 0))
     return cf.Scene([rod], [cf.Clamp(rod.start), pressed], [])
@@ -67,7 +68,8 @@ def test_events_lie_between_their_points(scene, end):
 
 
 def test_divergence_under_a_follower_load():
-    """At half the height of a pinned column: tan(k/2) = -k/2, P = k^2. Its symmetric part is indefinite long before."""
+    """A pinned column, loaded at half its height: tan(k/2) = -k/2, P =
+    k^2. The symmetric part is indefinite long before."""
     rod = cf.Rod(cf.Line((0, 0, 0), (0, 0, 1.0), d1=(1, 0, 0)), cf.Stiffness((np.inf,) * 2, np.inf, (1.0, 4.0), 1.0))
     guides = [cf.Roller(rod.end, axis) for axis in ((1, 0, 0), (0, 1, 0))]
     scene = cf.Scene([rod], [cf.Hinge(rod.start, (1, 0, 0)), *guides], [cf.FollowerForce(rod.at(0.5), (0, 0, -1.0))])
@@ -81,7 +83,7 @@ def test_divergence_under_a_follower_load():
 
 @pytest.mark.serial
 def test_a_slender_spring_is_stable_where_it_bends_sideways():
-    """K was bounded over the length of its wire: negative modes, and a bifurcation at 0.807, beyond the end."""
+    """With K bounded by the length of its wire there were negative modes, and a bifurcation at 0.807."""
     path = cf.solve(spring(), (0.0, 0.5), elements=128)
     assert path.stable.all() and path.events == [] and not told(path)
 

@@ -1,4 +1,4 @@
-"""What is told below the table: the largest contact force and moment."""
+"""The largest contact force and moment, below the table."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""Where methods fail: every cell of this package holds what it promises, and the map's command works."""
+"""The comparison of methods (demos/failures.py): this package's results are right, and the command works."""
 
 import json
 import sys
@@ -15,7 +15,7 @@ sys.path.append(str(Path(__file__).parent.parent / "demos"))
 from trials import catalogue, cells, chains, methods, own, problems, secant
 from trials.rotation_vector import RotationVector
 
-#: What is not right, by trial and method: verdicts that are allowed. A jump may end anywhere, if it is said.
+#: Verdicts other than "right" that are allowed, by trial and method. One large step may end anywhere, with a warning.
 _SAID = {cells.SAID, cells.STOPPED}
 _JUMPS = {(trial, method.key): _SAID for trial in ("jump_1.1", "jump_1.5", "jump_4") for method in own.OWN[1:]}
 ALLOWED = {
@@ -48,7 +48,8 @@ def test_own_cell(trial, method):
 
 @pytest.mark.parametrize(("slenderness", "elements"), [(1e3, 64), (1e4, 128), (1e4, 256)])
 def test_a_small_step_alone_is_no_convergence(slenderness, elements):
-    """Without a contact force Newton bends a slender rod in one step and takes back its stretch in the next, which is small."""
+    """Without an independent contact force, Newton's method bends a slender rod in
+    one step, which stretches it; the next, small step corrects this."""
     problem = problems.column([0.5, 0.9], slenderness)
     rod, scene = problems.scene_of(problem)
     path = cf.solve(scene, problem["load_factors"], model="spatial", formulation="displacement", elements=elements)
@@ -63,7 +64,7 @@ def test_what_rounding_puts_out_of_reach_is_refused():
 
 
 def test_a_word_on_stability_is_held_against_becks_column():
-    """Right where it is right everywhere; wrong and taken back by its own words; silently wrong."""
+    """Verdicts for answers that are right, wrong with a warning, and wrong without one."""
     loads = (5, 10, 15, 20, 25)
 
     def verdict(stable, said=""):
@@ -81,13 +82,13 @@ def test_a_word_on_stability_is_held_against_becks_column():
 
 
 def test_what_is_written_for_comparison_fails_as_it_is_known_to():
-    """Rotation vectors, truncated rotations, bare loops: if these became right, the map would say nothing."""
+    """Rotation vectors, truncated rotations and bare loops fail as expected, so that the comparison has a meaning."""
     vector, (beam, mcre), bare = RotationVector(), chains.CHAINS, methods.BY_KEY["bare"]
     of = catalogue.BY_KEY
     path = methods.cell(of["order"], vector)
     assert path.verdict == cells.SILENT and 1e-5 < path.value < 1e-3 and "of order 2.0 in the mesh" in path.note
     assert methods.cell(of["objectivity"], vector).verdict == cells.SILENT
-    # the number of steps costs a hundredth of what the mesh costs, and as that does it vanishes with the mesh
+    # the error by the number of steps is a hundredth of that by the mesh, and also converges with the mesh
     steps = methods.cell(of["steps"], vector)
     assert steps.verdict == cells.RIGHT and steps.value > 1e-6 and "of order 2.0 in the mesh" in steps.note
     assert methods.cell(of["flutter"], beam).verdict == cells.SILENT
@@ -96,12 +97,13 @@ def test_what_is_written_for_comparison_fails_as_it_is_known_to():
     assert methods.cell(of["truncated"], secant.Secant()).verdict == cells.RIGHT
     assert methods.cell(of["pole"], secant.Secant()).number == "inf"
     for trial, verdict in (("residual", cells.SILENT), ("line_search", cells.STOPPED), ("clamp", cells.SILENT),
-                           ("lu", cells.STOPPED), ("quadrature", cells.SILENT), ("jump_1.5", cells.SILENT)):  # fmt: skip
+                           ("lu", cells.STOPPED), ("quadrature", cells.SILENT),
+                           ("jump_1.5", cells.SILENT)):  # fmt: skip
         assert methods.cell(of[trial], bare).verdict == verdict, trial
 
 
 def test_the_command_is_broken_off_and_goes_on(tmp_path, monkeypatch, capsys):
-    """The quick map of a few methods; programs that are not installed are cells that say so."""
+    """The quick comparison of a few methods; programs that are not installed are marked as such."""
     import failures
 
     few = [methods.BY_KEY[key] for key in ("determinate", "rotation_vector", "secant")]

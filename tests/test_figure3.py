@@ -1,4 +1,4 @@
-"""Figure 3: each comparison model against a truth of its own, and the whole figure in its quick mode."""
+"""Figure 3: each comparison model against a reference solution, and the whole figure in its quick mode."""
 
 import json
 import sys
@@ -41,7 +41,7 @@ def test_the_corotational_beam_tends_to_the_rod_with_second_order(arm):
 
 
 def test_one_jump_of_the_corotational_beam_is_not_the_path():
-    """From the unloaded state Newton's method finds an unstable equilibrium at eta = 1.5: counted, not hidden."""
+    """From the unloaded state Newton's method finds an unstable equilibrium at eta = 1.5, with its negative modes."""
     jumped = corotational.solve([1.5], 32, adaptive=False)
     followed = corotational.solve([1.5], 32)
     assert jumped.negative_modes[0] > 0 and jumped.delta[0] < 0
@@ -61,7 +61,7 @@ def test_elements_have_consistent_tangents(law):
 
 
 def test_the_truncated_energy_is_the_rods_to_fourth_order():
-    """Its error against the exact strains falls as the fifth power; a pure rotation leaves -EA phi^6/8."""
+    """Its difference from the exact energy is of fifth order; that of a pure rotation by phi is -EA phi^6/8."""
     EA, GA, EI = 300.0, 120.0, 1.7
 
     def error(size):
@@ -79,7 +79,7 @@ def test_the_truncated_energy_is_the_rods_to_fourth_order():
 
 
 def test_the_energy_of_an_mcre_is_that_of_the_rod_within_to_fourth_order():
-    """Against the exact strains, their energy made a minimum over all that may happen between the nodes."""
+    """Against the energy of the exact strains, minimised over the motions between the nodes."""
     length, EA, GA, EI = 0.7, 400.0, 150.0, 1.3
     tensors = mcre.energy(length, EA, GA, EI)
     x, weights = np.polynomial.legendre.leggauss(24)
@@ -115,7 +115,7 @@ def test_the_energy_of_an_mcre_is_that_of_the_rod_within_to_fourth_order():
     ("elements", "eta"), [(1, 0.311), (2, 0.464), (4, 0.584), (8, 0.606), (16, 0.609), (32, 0.611)]
 )
 def test_limit_points_of_the_mcre(elements, eta):
-    """Shear factor 0.9; a limit point: the tangent is singular there, and one mode is unstable beyond."""
+    """Shear factor 0.9: at a limit point the tangent is singular, and beyond it one mode is unstable."""
     problem = mcre.problem(elements, Column(shear_factor=0.9))
     found = mcre.limit(problem)
     assert found.eta == pytest.approx(eta, abs=6e-4)
@@ -143,7 +143,7 @@ def test_the_mcre_before_and_beyond_its_limit_point():
 
 
 def test_ever_more_elements_tend_to_the_truncated_energy():
-    """The limit point of forms/truncated.py on two meshes, and the elements' on the way there with second order."""
+    """The limit point of forms/truncated.py on two meshes; those of the elements converge to it with second order."""
     limit = mcre.limit(TruncatedColumn())
     assert limit.eta == pytest.approx(mcre.limit(TruncatedColumn(8, 3)).eta, rel=1e-6)
     gaps = [limit.eta - mcre.limit(mcre.problem(n)).eta for n in (256, 512)]
@@ -151,7 +151,8 @@ def test_ever_more_elements_tend_to_the_truncated_energy():
 
 
 def test_the_mesh_of_the_bar():
-    """The second moment of area is the circle's; so is the area, to 1e-6; no face lies off the circle by 4e-4."""
+    """Second moment of area (exactly) and area (to 1e-6) are those of
+    the circle; no node of the surface is off it by 4e-4."""
     points, cells = bar_mesh.half_disc(0.1, 1)
     area, second = bar_mesh.moments(points, cells)
     assert second == pytest.approx(np.pi * 0.1**4 / 8, rel=1e-12) and area == pytest.approx(

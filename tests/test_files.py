@@ -1,4 +1,4 @@
-"""Files and pictures, opened as a user would open them."""
+"""Files and pictures, read back with the usual libraries."""
 
 import numpy as np
 import pytest
@@ -24,7 +24,7 @@ def xdmf(solved, tmp_path_all):
 
 
 def check(data, rod, path, k):
-    """All fields of the file against the path's own, and against each other."""
+    """All fields of the file against those of the path, and against each other."""
     expected = path.fields(k, rod)
     data = {name: np.asarray(data[name]) for name in data.keys()}
     data["quaternion"] = np.column_stack([data["quaternion_a"], data["quaternion_bcd"]])
@@ -101,7 +101,7 @@ def test_an_empty_path_is_not_written(solved, tmp_path_all):
 
 
 def test_picture(solved, tmp_path_all):
-    """The tubes are there, in more than one colour, with the bar's title in black on white."""
+    """The rods are visible in more than one colour, the title of the colour bar is black on white."""
     _, path = solved
     file = tmp_path_all / "rods.png"
     path.plot(file)

@@ -1,4 +1,4 @@
-"""The forms themselves: Taylor test of every tangent, balance under rigid motions, and the second variation."""
+"""The forms: Taylor test of every tangent, balance under rigid motions, and the second variation."""
 
 from dataclasses import replace
 
@@ -19,7 +19,7 @@ from cosserat_fenicsx.statics.stability import NegativeModes
 pytestmark = pytest.mark.serial
 
 
-#: The multiplier formulation with n from the motion: what the carried n goes over to in equilibrium.
+#: The multiplier formulation with n from the motion, which the carried n equals in equilibrium.
 GALERKIN = replace(MULTIPLIER, force=OF_MOTION)
 
 
@@ -28,7 +28,9 @@ def problem_of(formulation, *, arm=False, rigid=False):
     section = None
     if rigid:
         section = cf.Stiffness(shear=(np.inf, np.inf), axial=np.inf, bending=k.bending, torsion=k.torsion)
-    rod, scene = column(arm=arm, diameter=2.0, section=section)  # thick: the tangent's parts are of like size
+    rod, scene = column(
+        arm=arm, diameter=2.0, section=section
+    )  # thick, so that all parts of the tangent have similar size
     layout = Layout.of(scene, 3)
     signature = Signature.of(scene, layout, formulation=formulation, degree=2)
     problem = Problem(SpatialModel(MPI.COMM_SELF, signature))

@@ -17,10 +17,9 @@ STIFF = cf.Stiffness((1e5, 1e5), 1e5, (1e3, 1e3), 1e3, mass=2.0, inertia=(0.1, 0
 
 
 def oscillator(omega, tau, v, steps, rho):
-    """u'' = -omega^2 (u + tau u') from u = 0, u' = v: rows (u, u') after the steps, by the scheme as it is published.
+    """u'' = -omega^2 (u + tau u') from u = 0, u' = v: rows (u, u') after the steps, by the published scheme.
 
-    The acceleration at the start is that of an implicit step of a tenth of the first; b - a is taken in proportion
-    to the step.
+    The initial acceleration is that of an implicit step of a tenth of the first; b - a is scaled with the step.
     """
     m, f = (2 * rho - 1) / (rho + 1), rho / (rho + 1)
     gamma = 0.5 - m + f
@@ -53,7 +52,8 @@ def test_a_mode_is_what_linear_theory_says(rho, omega_h):
         turn = model == "spatial"
         push = cf.InitialVelocity(damped, **{"angular" if turn else "linear": lambda s, v=small: (v * s / 2, 0, 0)})
         scene = cf.Scene([damped], [cf.Clamp(damped.start)], velocities=[push])
-        history = cf.simulate(scene, 32 * h, dt=h, save_every=28 * h, elements=1, degree=1, scheme=SCHEME, rho_inf=rho, model=model)  # fmt: skip
+        history = cf.simulate(scene, 32 * h, dt=h, save_every=28 * h, elements=1, degree=1, scheme=SCHEME, rho_inf=rho,
+                              model=model)  # fmt: skip
         assert history.steps[-1] == 32
         every = cf.simulate(scene, 28 * h, dt=h, elements=1, degree=1, scheme=SCHEME, rho_inf=rho, model=model)
         for found, steps in ((history, [h] * 32), (every, [h] * 28)):
@@ -67,7 +67,7 @@ def test_a_mode_is_what_linear_theory_says(rho, omega_h):
 
 
 def test_the_spectral_radius_at_high_frequency_is_rho_inf():
-    """Of the theory above, which the package follows; resolved motions are hardly damped."""
+    """The spectral radius of the scheme above; resolved motions are hardly damped."""
     for rho in (0.5, 0.8, 1.0):
         high, low = (np.abs(oscillator(w, 0.0, 1.0, [1.0] * 600, rho)[:, 1]) for w in (1e6, 2 * np.pi / 100))
         shrunk = (high[580:].max() / high[480:500].max()) ** 0.01
@@ -89,7 +89,7 @@ def test_order_in_time(rho):
 
 
 def test_the_ledger_of_all_that_there_is_closes_with_the_order_two(monkeypatch):
-    """Joints, damping, drag, a driven root, loads that turn; motions themselves are in tests/test_demos.py."""
+    """With joints, damping, drag, a prescribed motion and follower loads."""
     monkeypatch.syspath_prepend(str(Path(__file__).parent.parent / "demos"))
     import orders
 
@@ -107,7 +107,8 @@ def test_the_ledger_of_all_that_there_is_closes_with_the_order_two(monkeypatch):
 
 
 def test_what_is_dissipated_numerically_is_in_the_balance():
-    """A sudden push along a stiff rod rings; half of what it holds is gone in the end, and no damping has taken it."""
+    """A sudden axial force makes a stiff rod vibrate; half of the
+    energy is lost in the end, without physical damping."""
     rod = cf.Rod(cf.Line((0, 0, 0), (2, 0, 0)), STIFF)
     scene = cf.Scene([rod], loads=[cf.Force(rod.end, cf.Step((1e3, 0, 0), end=0.001))])
     history = cf.simulate(scene, 1, dt=0.01, elements=4, degree=2, scheme=SCHEME, rho_inf=0.5)
@@ -121,7 +122,8 @@ def test_what_is_dissipated_numerically_is_in_the_balance():
 
 @pytest.mark.parametrize("model", ["planar", "spatial"])
 def test_starts_and_jumps_are_consistent(model):
-    """Under a constant force accelerations are right from the first step on: free fall, and flight after it, are exact."""
+    """Under a constant force accelerations are exact from the first step
+    on, and so are free fall and the flight after it."""
     rod = cf.Rod(cf.Line((0, 0, 0), (2, 0, 0)), STIFF)
     scene = cf.Scene([rod], loads=[cf.LineForce(rod, cf.Step((0, 0, 4.0), end=0.5))])
     history = cf.simulate(scene, 1, dt=0.07, elements=2, degree=2, scheme=SCHEME, model=model)
@@ -142,12 +144,12 @@ def test_from_a_static_point_nothing_moves_and_kinks_of_a_drive_do_no_harm():
     )
     history = cf.simulate(cf.Scene([rod], [kinked]), 1, dt=0.01, elements=4, degree=2, scheme=SCHEME)
     assert np.abs(history.position(rod.start)[:, 2] - np.maximum(history.times - 0.5, 0)).max() < 1e-12
-    assert history.velocity(rod.start)[-1, 2] == pytest.approx(1.0, abs=1e-3)  # 0.8^50 of what rings
+    assert history.velocity(rod.start)[-1, 2] == pytest.approx(1.0, abs=1e-3)  # 0.8^50 of the vibration remains
     assert np.abs(history.velocity(rod.end)).max() < 4
 
 
 def test_rigid_spins_are_exact_and_undamped():
-    """The rotation vector of a step is h Om, whatever h; strain rates are those of strains."""
+    """The rotation vector of a step is h Om for any h; strain rates are computed from strains, and vanish."""
     damping, axis = cf.Damping(time=2e-3), np.array([1, 2, 2]) / 3
     rod = cf.Rod(cf.Line((0, 0, 0), (1, 2, 2)), STIFF, damping=damping)
     spin = cf.InitialVelocity(rod, linear=(0.5, 0, 0), angular=2 * np.pi * axis)
@@ -180,7 +182,7 @@ def test_flight_in_space():
 
 @pytest.mark.parametrize("scheme", [SCHEME, "momentum", "energy"])
 def test_a_step_by_half_a_turn_is_none(monkeypatch, scheme):
-    """-q would do for |q| = 1 where q does; Newton's method that finds it has failed."""
+    """-q also satisfies |q| = 1: where Newton's method converges to it, the step counts as failed."""
     rod = cf.Rod(cf.Line((0, 0, 0), (2, 0, 0)), STIFF)
     scene = cf.Scene([rod], [cf.Clamp(rod.start)], velocities=[cf.InitialVelocity(rod, angular=lambda s: (0, s, 0))])
     predicted, flips = OneStep._predicted, []

@@ -1,4 +1,4 @@
-"""The house: what may import what, the wheel and the plain checkout, files that stay small."""
+"""The structure of the package: allowed imports, the wheel and the plain checkout, the length of files."""
 
 import ast
 import shutil
@@ -17,7 +17,7 @@ PACKAGE = ROOT / "cosserat_fenicsx"
 
 
 def imports(file):
-    """All modules that a file imports, wherever in it."""
+    """All modules that a file imports, inside functions too."""
     for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
@@ -40,7 +40,7 @@ def test_forms_know_ufl_alone():
         assert all(name.startswith("forms") for name in inside(file)), file
 
 
-#: What all rooms share; and the rooms that each room may know beside these and itself.
+#: Modules that all subpackages may import; and the other subpackages that each subpackage may import.
 SHARED = {
     "analytic",
     "checks",
@@ -65,9 +65,19 @@ ROOMS = {
     "dynamics": {"scene", "models", "algebra", "results", "storage", "statics"},
     "cli": {"scene", "models", "statics", "dynamics", "results", "storage", "pictures"},
 }
-#: Files that put a scene's model, its solvers and its results together; the other solvers know no rung, no scene, no result.
+#: Files that combine scenes, models, solvers and results; all other solver files import none of scene, models and
+#: results.
 FITTERS = {
-    "statics": {"circulatory", "first_mesh", "grading", "linear_buckling", "refinement", "solve", "solvers", "path/recorder"},
+    "statics": {
+        "circulatory",
+        "first_mesh",
+        "grading",
+        "linear_buckling",
+        "refinement",
+        "solve",
+        "solvers",
+        "path/recorder",
+    },
     "dynamics": {
         "time_loop",
         "natural_modes",
@@ -110,7 +120,7 @@ def test_solvers_know_the_protocol_of_models_alone():
 
 
 def test_no_module_takes_the_name_of_something_public():
-    """Importing it would put the module in the place of what the package offers by that name."""
+    """Importing such a module would replace the public object of the same name."""
     modules = {file.stem for file in PACKAGE.glob("*.py")} | {file.name for file in PACKAGE.iterdir() if file.is_dir()}
     for name in modules & set(cf.__all__):
         assert getattr(cf, name).__name__ == f"cosserat_fenicsx.{name}"
@@ -118,7 +128,10 @@ def test_no_module_takes_the_name_of_something_public():
 
 
 def test_pictures_are_imported_only_when_asked_for():
-    code = "import sys, cosserat_fenicsx as cf; cf.solve, cf.Path; print({'pyvista', 'matplotlib', 'meshio', 'vtk'} & set(sys.modules))"
+    code = (
+        "import sys, cosserat_fenicsx as cf; cf.solve, cf.Path; print({'pyvista', 'matplotlib', 'meshio', 'vtk'} &"
+        " set(sys.modules))"
+    )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, encoding="utf-8", cwd=ROOT)
     assert done.stdout.strip() == "set()", done.stderr
 
@@ -152,7 +165,8 @@ def test_the_wheel_holds_the_forms_and_works(tmp_path):
     assert "cosserat_fenicsx/forms/spatial.py" in names and "cosserat_fenicsx/models/spatial.py" in names
     zipfile.ZipFile(wheel).extractall(tmp_path / "site")
     code = "import cosserat_fenicsx.forms.spatial as f, cosserat_fenicsx as cf; print(f.__file__); cf.solve"
-    done = subprocess.run([sys.executable, "-S", "-c", f"import sys; sys.path[:0] = {[str(tmp_path / 'site'), *sys.path]!r}; {code}"],
+    done = subprocess.run([sys.executable, "-S", "-c",
+                           f"import sys; sys.path[:0] = {[str(tmp_path / 'site'), *sys.path]!r}; {code}"],
                           capture_output=True, encoding="utf-8", cwd=tmp_path)  # fmt: skip
     assert str(tmp_path / "site") in done.stdout, done.stderr
 

@@ -1,4 +1,4 @@
-"""What must not change the answer: a rotation of everything, the units, the number of ranks, the way to the load."""
+"""Invariance of results under rotation of the scene, change of units, the number of ranks and the load steps."""
 
 import numpy as np
 import pytest
@@ -73,7 +73,7 @@ def rich_scene():
 
 
 def test_number_of_ranks_changes_nothing():
-    """All ranks together against every rank alone; -n 1 compares a run with itself."""
+    """All ranks together against every rank alone (trivial with one process)."""
     cases = [column(), *rich_scene()]
     for rod, scene in cases:
         arguments = dict(elements=9, degree=3)
@@ -105,7 +105,7 @@ def test_an_unstable_path_is_counted_alike_in_parallel():
 
 
 def test_the_way_does_not_matter():
-    """8, 10 or 160 steps to one load: one answer, to round-off."""
+    """8, 10 or 160 steps to one load give the same result to round-off."""
     rod, scene = next(rich_scene())
     ends = [cf.solve(scene, np.linspace(0, 1, n + 1)[1:], elements=6).position(rod.end)[-1] for n in (8, 10, 160)]
     np.testing.assert_allclose(ends[1], ends[0], atol=1e-11 * rod.length)
@@ -113,7 +113,7 @@ def test_the_way_does_not_matter():
 
 
 def test_one_problem_serves_every_scene_of_its_shape():
-    """Numbers of a first scene must not leak into a second, nor compilation be repeated for it."""
+    """Data of a first scene must not affect a second one, and nothing is compiled again for it."""
     from cosserat_fenicsx.algebra.pool import PROBLEMS
 
     first, scene = column()

@@ -1,4 +1,4 @@
-"""Rods joined: a cut rod is the whole one, forces and moments balance at every joint, releases release."""
+"""Joints: a rod cut in two and joined equals the whole rod, forces and moments balance at joints, releases work."""
 
 from dataclasses import dataclass
 
@@ -21,7 +21,7 @@ def line(a, b, name, section=SECTION, **more):
 
 @pytest.mark.parametrize("turned_round", [False, True])
 def test_a_cut_rod_is_the_whole_rod(turned_round):
-    """Also where the second half runs the other way, with its axes turned."""
+    """Also if the second half runs in the opposite direction, with rotated axes."""
     a, b, c = np.array([1.0, 2.0, 3.0]), np.array([1.2, 2.4, 3.2]), np.array([1.5, 3.0, 3.5])
     whole = line(a, c, "whole", d1=(1, 0, 0))
     lower = line(a, b, "lower", d1=(1, 0, 0))
@@ -44,7 +44,7 @@ def test_a_cut_rod_is_the_whole_rod(turned_round):
 
 
 def star(release=None, elements=3):
-    """Four rods meet at one point, at odd angles."""
+    """Four rods that meet at one point, at arbitrary angles."""
     tips = [(0, 0, -1.0), (1.0, 0.2, 0.3), (-0.4, 0.9, 0.5), (-0.3, -0.8, 0.9)]
     rods = [line((0, 0, 0), tip, f"arm{i}") for i, tip in enumerate(tips)]
     joints = [cf.Joint(rods[0].start, rod.start, release if i == 1 else None) for i, rod in enumerate(rods) if i]
@@ -79,7 +79,7 @@ def test_balance_at_a_joint_of_four(release):
     assert relative.magnitude() > 0.02
     if release == "all":
         np.testing.assert_allclose(transmitted, 0, atol=1e-11)
-    else:  # it turns about the axis alone, and sends no moment about where the axis is now
+    else:  # it rotates about the axis only, and transmits no moment about the current axis
         axis = np.array(release) / np.linalg.norm(release)
         np.testing.assert_allclose(np.cross(relative.as_rotvec(), axis), 0, atol=1e-12)
         assert abs(transmitted @ Rotation.from_quat(q[0, [1, 2, 3, 0]]).apply(axis)) < 1e-11
@@ -100,7 +100,7 @@ def test_ranks_agree_on_branching_structures(release):
 
 
 def test_number_of_unknowns():
-    """Nodes of the free arms, the shared point once, six-component nodes have seven unknowns; a hinge adds five."""
+    """The shared node counts once; nodes have seven unknowns; a hinge adds five equations."""
     _, rigid, elements = star()
     path = cf.solve(rigid, [0.1], elements=elements, degree=2, model="spatial")
     nodes = 4 * 2 * elements + 1
@@ -111,7 +111,7 @@ def test_number_of_unknowns():
 
 @pytest.mark.parametrize("elements", [1, 8])
 def test_a_closed_ring(elements):
-    """A ring held at one point is two half rings in parallel: the same as its halves joined at both ends."""
+    """A closed ring, held at one point, equals two half rings joined at both ends."""
     ring = cf.Rod(cf.Arc((0, 0, 0), (1, 0, 0), 2 * np.pi), SECTION, name="ring")
     far = ring.at(np.pi)
     loads = [cf.Force(far, (-1.5, 0.3, 1.0))]
@@ -188,7 +188,7 @@ force = [0.2, 0, 0]
 
 @dataclass(frozen=True)
 class Pressure(cf.LineAction):
-    """A load of a new kind, and all that it takes: a force along a rod that stays across it."""
+    """A complete user-defined load: a force along a rod that stays normal to it."""
 
     rod: cf.Rod
     pressure: float
@@ -204,7 +204,7 @@ class Pressure(cf.LineAction):
 
 
 def test_a_new_kind_of_load_takes_no_change_elsewhere():
-    """A ring under outer pressure p shrinks by the hoop force p R, wherever it is held."""
+    """A ring under outer pressure p shrinks by the hoop force p R, wherever it is supported."""
     ring = cf.Rod(cf.Arc((0, 0, 0), (2.0, 0, 0), 2 * np.pi), cf.Stiffness((50.0, 50.0), 90.0, (1.0, 1.0), 0.7))
     inwards = np.sign(ring.curve.frame(np.array([0.0]))[0, 0, 1]) * -0.2
     scene = cf.Scene([ring], [cf.Clamp(ring.start)], [Pressure(ring, inwards)], [cf.Joint(ring.start, ring.end)])

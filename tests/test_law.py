@@ -29,7 +29,7 @@ def law_by_hand(M, kind=law.CoupledLaw):
 
 
 class Numeric(law.CoupledLaw):
-    """The same, its values in numbers at once: UFL evaluates nested expressions slowly."""
+    """The same, evaluated to numbers at once: UFL evaluates nested expressions slowly."""
 
     def force(self, e, k):
         return VECTOR(value(super().force(VECTOR(value(e)), VECTOR(value(k)))))
@@ -52,7 +52,9 @@ class CoupledPoint(Point):
     def motion(self, h=0.0):
         """In numbers, which UFL evaluates faster."""
         exact = super().motion(h)
-        return equilibrium.Motion(VECTOR(value(exact.r_s)), ufl.as_matrix(value(exact.R)), VECTOR(value(exact.curvature)))
+        return equilibrium.Motion(
+            VECTOR(value(exact.r_s)), ufl.as_matrix(value(exact.R)), VECTOR(value(exact.curvature))
+        )
 
 
 def as_it_is(a):
@@ -73,7 +75,7 @@ def test_law_is_the_matrix_and_its_partial_inverse(seed):
 
 @pytest.mark.parametrize("seed", range(3))
 def test_numbers_of_a_matrix_make_its_law(seed):
-    """Also with components along other axes, and with K bounded: then A alone is smaller."""
+    """Also with components along other axes, and with K bounded, which changes A alone."""
     M = random_matrix(seed)
     P, _ = np.linalg.qr(np.random.default_rng(seed).normal(size=(3, 3)))
     along = Stiffnesses(np.zeros((1, 1, 3)), np.zeros((1, 1, 3)), None, None, M[None, None])
@@ -119,7 +121,8 @@ def test_coupled_second_variation_is_the_change_of_the_balance(seed):
 
 
 def test_carried_force_is_the_mixed_step_condensed():
-    """For any carried n: dn solves the linear compatibility, and the tangent is the change of the mixed balance with it."""
+    """For any carried n: dn solves the linearised compatibility, and the
+    tangent is the change of the mixed balance with it."""
     p, h, random = CoupledPoint(5), ufl.variable(ufl.as_ufl(1.0)), np.random.default_rng(5)
     section = p.section._replace(law=law_by_hand(p.matrix))
     start = p.motion()
@@ -154,9 +157,7 @@ def test_carried_force_is_the_mixed_step_condensed():
 @pytest.mark.parametrize("seed", range(2))
 def test_diagonal_law_is_a_special_matrix(seed):
     p = CoupledPoint(seed)
-    p.section, matrix = (
-        p.section._replace(law=here) for here in (p.law, law_by_hand(np.diag([*p.K, *p.J]), Numeric))
-    )
+    p.section, matrix = (p.section._replace(law=here) for here in (p.law, law_by_hand(np.diag([*p.K, *p.J]), Numeric)))
     n, motion = VECTOR([0.3, -0.7, 0.5]), p.motion()
     test = determinate.tests_of(p.test.phi, p.test.phi_s)
     for form in (

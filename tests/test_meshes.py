@@ -1,4 +1,4 @@
-"""Unequal elements: boundary layers of sqrt(EI/T), notches, and how far the estimated error may be believed there."""
+"""Unequal elements: boundary layers of length sqrt(EI/T), notches, and the accuracy of the estimated error there."""
 
 import numpy as np
 import pytest
@@ -20,7 +20,7 @@ def stiffnesses(rod):
 
 
 def taut_wire(slenderness, load=1e-2, diameter=1e-3):
-    """A clamped steel wire that is stretched by a thousandth, with a force across at mid-span, over its tension.
+    """A clamped steel wire, stretched by a thousandth, with a transverse force at mid-span of `load` times its tension.
 
     Returns:
         scene, rod, Wire, tension.
@@ -35,7 +35,8 @@ def taut_wire(slenderness, load=1e-2, diameter=1e-3):
 
 
 def cable(diameter, length=110.0, angle=1.0):
-    """A clamped steel cable, an arc that leaves its ends at an angle (rad) below the level, under its weight."""
+    """A clamped steel cable under its weight: an arc whose tangents at
+    the ends are at an angle (rad) to the horizontal."""
     radius, half = length / (2 * angle), length * np.sin(angle) / (2 * angle)
     arc = cf.Arc((half, 0, radius * np.cos(angle)), (0, 0, 0), 2 * angle, axis=(0, -1, 0))
     rod = cf.Rod(arc, cf.Circle(diameter), STEEL, name="cable")
@@ -46,7 +47,8 @@ def cable(diameter, length=110.0, angle=1.0):
 
 
 def true_error(path, rod, truth):
-    """Largest error of the last point's positions over the largest displacement, at many places of every element."""
+    """Largest error of the positions over the largest displacement, of
+    the last point, at many places of every element."""
     breaks = path.layout.breaks[0]
     inside = (breaks[:-1, None] + np.diff(breaks)[:, None] * np.arange(8) / 8).ravel()
     x = np.unique(np.concatenate([np.linspace(0, 1, 1001), inside]))
@@ -104,7 +106,8 @@ def test_modes_of_taut_wires(slenderness, tol):
 
 
 def notched(width):
-    """A cantilever, 20 mm thick, half of that at a notch of Gauss's shape, so wide over its length of 1 m."""
+    """A cantilever of 1 m, 20 mm thick and half as thick at a notch with
+    a Gaussian profile of this width (over the length)."""
 
     def diameter(s):
         return 0.02 * (1 - 0.5 * np.exp(-(((np.asarray(s) - 0.4) / width) ** 2)))
@@ -117,7 +120,7 @@ def notched(width):
 @pytest.mark.serial
 @pytest.mark.parametrize("width", [0.02, 0.005, 0.002])
 def test_a_notch(width):
-    """Beside the integrals of the linear theory of a load so small that it is exact to 1e-9."""
+    """Against the integrals of linear theory, under a load so small that it is exact to 1e-9."""
     rod, diameter = notched(width)
     force = 1e-3
     path = cf.solve(cf.Scene([rod], [cf.Clamp(rod.start)], [cf.Force(rod.end, (0, 0, -force))]), [1.0], tol=1e-6)

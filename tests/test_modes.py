@@ -1,4 +1,5 @@
-"""Natural frequencies against Timoshenko's and Euler's beams, about loaded states, of free rods; and long vibrations."""
+"""Natural frequencies against Timoshenko's and Euler's beams, about
+loaded states, of free rods; and long vibrations."""
 
 import itertools
 import math
@@ -24,7 +25,8 @@ def beta(modes, rod, L=1.0):
     [(0.1, (3.11568, 6.09066, 8.84052)), (0.01, (3.14133, 6.28106, 9.41761, 12.54941, 15.67492))],
 )
 def test_a_simply_supported_timoshenko_beam(slender, expected):
-    """Height over length `slender`, nu = 0.3, shear factor 5/6; bending in the x-y plane is held by hinge and roller."""
+    """Height over length `slender`, nu = 0.3, shear factor 5/6;
+    bending in the x-y plane is held by hinge and roller."""
     rod = cf.Rod(LINE, cf.Rectangle(5 * slender, slender, shear_factor=5 / 6), cf.Material(1e6, 0.3, 1.0))
     scene = cf.Scene([rod], [cf.Hinge(rod.start, (0, 0, 1)), cf.Roller(rod.end, (0, 1, 0))])
     modes = cf.modes(scene, 9)
@@ -85,7 +87,8 @@ def test_a_free_rod_has_six_motions_for_nothing():
 
 @pytest.mark.parametrize("EI", [1e-4, 1e-7])
 def test_no_copy_of_a_low_frequency_is_missing(EI):
-    """A round wire at the end of a heavy steel shaft: pairs of equal squares, ten orders and more below the shaft's own."""
+    """A round wire at the end of a heavy steel shaft: pairs of equal
+    squares, ten orders of magnitude below the shaft's."""
     A, I = math.pi * 0.1**2, math.pi * 0.1**4 / 4
     steel = cf.Stiffness((7e10 * A,) * 2, 2e11 * A, (2e11 * I,) * 2, 1.6e11 * I, mass=7850 * A, inertia=(7850 * I,) * 3)
     wire = cf.Stiffness((EI * 1e4,) * 2, EI * 1e4, (EI, EI), EI, mass=0.01, inertia=(1e-7, 1e-7, 2e-7))
@@ -101,7 +104,7 @@ def test_no_copy_of_a_low_frequency_is_missing(EI):
 
 
 def test_motions_for_nothing_of_a_very_thin_rod():
-    """Length over diameter 1e4: rounding moves their squares by 1e-2 in units of EI/(rho A L^4)."""
+    """Length over diameter 1e4: rounding changes the squares of rigid motions by 1e-2 in units of EI/(rho A L^4)."""
     rod = cf.Rod(LINE, cf.Circle(1e-4), cf.Material(1e9, 0.3, 1e3))
     squares = cf.modes(cf.Scene([rod]), 7, elements=8).squares
     assert squares[:6].tolist() == [0.0] * 6
@@ -137,7 +140,8 @@ def on_a_hinge(station):
 
 
 def test_pendulums():
-    """Mechanisms without their weight. One rod: omega^2 = m g L/2 over m L^2/3 + J; two: the eigenvalues of their small swings."""
+    """Mechanisms if they had no weight. One rod: omega^2 = (m g L/2)/(m
+    L^2/3 + J); two: eigenvalues of small oscillations."""
     square = 9.81 / (2 / 3 + 1e-4)
     down = cf.modes(hanging(on_a_hinge), 2, load_factor=1.0)
     assert down.squares[0] == pytest.approx(square, rel=1e-5) and down.negative_modes == 0
@@ -156,7 +160,7 @@ def test_pendulums():
         cf.modes(cf.Scene([rod], loads=[cf.Weight()]), 1, load_factor=1.0)
 
 
-@pytest.mark.serial  # factors of many ranks call the tangent singular, which a spin makes it but for rounding
+@pytest.mark.serial  # a free spin makes the tangent singular up to rounding, which parallel factorisations report
 def test_a_pendulum_on_a_ball_spins_about_itself():
     ball = cf.modes(hanging(cf.Pin), 3, load_factor=1.0, elements=2)
     assert ball.squares[0] == 0 and ball.negative_modes == 0
@@ -165,7 +169,7 @@ def test_a_pendulum_on_a_ball_spins_about_itself():
 
 @pytest.mark.serial
 def test_a_vibration_keeps_its_amplitude_over_a_thousand_periods():
-    """And its period is that of the mode, to the phase error (omega h)^2/12 of the rule."""
+    """And its period is that of the mode, up to the phase error (omega h)^2/12 of the scheme."""
     section = cf.Stiffness((1e4, 1e4), 1e4, (1.0, 3.0), 1.0, mass=1.0, inertia=(1e-3, 1e-3, 2e-3))
     rod = cf.Rod(LINE, section)
     clamps = [cf.Clamp(rod.start)]

@@ -1,4 +1,4 @@
-"""Motions of the literature, conservation, order in time, supports, starts. Numbers: tests/moving_scenes.py."""
+"""Motions from the literature (tests/moving_scenes.py), conservation, order in time, supports, starts."""
 
 import numpy as np
 import pytest
@@ -73,7 +73,7 @@ def test_where_a_load_bends_steps_stay_and_where_it_jumps_they_begin_anew():
 
 
 def test_a_step_that_fails_is_halved():
-    """The stiff thin rod: steps of 0.04 s fail here and there; halves of them carry the motion on, momenta intact."""
+    """The stiff thin rod: some steps of 0.04 s fail and are halved; momenta are conserved."""
     section = cf.Stiffness((1e6, 1e6), 1e6, (100, 100), 100, mass=1.0, inertia=(1e-4, 1e-4, 2e-4))
     rod = cf.Rod(cf.Line((6, 0, 0), (0, 8, 0)), section)
     pulls = [cf.Force(rod.start, cf.Step((8, 0, 3), end=1)), cf.Force(rod.end, cf.Step((0, 6, -5), end=1))]
@@ -85,7 +85,8 @@ def test_a_step_that_fails_is_halved():
 
 
 def test_a_rigid_spin_stays_rigid_and_keeps_its_time():
-    """About the tangent: nothing is strained, and after a turn all is where it was (to the phase error of the rule)."""
+    """About the tangent: no strains, and after a turn everything is
+    where it was, up to the phase error of the scheme."""
     rod = cf.Rod(cf.Line((0, 0, 0), (1, 2, 2)), SECTION)
     axis = np.array([1, 2, 2]) / 3
     spin = cf.InitialVelocity(rod, linear=(0.5, 0, 0), angular=2 * np.pi * axis)
@@ -113,7 +114,7 @@ def test_joints_keep_momenta():
 
 
 def test_a_pendulum_books_what_its_weight_does():
-    """A stiff rod on a hinge, let go level, phi'' = -3 g/(2 L) sin(phi); the ledger closes."""
+    """A stiff rod on a hinge, released from the horizontal, phi'' = -3 g/(2 L) sin(phi); the energy balance holds."""
     rod = cf.Rod(
         cf.Line((0, 0, 0), (2, 0, 0)),
         cf.Stiffness((1e8, 1e8), 1e8, (1e7, 1e7), 1e7, mass=2.0, inertia=(1e-3, 1e-3, 2e-3)),
@@ -128,7 +129,7 @@ def test_a_pendulum_books_what_its_weight_does():
 
 
 def test_a_prescribed_motion_does_work():
-    """The root is turned up to 2 turns a second: the rod follows, and its energy is what the root's drive did."""
+    """The root is rotated with up to 2 turns per second: the rod follows, and its energy is the work of the support."""
     rod = cf.Rod(cf.Line((0, 0, 0), (2, 0, 0)), SECTION)
 
     def turn(t):

@@ -1,4 +1,4 @@
-"""Motions: bad input is refused in words; functions of time by name."""
+"""Motions: invalid input is refused with a message; functions of time are named in it."""
 
 import math
 
@@ -39,14 +39,18 @@ REFUSED = {
     "scheme": (lambda: cf.simulate(FREE, 1.0, scheme="momentun"), "scheme = 'momentun': did you mean 'momentum'?"),
     "elements": (lambda: cf.simulate(FREE, 1.0, elements=0), "simulate.elements = 0"),
     "start": (lambda: cf.simulate(FREE, 1.0, start="a"), "simulate.start = 'a': expected a load factor, a Path"),
-    "start at 0": (lambda: cf.simulate(FREE, 1.0, start=0), "simulate.start = 0: expected a load factor that is finite and not 0"),
+    "start at 0": (lambda: cf.simulate(FREE, 1.0, start=0),
+                   "simulate.start = 0: expected a load factor that is finite and not 0"),
     "start of nothing": (lambda: cf.simulate(FREE, 1.0, start=3), "Scene.loads is empty"),
     "run-up": (lambda: cf.RunUp((1, 0, 0), 2.0, 1.0), "RunUp.end = 1.0: expected a time after 2 s"),
     "no mass": (lambda: moving(rods=[cf.Rod(ROD.curve, sections(mass=None), name="a")]), "'a': Stiffness.mass = None"),
-    "no inertia": (lambda: moving(rods=[cf.Rod(ROD.curve, sections(inertia=None), name="a")]), "Stiffness.inertia = None"),
-    "no density": (lambda: moving(rods=[cf.Rod(ROD.curve, cf.Circle(0.1), cf.Material(1e9), name="a")]), "Material.density"),
+    "no inertia": (lambda: moving(rods=[cf.Rod(ROD.curve, sections(inertia=None), name="a")]),
+                   "Stiffness.inertia = None"),
+    "no density": (lambda: moving(rods=[cf.Rod(ROD.curve, cf.Circle(0.1), cf.Material(1e9), name="a")]),
+                   "Material.density"),
     "late NaN": (lambda: cf.simulate(LATE_NAN, 1.0, dt=0.02, model="spatial"), "numbers (N), at the time t = 0.05 s"),
-    "two numbers": (lambda: cf.Moment(ROD.end, lambda t: (1, 2)), "Moment.moment = (1, 2): expected 3 finite numbers (N m), at the time t = 0 s"),
+    "two numbers": (lambda: cf.Moment(ROD.end, lambda t: (1, 2)),
+                    "Moment.moment = (1, 2): expected 3 finite numbers (N m), at the time t = 0 s"),
     "jumps of a vector": (lambda: cf.Force(ROD.end, (1, 2, 3), jumps=(1,)), "Force.jumps = (1,): expected none"),
     "jumps": (lambda: cf.Force(ROD.end, cf.Step((1, 2, 3)), jumps=("a",)), "Force.jumps = 'a'"),
     "ramp": (lambda: cf.Ramp((1, 0, 0), 2.0, 1.0), "Ramp.end = 1.0: expected a time after 2 s"),
@@ -54,24 +58,37 @@ REFUSED = {
     "sine": (lambda: cf.Sine((1, 0, 0), math.nan), "Sine.frequency = nan"),
     "table": (lambda: cf.Table((0, 0), ((0, 0, 0), (1, 1, 1))), "Table.times = (0, 0): expected ascending"),
     "table rows": (lambda: cf.Table((0, 1), ((0, 0, 0),)), "Table.values"),
-    "against a clamp": (lambda: moving(cf.InitialVelocity(ROD, (1, 0, 0)), supports=[cf.Clamp(ROD.start)]), "goes against supports[0] (Clamp"),
-    "against a pin": (lambda: moving(cf.InitialVelocity(ROD, (1, 0, 0)), supports=[cf.Pin(ROD.end)]), "goes against supports[0] (Pin"),
-    "against a joint": (lambda: moving(cf.InitialVelocity(ROD, (1, 0, 0)), rods=[ROD, OTHER], joints=[cf.Joint(ROD.end, OTHER.start)]), "joints[0]"),
+    "against a clamp": (lambda: moving(cf.InitialVelocity(ROD, (1, 0, 0)), supports=[cf.Clamp(ROD.start)]),
+                        "goes against supports[0] (Clamp"),
+    "against a pin": (lambda: moving(cf.InitialVelocity(ROD, (1, 0, 0)), supports=[cf.Pin(ROD.end)]),
+                      "goes against supports[0] (Pin"),
+    "against a joint": (lambda: moving(cf.InitialVelocity(ROD, (1, 0, 0)), rods=[ROD, OTHER],
+                                       joints=[cf.Joint(ROD.end, OTHER.start)]), "joints[0]"),
     "two velocities": (lambda: moving(cf.InitialVelocity(ROD), cf.InitialVelocity(ROD)), "the second of rod 'rod'"),
     "a velocity elsewhere": (lambda: moving(cf.InitialVelocity(OTHER)), "Scene.velocities[0] acts at"),
-    "velocity of NaN": (lambda: moving(cf.InitialVelocity(ROD, lambda s: (0, 0, 1 / s if s else math.nan))), "at s = 0 m"),
-    "about with a function": (lambda: cf.InitialVelocity(ROD, lambda s: (0, 0, 0), about=(0, 0, 0)), "InitialVelocity.about"),
-    "a support that jumps": (lambda: cf.simulate(cf.Scene([ROD], [cf.Prescribed(ROD.end, (0, 0, 1))]), 1.0), "does not hold at the time 0"),
-    "statics in time": (lambda: cf.solve(LATE_NAN, [1.0]), "the Force depends on time, which a static analysis excludes"),
-    "a step longer than the motion": (lambda: cf.simulate(FREE, 1.0, dt=50.0), "simulate.dt = 50.0: expected at most the duration, 1 s"),
+    "velocity of NaN": (lambda: moving(cf.InitialVelocity(ROD, lambda s: (0, 0, 1 / s if s else math.nan))),
+                        "at s = 0 m"),
+    "about with a function": (lambda: cf.InitialVelocity(ROD, lambda s: (0, 0, 0), about=(0, 0, 0)),
+                              "InitialVelocity.about"),
+    "a support that jumps": (lambda: cf.simulate(cf.Scene([ROD], [cf.Prescribed(ROD.end, (0, 0, 1))]), 1.0),
+                             "does not hold at the time 0"),
+    "statics in time": (lambda: cf.solve(LATE_NAN, [1.0]),
+                        "the Force depends on time, which a static analysis excludes"),
+    "a step longer than the motion": (lambda: cf.simulate(FREE, 1.0, dt=50.0),
+                                      "simulate.dt = 50.0: expected at most the duration, 1 s"),
     "a number for a vector": (lambda: cf.Sine(5.0, 2.0), "Sine.value = 5.0: expected a vector"),
-    "no end of steps": (lambda: cf.simulate(FREE, 1.0, dt=1e-18), "simulate: duration = 1 s and dt = 1e-18 s: expected at most 1e+09 steps"),
-    "no end of states": (lambda: cf.simulate(FREE, 1.0, save_every=1e-12), "save_every = 1e-12 s: expected at most 1e+06 saved states"),
-    "no end": (lambda: cf.simulate(FREE, 1e308), "simulate.duration = 1e+308: expected a positive number (s), from 1e-30 to 1e30"),
-    "no step": (lambda: cf.simulate(FREE, 1.0, dt=1e-300), "simulate.dt = 1e-300: expected a positive number (s), from"),
+    "no end of steps": (lambda: cf.simulate(FREE, 1.0, dt=1e-18),
+                        "simulate: duration = 1 s and dt = 1e-18 s: expected at most 1e+09 steps"),
+    "no end of states": (lambda: cf.simulate(FREE, 1.0, save_every=1e-12),
+                         "save_every = 1e-12 s: expected at most 1e+06 saved states"),
+    "no end": (lambda: cf.simulate(FREE, 1e308),
+               "simulate.duration = 1e+308: expected a positive number (s), from 1e-30 to 1e30"),
+    "no step": (lambda: cf.simulate(FREE, 1.0, dt=1e-300),
+                "simulate.dt = 1e-300: expected a positive number (s), from"),
     "schemes": (lambda: cf.simulate(FREE, 1.0, scheme=["energy"]), "scheme = ['energy']: did you mean 'energy'?"),
     "true start": (lambda: cf.simulate(FREE, 1.0, start=True), "simulate.start = True: expected a load factor, a Path"),
-    "infinite stiffness": (lambda: moving(rods=[cf.Rod(ROD.curve, sections(axial=math.inf), name="a")]), "infinite axial or shear stiffness: expected finite ones, for a motion"),
+    "infinite stiffness": (lambda: moving(rods=[cf.Rod(ROD.curve, sections(axial=math.inf), name="a")]),
+                           "infinite axial or shear stiffness: expected finite ones, for a motion"),
 }  # fmt: skip
 
 
@@ -89,7 +106,7 @@ def driven(**motion):
 
 @pytest.mark.parametrize("scheme", ["momentum", "energy", "triple-jump", "generalised-alpha"])
 def test_a_support_that_jumps_is_refused(scheme):
-    """What it does depends on the step alone."""
+    """The result would depend on the step size alone."""
 
     def jumping(t):
         return (0, 0, 0) if t < 0.5 else (0, 0.01 + 1e-3 * (t - 0.5), 0)
@@ -115,7 +132,7 @@ def test_a_support_that_bends_and_a_load_that_jumps_are_taken():
     back = cf.Table((0, 0.5, 0.6), ((0, 0, 0), (0, 0.05, 0), (0, 0, 0)))
 
     def run_up(t):
-        """With the rounding of 1 - cos where it is next to nothing, and not known after the end."""
+        """Small values have the rounding error of 1 - cos; it is not defined after the end."""
         assert t <= 1
         return (0, max(0.0, t - 0.25) ** 2 / 2 + (math.cos(max(0.0, t - 0.25)) - 1), 0)
 
@@ -136,7 +153,7 @@ def no_number(t):
 
 @pytest.mark.parametrize("force", [raising, no_number])
 def test_a_function_of_time_that_fails_late_leaves_the_history(force):
-    """And says which load failed, and when."""
+    """And the message names the load and the time."""
     scene = cf.Scene([ROD], loads=[cf.Force(ROD.start, (0, 1, 0)), cf.Force(ROD.end, force)])
     how = {"dt": 0.1, "model": "spatial", "elements": 1, "degree": 1}
     with pytest.raises(cf.SceneError, match=r"at the time t = 0.55 s, of the Force at rod.end") as failure:

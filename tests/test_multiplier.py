@@ -1,4 +1,4 @@
-"""The multiplier formulation is one among equals: every support, joint and load, its moments, its stability, its meshes."""
+"""The multiplier formulation with every support, joint and load; its moments, stability and mesh refinement."""
 
 from dataclasses import replace
 
@@ -24,8 +24,12 @@ SECTION = cf.Stiffness(shear=(3e3, 5e3), axial=8e3, bending=(1.0, 2.5), torsion=
 
 
 def bow():
-    """A bent and twisted rod of length 1 that lies askew in space."""
-    return cf.Rod(cf.UniformCurvature(1.0, (0.4, 0.9, 0.5), start=(3.0, 1.0, -2.0), frame=(0.1, -0.5, 0.7, -0.5)), SECTION, name="bow")
+    """A bent and twisted rod of length 1 in a general position."""
+    return cf.Rod(
+        cf.UniformCurvature(1.0, (0.4, 0.9, 0.5), start=(3.0, 1.0, -2.0), frame=(0.1, -0.5, 0.7, -0.5)),
+        SECTION,
+        name="bow",
+    )
 
 
 def supported(*supports):
@@ -50,7 +54,7 @@ def loaded(*loads):
 
 
 def joined(release):
-    """A clamped rod, another one at its end that is held by its other end, and a third at the same point."""
+    """A clamped rod, a second one joined to its end and held at the other, and a third joined at the same point."""
 
     def scene():
         ends = [(0, 0, 1.0), (1.0, 0.2, 1.3), (-0.3, 0.8, 1.4)]
@@ -68,7 +72,8 @@ SCENES = {
     "pin": supported(lambda rod: cf.Pin(rod.end)),
     "pin inside": supported(lambda rod: cf.Pin(rod.at(0.37))),
     "hinge": supported(lambda rod: cf.Hinge(rod.end, (0.2, 0.9, 0.3))),
-    "rollers": supported(lambda rod: cf.Roller(rod.end, (0.2, 0.9, 0.3)), lambda rod: cf.Roller(rod.at(0.5), (1, 0, 0))),
+    "rollers": supported(lambda rod: cf.Roller(rod.end, (0.2, 0.9, 0.3)),
+                         lambda rod: cf.Roller(rod.at(0.5), (1, 0, 0))),
     "moved": supported(lambda rod: cf.Prescribed(rod.end, displacement=(0.02, -0.03, 0.01), rotation=(0.3, -0.4, 0.2))),
     "turned": supported(lambda rod: cf.Prescribed(rod.end, rotation=(1.1, 0.7, -0.4))),
     "rigid joints": joined(None),
@@ -77,17 +82,19 @@ SCENES = {
     "dead": loaded(lambda rod: cf.Force(rod.end, (0.5, 0.8, 2.0)), lambda rod: cf.Moment(rod.end, (0.3, -0.6, 0.5))),
     "eccentric": loaded(lambda rod: cf.EccentricForce(rod.end, (0.5, 0.8, -1.0), offset=(0.2, -0.1))),
     "follower": loaded(
-        lambda rod: cf.FollowerForce(rod.end, (0.9, -0.4, 0.6)), lambda rod: cf.FollowerMoment(rod.at(0.5), (0.2, 0.3, -0.5))
+        lambda rod: cf.FollowerForce(rod.end, (0.9, -0.4, 0.6)),
+        lambda rod: cf.FollowerMoment(rod.at(0.5), (0.2, 0.3, -0.5))
     ),
 }  # fmt: skip
 
 
 @pytest.mark.parametrize("name", SCENES)
 def test_every_support_joint_and_load_as_mixed_has_them(name):
-    """Both tend to the same rod; P4 on 8 elements leaves less than 1e-8 at element ends, where the order is 2p."""
+    """Both converge to the same solution; P4 on 8 elements differ by less than 1e-8 at element ends (order 2p)."""
     scene = SCENES[name]()
     paths = [
-        cf.solve(scene, [0.5, 1.0], model="spatial", formulation=f, degree=4, elements=8) for f in ("mixed", "multiplier")
+        cf.solve(scene, [0.5, 1.0], model="spatial", formulation=f, degree=4, elements=8)
+        for f in ("mixed", "multiplier")
     ]
     for rod in scene.rods:
         one, other = (path.fields(-1, rod) for path in paths)
@@ -130,7 +137,8 @@ def test_moments_are_of_order_2p_at_element_ends(degree, meshes):
     ("name", "degree"), [("moved", 1), ("hinge", 2), ("follower", 1), ("eccentric", 2), ("a hinge between", 2)]
 )
 def test_the_tangent_of_reactions_and_live_loads_is_their_derivative(name, degree):
-    """Taylor, with multipliers of equations that are not zero; n from the motion, for the carried one is another tangent."""
+    """Taylor test with non-zero multipliers; n is that of the motion,
+    since the tangent with a carried n is not the derivative."""
     scene = SCENES[name]()
     layout = Layout.of(scene, 2)
     signature = Signature.of(scene, layout, formulation=replace(MULTIPLIER, force=OF_MOTION), degree=degree)
@@ -166,7 +174,8 @@ def propped():
 @pytest.mark.serial
 @pytest.mark.parametrize("make", [lambda: column(eccentricity=0.0)[1], propped], ids=["column", "propped"])
 def test_the_saddle_points_own_inertia_says_the_same(make):
-    """Negative squares of the tangent less those of the constraints are those of the second variation in (r, theta)."""
+    """Negative eigenvalues of the tangent minus those due to constraints
+    equal those of the second variation in (r, theta)."""
     scene = make()
     layout, counts = Layout.of(scene, 5), []
     problem = Problem(SpatialModel(MPI.COMM_SELF, Signature.of(scene, layout, formulation="multiplier", degree=2)))
@@ -206,7 +215,7 @@ def test_limit_points_and_branches():
 
 
 def test_meshes_are_refined_from_coarser_ones():
-    """As many iterations as `mixed` needs, and an estimate that holds."""
+    """As many iterations as with `mixed`, and the true error is below the estimate."""
     rod, scene = column()
     exact = cf.analytic.reissner(
         [0.9, 1.5], 0.2, 20.0, bending=rod.stiffness.bending[1], axial=rod.stiffness.axial, shear=rod.stiffness.shear[0]
@@ -223,7 +232,9 @@ def test_meshes_are_refined_from_coarser_ones():
 def test_infinite_and_very_large_stiffnesses_make_the_force_an_unknown():
     k = column()[0].stiffness
     rod, scene = column(section=cf.Stiffness((np.inf, np.inf), np.inf, k.bending, k.torsion))
-    mixed, path = (cf.solve(scene, [0.9, 1.5], model="spatial", formulation=f, elements=8) for f in ("mixed", "multiplier"))
+    mixed, path = (
+        cf.solve(scene, [0.9, 1.5], model="spatial", formulation=f, elements=8) for f in ("mixed", "multiplier")
+    )
     np.testing.assert_allclose(path.displacement(rod.end), mixed.displacement(rod.end), rtol=1e-9, atol=1e-12)
     assert path.stable.all() and any("an unknown (formulation 'multiplier')" in why for why in path.why)
 

@@ -1,5 +1,5 @@
-"""Calls inside calls: `solve` and `simulate` from `until`, from a force as a function of time and from threads, each on
-a problem of its own."""
+"""Nested calls: `solve` and `simulate` called from `until`, from a force as a
+function of time and from threads, each with a problem of its own."""
 
 import threading
 
@@ -29,7 +29,7 @@ def rising(t):
 
 
 def and_nothing_more(*calls):
-    """A function of whatever that makes the calls and is no reason to stop."""
+    """A function of any argument that makes the calls and returns False."""
     return lambda *_: bool([call() for call in calls] and False)
 
 
@@ -44,7 +44,7 @@ def another_motion():
 
 
 def test_solve_within_until():
-    """The same shape with twice the eccentricity: 15.8724713 m came out where one problem served both."""
+    """The same signature with twice the eccentricity: sharing one problem gave 15.8724713 m."""
     rod, scene = column(eccentricity=0.2)
     _, other = column(eccentricity=0.4)
     inner = and_nothing_more(lambda: cf.solve(other, [0.3], elements=8))
@@ -64,7 +64,7 @@ def test_calls_within_a_force():
 
     def with_inner(call):
         def force(t):
-            if abs(t - 0.075) < 1e-9:  # half way in the second step: others look the function over beforehand
+            if abs(t - 0.075) < 1e-9:  # in the middle of the second step, since the function is sampled before too
                 made.append(call())
             return rising(t)
 
@@ -93,7 +93,7 @@ def test_simulate_within_until():
 
 @pytest.mark.serial
 def test_threads():
-    """Four at once on one shape."""
+    """Four threads at once with the same signature."""
     columns = [column(eccentricity=e) for e in (0.1, 0.2, 0.3, 0.4)]
 
     def tip(k):
@@ -111,7 +111,7 @@ def test_threads():
 
 
 def test_results_outlive_their_problem():
-    """Also what an error brings along: numbers do not change when the problem serves another scene."""
+    """Also the partial result of an error: results do not change when the problem is used for another scene."""
     rod, scene = column()
     _, other = column(eccentricity=1.0, length=13.0)
     for model in ("determinate", "planar", "spatial"):
@@ -130,7 +130,7 @@ def test_results_outlive_their_problem():
 
 
 def test_warm_calls_make_nothing():
-    """Nor do those that end by an error of the solver's, or that go over to another model."""
+    """Nor do calls that end with a solver's error, or that change to another model."""
     rod, scene = column(eccentricity=0.0)
     _, motion = pulled(rising)
     calls = (
@@ -154,7 +154,7 @@ def test_warm_calls_make_nothing():
 
 
 def used(pool, key, comm=MPI.COMM_WORLD, error=None):
-    """A problem that was lent for a moment, within which an error may occur."""
+    """Borrow and return a problem; an error may be raised in between."""
     try:
         with pool.lend(key, comm, object, KeyError) as problem:
             if error:
@@ -172,14 +172,14 @@ def test_a_busy_problem_is_not_lent():
 
 
 def test_what_is_idle_is_bounded():
-    """What a rank does alone does not decide what all make together."""
+    """The work of one rank alone does not influence what all ranks create together."""
     pool = ProblemPool(most_idle=2)
     a = used(pool, "a")
     for key in range(10):
         used(pool, key, MPI.COMM_SELF)
     used(pool, "b")
     assert used(pool, "a") is a
-    used(pool, "c")  # b waited longest
+    used(pool, "c")  # b was idle for the longest time
     made = pool.made
     assert used(pool, "a") is a and pool.made == made
     used(pool, "b")

@@ -1,4 +1,4 @@
-"""What sets in late, at once or with a kink: adaptive steps see it, and driven stations move as they are driven."""
+"""Loads and prescribed motions that start late, suddenly or with a kink are resolved by adaptive steps."""
 
 import numpy as np
 import pytest
@@ -20,13 +20,13 @@ def test_what_sets_in_after_a_rest_is_seen(signal):
     found, fine = cf.simulate(scene, 55.0, tol=1e-3), cf.simulate(scene, 55.0, dt=0.02)
     there = np.array([np.interp(found.times, fine.times, x) for x in fine.position(rod.end).T]).T
     assert np.linalg.norm(found.position(rod.end) - there, axis=1).max() < 1e-3 * rod.length
-    assert np.diff(found.times).max() > 0.5  # nothing is resolved where nothing happens
+    assert np.diff(found.times).max() > 0.5  # long steps where nothing happens
 
 
 @pytest.mark.parametrize("scheme", ["momentum", "energy"])
 @pytest.mark.parametrize("start", [0.0, 0.2])
 def test_kinks_of_a_prescribed_motion(scheme, start):
-    """The driven end has the speed of its motion; what changes its momentum at once is work of the support."""
+    """The driven end has the prescribed speed; a sudden change of its momentum counts as work of the support."""
     section = cf.Stiffness((1e4, 1e4), 1e4, (50, 50), 50, mass=1.0, inertia=(1e-2, 1e-2, 2e-2))
     rod = cf.Rod(cf.Line((0, 0, 0), (2, 0, 0)), section)
     drive = cf.Ramp((0, 0, 0.5), start, 1.0)
@@ -45,7 +45,8 @@ def test_kinks_of_a_prescribed_motion(scheme, start):
 @pytest.mark.parametrize("scheme", ["momentum", "generalised-alpha"])
 @pytest.mark.parametrize("function", [False, True], ids=["Sine", "callable"])
 def test_what_swings_fast_and_moves_little_is_not_taken_for_a_constant(scheme, function):
-    """A free rod under A w^2 cos(wt) per unit of mass moves by A (1 - cos(wt)): less than any step foretells wrongly."""
+    """A free rod under A w^2 cos(wt) per unit of mass moves by A (1 -
+    cos(wt)), too little for the error estimate to notice."""
     A, f, duration, tol = 1e-4, 1.0, 50.0, 1e-3
     w = 2 * np.pi * f
     section = cf.Stiffness((1e3, 1e3), 1e3, (10, 10), 10, mass=1.0, inertia=(1e-3, 1e-3, 2e-3))
@@ -93,7 +94,7 @@ def test_straight_signals_are_not_told():
 
 @pytest.mark.parametrize("damping", [None, cf.Damping(time=2e-3, drag=0.5)], ids=["undamped", "damped"])
 def test_steps_of_generalised_alpha_recover_where_a_motion_is_prescribed(damping):
-    """A velocity that a longer step left at the driven end is no acceleration of a shorter one."""
+    """A velocity error of a longer step at the driven end must not cause large accelerations in a shorter one."""
     section = cf.Stiffness((5e3, 5e3), 1e4, (50, 50), 40, mass=1.0, inertia=(0.01, 0.01, 0.02))
     rod = cf.Rod(cf.Line((0, 0, 0), (0, 1, 0)), section, damping=damping)
     drive = cf.Prescribed(rod.start, displacement=lambda t: (0.05 * np.sin(4.4 * t) ** 3, 0, 0), rotation=(0, 0, 0))
@@ -105,7 +106,7 @@ def test_steps_of_generalised_alpha_recover_where_a_motion_is_prescribed(damping
 
 
 def test_steps_that_stay_tiny_end_in_words(monkeypatch):
-    """A load that is another one at every time, however near: no step follows it."""
+    """A load with random values at all times, which no step resolves."""
     section = cf.Stiffness((1e3, 1e3), 1e3, (10, 10), 10, mass=1.0, inertia=(1e-3, 1e-3, 2e-3))
     rod = cf.Rod(cf.Line((0, 0, 0), (1, 0, 0)), section)
     noise = cf.LineForce(rod, lambda t: (0, np.sin(1e9 * t), 0))
@@ -116,7 +117,7 @@ def test_steps_that_stay_tiny_end_in_words(monkeypatch):
 
 
 def test_what_steps_have_seen_of_loads_is_remembered():
-    """A motion that goes on from what was kept takes the same steps."""
+    """A motion continued from a checkpoint takes the same steps."""
     section = cf.Stiffness((1e3, 1e3), 1e3, (10, 10), 10, mass=1.0, inertia=(1e-3, 1e-3, 2e-3))
     rod = cf.Rod(cf.Line((0, 0, 0), (1, 0, 0)), section)
     load = cf.Force(rod.end, lambda t: (0, np.exp(-((t - 3.3) ** 2) * 100), 0), jumps=(6.0,))

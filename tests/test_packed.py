@@ -1,4 +1,4 @@
-"""Packed forms give what dolfinx's own assembly gives, at any state, also after another scene was loaded."""
+"""Packed forms assemble the same as dolfinx does, at any state, also after another scene was loaded."""
 
 import numpy as np
 import pytest

@@ -76,14 +76,14 @@ def test_load_factors_are_the_next_along_the_path_or_the_next_of_load_control():
 @pytest.mark.parametrize("far", [45.0, 20000.0])
 @pytest.mark.parametrize("control", ["auto", "arc"])
 def test_shallow_arch(control, far):
-    """Also where the first step of load control would leap over the whole snap."""
+    """Also if the first step of load control would jump over the whole snap-through."""
     rod, crown, scene = shallow_arch()
     path = cf.solve(scene, (0.0, far), elements=16, control=control)
     np.testing.assert_allclose(loads(path, "limit"), ARCH_LIMITS, rtol=2e-8)
     np.testing.assert_allclose(loads(path, "bifurcation"), ARCH_BIFURCATIONS, rtol=2e-7)
     skew = path.mode(next(event for event in path.events if event.kind == "bifurcation"), rod)
     snap = path.mode(path.events[0], rod)
-    # the states next to a singular tangent are known to rounding over its smallest eigenvalue: 2e-5 on dolfinx 0.9
+    # near a singular tangent the accuracy is rounding over the smallest eigenvalue: 2e-5 with dolfinx 0.9
     np.testing.assert_allclose(snap[:, :2], snap[::-1, :2] * [-1, 1], atol=1e-4)
     np.testing.assert_allclose(skew[:, :2], skew[::-1, :2] * [1, -1], atol=1e-4)
     for mode in (snap, skew):
@@ -131,8 +131,8 @@ def test_perfect_column_bifurcates_at_its_exact_critical_loads(section, count):
 @pytest.mark.parametrize("section", [cf.Circle(0.2), cf.Rectangle(0.2, 0.25)])
 @pytest.mark.parametrize("branch", [1, -1])
 def test_branch_of_the_perfect_column(section, branch):
-    """The buckled column against the exact rod whose eccentricity tends to zero; the round one may also turn about its
-    axis, which changes nothing and does not count."""
+    """The buckled column against the exact rod as its eccentricity tends to zero; a round one may also rotate about its
+    axis, a neutral motion that is not counted."""
     rod, scene = perfect_column(section)
     etas = [0.5, 1.0005, 1.1, 2.0]
     path = cf.solve(scene, etas, elements=16, branch=branch)
@@ -158,7 +158,8 @@ def test_a_branch_meets_its_tolerance():
 
 
 def test_a_ring_sways_and_tips():
-    """In its plane, whatever its stiffness across it; out of it where that is weak. The branches are mirror images."""
+    """In its plane, whatever its stiffness out of it; out of the plane
+    if that is low. The branches are mirror images."""
     sways = []
     for out_of_plane in (50.0, 1.0):
         top, scene = clamped_ring(out_of_plane)
@@ -189,7 +190,7 @@ def test_until():
 
 
 def test_prescribed_motion_by_arc_length():
-    """The load factor then moves a station, and enters the residual through the reactions' equations."""
+    """The load factor moves a station, and is in the residual only through the constraint equations."""
     rod, _ = perfect_column(cf.Circle(0.2))
     motion = cf.Prescribed(rod.end, displacement=(3.0, 0.0, -6.0), rotation=(0.0, 1.2, 0.0))
     scene = cf.Scene([rod], [cf.Clamp(rod.start), motion], [])
@@ -254,7 +255,7 @@ def test_an_inextensible_column_stands_still_until_it_buckles(weak, elements):
 
 
 def t_frame(soft, k=1.5):
-    """A column (EI = 1 and k) under a beam that is softer by a factor, both halves guided."""
+    """A column (EI = 1 and k) under a beam that is softer by a factor, with guided ends."""
 
     def section(EI, k):
         return cf.Stiffness((1e4 * EI,) * 2, 2e4 * EI, (EI, k * EI), EI)
@@ -270,7 +271,8 @@ def t_frame(soft, k=1.5):
 
 
 def test_bifurcations_are_neither_lost_nor_found_twice():
-    """A soft member's mode is the lowest one until another crosses zero: its eigenvalue has a kink in between."""
+    """The lowest mode is that of a soft member until that of another
+    one crosses zero: the lowest eigenvalue has a kink."""
     scene = t_frame(0.1)
     fine = cf.solve(scene, [3.0, 4.0, 9.0]).events
     for load_factors in ([3.0, 9.0], (0.0, 9.0)):
@@ -282,7 +284,7 @@ def test_bifurcations_are_neither_lost_nor_found_twice():
 
 @pytest.mark.parametrize("soft, located", [(1e-2, 1), (1e-4, 1), (1e-6, 0)])
 def test_what_could_not_be_located_is_told(soft, located):
-    """A propped column whose head is joined to a rod that is softer by orders of magnitude; (4.4934)^2."""
+    """A propped column, (4.4934)^2, whose head is joined to a rod that is softer by orders of magnitude."""
     stiff = cf.Stiffness((np.inf,) * 2, np.inf, (1.0, 50.0), 1.0)
     column = cf.Rod(cf.Line((0, 0, 0), (0, 0, 1)), stiff, name="column")
     stub = cf.Rod(cf.Line((0, 0, 1), (0, 1, 1)), cf.Stiffness((np.inf,) * 2, np.inf, (soft, soft), soft), name="stub")

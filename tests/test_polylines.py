@@ -1,4 +1,4 @@
-"""Points that splines take and refuse, from arrays and files, and curves of every kind in scene files."""
+"""Valid and invalid points of splines, from arrays and files, and all curves in scene files."""
 
 import math
 
@@ -9,7 +9,7 @@ import pytest
 import cosserat_fenicsx as cf
 from cosserat_fenicsx.cli.explain import explain
 
-pytestmark = pytest.mark.serial  # no ranks in it
+pytestmark = pytest.mark.serial  # independent of ranks
 
 POINTS = np.array([(0, 0, 0), (1.0, 0.2, 0.1), (1.8, 1.1, 0.7), (2.0, 2.3, 0.4)])
 
@@ -24,7 +24,7 @@ def test_csv(header, tmp_path):
 
 @pytest.mark.parametrize("suffix", ["vtk", "vtu", "xdmf"])
 def test_mesh_files(suffix, tmp_path):
-    """Lines in any order and direction, and a point that belongs to none."""
+    """Line cells in any order and direction, and a point that belongs to none."""
     file = tmp_path / f"line.{suffix}"
     order = np.array([4, 1, 0, 2])  # where each point of the line is stored
     stored = np.full((5, 3), 9.0)
@@ -98,11 +98,15 @@ REFUSED = {
     "spline of ragged points": (lambda: cf.Spline([(0, 0, 0), (1, 1)]), "expected points of three numbers"),
     "spline of words": (lambda: cf.Spline([("a", "b", "c")]), "expected points of three numbers"),
     "spline of a number": (lambda: cf.Spline(3.0), "expected points of three numbers"),
-    "spline, NaN": (lambda: cf.Spline([(0, 0, 0), (1, math.nan, 0)]), "Spline.points[1] = (1.0, nan, 0.0): expected finite numbers"),
-    "spline, nearly": (lambda: cf.Spline([(0, 0, 0), (1, 0, 0), (1 + 1e-9, 0, 0), (2, 0, 1)]), "Spline.points[2] = (1.000000001, 0.0, 0.0): expected a point apart"),
-    "spline, repeated": (lambda: cf.Spline([(0, 0, 0), (1, 1, 0), (1, 1, 0)]), "Spline.points[2] = (1.0, 1.0, 0.0): expected a point apart"),
+    "spline, NaN": (lambda: cf.Spline([(0, 0, 0), (1, math.nan, 0)]),
+                    "Spline.points[1] = (1.0, nan, 0.0): expected finite numbers"),
+    "spline, nearly": (lambda: cf.Spline([(0, 0, 0), (1, 0, 0), (1 + 1e-9, 0, 0), (2, 0, 1)]),
+                       "Spline.points[2] = (1.000000001, 0.0, 0.0): expected a point apart"),
+    "spline, repeated": (lambda: cf.Spline([(0, 0, 0), (1, 1, 0), (1, 1, 0)]),
+                         "Spline.points[2] = (1.0, 1.0, 0.0): expected a point apart"),
     "spline, one point twice": (lambda: cf.Spline([(1, 1, 0), (1, 1, 0)], closed=False), "Spline.points[1]"),
-    "closed spline of two": (lambda: cf.Spline([(0, 0, 0), (1, 0, 0), (0, 0, 0)], closed=True), "expected three points or more"),
+    "closed spline of two": (lambda: cf.Spline([(0, 0, 0), (1, 0, 0), (0, 0, 0)], closed=True),
+                             "expected three points or more"),
     "spline that turns back": (lambda: cf.Spline([(0, 0, 0), (1, 0, 0), (0, 0, 0)]), "a cusp at (1, 0, 0) m"),
     "spline that turns back inside": (lambda: cf.Spline([(0, 0, 0), (1, 0, 0), (0.4, 0, 0)]), "a cusp at (1."),
     "closed and flat": (lambda: cf.Spline([(0, 0, 0), (1, 0, 0), (3, 0, 0)], closed=True), "a cusp"),
@@ -179,13 +183,18 @@ def test_pieces_in_a_scene_file(tmp_path):
         scene = read(tmp_path, section=f"[{thick}, {last}]")
         rod = scene.rods[0]
         assert rod.breaks == (5.0,) and rod.section_at(6.0) == cf.Tube(0.1, 0.05)
-        words = "Circle (diameter 0.2 m) up to s = 5 m, then Tube (outer_diameter 0.1 m, inner_diameter 0.05 m) up to s = 8 m"
+        words = (
+            "Circle (diameter 0.2 m) up to s = 5 m, then Tube (outer_diameter 0.1 m, inner_diameter 0.05 m) up to s"
+            " = 8 m"
+        )
         assert words in explain(scene, [1.0], {})
     EI = [210e9 * math.pi * (0.1**4 - 0.05**4) / 64, 210e9 * math.pi * 0.2**4 / 64]
     assert f"EI = {EI[0]:.4g} to {EI[1]:.4g}, " in explain(scene, [1.0], {})
     refused = {
         f"[{CIRCLE}, {CIRCLE}]": r"rods\[0\].section\[0\]: 'to' is missing",
-        f"[{thick}, {{ to = 7, diameter = 0.1, type = 'Circle' }}]": r"section\[1\].to = 7: expected the rod's length 8 m",
+        f"[{thick}, {{ to = 7, diameter = 0.1, type = 'Circle' }}]": (
+            r"section\[1\].to = 7: expected the rod's length 8 m"
+        ),
         "[]": "at least one piece",
         "[3]": r"rods\[0\].section\[0\] = 3: expected a table",
     }

@@ -1,4 +1,4 @@
-"""Loads without a potential: which results say so, and what linear buckling means then.
+"""Loads without a potential: which results report it, and the meaning of linear buckling then.
 
 Reference values come from the strong form of a straight shaft.
 
@@ -33,7 +33,7 @@ def held(supports, loads, section=ROUND):
 
 
 def pinned_at_both_ends():
-    """An arm across the shaft on a roller keeps its start from spinning, and lets it bend both ways."""
+    """A roller under a transverse arm keeps the start from spinning; bending is free in both directions."""
     rod, arm = shaft(), cf.Rod(cf.Line((0, 0, 0), (0.5, 0, 0)), cf.Stiffness((1e6,) * 2, 1e6, (1e3,) * 2, 1e3))
     supports = [cf.Pin(rod.start), cf.Roller(arm.end, (0, 1, 0)), *guided(rod.end)]
     moments = [cf.Moment(rod.end, ALONG), cf.Moment(rod.start, (0, 0, -1.0))]
@@ -90,9 +90,10 @@ def test_becks_column(load_factor):
 
 
 def test_a_blade_under_a_moment_about_its_normal():
-    """As a cantilever it has no static bifurcation; between forks that hold its spin it buckles at M = pi sqrt(EI GJ).
+    """As a cantilever it has no static bifurcation; between forks that prevent its twist it buckles at M = pi sqrt(EI
+    GJ).
 
-    The bound is the same: on rigid forks, without the strain of their arms, the moment would have a potential."""
+    The bound is the same, since on forks with rigid arms the moment would have a potential."""
     exact = np.pi * np.sqrt(0.7)
     found = cf.buckling(held(clamped, lambda rod: [cf.Moment(rod.end, (1.0, 0, 0))], BLADE), elements=8)
     assert not found.conservative and len(found.load_factors) == 0 and found.bound == pytest.approx(exact, rel=2e-4)
@@ -125,7 +126,7 @@ CONSERVATIVE = {
 
 @pytest.mark.parametrize("case", CONSERVATIVE)
 def test_loads_with_a_potential(case):
-    """Asked of the virtual work on what the supports allow, not of the names of loads."""
+    """Determined from the virtual work on the motions that the supports allow, not from the classes of loads."""
     supports, loads, exact = CONSERVATIVE[case]
     found = cf.buckling(held(supports, loads), elements=8)
     assert found.conservative and found.caution == "" and "potential" not in repr(found)
@@ -135,7 +136,7 @@ def test_loads_with_a_potential(case):
 
 
 def test_paths_and_vibrations_say_so_too():
-    """In space, whichever model found the path."""
+    """For motions in space, whichever model computed the path."""
     dead, arm, moment, follower, line = (
         held(clamped, lambda rod, load=load: [cf.Force(rod.end, (0, 0, -0.5)), load(rod)])
         for load in (

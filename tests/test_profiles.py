@@ -8,7 +8,7 @@ from scipy.optimize import brentq
 
 import cosserat_fenicsx as cf
 
-pytestmark = pytest.mark.serial  # no ranks in it
+pytestmark = pytest.mark.serial  # independent of ranks
 
 STEEL = cf.Material(E=210e9, density=7850.0)
 LINE = cf.Line((0, 0, 0), (0, 0, 10))
@@ -38,7 +38,7 @@ def test_pieces(end):
     assert rod.breaks == (4.0, 7.0) and rod.profile.pieces[-1][0] == rod.length and not rod.profile.constant
     for side, expected in (("right", [THICK, THIN, THIN, THICK, THICK]), ("left", [THICK, THICK, THIN, THIN, THICK])):
         s = np.array([0.0, 4.0, 5.0, 7.0, 10.0])
-        for shift in (0, -1e-14, 1e-14):  # on a jump, but for rounding
+        for shift in (0, -1e-14, 1e-14):  # at a jump, up to rounding
             K, J, mass, *_ = rod.stiffness_at(s + shift, side=side)
             for i, section in enumerate(expected):
                 assert (K[i].tolist(), J[i].tolist(), mass[i]) == row(section)
@@ -100,10 +100,13 @@ def test_euler_load():
 
 REFUSED = {
     "no piece": (lambda: [], "section = []: expected at least one piece"),
-    "no pair": (lambda: [THICK], "section[0] = Circle(diameter=0.2, shear_factor=None): expected a piece (s_end, section)"),
+    "no pair": (lambda: [THICK],
+                "section[0] = Circle(diameter=0.2, shear_factor=None): expected a piece (s_end, section)"),
     "short of the end": (lambda: [(4, THICK), (9.9, THIN)], "section[1].to = 9.9: expected the rod's length 10 m"),
-    "beyond the end": (lambda: [(11, THICK), (None, THIN)], "section[0].to = 11: expected an arc length above 0 and up to 10 m"),
-    "not ascending": (lambda: [(4, THICK), (4, THIN), (None, THIN)], "section[1].to = 4: expected an arc length above 4"),
+    "beyond the end": (lambda: [(11, THICK), (None, THIN)],
+                       "section[0].to = 11: expected an arc length above 0 and up to 10 m"),
+    "not ascending": (lambda: [(4, THICK), (4, THIN), (None, THIN)],
+                      "section[1].to = 4: expected an arc length above 4"),
     "a piece at the end": (lambda: [(10, THICK), (10, THIN)], "section[1].to = 10.0: expected an arc length above 10"),
     "NaN": (lambda: [(math.nan, THICK), (None, THIN)], "section[0].to = nan"),
     "no end": (lambda: [(None, THICK), (None, THIN)], "section[0].to = None"),
@@ -111,7 +114,8 @@ REFUSED = {
     "a class": (lambda: cf.Circle, "Rod.section = <class"),
     "a function of numbers": (lambda: lambda s: 0.1 + s, "section(0) = 0.1: expected a section"),
     "a function without a return": (lambda: lambda s: THICK if s < 9 else None, " = None: expected a section"),
-    "a function of NaN": (lambda: lambda s: cf.Circle(math.nan if s > 9.99 else 0.1), "section at s = 10 m: Circle.diameter = nan"),
+    "a function of NaN": (lambda: lambda s: cf.Circle(math.nan if s > 9.99 else 0.1),
+                          "section at s = 10 m: Circle.diameter = nan"),
     "a function to zero": (lambda: lambda s: cf.Circle(1 - s / 10), "section at s = 10 m: Circle.diameter = 0.0"),
 }  # fmt: skip
 
@@ -157,7 +161,7 @@ def test_a_weak_spot_between_the_points_of_a_coarse_mesh_is_seen(place):
 
 
 def test_a_scene_is_solved_again_as_it_is_now():
-    """Numbers that cannot have changed are not taken anew; what a function says is asked again."""
+    """Constant data are kept, functions are evaluated again."""
     diameter = [0.02]
     tips = []
     for section in (cf.Circle(0.02), lambda s: cf.Circle(diameter[0])):

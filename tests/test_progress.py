@@ -1,4 +1,4 @@
-"""Progress: lines where there is no terminal, from rank 0 alone, and nothing where it is not wanted."""
+"""Progress: lines of text without a terminal, from rank 0 only, and nothing if not wanted."""
 
 import io
 

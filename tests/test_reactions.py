@@ -1,4 +1,4 @@
-"""Reactions by global balance: with what acts they sum up to nothing, or to the rate of momentum, in forces and in moments."""
+"""Reactions by global balance: with all loads, forces and moments sum to zero or to the rate of momentum."""
 
 import numpy as np
 import pytest
@@ -17,7 +17,7 @@ def wrench(place, force, moment=0.0):
 
 
 def of_load(result, load, k, eta=1.0):
-    """What a load of a scene exerts in state k, about the origin; times the load factor."""
+    """Force and moment about the origin of a load in state k, times the load factor."""
     if load.station is None:
         gauss, weights = np.polynomial.legendre.leggauss(8)
         breaks = result.layout.breaks[result.scene.rods.index(load.rod)]
@@ -45,10 +45,12 @@ def of_load(result, load, k, eta=1.0):
 
 
 def off_balance(path):
-    """What is left of the sums of reactions and loads, over the sums of their sizes; the largest of all points."""
+    """Sums of reactions and loads over the sums of their sizes; the largest of all points."""
     worst = 0.0
     for k, eta in enumerate(path.load_factors):
-        held = [wrench(path.position(x.station)[k], *(part[k] for part in path.reaction(x))) for x in path.scene.supports]
+        held = [
+            wrench(path.position(x.station)[k], *(part[k] for part in path.reaction(x))) for x in path.scene.supports
+        ]
         everything = np.array([*held, *(of_load(path, x, k, eta) for x in path.scene.loads)])
         force, moment = np.split(everything, 2, axis=1)
         for part in (force, moment):
@@ -57,8 +59,8 @@ def off_balance(path):
 
 
 def frame(section=SECTION, planar=False):
-    """Three rods: a is clamped and carries b; c hangs by a ball on the clamped point; every kind of support and of load, also at
-    the clamp and beside supports."""
+    """Three rods: a is clamped and carries b; c is connected to the clamped point by a ball joint. All kinds of
+    supports and loads, also at the clamp and at other supports."""
     z = 0.0 if planar else 1.0
     a = cf.Rod(cf.Line((1, 2, 0), (3, 2, z)), section, name="a")
     b = cf.Rod(cf.Line((3, 2, z), (4, 4, z)), section, name="b")
@@ -88,7 +90,7 @@ def frame(section=SECTION, planar=False):
 
 
 def tree():
-    """A rod that is clamped inside and carries another: of these statics gives the contact force."""
+    """A rod that is clamped between its ends and carries another one; statics gives the contact force."""
     a = cf.Rod(cf.Line((0, 0, 0), (2, 0, 1)), SECTION, name="a")
     b = cf.Rod(cf.Line((2, 0, 1), (2, 0, 3)), SECTION, name="b")
     loads = [
@@ -130,7 +132,7 @@ def test_balance_of_a_tree(model, flat):
 def test_tables_tell_reactions():
     path = cf.solve(frame(), [1.0], elements=3, model="spatial")
     told = list(reactions_in_words(path))
-    assert [sentence.split(" holds with")[0] for sentence in told] == [
+    assert [sentence.split(" exerts")[0] for sentence in told] == [
         "Roller at b.end", "Clamp at a.start", "Prescribed at c.end", "Hinge at b@1"
     ]  # fmt: skip
     assert told[0].endswith("and (0, 0, 0) N m at the load factor 1.")
@@ -138,12 +140,12 @@ def test_tables_tell_reactions():
         path.reaction(cf.Clamp(path.scene.rods[0].start))
 
 
-# -- motions: over each step the sum is the rate of momentum -------------------------------------------------------------
+# -- motions: the sum over each step is the rate of momentum -----------------------------------------------------------
 
 
 def moving_frame(planar=False, damping=None):
-    """Two rods between two clamps, with a roller and a prescribed motion, a third one on a ball; loads that change in time, also at
-    a clamp."""
+    """Two rods between two clamps, with a roller and a prescribed motion, a third
+    one on a ball joint; loads that depend on time, also at a clamp."""
     z = 0.0 if planar else 1.0
     a = cf.Rod(cf.Line((1, 2, 0), (3, 2, z)), SECTION, name="a", damping=damping)
     b = cf.Rod(cf.Line((3, 2, z), (4, 4, z)), SECTION, name="b", damping=damping)
@@ -166,7 +168,8 @@ def moving_frame(planar=False, damping=None):
 
 
 def over_step(history, k, at_end=0.5):
-    """Sum of loads and reactions on the step that ends at the time k, about the origin; places are those half way, or at the end."""
+    """Sum of loads and reactions over the step that ends at the time k, about the
+    origin; positions are those in the middle of the step, or at its end."""
 
     def place(station):
         before, after = history.position(station)[k - 1 : k + 1]
@@ -186,7 +189,7 @@ def over_step(history, k, at_end=0.5):
 
 
 def off_rate(history, which, total=over_step):
-    """Largest difference of the sums and the rates of momenta, over the largest of them."""
+    """Largest difference of the sums and the rates of momenta, over the largest sum."""
     momenta = np.concatenate([history.linear_momentum, history.angular_momentum], axis=1)
     rates = np.diff(momenta, axis=0) / np.diff(history.times)[:, None]
     sums = np.array([total(history, k) for k in range(1, len(history))])
@@ -199,7 +202,7 @@ STEPS = {"dt": 0.02, "elements": 3, "degree": 3}
 
 @pytest.mark.parametrize(("scheme", "model"), [("momentum", "planar"), ("momentum", "spatial"), ("energy", "spatial")])
 def test_rate_of_momentum(scheme, model):
-    """The scheme "energy" keeps angular momentum to the second order alone."""
+    """The scheme "energy" conserves angular momentum to second order only."""
     scene = moving_frame(model == "planar", cf.Damping(time=1e-2))
     history = cf.simulate(scene, 0.3, model=model, scheme=scheme, **STEPS)
     assert history.model == model
@@ -209,18 +212,19 @@ def test_rate_of_momentum(scheme, model):
 
 @pytest.mark.parametrize("model", ["planar", "spatial"])
 def test_rate_of_momentum_by_generalised_alpha(model):
-    """With rho_inf = 1 linear momentum goes by the trapezoidal rule: by the average of what acts at both ends of a step."""
+    """With rho_inf = 1 the rate of linear momentum is the average of the
+    forces at both ends of a step (trapezoidal rule)."""
     history = cf.simulate(
         moving_frame(model == "planar"), 0.3, model=model, scheme="generalised-alpha", rho_inf=1.0, **STEPS
     )
-    end = 1 - 1e-6  # loads are asked for just before a step ends
+    end = 1 - 1e-6  # loads are evaluated just before the end of a step
     sums = np.array([over_step(history, k, end)[:3] for k in range(1, len(history))])
     rates = np.diff(history.linear_momentum, axis=0)[1:] / STEPS["dt"]
     assert np.abs((sums[1:] + sums[:-1]) / 2 - rates).max() < 1e-9 * np.abs(sums).max()
 
 
 def push_of_bed(result, k, stiffness):
-    """(3,) of an elastic bed under the first rod."""
+    """(3,) force of an elastic foundation under the first rod."""
     rod, (breaks,) = result.scene.rods[0], result.layout.breaks
     gauss, weights = np.polynomial.legendre.leggauss(8)
     x = (breaks[:-1, None] + np.diff(breaks)[:, None] * (gauss + 1) / 2).ravel()
@@ -229,7 +233,7 @@ def push_of_bed(result, k, stiffness):
 
 
 def push_of_wall(displacements, result, clearance, stiffness):
-    """(3,) of a wall around the z axis on the first rod, from the displacements of its nodes (n, 3)."""
+    """(3,) force of a wall around the z axis on the first rod, from the displacements of its nodes (n, 3)."""
     rod, (breaks,), p = result.scene.rods[0], result.layout.breaks, result.degree
     weights = np.zeros(len(displacements))
     for i, size in enumerate(np.diff(breaks) * rod.length):
@@ -242,8 +246,8 @@ def push_of_wall(displacements, result, clearance, stiffness):
 
 @pytest.mark.parametrize("what", ["bed", "wall"])
 def test_what_acts_along_rods_and_sees_the_state(what):
-    """An elastic bed, and contact, which is integrated at the nodes: with two clamps and a line force they are the rate of
-    momentum."""
+    """A foundation, and a wall, which is integrated at the nodes: with two
+    clamps and a line force they balance the rate of momentum."""
     rod = cf.Rod(cf.Line((0, 0, 0), (0, 0, 2)), SECTION, name="rod")
     action = cf.Foundation(rod, 30.0) if what == "bed" else cf.Wall(rod, (0, 0, 0), (0, 0, 1), 0.001, stiffness=1e3)
     line = np.array([4.0, 1.0, 0.5])

@@ -1,4 +1,4 @@
-"""Requests that are refused in words before the work, and work that ends soon after Ctrl-C."""
+"""Requests that are refused before the computation, and computations that end soon after Ctrl-C."""
 
 import re
 import signal
@@ -33,7 +33,7 @@ def test_long_eigenproblems_end_soon_after_a_signal(command, number):
 
 @pytest.mark.serial
 def test_a_thread_that_waits_is_interrupted(monkeypatch):
-    """At once, though the work goes on; what the work raises is raised."""
+    """At once, although the thread goes on; an exception in the thread is raised in the caller."""
     from cosserat_fenicsx import interrupts
 
     assert interrupts.interruptible(lambda: 7) == 7
@@ -52,7 +52,7 @@ def motions(scene, **more):
 
 @pytest.mark.parametrize("work", [cf.buckling, cf.modes, motions, lambda scene, **more: cf.solve(scene, [1.0], **more)])
 def test_too_many_elements_are_refused_before_the_work(work):
-    """In words, with little memory: before, it was that of all elements."""
+    """With a message, and without allocating memory for all elements."""
     _, scene = column()
     tracemalloc.start()
     with pytest.raises(cf.SceneError, match="elements = 1000000000 on 1 rod.* expected at most 100000 per rod"):
@@ -70,7 +70,7 @@ def test_the_command_line_refuses_both(command, more, tmp_path, capsys, monkeypa
     from cosserat_fenicsx import interrupts
     from cosserat_fenicsx.cli import main as cli
 
-    monkeypatch.setattr(interrupts, "listen", lambda: None)  # the signals are pytest's
+    monkeypatch.setattr(interrupts, "listen", lambda: None)  # signals belong to pytest
     assert cli.main([command, str(DEMO), "--elements", "1000000000", *more]) == 2
     assert "expected at most 100000 per rod" in capsys.readouterr().err
     file = tmp_path / "scene.toml"

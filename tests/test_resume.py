@@ -1,4 +1,4 @@
-"""Motions that are written as they go: whatever ends them, they go on to the same digits."""
+"""Motions written to a folder: whatever ends them, they are continued to the same digits."""
 
 import errno
 import gc
@@ -28,10 +28,10 @@ SOLVERS = ("cosserat_fenicsx.dynamics.steppers", "cosserat_fenicsx.dynamics.pace
 
 @pytest.mark.parametrize(("case", "apart"), [*((case, 0.02) for case in CASES), ("fixed", 0.0), ("adaptive", 1e9)])
 def test_it_goes_on_to_the_same_digits(case, apart, tmp_path, monkeypatch, never_ended):
-    """With checkpoints now and then, at every step, and at the start alone."""
+    """With some checkpoints, one at every step, and one at the start alone."""
     scene = part_of(case, tmp_path / "part", monkeypatch, step=25, apart=apart)
     before = rows(tmp_path / "part").copy()
-    cf.simulate(scene, 0.05, dt=0.05, **SMALL)  # the solver that is kept has another tangent by now
+    cf.simulate(scene, 0.05, dt=0.05, **SMALL)  # the pooled solver now has another tangent
     history = cf.resume(tmp_path / "part", scene)
     assert_same(tmp_path / "part", never_ended(case))
     assert 0 < len(before) < len(history)
@@ -41,7 +41,8 @@ def test_it_goes_on_to_the_same_digits(case, apart, tmp_path, monkeypatch, never
 
 @pytest.mark.parametrize("scheme", SCHEMES)
 def test_everything_that_steps_depend_on_is_remembered(scheme, tmp_path, monkeypatch):
-    """Of a gentle motion, where tangents serve for long: all numbers that solvers hold come out as they would have."""
+    """A smooth motion, where tangents are reused for many steps: all
+    numbers in the solvers are those of an uninterrupted run."""
     section = cf.Stiffness((1e6, 1e6), 1e6, (1e3, 1e3), 1e3, mass=1.0, inertia=(1, 1, 2))
     rod = cf.Rod(cf.Line((0, 0, 0), (10, 0, 0)), section)
     scene = cf.Scene([rod], [cf.Clamp(rod.start)], [cf.Force(rod.end, cf.Sine((0, 0, 3.0), 0.05))])
@@ -73,7 +74,7 @@ def test_everything_that_steps_depend_on_is_remembered(scheme, tmp_path, monkeyp
 
 
 def numbers_held(thing, before=""):
-    """All numbers that a motion's solvers hold, by the names of attributes."""
+    """All numbers in the solvers of a motion, by attribute names."""
     found = {}
     for name, value in vars(thing).items():
         if isinstance(value, bool | int | float):
@@ -86,7 +87,10 @@ def numbers_held(thing, before=""):
 
 @pytest.mark.parametrize(("case", "step"), [("adaptive", 25), ("plane", 100)])
 def test_kill_9(case, step, tmp_path, never_ended):
-    code = f"import sys; sys.path.insert(0, {str(Path(__file__).parent)!r}); import ended_motions as t; t.kill_in(*{(case, step, str(tmp_path / 'killed'))!r})"
+    code = (
+        f"import sys; sys.path.insert(0, {str(Path(__file__).parent)!r}); import ended_motions as t;"
+        f" t.kill_in(*{(case, step, str(tmp_path / 'killed'))!r})"
+    )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, encoding="utf-8")
     assert done.returncode == -signal.SIGKILL, done.stderr
     scene = CASES[case][0]()[1]
@@ -95,7 +99,7 @@ def test_kill_9(case, step, tmp_path, never_ended):
     assert 0 < len(seen) < len(whole) and (seen.times == whole.times[: len(seen)]).all()
     cf.resume(tmp_path / "killed", scene)
     assert_same(tmp_path / "killed", never_ended(case))
-    assert len(seen) < len(whole)  # what was read stays what it was
+    assert len(seen) < len(whole)  # a history read before does not grow
 
 
 def test_a_stored_history_answers_as_one_in_memory(tmp_path):
@@ -138,7 +142,7 @@ def test_none_of_its_states_stays_in_memory(tmp_path):
 
 
 def test_a_full_disk_is_said_and_costs_nothing(tmp_path, never_ended):
-    """A limit on the size of files ends the writing in the middle of a state."""
+    """A limit of the file size ends the writing in the middle of a state."""
     whole = cf.read_history(never_ended("adaptive"))
     size = rows(never_ended("adaptive")).dtype.itemsize
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
@@ -180,7 +184,7 @@ def test_a_checkpoint_that_cannot_be_written_leaves_the_one_before(tmp_path, mon
 
 
 def test_a_complete_motion_stays_as_it_is_and_may_be_prolonged(tmp_path, monkeypatch, never_ended):
-    """Steps of 0.05 s: the longer motion is the one that was as long from the start."""
+    """Steps of 0.05 s: the extended motion equals one of that duration from the start."""
     scene = flying_in_space()[1]
     short = cf.simulate(scene, 2, dt=0.05, folder=tmp_path / "short", **SMALL)
     stamps = {file.name: file.stat().st_mtime_ns for file in (tmp_path / "short").iterdir()}

@@ -1,4 +1,4 @@
-"""Motions that are written as they go, on one rank or many: errors on one end all, and what was ended goes on."""
+"""Motions written to a folder, on one rank or many: an error on one rank ends all, and the motion can be continued."""
 
 import errno
 import os
@@ -16,7 +16,7 @@ ASKED = {"duration": 2, "dt": 0.05, "elements": 4, "degree": 2}
 
 
 class Stopped(Exception):
-    """What ends a run here."""
+    """Raised to end a run."""
 
 
 def test_it_goes_on(tmp_path_all, monkeypatch):

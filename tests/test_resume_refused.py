@@ -1,4 +1,4 @@
-"""Motions that are written as they go: damaged files, other scenes, and what cannot be done."""
+"""Motions written to a folder: damaged files, other scenes, and requests that are refused."""
 
 import json
 
@@ -13,7 +13,7 @@ pytestmark = pytest.mark.serial
 
 
 def test_damaged_files(tmp_path, monkeypatch, never_ended):
-    """A cut-off file of states and a checkpoint that is no more cost time alone; what is lost with them is said."""
+    """A truncated file of states or a missing checkpoint only costs time; the message says what was lost."""
     folder = tmp_path / "part"
     part_of("fixed", folder, monkeypatch)
     states = folder / "instants.npy"
@@ -117,7 +117,7 @@ def pushed(force):
 
 
 def test_a_scene_that_changes_after_the_first_duration_is_another(tmp_path):
-    """It is looked at over the longest duration that was ever asked for, also of the one that is asked for now."""
+    """Scenes are compared over the longest duration requested so far, the present one included."""
     folder = tmp_path / "motion"
     first = pushed(lambda t: (0, 5.0, 0))
     cf.simulate(first, 1.0, folder=folder, **BEGUN)
@@ -138,7 +138,7 @@ def test_a_scene_that_changes_after_the_first_duration_is_another(tmp_path):
 
 
 def test_what_differs_is_told_where_it_differs_most(tmp_path):
-    """A sine that is zero to rounding half way says nothing there."""
+    """Not at half the duration, where the sine is zero up to rounding."""
     folder = tmp_path / "motion"
     cf.simulate(pushed(cf.Sine((0, 5, 0), 2.0)), 1.0, folder=folder, **BEGUN)
     with pytest.raises(cf.SceneError) as refusal:
@@ -174,7 +174,7 @@ def test_what_leaves_its_plane_later_is_refused_before_anything_is_written(tmp_p
 
 
 def test_a_longer_duration_that_is_refused_leaves_no_trace(tmp_path):
-    """A support that jumps later; more steps than can be."""
+    """A support that jumps later; too many steps."""
     folder = tmp_path / "motion"
     scene = cf.Scene([ROD], [cf.Prescribed(ROD.start, cf.Step((0, 0.1, 0), 2.0), (0, 0, 0))])
     cf.simulate(scene, 1.0, folder=folder, **BEGUN)

@@ -1,4 +1,4 @@
-"""Every rung gives the same answer, and the same count of negative modes, where it applies."""
+"""All models valid for a scene give the same results and the same number of negative modes."""
 
 import numpy as np
 import pytest
@@ -12,8 +12,8 @@ pytestmark = pytest.mark.few_ranks
 
 
 def same(found, truth, tolerance):
-    """Every field of every rod at every point, relative to its size, and to what rounding leaves of it: strains are
-    differences of r over a node's spacing, and forces are those times the stiffness."""
+    """Compare all fields of all rods at all points, relative to their size, and to their rounding errors: strains are
+    differences of r over the spacing of nodes, and forces are strains times stiffnesses."""
     for k in range(len(truth)):
         for rod in truth.scene.rods:
             a, b = found.fields(k, rod), truth.fields(k, rod)
@@ -74,7 +74,7 @@ def test_tip_converges_with_order_2p(model, degree, reference):
 
 @pytest.mark.parametrize("model", ["determinate", "planar", "spatial"])
 def test_full_turns(model):
-    """M = 2 pi EI/L a turn: q keeps its sign along rod and path, though the ring closes twice."""
+    """M = 2 pi EI/L per turn: the sign of q is continuous along rod and path, although the ring closes twice."""
     rod = cf.Rod(cf.Line((0, 0, 0), (2.0, 0, 0)), cf.Circle(0.01), STEEL)
     M = 2 * np.pi * rod.stiffness.bending[0] / rod.length
     scene = cf.Scene([rod], [cf.Clamp(rod.start)], [cf.Moment(rod.end, (0, -M, 0))])
@@ -112,7 +112,7 @@ def test_number_of_ranks_changes_nothing(name):
 
 @pytest.mark.parametrize("model", ["determinate", "planar", "spatial"])
 def test_a_perfect_round_column_loses_two_motions_at_once(model):
-    """One in the plane and one out of it: planar models count both."""
+    """One in the plane and one out of it; planar models count both."""
     _, scene = column(eccentricity=0.0)
     path = cf.solve(scene, [0.5, 0.999, 1.001, 8.9, 9.1], model=model, elements=8)
     assert path.negative_modes.tolist() == [0, 0, 2, 2, 4]
@@ -127,7 +127,7 @@ def test_lateral_buckling_is_seen_in_the_plane(model, rigid):
 
 
 def test_supports_count_out_of_the_plane_too():
-    """A strip that a pin would let buckle sideways, and that a hinge about the normal holds there."""
+    """A strip that would buckle sideways on a pin, but not on a hinge about the normal."""
     section = cf.Stiffness((1e6, 1e6), 1e6, (1.0, 4.0), 2.0)
     rod = cf.Rod(cf.Line((0, 0, 0), (0, 0, 1.0), d1=(1, 0, 0)), section)
     roller = [cf.Roller(rod.end, (1, 0, 0)), cf.Roller(rod.end, (0, 1, 0))]
@@ -142,7 +142,7 @@ def test_supports_count_out_of_the_plane_too():
 
 
 def test_points_keep_their_own_numbers_when_another_scene_is_solved():
-    """What is expanded late must not see the scene that was loaded since."""
+    """States expanded later must not be affected by a scene that was loaded in between."""
     first, second = tree(Drawn(1)), tree(Drawn(2))
     path = cf.solve(first, [1.0], elements=4)
     fresh = cf.solve(first, [1.0], elements=4)
@@ -152,7 +152,7 @@ def test_points_keep_their_own_numbers_when_another_scene_is_solved():
 
 
 def in_space(kind):
-    """Scenes out of any plane whose contact force statics gives."""
+    """Scenes that are not plane, and whose contact force is given by statics."""
     section = (
         cf.Stiffness((300.0, 50.0), 200.0, (169.0, 1014.0), 84.5, mass=0.04)
         if kind == "soft"
@@ -207,7 +207,7 @@ def test_determinate_in_space_counts_what_the_spatial_counts():
 
 @pytest.mark.parametrize("seed, release", [(0, None), (1, "all"), (2, "normal"), (4, "all")])
 def test_stability_with_ties_is_the_spatial_one(seed, release):
-    """Reactions of hinges and prescribed turns, in the plane and out of it, up to where a motion loses its stability."""
+    """With reactions of hinges and prescribed rotations, in the plane and out of it, up to the loss of stability."""
     draw, random = Drawn(seed), np.random.default_rng(seed)
     section = cf.Stiffness((1e5, 2e5), 3e5, tuple(random.uniform(0.3, 0.9, 2)), random.uniform(0.2, 0.5))
     post = cf.Rod(cf.Line(draw.point(0, 0, 0), draw.point(0, 0, 1), d1=draw.vector(1, 0, 0)), section, name="post")

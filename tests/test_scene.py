@@ -1,4 +1,4 @@
-"""Bad input: every refusal names the field, its value and what was expected."""
+"""Invalid input: every message names the field, its value and what was expected."""
 
 import math
 
@@ -121,7 +121,7 @@ def test_infinite_stiffness_needs_a_contact_force_of_its_own():
 
 
 def test_not_converged_keeps_the_partial_path():
-    """A perfect refusal: one Newton iteration is never enough."""
+    """One Newton iteration is never enough."""
     _, scene = column()
     with pytest.raises(cf.NotConverged) as refusal:
         cf.solve(scene, [0.0, 0.5, 1.0], elements=4, steps=cf.StepControl(max_iterations=1), control="load")
@@ -182,7 +182,8 @@ def test_frames_of_a_line():
 
 
 def test_what_looks_like_a_slip_is_asked_about():
-    """A forgotten joint, a section in mm, a modulus in MPa; and nothing where two rods are held at one point, or joined."""
+    """Warnings about a forgotten joint, a section in mm, a modulus in MPa;
+    none where two rods are supported at one point, or joined."""
 
     def scene(across=0.1, E=210e9, joints=(), clamps=("start", "end")):
         steel, section = cf.Material(E, density=7850.0), cf.Rectangle(across, across)

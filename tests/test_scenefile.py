@@ -1,4 +1,4 @@
-"""The TOML scene file: the same scene as Python's, and refusals that name the key."""
+"""TOML scene files: the same scene as in Python, and error messages that name the key."""
 
 from pathlib import Path
 
@@ -21,21 +21,25 @@ def test_the_file_gives_the_same_path_as_python():
 
 
 CHANGES = {
-    "unknown key": ("diameter = 0.2", "diametre = 0.2", "rods[0].section (Circle): unknown key 'diametre', did you mean 'diameter'?"),
+    "unknown key": ("diameter = 0.2", "diametre = 0.2",
+                    "rods[0].section (Circle): unknown key 'diametre', did you mean 'diameter'?"),
     "unknown table": ("[[supports]]", "[[suports]]", "unknown key 'suports', did you mean 'supports'?"),
     "unknown type": ('type = "Clamp"', 'type = "Clmap"', "supports[0].type = 'Clmap'"),
     "unknown solve key": ("tol = 1e-6", "tolerance = 1e-6", "[solve]: unknown key 'tolerance', did you mean 'tol'?"),
     "type error": ("diameter = 0.2", 'diameter = "0.2"', "Circle.diameter = '0.2': expected a positive number (m)"),
     "type error in solve": ("tol = 1e-6", 'tol = "small"', "[solve].tol = 'small': expected int or float"),
     "missing key": (", diameter = 0.2", "", "'diameter' is missing"),
-    "unknown station": ('station = "column.start"', 'station = "colum.start"', "no rod is named 'colum', did you mean 'column'?"),
-    "unknown place": ('station = "column.start"', 'station = "column.top"', "expected 'rod.start', 'rod.end' or 'rod@s'"),
+    "unknown station": ('station = "column.start"', 'station = "colum.start"',
+                        "no rod is named 'colum', did you mean 'column'?"),
+    "unknown place": ('station = "column.start"', 'station = "column.top"',
+                      "expected 'rod.start', 'rod.end' or 'rod@s'"),
     "station is a number": ('station = "column.start"', "station = 3", "supports[0].station = 3"),
     "beyond the end": ('station = "column.start"', 'station = "column@21"', "expected an arc length in [0, 20] m"),
     "unknown material": ('material = "steel"', 'material = "steal"', "did you mean 'steel'?"),
     "no array": ("[[supports]]", "[supports]", "expected an array of tables, [[supports]]"),
     "not TOML": ("[[supports]]", "[[supports", "not valid TOML"),
-    "vector": ("force = [0, 0, -101739.34535723379]", "force = [0, -1.0]", "Force.force = [0, -1.0]: expected 3 finite numbers (N)"),
+    "vector": ("force = [0, 0, -101739.34535723379]", "force = [0, -1.0]",
+               "Force.force = [0, -1.0]: expected 3 finite numbers (N)"),
     "title": ('title = "Eccentrically compressed cantilever"', "title = 3", "title = 3: expected a string"),
 }  # fmt: skip
 

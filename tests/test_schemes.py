@@ -1,4 +1,4 @@
-"""What each scheme conserves, its order, and the ledger of all that a scene can hold."""
+"""Time integration schemes: conserved quantities, orders, and energy balances."""
 
 import itertools
 
@@ -13,7 +13,7 @@ SECTION = cf.Stiffness((1e5, 1e5), 1e5, (1e3, 1e3), 1e3, mass=2.0, inertia=(0.1,
 
 
 def smooth():
-    """A free rod, so soft that the steps resolve its waves, that starts to bend out of itself as it tumbles."""
+    """A free rod, so soft that the steps resolve its waves, which begins to bend while it tumbles."""
     soft = cf.Stiffness((100, 100), 100, (500, 500), 500, mass=1.0, inertia=(10, 10, 20))
     rod = cf.Rod(cf.Line((6, 0, 0), (0, 8, 0)), soft)
     tangent, spin, out = np.array([-0.6, 0.8, 0]), np.array([0.2, 0.1, 0.3]), np.array([0, 0, 1.0])
@@ -55,7 +55,7 @@ def test_energy_is_exact_and_ends_agree():
 
 
 def everything():
-    """Damping and drag, a hinge, a ball joint, weight, and loads that turn with sections and depend on time."""
+    """A scene with damping and drag, a hinge, a ball joint, weight, follower loads and loads that depend on time."""
     a = cf.Rod(cf.Line((0, 0, 0), (2, 0, 0)), SECTION, name="a", damping=cf.Damping(time=1e-3, drag=0.1))
     b = cf.Rod(cf.Line((2, 0, 0), (2, 1, 1)), SECTION, name="b")
     loads = [
@@ -68,7 +68,7 @@ def everything():
 
 
 def test_the_ledger_closes_whatever_there_is():
-    """To the last digits with `energy`, with the order 2 by default; and both go the same way."""
+    """To rounding with `energy`, with order 2 by default; both schemes give the same motion."""
     b, scene = everything()
     exact = cf.simulate(scene, 1, dt=0.01, elements=4, degree=2, scheme="energy")
     assert np.abs(exact.balance).max() < 1e-9 * exact.energy.max()
@@ -80,7 +80,8 @@ def test_the_ledger_closes_whatever_there_is():
 
 
 def test_a_run_does_not_depend_on_the_one_before():
-    """What Newton learnt of kept tangents in a run is forgotten: the same digits, whatever ran on the same forms."""
+    """Statistics on reused tangents are reset: results are identical,
+    whatever was computed with the same forms before."""
     rod, scene = flying_in_space()
     settings = {"elements": 8, "degree": 2, "save_every": 2}
     first = cf.simulate(scene, 2, dt=0.05, **settings).position(rod.end)

@@ -1,4 +1,4 @@
-"""Physics in space against a strong form that shares nothing with the package, critical loads, and the right branch."""
+"""Rods in space against an independent strong form; critical loads, and the right branch."""
 
 import numpy as np
 import pytest
@@ -52,7 +52,7 @@ def test_against_the_strong_form(name):
 
 
 def test_force_just_beyond_an_interior_load():
-    """Nothing acts beyond mid-span: n is F before and 0 after, in the very next element too."""
+    """A force at mid-span: n is F before and 0 after it, from the next element on."""
     rod = cf.Rod(cf.Line((0, 0, 0), (10.0, 0, 0)), cf.Circle(0.2), STEEL)
     path = cf.solve(cf.Scene([rod], [cf.Clamp(rod.start)], [cf.Force(rod.at(5.0), (0, 0, -1000.0))]), [1.0])
     for s, expected in ((4.99, -1000.0), (5.0, -1000.0), (5.01, 0.0), (5.3, 0.0), (9.0, 0.0)):
@@ -82,7 +82,7 @@ def test_self_weight_column():
 @pytest.mark.parametrize("weak", [(1.0, 1.5), (1.0, 10.0), (1.0, 1.0)])
 @pytest.mark.parametrize("tilt", [1e-3, 1e-4])
 def test_nearly_perfect_columns_stay_on_the_branch_of_their_tilt(weak, tilt):
-    """The mirrored branch is stable about a stiff axis: neither distance nor negative modes give it away."""
+    """The mirrored branch is stable if one axis is stiff: neither distance nor negative modes reveal a jump to it."""
     section = cf.Stiffness(shear=(1e5, 1e5), axial=1e5, bending=weak, torsion=0.8)
     rod = cf.Rod(cf.Line((0, 0, 0), (0, 0, 1.0)), section)
     P = np.pi**2 / 4
@@ -112,7 +112,7 @@ def test_the_estimate_covers_the_error_everywhere(degree, tol, loads):
 
 
 def test_the_estimate_is_not_fooled_by_a_boundary_layer():
-    """Pulled by 1e4 EI/L^2 the rod bends within L/100 of its clamp: two coarse meshes agree on too little."""
+    """Under a tension of 1e4 EI/L^2 the rod bends within L/100 of its clamp, which two coarse meshes do not resolve."""
     rod = cf.Rod(cf.Line((0, 0, 0), (10.0, 0, 0)), cf.Circle(0.05), STEEL)
     F = rod.stiffness.bending[0] / 100
     scene = cf.Scene(
@@ -152,7 +152,8 @@ def test_where_hardly_anything_moves(kind):
 
 
 def test_very_slender_rods_on_fine_meshes():
-    """Where rounding in the condensed tangent reaches the bending stiffness, the contact force becomes an unknown."""
+    """The contact force becomes an unknown where rounding errors of
+    the condensed tangent reach the bending stiffness."""
     rod = cf.Rod(cf.Line((0, 0, 0), (0, 0, 20.0)), cf.Circle(20.0 / 1e5), STEEL)
     P = cf.euler_load(rod)
     scene = cf.Scene([rod], [cf.Clamp(rod.start)], [cf.Force(rod.end, (0, 0, -P)), cf.Moment(rod.end, (0, 0.2 * P, 0))])

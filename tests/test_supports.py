@@ -1,4 +1,4 @@
-"""Supports and loads by duality: what a support does, its reactions as loads do too, and the other way round."""
+"""Supports and loads by duality: reactions applied as loads give the same state as the supports, and vice versa."""
 
 import numpy as np
 import pytest
@@ -16,7 +16,7 @@ def turned(x):
 
 
 def bow():
-    """A bent rod of length 1 that lies askew in space."""
+    """A bent rod of length 1 in a general position."""
     q = TURN.as_quat()
     return cf.Rod(cf.UniformCurvature(1.0, (0.4, 0.9, 0.5), start=(3.0, 1.0, -2.0), frame=(q[3], *q[:3])), SECTION)
 
@@ -41,7 +41,7 @@ def across(rod):
 
 
 def test_a_prescribed_motion_is_what_its_reaction_would_do():
-    """A tip that is moved and turned as a force and a moment move and turn it feels that force and that moment."""
+    """A tip that is displaced and rotated as by a force and a moment has these as reactions."""
     rod = bow()
     force, moment = LOADS
     pushed = solve(rod, [], [cf.Force(rod.end, force), cf.Moment(rod.end, moment), across(rod)])
@@ -159,7 +159,7 @@ def test_refusals():
 
 
 def test_a_small_rod_beside_a_large_one_keeps_its_stability():
-    """What holds a short stiff post is stiff by its measure, not by that of a long wire in the same scene."""
+    """Penalties of its supports are relative to its own stiffness, not to that of a long wire in the same scene."""
     steel = cf.Material(E=210e9, nu=0.3)
     wire = cf.Rod(cf.Line((10, 0, 0), (110, 0, 0)), cf.Circle(0.02), steel, name="wire")
     post = cf.Rod(cf.Line((0, 0, 0), (0, 0, 5.0)), cf.Circle(0.2), steel, name="post")
@@ -206,7 +206,7 @@ def test_one_jump_of_more_than_half_a_turn_is_refused():
 @pytest.mark.serial
 @pytest.mark.parametrize("load_factors", [[1.0], [0.3, 0.6, 1.0]])
 def test_many_turns_are_not_mistaken_for_fewer(load_factors):
-    """Ten turns of a shaft, in torsion and in bending: each step is short enough to tell a turn from none."""
+    """Ten turns of a shaft, in torsion and in bending: steps are small enough not to skip a turn."""
     rod = cf.Rod(cf.Line((0, 0, 0), (1.0, 0, 0)), cf.Stiffness((1e4, 1e4), 1e4, (1.0, 1.0), 0.5))
     for axis, stiffness in (((1, 0, 0), 0.5), ((0, 1, 0), 1.0)):
         turns = cf.Prescribed(rod.end, rotation=tuple(20 * np.pi * np.array(axis)))

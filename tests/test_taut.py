@@ -1,4 +1,4 @@
-"""Stability of rods drawn taut, or pressed far beyond their first critical load: the count of negative modes."""
+"""The number of negative modes of rods under high tension, or far beyond their first critical load."""
 
 import numpy as np
 import pytest
@@ -13,7 +13,8 @@ RUNGS = [("determinate", False), ("planar", False), ("planar", True), ("spatial"
 
 
 def straight(force, guided=False, *, K=STIFF, direction=(0.6, 0, 0.8), shear=STIFF):
-    """A rod of length and bending stiffness 1, clamped at its start; the end that is drawn is free, or held across."""
+    """A rod of length and bending stiffness 1, clamped at its start; its
+    loaded end is free, or guided in the direction of the load."""
     rod = cf.Rod(cf.Line((0, 0, 0), direction), cf.Stiffness((shear, shear), K, (1, 1), SMALL), name="rod")
     x, y, z = direction
     supports = [cf.Clamp(rod.start)]
@@ -27,7 +28,8 @@ def counts(scene, forces, **options):
 
 
 def critical_below(force, guided):
-    """How many critical loads x^2 lie below, each twice: cos x = 0 where the end is free, otherwise tan x = x."""
+    """The number of critical loads x^2 below a force, each counted
+    twice: cos x = 0 for a free end, otherwise tan x = x."""
     x, k = np.sqrt(force), np.arange(1, 1000)
     roots = (k - 0.5) * np.pi
     if guided:
@@ -48,7 +50,8 @@ def test_tension_makes_no_negative_modes(model, guided, elements, degree):
 
 @pytest.mark.parametrize("model, guided", RUNGS)
 def test_compression_makes_as_many_as_there_are_critical_loads_below(model, guided):
-    """Half way between two of them: on a mesh where these used to be shifted by up to a quarter."""
+    """Half way between two critical loads, on a mesh where these were
+    shifted by up to a quarter with a tighter bound of K."""
     roots = np.pi * (np.array([10, 159]) + 0.5 * guided)
     expected = [critical_below(x**2, guided) for x in roots]
     assert expected == [20, 318]
@@ -72,7 +75,7 @@ def test_infinite_stiffness(model):
 
 @pytest.mark.serial
 def test_displacement_form():
-    """On a rod so slender that the true stiffnesses would drown bending in rounding."""
+    """On a rod so slender that with the true stiffnesses rounding errors would exceed the bending stiffness."""
     scene = straight(1.0, direction=(0, 0, 1.0))
     forces = [-10.0, 1.0, 1e3, 1e6]
     assert counts(scene, forces, model="spatial", formulation="displacement", elements=512) == [2, 0, 0, 0]
@@ -80,7 +83,7 @@ def test_displacement_form():
 
 @pytest.mark.serial
 def test_true_instability_of_a_soft_rod_stays():
-    """A rod that shears more easily than it stretches turns its sections aside under a tension N > GA (1 + N/EA)."""
+    """Under a tension N > GA (1 + N/EA) the sections of a shear-flexible rod rotate: a real instability."""
     scene = straight(1.0, K=1e6, shear=1e5)
     threshold = 1 / (1 / 1e5 - 1 / 1e6)
     for model in ("determinate", "planar", "spatial"):
@@ -90,7 +93,7 @@ def test_true_instability_of_a_soft_rod_stays():
 
 @pytest.mark.parametrize("tension", [10.0, 1e6])
 def test_a_column_between_taut_wires(tension):
-    """The wires hold its top in their plane as a support, and out of it as strings, with 2 T/L and their bent ends."""
+    """The wires support its top rigidly in their plane, and out of it with 2 T/L and the bending of their ends."""
     column = cf.Rod(cf.Line((0, 0, 0), (0, 0, 1)), cf.Stiffness((1e9, 1e9), 1e9, (1, 1), SMALL), name="column")
     thin = cf.Stiffness((1e9, 1e9), 1e9, (1e-3, 1e-3), 1e-3)
     wires = [cf.Rod(cf.Line((side, 0, 1), (0, 0, 1)), thin, name=f"wire {side}") for side in (-1, 1)]
@@ -106,7 +109,7 @@ def test_a_column_between_taut_wires(tension):
     critical = x[np.flatnonzero(np.diff(np.sign(beside)))[0]] ** 2
     expected = {0.98 * critical: 0, (critical + supported) / 2: 1, 1.02 * supported: 2}
     if tension > 1e3:
-        del expected[(critical + supported) / 2]  # the two are one
+        del expected[(critical + supported) / 2]  # here both coincide
     for model in ("planar", "spatial"):
         for force, modes in expected.items():
             load = cf.Force(column.end, (0, 0, -force))
@@ -117,7 +120,7 @@ def test_a_column_between_taut_wires(tension):
 @pytest.mark.serial
 @pytest.mark.parametrize("model, elements", [("determinate", 16), ("planar", 16), ("planar", 256), ("spatial", 16)])
 def test_a_steel_wire_with_a_small_force_across(model, elements):
-    """2 mm, 100 m, 500 N at its end and 1 N across: the path starts slack."""
+    """2 mm, 100 m, 500 N at its end and 1 N transverse: the path starts without tension."""
     wire = cf.Rod(cf.Line((0, 0, 0), (0, 0, 100.0)), cf.Circle(0.002), STEEL, name="wire")
     scene = cf.Scene([wire], [cf.Clamp(wire.start)], [cf.Force(wire.end, (1.0, 0, 500.0))])
     path = cf.solve(scene, [1.0], model=model, elements=elements)
@@ -130,8 +133,8 @@ def test_a_steel_wire_with_a_small_force_across(model, elements):
 @pytest.mark.serial
 @pytest.mark.parametrize("slenderness", [1e4, 3e4])
 def test_a_taut_wire_with_a_force_at_mid_span(slenderness):
-    """Drawn by a strain of 1e-3 between two clamps, then 1 N across: the deflection of a beam under tension, with the
-    strain and what the sag adds to it."""
+    """Strained by 1e-3 between two clamps, then loaded by 1 N: the deflection of
+    a beam under tension, including the strain due to the sag."""
     L = 0.002 * slenderness
     wire = cf.Rod(cf.Line((0, 0, 0), (L, 0, 0)), cf.Circle(0.002), STEEL, name="wire")
     ends = [cf.Clamp(wire.start), cf.Prescribed(wire.end, displacement=(1e-3 * L, 0, 0), rotation=(0, 0, 0))]
@@ -148,8 +151,8 @@ def test_a_taut_wire_with_a_force_at_mid_span(slenderness):
 @pytest.mark.parametrize("diameter", [0.005, 0.001])
 @pytest.mark.parametrize("held", ["hinged", "clamped"])
 def test_a_wire_that_hangs_as_an_arc(diameter, held):
-    """110 m between two points 100 m apart, at rest an arc of a circle, under its weight next to a catenary. On the first
-    mesh the thin one seems to buckle out of its plane."""
+    """110 m between two points 100 m apart, a circular arc in the reference, close to a catenary under its weight. On
+    the first mesh the thin one seems to buckle out of its plane."""
     angle = 1.0
     for _ in range(100):  # sin(a/2)/(a/2) = 100/110
         angle = 2 * np.sin(angle / 2) * 1.1
@@ -162,7 +165,7 @@ def test_a_wire_that_hangs_as_an_arc(diameter, held):
     path = cf.solve(cf.Scene([wire], [hold(wire.start), hold(wire.end)], [cf.Weight()]), [1.0], tol=1e-3)
     assert path.model == "planar" and path.stable.all()
     c = 50.0
-    for _ in range(200):  # of the catenary: 2 c sinh(50/c) = 110
+    for _ in range(200):  # parameter c of the catenary: 2 c sinh(50/c) = 110
         c = 50.0 / np.arcsinh(55.0 / c)
     sag = c * (np.cosh(50.0 / c) - 1)
     drop = path.position(wire.at(55.0))[0, 2] - path.position(wire.start)[0, 2]

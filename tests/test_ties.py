@@ -1,4 +1,4 @@
-"""The equations of supports and joints against their own differences: Newton's tangent is exact."""
+"""Derivatives of the constraint equations of supports and joints against finite differences."""
 
 import numpy as np
 import pytest
@@ -35,7 +35,8 @@ def test_gradient_and_tangent(which):
     rq = np.hstack([rng.normal(size=(3, 3)), q / np.linalg.norm(q, axis=1, keepdims=True)])
     ties = [
         PositionTie(0, 1, vector(), 0.3), PositionTie(0, None, vector(), 0.7), AngleTie(0, 1, vector(), vector()),
-        AngleTie(2, None, vector(), vector()), TurnTie(2, None, vector(), vector()), TurnTie(0, None, vector(), (0, 0, 0)),
+        AngleTie(2, None, vector(), vector()), TurnTie(2, None, vector(), vector()),
+        TurnTie(0, None, vector(), (0, 0, 0)),
         AngleTie(1, 2, vector(), vector()),
     ]  # fmt: skip
     known, multipliers = Ties(ties, NODES, rng.normal(size=(3, 3)), 2.0), rng.normal(size=len(which))

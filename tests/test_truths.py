@@ -1,4 +1,5 @@
-"""The tests' own truths against closed forms, published numbers and the energy: bvp.py and random_scenes.py."""
+"""The reference solutions of the tests (bvp.py, random_scenes.py)
+against closed forms, published numbers and the energy."""
 
 import json
 import sys
@@ -60,7 +61,8 @@ def test_straight_rods_are_those_of_the_other_truth():
 
 
 def test_line_moments_and_stiffness_that_varies():
-    """A torque per length on GJ = 1/(1 + s), and a pull on EA = 40/(1 + 3 s): twist and stretch in closed form."""
+    """A torque per length with GJ = 1/(1 + s), and a tension with EA =
+    40/(1 + 3 s): twist and stretch in closed form."""
 
     def J(s):
         return np.array([1 + 0 * s, 2 + 0 * s, 1 / (1 + s)]).T
@@ -101,7 +103,8 @@ def test_negative_modes_begin_at_the_critical_loads(J, critical, modes, shape):
 
 
 def energy(problem, x, q, first):
-    """Energy of rotations q(x) (n, 4), r eliminated, by trapezoids of central differences: no strong form in it."""
+    """Energy of rotations q(x) (n, 4), r eliminated, by central
+    differences and the trapezoidal rule, without the strong form."""
     T = bvp.matrix(q.T) @ first
     h = (x[1] - x[0]) * problem.length
 

@@ -1,5 +1,4 @@
-"""Wires that are drawn straight and hang under their weight: very soft across, under loads that are large multiples of
-EI/L^2."""
+"""Taut wires under their weight: very soft in bending, under loads that are large multiples of EI/L^2."""
 
 import numpy as np
 import pytest
@@ -14,7 +13,7 @@ STEEL = cf.Material(E=210e9, nu=0.3, density=7850.0)
 
 
 def wire(diameter, move, length=110.0):
-    """A steel wire whose ends are moved towards each other under its weight."""
+    """A steel wire under its weight, whose end is moved towards its start by `move`, m."""
     rod = cf.Rod(cf.Line((0, 0, 0), (length, 0, 0)), cf.Circle(diameter), STEEL)
     supports = [cf.Hinge(rod.start, (0, 1, 0)), cf.Prescribed(rod.end, displacement=(-move, 0, 0))]
     return rod, cf.Scene([rod], supports, [cf.Weight()])
@@ -22,7 +21,7 @@ def wire(diameter, move, length=110.0):
 
 @pytest.mark.parametrize(("diameter", "move"), [(0.005, 10.0), (0.005, 1.0), (0.001, 10.0)])
 def test_a_wire_drawn_straight(diameter, move):
-    """Its sag is that of an elastic catenary but for EI, with the default steps."""
+    """Its sag is that of an elastic catenary, up to the effect of EI, with the default steps."""
     rod, scene = wire(diameter, move)
     path = cf.solve(scene, [1.0], tol=1e-5)
     w, EA = 9.81 * rod.stiffness.mass, rod.stiffness.axial
@@ -34,7 +33,7 @@ def test_a_wire_drawn_straight(diameter, move):
 
 @pytest.mark.parametrize("control", ["load", "arc"])
 def test_what_is_advised_helps(control):
-    """Where a first step must be shorter than is allowed; and nobody doubts the units of a cable."""
+    """The first step must be smaller than allowed; and there is no warning about the units."""
     _, scene = wire(0.005, 10.0)
     steps = cf.StepControl(smallest=0.5)
     with pytest.raises(cf.NotConverged) as refused:
@@ -44,9 +43,7 @@ def test_what_is_advised_helps(control):
         assert "Try control='auto'" in str(refused.value)
         return
     assert "by steps=StepControl(smallest=0.0005)" in str(refused.value)
-    path = cf.solve(
-        scene, [1.0], model="spatial", elements=16, steps=cf.StepControl(smallest=0.0005), control=control
-    )
+    path = cf.solve(scene, [1.0], model="spatial", elements=16, steps=cf.StepControl(smallest=0.0005), control=control)
     assert path.stable.all()
 
 

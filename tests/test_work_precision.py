@@ -1,4 +1,5 @@
-"""Speed against accuracy: the machinery, this package's own accuracy, and whichever peers are installed already."""
+"""The measurement of speed against accuracy: its programs, this
+package's accuracy, and the peers that are installed."""
 
 import json
 import sys
@@ -17,7 +18,7 @@ def demos_on_the_path(monkeypatch):
 
 
 def test_quick(tmp_path, capsys):
-    """Every own answer is as accurate as its degree allows; every peer answers, or is told of with a reason."""
+    """This package's results are as accurate as their degree allows; every peer gives a result or a reason why not."""
     import work_precision
     from peers.configurations import PEERS
     from peers.environments import OWN
@@ -45,7 +46,7 @@ def test_quick(tmp_path, capsys):
 
 
 def test_quick_motion(tmp_path, capsys):
-    """Every scheme comes as near to the truths as its step allows; Exudyn takes part where it is installed."""
+    """Every scheme is as accurate as its step allows; Exudyn is included if installed."""
     import work_precision_motion
     from peers.environments import OWN
 
@@ -65,7 +66,7 @@ def test_quick_motion(tmp_path, capsys):
 
 
 def test_broken_off_run_goes_on(tmp_path, monkeypatch):
-    """Samples are kept, those of other sources forgotten; an interruption says how to go on."""
+    """Samples are kept, unless sources have changed; an interruption prints how to continue."""
     import work_precision
     from peers.environments import OWN
 
@@ -100,7 +101,7 @@ def _after(count, sample):
 
 
 def test_truths_belong_to_their_models():
-    """The 45-degree bend of section 2 of the references' list, the paper's column, and what shear adds."""
+    """References for the 45-degree bend and the paper's column, with and without shear."""
     from peers import problems
 
     rest = 100 * np.array([np.sin(np.pi / 4), 1 - np.cos(np.pi / 4), 0])
@@ -138,7 +139,7 @@ def test_a_missing_peer_is_named(tmp_path, monkeypatch):
 
 
 def test_time_at_an_accuracy():
-    """The cheapest that is good enough, not the nearest; the frontier drops what is beaten in both."""
+    """The cheapest result that is accurate enough is taken; the frontier has no result that another beats in both."""
     from work_precision_chart import frontier
     from work_precision_table import cheapest
 

@@ -1,7 +1,7 @@
-"""A truth for cables and taut wires in a plane: the strong form of one rod held at both ends, by scipy's solve_bvp.
+"""A reference for cables and taut wires in a plane: the strong form of one rod held at both ends, by scipy's solve_bvp.
 
-Shares nothing with the package. Collocation on a mesh that is graded towards the ends and the load, since shooting is
-hopeless where boundary layers of length sqrt(EI/T) are a small part of the rod.
+Independent of the package. Collocation on a mesh that is graded towards the ends and the load, since shooting fails
+where boundary layers of length sqrt(EI/T) are a small part of the rod.
 """
 
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ from scipy.optimize import brentq
 
 @dataclass(frozen=True)
 class Wire:
-    """SI units. Held at the ends of a straight rod or of an arc whose two ends lie on a level, in the x-z plane.
+    """SI units. A straight rod along x, or an arc with both ends at one height, held at both ends, in the x-z plane.
 
     Attributes:
         length, EI, EA, GA: of the wire.
@@ -42,8 +42,8 @@ class Wire:
         """A function from arc lengths (n,) to positions (2, n) from the start.
 
         Args:
-            tension: N, about what it bears, for the units and the first guess.
-            tol: of solve_bvp's residuals; with 1e-7 positions are right to about 1e-9 of the length.
+            tension: its approximate tension, N, for the units and the initial guess.
+            tol: of solve_bvp's residuals; with 1e-7 the error of positions is about 1e-9 of the length.
         """
         half, unit = self.length / 2, tension
         layer = np.sqrt(self.EI / unit) / half
@@ -70,7 +70,7 @@ class Wire:
         near = np.concatenate([[0], np.geomspace(min(layer / 20, 0.01), 0.5, 150)])
         s = np.concatenate([near, 1 - near[-2::-1]])
         y = np.zeros((12, len(s)))
-        for first in (0, 6):  # a parabola, and what a load at mid-span adds
+        for first in (0, 6):  # a parabola, and the effect of a load at mid-span
             x = (s + first / 6) * half
             rise = self.load * np.minimum(x, self.length - x) / 2 - self.weight * x * (self.length - x) / 2
             y[first] = x / half * (self.span + self.stretch) / self.length
@@ -90,10 +90,10 @@ class Wire:
 
 
 def natural_frequency(length, EI, EA, GA, mass, inertia, strain, k=1, clamped=True):
-    """k-th angular frequency, rad/s, of a straight rod that is stretched between its held ends and vibrates.
+    """k-th angular frequency, rad/s, of a straight rod that is stretched between its supported ends.
 
-    Of the linearised equations of a rod with shear and rotary inertia, whose coefficients are constant: their four
-    exponential solutions at a frequency, those that grow scaled at the far end, and the zeros of a determinant.
+    A zero of the determinant of the boundary conditions, from the four exponential solutions of the linearised
+    equations with shear and rotary inertia; growing solutions are scaled at the far end.
     """
     N = EA * strain
     low = np.pi * k / length * np.sqrt(N / mass)

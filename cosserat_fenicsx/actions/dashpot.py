@@ -12,7 +12,7 @@ from cosserat_fenicsx.scene.rod import Station
 
 @dataclass(frozen=True)
 class Dashpot(Directed, PointAction):
-    """A linear dashpot between a station and the ground: the force -b v and the moment -d omega. None at rest.
+    """A linear dashpot between a station and the ground: the force -b v and the moment -d omega, zero in statics.
 
     The energy it dissipates is counted as work of the loads in the energy balance of a motion. It is not multiplied by
     the load factor.

@@ -1,4 +1,4 @@
-"""What springs, dashpots, drag and foundations share: coefficients from 0 on, and a direction or none."""
+"""Shared by springs, dashpots, drag and foundations: checked coefficients, and an optional direction."""
 
 import numpy as np
 
@@ -7,12 +7,12 @@ from cosserat_fenicsx.scene.action import vector
 
 
 def store_coefficients(action, units, expected):
-    """Check and store the coefficients of an action, numbers from 0 on of which one at least is not 0.
+    """Check and store the coefficients of an action: numbers from 0 on, at least one of them not 0.
 
     Args:
         action: the action, a frozen dataclass.
         units: {field: unit}.
-        expected: what the message says where all are 0.
+        expected: end of the message if all are 0.
 
     Raises:
         SceneError: a negative or infinite coefficient, or all are 0.

@@ -18,8 +18,10 @@ _STILL = 1e-12
 
 @dataclass(frozen=True)
 class Drag(Load, LineAction):
-    """Quadratic drag per unit of reference length, from the velocity w relative to a fluid: -c_n |w_n| w_n - c_t |w_t|
-    w_t, with w_t along the tangent and w_n across it (Morison's equation, independence principle).
+    """Quadratic drag of a fluid per unit of reference length: -c_n |w_n| w_n - c_t |w_t| w_t.
+
+    w is the velocity of the rod relative to the fluid, w_t its part along the tangent and w_n that across it (Morison's
+    equation, independence principle).
 
     In a current it also acts on a rod at rest. Like a load it is multiplied by the load factor, unless it is
     `permanent`. The energy it dissipates is counted as work of the loads in the energy balance of a motion.

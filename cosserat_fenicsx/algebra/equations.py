@@ -1,4 +1,4 @@
-"""What an equilibrium and a time step have in common: unknowns in PETSc's vectors, constraint equations, assembly."""
+"""Base class of equilibrium and time step problems: unknowns in PETSc vectors, constraint equations, assembly."""
 
 import numpy as np
 

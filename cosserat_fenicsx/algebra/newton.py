@@ -155,10 +155,10 @@ class Newton:
 
         With the ratio c of the last two steps the error is step * c/(1 - c) for linear convergence. Where convergence
         is quadratic the next ratio is c^2 or less; the estimate is then multiplied by min(1, 100 c), with a margin.
-        Slender rods with a contact force of their own are denied that factor: rounding makes their tangent inexact for
-        motions of low stiffness. Where n follows from the motion alone, Newton steps alternate between bending and the
-        correction of the stretch that this causes; c is then the ratio of successive pairs of steps, because one small
-        step does not imply convergence.
+        That factor is not used for slender rods whose contact force is carried or unknown: rounding makes their tangent
+        inexact for motions of low stiffness. Where n follows from the motion alone, Newton steps alternate between
+        bending and the correction of the stretch that this causes; c is then the ratio of successive pairs of steps,
+        because one small step does not imply convergence.
         """
         model = self.problem.model
         period = 1 if model.carries_force else 2

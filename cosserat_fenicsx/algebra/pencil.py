@@ -8,7 +8,7 @@ from cosserat_fenicsx.algebra import eigen, linear
 from cosserat_fenicsx.errors import NotConverged
 from cosserat_fenicsx.interrupts import interruptible, obey
 
-# Eigenvalues below this fraction of the shift are not resolved: the solver returns mixtures of their vectors.
+# Eigenvalues below this fraction of the shift are not resolved: the solver returns combinations of their vectors.
 _BLURRED = 1e-5
 # Values of x^T K x below this times a bound on their rounding error count as zero; errors reach a fifth of it.
 _SAFETY = 2.0
@@ -39,7 +39,7 @@ class Pencil:
         self._L = M.copy()
         self._L.data = np.linalg.cholesky(M.data)
         self.size = K.shape[0]
-        #: how many eigenvalues there are
+        #: number of eigenvalues
         self.count = self.size - len(held)
 
     def lowest(self, count):

@@ -25,7 +25,7 @@ class TieRows:
     def __init__(self, model, numbering):
         self.model, self.numbering = model, numbering
         self.rows = model.rows_of_tied.astype(PETSc.IntType)
-        # unlike a matrix, a vector takes -1 for the place before its first number
+        # PETSc skips rows numbered -1 in a matrix, but in a vector it would write in front of the array
         self._free = np.flatnonzero(self.rows >= 0)
         self._free_rows = self.rows.ravel()[self._free]
         self._here = numbering.comm.rank == numbering.comm.size - 1
@@ -34,7 +34,7 @@ class TieRows:
         self._which = np.array(self._added, dtype=np.intp)
         place = {vertex: i for i, vertex in enumerate(links.tied)}
         stations = np.array([(place[a], place.get(b, -1)) for _, a, b in links.ties]).reshape(-1, 2)
-        # of every added equation its row and its two stations among the gradients, and the sign of its reaction
+        # for every added equation: its row and its two stations in the gradients, and the sign of its reaction
         rows, ends = np.arange(len(self._added))[:, None], stations[self._which]
         self._exerted = rows, ends, np.where(ends >= 0, -1.0, 0.0)
         count = numbering.multipliers
@@ -79,7 +79,7 @@ class TieRows:
         return comm.bcast(self.seen[1] if self._here else None, root=comm.size - 1)
 
     def forces(self, eta):
-        """See `Equations.tie_forces`: where the state was last seen."""
+        """See `Equations.tie_forces`; at the state of the last call of `see`."""
         comm, found = self.numbering.comm, None
         if self._here:
             found, (rows, ends, signs) = np.zeros((len(self._all), 2, 6)), self._exerted

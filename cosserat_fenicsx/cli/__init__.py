@@ -1,1 +1,1 @@
-"""What a person does and sees at the command line."""
+"""The command line."""

@@ -47,9 +47,7 @@ def deliver(computed, options, moving):
         if out is not None:
             film = options.animate if code != INTERRUPTED else None  # a film would take long after an interruption
             if code == INTERRUPTED:
-                say(
-                    "cosserat: interrupted; writing the partial result, Ctrl-C again skips what is not written yet"
-                )
+                say("cosserat: interrupted; writing the partial result, Ctrl-C again skips what is not written yet")
             try:
                 look = {"magnify": options.magnify, "shown": _shown(path, at), "film": film, "speed": options.speed}
                 _write(path, out, station, picture=not options.no_picture, **look)

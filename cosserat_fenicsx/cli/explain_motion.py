@@ -81,7 +81,7 @@ def _start(scene, start, load_factor):
     moving = ", ".join(velocity.rod.name for velocity in scene.velocities)
     velocities = f" with the initial velocity given for {moving}" if moving else ", at rest"
     if start is None:
-        factor = "" if load_factor in (None, 1) else f" Loads and prescribed motions are taken {load_factor:g} times."
+        factor = "" if load_factor in (None, 1) else f" Loads and prescribed motions are multiplied by {load_factor:g}."
         return f"Start: the reference, free of stress{velocities}.{factor}"
     loads = ", ".join(describe(x) for x in before(scene).loads) or "prescribed motions"
     as_they_are = "as they are just before t = 0" if scene.moving else "constant"

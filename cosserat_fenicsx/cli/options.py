@@ -66,9 +66,7 @@ def _outputs(parser):
         "and energy.png; without it only the table is shown",
     )
     parser.add_argument("--no-picture", action="store_true", help="write no pictures")
-    parser.add_argument(
-        "--magnify", type=float, default=1.0, help="pictures: factor on displacements [1]"
-    )
+    parser.add_argument("--magnify", type=float, default=1.0, help="pictures: factor on displacements [1]")
     parser.add_argument(
         "--station",
         metavar="ROD@S",

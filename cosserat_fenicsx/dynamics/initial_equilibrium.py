@@ -16,8 +16,7 @@ _BEFORE = -sys.float_info.min
 def before(scene):
     """The scene just before its motion: functions of time evaluated just before t = 0, without initial velocities.
 
-    A `Step`, `Ramp` or `Sine` that starts at 0 does not act yet; one that ends at 0 still acts, and is released at t =
-    0.
+    A `Step`, `Ramp` or `Sine` that starts at 0 does not act yet; one that ends at 0 still acts, and is released at 0.
     """
     supports, loads = ([at(item, _BEFORE) for item in items] for items in (scene.supports, scene.loads))
     return Scene(scene.rods, supports, loads, scene.joints, scene.title)

@@ -9,9 +9,9 @@ Two conditions limit the step:
 - Within the step the function differs from the straight line between its ends by a small share of its range at most. A
   sine then gets at least ten steps a period.
 - The impulse of a load by the rule of the scheme (its value at mid-step, or at the ends) must be accurate. For a smooth
-  load f the accumulated error is h^2/24 times the change of f' (mid-step), or h^2/12 times it (ends), by Euler &
-  Maclaurin. This error of the velocity grows to one of the displacement until the end of the motion or, of clamped
-  rods, for as long as half a swing of the slowest mode takes.
+  load f the accumulated error is h^2/24 (mid-step) or h^2/12 (ends) times the change of f', by the Euler-Maclaurin
+  formula. This error of the velocity causes an error of the displacement that grows until the end of the motion or, if
+  the rods are clamped, for half a period of the slowest mode.
 """
 
 import math
@@ -39,7 +39,7 @@ _SHARE = 0.5
 _DECAY, _SUDDEN_DROP = 0.99, 1e-3
 # Number of fixed steps that are tested, and the share of dt below which the longest resolving step causes a warning.
 _TESTED_STEPS, _WARNING_SHARE = 200, 0.85
-# Multiples of the golden ratio modulo 1 fill an interval evenly without a common spacing.
+# Multiples of the golden ratio modulo 1 are evenly distributed in [0, 1] without a common spacing.
 _GOLDEN = (math.sqrt(5) - 1) / 2
 
 
@@ -112,7 +112,7 @@ class _SampledSignal:
 
     Args:
         signal: a `Signal`.
-        acceleration: m/s^2 per unit of the load, the largest that it gives its rod; None of a prescribed motion.
+        acceleration: the largest that it gives its rod, m/s^2 per unit of the load; None for a prescribed motion.
         persistence: how long a velocity that it gives persists, s; duration: s.
         allowed: displacement that errors of its impulse may cause, m.
 
@@ -179,8 +179,8 @@ class _SampledSignal:
 
 
 def _largest_acceleration(scene, item, field):
-    """m/s^2 per unit of a load, at the end of a free rigid rod that it acts on, the lightest; None of a prescribed
-    motion."""
+    """The largest acceleration that a load gives the end of a rod that it acts on, taken as free and rigid, m/s^2 per
+    unit of the load; None for a prescribed motion."""
     if not hasattr(item, "data"):  # a prescribed motion
         return None
     turns = getattr(item, field).unit.startswith("N m")

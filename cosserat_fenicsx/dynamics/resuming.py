@@ -72,7 +72,7 @@ def _check_plane(kept, scene, until):
         return
     before, (after, why) = scene.over(kept.asked["duration"]).plane, scene.over(until).flatness
     if after is not None and not np.allclose(after.axes[2], before.axes[2], rtol=0, atol=1e-9):
-        why = f"{after.words} is then the one that everything keeps to"
+        why = f"the scene moves in {after.words}"
     if why:
         raise SceneError(
             f"resume.duration = {until:g}: {kept.place} was computed in {before.words}, and until then {why}: expected "

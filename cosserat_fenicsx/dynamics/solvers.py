@@ -43,7 +43,7 @@ def chosen_model(scene, model, scheme, start=None):
     if plane is not None and not flat:
         plane, reason = None, f"the scheme '{scheme}' has no planar model"
     if plane is not None:
-        return "planar", f"everything keeps to {plane.words}"
+        return "planar", f"the whole scene moves in {plane.words}"
     if model == "planar":
         raise SceneError(f"model = 'planar': {reason}; expected 'spatial' or 'auto'")
     return "spatial", reason

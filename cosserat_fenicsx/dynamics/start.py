@@ -98,7 +98,7 @@ def _of_path(model, path, k):
     for rod, x in zip(scene.rods, model.layout.node_s(model.nodes), strict=True):
         if rod not in path.scene.rods:
             raise SceneError(
-                f"simulate.start: the path knows no rod '{rod.name}': expected one with the rods of the scene"
+                f"simulate.start: the path has no rod '{rod.name}': expected one with the rods of the scene"
             )
         moved = path.motion(rod, x, [path[k]])[0]
         r = rod.curve.position(x * rod.length) - scene.origin(rod) + moved[:, :3] * path.scales.length

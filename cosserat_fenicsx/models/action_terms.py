@@ -83,7 +83,7 @@ class Term:
         weight: Function: 1 where distributed actions act; 2 over the element length at the station of a point action,
             because the end-point rule gives each end half that length; 0 elsewhere.
         data, memory: Functions of the data, and of the memory (history variables).
-        moves: whether something in it depends on time.
+        moves: whether any of its data depend on time.
     """
 
     def __init__(self, rods, signature, nodes, kind):
@@ -185,7 +185,7 @@ class Term:
     def put(self, t):
         """Fill in the data at the time t, s."""
         for action, rod, rows, s, _ in self._where:
-            now = at(action, t)  # on all ranks: a user's function of time may call what communicates
+            now = at(action, t)  # on all ranks, since a user's function of time may communicate
             if len(rows):
                 self._take(now.data(rod, s), rod, rows)
 
@@ -202,7 +202,7 @@ class Term:
         return value @ model.axes.T if datum.size == 3 else value
 
     def _interpolated(self, nodal):
-        """(local elements, points of one, k) interpolated from nodal values (local nodes, k)."""
+        """(local elements, points per element, k) interpolated from nodal values (local nodes, k)."""
         model = self._model
         basis = model.rule.basis(self._dof_places)[:, model.node_order]
         return np.einsum("qj,cji->cqi", basis, nodal[model.cell_nodes])

@@ -33,11 +33,11 @@ class RodModel:
     Attributes:
         state: Function of the unknowns (nodal ones, and those that the formulation adds), clamped nodes included.
         before, step: the state before a Newton step and the step, for `advance`.
-        carried: Functions updated after each Newton step beside the unknowns: n at the Gauss points, or ().
+        carried: Functions updated after each Newton step together with the unknowns: n at the Gauss points, or ().
         carries_force: whether n is not a function of the motion alone.
         force_nodes: reference coordinates of the nodes of n, where n is an unknown.
         load_factor: the Constant eta; permanent_factor: that of permanent loads, 1 except while they are applied.
-        actions: the `ActionTerms`, the data of what acts on the rods; densities: their `Densities`.
+        actions: the `ActionTerms` with the data of all actions; densities: their `Densities`.
         forms: the `CompiledForms`.
         numbering: the solver's unknowns.
         second_variations: the `SecondVariation`s, whose numbers of negative eigenvalues add up; with the axes of the
@@ -61,7 +61,7 @@ class RodModel:
     frame_size, strain_size, force_size = 9, 3, 3
     #: components of a node in each second variation, and whether these leave the plane.
     variations = ()
-    #: whether the rows that reactions work in change with a node's unknowns
+    #: whether the map from reactions to a node's residual rows depends on the node's unknowns
     rows_turn = False
     tangent = "general"
     load_norm = 0.0
@@ -114,7 +114,7 @@ class RodModel:
         raise NotImplementedError
 
     def held_forces(self, forces):
-        """What of forces and moments (.., 6), inertial, the equations of the model speak of."""
+        """Forces and moments (.., 6), inertial, with zero for components that the model's equations do not contain."""
         return forces
 
     def unknowns_of(self, rq):
@@ -280,7 +280,7 @@ class RodModel:
             function.x.array[:] = 0
 
     def _round_off(self, sizes):
-        """|F| cannot fall below its own rounding: strains are differences of r over a node's spacing."""
+        """Bound on the rounding error of |F|: strains are differences of r over the spacing of the nodes."""
         stiffest = self.section.K[np.isfinite(self.section.K)].max(initial=0.0)
         return 4 * np.finfo(float).eps * stiffest * self.signature.degree / sizes.min() * np.sqrt(self.unknowns)
 

@@ -46,7 +46,7 @@ def choose(scene, *, model="auto", formulation=None, degree=4, points=None, foll
     if model not in MODELS:
         raise SceneError(f"model = {model!r}: {nearest(model, MODELS)}")
     if model == "spatial":
-        return Choice("spatial", ["the spatial model was asked for; it takes any scene"])
+        return Choice("spatial", ["the spatial model was requested; it is valid for any scene"])
     obstacles = {
         name: "arc length and branches are followed in space alone" if follows else
         _obstacle(name, scene, formulation, degree, points)
@@ -55,7 +55,7 @@ def choose(scene, *, model="auto", formulation=None, degree=4, points=None, foll
     if model != "auto":
         if obstacles[model]:
             raise SceneError(f"model = '{model}' is not possible: {obstacles[model]}; expected 'auto' or 'spatial'")
-        return Choice(model, [f"the {model} model was asked for", *_reasons(model, scene)])
+        return Choice(model, [f"the {model} model was requested", *_reasons(model, scene)])
     for name, obstacle in obstacles.items():
         if not obstacle:
             why = _reasons(name, scene)
@@ -63,7 +63,9 @@ def choose(scene, *, model="auto", formulation=None, degree=4, points=None, foll
                 why.append(f"determinate is not possible: {obstacles['determinate']}")
             return Choice(name, why, promoted=True)
     if obstacles["determinate"] == obstacles["planar"]:
-        return Choice("spatial", [f"planar is not possible: {obstacles['planar']}", "the spatial rod takes any scene"])
+        return Choice(
+            "spatial", [f"planar is not possible: {obstacles['planar']}", "the spatial model is valid for any scene"]
+        )
     return Choice("spatial", [*(f"{name} is not possible: {why}" for name, why in obstacles.items())])
 
 
@@ -152,4 +154,3 @@ def _reasons(name, scene):
     clamp = "one clamp" if len(scene.supports) == 1 else f"one clamp on each of {len(scene.supports)} structures"
     known = f"{clamp} and dead loads: statics gives the contact force"
     return [known, where] if plane is None else [where, known]
-

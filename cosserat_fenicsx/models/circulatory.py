@@ -19,8 +19,8 @@ from cosserat_fenicsx.models.spatial import SpatialModel
 
 
 class CirculatoryModel(SpatialModel):
-    """A `SpatialModel` whose only form is h of `_form`, in the place of the second variation; h is None, and nothing is
-    compiled, where the actions have a potential in every state, such as dead forces."""
+    """A `SpatialModel` whose only form is h of `_form`, stored as its second variation. h is None, and nothing is
+    compiled, if the actions have a potential in every state, as dead forces have."""
 
     def _compile(self, spaces):
         return compile_single(self, self._form(*spaces))

@@ -1,5 +1,4 @@
-"""What acts at clamped points, which have no unknowns, so that no equation of the solver tells what they are held
-with."""
+"""Forces and moments at clamped points, from which reactions follow: a clamped point has no equation in the solver."""
 
 import numpy as np
 
@@ -9,8 +8,7 @@ from cosserat_fenicsx.scene.signals import signals_of
 
 
 class Clamps:
-    """The clamped points of a model, in the order of `Connections.clamped`; rods that are joined rigidly there share
-    one.
+    """The clamped points of a model, in the order of `Connections.clamped`. Rods joined rigidly there share one point.
 
     Forces and moments are inertial and dimensionless.
 
@@ -26,7 +24,7 @@ class Clamps:
         self._find_elements()
 
     def _find_elements(self):
-        """The elements of this rank that end at clamped points: their local numbers, which end, and which point."""
+        """Find this rank's elements at clamped points: their local numbers, the end (0 or 1) and the point of each."""
         model, found = self._model, []
         rods, counts = model.rods, model.signature.counts
         first = np.concatenate([[0], np.cumsum(counts)])
@@ -38,7 +36,7 @@ class Clamps:
         self._cells, self._ends, self._of_point = np.array(found, dtype=np.int32).reshape(-1, 3).T.copy()
 
     def load(self):
-        """Take the model's scene."""
+        """Take the data of the model's scene."""
         scene, layout = self._model.scene, self._model.layout
         here = [(x, layout.vertex(scene, x.station)) for x in scene.actions if x.station is not None]
         here = [(action, self._points[vertex]) for action, vertex in here if vertex in self._points]
@@ -65,7 +63,7 @@ class Clamps:
         return total
 
     def of_step(self):
-        """(points, 6) force and moment that the stress of a step and what acts along rods are held with, see
+        """(points, 6) force and moment that balance the stress of a step and the actions along rods, see
         `moving_forms.virtual_work_of_step`; on all ranks."""
         model, total = self._model, np.zeros((self.count, 6))
         if self._maps is None:
@@ -75,8 +73,8 @@ class Clamps:
         return model.comm.allreduce(total) if model.comm.size > 1 else total
 
     def _from_expressions(self):
-        """[(expression, matrix)] that `of_step` is made of: from what an expression gives on the elements at clamped
-        points to the forces and moments."""
+        """[(expression, matrix)]: `of_step` is the sum of each matrix times the values of its expression on the
+        elements at clamped points."""
         model, rule = self._model, self._model.rule
         if not len(self._cells):
             return []
@@ -91,8 +89,8 @@ class Clamps:
         return maps
 
     def _map(self, weights, turned):
-        """Weights (elements, points, parts) of numbers (elements, points, parts, force or moment, 3) along the model's
-        axes as a matrix to (points, 6), inertial."""
+        """The matrix to (clamped points, 6), inertial, from values (elements, points, parts, force or moment, 3) along
+        the model's axes, which are summed with weights (elements, points, parts)."""
         weights[turned] = weights[turned][:, ::-1]
         to_point = self._of_point == np.arange(self.count)[:, None]
         axes = self._model.axes.T

@@ -16,14 +16,15 @@ _STRAINS = 6
 class Collocated:
     """Mixin that adds accelerations to a moving model; it must come first among the bases.
 
-    The increments D of a step are those of the nodes and of the strains at the Gauss points. The scheme is a matrix
-    that gives the rates (v, a, s) at the end of the step, velocities, accelerations and the scheme's auxiliary rate,
-    from D and the rates at its beginning. Strain rates follow by the same rule from strain increments, so that rigid
-    motions are not damped.
+    D are the increments of the nodes' motion over a step. The scheme is a matrix that gives the rates (v, a, s) at the
+    end of the step from D and the rates at its beginning: velocities, accelerations and the scheme's auxiliary rate.
+    The same matrix gives strain rates from the increments of the strains at the Gauss points, so that rigid motions are
+    not damped.
 
     Attributes:
         by_velocity, by_acceleration: Constants, the factors of D in v and a.
-        known_velocity, known_acceleration, known_strain_rate: Functions, the parts of the rates that are known.
+        known_velocity, known_acceleration, known_strain_rate: Functions, the parts of the rates that do not depend on
+            the increments.
     """
 
     #: components of a node's velocity
@@ -59,11 +60,11 @@ class Collocated:
 
     @property
     def known(self):
-        """The Functions that change from step to step beside the state."""
+        """The Functions, other than the state, that change from step to step."""
         return self.known_velocity, self.known_acceleration, self.known_strain_rate
 
     def begin_rates(self):
-        """Initialise strain rates from the state and its velocity; accelerations are not known yet, and zero."""
+        """Set the strain rates from the state and its velocity; accelerations are set to zero until they are known."""
         self._node_rates[:] = self._strain_rates[:] = 0.0
         self.follow_velocities()
 
@@ -96,7 +97,7 @@ class Collocated:
             self._strain_rates[:] = self._ahead @ (self._at_gauss(self._strain_change), *self._strain_rates)
 
     def take_accelerations(self):
-        """Use only the accelerations of the step, as the initial accelerations at its beginning."""
+        """Set the initial accelerations to those of the step just solved; everything else of it is discarded."""
         a, s = self._node_rates
         rates = self._ahead[1] @ (self._increments(), self._velocities(), a, s)
         if self.damped:

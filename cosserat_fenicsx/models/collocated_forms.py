@@ -78,7 +78,7 @@ def compile_collocated(step):
 
     def end_point(place, rest, frame):
         w, w0, known = step.nodal, step.nodal0, model.known_velocity
-        if place == "line":  # a rule that may have one point needs aliases (compat.alias)
+        if place == "line":  # at the Gauss points: coefficients of their own, see `compat.alias`
             w, w0, known = step.state, step.start, compat.alias(known)
         return step.point_with(w, model.by_velocity * step.increment(w, w0) + known, rest, frame)
 

@@ -9,6 +9,7 @@ from cosserat_fenicsx.forms.rotation import small_rotation
 from cosserat_fenicsx.models.compiled import action_work, derivative_in, measures
 from cosserat_fenicsx.models.moving_forms import (
     SpatialData,
+    along,
     booked,
     compile_motion,
     parts_of,
@@ -26,9 +27,6 @@ def compile_conserving(model):
     U, U0, V, W = model.state, model.start, model.velocity, model.turning
     nodal, nodal0, rates, turning = named(U), named(U0), named(V), named(W)
     h, section, viscosity, body = model.h, data.section, data.viscosity, data.body
-
-    def along(w):
-        return ufl.grad(w)[:, 0]
 
     def line(w):
         (_, q), (r_s, q_s) = parts_of(w), parts_of(along(w))

@@ -52,6 +52,7 @@ def compile_in_plane(model, displacements, rotations, N, N_permanent):
     phi, trial = ufl.TestFunction(model.space), ufl.TrialFunction(model.space)
     test = about_normal(phi)
     derivative = derivative_in(trial, U, U_node)
+
     def point_at(place, rest, frame):
         theta = (U if place == "line" else U_node)[0]
         return Point(None, None, planar.rotation_matrix(theta), planar.along_normal(theta), rest=rest, frame=frame)

@@ -37,7 +37,7 @@ class Moving:
     inertia_size = 0
 
     def _motion_fields(self):
-        """Make the Functions in forms beside those of a `RodModel`."""
+        """Make the Functions that the forms need in addition to those of a `RodModel`."""
         mesh, points = self.mesh, self.signature.points
         self.start, self.velocity = fem.Function(self.space), fem.Function(self.space)
         self.h = fem.Constant(mesh, np.float64(1))

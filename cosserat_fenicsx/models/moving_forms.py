@@ -32,8 +32,7 @@ class MotionForms(CompiledForms):
         live: virtual work of state-dependent actions at the middle of the step, factors included; or None.
         live_tangent: its derivative, where this is not part of the tangent.
         kinetic, strain: energies of the state; dissipated: energy dissipated in the step.
-        of_step, of_step_at_nodes: see `virtual_work_of_step`, at Gauss's points and at the nodes of an element; or
-            None.
+        of_step, of_step_at_nodes: the two results of `virtual_work_of_step`, compiled, or None.
     """
 
     momentum: object
@@ -86,7 +85,7 @@ class StepForms:
 
     def __init__(self, model):
         self.model, self.dx = model, measures(model)
-        # other rules than Gauss's need aliases where Gauss's has one point (compat.alias)
+        # where the Gauss rule has one point, the other rules need other coefficients (compat.alias)
         named = compat.alias if model.signature.degree == 1 else (lambda function: function)
         self.state, self.start, self.velocity = U, U0, V = model.state, model.start, model.velocity
         self.nodal, self.nodal0, self.rates = nodal, nodal0, _ = named(U), named(U0), named(V)
@@ -124,7 +123,7 @@ class StepForms:
         raise NotImplementedError
 
     def constraint(self):
-        """Terms of the residual beside the balances, or 0."""
+        """Terms of the residual in addition to the balances, or 0."""
         return 0
 
     def fields(self, n, m):
@@ -152,7 +151,7 @@ class StepForms:
 
         Args:
             of_step: see `virtual_work_of_step`.
-            acting: `ActionWork` in the balances; working: that of which the work is computed, at the middle.
+            acting: `ActionWork` in the residual; working: that in the energy balance, at the middle of the step.
         """
         model, dx, section, viscosity, h = self.model, self.dx, self.section, self.viscosity, self.model.h
         residual, tangent = with_live_actions(acting, residual, self.derivative(residual), self.derivative)
@@ -186,14 +185,14 @@ def compile_momentum(step, stress=inertia.averaged_stress):
 
 
 def virtual_work_of_step(model, stress, point_at):
-    """The virtual work per length of a step's stress, less that of what acts along rods, as what multiplies phi_r, phi,
-    phi_r' and phi' in it: UFL (12,), under Gauss's rule. And of what is integrated at the nodes what multiplies phi_r
-    and phi: (6,).
-
-    Each is None where there is nothing of the kind; both are where nothing is clamped, and nobody asks.
+    """Coefficients of the virtual work of a step per unit length: that of the stress minus that of actions along rods.
 
     Args:
-        stress: function of a `VirtualMotion`; point_at: see `action_work`.
+        stress: function from a `VirtualMotion` to the virtual work of the stress; point_at: see `action_work`.
+
+    Returns:
+        UFL (12,), the coefficients of phi_r, phi, phi_r' and phi' at the Gauss points; and (6,), those of phi_r and phi
+        for the actions integrated at the nodes, None without such. (None, None) for a scene without clamps.
     """
     if not model.signature.connections.clamped:
         return None, None
@@ -212,7 +211,7 @@ def virtual_work_of_step(model, stress, point_at):
 
 
 def booked(acting):
-    """The virtual work of state-dependent actions, factors included; or None."""
+    """The virtual work of state-dependent actions with their factors, for the energy balance; or None."""
     return sum(live.factor * live.form for live in acting.live) if acting.live else None
 
 

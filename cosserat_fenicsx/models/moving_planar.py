@@ -17,7 +17,7 @@ _OFF = 1e-9
 
 
 class MovingPlanar(Moving, PlanarModel):
-    """Scenes that move in a plane."""
+    """The planar model with inertia."""
 
     variations = ()
     inertia_size = 1

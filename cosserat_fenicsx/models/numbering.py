@@ -39,7 +39,7 @@ class Numbering:
         own = np.zeros(len(slots), dtype=bool)
         own[:owned] = (free & (lead == slots))[:owned]
         self.nodes = int(own.sum())
-        # PETSc inserts node blocks only where all sizes are multiples of the block: unused multipliers pad the last one
+        # PETSc inserts node blocks only if all sizes are multiples of the block: unused multipliers fill the last one
         self.idle = -multipliers % self.block if self._blocked else 0
         dofs = dofmap.index_map.size_local * dofmap.index_map_bs
         others = np.setdiff1d(np.arange(dofs), node_dofs[:owned].ravel())

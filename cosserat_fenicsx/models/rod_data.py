@@ -10,12 +10,12 @@ from cosserat_fenicsx.checks import refuse
 from cosserat_fenicsx.element import lobatto_weights
 from cosserat_fenicsx.models.laws import LawData, field_values, law_data
 
-# EA and GA are bounded where only the signs of the second variation's eigenvalues matter: with larger values, rounding
-# errors would exceed the eigenvalues of bending of slender rods and of weak modes of thin blades. The bound is in
-# EI/L^2 of each rod, L by `bending_lengths` (see `ContactForce.stiff`). The critical load of a mode with n half waves
-# changes by about (n pi)^2 over the bound relatively; the bound is therefore up to _HIGHER times higher where rounding
-# permits, i.e. up to _ROOM times the bending stiffness about the weak axis times (element length over rod length)^2.
-# Forms raise it with the contact force (`law.stiffness_for`).
+# EA and GA are bounded in the second variation, of which only the signs of the eigenvalues matter: with larger values,
+# rounding errors would exceed the eigenvalues of bending of slender rods and of weak modes of thin blades. The bound is
+# `ContactForce.stiff` times EI/L^2, with L from `bending_lengths`. A bound of B EI/L^2 changes the critical load of a
+# mode with n half waves relatively by about (n pi)^2/B. Therefore it is up to _HIGHER times higher where rounding
+# permits: at most _ROOM times the bending stiffness about the weak axis times (element length over rod length)^2. Forms
+# raise it with the contact force (`law.stiffness_for`).
 _HIGHER, _ROOM = 100.0, 1e10
 
 #: Arrays (elements, points, k) in the scene's order, dimensionless: the fields of `LawData`, frames R_R (3 x 3) and
@@ -73,10 +73,10 @@ def rod_fields(mesh, points, frame, strain, *, coupled):
 
 
 def bending_lengths(data, lengths, counts):
-    """(elements,) length scale of bending of each rod: its length, or that of a radian of its arc if shorter.
+    """(elements,) length scale of bending of each rod: its length, or the length of one radian of its arc if shorter.
 
-    The bending and the shear compliance of a coil of radius R are in proportion to R^2/EI and 1/K, for any length L of
-    its wire: with K = 1e6 EI/L^2 a spring of 40 turns would be 6 % too soft.
+    The compliances of a coil of radius R due to bending and to shear are proportional to R^2/EI and 1/K, whatever the
+    length L of its wire: with K bounded by 1e6 EI/L^2 a spring of 40 turns would be 6 % too soft.
     """
     tangents, scales = np.split(data.R_R[:, :, 2::3], np.cumsum(counts)[:-1]), []
     for length, along in zip(lengths, tangents, strict=True):

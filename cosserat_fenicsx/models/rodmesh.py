@@ -74,7 +74,7 @@ class Layout:
         """The layout whose pieces have short elements at their ends, by repeated halving of the end elements.
 
         Args:
-            longest: for every rod (elements,) how long each may be at the end of a piece, over the rod's length.
+            longest: for every rod (elements,) the largest length of each at the end of a piece, over the rod's length.
         """
 
         def divide(rod, start, end):
@@ -108,7 +108,7 @@ class Layout:
 
     @classmethod
     def _of_pieces(cls, scene, divide):
-        """`divide`: function (index of a rod, start and end of a piece) -> its element ends, including both."""
+        """The layout with the element ends `divide(rod index, start, end)` of every piece, its two ends included."""
         breaks = []
         for i, rod in enumerate(scene.rods):
             pieces = [divide(i, a, b)[:-1] for a, b in itertools.pairwise(_fixed_ends(scene, rod))]

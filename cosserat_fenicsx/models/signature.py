@@ -13,7 +13,7 @@ from cosserat_fenicsx.models.formulations.formulation import Formulation
 from cosserat_fenicsx.models.traits import traits_of, work_of
 from cosserat_fenicsx.scene.signals import at
 
-#: Unknowns of a node, and numbers of a contact force, by the model's name and whether it is that of a plane.
+#: (unknowns of a node, components of the contact force) by the model's name and whether it is planar.
 _SIZES = {
     ("spatial", False): (7, 3),
     ("planar", True): (3, 2),
@@ -85,7 +85,7 @@ class Signature:
 
     @property
     def lives_along_rods(self):
-        """Whether something along rods may depend on the state."""
+        """Whether a distributed action depends on the state."""
         return any(kind.place != "point" and not kind.dead for kind in self.terms)
 
     @property
@@ -116,7 +116,7 @@ TermKind = namedtuple("TermKind", "work place sizes memory scaled evolve refresh
 
 
 def place_actions(scene, layout):
-    """Terms of the actions: [(`TermKind`, [(action, rod index, vertex or None)])], actions of one kind share a term if
+    """Terms of the actions: [(`TermKind`, [(action, rod index, vertex or None)])]. Actions of one kind share a term if
     they act at different places."""
     terms = []
     for action in scene.actions:

@@ -17,7 +17,7 @@ class Ties:
     """The ties of a scene, dimensionless.
 
     Args:
-        ties: the scene's (`cosserat_fenicsx.scene.ties`).
+        ties: those of the scene (`cosserat_fenicsx.scene.ties`).
         nodes: (a, b) of every tie as indices into the tied nodes; b = -1 for the ground.
         reference: (tied nodes, 3) positions at rest.
         length: unit of length, m.

@@ -83,8 +83,8 @@ class _Resultant(namedtuple("_Resultant", "force moment symbols data")):
 
 
 def resultant_at_rest(action, scene, t):
-    """(6,) force (N) and moment (N m), inertial, of an action at its station where this stays as it is in the
-    reference, at the time t (s); with the memory that it begins with."""
+    """(6,) force (N) and moment (N m), inertial, of a point action with its station at rest in the reference, at the
+    time t (s) and with its initial memory."""
     work, rod = work_of(action), action.station.rod
     if work is None:
         return np.zeros(6)
@@ -126,7 +126,7 @@ class _Trials:
     """Numerical tests of a virtual work at random states and with random data.
 
     Args:
-        resultant: a `_Resultant`; kinds: (size, whether a moment) of the data.
+        resultant: a `_Resultant`; kinds: (size, whether an axial vector) of the data.
     """
 
     def __init__(self, resultant, kinds):

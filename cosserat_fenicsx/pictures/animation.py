@@ -50,7 +50,7 @@ def film(history, file, *, fps=FPS, speed=None, magnify=1.0, size=SIZE, progress
     """
     file = check_name(file)
     if len(history) < 2:
-        raise SceneError(f"{file}: the history has no two times to make a film of")
+        raise SceneError(f"{file}: expected a history with at least two times")
     fps = number("animate", "fps", fps, "a number from 1 to 100", lambda x: 1 <= x <= 100)
     positive("animate", "magnify", magnify, "-")
     width, height = _pixels(size)

@@ -21,7 +21,7 @@ def load_pyvista():
     Raises:
         SceneError: pyvista or a system library that it needs is missing.
     """
-    # EGL draws without a screen; VTK would try X first and print warnings.
+    # EGL draws without a screen; without this VTK would try X first and print warnings.
     if not os.environ.get("DISPLAY"):
         os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
     try:

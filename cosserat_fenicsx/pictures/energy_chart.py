@@ -28,7 +28,7 @@ def draw(history, file=None):
         OSError: the file cannot be written.
     """
     if len(history) < 2:
-        raise SceneError("the history has no two times to draw energies between")
+        raise SceneError("chart of energies: expected a history with at least two times")
     if file is None:
         return _figure(history)
     on_first(history.comm, lambda: _save(history, Path(file)))

@@ -151,7 +151,7 @@ def _label(plotter, path, shown, bodies, span):
     _, right, above, _ = view_of(span)
     spread = [np.ptp([bodies[k, rod].line for k in shown], axis=0).max(axis=1) for rod in rods]
     rod = max(range(len(rods)), key=lambda i: (round(spread[i].max() / size, 6), -i))
-    place = len(spread[rod]) - 1 - int(np.argmax(spread[rod][::-1]))  # the last maximum: rather the end than before it
+    place = len(spread[rod]) - 1 - int(np.argmax(spread[rod][::-1]))  # the last one of equal maxima, nearest to the end
     end = 1 if place == len(spread[rod]) - 1 else -1 if place == 0 else 0
     placed = []
     for k in reversed(shown):

@@ -18,9 +18,9 @@ def estimate_error(fine, coarse, before=None):
     """Estimate the error of a path from the same points on the mesh of elements twice as long; sets `fine.error`.
 
     The error is the difference of the positions, at the coarse nodes and half way between them, over an assumed gain in
-    accuracy. The gain of a halving is asymptotically 2^(p + 1) between the nodes, of which only a part is assumed, once
-    it is confirmed:
-    - with the differences `before` of the previous halving: (their ratio to the present ones - 1)/4, within 1 and
+    accuracy. The gain of a halving is asymptotically 2^(p + 1) between the nodes. Only a part of it is assumed, and
+    only where the differences confirm it:
+    - with the differences `before` of the previous halving: (their ratio to the present ones - 1)/4, between 1 and
       2^(p - 1);
     - without: 2^(p - 1) or 2^(p - 3) if the element ends, whose order is 2 p, are much or moderately more accurate than
       the rest, else 1. Splines and sections that are functions of s may reduce the order: for these at most 2^(p - 3).
@@ -29,7 +29,8 @@ def estimate_error(fine, coarse, before=None):
     rotation times the radius of gyration; at least to 1e-9 of the length.
 
     Returns:
-        (n,) the relative differences, `before` of the next halving; and the assumed order of the error in h, 1 to p.
+        (n,) the relative differences, which are `before` in the next halving; and the assumed order of the error in h,
+        1 to p.
     """
     p = fine.degree
     relative, difference, at_ends = _differences(fine, coarse)
@@ -48,8 +49,8 @@ def carry_error(fine, coarse, factor, order, before=None):
     """Set the error of a path from that of the same points on a mesh of elements less than twice as long.
 
     It is the coarser mesh's error reduced by the assumed order, limited to one to two times the Richardson estimate
-    from the difference of the two meshes, since the coarser mesh's error may be overestimated. The order of the
-    Richardson estimate is the observed one less one.
+    from the difference of the two meshes, since the coarser mesh's error may be overestimated. The Richardson estimate
+    uses the observed order minus one.
 
     Args:
         factor: number of elements over that of the coarser mesh.

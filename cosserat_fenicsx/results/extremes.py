@@ -1,4 +1,4 @@
-"""The largest contact forces and moments over a path or a motion, in words too."""
+"""The largest contact forces and moments over a path or a motion, also as text."""
 
 from dataclasses import dataclass
 
@@ -7,16 +7,16 @@ import numpy as np
 from cosserat_fenicsx.quaternions import directors
 from cosserat_fenicsx.results.on_nodes import OnNodes
 
-# Places looked at in an element, for each degree of its polynomials.
+# Sampling intervals of an element, per degree of its polynomials.
 _PLACES = 6
-# Less than this share of what it stands beside is rounding.
+# Relative differences, and values relative to the largest of the same unit, below this are rounding.
 _ROUNDING = 1e-6
 _UNITS = {"bending moment": "N m", "twisting moment": "N m", "shear force": "N", "tension": "N", "compression": "N"}
 
 
 @dataclass(frozen=True)
 class Largest:
-    """The largest of a quantity: its size (N m or N), its station, and the point of the path."""
+    """The largest value of a quantity: its size (N m or N), its station, and the index of the point or time."""
 
     size: float
     station: object
@@ -27,12 +27,15 @@ class Extremes(OnNodes):
     """The largest contact forces and moments of a path or a motion."""
 
     def largest(self):
-        """{quantity: `Largest`} over all points and places of a path or a motion, both sides of a jump and between the
-        nodes; on the mesh there is, which `tol` does not speak of. What is zero everywhere but for rounding is left
-        out.
+        """The largest contact forces and moments over all points of a path (or times of a motion) and all rods.
 
-        With the tangent t = d3: bending |m - (m.t) t|, twisting |m.t|, shear |n - (n.t) t|, tension n.t, compression
-        -n.t.
+        Both sides of jumps are included, and places between the nodes. Values are those of the mesh used: `tol` limits
+        the error of positions only. With t = d_3: bending |m - (m.t) t|, twisting |m.t|, shear |n - (n.t) t|, tension
+        n.t, compression -n.t.
+
+        Returns:
+            {quantity: `Largest`}, the quantities "bending moment", "twisting moment" (N m), "shear force", "tension"
+            and "compression" (N), without those that are zero up to rounding.
         """
         found = dict.fromkeys(_UNITS, Largest(0.0, None, 0))
         inside = np.linspace(0, 1, _PLACES * self.degree + 1)
@@ -59,7 +62,7 @@ class Extremes(OnNodes):
                     -force * axial,
                 )
                 for what, size in zip(_UNITS, sizes, strict=True):
-                    place = int(np.argmax(size >= size.max() - _ROUNDING * abs(size.max())))  # the first of many alike
+                    place = int(np.argmax(size >= size.max() - _ROUNDING * abs(size.max())))  # the first of equal ones
                     if size[place] > (1 + _ROUNDING) * found[what].size:
                         found[what] = Largest(float(size[place]), rod.at(s[place]), k)
         most = {unit: max(x.size for what, x in found.items() if _UNITS[what] == unit) for unit in ("N m", "N")}
@@ -67,11 +70,11 @@ class Extremes(OnNodes):
 
 
 def largest_in_words(path):
-    """`Extremes.largest` as a sentence."""
+    """`Extremes.largest` as a line of text."""
     where = "time" if path.axis == "time" else path.axis
     unit = " s" if path.axis == "time" else ""
     told = [
         f"{what} {x.size:.4g} {_UNITS[what]} ({x.station}, {where} {path.along_axis[x.point]:.4g}{unit})"
         for what, x in path.largest().items()
     ]
-    return f"Largest, on this mesh (tol speaks of positions): {'; '.join(told) or 'no contact force or moment'}."
+    return f"Largest on this mesh (tol limits errors of positions only): {'; '.join(told) or 'no force or moment'}."

@@ -1,4 +1,4 @@
-"""A motion as arrays with named fields, in SI units. Knows no solver; files and pictures are made by other rooms."""
+"""A motion as arrays with named fields, in SI units. Imports no solver; other packages make files and pictures."""
 
 from collections import namedtuple
 from dataclasses import dataclass
@@ -10,15 +10,22 @@ from cosserat_fenicsx.quaternions import directors
 from cosserat_fenicsx.results.records import Record
 from cosserat_fenicsx.results.result import Result
 
-#: Energies so far, J, and momenta, kg m/s and kg m^2/s, inertial, the latter about the inertial origin.
+#: Energies (J), work and dissipation since the start (J), linear and angular momentum (kg m/s, kg m^2/s), inertial, the
+#: latter about the inertial origin.
 Ledger = namedtuple("Ledger", "kinetic strain work dissipated linear_momentum angular_momentum")
 
 
 @dataclass
 class Instant(Record):
-    """A `Record` at a time (s), with velocities and angular velocities of the nodes (N, 6), dimensionless, inertial,
-    the steps taken so far, the `Ledger`, and what every clamped point was held with in the last step (points, 6), less
-    what joints exert there. NaN stands for reactions where no step has led to the state."""
+    """A `Record` at a time (s).
+
+    Attributes:
+        rates: velocities and angular velocities of the nodes (N, 6), dimensionless, inertial.
+        steps: number of steps since the start.
+        ledger: the `Ledger`.
+        clamp_forces: force and moment (points, 6) that held every clamped point in the last step, dimensionless,
+            inertial: those of the clamp and of other supports and joints together; NaN where no step led to the state.
+    """
 
     time: float = 0.0
     rates: np.ndarray = None
@@ -28,20 +35,20 @@ class Instant(Record):
 
 
 class History(Result):
-    """A motion: its states at the saved times, and what became of energy and momenta.
+    """A motion: its states at the saved times, energies and momenta.
 
-    All station queries (`position`, `displacement`, `rotation`, `force`, `moment`, `centreline`, `fields`, ...) give
-    one row a time. Contact force and moment include what damping adds. With the `folder` of `simulate` the states lie
-    in a file and are read from there.
+    All station queries (`position`, `displacement`, `rotation`, `force`, `moment`, ...) give one row per time. Contact
+    forces and moments include those of damping. If `simulate` was given a `folder`, the states are read from a file in
+    it.
 
     Attributes:
         see `Result`;
         times: (n,) s.
         scheme: the scheme's name.
-        steps: (n,) steps taken up to there.
+        steps: (n,) number of steps since the start.
         kinetic, strain: (n,) energies, J.
-        work: (n,) J, what loads and prescribed motions have done since the start.
-        dissipated: (n,) J, what damping has taken since the start.
+        work: (n,) J, work of loads and prescribed motions since the start.
+        dissipated: (n,) J, energy dissipated by damping since the start.
         balance: (n,) J, kinetic + strain - work + dissipated, minus its value at the start; zero for an exact solution.
         linear_momentum: (n, 3) kg m/s; angular_momentum: (n, 3) kg m^2/s about the inertial origin, inertial.
     """
@@ -75,7 +82,7 @@ class History(Result):
 
     @property
     def time_unit(self):
-        """s: what the rates of an `Instant` are made dimensionless with."""
+        """The unit of time of the dimensionless rates of an `Instant`, s."""
         return self._time_unit
 
     @property
@@ -103,11 +110,11 @@ class History(Result):
 
     @property
     def along_axis(self):
-        """(n,) s."""
+        """(n,) the times, s."""
         return self.times
 
     def label(self, k):
-        """What a picture writes beside time k."""
+        """The label of time k in pictures."""
         return f"{self.times[k]:.3g} s"
 
     def fields(self, k, rod=None):
@@ -132,10 +139,10 @@ class History(Result):
         Args:
             file: .gif or .mp4.
             fps: frames per second.
-            speed: seconds of the motion in a second of the film; None for a round number that suits, 1 if possible.
-            magnify: displacements are drawn this many times their size.
+            speed: seconds of the motion per second of the film; None for a suitable round number, 1 if possible.
+            magnify: factor of the displacements in the picture.
             size: (width, height), pixels.
-            progress: True, False, or None for a bar where it takes long.
+            progress: whether to show a progress bar; None: only if it takes long.
         """
         from cosserat_fenicsx.pictures import animation
 
@@ -154,7 +161,7 @@ class History(Result):
     def _at_clamp(self, point, joined):
         return self._stacked("clamp_forces")[:, point]
 
-    # n and m at the nodes are those of the polynomials through the Gauss points
+    # n and m at the nodes are extrapolated by the polynomials through the Gauss points
 
     @property
     def _from_gauss(self):

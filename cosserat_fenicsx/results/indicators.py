@@ -5,19 +5,19 @@ import numpy as np
 from cosserat_fenicsx.quaternions import conjugate_product, directors
 from cosserat_fenicsx.results.accuracy import halfway, sizes_of
 
-# Largest length of an element where a boundary layer may begin, over the length of that layer.
+# Largest length of an element next to a support, load or kink, over the length of the boundary layer there.
 _COARSE = 4.0
 
 
 def layer_lengths(scene, scales, layout, rule, n):
-    """Lengths sqrt(EI/|n|) of boundary layers, over which bending decays beside a support or a load, per element.
+    """Lengths sqrt(EI/|n|) of the boundary layers in which bending decays next to a support or a load.
 
     Args:
-        layout, rule: of the mesh.
+        scales: units of n; layout, rule: of the mesh.
         n: (states, elements, points, 3) contact forces at the Gauss points, dimensionless, all rods one after another.
 
     Returns:
-        For every rod (elements,), over the length of the rod; None where all elements are short compared with these.
+        For every rod (elements,), over the length of the rod; None where all elements are shorter than these.
     """
     force = np.sqrt(3) * np.abs(n).max(initial=0.0) * scales.force
     if all(
@@ -42,7 +42,7 @@ def of_path(path):
 
 
 def unresolved(scene, layout, lengths):
-    """Whether elements at the end of a piece are too long for the boundary layers that may begin there."""
+    """Whether elements at the ends of pieces (see `rodmesh`) are too long for boundary layers there."""
     for breaks, pieces, layers in zip(layout.breaks, layout.pieces(scene), lengths, strict=True):
         sizes = np.diff(breaks)
         at_ends = np.unique([k for piece in pieces for k in (piece.start, piece.stop - 1)])
@@ -62,7 +62,8 @@ def element_differences(fine, coarse):
         fine, coarse: Paths with the same points; every element of `fine` lies within one of `coarse`.
 
     Returns:
-        For every rod (elements of the coarse mesh,): maximum over all points, relative to their largest displacements.
+        For every rod (elements of the coarse mesh,): maximum over all points, relative to the largest displacement of
+        each point.
     """
     sizes = sizes_of(fine).largest
     n = np.array([record.gauss_fields[:, :, :3] for record in coarse])
@@ -89,7 +90,7 @@ def element_differences(fine, coarse):
 
 
 def _deformation(motion, rest):
-    """Relative displacements of the ends of elements, in the frame half way between, and their relative rotations.
+    """Relative displacements of the two ends of elements, in the mean frame of both ends, and their relative rotations.
 
     Args:
         motion: (points, ends, 7) displacements and unit quaternions; rest: (ends, 3) reference positions.

@@ -7,7 +7,7 @@ from cosserat_fenicsx.results.extremes import largest_in_words
 from cosserat_fenicsx.results.reactions import reactions_in_words
 from cosserat_fenicsx.results.tables import as_text, most_displaced, station_columns, write_columns
 
-#: Rows of the table, where more times were saved.
+#: Largest number of rows of the table.
 ROWS = 21
 _ENERGIES = ("kinetic", "strain", "work", "dissipated", "balance")
 
@@ -55,7 +55,7 @@ def motion_table(history, station=None, rows=ROWS):
 
 
 def _named(scene):
-    """The ends of all rods and the stations of supports, loads and joints, each place once."""
+    """The ends of all rods and the stations of supports, loads and joints, without repetitions."""
     places = {}
     for rod in scene.rods:
         for station in (rod.start, *scene.stations(rod), rod.end):

@@ -17,7 +17,7 @@ class OnNodes:
         rods = self.scene.rods
         if rod is not None and rod not in rods:
             known = ", ".join(x.name for x in rods)
-            raise SceneError(f"{rod!r} is no rod of this result's scene: expected one of {known}")
+            raise SceneError(f"{rod!r} is not a rod of this result's scene: expected one of {known}")
         return rods[0] if rod is None else rod
 
     def _rows(self, rod=None):

@@ -1,4 +1,4 @@
-"""An equilibrium path as arrays with named fields. Knows no solver; files and pictures are made by other rooms."""
+"""An equilibrium path as arrays with named fields. Imports no solver; other packages make files and pictures."""
 
 from functools import cached_property
 
@@ -14,21 +14,22 @@ class Path(Result):
     Attributes:
         see `Result`;
         load_factors: (n,).
-        negative_modes: (n,) negative squares of the second variation; 0 at a stable point, -1 where it is singular.
-            Where the loads have no potential (`conservative`), those of its symmetric part, which shows no flutter.
+        negative_modes: (n,) number of negative eigenvalues of the second variation; 0 at a stable point, -1 where it is
+            singular. Where the loads have no potential (see `conservative`) its symmetric part is used, which does not
+            detect flutter.
         stable: (n,) bool.
         error: (n,) estimated error of the positions, relative to the largest displacement; NaN where not estimated.
-        rounding: what rounding of the residual alone may make of it.
-        events: the `Event`s met, in order: limit points and bifurcations.
-        left: whether the path was left at its first bifurcation, for a branch.
+        rounding: the error of the positions that the rounding of the residual alone may cause, likewise relative.
+        events: the `Event`s of the path in order: limit points and bifurcations.
+        left: whether the path continues on a branch from its first bifurcation.
         control: "load", or "arc" where the path, or a part of it, was followed in arc length.
     """
 
     axis = "load factor"
-    #: whether the virtual rotations of the formulation are those of changes of q, not small rotations
+    #: whether the formulation's virtual rotations are those of changes of q instead of independent small rotations
     galerkin = False
     _computed = (*Result._computed, "_contact", "conservative")
-    # a function of the path: what finds `conservative`
+    # function of a path that computes its `conservative`
     _potential = None
 
     def __init__(self, *args, **more):
@@ -38,7 +39,7 @@ class Path(Result):
 
     @classmethod
     def of(cls, model, why=(), potential=None):
-        """See `Result`; `potential` is a function that finds a path's `conservative`."""
+        """See `Result`; `potential`: a function of the path that computes its `conservative`."""
         formulation = model.signature.formulation
         path = super().of(model, formulation.name, why)
         path.rounding, path.galerkin = formulation.force.rounding * model.round_off, formulation.unit_length.galerkin
@@ -46,7 +47,7 @@ class Path(Result):
         return path
 
     def at_points(self, which):
-        """The path of some of its points alone, without events.
+        """A path of some of the points, without events.
 
         Args:
             which: their indices.
@@ -56,11 +57,11 @@ class Path(Result):
         return part
 
     def with_points(self, others, which):
-        """The path of these points and those of another one on the same mesh.
+        """A path that merges these points with those of another path on the same mesh.
 
         Args:
-            others: a Path.
-            which: for every point of the whole, in order, whether it is of `others`.
+            others: the other `Path`.
+            which: for every point of the result, in order, whether it comes from `others`.
         """
         mine, theirs = iter(self._records), iter(others._records)
         whole = self.at_points([])
@@ -79,7 +80,7 @@ class Path(Result):
     def conservative(self):
         """Whether the loads have a potential near every point, for all motions in space that the supports allow.
 
-        A dead moment has none where its section can turn about two axes. Computed on first use, which may take a
+        A dead moment has none where its section can turn about two axes. It is computed on first use, which may take a
         second."""
         return self._potential(self)
 
@@ -89,7 +90,7 @@ class Path(Result):
         return self.load_factors
 
     def label(self, k):
-        """What a picture writes beside point k."""
+        """The label of point k in pictures."""
         return f"{self.load_factors[k]:.3g}" + ("" if self.stable[k] else " (unstable)")
 
     @property
@@ -98,7 +99,7 @@ class Path(Result):
         return np.full(len(self), np.nan) if self._error is None else self._error
 
     def set_error(self, error):
-        """Take an estimate; it is never below what rounding leaves of the residual."""
+        """Set the estimated error, which is at least that of rounding."""
         self._error = np.maximum(error, self.rounding)
 
     def mode(self, event, rod=None):
@@ -107,11 +108,11 @@ class Path(Result):
 
     @cached_property
     def _contact(self):
-        """(points, elements, nodes of one, 6) n and m, dimensionless: two-valued where a load sits between elements."""
+        """(points, elements, nodes per element, 6) n and m, dimensionless; they jump at point loads."""
         return np.array([element_contact(self, record) for record in self._records])
 
     def _at_clamp(self, point, joined):
-        """See `Reactions`: by the balance of the ends of elements."""
+        """See `Reactions`: from the contact forces and moments at the ends of the elements there."""
         internal = -self._stacked("clamp_loads")[:, point]
         for rod, vertex in joined:
             cells = self._cells(rod)

@@ -1,4 +1,4 @@
-"""What supports hold their rods with."""
+"""The reactions of supports."""
 
 import numpy as np
 
@@ -6,7 +6,7 @@ from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.results.on_nodes import OnNodes
 from cosserat_fenicsx.scene.describe import describe
 
-# Less than this share of what it stands beside is rounding.
+# Components below this times the largest force or moment are rounding.
 _ROUNDING = 1e-6
 
 
@@ -14,41 +14,41 @@ class Reactions(OnNodes):
     """Reactions of a result, from the residual of the equations that it solves."""
 
     def reaction(self, support):
-        """What a support exerts on its rod in every state: the multipliers of its equations, or at a clamp, which has
-        no
-        equations, what is missing in the balance of its node: the internal force of all rods that are joined there,
-            less what
-        acts there and what other supports and joints exert.
+        """Force and moment that a support exerts on its rod in every state.
+
+        They are the multipliers of the support's constraint equations. A clamp has none: its reaction balances the
+        internal forces of the rods joined there, the loads on that point, and other supports and joints there.
+
+        In a motion they balance loads and momenta over the step that led to a saved state: they belong to the middle of
+        this step with "momentum" and "energy", to the middle of the last of its three substeps with "triple-jump", and
+        to its end with "generalised-alpha". They are NaN where no step led to the state: at the start, and where a
+        motion was lost.
 
         Args:
-            support: one of the scene's (`result.scene.supports`).
+            support: one of `result.scene.supports`.
 
         Returns:
             force (n, 3), N, and moment (n, 3) about the station, N m, both inertial.
 
-            Of a motion they balance loads and momenta over the step that led to a saved state. With "momentum" and
-            "energy" they are those of the middle of this step, with "triple-jump" those of the middle of the last of
-            its three; with "generalised-alpha" those at its end. NaN where no step led to the state: at the start, and
-            where a motion was lost.
-
         Raises:
-            SceneError: it is no support of the scene; or a clamp where an action remembers, which may exert anything.
+            SceneError: not a support of the scene; or a clamp at whose point an action with memory acts, since its
+                force is not stored.
         """
         which = [i for i, x in enumerate(self.scene.supports) if x is support]
         if not which:
-            raise SceneError(f"{support!r} is no support of this result's scene: expected one of its `scene.supports`")
+            raise SceneError(f"{support!r} is no support of this result's scene: expected one of `scene.supports`")
         exerted = self._of_clamp(support) if support.clamps else self._of_equations(which[0])
         force, moment = np.split(exerted, 2, axis=1)
         return force * self.scales.force, moment * self.scales.moment
 
     def _of_equations(self, which):
-        """(n, 6) dimensionless, of a support that adds equations."""
+        """(n, 6) force and moment, dimensionless, of a support with constraint equations."""
         first = sum(len(support.ties()) for support in self.scene.supports[:which])
         own = slice(first, first + len(self.scene.supports[which].ties()))
         return self._stacked("tie_forces")[:, own, 0].sum(axis=1)
 
     def _of_clamp(self, clamp):
-        """(n, 6) dimensionless."""
+        """(n, 6) force and moment, dimensionless."""
         links = self._connections
         leaders = dict(links.leaders)
         vertex = self.layout.vertex(self.scene, clamp.station)
@@ -56,7 +56,10 @@ class Reactions(OnNodes):
         joined = [point, *(vertex for vertex, leader in links.leaders if leader == point)]
         for action in self.scene.actions:
             if action.memory and action.station and self.layout.vertex(self.scene, action.station) in joined:
-                raise SceneError(f"{describe(action)} remembers: what {describe(clamp)} exerts beside it is not told")
+                raise SceneError(
+                    f"{describe(clamp)}: its reaction is unknown, since {describe(action)} at the same point has "
+                    "memory, and its force is not stored"
+                )
         exerted = self._at_clamp(links.clamped.index(point), joined)
         tie_forces = self._stacked("tie_forces")
         for i, (_, *stations) in enumerate(links.ties):
@@ -66,16 +69,16 @@ class Reactions(OnNodes):
         return exerted
 
     def _at_clamp(self, point, joined):
-        """(n, 6) internal force and moment less those of what acts there, dimensionless.
+        """(n, 6) force and moment that hold a clamped point against internal forces and loads, dimensionless.
 
         Args:
-            point: number of the clamped point; joined: (rod, element end) of all rods that share it.
+            point: index of the clamped point; joined: (rod index, element end) of all rods that share it.
         """
         raise NotImplementedError
 
 
 def reactions_in_words(result):
-    """What every support holds with in the last state, a sentence each."""
+    """The reaction of every support in the last state, one sentence each."""
     contact = result._contact_of(len(result) - 1)
     n = np.linalg.norm(contact[..., :3], axis=-1).max() * result.scales.force
     m = np.linalg.norm(contact[..., 3:], axis=-1).max() * result.scales.moment
@@ -88,10 +91,10 @@ def reactions_in_words(result):
             yield f"{unknown}."
             continue
         if np.isfinite(force).all():
-            yield f"{describe(support)} holds with {_vector(force, n)} N and {_vector(moment, m)} N m {when}."
+            yield f"{describe(support)} exerts {_vector(force, n)} N and {_vector(moment, m)} N m {when}."
 
 
 def _vector(a, beside):
-    """Components in words; those that are rounding beside each other or a number as 0."""
+    """Components as text, with 0 for those that are rounding relative to the largest of them or to `beside`."""
     least = _ROUNDING * max(np.abs(a).max(), beside)
     return f"({', '.join(f'{x:.6g}' if abs(x) > least else '0' for x in a)})"

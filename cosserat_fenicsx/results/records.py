@@ -1,4 +1,4 @@
-"""What a path is made of: equilibria, and what was met between them."""
+"""The contents of a path: equilibria, and the events between them."""
 
 from dataclasses import dataclass, field
 
@@ -7,13 +7,21 @@ import numpy as np
 
 @dataclass
 class Record:
-    """One equilibrium, dimensionless: (r, q) at the nodes (N, 7), (n, m, r') at the Gauss points (cells, points, 9),
-    and the reactions of the equations that supports and joints add; whether a motion is neutral there, see `Track`;
-    force and moment per length of what acts along rods, at the Gauss points and at the nodes, see `models.densities`;
-    force and moment, inertial, that each of those equations exerts on its two stations (equations, 2, 6), and of what
-    acts at every clamped point (points, 6), both in the order of `Connections`.
+    """One equilibrium, dimensionless and in inertial components.
 
-    A record that is appended to a path may hold its model's own numbers; the path's `expand` makes these of them.
+    A record that is appended to a path may hold the arrays of its model's `snapshot` in `rq` and `gauss_fields`; the
+    path converts them by the model's `expansion`.
+
+    Attributes:
+        rq: (N, 7) r and q at the nodes.
+        gauss_fields: (elements, points, 9) n, m and r' at the Gauss points.
+        negative_modes, iterations: see `Path`.
+        reactions: multipliers of the constraint equations of supports and joints.
+        neutral: whether a motion is neutral there, see `Track`.
+        densities: force and moment per length along rods, at the Gauss points and at the nodes, see `models.densities`.
+        tie_forces: (equations, 2, 6) force and moment that each constraint equation exerts on its two stations.
+        clamp_loads: (points, 6) force and moment of the loads at every clamped point. Both are in the order of
+            `Connections`.
     """
 
     load_factor: float
@@ -39,11 +47,12 @@ class Event:
             the path's own direction at a limit point, the buckling mode at a bifurcation. `Path.mode` picks a rod.
         after: index of the path's last point before it; -1 where there is none.
         residual: how nearly the tangent is singular: the stiffness against the mode at the event over that in the
-            unloaded state, 1e-5 at most, or the event is not listed. It is 1/(v S^-1 v) against a motion v, with S the
-            tangent in displacements and rotations. It hardly depends on the mesh; where the stiffness decreases in
-            proportion to the load, as that of a straight column does, it is the relative error of the load factor.
-        error: relative difference of the load factor to that of the same event on the mesh before; NaN where the mesh
-            was given.
+            unloaded state; events with more than 1e-5 are not listed. The stiffness against a motion v is
+            1/(v S^-1 v), with S the tangent in displacements and rotations. The ratio hardly depends on the mesh; where
+            the stiffness decreases linearly with the load, as that of a straight column does, it is the relative error
+            of the load factor.
+        error: relative difference of the load factor from that of the same event on the previous mesh; NaN where the
+            mesh was given.
     """
 
     kind: str

@@ -1,4 +1,4 @@
-"""From what an element computes (nodal r, q; n, m at Gauss points) to values everywhere, by its own equilibrium."""
+"""Contact forces and moments at the nodes from the values at the Gauss points, by the equilibrium of each element."""
 
 import numpy as np
 
@@ -8,10 +8,9 @@ from cosserat_fenicsx.quaternions import product_conjugate
 def element_contact(path, record):
     """(elements, p + 1, 6) n and m (dimensionless, inertial) of one record at the nodes of every element.
 
-    Element ends from the element's balance tested with its end functions, which is as accurate as the nodal positions
-    (order 2p); the nodes between by the polynomial through both ends and the Gauss points. The virtual rotations are
-    those
-    of the formulation: `Path.galerkin`.
+    At the element ends they follow from the element's weak form with the shape functions of its ends as test functions,
+    which is as accurate as the nodal positions (order 2p). At the nodes between they are interpolated by the polynomial
+    through both ends and the Gauss points. Virtual rotations are those of the formulation, see `Path.galerkin`.
     """
     rule, scales, p = path.rule, path.scales, path.degree
     basis, lobatto = rule.basis(rule.gauss), rule.lobatto
@@ -43,13 +42,13 @@ def element_contact(path, record):
 
 
 def _tested_by_turning(q, end, rule, h, m, density):
-    """(elements, 3) the moments that an end's turning works against, where virtual rotations are those of changes of q.
+    """(elements, 3) work-conjugate moments of small rotations of one end, where virtual rotations are changes of q.
 
-    A turning theta of the end alone changes q_h by N theta q_end/2, and is the virtual rotation N vec(theta c) with
-    c = q_end conj(q_h)/|q_h|^2.
+    A small rotation theta of the end alone changes q_h by N theta q_end/2, which is the virtual rotation
+    N vec(theta c) with c = q_end conj(q_h)/|q_h|^2 and N the shape function of the end.
 
     Args:
-        q: (elements, p + 1, 4) at the nodes; end: which of them.
+        q: (elements, p + 1, 4) at the nodes; end: index of the end among them.
         h: (elements,) lengths; m: (elements, points, 3) moments at the Gauss points.
         density: (elements, points, 3) r' x n and moments per length.
     """
@@ -65,11 +64,11 @@ def _tested_by_turning(q, end, rule, h, m, density):
 
 
 def _turned(c, a):
-    """theta -> vec(theta c) transposed, on vectors a."""
+    """The transpose of the map theta -> vec(theta c), applied to vectors a."""
     return c[..., :1] * a + np.cross(c[..., 1:], a)
 
 
 def at_nodes(values):
-    """(nodes, k) from values at the nodes of every element of a rod (elements, p + 1, k): those before a shared
-    node."""
+    """(nodes, k) from values at the nodes of every element of a rod (elements, p + 1, k); at shared nodes those of the
+    element before."""
     return np.concatenate([values[:1, 0], values[:, 1:].reshape(-1, values.shape[2])])

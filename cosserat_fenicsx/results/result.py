@@ -1,4 +1,4 @@
-"""What an equilibrium path and a motion have in common: all that is asked of states on the rods of a scene."""
+"""Base class of equilibrium paths and motions: queries of a sequence of states."""
 
 from functools import cached_property
 
@@ -14,37 +14,37 @@ from cosserat_fenicsx.scene.rod import Station
 
 
 class Result(Extremes, Reactions, States):
-    """A sequence of states of a scene, in SI units where it is asked, dimensionless inside. It can be copied and
-    pickled, see `States`.
+    """A sequence of states of a scene. Public methods return SI units. It can be copied and pickled, see `States`.
 
     Attributes:
         scene: the scene it belongs to.
-        model, formulation, degree, elements, unknowns: what it was computed with (`elements`: of each rod).
-        why: sentences that say why.
-        comm: the ranks that solved it; each holds all of it, the first writes files and pictures.
-        iterations: (n,) Newton iterations spent since the state before, rejected steps included.
+        model, formulation: names of those it was computed with.
+        degree, unknowns: of the elements, and number of unknowns; elements: number of elements of each rod.
+        why: sentences on the choice of the model, and cautions.
+        comm: the MPI communicator of the solution; every rank has the whole result, rank 0 writes files and pictures.
+        iterations: (n,) Newton iterations since the previous state, rejected steps included.
 
-    Station queries take a `Station` or its name as in scene files ("column.end", "column@5.0"), and return one row a
-    state, in inertial components unless they say material.
+    Station queries take a `Station` or its name as in scene files ("column.end", "column@5.0"), and return one row per
+    state, in inertial components unless stated otherwise.
     """
 
     def station(self, station):
-        """The `Station` that a query means.
+        """The `Station` given as one or by its name.
 
         Raises:
-            SceneError: it is neither a station nor the name of one.
+            SceneError: neither a station nor the name of one.
         """
         if isinstance(station, str):
             return self.scene.station(station)
         return instance(type(self).__name__, "station", station, Station, "a station such as rod.end, or its name")
 
     def position(self, station):
-        """(n, 3) m, inertial."""
+        """(n, 3) positions, m, inertial."""
         station = self.station(station)
         return self.displacement(station) + station.rod.curve.position(station.s)
 
     def displacement(self, station):
-        """(n, 3) m, inertial, from the reference."""
+        """(n, 3) displacements from the reference, m, inertial."""
         return self._at(station, self._all_rq[:, :, :3], self._rest) * self.scales.length
 
     def rotation(self, station):
@@ -54,19 +54,19 @@ class Result(Extremes, Reactions, States):
         return q / np.linalg.norm(q, axis=1, keepdims=True)
 
     def rotation_angle(self, station):
-        """(n,) rad: angle of `rotation`, in [0, 2 pi]: q is continuous from point to point, so it folds at 2 pi and not
-        at pi."""
+        """(n,) angle of `rotation`, rad, in [0, 2 pi]: since q is continuous, it exceeds pi and decreases again after
+        2 pi."""
         q = self.rotation(station)
         half = np.arctan2(np.linalg.norm(q[:, 1:], axis=1), q[:, 0])
         return 2 * half
 
     def force(self, station):
-        """(n, 3) contact force n, N, inertial: what the part beyond (larger s) exerts on the part before. At a
-        station with a point load, the value just before it; at rod.start the value just after."""
+        """(n, 3) contact force n, N, inertial, exerted by the part with larger s on the part with smaller s. At a
+        station with a point load it is the value just before it; at rod.start the value just after."""
         return self._contact_at(station)[:, :3] * self.scales.force
 
     def moment(self, station):
-        """(n, 3) contact moment m, N m, inertial; sides as in `force`."""
+        """(n, 3) contact moment m, N m, inertial; sign and side as in `force`."""
         return self._contact_at(station)[:, 3:] * self.scales.moment
 
     def centreline(self, k=-1, rod=None):
@@ -74,7 +74,7 @@ class Result(Extremes, Reactions, States):
         return self.fields(k, rod)["position"]
 
     def fields(self, k, rod=None):
-        """Everything at the nodes of a rod, given as one or by its name (default the first), at point k.
+        """All fields at the nodes of a rod (a `Rod` or its name; default the first) at point k.
 
         Returns:
             dict of arrays (nodes, ...): s (m), position, displacement (m), quaternion, d1, d2, d3, force (N), moment
@@ -91,7 +91,7 @@ class Result(Extremes, Reactions, States):
         d = directors(q) @ rod.curve.frame(s)
         n, m = contact[:, :3] * self.scales.force, contact[:, 3:] * self.scales.moment
         n_material, m_material = np.einsum("kij,ki->kj", d, n), np.einsum("kij,ki->kj", d, m)
-        # like n and m, on a jump those of the element before
+        # at a jump those of the element before, as n and m
         strain, curvature = rod.stiffness_at(s, "left").strains(n_material, m_material)
         return {
             "s": s,
@@ -109,7 +109,7 @@ class Result(Extremes, Reactions, States):
         }
 
     def largest_displacement(self):
-        """(n,) m: the largest over all nodes."""
+        """(n,) the largest displacement of any node, m."""
         return np.array(
             [max(np.linalg.norm(self.fields(k, rod)["displacement"], axis=1).max() for rod in self.scene.rods)
              for k in range(len(self))]
@@ -122,7 +122,7 @@ class Result(Extremes, Reactions, States):
 
     @cached_property
     def _rest(self):
-        """(nodes, 3) positions at rest, dimensionless, from where each structure starts."""
+        """(nodes, 3) positions at rest, dimensionless, relative to the origin of each structure."""
         return np.concatenate([
             (rod.curve.position(x * rod.length) - self.scene.origin(rod)) / self.scales.length
             for rod, x in zip(self.scene.rods, self.layout.node_s(self.rule.nodes), strict=True)
@@ -136,12 +136,11 @@ class Result(Extremes, Reactions, States):
         return np.einsum("j,njk->nk", weights, self._contact_in(self._cells(i).start + cell))
 
     def _contact_of(self, k):
-        """(elements, nodes of one, 6) n and m at point k, dimensionless: two-valued where a load sits between
-        elements."""
+        """(elements, nodes per element, 6) n and m at point k, dimensionless; they jump at point loads."""
         raise NotImplementedError
 
     def _contact_in(self, cell):
-        """(points, nodes of one, 6) n and m in one element, dimensionless."""
+        """(points, nodes per element, 6) n and m in one element, dimensionless."""
         raise NotImplementedError
 
     def _cells(self, i):
@@ -150,7 +149,7 @@ class Result(Extremes, Reactions, States):
         return slice(first, first + self.elements[i])
 
     def _at(self, station, values, rest=None):
-        """Values (points, nodes, k), less those at rest (nodes, k), at a station, by the element's polynomial."""
+        """Values (points, nodes, k), minus those at rest (nodes, k), interpolated to a station."""
         station = self.station(station)
         i, rows = self._rows(station.rod)
         cell, weights = self.rule.locate(self.layout.breaks[i], station.s / station.rod.length)
@@ -159,7 +158,7 @@ class Result(Extremes, Reactions, States):
         return np.einsum("j,njk->nk", weights, values[:, nodes] if rest is None else values[:, nodes] - rest[nodes])
 
     def sample(self, k, rod, x):
-        """Between the nodes, by the elements' polynomials, at point k.
+        """Positions and directors anywhere along a rod, at point k.
 
         Args:
             k: the point, or a `Record`.
@@ -188,12 +187,15 @@ class Result(Extremes, Reactions, States):
     # -- files and pictures ------------------------------------------------------------------------------------------
 
     def write(self, file, k=-1):
-        """Write all points as .xdmf (its time axis: the load factor, or the time), or point k as .vtu, .vtk or what
-        else meshio writes.
+        """Write all points as .xdmf (time axis: the load factor, or the time), or point k in a format of meshio.
+
+        Args:
+            file: its name, with the ending .xdmf, or .vtu, .vtk or another of meshio's.
+            k: the index of the point, for formats other than .xdmf.
 
         Raises:
             OSError: the file cannot be written.
-            SceneError: a format that is not known.
+            SceneError: an unknown format.
         """
         from cosserat_fenicsx.results import xdmf
 
@@ -205,7 +207,7 @@ class Result(Extremes, Reactions, States):
         Args:
             file: a .png; None returns the pyvista plotter.
             points: indices of points of a path, or of times.
-            magnify: displacements are drawn this many times their size.
+            magnify: factor of the displacements in the picture.
         """
         from cosserat_fenicsx.pictures import plot
 

@@ -7,7 +7,7 @@ import numpy as np
 # Largest relative difference of the load factors of corresponding events on two meshes.
 _SAME = 1e-2
 _NAMES = {"limit": "a limit point", "bifurcation": "a bifurcation"}
-# Differences are relative to the event's load factor, or to this times the largest of the path where that is larger.
+# Differences are relative to the event's load factor, or to this times the largest one of the path if that is larger.
 _LEAST = 1e-3
 
 

@@ -11,16 +11,16 @@ from cosserat_fenicsx.scene.describe import unpicklable
 
 
 class States(OnNodes):
-    """What `Result` keeps its states in. It can be copied and pickled.
+    """Base class of `Result` with its list of states. It can be copied and pickled.
 
-    A deep copy shares the scene, which does not change, so that stations of its rods serve both. What was pickled
-    belongs to the process that loads it, which writes its files, and has a scene of its own: its stations are those of
-    `result.rod(name)`, or names.
+    A deep copy shares the scene, so that stations of the scene's rods can be used with both. A loaded pickle has a copy
+    of the scene: its stations are those of `result.rod(name)`, or are given by name. It belongs to the one process that
+    loaded it.
     """
 
-    #: what tells the states apart, in words; fields that files hold beside those of `xdmf.FIELDS`
+    #: name of the quantity in `along_axis`; fields in files in addition to `xdmf.FIELDS`
     axis, more_fields = "", {}
-    #: what is computed once, until a state is added
+    #: cached properties, which are cleared when a state is added
     _computed = ("_all_rq",)
 
     def __init__(self, scene, layout, scales, rule, *, comm, model, formulation, degree, unknowns, why, connections,
@@ -32,7 +32,7 @@ class States(OnNodes):
 
     @classmethod
     def of(cls, model, formulation, why=()):
-        """An empty one for the scene that a model was loaded with; `why` are sentences on the choice of the model."""
+        """An empty result for the scene that a model was loaded with; `why`: sentences on the choice of the model."""
         return cls(
             model.scene,
             model.layout,
@@ -49,7 +49,7 @@ class States(OnNodes):
         )
 
     def append(self, record):
-        """Add a state that was solved."""
+        """Add a converged state."""
         self._appended.append(record)
         self._forget()
 
@@ -59,7 +59,7 @@ class States(OnNodes):
 
     @property
     def _records(self):
-        """All records, in space."""
+        """All records, expanded to three dimensions."""
         if self._appended:
             new, self._appended = self._appended, []
             gauss = None if new[0].gauss_fields is None else np.array([x.gauss_fields for x in new])
@@ -73,11 +73,11 @@ class States(OnNodes):
         return len(self._expanded) + len(self._appended)
 
     def __getitem__(self, k):
-        """State k as it was solved: a `Record`."""
+        """State k: a `Record`."""
         return self._records[k]
 
     def at_points(self, which):
-        """The result of some of its states alone.
+        """The result with some of its states only.
 
         Args:
             which: their indices.
@@ -85,7 +85,7 @@ class States(OnNodes):
         return self._with([self[k] for k in which])
 
     def _with(self, records):
-        """The same with other states."""
+        """A copy with other states."""
         part = object.__new__(type(self))
         vars(part).update(vars(self))
         part._forget()
@@ -103,11 +103,11 @@ class States(OnNodes):
 
     @property
     def along_axis(self):
-        """(n,) what tells the states apart."""
+        """(n,) the load factor or the time (s) of each state."""
         raise NotImplementedError
 
     def label(self, k):
-        """What a picture writes beside state k."""
+        """The label of state k in pictures."""
         raise NotImplementedError
 
     # -- copies ------------------------------------------------------------------------------------------------------
@@ -122,7 +122,7 @@ class States(OnNodes):
         return other
 
     def __getstate__(self):
-        """Plain data: without the communicator, and without the model's functions, since all states are in space."""
+        """Plain data, without the communicator, and without the model's expansion, since all states are expanded."""
         names = unpicklable(self.scene)
         if names:
             raise pickle.PicklingError(

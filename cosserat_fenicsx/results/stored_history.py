@@ -13,7 +13,7 @@ class StoredHistory(History):
     """A `History` that keeps no states in memory. Rank 0 writes them, all ranks read them.
 
     Attributes:
-        folder: the `pathlib.Path` of its folder.
+        folder: the `pathlib.Path` of the folder with the file.
     """
 
     _computed = ()
@@ -26,7 +26,7 @@ class StoredHistory(History):
 
     @classmethod
     def as_told(cls, told, scene, layout, scales, comm, connections, expand=None):
-        """A `StoredHistory` from what `told` returned; `expand`: that of the model, if states will be appended."""
+        """A `StoredHistory` from the dict of `told`; `expand`: the model's expansion, if states will be appended."""
         rule = ElementRule(**{name: np.array(values) for name, values in told["rule"].items()})
         history = cls(scene, layout, scales, rule, comm=comm, model=told["model"], formulation="displacement",
                       degree=told["degree"], unknowns=told["unknowns"], why=told["why"], connections=connections,
@@ -38,7 +38,7 @@ class StoredHistory(History):
         """Set the folder of the states, and return the history.
 
         Args:
-            folder: a `pathlib.Path`; states that it holds already belong to the history.
+            folder: a `pathlib.Path`; states that are already in it belong to the history.
         """
         self.folder, self._file, self._done = folder, InstantFile(folder / "instants.npy"), 0
         return self
@@ -63,7 +63,7 @@ class StoredHistory(History):
         self._file.look()
 
     def settle(self, write):
-        """Flush the states so far to the disk, and then what `write()` writes, so that they survive a crash.
+        """Flush the states so far to the disk, then call `write()`, so that both survive a crash.
 
         Raises:
             NotStored: it cannot be written.

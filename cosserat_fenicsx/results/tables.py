@@ -60,7 +60,7 @@ def path_table(path, station=None):
 def most_displaced(path):
     """The station with the largest displacement among the ends of rods and the stations of loads and supports.
 
-    The node with the largest displacement of all where the displacement of these is much smaller.
+    If these move much less than the rest, it is the node with the largest displacement.
     """
 
     def moves(station):
@@ -108,7 +108,7 @@ def modes_table(found):
 
 
 def _farthest(found, k):
-    """Words for the station with the largest displacement of a mode, and its direction there, inertial."""
+    """Texts: the station with the largest displacement of a mode, and its direction there, inertial."""
     sizes = [(np.linalg.norm(found.mode(k, rod), axis=1), rod) for rod in found.scene.rods]
     size, rod = max(sizes, key=lambda item: item[0].max())
     if size.max() < _TWIST:
@@ -152,11 +152,11 @@ def write_csv(path, file, station=None):
 
 
 def station_columns(path, station=None, more=()):
-    """Columns by their names: displacement, quaternion, contact force and moment at the stations of `write_csv`.
+    """{name: (n,)} displacement, quaternion, contact force and moment at the stations of `write_csv`.
 
     Args:
         station: of the table; default the one with the largest displacement.
-        more: further quantities, (query, name, names of its components).
+        more: further quantities, (method of the path, name, names of its components).
     """
     columns, of_table = {}, path.station(station or most_displaced(path))
     quantities = (("displacement", "displacement (m)", "xyz"), ("rotation", "quaternion", "abcd"), *more,
@@ -171,7 +171,7 @@ def station_columns(path, station=None, more=()):
 
 
 def write_columns(path, file, columns):
-    """Columns (n,) by their names as CSV, on rank 0."""
+    """Write columns {name: (n,)} as CSV, on rank 0."""
     rows = zip(*(column.tolist() for column in columns.values()), strict=True)
     on_first(path.comm, lambda: _write_rows(file, list(columns), rows))
 

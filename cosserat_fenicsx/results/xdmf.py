@@ -51,7 +51,7 @@ def _write(path, file, k):
     file.parent.mkdir(parents=True, exist_ok=True)
     if file.suffix != ".xdmf":
         if file.suffix not in meshio.extension_to_filetypes:
-            known = ".xdmf, .vtu, .vtk, .ply and what else meshio writes"
+            known = ".xdmf, .vtu, .vtk, .ply or another ending that meshio knows"
             raise SceneError(f"{file}: the ending '{file.suffix}' is not known: expected {known}")
         with open(file, "wb"):
             pass  # raises a plain OSError here if the file cannot be written
@@ -62,7 +62,7 @@ def _write(path, file, k):
 
 
 def _write_series(path, file):
-    """Write the arrays to the .h5 file, then the .xdmf file that refers to them: an existing .xdmf is complete."""
+    """Write the arrays to the .h5 file, then the .xdmf file that refers to them, so that every .xdmf is complete."""
     try:
         import h5py
     except ImportError:

@@ -73,8 +73,9 @@ class Action:
             None.
         at_nodes: of a distributed action: it is integrated with the nodes as quadrature points (Gauss-Lobatto) instead
             of Gauss points, as contact requires.
-        scaled: whether it is multiplied by the load factor. False: it acts in full from the start.
-        permanent: of an action that is not scaled: it grows from zero before the load factor does, such as a weight.
+        scaled: whether it is multiplied by the load factor; otherwise it acts in full.
+        permanent: for an action that is not scaled: whether it is applied in steps, from zero, before the scaled ones,
+            such as a weight.
         follows: whether it depends on the rotation and has no potential.
         work: a static method (point, virtual motion, *data) -> UFL, or the name of a function in `forms.loads`: the
             virtual work at a point, per reference length of a distributed action. None for an action with inertia
@@ -121,11 +122,10 @@ class Action:
         """Actions that it adds to a scene, such as the weight of its point masses."""
         return ()
 
-    # Actions whose data depend on the position of the rod, such as the nearest point of a curved axis.
-
+    #: For data that depend on the rod's position (such as the nearest point of a curved axis): a method
+    #: (rod, s (n,), r (n, 3)) -> the `Datum`s of `data` for a rod whose points are at r (m, inertial). It is evaluated
+    #: in every Newton iteration; its derivative by r is not in the tangent.
     refreshed = None
-    """A method (rod, s (n,), r (n, 3)) -> the `Datum`s of `data` for a rod whose points are at r (m, inertial): where
-    it is not None, it is evaluated at every iteration of Newton's method; its derivative by r is not in the tangent."""
 
 
 class PointAction(Action):

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from cosserat_fenicsx.checks import number, refuse, vector
+from cosserat_fenicsx.checks import call, number, refuse, vector
 from cosserat_fenicsx.errors import SceneError
 
 # Elements end at the rows of tables of up to this length; for longer ones the error estimate resolves the kinks.
@@ -40,17 +40,12 @@ class Along:
         """
         values = []
         for x in np.asarray(s, dtype=float).tolist():
-            try:
-                given = self.function(x)
-            except Exception as problem:  # a user's function may raise any exception
-                raise SceneError(
-                    f"Along.function raised {type(problem).__name__} ({problem}) at s = {x:g} m"
-                ) from problem
+            given = call(self.function, x, "Along.function", f" at s = {x:g} m")
             values.append(vector("Along", f"function({x:g})", given, "per length"))
         return np.array(values).reshape(-1, 3)
 
     def check(self, length):
-        """Evaluate it at samples along a rod of a length, m; raises SceneError as a call does."""
+        """Evaluate it at samples in [0, length], m; raises SceneError as a call does."""
         self(np.linspace(0, length, _SAMPLES))
 
 
@@ -63,7 +58,7 @@ class AlongTable:
         values: (n, 3), inertial; None with a file.
 
     Raises:
-        SceneError: arc lengths that do not ascend, not one vector for each, or a file that cannot be read.
+        SceneError: arc lengths that do not ascend, not one vector per arc length, or a file that cannot be read.
     """
 
     s: object = field(metadata={"file": True})
@@ -95,7 +90,7 @@ class AlongTable:
         return np.column_stack([np.interp(s, self.s, column) for column in zip(*self.values, strict=True)])
 
     def check(self, length):
-        """Refuse a table that lies outside a rod of a length, m."""
+        """Refuse a table whose range does not overlap [0, length], m."""
         if self.s[-1] < 0 or self.s[0] > length:
             refuse(self, "s", self.s, f"arc lengths along the rod, from 0 to {length:g} m")
 
@@ -105,7 +100,7 @@ class AlongPieces:
     """Piecewise constant.
 
     Args:
-        pieces: (s_end, vector) from the start of the rod, s_end in m; after the last it is zero.
+        pieces: (s_end, vector) in order from the start of the rod, s_end in m; after the last it is zero.
 
     Raises:
         SceneError: ends that do not ascend, or vectors that are not three finite numbers.
@@ -140,7 +135,7 @@ class AlongPieces:
         """Pieces fit any length."""
 
 
-#: Functions of the arc length that scene files know; and all of them.
+#: Functions of the arc length in scene files, and all functions of the arc length.
 ALONG = (AlongTable, AlongPieces)
 FUNCTIONS_ALONG = (Along, *ALONG)
 

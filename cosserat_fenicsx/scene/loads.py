@@ -17,8 +17,7 @@ from cosserat_fenicsx.scene.signals import vector_or_signal
 
 
 class Load:
-    """An action scaled by the load factor, or, where `permanent`, applied before it; must be the first base of a
-    class."""
+    """An action scaled by the load factor, or, if `permanent`, applied before; must be the first base of a class."""
 
     permanent = False
 
@@ -40,7 +39,7 @@ class PointLoad(Load, PointAction):
         self._check_permanent()
 
     def _turned(self, rod, a):
-        """Inertial components in the reference of a vector with material components a."""
+        """Inertial components of the vector with the material components a, in the reference."""
         return rod.curve.frame(self.station.s) @ np.asarray(a)
 
 
@@ -51,7 +50,7 @@ class Force(PointLoad):
     Args:
         station: where it acts.
         force: N, inertial; it keeps its direction.
-        permanent: it is there in full before the load factor grows.
+        permanent: whether it is applied in full, before all loads that the load factor multiplies.
 
     Raises:
         SceneError: not a station, or not three finite numbers nor a function of time.
@@ -79,7 +78,7 @@ class Moment(PointLoad):
     Args:
         station: where it acts.
         moment: N m, inertial; it keeps its direction.
-        permanent: it is there in full before the load factor grows.
+        permanent: whether it is applied in full, before all loads that the load factor multiplies.
 
     Raises:
         SceneError: not a station, or not three finite numbers nor a function of time.
@@ -108,7 +107,7 @@ class EccentricForce(PointLoad):
         station: where the arm sits.
         force: N, inertial.
         offset: (a1, a2), the arm along d_1 and d_2, m.
-        permanent: it is there in full before the load factor grows.
+        permanent: whether it is applied in full, before all loads that the load factor multiplies.
 
     Raises:
         SceneError: not a station, or numbers that are not finite.
@@ -138,7 +137,7 @@ class FollowerForce(PointLoad):
     Args:
         station: where it acts.
         force: N, material: along d_1, d_2, d_3 of the moving section.
-        permanent: it is there in full before the load factor grows.
+        permanent: whether it is applied in full, before all loads that the load factor multiplies.
 
     Raises:
         SceneError: not a station, or not three finite numbers nor a function of time.
@@ -166,7 +165,7 @@ class FollowerMoment(PointLoad):
     Args:
         station: where it acts.
         moment: N m, material: about d_1, d_2, d_3 of the moving section.
-        permanent: it is there in full before the load factor grows.
+        permanent: whether it is applied in full, before all loads that the load factor multiplies.
 
     Raises:
         SceneError: not a station, or not three finite numbers nor a function of time.
@@ -193,7 +192,7 @@ class Weight(Load, LineAction):
 
     Args:
         gravity: m/s^2, inertial.
-        permanent: it is there in full before the load factor grows.
+        permanent: whether it is applied in full, before all loads that the load factor multiplies.
 
     Raises:
         SceneError: not three finite numbers; a rod without mass (raised by `Scene`).
@@ -252,7 +251,7 @@ class LineForce(LineLoad):
         rod: the rod.
         force: N/m, inertial: three numbers, a function of time, or `Along`, `AlongTable`, `AlongPieces` where it
             changes along the rod.
-        permanent: it is there in full before the load factor grows.
+        permanent: whether it is applied in full, before all loads that the load factor multiplies.
 
     Raises:
         SceneError: not a rod, or not three finite numbers nor a function.
@@ -284,7 +283,7 @@ class LineMoment(LineLoad):
     Args:
         rod: the rod.
         moment: N m/m, inertial; given as the force of a `LineForce`.
-        permanent: it is there in full before the load factor grows.
+        permanent: whether it is applied in full, before all loads that the load factor multiplies.
 
     Raises:
         SceneError: not a rod, or not three finite numbers nor a function.

@@ -18,8 +18,8 @@ _MOST_MOTION = 1e6
 # Samples of a distributed load along a rod.
 _SAMPLES = 9
 
-#: share: the size over the largest one allowed; scaled: whether the load factor multiplies it; words: the load or
-#: support and its size; most: the largest size, in words.
+#: share: the size over the largest one allowed; scaled: whether the load factor multiplies it; words: text that gives
+#: the load or support and its size; most: the largest size allowed, as text.
 Magnitude = namedtuple("Magnitude", "share scaled words most")
 
 
@@ -46,8 +46,8 @@ def magnitudes(scene):
 
 
 def _sampled(item, until):
-    """A load or a support at times up to `until`, s, without those at which a function of time fails: a motion that
-    reaches these refuses them."""
+    """A load or a support at sample times up to `until`, s. Times at which a function of time fails are left out: a
+    motion that reaches them raises the error."""
     for t in sample_times(item, until):
         with contextlib.suppress(SceneError):
             yield at(item, t)
@@ -68,7 +68,7 @@ def _force(load, scene, length):
 
 
 def check_magnitudes(scene, load_factor):
-    """Refuse loads and prescribed motions beyond any rod's range.
+    """Refuse loads and prescribed motions that are so large that rounding errors would dominate.
 
     Args:
         scene: a `Scene`; load_factor: the largest one requested.

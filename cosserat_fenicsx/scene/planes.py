@@ -59,11 +59,11 @@ def find_plane(scene):
 
 
 class _Leaves(Exception):
-    """The part of a scene that leaves the plane, in words."""
+    """The message names the part of a scene that leaves the plane."""
 
 
 def independent_in(plane, ties):
-    """Indices of linearly independent ties among those for motions in the plane: of x, y and z of a point, two
+    """Indices of linearly independent ties among those for motions in the plane: for a point held in x, y and z two
     remain."""
     groups = {}
     for i, tie in enumerate(ties):
@@ -207,7 +207,7 @@ def _check_section(rod, s, frames, normal):
         along = rod.stiffness_at(s[skew], side)
         for name, pair in (("EI", along.J[..., :2]), ("GA", along.K[..., :2])):
             if not np.isclose(pair[..., 0], pair[..., 1], rtol=1e-12, atol=0).all():
-                raise _Leaves(f"a section of rod '{rod.name}' has its principal axes ({name}) askew to the plane")
+                raise _Leaves(f"a section of rod '{rod.name}' has its principal axes ({name}) oblique to the plane")
 
 
 def _check_supports(scene, plane):
@@ -226,9 +226,7 @@ def _check_supports(scene, plane):
             if apart > np.linalg.matrix_rank(np.array(rows), tol=_PARALLEL) or max(out, default=0.0) > _SMALLEST_ANGLE:
                 where = getattr(holder, "station", None) or f"{holder.first} with {holder.second}"
                 name = type(holder).__name__
-                raise _Leaves(
-                    f"{what} {i + 1} ({name} at {where}) holds or moves what is askew to the plane of the rods"
-                )
+                raise _Leaves(f"{what} {i + 1} ({name} at {where}) constrains motions oblique to the plane of the rods")
 
 
 def _words(load):

@@ -31,7 +31,7 @@ class Scene:
             `LineMoment`, `Weight`, which are multiplied by the load factor or `permanent`; `Spring`, `Foundation`,
             `Dashpot`, `Drag`, `PointMass`, `Wall`; or an `Action` of your own.
         joints: `Joint`s between stations that touch; rods without a joint are independent of each other.
-        velocities: `InitialVelocity`s, at most one a rod; rods without one start at rest. For motions alone.
+        velocities: `InitialVelocity`s, at most one per rod; rods without one start at rest. For motions only.
         title: for tables and pictures.
 
     Raises:
@@ -140,7 +140,7 @@ class Scene:
 
     @cached_property
     def magnitudes(self):
-        """The sizes of its loads and prescribed motions, see `magnitudes.check_magnitudes`."""
+        """The `Magnitude`s of its loads and prescribed motions, see `magnitudes.check_magnitudes`."""
         return magnitudes(self)
 
     @property

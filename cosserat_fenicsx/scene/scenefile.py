@@ -34,7 +34,7 @@ load_factors = [0.5, 1.0]
 [simulate]                        # a motion, instead of an equilibrium path; arguments of `simulate`
 duration = 10.0                   # s
 tol = 1e-3                        # or dt = 0.01
-start = 0.9                       # optional: an equilibrium at this load factor first, of the loads just before t = 0
+start = 0.9                       # optional: begin at the equilibrium of the loads just before t = 0 at this factor
 """
 
 import dataclasses

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cosserat_fenicsx.checks import number, positive, refuse, stiffness, store, vector
+from cosserat_fenicsx.checks import finite_array, number, positive, refuse, stiffness, store, vector
 
 _ZETA_5 = 1.0369277551433699263  # sum of 1/n^5
 # Asymmetry and smallest eigenvalue of a matrix, scaled to a unit diagonal, that are rounding.
@@ -80,10 +80,9 @@ class Stiffness:
         """A section whose centroid and shear centre are off the rod's line.
 
         A point (x1, x2) of the section has the strains e + k x (x1, x2, 0), where e and k are those at the line. EA
-        acts on the stretch at the centroid, GA on the shear at the shear centre: the strain energy per length is half
-            of
-        GA1 (e1 - k3 x2)^2 + GA2 (e2 + k3 x1)^2 at the shear centre, EA (e3 + k1 x2 - k2 x1)^2 at the centroid, and
-        EI1 k1^2 + EI2 k2^2 + GJ k3^2; its second derivatives are the matrix.
+        acts on the stretch at the centroid, GA on the shear at the shear centre. The strain energy per length is half
+        the sum of GA1 (e1 - k3 x2)^2 + GA2 (e2 + k3 x1)^2 at the shear centre, EA (e3 + k1 x2 - k2 x1)^2 at the
+        centroid, and EI1 k1^2 + EI2 k2^2 + GJ k3^2; its second derivatives are the matrix.
 
         Args:
             shear, axial, bending, torsion: as of `Stiffness`, finite, along and about the principal axes; bending about
@@ -219,11 +218,8 @@ def _check_lengths(section, *fields):
 def _checked(section, matrix):
     """The checked matrix as a tuple of rows, made exactly symmetric."""
     expected = "6 x 6 finite numbers, symmetric and positive definite (N, N m and N m^2)"
-    try:
-        M = np.asarray(matrix)
-    except ValueError:
-        refuse(section, "matrix", matrix, expected)
-    if M.shape != (6, 6) or M.dtype.kind not in "iuf" or not np.isfinite(M).all() or not (np.diag(M) > 0).all():
+    M = finite_array(section, "matrix", matrix, expected)
+    if M.shape != (6, 6) or not (np.diag(M) > 0).all():
         refuse(section, "matrix", matrix, expected)
     size = np.sqrt(np.outer(np.diag(M), np.diag(M)))
     if (np.abs(M - M.T) > _ROUNDING * size).any() or np.linalg.eigvalsh((M + M.T) / (2 * size))[0] < _ROUNDING:
@@ -252,15 +248,10 @@ def representative(matrix):
 
 def _corners(section, outline):
     expected = "three or more corners (x1, x2) of finite numbers (m)"
-    try:
-        corners = np.asarray(outline)
-    except ValueError:
+    corners = finite_array(section, "outline", outline, expected)
+    if corners.ndim != 2 or corners.shape[1] != 2 or len(corners) < 3:
         refuse(section, "outline", outline, expected)
-    if corners.ndim != 2 or corners.shape[1] != 2 or len(corners) < 3 or corners.dtype.kind not in "iuf":
-        refuse(section, "outline", outline, expected)
-    if not np.isfinite(corners).all():
-        refuse(section, "outline", outline, expected)
-    return tuple(map(tuple, corners.astype(float).tolist()))
+    return tuple(map(tuple, corners.tolist()))
 
 
 def _circle(radius, corners=24):

@@ -13,7 +13,7 @@ from functools import cached_property
 
 import numpy as np
 
-from cosserat_fenicsx.checks import number, refuse, vector
+from cosserat_fenicsx.checks import call, number, refuse, vector
 from cosserat_fenicsx.errors import SceneError
 
 
@@ -248,16 +248,11 @@ class Signal:
         """The vector at t, s.
 
         Raises:
-            SceneError: another number of values, or values that are not finite, or an exception of the function; says
-                at which time.
+            SceneError: the function raised, or returned another number of values or values that are not finite; the
+                message gives the time.
         """
         when = f"at the time t = {t:g} s" + (f", of the {self.owner} at {self.place}" if self.place else "")
-        try:
-            given = self.function(t)
-        except Exception as problem:  # a user's function may raise any exception
-            raise SceneError(
-                f"{self.owner}.{self.field}: its function raised {type(problem).__name__} ({problem}), {when}"
-            ) from problem
+        given = call(self.function, t, f"{self.owner}.{self.field}: its function", f", {when}")
         try:
             return vector(self.owner, self.field, given, self.unit, self.size)
         except SceneError as problem:
@@ -302,7 +297,7 @@ def at(item, t):
 
 
 def sample_times(item, until):
-    """Sample times (s) up to `until` for checks of a load or a support that depends on time; else the time 0 alone.
+    """Sample times (s) up to `until` for checks of a load or a support; only 0 if it does not depend on time.
 
     They are its jumps, the midpoints between them, and times spread logarithmically.
     """

@@ -169,11 +169,10 @@ def touching(scene):
 
 
 def without_mechanism(scene):
-    """The scene itself; a mechanism with joints, then supports made rigid one by one until it is no mechanism.
+    """The scene itself; or, for a mechanism, a copy with joints, then supports, made rigid until it is none.
 
-    Where a mechanism is in equilibrium in its reference, but for strains, the result has the same equilibrium: the
-        added
-    constraints carry no reaction.
+    If the mechanism is in equilibrium in its reference, except for strains, the copy has the same equilibrium: the
+    added constraints carry no reaction.
 
     Raises:
         SceneError: it remains a mechanism.
@@ -199,7 +198,7 @@ def without_mechanism(scene):
 
 
 def _words(motion, start, size):
-    """A rigid motion (velocity of the start over size, rotation) in words."""
+    """A rigid motion (velocity of the start over size, rotation) as text."""
     moved, turn = motion[:3], motion[3:]
     if np.linalg.norm(turn) <= 1e-6:
         return f"move along ({_numbers(moved / np.abs(moved).max())})"

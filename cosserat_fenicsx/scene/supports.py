@@ -108,7 +108,7 @@ class Roller:
 
 @dataclass(frozen=True)
 class Prescribed:
-    """A station is moved, in proportion to the load factor; a motion that is None is free.
+    """A station is moved in proportion to the load factor; displacement or rotation is free where None.
 
     Both motions may be functions of time (`signals`), with `jumps` where these are not smooth.
 

@@ -7,7 +7,7 @@ import numpy as np
 from cosserat_fenicsx.results.accuracy import leading_coefficients
 from cosserat_fenicsx.results.indicators import element_differences, layer_lengths, unresolved
 
-# Largest length of an element where a boundary layer may begin, over the length of that layer.
+# Largest length of an element next to a support, load or kink, over the length of the boundary layer there.
 _RESOLVED = 2.0
 # Smallest length of an element over that of its rod.
 _SHORTEST = 1e-6

@@ -37,7 +37,7 @@ class Problem(Equations):
         )
         self._live = [function.x.array for function in model.carried]
         self.load_factor = self.load_norm = 0.0
-        # Arrays of the constants, written in place: the setter of `value` costs as much as a residual of few elements.
+        # Arrays of the constants, written in place: the setter of `value` takes as long as a residual of few elements.
         self._eta, self._share = model.load_factor.value, model.permanent_factor.value
         self._refreshes, self._remembers = bool(model.actions.refreshed), bool(model.actions.memory)
         self._loaded, self.begins = None, False

@@ -80,7 +80,7 @@ class _Search:
         self._order, self._factor = 1.0, 2.0
         self._failed, self._promoted, self._best = False, None, math.inf
         self.accurate, self._meshes_for_events, self._lost_events = None, _FOR_EVENTS, []
-        self._halved = None  # sample points on this mesh and on the mesh before, where that one's elements were halved
+        self._halved = None  # sample points on this mesh and on the one before, if this one halves its elements
         self._layered = None  # the next mesh where the last one does not resolve the boundary layers
         self._balancings = 0
 

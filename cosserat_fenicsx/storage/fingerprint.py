@@ -56,9 +56,9 @@ def times_ahead(duration):
 
 
 def difference(given, expected):
-    """Where two fingerprints differ, in words; None where they agree to rounding.
+    """Text that says where two fingerprints differ; None where they agree to rounding.
 
-    Of the first quantity that differs, the message gives the sample where it differs most.
+    It gives the first quantity that differs, and the sample where this differs most.
     """
     groups = {}
     for what in expected:

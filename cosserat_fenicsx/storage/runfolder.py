@@ -37,7 +37,7 @@ class RunFolder:
 
     Attributes:
         place: a `pathlib.Path`.
-        asked: the arguments of `simulate`; told: the description of the `History`, see `History.told`.
+        asked: the arguments of `simulate`; told: the description of the `History`, see `StoredHistory.told`.
         durations: s, that of `simulate` and those of later continuations, ascending; ranks: number of MPI ranks.
     """
 

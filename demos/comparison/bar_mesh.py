@@ -36,7 +36,7 @@ def _joined(grids):
     """Points and nine-node cells of several grids (i, j, 2) of nodes; points that coincide become one."""
     every = np.vstack([np.zeros((1, 2)), *(grid.reshape(-1, 2) for grid in grids)])
     _, first, inverse = np.unique(np.round(every, 9), axis=0, return_index=True, return_inverse=True)
-    rank = np.argsort(np.argsort(first))  # numbered as they come: the centre is the first
+    rank = np.argsort(np.argsort(first))  # numbered in the order of occurrence: the centre is the first
     number, cells, start = rank[inverse.ravel()], [], 1
     for grid in grids:
         index = number[start : start + grid.shape[0] * grid.shape[1]].reshape(grid.shape[:2])

@@ -1,7 +1,7 @@
 """A chain of two-node planar elements, (u, w, theta) at every node, clamped at the first: banded Newton systems.
 
 u is axial (along z), w transverse (along x), in units of L; forces in EI/L^2. An element law takes nodal unknowns
-(n, 6) and gives the gradient (n, 6) and the Hessian (n, 6, 6) of the elements' energies; `law_of` makes it from the elements' length.
+(n, 6) and gives the gradient (n, 6) and the Hessian (n, 6, 6) of the elements' energies; `law_of(length)` returns it.
 """
 
 import numpy as np
@@ -51,7 +51,7 @@ class Chain:
         lower = self._tangent(x, eta)[_BAND:]
         if not np.isfinite(lower).all():
             return self.size
-        # scaled to a unit diagonal: the count stays, the range of the eigenvalues shrinks
+        # scaled to a unit diagonal, which leaves the count unchanged and reduces the range of the eigenvalues
         scale = 1 / np.sqrt(np.abs(lower[0]) + 1e-300)
         scaled = np.array([row * scale * np.roll(scale, -k) for k, row in enumerate(lower)])
         return int((eigvals_banded(scaled, lower=True) < 0).sum())

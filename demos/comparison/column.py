@@ -1,4 +1,4 @@
-"""The column of the paper's section 3 in numbers, and the answer that every comparison model gives about it."""
+"""The data of the column of the paper's section 3, and the results of a comparison model."""
 
 import math
 from dataclasses import dataclass, field
@@ -62,9 +62,9 @@ class Curve:
         delta: transverse displacement of the tip, m.
         shortening: axial displacement of the tip towards the clamp, m.
         rotation: of the tip section, rad; nan where the model has none.
-        iterations: Newton's, since the point before, rejected steps included.
+        iterations: Newton iterations since the previous point, rejected steps included.
         negative_modes: negative eigenvalues of the tangent: 0 where stable.
-        stopped: why the path ended before the last requested load factor, in words; empty where it did not.
+        stopped: text why the path ended before the last requested load factor; empty if it did not.
     """
 
     eta: np.ndarray

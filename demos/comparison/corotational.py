@@ -1,8 +1,8 @@
-"""A planar two-node co-rotational Timoshenko beam for large displacements: what a commercial package has built in.
+"""A planar two-node co-rotational Timoshenko beam for large displacements, as in commercial packages.
 
 Each element is a linear Timoshenko beam, exact in its nodes for bending and shear, in a frame that turns with the chord
-(after Crisfield, Non-linear Finite Element Analysis of Solids and Structures 1, 1991, ch. 7). Second order; the limit of
-many elements is Reissner's rod but for terms of the square of the strains, here 1e-8.
+(after Crisfield, Non-linear Finite Element Analysis of Solids and Structures 1, 1991, ch. 7). It converges with second
+order to Reissner's rod, except for terms of the order of the square of the strains, here 1e-8.
 """
 
 import numpy as np
@@ -19,10 +19,10 @@ def solve(etas, elements, *, column=None, adaptive=True):
         etas: load factors F/P_cr, ascending.
         elements: number of equal elements.
         column: `Column`; the paper's by default. `arm=True` puts the force on an arm that turns with the tip.
-        adaptive: False jumps from one load factor to the next and believes what Newton's method finds.
+        adaptive: False takes each load factor in one step and accepts any state that Newton's method converges to.
 
     Returns:
-        A `Curve`; `stopped` says in words why it ends early, if it does.
+        A `Curve`; `stopped` gives the reason if it ends early.
 
     Raises:
         SceneError: a number of elements that is not whole and positive, load factors that are no numbers or descend.
@@ -87,7 +87,7 @@ def beam(nodal, length, axial, shear, bending=1.0):
 
 
 def _wrapped(angle):
-    """The same direction within half a turn."""
+    """The same angle in [-pi, pi]."""
     return np.remainder(angle + np.pi, 2 * np.pi) - np.pi
 
 

@@ -1,4 +1,4 @@
-"""The curves of Figure 3, each as a dict that JSON can hold: eta, delta (m) and what else is worth keeping."""
+"""The curves of Figure 3, each as a dict for JSON: eta, delta (m) and further results."""
 
 import sys
 import time
@@ -20,16 +20,17 @@ from cosserat_fenicsx.progress import Progress
 
 @dataclass(frozen=True)
 class Settings:
-    """How fine the curves are.
+    """Load factors and meshes of the curves.
 
     Attributes:
         etas: of the rods.
         coarse_etas: of the co-rotational beam and the solid.
-        rungs: elements of the co-rotational beam, each twice the one before.
+        rungs: numbers of elements of the co-rotational beam, each twice the previous one.
         mcre: elements of the reconstructed MCRE whose limit points are found.
         along, refinement: of the solid's mesh, see `SolidBar`.
-        finer, finer_etas: elements along the solid's finer mesh, and where it is solved on it too.
-        clamped_etas: where the solid is also solved with its foot fixed altogether.
+        finer, finer_etas: elements along the solid's finer mesh, and the load factors at which it is also solved on
+            that.
+        clamped_etas: load factors at which the solid is also solved with all displacements of its foot fixed.
     """
 
     etas: tuple
@@ -68,7 +69,7 @@ QUICK = Settings(
     finer_etas=(0.9,),
     clamped_etas=(0.9,),
 )
-#: Elements of the MCRE that stand for many.
+#: Number of elements that represents a fine mesh of the MCRE.
 MANY = 32
 
 
@@ -124,8 +125,8 @@ def beam(settings):
 
 
 def truncated(settings):
-    """The reconstructed MCRE: branches through the limit point with 1, 2 and many elements, all limit points found, and the
-    truncated energy that ever more elements tend to."""
+    """The reconstructed MCRE: branches through the limit point with 1, 2 and many elements, all limit points found, and
+    the truncated energy, the limit under mesh refinement."""
     found = {}
     for name, problem in [(str(n), mcre.problem(n)) for n in settings.mcre] + [("limit", TruncatedColumn())]:
         top = mcre.limit(problem)
@@ -143,9 +144,9 @@ def solid(settings, keep, clamp, points=(), so_far=None):
     """The three-dimensional bar.
 
     Args:
-        keep: called with the curve so far and the last three points whenever one is reached.
+        keep: called after every point with the curve so far and the last three points.
         clamp: see `SolidBar`.
-        points, so_far: what `keep` was given last, by a run that was broken off.
+        points, so_far: the last arguments of `keep` of an interrupted run.
     """
     bar = SolidBar(Column(arm=True), settings.along, settings.refinement, clamp)
     finer = SolidBar(Column(arm=True), settings.finer, settings.refinement) if clamp == "plane" else None
@@ -170,7 +171,7 @@ def solid(settings, keep, clamp, points=(), so_far=None):
 
 
 def _on_finer(finer, bar, point, curve):
-    """Solve on the finer mesh from the point of the other, and keep delta there."""
+    """Solve on the finer mesh, starting from the point on the coarser one, and store delta."""
     x, _ = newton(finer, finer.carried(bar, point.x), point.eta, tolerance=1e-4)
     if x is None:
         raise Stopped(f"Newton's method does not converge on the finer mesh at the load factor {point.eta:g}")
@@ -180,7 +181,7 @@ def _on_finer(finer, bar, point, curve):
 
 
 def timed(name, compute):
-    """The curve that `compute()` returns, with its seconds in it, and a line for who waits."""
+    """The curve that `compute()` returns, with its computing time; prints a line of progress."""
     began = time.perf_counter()
     found = compute()
     found.setdefault("seconds", round(time.perf_counter() - began, 2))

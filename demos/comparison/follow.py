@@ -1,10 +1,10 @@
 """The equilibrium path F(x, eta) = 0 of a comparison model: load control, arc length and limit points.
 
-A problem knows, in its own dimensionless units:
+The attributes and methods of a problem, in its own dimensionless units:
     size                              number of unknowns; x = 0 is the unloaded state
     residual(x, eta)                  F, shape (size,)
-    linearise(x, eta, before)         a function b -> K^-1 b for b of shape (size,) or (size, k), where K = dF/dx; `before`
-                                      is the state that the step to x started from (most problems ignore it)
+    linearise(x, eta, before)         a function b -> K^-1 b for b of shape (size,) or (size, k), where K = dF/dx;
+                                      `before` is the state before the last Newton step (most problems ignore it)
     load(x)                           -dF/deta, shape (size,)
     negative_modes(x, eta)            negative eigenvalues of K
     tip(x)                            (delta in m, shortening in m, rotation in rad)
@@ -23,7 +23,7 @@ TOLERANCE = 1e-10  # of the last step of Newton's method, relative to the state
 
 @dataclass
 class Point:
-    """One equilibrium: load factor, unknowns, Newton's iterations since the one before, negative modes."""
+    """One equilibrium: load factor, unknowns, Newton iterations since the previous one, negative modes."""
 
     eta: float
     x: np.ndarray
@@ -49,7 +49,7 @@ def newton(problem, x, eta, before=None, most=20, tolerance=TOLERANCE):
             return None, k
         before, x = x, x + step
         size = np.abs(step).max()
-        if not size < 10.0:  # ten lengths, or no number
+        if not size < 10.0:  # ten lengths, or NaN
             return None, k
         if size <= tolerance * max(np.abs(x).max(), 1e-6):
             return x, k
@@ -61,8 +61,8 @@ def follow(problem, etas, *, adaptive=True, points=(), largest=0.25, tolerance=T
 
     Args:
         etas: finite; ascending where adaptive.
-        adaptive: False jumps from one load factor to the next from the last state as it is, and believes whatever Newton's
-            method converges to; True extrapolates, halves steps that fail, leave their prediction or lose stability.
+        adaptive: False starts Newton's method at the last state, and accepts any state that it converges to; True
+            extrapolates, and halves steps that fail, end far from their prediction or lose stability.
         points: up to three earlier points to start from instead of the unloaded state.
         largest: step of the load factor.
         tolerance: of the last step, relative to the state.
@@ -81,7 +81,7 @@ def follow(problem, etas, *, adaptive=True, points=(), largest=0.25, tolerance=T
 
 
 def _jumps(problem, last, etas, tolerance):
-    """One Newton's method a load factor, each from the state before."""
+    """One run of Newton's method per load factor, each from the previous state."""
     for eta in etas:
         x, iterations = newton(problem, last.x, eta, tolerance=tolerance)
         if x is None:
@@ -91,13 +91,13 @@ def _jumps(problem, last, etas, tolerance):
 
 
 def _steps(problem, known, etas, largest, tolerance):
-    """Steps of their own size, each load factor landed on."""
+    """Adaptive steps that reach each load factor exactly."""
     step = largest
     for target in etas:
         work = 0
         while known[-1].eta < target:
             last = known[-1]
-            # equal parts of what is left, so that no sliver remains before the target
+            # equal parts of the remaining distance, so that no tiny step remains before the target
             parts = max(math.ceil((target - last.eta) / step - 1e-9), 1)
             eta = float(target) if parts == 1 else last.eta + (target - last.eta) / parts
             start = _predicted(problem, known, eta)
@@ -116,13 +116,13 @@ def _steps(problem, known, etas, largest, tolerance):
 
 
 def _why(x, eta):
-    """Words for a path that ends at the load factor eta."""
+    """The message for a path that ends at the load factor eta."""
     found = "Newton's method does not converge" if x is None else "what Newton's method finds is not on the stable path"
     return f"{found} beyond the load factor {eta:.4f}: load control ends here"
 
 
 def _predicted(problem, known, eta):
-    """Extrapolation through the last three points, along the tangent where there is only one."""
+    """Extrapolation through the last three points, along the tangent if there is only one."""
     if len(known) == 1:
         last = known[0]
         return last.x + (eta - last.eta) * problem.linearise(last.x, last.eta, last.x)(problem.load(last.x))
@@ -132,10 +132,11 @@ def _predicted(problem, known, eta):
 
 
 class Arc:
-    """Steps along the arc length of (x, eta): they pass limit points, where K is singular but the bordered system is not.
+    """Steps along the arc length of (x, eta): they pass limit points, where K is singular but the bordered system is
+    not.
 
-    Length: sqrt(mean square of x / 0.05^2 + eta^2): a twentieth of L counts like a load factor of 1, so that steps resolve both
-    the small displacements before a limit point and the load.
+    The arc length is sqrt(mean square of x / 0.05^2 + eta^2): a twentieth of L counts as much as a load factor of 1, so
+    that steps resolve both the small displacements before a limit point and the load.
     """
 
     def __init__(self, problem):
@@ -155,7 +156,8 @@ class Arc:
         return dx / size, 1.0 / size
 
     def at(self, length, origin, tangent):
-        """The point of the path at the projected distance `length` from `origin`; (None, iterations) where there is none."""
+        """The point of the path at the projected distance `length` from
+        `origin`; (None, iterations) where there is none."""
         (x0, eta0), (tx, teta) = origin, tangent
         x, eta, before = x0 + length * tx, eta0 + length * teta, x0
         for k in range(1, 16):
@@ -172,7 +174,8 @@ class Arc:
         return None, 15
 
     def points(self, largest):
-        """The path from the unloaded state on, without end; yields (origin, tangent, length, point, its tangent)."""
+        """Endless iterator over the path from the unloaded state; yields
+        (origin, tangent, length, point, its tangent)."""
         length = largest
         while True:
             found, iterations = self.at(length, self.origin, self.tangent)
@@ -210,7 +213,7 @@ def limit_point(problem, *, largest=0.02, beyond=10.0):
 
 
 def trace(problem, until, *, largest=0.02):
-    """Points along the arc length from the unloaded state while until(eta, tip) is false, limit points passed."""
+    """Points along the arc length from the unloaded state, past limit points, until until(eta, tip) is true."""
     found = [Point(0.0, np.zeros(problem.size))]
     for _, _, _, (x, eta), _ in Arc(problem).points(largest):
         found.append(Point(eta, x, 0, problem.negative_modes(x, eta)))

@@ -1,14 +1,15 @@
 """A reconstruction of the Modified Cosserat Rod Element (MCRE), in a plane.
 
-After Liu, Cao, Rosing, Wang & Richardson, Int. J. Solids Struct. 44 (2007) 7785, doi:10.1016/j.ijsolstr.2007.05.020. Their
-text was not at hand. What is known: shape functions with up to third-order terms of the nodal displacements, from a
-quasi-static solution; a rotation vector; nodal unknowns measured from the undeformed frame; an element energy of fourth
-order in them. So: within an element the rod is in equilibrium, solved order by order in the nodal unknowns, and the energy
-of that solution is kept to fourth order (for which the second-order terms of the solution are enough: third-order ones
-enter the energy from the fifth order on). Ever more elements tend to the truncated energy of forms/truncated.py
-(`mcre_limit`); see `limit` for how.
+After Liu, Cao, Rosing, Wang & Richardson, Int. J. Solids Struct. 44 (2007) 7785, doi:10.1016/j.ijsolstr.2007.05.020.
+Their full text was not available. Known are: shape functions with up to third-order terms of the nodal displacements,
+from a quasi-static solution; a rotation vector; nodal unknowns measured from the undeformed frame; an element energy of
+fourth order in them. So: within an element the rod is in equilibrium, solved order by order in the nodal unknowns, and
+the energy of that solution is kept to fourth order (for which the second-order terms of the solution are enough:
+third-order ones enter the energy from the fifth order on). Under mesh refinement it converges to the truncated energy
+of forms/truncated.py (`mcre_limit`); see `limit`.
 
-With a = u', g = w' - phi, b = w' phi - phi^2/2, c = -u' phi, the strains' expansions give the energy per length, by order,
+With a = u', g = w' - phi, b = w' phi - phi^2/2, c = -u' phi, the strains' expansions give the energy per length, by
+order,
     2 W_2 = EA a^2 + GA g^2 + EI phi'^2,    2 W_3 = 2 EA a b + 2 GA g c,
     2 W_4 = EA (b^2 - u'^2 phi^2) + GA (c^2 + 2 g (phi^3/6 - w' phi^2/2)).
 """
@@ -40,9 +41,9 @@ def problem(elements, column=None):
 def limit(problem):
     """Where the path's load factor is largest, as a `LimitPoint`.
 
-    For the paper's column at 0.3111, 0.4644, 0.5837, 0.6065, 0.6085, 0.6107 with 1, 2, 4, 8, 16, 32 elements: a plateau at
-    0.61, but not the limit. With 64, 128, 256 elements it is at 0.6158, 0.6219, 0.6251, and the truncated energy itself,
-    which the ever shorter elements tend to, has it at 0.62655.
+    For the paper's column at 0.3111, 0.4644, 0.5837, 0.6065, 0.6085, 0.6107 with 1, 2, 4, 8, 16, 32 elements: a plateau
+    at 0.61, but not the limit. With 64, 128, 256 elements it is at 0.6158, 0.6219, 0.6251, and for the truncated energy
+    itself, the limit under mesh refinement, at 0.62655.
 
     Returns:
         None where the load factor passes 10 without one.
@@ -74,7 +75,7 @@ def energy(length, axial, shear, bending=1.0):
     second = _second_order(linear, linear, ds, axial, shear, bending)
     third = _third_order(linear, linear, linear, ds, axial, shear)
     fourth = _fourth_order(linear, ds, axial, shear)
-    # the second-order part of the solution: bubbles in equilibrium with the forces that W_3 makes
+    # the second-order part of the solution: bubble functions in equilibrium with the forces due to W_3
     force = (
         _third_order(bubbles, linear, linear, ds, axial, shear)
         + np.moveaxis(_third_order(linear, bubbles, linear, ds, axial, shear), 1, 0)

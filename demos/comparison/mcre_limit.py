@@ -1,4 +1,4 @@
-"""The truncated energy that ever more elements of the reconstructed MCRE tend to (forms/truncated.py), on dolfinx."""
+"""The truncated energy (forms/truncated.py), to which the reconstructed MCRE converges, discretised with dolfinx."""
 
 import numpy as np
 import ufl

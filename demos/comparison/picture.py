@@ -1,4 +1,4 @@
-"""The chart of Figure 3: the whole path, the part below eta = 1 where the models part, and by how much they do."""
+"""The chart of Figure 3: the whole path, the part below eta = 1, and the differences of the models."""
 
 from pathlib import Path
 
@@ -34,7 +34,8 @@ def draw(data, file):
     whole.text(0.03, 2.7, "enlarged on the right", color="grey", fontsize=9)
     _limit_points(near, curves["mcre"]["elements"])
     figure.suptitle(
-        "Eccentrically compressed column: steel, 20 m, diameter 0.2 m, eccentricity e = L/100, clamped below, free above"
+        "Eccentrically compressed column: steel, 20 m, diameter 0.2 m, eccentricity e = L/100, clamped below, free"
+        " above"
     )
     figure.legend(*whole.get_legend_handles_labels(), loc="outside lower center", ncols=3, frameon=False, fontsize=9)
     Path(file).parent.mkdir(parents=True, exist_ok=True)
@@ -46,7 +47,8 @@ def _curves(axes, curves):
     below = np.linspace(0, 0.9999, 2000)
     beam, eq_8 = curves["corotational"], analytic.secant_delta(below, Column().eccentricity)
     axes.plot(*_from_zero(curves["mixed"]), color="tab:blue", lw=2, label="Cosserat rod, mixed: constant moment F e")
-    axes.plot(curves["displacement"]["eta"][::2], curves["displacement"]["delta"][::2], "o", mfc="none", mec="tab:blue", ms=8,
+    axes.plot(curves["displacement"]["eta"][::2], curves["displacement"]["delta"][::2], "o", mfc="none", mec="tab:blue",
+              ms=8,
               label="Cosserat rod, eq. (1), displacement: constant moment")  # fmt: skip
     axes.plot(
         beam["eta"],
@@ -68,7 +70,7 @@ def _curves(axes, curves):
 
 
 def _differences(axes, curves):
-    """How far every model is from the exact rod under the same load, in percent."""
+    """Difference of every model from the exact rod under the same load, in percent."""
     below = np.linspace(0.02, 0.999, 400)
     eq_8, beam = analytic.secant_delta(below, Column().eccentricity), curves["corotational"]
     axes.semilogy(below, _percent(eq_8, exact(below)), color="tab:red", ls="--")
@@ -82,7 +84,8 @@ def _differences(axes, curves):
                   label=f"3D elasticity, {solid['along']} elements along (the curve)")  # fmt: skip
     axes.semilogy(finer["eta"], _percent(finer["delta"], exact(finer["eta"], arm=True)), "s", color="tab:orange", ms=6,
                   label=f"3D elasticity, {finer['along']} elements along: less of the mesh's error")  # fmt: skip
-    axes.semilogy(clamped["eta"], _percent(clamped["delta"], exact(clamped["eta"], arm=True)), "D", color="tab:orange", ms=6,
+    axes.semilogy(clamped["eta"], _percent(clamped["delta"], exact(clamped["eta"], arm=True)), "D", color="tab:orange",
+                  ms=6,
                   label="3D elasticity with the foot's face fixed altogether")  # fmt: skip
     for name, colour in _GREEN.items():
         _, eta, delta, turn = _branch(curves, name)
@@ -115,7 +118,7 @@ def _elements(name):
 
 
 def _limit_points(axes, found):
-    """Numbers at the stars."""
+    """Label the limit points (stars) with numbers."""
     for name, place in (("1", (0.03, 0.72)), ("2", (0.17, 1.15)), (str(MANY), (0.33, 1.6))):
         top = found[name]["limit_point"]
         words = f"limit point, {_elements(name)}:\n" rf"$\eta$ = {top['eta']:.3f}, $\delta$ = {top['delta']:.2f} m"

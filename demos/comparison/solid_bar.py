@@ -1,10 +1,10 @@
 """The circular bar itself as a three-dimensional St Venant-Kirchhoff solid: second-order hexahedra, on dolfinx.
 
-One half of the bar, y >= 0, with the plane y = 0 as a plane of symmetry: it bends towards x and nowhere else, as the planar
-rods do. The end face carries the eccentric force as a dead traction, linear over the face, whose resultant is the force
-and its moment about the centroid. The traction stays on its material points, which turn with the face: its partner among
-the rods is the force on an arm (`EccentricForce`), not the constant moment.
-Inside, lengths are in units of L and stresses in units of EI/L^4, for the EI of the circle.
+One half of the bar, y >= 0, with the plane y = 0 as a plane of symmetry: it bends towards x only, as the planar rods
+do. The end face carries the eccentric force as a dead traction, linear over the face, whose resultant is the force and
+its moment about the centroid. The traction stays on its material points, which rotate with the face: the comparable
+load of a rod is the force on an arm (`EccentricForce`), not the constant moment. Inside, lengths are in units of L and
+stresses in units of EI/L^4, for the EI of the circle.
 """
 
 import basix
@@ -33,8 +33,9 @@ class SolidBar:
         column: `Column`.
         along: elements along the bar.
         refinement: elements along an eighth of the circle.
-        clamp: "plane" keeps the foot's face plane (u_z = 0, its centre fixed) and lets it contract, as a rod's clamp holds
-            the section's place and direction and not its shape; "face" fixes all of it, and the mesh is finer there.
+        clamp: "plane" keeps the foot's face plane (u_z = 0, its centre fixed) but lets it contract, as a rod's clamp
+            fixes the position and direction of the section but not its shape; "face" fixes all of it, and the mesh is
+            finer there.
 
     Attributes:
         along: elements along the bar, as asked for.
@@ -52,7 +53,7 @@ class SolidBar:
         radius = column.diameter / column.length / 2
         points, quads = half_disc(radius, refinement)
         levels = np.linspace(0, 1, along + 1)
-        if clamp == "face":  # the disturbance fades within a diameter
+        if clamp == "face":  # the disturbance decays within a diameter
             levels = np.union1d(levels, 2 * radius * np.array([0.05, 0.125, 0.25, 0.5, 1.0]))
         x, cells = swept(points, quads, levels)
         self.elements = len(cells)
@@ -143,11 +144,12 @@ class SolidBar:
         return found.reshape(b.T.shape).T
 
     def negative_modes(self, x, eta):
-        """Negative eigenvalues of the tangent that was factorised last: at a converged state, the one before its last step."""
+        """Negative eigenvalues of the last tangent that was factorised: the one before the last Newton step."""
         return self._solver.getPC().getFactorMatrix().getInertia()[0]
 
     def carried(self, coarser, x):
-        """The state x of a bar with the same section and other elements along it, on this one's nodes: splines along z.
+        """The state x of a bar with the same mesh of the section and other elements along it, interpolated by splines
+        in z.
 
         Args:
             coarser: a `SolidBar` of the same refinement.
@@ -165,7 +167,8 @@ class SolidBar:
         return np.lexsort(places.T[[2, 1, 0]]), np.unique(places[:, 2]) / 1e9
 
     def tip(self, x):
-        """(delta, shortening, rotation) of the end face's centre: m, m, rad (of the material line along x through it)."""
+        """(delta, shortening, rotation) of the end face's centre: m, m,
+        rad (of the material line along x through it)."""
         return tuple(x[3 * self._tip : 3 * self._tip + 3][[0, 2]] * self.column.length * (1, -1)) + (np.nan,)
 
 
@@ -185,6 +188,6 @@ def _cholesky(A):
     pc.setFactorSolverType("mumps")
     pc.setFactorSetUpSolverType()
     factor = pc.getFactorMatrix()
-    factor.setMumpsIcntl(14, 200)  # room for fill: too little of it fails without a word
-    factor.setMumpsIcntl(24, 1)  # null pivots are counted apart, which the count of negative ones asks for
+    factor.setMumpsIcntl(14, 200)  # % extra memory for fill-in: too little fails without a message
+    factor.setMumpsIcntl(24, 1)  # null pivots are counted separately from negative ones
     return solver

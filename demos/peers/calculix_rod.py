@@ -1,8 +1,8 @@
 """CalculiX: quadratic beams with reduced integration (B32R), which it expands into solid elements; see `speak`.
 
-Clamped and loaded ends are solid ends too: about 2e-3 of the deflection at the load factor 0.9 that no mesh removes.
-The sample is the whole program, which has no warm state: reading the input deck is a small part of it. Every load
-factor is a step of its own; the program chooses increments inside it. Displacements are printed with seven digits.
+Clamped and loaded ends are solids too, which causes an error of about 2e-3 of the deflection at the load factor 0.9 on
+any mesh. The sample is the whole program, which has no warm state: reading the input deck is a small part of it. Every
+load factor is a separate step, in which the program chooses increments. Displacements are printed with seven digits.
 """
 
 import itertools

@@ -9,12 +9,12 @@ _MODELS = {"planar ANCF cable": "shear-rigid", "planar elastic": "shear-rigid", 
 
 
 def model(peer, configuration):
-    """The mechanical model whose truth a configuration is held against."""
+    """The mechanical model whose reference solution a configuration is compared with."""
     return "Reissner" if peer == OWN else _MODELS.get(configuration["element"], "Reissner")
 
 
 def kind(peer, configuration):
-    """(what is compared: an own rung and formulation or a peer's element, whether it is spatial)."""
+    """(name of this package's model and formulation, or of the peer's element; whether it is spatial)."""
     if peer != OWN:
         return configuration["element"], configuration["element"].startswith("spatial")
     rung = configuration["model"]
@@ -53,7 +53,7 @@ def _own(problem):
 
 
 def _substeps(problem):
-    """Load steps from one load factor to the next, as few as may do; a peer's solver divides them where it can."""
+    """Load steps from one load factor to the next, as few as possible; most peers' solvers divide them if necessary."""
     more = {"single": (1, 3), "bend": (1, 4), "roll-up 1": (1, 4, 8), "roll-up 2": (2, 8, 16), "roll-up 4": (4, 16, 32)}
     return more.get(problem, (1,))
 
@@ -67,11 +67,11 @@ def _exudyn(problem):
         elif problem != "bend":
             found += _grid("planar 3-node", (4, 8, 16, 32, 64), (1e-3, 1e-5), substeps)
             found += _grid("planar ANCF cable", (8, 16, 32, 64), (1e-5,), substeps)
-        if problem != "bend":  # a hundred times slower there
+        if problem != "bend":  # there a hundred times slower
             found += _grid("spatial 2-node", (16, 48, 64, 128, 256), (1e-4,), substeps)
         if problem == "sweep":
             found += _grid("spatial 2-node", (512,), (1e-5,), substeps)
-        else:  # slower in the sweep
+        else:  # slower for the sweep
             found += _grid("spatial 2-node EP", (8, 16, 64, 256), (1e-4,), substeps)
     return found
 
@@ -80,7 +80,7 @@ def _opensees(problem):
     found, rolled = [], problem.startswith("roll-up")
     for substeps in _substeps(problem)[: 2 if rolled else None]:
         for space in ("spatial",) if problem == "bend" else ("planar", "spatial"):
-            if rolled:  # few of them come around
+            if rolled:  # few meshes and tolerances reach full turns
                 found += _grid(f"{space} elastic", (8, 32, 128), (1e-4,), substeps)
                 found += _grid(f"{space} CBDI", (8, 16, 32), (1e-5,), substeps)
                 continue

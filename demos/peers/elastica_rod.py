@@ -1,9 +1,9 @@
-"""PyElastica: an explicit dynamic rod, damped until it rests; see `speak` for what comes and goes.
+"""PyElastica: an explicit dynamic rod, damped until it rests; see `speak` for requests and answers.
 
 The sample is the whole relaxation from the unloaded state, load factor after load factor; numba has compiled before.
-Statics knows no inertia: the density only sets the unit of time, and the rotational inertia is raised until axial
-waves alone bound the step (thousands of steps less on slender rods). The damping is below critical for the
-lowest bending mode, and a load factor is done when the tip has moved by less than `tol` of the length in a period.
+Inertia does not affect the equilibrium: the density only sets the unit of time, and the rotational inertia is raised so
+that only axial waves limit the step (thousands of steps less for slender rods). The damping is below critical for the
+lowest bending mode, and a load factor is finished when the tip moves by less than `tol` of the length in a period.
 """
 
 import math
@@ -68,7 +68,8 @@ def _relax(problem, configuration):
 
 
 def _size(problem, n):
-    """Length of an element: half of one lies before the clamp, where the clamped director, its centre's, is then."""
+    """Length of an element: half of the first one lies before the
+    clamp, so that its clamped director is at the clamp."""
     return problem["length"] / (n - 0.5)
 
 
@@ -83,7 +84,8 @@ def _rod(problem, n, density):
     normals = np.tile([[0.0], [0.0], [1.0]], n)
     given["directors"] = np.stack([normals, np.cross(tangents, normals, axis=0), tangents])
     rod = ea.CosseratRod.straight_rod(
-        n, given["position"][:, 0], tangents[:, 0], normals[:, 0], size * n, math.sqrt(problem["area"] / math.pi), density,
+        n, given["position"][:, 0], tangents[:, 0], normals[:, 0], size * n, math.sqrt(problem["area"] / math.pi),
+        density,
         youngs_modulus=problem["EA"] / problem["area"], shear_modulus=problem["GA"] / problem["area"], **given,
     )  # fmt: skip
     shear = np.diag([problem["GA"], problem["GA"], problem["EA"]])

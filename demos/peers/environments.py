@@ -1,4 +1,4 @@
-"""An environment of its own for every peer, made once under the user's cache folder, with releases pinned."""
+"""A separate Python environment for every peer, made once in the user's cache folder, with fixed releases."""
 
 import hashlib
 import os
@@ -27,24 +27,24 @@ OWN = "cosserat_fenicsx"
 
 
 class Missing(Exception):
-    """A peer that is not there; says why."""
+    """A peer that is not installed; the message says why."""
 
 
 def cache():
-    """Where the environments are."""
+    """The folder of the environments."""
     given = os.environ.get("XDG_CACHE_HOME")
     return (Path(given) if given else Path.home() / ".cache") / "cosserat_fenicsx" / "peers"
 
 
 def command(peer, install=True):
-    """The command that starts a peer's process, its environment made first where it is missing.
+    """The command that starts a peer's process; a missing environment is made first.
 
     Args:
         peer: a key of SCRIPTS.
-        install: whether to go to the network for it.
+        install: whether to install it from the network.
 
     Raises:
-        Missing: the peer is not there and cannot be installed.
+        Missing: the peer is not installed and cannot be.
     """
     script = str(HERE / SCRIPTS[peer])
     if peer == OWN:
@@ -62,7 +62,7 @@ def command(peer, install=True):
 
 
 def surroundings(peer):
-    """Environment variables of a peer's process: one thread, and nobody else's packages."""
+    """Environment variables of a peer's process: one thread, no other packages."""
     given = {k: v for k, v in os.environ.items() if not k.startswith("PYTHON")}
     given |= {f"{name}_NUM_THREADS": "1" for name in ("OMP", "OPENBLAS", "MKL", "NUMBA")}
     if peer == OWN:
@@ -76,7 +76,7 @@ def surroundings(peer):
 
 
 def fingerprint(peer):
-    """Hash of what a peer's samples depend on here: its script and, for this package, the package."""
+    """Hash of the files that a peer's samples depend on: its script and, for this package, the package."""
     files = [HERE / name for name in (SCRIPTS[peer], "speak.py", "problems.py", "motions.py")]
     files += [file for file in [HERE / SCRIPTS[peer].replace("_rod", "_motion")] if file.exists()]
     if peer == OWN:
@@ -85,7 +85,7 @@ def fingerprint(peer):
 
 
 def _calculix(install):
-    """The program: Debian's, unpacked into the cache with the libraries that are not installed; no root needed."""
+    """Debian's program, unpacked into the cache with missing libraries, without root."""
     folder = cache() / "CalculiX"
     program = folder / "usr" / "bin" / "ccx"
     if (folder / "ready").exists():

@@ -1,7 +1,7 @@
 """Exudyn's motions: geometrically exact rods of two nodes in space under generalised alpha.
 
-The sample is one call of SolveDynamic from rest; the model is built and assembled before it. Rods meet in a joint that
-holds two nodes together, since a node's frame is that of its section at rest.
+The sample is one call of SolveDynamic from rest; the model is built and assembled before it. Rods are connected by a
+joint of two nodes, since a node's frame is that of its section at rest.
 """
 
 from itertools import pairwise

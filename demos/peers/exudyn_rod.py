@@ -1,8 +1,8 @@
-"""Exudyn: geometrically exact and ANCF rods under its static Newton solver; see `speak` for what comes and goes.
+"""Exudyn: geometrically exact and ANCF rods with its static Newton solver; see `speak` for requests and answers.
 
 The sample is one call of SolveStatic from the unloaded state over all load factors; the model is built and assembled
-before it. Where a step fails the solver halves it by itself. The tolerance is on the increments (residualMode 1): a
-tolerance on the residual is either too coarse or below its rounding.
+before it. The solver halves steps that fail. The tolerance is on the increments (residualMode 1): a tolerance on the
+residual is either too coarse or below its rounding error.
 """
 
 import math

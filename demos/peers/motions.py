@@ -1,9 +1,9 @@
-"""The motions of the chart of speed against accuracy: problems, truths, and which configurations are measured.
+"""The motions of the chart of speed against accuracy: problems, reference solutions and configurations.
 
-A problem is a dict that JSON can hold: straight rods from the first to the second of `lines` (m), each from where the one
-before ends, rigidly joined, clamped at the start if `clamped`; EA, GA (N), EI, GJ (N m^2), `mass` (kg/m), `inertia`
-(kg m, about d1, d2 and the tangent); a dead `force` (N) and `moment` (N m) at the end of the first rod that is named
-("start" or "end"), a triangle in time over `rise` (start, peak, end, s); the `duration` (s), and which ends are `watched`.
+A problem is a dict for JSON: straight rods, rigidly joined, each from the first to the second point of an entry of
+`lines` (m), clamped at the start if `clamped`; EA, GA (N), EI, GJ (N m^2), `mass` (kg/m), `inertia` (kg m, about d1, d2
+and the tangent); a dead `force` (N) and `moment` (N m) at the end of the first rod that is named ("start" or "end"), a
+triangle in time over `rise` (start, peak, end, s); the `duration` (s), and which ends are `watched`.
 """
 
 import numpy as np
@@ -46,7 +46,7 @@ def problems():
 
 
 def error(name, model, ends):
-    """Largest distance of the ends (n, 3) from where they should be, over the length of a rod.
+    """Largest error of the positions of the ends (n, 3), over the length of a rod.
 
     Args:
         name: of the problem; model: the mechanical model, one for all here.
@@ -55,12 +55,12 @@ def error(name, model, ends):
 
 
 def model(peer, configuration):
-    """The mechanical model whose truth a configuration is held against."""
+    """The mechanical model whose reference solution a configuration is compared with."""
     return "Reissner"
 
 
 def kind(peer, configuration):
-    """(what is compared: an own scheme or a peer's node and integrator, whether it is spatial)."""
+    """(name of this package's scheme, or of the peer's node and integrator; whether it is spatial)."""
     if peer == OWN:
         return configuration["scheme"] + (", by tol" if "tol" in configuration else ""), True
     return f"{configuration['node']}, {configuration['solver']}", True
@@ -88,12 +88,13 @@ def _own(problem):
 
 
 def _exudyn(problem):
-    """Nodes with rotation vectors (Lie group) and with Euler parameters; Newton's tolerances where they begin to spoil
-    the answer and where they no longer do; sparse LU, which wins from some 20 elements on; modified Newton (full Newton takes twice as long).
+    """Nodes with rotation vectors (Lie group) and with Euler parameters; tolerances of Newton's method that affect the
+    result and that do not; sparse LU, faster from about 20 elements on; modified Newton (full Newton takes twice as
+    long).
 
-    Tried beside these and left out, on the spaghetti: no numerical damping (the same time and error), EXUdense (slower
-    here), the trapezoidal index-2 solver (the same as generalised alpha), and the explicit Runge-Kutta method of order 4,
-    ten times slower at the largest step that is stable, 2 ms.
+    Also tried on the spaghetti, and left out: no numerical damping (the same time and error), EXUdense (slower), the
+    trapezoidal index-2 solver (the same as generalised alpha), and the explicit Runge-Kutta method of order 4, ten
+    times slower at the largest stable step, 2 ms.
     """
     spatial = problem == "spaghetti"
     meshes = (16, 28, 32, 40, 64) if spatial else (16, 24, 32, 40)

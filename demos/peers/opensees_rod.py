@@ -1,9 +1,10 @@
-"""OpenSeesPy: corotational frames in a plane or in space, Newton under load control; see `speak` for what comes and goes.
+"""OpenSeesPy: corotational frames in a plane or in space, Newton with load control; see `speak` for requests and
+answers.
 
 Elements: "elastic" is elasticBeamColumn, of second order; "CBDI" is forceBeamColumnCBDI, whose curvature-based
 displacements carry the force's moment inside the element: of high order. A step that fails is halved.
-The sample is the analysis alone, over all load factors, of a model that was built just before and is not counted:
-`reset` does not bring its spatial corotational transformation back to rest.
+The sample is the analysis over all load factors. The model is built anew for each sample, which is not counted, since
+`reset` does not restore its spatial corotational transformation.
 """
 
 import math
@@ -30,7 +31,7 @@ def _build(problem, configuration):
     if kind == "CBDI":
         numbers = (E, problem["EA"], EI) if not spatial else (E, problem["EA"], EI, EI, E, problem["GJ"])
         ops.section("Elastic", 1, *numbers)
-        ops.beamIntegration("Legendre", 1, 1, 2)  # more points cost more and gave less
+        ops.beamIntegration("Legendre", 1, 1, 2)  # more points were slower and less accurate
     for i in range(1, n + 1):
         if kind == "elastic":
             ops.element("elasticBeamColumn", i, i, i + 1, *section, 1)
@@ -71,7 +72,7 @@ def _analyse(problem, substeps, tip):
             if ops.analyze(1) == 0:
                 reached += step
             elif step > 1e-3 * factor:
-                step /= 2  # the failed step was taken back
+                step /= 2  # the failed step was undone
             else:
                 raise Stopped(f"no convergence beyond the load factor {reached:g}")
         u = ops.nodeDisp(tip)

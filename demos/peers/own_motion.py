@@ -1,4 +1,4 @@
-"""This package's motions as a peer's; the sample is the whole call of `simulate` and the query of the ends."""
+"""This package's motions; the sample is the whole call of `simulate` and the query of the ends."""
 
 from itertools import pairwise
 

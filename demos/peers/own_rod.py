@@ -1,7 +1,7 @@
-"""This package through its public face, as a peer among peers; see `speak` for what comes and goes.
+"""This package through its public interface; see `speak` for requests and answers.
 
-The sample is the whole call of `cosserat_fenicsx.solve` and the query of the tip, stability count included. Forms and
-solvers of the shape are kept by `solve` from the call before it (a warm cache); load, mesh data and path are new.
+The sample is the whole call of `cosserat_fenicsx.solve` and the query of the tip, stability count included. Compiled
+forms and solvers are those of the previous call (a warm cache); load, mesh data and path are new.
 """
 
 import numpy as np

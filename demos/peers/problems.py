@@ -1,7 +1,7 @@
-"""The problems of the chart of speed against accuracy, and their truths, one for each mechanical model.
+"""The problems of the chart of speed against accuracy, and their reference solutions, one for each mechanical model.
 
-A problem is a dict that JSON can hold: a rod of `length` (m), straight along x or an arc of `radius` (m) that leaves
-along x towards y, clamped at its start; EA, GA (N), EI, GJ (N m^2), and the rectangle and material that have them;
+A problem is a dict for JSON: a rod of `length` (m), straight along x or an arc of `radius` (m) that starts along x and
+bends towards y, clamped at its start; EA, GA (N), EI, GJ (N m^2), and the rectangle and material that have them;
 dead `force` (N) and `moment` (N m) on the tip, times each of the `load_factors`.
 """
 
@@ -59,7 +59,7 @@ def _bend():
 def problems():
     """{name: problem}."""
     compressed, bent = (-1.0, 0.0, 0.0), (0.0, 0.0, 1.0)
-    # A closed polygon closes for any number of turns and on any mesh: a quarter of a turn before that tells them apart.
+    # A full number of turns closes on any mesh, so that the load ends a quarter of a turn before.
     rolls = {f"roll-up {k}": _column([1 - 0.25 / k, 1.0], (0, 0, 0), (0, 0, 2 * math.pi * k)) for k in (1, 2, 4)}
     return {
         "sweep": _column(np.linspace(0.05, 1.5, 31), compressed, bent),
@@ -69,7 +69,7 @@ def problems():
     }
 
 
-#: What a reader sees above a chart.
+#: Titles of the charts.
 TITLES = {
     "sweep": "Eccentric cantilever, 31 load factors from 0.05 to 1.5",
     "single": "Eccentric cantilever, one answer at load factor 0.9",
@@ -82,7 +82,7 @@ TITLES = {
 
 @cache
 def truth(name, model):
-    """Displacements of the tip at the load factors, (n, 3) m, by means that share nothing with the solvers.
+    """Displacements of the tip at the load factors, (n, 3) m, independent of all solvers.
 
     Args:
         name: of the problem.
@@ -102,7 +102,7 @@ def truth(name, model):
 
 
 def _shot(problem, GA):
-    """The strong form of the bend, shot and collocated to 1e-10 by the tests' own solver."""
+    """The strong form of the bend, by shooting and collocation to 1e-10 (tests/bvp.py)."""
     sys.path.append(str(Path(__file__).resolve().parents[2] / "tests"))
     import bvp
 

@@ -1,4 +1,4 @@
-"""A peer's process: requests go in, answers come out, and a sample that takes too long ends it."""
+"""The process of a peer, which answers requests and is ended if a sample takes too long."""
 
 import json
 import select
@@ -9,7 +9,7 @@ from peers.environments import command, surroundings
 
 
 class Peer:
-    """Started at its first request and again after it was ended; use as a context.
+    """Started at its first request, and again after it was ended; a context manager.
 
     Args:
         name: as in `environments.SCRIPTS`.
@@ -26,7 +26,7 @@ class Peer:
         self.end()
 
     def ask(self, problem, configuration, *, warm, samples, limit):
-        """The answer of `speak.serve`, or {"failed": ...} after limit seconds."""
+        """The answer of `speak.serve`, or {"failed": ...} after `limit` seconds."""
         request = {"problem": problem, "configuration": configuration, "warm": warm, "samples": samples}
         process = self._running()
         try:

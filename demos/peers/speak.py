@@ -1,8 +1,8 @@
-"""The language between `work_precision` and a peer's process: JSON, one line a request and one line an answer.
+"""The protocol between `work_precision` and a peer's process: JSON, one line per request and one per answer.
 
-Standard library alone, since every peer runs in an environment of its own. A request holds the problem (see
-`problems.py`), the configuration, how often to warm up and how many samples to take. An answer holds the processor
-time (s) of every sample and the displacement of the tip at every load factor, (n, 3) m; or what went wrong.
+It uses the standard library only, since every peer has its own environment. A request has the problem (see
+`problems.py`), the configuration, the number of warm-up runs and the number of samples. An answer has the processor
+time (s) of every sample and the displacement of the tip at every load factor, (n, 3) m; or the error.
 """
 
 import json
@@ -13,7 +13,7 @@ import time
 
 
 class Stopped(Exception):
-    """The peer's solver did not reach every load factor; says in a few words what happened."""
+    """The peer's solver did not reach every load factor; the message gives the reason."""
 
 
 def serve(prepare, versions):
@@ -22,11 +22,11 @@ def serve(prepare, versions):
     Args:
         prepare: prepare(problem, configuration) builds the model once, outside of every sample, and returns solve();
             solve() goes from the unloaded state over all load factors and returns the tip's displacements. It may
-            return (tip, seconds), the processor time of its own choosing, where not all of it counts.
+            return (tip, seconds) with a processor time of its own if not all of it is to be counted.
         versions: names and versions, for the record.
     """
     out = os.fdopen(os.dup(1), "w", encoding="utf-8")
-    os.dup2(2, 1)  # what a peer prints is not an answer
+    os.dup2(2, 1)  # other output of a peer goes to stderr
     kept = {}
     for line in sys.stdin:
         request = json.loads(line)

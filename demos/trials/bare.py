@@ -1,6 +1,7 @@
-"""Newton's method by hand on dolfinx and PETSc: this package's own forms, and one habit at a time that this package avoids.
+"""Newton's method by hand on dolfinx and PETSc with this package's forms, with one common choice at a time that the
+package avoids.
 
-What a short script does: assemble, fix the clamp's rows, give PETSc's SNES its head. The rows may be put into N and N m first.
+As in a short script: assemble, fix the clamp's rows, solve by PETSc's SNES. The rows may be scaled to N and N m first.
 """
 
 from contextlib import ExitStack
@@ -33,9 +34,9 @@ class Loop:
         problem: see `trials.problems`.
         predict: start from the secant through the last two states.
         weak: see `weakly_unit`.
-        held: components of the clamped node that are fixed: r, then q.
+        held: components of the clamped node that are fixed, in the order r, q.
         line_search: PETSc's name; None for its default.
-        solver: of LU: "klu", or "petsc", which does not pivot.
+        solver: for LU: "klu", or "petsc", which does not pivot.
         relative: SNES's relative tolerance on the residual; None to stop on the increment, by 1e-11.
         in_si: whether the rows of the residual are in N, N m and m, instead of this package's units.
         formulation, degree, points, elements: of the package's model.
@@ -45,7 +46,7 @@ class Loop:
                  formulation="displacement", degree=2, points=None, elements=8, predict=False, weak=False):  # fmt: skip
         _, scene = problems.scene_of(problem)
         layout = Layout.of(scene, elements)
-        self._lease = ExitStack()  # never closed: the problem is this loop's for good
+        self._lease = ExitStack()  # never closed: the problem is not returned to the pool
         lent = solvers.solvers_of(scene, layout, formulation=formulation, degree=degree, points=points)
         loaded, _, _ = self._lease.enter_context(lent)
         self.problem, self.model = problem, loaded.model
@@ -116,10 +117,10 @@ class Loop:
         return reason.DIVERGED_MAX_IT if iteration >= 60 else reason.CONVERGED_ITERATING
 
     def to(self, eta):
-        """Newton to a load factor from where it is; the tip's displacement, (3,) m.
+        """Newton's method from the current state to a load factor; the tip's displacement, (3,) m.
 
         Raises:
-            Stopped: PETSc says so.
+            Stopped: PETSc reports divergence.
         """
         self.eta = eta
         self.known.append(None)
@@ -139,7 +140,8 @@ class Loop:
 
 
 def weakly_unit(model):
-    """Residual and tangent of eq. (1) as it reads: |q|^2 = 1 is tested with the Gauss points of the rest, not at the nodes."""
+    """Residual and tangent of eq. (1) with |q|^2 = 1 integrated with the
+    Gauss points of the other terms, not at the nodes."""
     U, data = model.state, model.data
     w, trial = ufl.TestFunction(model.space), ufl.TrialFunction(model.space)
     section = equilibrium.Section(law_of(data.K, data.K_inv, data.J, data.G), as_matrix(data.R_R), data.v_R)
@@ -158,20 +160,20 @@ def weakly_unit(model):
 
 @dataclass(frozen=True)
 class Bare:
-    """A column of the map; see `methods`."""
+    """A column of the table; see `methods`."""
 
     key: str = "bare"
     title: str = "bare loop on\ndolfinx, PETSc"
     what: str = (
-        "a short loop on PETSc's SNES over this package's own form of eq. (1), degree 2, 8 elements, one habit at a time that the package avoids; "
-        "no count of negative modes"
+        "a short loop on PETSc's SNES over this package's own form of eq. (1), degree 2, 8 elements, one habit at a"
+        " time that the package avoids; no count of negative modes"
     )
     spatial: bool = True
     own: bool = False
     turn: tuple = (0.0, 0.0, 0.0)
 
     def solve(self, problem, jump=False):
-        """Jumps alone: everything else is this package's own answer."""
+        """Only problems with `jump`; for all others the answer would be this package's."""
         if not jump:
             raise NotForIt("the package's own equations: only jumps and loops are its matter")
         tip = Loop(problem, line_search="basic").to(problem["load_factors"][0])
@@ -182,11 +184,13 @@ class Bare:
         infinite = key == "lu"
         problem = problems.column([0.9], 1e3 if key == "residual" else 1e2, infinite=infinite)
         options, etas, note = {
-            "residual": ({"relative": 1e-6, "in_si": True, "predict": True}, (0.3, 0.6, 0.9), "rtol 1e-6, three steps with a secant predictor"),
+            "residual": ({"relative": 1e-6, "in_si": True, "predict": True}, (0.3, 0.6, 0.9),
+                         "rtol 1e-6, three steps with a secant predictor"),
             "line_search": ({"line_search": None}, (0.9,), ""),
             "clamp": (
                 {"held": (0, 1, 2, 4, 5, 6), "weak": True}, (0.1, 0.3, 0.5, 0.7, 0.9),
-                "|q| = 1 weakly, in five steps: q_a of the clamp drifts; where |q| = 1 is asked for at the nodes, as this package does, it stays",
+                "|q| = 1 weakly, in five steps: q_a of the clamp drifts; where |q| = 1 is asked for at the nodes, as "
+                "this package does, it stays",
             ),
             "lu": ({"solver": "petsc", "formulation": "mixed"}, (0.9,), ""),
             "quadrature": ({"points": 3, "elements": 4}, (0.9,), "4 elements of degree 2, 3 Gauss points"),

@@ -1,4 +1,4 @@
-"""The trials: what is tried, what right means, and how a method's answers become a cell."""
+"""The trials: the problem, the criterion, and the cell for a method's answers."""
 
 from dataclasses import dataclass, replace
 from functools import cache
@@ -16,11 +16,11 @@ _FLUTTER = 20.05095
 
 @dataclass(frozen=True)
 class Trial:
-    """A row of the map.
+    """A row of the table.
 
     Attributes:
         key, title: its name, in short and for the reader.
-        tried: what is tried and what right means, a sentence or two.
+        tried: the problem and the criterion, in a sentence or two.
         run: from a method to a `Cell`; raises what the method raises.
     """
 
@@ -31,7 +31,7 @@ class Trial:
 
 
 def _column(etas, judged_from, limit=1e-2, jump=False, **more):
-    """delta of the column, judged from a load factor on."""
+    """delta of the column, whose error counts from a load factor on."""
 
     def run(method):
         problem = problems.column(etas, **more)
@@ -43,13 +43,13 @@ def _column(etas, judged_from, limit=1e-2, jump=False, **more):
 
 
 def _delta_error(problem, answer):
-    """At the load factors that there are answers for: all of them, or the last."""
+    """The error at the load factors of the answer: all of them, or the last."""
     error = np.abs(answer.tip[:, 1] / problems.column_truth(problem)[-len(answer.tip) :, 1] - 1)
     return np.where(np.isnan(error), np.inf, error)
 
 
 def _tips(answer, truth, problem):
-    """Largest distance of the tips from the truth, in lengths."""
+    """Largest error of the tips' positions over the length."""
     both = min(len(answer.tip), len(truth))
     error = np.linalg.norm(answer.tip[-both:] - truth[-both:], axis=1) / problem["length"]
     return float(np.where(np.isnan(error), np.inf, error).max())
@@ -91,7 +91,7 @@ def _limit_point(method):
 
 
 def _locking(method):
-    """Few elements on a straight rod and on an arc, a thousand times longer than thick."""
+    """Locking: few elements on a straight rod and on an arc, a thousand times longer than thick."""
     straight = {**problems.column([0.5], 1e3), "coarse": True}
     answer = method.solve(straight)
     errors, notes = [_delta_error(straight, answer).max()], []
@@ -133,7 +133,7 @@ def _units(method):
 
 
 def _numerics(key, limit=1e-4):
-    """What concerns loops on PETSc: the method knows what the trial is to it."""
+    """Trials of loops on PETSc, which the method defines in `numerics`."""
 
     def run(method):
         problem, answer, value, unit = method.numerics(key)
@@ -145,14 +145,14 @@ def _numerics(key, limit=1e-4):
 
 
 def _flutter(method):
-    """Its word on stability, by load factor, against Beck's: stable up to flutter."""
+    """Its statement on stability at each load factor against Beck's column, which is stable up to flutter."""
     problem = problems.beck()
     answer, unit = method.solve(problem), "flutter load"
     loads = np.array(problem["load_factors"])
     wrong = (loads < _FLUTTER) != answer.stable
     if not wrong.any():
         return Cell(RIGHT, loads[-1] / _FLUTTER, unit, answer.said)
-    # each wrong word must be taken back by one of its own
+    # a wrong statement must come with a warning of its own
     missed, feared = wrong & answer.stable, wrong & ~answer.stable
     excused = all(
         words in answer.said for words, which in (("flutter", missed), ("may be stable", feared)) if which.any()
@@ -167,77 +167,100 @@ def _flutter(method):
 
 
 _JUMP = (
-    "The whole load at once, in one Newton solution from the straight rod; the default is asked for that load factor alone and steps as it "
-    "likes. Right: the stable equilibrium that a growing load leads to, delta within 1 %."
+    "The whole load at once, in one Newton solution from the straight rod; the default is asked for that load factor"
+    " alone and steps as it likes. Right: the stable equilibrium that a growing load leads to, delta within 1 %."
 )
 TRIALS = (
     Trial("truncated", "truncated rotations\n(column, eta = 0.6)",
-          "The paper's column at 0.6 of its critical load, where the tip turns by 0.03 rad: rotations that are truncated already show. Right: delta "
+          "The paper's column at 0.6 of its critical load, where the tip turns by 0.03 rad: rotations that are "
+          "truncated already show. Right: delta "
           "within 1 % of the exact rod.", _column([0.2, 0.4, 0.6], 0.6)),
     Trial("pole", "eq. (8) at its pole\n(column, eta = 0.95 and 1)",
-          "The column close to and at its critical load, where the secant formula of second order has a pole and the rod has none: delta = 3.89 m and "
+          "The column close to and at its critical load, where the secant formula of second order has a pole and the "
+          "rod has none: delta = 3.89 m and "
           "6.70 m. Right: delta within 1 % at both.", _column([0.5, 0.8, 0.9, 0.95, 1.0], 0.95)),
     Trial("jump_1.1", "one jump to eta = 1.1", _JUMP, _column([1.1], 0, jump=True)),
     Trial("jump_1.5", "one jump to eta = 1.5", _JUMP, _column([1.5], 0, jump=True)),
     Trial("jump_4", "one jump to eta = 4", _JUMP, _column([4.0], 0, jump=True)),
     Trial("limit", "limit point under load control\n(shallow clamped arch)",
-          "A shallow clamped arch is loaded to 1.3 times its limit load in 13 steps of the load. Right: the limit point is reported, its load "
-          "within 1 %; a method that stops there and says so has stopped; one that snaps through without a word is silently wrong.", _limit_point),
+          "A shallow clamped arch is loaded to 1.3 times its limit load in 13 steps of the load. Right: the limit "
+          "point is reported, its load "
+          "within 1 %; a method that stops there and says so has stopped; one that snaps through without a word is "
+          "silently wrong.", _limit_point),
     Trial("roll", "roll-up past one turn\n(2 turns, 16 steps)",
-          "An end moment of 2 * 2 pi EI/L in 16 steps closes two circles. Right: the tip within 1 % of the length at every step.", _rolled(2, 16, 1e-2)),
+          "An end moment of 2 * 2 pi EI/L in 16 steps closes two circles. Right: the tip within 1 % of the length at "
+          "every step.", _rolled(2, 16, 1e-2)),
     Trial("ten", "ten turns\n(80 steps)",
-          "The same with ten turns in 80 steps. Right: the tip within 1 % of the length at every step.", _rolled(10, 80, 1e-2)),
+          "The same with ten turns in 80 steps. Right: the tip within 1 % of the length at every step.",
+          _rolled(10, 80, 1e-2)),
     Trial("through", "rotation through 2 pi\n(twist of 1.25 turns)",
-          "A rod of small torsional stiffness, twisted by 1.25 turns by a tip moment while a force bends it, in 20 steps. Right: the tip within 1 % "
+          "A rod of small torsional stiffness, twisted by 1.25 turns by a tip moment while a force bends it, in 20 "
+          "steps. Right: the tip within 1 % "
           "of the length.", _twisted),
     Trial("steps", "path dependence\n(8, 10 and 160 steps)",
-          "The rod twisted by 1.25 turns and bent (for methods in a plane: the column at eta = 0.5) in 8, 10 and 160 equal steps. Right: one "
+          "The rod twisted by 1.25 turns and bent (for methods in a plane: the column at eta = 0.5) in 8, 10 and 160 "
+          "equal steps. Right: one "
           f"and the same tip {ways.SAME}.", ways.steps),
     Trial("order", "path dependence\n(force then moment)",
-          "A force and a moment on the tip, in space where the method knows it: together, the force first, the moment first. Right: one and the same "
+          "A force and a moment on the tip, in space where the method knows it: together, the force first, the moment "
+          "first. Right: one and the same "
           f"tip {ways.SAME}.", ways.order),
     Trial("objectivity", "objectivity\n(all turned)",
-          "A loaded rod, and the same with its clamp turned and its loads turned with it: by 1.33 rad about an odd axis, 1.2 rad in a plane, for programs "
-          "whose runner cannot turn a clamp the loads alone, by 0.7 rad about the axis of a rod that is alike in all directions. Right: the answer "
+          "A loaded rod, and the same with its clamp turned and its loads turned with it: by 1.33 rad about an odd "
+          "axis, 1.2 rad in a plane, for programs "
+          "whose runner cannot turn a clamp the loads alone, by 0.7 rad about the axis of a rod that is alike in all "
+          "directions. Right: the answer "
           f"turns with them, {ways.SAME}.", ways.objective),
     Trial("locking", "shear and membrane locking\n(L/d = 1000, few elements)",
-          "Two thin rods, a straight one in compression at eta = 0.5 and a quarter of a circle bent in its plane, with few elements: 4 of second order, 8 "
+          "Two thin rods, a straight one in compression at eta = 0.5 and a quarter of a circle bent in its plane, with "
+          "few elements: 4 of second order, 8 "
           "of first. Right: within 10 %, what few elements may cost; locking costs ten times more.", _locking),
     Trial("slender", "slenderness to 1e5\n(column, eta = 0.9)",
           "The column with L/d = 1e2, 1e3, 1e4, 1e5, at eta = 0.5 and 0.9. Right: delta within 1 % for all.", _slender),
     Trial("inextensible", "inextensible limit\n(EA = GA = infinity)",
-          "The column with infinite EA and GA, eta = 0.9; where a method needs a number, 1e10 EI/L^2. Right: delta within 1 % of the elastica.",
+          "The column with infinite EA and GA, eta = 0.9; where a method needs a number, 1e10 EI/L^2. Right: delta "
+          "within 1 % of the elastica.",
           _column([0.3, 0.6, 0.9], 0.9, infinite=True)),
     Trial("units", "unit systems\n(N m and MN mm)",
           "The same column in N and m and in MN and mm. Right: the same delta to 1e-6.", _units),
     Trial("residual", "false convergence of\nresidual norms (L/d = 1000)",
-          "The column at eta = 0.9, L/d = 1000. This package and Figure 3's beams by their own test, which asks for a small increment as well; the bare loop and the "
-          "programs stop on the norm of the residual in N and N m alone, as many codes do. Right: delta within 1e-4 of what the same mesh converges to.",
+          "The column at eta = 0.9, L/d = 1000. This package and Figure 3's beams by their own test, which asks for a "
+          "small increment as well; the bare loop and the "
+          "programs stop on the norm of the residual in N and N m alone, as many codes do. Right: delta within 1e-4 of "
+          "what the same mesh converges to.",
           _numerics("residual")),
     Trial("line_search", "PETSc's default line search\n(column, eta = 0.9)",
-          "The column at eta = 0.9 from the straight rod in one Newton solution on 8 elements; this package's columns take Newton's full steps, as its "
-          "solver does, and the bare loop, on the form and mesh of the column `displacement`, has PETSc's default line search, `bt`. The default takes full "
-          "steps too, but goes to the load in steps of its own. The number is Newton iterations. Right: delta within 1e-4 of what the same mesh gives in steps.", _numerics("line_search")),
+          "The column at eta = 0.9 from the straight rod in one Newton solution on 8 elements; this package's columns "
+          "take Newton's full steps, as its "
+          "solver does, and the bare loop, on the form and mesh of the column `displacement`, has PETSc's default line "
+          "search, `bt`. The default takes full "
+          "steps too, but goes to the load in steps of its own. The number is Newton iterations. Right: delta within "
+          "1e-4 of what the same mesh gives in steps.", _numerics("line_search")),
     Trial("clamp", "a clamp that fixes three of\nfour quaternion components",
-          "The column at eta = 0.9; the bare loop fixes (q_b, q_c, q_d) at the clamp and leaves q_a to |q| = 1, where this package fixes all four. Right: delta within 1e-4.", _numerics("clamp")),
+          "The column at eta = 0.9; the bare loop fixes (q_b, q_c, q_d) at the clamp and leaves q_a to |q| = 1, where "
+          "this package fixes all four. Right: delta within 1e-4.", _numerics("clamp")),
     Trial("lu", "LU without pivoting\n(inextensible column)",
-          "The inextensible column at eta = 0.9, whose contact force is a field of unknowns: a saddle point; the bare loop factors it with PETSc's own LU, "
+          "The inextensible column at eta = 0.9, whose contact force is a field of unknowns: a saddle point; the bare "
+          "loop factors it with PETSc's own LU, "
           "which does not pivot, where this package takes one that does. Right: delta within 1e-4.", _numerics("lu")),
     Trial("quadrature", "more Gauss points than the\ndegree (column, eta = 0.9)",
-          "The column at eta = 0.9 with p + 1 Gauss points an element of degree p: 4 elements of degree 2 in the bare loop, which locks; this package "
+          "The column at eta = 0.9 with p + 1 Gauss points an element of degree p: 4 elements of degree 2 in the bare "
+          "loop, which locks; this package "
           "is asked for tol = 1e-4 and refines. Right: delta within 1e-3.", _numerics("quadrature", 1e-3)),
     Trial("flutter", "follower load\n(Beck's column to 25 EI/L^2)",
-          "A compressive force that turns with the tip, in steps of 5 EI/L^2: stable up to 20.05, where it flutters, which statics has no way to see. "
-          "Right: stable and unstable as they are; said so: the method itself says of what it gets wrong that it may be otherwise. The number is where it is wrong first.", _flutter),
+          "A compressive force that turns with the tip, in steps of 5 EI/L^2: stable up to 20.05, where it flutters, "
+          "which statics has no way to see. "
+          "Right: stable and unstable as they are; said so: the method itself says of what it gets wrong that it may "
+          "be otherwise. The number is where it is wrong first.", _flutter),
 )  # fmt: skip
 BY_KEY = {trial.key: trial for trial in TRIALS}
 
 
 def _quick(trial):
-    """The same trial with less to do, for a minute's run and for tests."""
+    """The same trial with fewer steps, for quick runs and tests."""
     less = {"ten": _rolled(4, 8, 1e-2, mesh=16)}
     return replace(trial, run=less[trial.key]) if trial.key in less else trial
 
 
-#: The trials of the quick map, where few of the ten turns stand for those of "roll" as well.
+#: The trials of the quick table, without "roll", since the quick "ten" is as short as that.
 QUICK = tuple(_quick(trial) for trial in TRIALS if trial.key != "roll")

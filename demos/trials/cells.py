@@ -1,4 +1,4 @@
-"""A cell of the map: one number of one method on one trial, and what became of it."""
+"""A cell of the table: a number and a verdict for a method on a trial."""
 
 import re
 from dataclasses import asdict, dataclass
@@ -21,9 +21,9 @@ class Cell:
     Attributes:
         verdict: one of VERDICTS.
         value: the number; None where there is none.
-        unit: of the number, in words.
-        note: why, in a few words.
-        seconds: that it took.
+        unit: of the number, as text.
+        note: a short reason.
+        seconds: computing time.
     """
 
     verdict: str
@@ -33,7 +33,7 @@ class Cell:
     seconds: float = 0.0
 
     def plain(self):
-        """As JSON holds it: infinity and nan as words."""
+        """A dict for JSON, with infinity and nan as strings."""
         found = asdict(self)
         if self.value is not None and not np.isfinite(self.value):
             found["value"] = str(self.value)
@@ -41,7 +41,7 @@ class Cell:
 
     @classmethod
     def of(cls, plain):
-        """The cell that `plain` was made of."""
+        """The cell from the result of `plain`."""
         value = plain["value"]
         return cls(**{**plain, "value": float(value) if isinstance(value, str) else value})
 
@@ -53,15 +53,15 @@ class Cell:
 
 @dataclass(frozen=True)
 class Answer:
-    """What a method answers.
+    """The answer of a method.
 
     Attributes:
         tip: displacements of the tip at the load factors, (n, 3) m; nan where the method has none.
-        said: what the method itself says against its answer, in words; empty where it says nothing.
+        said: warnings of the method about its answer, as text; empty without any.
         note: more about the answer.
         events: load factors of the limit points it reports.
-        iterations: Newton's, where they are known.
-        stable: what it calls stable, by load factor, (n,) bool; None where it has no word on that.
+        iterations: Newton iterations, where known.
+        stable: whether the method reports stability at each load factor, (n,) bool; None if it does not report it.
     """
 
     tip: np.ndarray
@@ -73,11 +73,11 @@ class Answer:
 
 
 class Stopped(Exception):
-    """The method gave up, and said so.
+    """The method stopped with an error.
 
     Args:
-        words: its own.
-        reached: the last load factor that it has an answer for; nan where nobody knows.
+        words: its message.
+        reached: the last load factor with an answer; nan if unknown.
     """
 
     def __init__(self, words, reached=np.nan):
@@ -86,21 +86,21 @@ class Stopped(Exception):
 
 
 def load_factor_in(words):
-    """The load factor that was reached by a path's last words; nan where they name none."""
+    """The load factor named in the error message of a path; nan if there is none."""
     found = re.search(r"beyond the load factor ([-+.e\d]*\d)", str(words))
     return float(found[1]) if found else np.nan
 
 
 class NotForIt(Exception):
-    """The method does not have what the trial asks for; says what."""
+    """The method lacks a feature that the trial needs; the message names it."""
 
 
 class NotInstalled(Exception):
-    """The method's program is not here."""
+    """The method's program is not installed."""
 
 
 def judged(error, limit, answer, unit, note=""):
-    """The cell of an answer with an error that may be as large as `limit`."""
+    """The cell of an answer whose error may be at most `limit`."""
     if error <= limit:
         verdict = RIGHT
     else:

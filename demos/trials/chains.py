@@ -13,7 +13,7 @@ from trials import problems
 from trials.cells import Answer, NotForIt, Stopped, load_factor_in
 
 ELEMENTS = 64
-#: For stiffnesses that a method cannot take as infinite, in EI/L^2.
+#: In place of infinite stiffnesses, which a method does not support, in EI/L^2.
 NEXT_TO_INFINITE = 1e10
 
 
@@ -42,7 +42,7 @@ class LoadedChain(Chain):
         self.law = lambda nodal: self._along(straight, nodal)
 
     def _along(self, law, nodal):
-        """The law of elements along x, for elements at their own angles; rotations are measured from those."""
+        """The law of elements along x, applied to elements at other angles, from which rotations are measured."""
         c, s = np.cos(self.angles), np.sin(self.angles)
         Q = np.zeros((len(nodal), 6, 6))
         for k in (0, 3):
@@ -52,7 +52,7 @@ class LoadedChain(Chain):
         return np.einsum("nji,nj->ni", Q, gradient), np.einsum("nji,njk,nkl->nil", Q, hessian, Q)
 
     def turn(self, angle):
-        """Turn clamp and loads about the clamp by an angle; returns what takes a state along."""
+        """Rotate clamp and loads about the clamp by an angle; returns a function that rotates a state likewise."""
         c, s = np.cos(angle), np.sin(angle)
         rotation = np.array([[c, -s], [s, c]])
         self.base = np.array([0.0, 0.0, angle])
@@ -88,7 +88,8 @@ class LoadedChain(Chain):
         return band
 
     def negative_modes(self, x, eta):
-        """Negative eigenvalues of the tangent; where a load follows, real ones of an unsymmetric tangent."""
+        """Number of negative eigenvalues of the tangent; under follower
+        loads of real ones of the unsymmetric tangent."""
         if not self.follows:
             return super().negative_modes(x, eta)
         found = np.linalg.eigvals(dense(self._tangent(x, eta)))
@@ -110,7 +111,7 @@ def dense(band):
 
 
 class Guided:
-    """A chain whose tip moves along y alone and does not turn, as a problem of `follow`."""
+    """A chain whose tip moves along y only and does not rotate, as a problem of `follow`."""
 
     def __init__(self, chain):
         self.chain, self.size = chain, chain.size - 2
@@ -139,7 +140,7 @@ class Guided:
 
 @dataclass(frozen=True)
 class ChainMethod:
-    """A column of the map; see `methods`."""
+    """A column of the table; see `methods`."""
 
     key: str
     title: str
@@ -176,7 +177,7 @@ class ChainMethod:
         )
 
     def _turned(self, chain, point, angle):
-        """The end of the path, turned with clamp and loads by parts of the angle, and solved again after each."""
+        """The end of the path, rotated with clamp and loads in parts of the angle, and solved again after each part."""
         x, parts = point.x, 12
         for _ in range(parts):
             base = chain.base[2]
@@ -225,7 +226,7 @@ class ChainMethod:
 
 
 def _elements(problem):
-    """Few where locking is looked for, and where unsymmetric eigenvalues are."""
+    """Number of elements: few in trials of locking, and where unsymmetric eigenvalues are computed."""
     few = 8 if problem.get("coarse") else 16 if problem.get("follower") else ELEMENTS
     return few * problem.get("finer", 1)
 
@@ -240,7 +241,9 @@ def _mcre(length, axial, shear):
 
 CHAINS = (
     ChainMethod("corotational", "co-rotational\nbeam",
-                f"Figure 3's planar two-node co-rotational Timoshenko beam, {ELEMENTS} elements, load control, halving steps", _beam),
+                f"Figure 3's planar two-node co-rotational Timoshenko beam, {ELEMENTS} elements, load control, halving "
+                "steps", _beam),
     ChainMethod("mcre", "MCRE (re-\nconstruction)",
-                f"Figure 3's reconstruction of the Modified Cosserat Rod Element: truncated rotations, {ELEMENTS} elements", _mcre),
+                f"Figure 3's reconstruction of the Modified Cosserat Rod Element: truncated rotations, {ELEMENTS} "
+                "elements", _mcre),
 )  # fmt: skip

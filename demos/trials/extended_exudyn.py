@@ -1,4 +1,5 @@
-"""Exudyn's runner of `demos/peers` with a history of loads, a held tip, and a test on the residual; see `peers.speak`."""
+"""Exudyn's runner of `demos/peers` with a history of loads, a held
+tip, and a test on the residual; see `peers.speak`."""
 
 import sys
 from pathlib import Path
@@ -25,7 +26,7 @@ def _solve(problem, configuration):
     last = len(stages) - 1
 
     def loaded(column):
-        def vector(mbs, time, whole):  # a unit of time is a stage; the solver may stop in between
+        def vector(mbs, time, whole):  # one unit of time per stage, with substeps of the solver in between
             i = min(int(time + 1e-9), last - 1)
             factor = stages[i][column] + (time - i) * (stages[i + 1][column] - stages[i][column])
             return [factor * x for x in whole]

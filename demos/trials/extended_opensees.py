@@ -1,4 +1,5 @@
-"""OpenSeesPy's runner of `demos/peers` with a history of loads, a held tip, a clamp that turns, and a test on the residual; see `peers.speak`."""
+"""OpenSeesPy's runner of `demos/peers` with a history of loads, a held tip, a
+clamp that turns, and a test on the residual; see `peers.speak`."""
 
 import sys
 from pathlib import Path
@@ -19,7 +20,7 @@ def _solve(problem, configuration):
     tip = _build({**problem, "force": [0.0] * 3, "moment": [0.0] * 3} if history else problem, configuration)
     if problem.get("guided"):
         ops.fix(tip, 1, 0, 1)
-    if "residual" in configuration:  # of the largest load
+    if "residual" in configuration:  # relative to the largest load
         size = max(map(abs, [*problem["force"], *problem["moment"]])) * max(problem["load_factors"])
         ops.test("NormUnbalance", configuration["residual"] * size, 12, 0)
     if "turn" in problem:
@@ -40,7 +41,7 @@ def _solve(problem, configuration):
         if ops.analyze(1) == 0:
             reached += step
         elif step > 1e-3:
-            step /= 2  # the failed step was taken back
+            step /= 2  # the failed step was undone
         else:
             raise Stopped(f"no convergence in stage {reached:.4g} of {len(history)}")
     u = ops.nodeDisp(tip)
@@ -48,7 +49,7 @@ def _solve(problem, configuration):
 
 
 def _turn_the_clamp(vector, last):
-    """The clamp's rotation grows with the load, about an axis that stays, to the whole of it at the last load factor."""
+    """The clamp's rotation grows with the load, about a fixed axis, up to the full one at the last load factor."""
     ops.wipeAnalysis()
     ops.timeSeries("Linear", 4, "-factor", 1 / last)
     ops.pattern("Plain", 4, 4)

@@ -1,9 +1,9 @@
-"""The columns of the map, and the cell of one method on one trial.
+"""The columns of the table, and the cell of a method on a trial.
 
-A method knows:
+The attributes and methods of a method:
     key, title, what        its name, its head, what it is in a sentence
-    own                     whether it is this package's
-    spatial                 whether it takes rods that leave a plane
+    own                     whether it is part of this package
+    spatial                 whether it supports rods that leave a plane
     turn                    rotation vector (rad) of the trial of objectivity
     solve(problem, jump)    an `Answer`; jump: the whole load at once. Raises Stopped, NotForIt, NotInstalled
     numerics(key)           (problem, Answer, number or None, unit) of a trial about loops; raises the same

@@ -1,4 +1,4 @@
-"""This package: the default, the rungs and the formulations, through its public face."""
+"""This package: the default, the models and the formulations, through its public interface."""
 
 from dataclasses import dataclass, replace
 
@@ -19,9 +19,9 @@ class Own:
     """A column of this package.
 
     Attributes:
-        key, title, what: its name, its head and what it is, for the reader.
+        key, title, what: its name, its heading and a description.
         options: of `cosserat_fenicsx.solve`.
-        spatial: whether it takes rods that leave a plane.
+        spatial: whether it supports rods that leave a plane.
         own: that it is this package's.
         turn: rotation vector of the trial of objectivity.
     """
@@ -39,12 +39,12 @@ class Own:
 
     @property
     def tol(self):
-        """What it is asked for."""
+        """The requested tolerance."""
         return self.options.get("tol", 1e-6)
 
     @property
     def default(self):
-        """Whether it is `solve` without a word."""
+        """Whether it is `solve` without options."""
         return not self.options
 
     def solve(self, problem, jump=False, **more):
@@ -86,7 +86,8 @@ class Own:
         return Answer(tip, "; ".join(said), note, events, int(path.iterations.sum()), path.stable)
 
     def _in_stages(self, problem):
-        """Force and moment each by factors of their own: Newton from state to state, on the solvers that `solve` uses."""
+        """With separate factors of force and moment: Newton's method
+        from state to state, with the solvers of `solve`."""
         degree, elements = formulation_of(self.options.get("formulation")).default_degree, 6 * problem.get("finer", 1)
         _, scene = problems.scene_of(problem)
         plain = cf.solve(scene, [0.0], elements=elements, progress=False, **self.options)
@@ -128,7 +129,7 @@ class Own:
 
 
 def against_steps(problem, answer, **options):
-    """The answer of a jump on 8 elements, its error counted from what this package finds there in steps."""
+    """The answer of a single step on 8 elements; its error is relative to this package's result in several steps."""
     rod, scene = problems.scene_of(problem)
     path = cf.solve(scene, problem["load_factors"], elements=_IN_ONE_STEP["elements"], progress=False, **options)
     ratio = problems.column_truth(problem)[:, 1] / path.displacement(rod.end)[:, 1]
@@ -137,14 +138,14 @@ def against_steps(problem, answer, **options):
 
 
 def _with_loads(problem, force, moment):
-    """The problem at factors of its loads; a load stays in the scene where its factor is zero."""
+    """The problem with factors of its loads; loads with the factor zero remain in the scene."""
     tiny = 1e-30
     return {**problem, "force": [x * (force or tiny) for x in problem["force"]],
             "moment": [x * (moment or tiny) for x in problem["moment"]]}  # fmt: skip
 
 
 def _refusal(refused):
-    """Not for it where a model does not fit; else it has stopped, before the first step."""
+    """`NotForIt` where a model is not valid for the problem, otherwise `Stopped` before the first step."""
     words = str(refused)
     if "is not possible" in words:
         return NotForIt(words.split(": ", 1)[-1].split("; expected")[0])
@@ -152,13 +153,15 @@ def _refusal(refused):
 
 
 def _reached(failure):
-    """The load factor that the message names, which may be beyond the last recorded point; else that one's."""
+    """The load factor named in the message, which may be beyond the
+    last recorded point; otherwise that of this point."""
     named, path = load_factor_in(failure), failure.path
     return float(path.load_factors[-1]) if np.isnan(named) and path is not None and len(path) else named
 
 
 OWN = (
-    Own("default", "default\ncf.solve", "`cosserat_fenicsx.solve(scene, load_factors)`, no options: it chooses model, degree and mesh", {}),
+    Own("default", "default\ncf.solve",
+        "`cosserat_fenicsx.solve(scene, load_factors)`, no options: it chooses model, degree and mesh", {}),
     Own("determinate", "rung\ndeterminate", 'model="determinate"', {"model": "determinate"}),
     Own("planar", "rung\nplanar", 'model="planar"', {"model": "planar"}, spatial=False),
     Own("mixed", "rung spatial,\nmixed", 'model="spatial", formulation="mixed"', {"model": "spatial"}),

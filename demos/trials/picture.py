@@ -1,4 +1,4 @@
-"""The map as a picture: a colour, a mark and a number in every cell."""
+"""The table as a picture: a colour, a mark and a number in every cell."""
 
 from pathlib import Path
 
@@ -8,7 +8,7 @@ from trials import catalogue, methods
 from trials.cells import MISSING, NOT, RIGHT, SAID, SILENT, STOPPED, Cell
 from trials.table import MARKS
 
-#: Light to dark in the order of harm, so that a print without colour reads the same.
+#: From light to dark in the order of severity, so that a print without colours can be read.
 _COLOURS = {
     RIGHT: "#d4efc5",
     SAID: "#fbe08c",
@@ -75,7 +75,7 @@ def _cell(axes, i, j, cell):
 
 
 def _groups(axes, columns):
-    """Who the columns belong to, above their heads."""
+    """Groups of columns, above their headings."""
     kinds = [0 if method.own else 2 if hasattr(method, "end") else 1 for method in columns]
     for kind, words in enumerate(_GROUPS):
         members = [i for i, each in enumerate(kinds) if each == kind]
@@ -97,6 +97,8 @@ def _legend(figure, data):
         hatch = {"hatch": "///", "edgecolor": "#c3d9f0"} if verdict == STOPPED else {"edgecolor": "grey"}
         handles.append(Patch(facecolor=_COLOURS[verdict], label=f"{mark}{words}", **hatch))
     figure.legend(handles=handles, loc="outside lower center", ncols=6, frameon=False, fontsize=9, title=(
-        "Numbers are relative errors, or errors over the length; in the rows of the limit point and the follower load, the load over the limit "
-        "or flutter load; in that of\nthe line search, Newton iterations. What each row tries, and what right means there, is in failures.md. "
+        "Numbers are relative errors, or errors over the length; in the rows of the limit point and the follower load, "
+        "the load over the limit "
+        "or flutter load; in that of\nthe line search, Newton iterations. What each row tries, and what right means "
+        "there, is in failures.md. "
         + machine.in_words(data["machine"]) + "."), title_fontsize=8.5)  # fmt: skip

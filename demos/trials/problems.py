@@ -1,14 +1,15 @@
-"""What is solved, as dicts in the form of `peers.problems`, and the truths, which share nothing with any method.
+"""The problems, as dicts in the form of `peers.problems`, and reference solutions, which are independent of all
+methods.
 
-A rod of `length` leaves the origin along x, straight or as an arc of `radius` towards y; dead `force` and `moment` on the tip,
-times the `load_factors`. More than the peers' problems may have:
+A rod of `length` starts at the origin along x, straight or as an arc of `radius` towards y; dead `force` and `moment`
+on the tip, times the `load_factors`. Keys in addition to those of the peers' problems:
     guided    the tip's x and its rotation are held: half of a symmetric arch
-    history   [(force factor, moment factor)] in the place of the load factors
-    turn      rotation vector, rad: the clamp is turned by it, and the loads with it
+    history   [(force factor, moment factor)] instead of the load factors
+    turn      rotation vector, rad: the clamp is rotated by it, and the loads with it
     follower  the force turns with the tip's section
-    coarse    few elements, to see what locks
-    finer     times as many elements, where the method lets choose; this package: that power of two more accurate
-    mesh      elements for the quick map, where a method of this package is not the default
+    coarse    whether to use few elements, to detect locking
+    finer     factor on the number of elements; for this package the tolerance is divided by its square
+    mesh      elements for the quick table, for methods of this package other than the default
 """
 
 import math
@@ -45,7 +46,7 @@ def _thinner(problem, ratio):
 
 
 def in_other_units(problem, length=1e3, force=1e-6):
-    """The same problem, its numbers in mm and MN where they were in m and N."""
+    """The same problem with numbers in mm and MN instead of m and N."""
     powers = {
         "length": (1, 0), "EA": (0, 1), "GA": (0, 1), "EI": (2, 1), "GJ": (2, 1), "E": (-2, 1), "area": (2, 0),
         "width": (1, 0), "height": (1, 0),
@@ -92,7 +93,7 @@ def twisted(steps=20):
 
 
 def pushed_and_turned(plane, history=None):
-    """A straight rod under a force and a moment, in a plane or out of all; (force factor, moment factor) in stages."""
+    """A straight rod under a force and a moment, in a plane or in space; (force factor, moment factor) in stages."""
     force, moment = ((-0.4, 0.6, 0.0), (0, 0, -0.4)) if plane else ((-1.2, 1.4, 2.0), (0.6, 1.0, -0.8))
     found = _numbers(1.0, None, EA=3e3, GA=1e3, EI=1.0, GJ=0.8, force=force, moment=moment)
     return {**found, "load_factors": [(k + 1) / 10 for k in range(10)], **({"history": history} if history else {})}
@@ -108,13 +109,13 @@ def thin_arc():
 
 
 def arch(upto):
-    """Half of a shallow clamped arch, from its crown on: the foot is pulled down, straight, without turning."""
+    """Half of a shallow clamped arch from its crown to its foot, which is displaced vertically without rotation."""
     found = _numbers(1.0, 2.5, EA=1e4, GA=4e3, EI=1.0, GJ=0.8, force=(0.0, -1.0, 0.0), moment=(0, 0, 0))
     return {**found, "guided": True, "load_factors": [upto * (k + 1) / 13 for k in range(13)]}
 
 
 def beck(upto=25.0):
-    """Beck's column: a compressive force that turns with the tip; it flutters from 20.05 EI/L^2 on."""
+    """Beck's column: a compressive force that follows the tip; it flutters from 20.05 EI/L^2 on."""
     found = _numbers(1.0, None, EA=1e4, GA=5e3, EI=1.0, GJ=0.8, force=(-1.0, 0, 0), moment=(0, 0, 0))
     return {**found, "follower": True, "load_factors": [upto * (k + 1) / 5 for k in range(5)]}
 
@@ -136,8 +137,8 @@ def in_a_plane(problem):
 
 
 def shot(problem):
-    """The tip's displacement at load factor 1, (1, 3) m, of any rod under dead loads: the strong form, shot and collocated to
-    1e-10 by the tests' own solver."""
+    """The tip's displacement at load factor 1, (1, 3) m, of any rod under dead loads:
+    the strong form, by shooting and collocation to 1e-10 (tests/bvp.py)."""
     sys.path.append(str(Path(__file__).resolve().parents[2] / "tests"))
     import bvp
 
@@ -162,7 +163,7 @@ def at_rest(problem, s):
 
 
 def scene_of(problem, whole=None):
-    """The rod and the scene, for this package; `whole`, a (3, 3) rotation, turns all of it."""
+    """The rod and the scene, for this package; `whole`: a (3, 3) rotation of everything."""
     L, R, EI, GA = (problem[key] for key in ("length", "radius", "EI", "GA"))
     turn = Rotation.from_rotvec(problem.get("turn", (0, 0, 0))).as_matrix()
     every, Q = (np.eye(3), turn) if whole is None else (whole, whole)
@@ -188,8 +189,8 @@ def scene_of(problem, whole=None):
 
 @cache
 def arch_limit():
-    """The load factor of the arch's limit point: Reissner's equations in a plane, shot, and the largest force over all
-    displacements of the foot."""
+    """The load factor of the arch's limit point, by shooting of Reissner's plane
+    equations: the largest force over all displacements of the foot."""
     problem = arch(1.0)
     L, R, EI, EA, GA = (problem[key] for key in ("length", "radius", "EI", "EA", "GA"))
     foot = at_rest(problem, L)

@@ -1,6 +1,6 @@
-"""The peers of `demos/peers`, each in a process of its own; where its environment is missing its cells say so.
+"""The peers of `demos/peers`, each in a separate process; cells of peers that are not installed say so.
 
-What their runners there do not know (histories of loads, held tips, tests on residuals) is in `extended_*.py`, which use them.
+The files `extended_*.py` add to their runners: histories of loads, guided tips, convergence tests on residuals.
 """
 
 import math
@@ -15,20 +15,21 @@ from trials import problems
 from trials.cells import Answer, NotForIt, NotInstalled, Stopped, load_factor_in
 from trials.chains import NEXT_TO_INFINITE
 
-LIMIT = 16.0  # s of one answer, where a program has no other
+LIMIT = 16.0  # time limit of an answer, s, unless a program has another
 _EXTENDED = {"Exudyn": "extended_exudyn.py", "OpenSeesPy": "extended_opensees.py"}
 
 
 class Program:
-    """A column of the map; see `methods`. Its process starts at the first question.
+    """A column of the table; see `methods`. Its process starts at the first request.
 
     Args:
         key: the peer's name.
-        planar, spatial: its configurations for rods in a plane and for others; with few elements: `coarse`.
-        can: what its runner knows: "history", "guided", "residual", "turned clamp"; "free" where stiffnesses need not be those of a rectangle; "relaxes"
-            where it answers at the last load factor alone; "arcs in space" where its planar element is straight.
-        what: for the legend.
-        limit: s of one answer.
+        planar, spatial: its configurations for plane rods and for others; `coarse`: with few elements.
+        can: features of its runner: "history", "guided", "residual", "turned clamp"; "free": stiffnesses need not be
+            those of a rectangle; "relaxes": it answers at the last load factor only; "arcs in space": its planar
+            element is straight.
+        what: description in the legend.
+        limit: time limit of an answer, s.
     """
 
     own, spatial = False, True
@@ -47,7 +48,7 @@ class Program:
         """Its process.
 
         Raises:
-            NotInstalled: its environment is not there.
+            NotInstalled: its environment is missing.
         """
         if self._peer is None:
             try:
@@ -69,7 +70,8 @@ class Program:
         """An `Answer`."""
         for need in {"history", "guided", "follower"} & set(problem):
             if need not in self._can:
-                raise NotForIt({"history": "its runner loads in proportion", "guided": "its runner clamps one end alone",
+                raise NotForIt({"history": "its runner loads in proportion",
+                                "guided": "its runner clamps one end alone",
                                 "follower": "its runner has dead loads"}[need])  # fmt: skip
         plain = "turn" not in problem
         problem = _as_it_takes(problem, "free" in self._can, "turned clamp" in self._can)
@@ -79,7 +81,7 @@ class Program:
         if problem.pop("coarse", False):
             configuration["elements"] = self._coarse
         configuration["elements"] *= problem.pop("finer", 1)
-        if "relaxes" in self._can:  # its path is a motion: what lies before the whole load is none of it
+        if "relaxes" in self._can:  # it is a motion to the final equilibrium, without intermediate equilibria
             problem["load_factors"] = problem["load_factors"][-1:]
         if "substeps" in configuration:
             few = len(problem["load_factors"]) < 8 or "history" in problem
@@ -114,8 +116,8 @@ class Program:
 
 
 def _as_it_takes(problem, free, turns_clamp):
-    """Numbers that a program can read. Where its runner cannot turn the clamp the loads alone are turned, about the axis of a
-    rod whose section is alike in all directions."""
+    """The problem with numbers that a program supports. If its runner cannot rotate the clamp, only the loads are
+    rotated, about the axis of a rod with equal bending stiffnesses."""
     found = {**problem}
     for key in ("EA", "GA"):
         if math.isinf(found[key]):
@@ -142,9 +144,12 @@ PROGRAMS = (
             {"element": "spatial CBDI", "elements": 48, "tol": 1e-8, "substeps": 4, "inner": 1e-16}, 8,
             ("free", "history", "guided", "residual", "turned clamp"),
             "OpenSeesPy 3.7.1.2, force-based frames with curvature-based displacements, co-rotational"),
-    Program("PyElastica", {"element": "spatial rod", "elements": 20, "tol": 1e-6}, {"element": "spatial rod", "elements": 20, "tol": 1e-6}, 8,
-            ("free", "relaxes"), "PyElastica 1.0.0, an explicit dynamic rod under the whole load, damped until it rests; 20 elements, 0.35 % of error at "
+    Program("PyElastica", {"element": "spatial rod", "elements": 20, "tol": 1e-6},
+            {"element": "spatial rod", "elements": 20, "tol": 1e-6}, 8,
+            ("free", "relaxes"), "PyElastica 1.0.0, an explicit dynamic rod under the whole load, damped until it "
+                                 "rests; 20 elements, 0.35 % of error at "
             "eta = 1 (12 have 1.06 %): more than the time allows for thinner rods", 25.0),
-    Program("CalculiX", {"element": "spatial B32R", "elements": 32, "tol": 1e-5}, {"element": "spatial B32R", "elements": 32, "tol": 1e-5}, 8,
+    Program("CalculiX", {"element": "spatial B32R", "elements": 32, "tol": 1e-5},
+            {"element": "spatial B32R", "elements": 32, "tol": 1e-5}, 8,
             (), "CalculiX 2.20, quadratic beams that become solids (B32R)"),
 )  # fmt: skip

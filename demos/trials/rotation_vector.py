@@ -1,8 +1,9 @@
-"""A rod whose rotations grow by rotation vectors, step by step: the textbook's way with large rotations.
+"""A rod with incremental rotation vectors, a common formulation of large rotations.
 
-In every load step the unknowns are r and the rotation vector of the step, interpolated in P_p; the rotation reached before and its
-curvature are kept at the Gauss points. What is interpolated is an increment, so that the discrete rotation depends on the way.
-The forms are those of this package (forms/equilibrium.py) on another motion. Units of L and EI/L^2.
+In every load step the unknowns are r and the rotation vector of the step, interpolated in P_p; the rotation before the
+step and its curvature are stored at the Gauss points. Since increments are interpolated, the discrete rotation depends
+on the load steps. The forms are those of this package (forms/equilibrium.py) with another `Motion`. Units of L and
+EI/L^2.
 """
 
 from dataclasses import dataclass
@@ -38,7 +39,7 @@ def rotation_of(theta):
 
 
 class Rod:
-    """The clamped rod on a mesh, where it stands after its last step.
+    """The clamped rod on a mesh, in the state after its last step.
 
     Args:
         problem: see `trials.problems`.
@@ -101,10 +102,10 @@ class Rod:
         function.x.array.reshape(-1, size)[self._nodes] = values
 
     def step(self, load, turn=(0.0, 0.0, 0.0), most=30):
-        """Newton to a tip load (force, moment) in units of EI/L^2, L; the clamp turns by a rotation vector meanwhile.
+        """Newton's method to a tip load (force, moment) in units of EI/L^2, L; the clamp rotates by a rotation vector.
 
         Raises:
-            Stopped: it does not converge.
+            Stopped: Newton's method does not converge.
         """
         x, free = self.U.x.array, self._free
         before = x.copy()
@@ -130,7 +131,7 @@ class Rod:
         raise Stopped("Newton's method does not converge")
 
     def _keep(self):
-        """Take the step's rotation over to the Gauss points; the next one starts from zero."""
+        """Add the step's rotation to that at the Gauss points; the next step starts from zero."""
         values = compat.evaluate(self._next, self.mesh, self._cells(self.mesh)).reshape(-1, 12)
         self._put(self.R, values[:, :9])
         self._put(self.curvature, values[:, 9:])
@@ -138,23 +139,26 @@ class Rod:
 
     @property
     def tip(self):
-        """(3,) m, its displacement."""
+        """(3,) displacement of the tip, m."""
         return self.length * self.U.x.array[self._tip[:3]]
 
 
 @dataclass(frozen=True)
 class RotationVector:
-    """A column of the map; see `methods`."""
+    """A column of the table; see `methods`."""
 
     key: str = "rotation_vector"
     title: str = "rotation vector,\nincremental"
-    what: str = "a rod in space with two-node elements and incremental rotation vectors, 32 elements, one Gauss point each; one Newton solution a load factor"
+    what: str = (
+        "a rod in space with two-node elements and incremental rotation vectors, 32 elements, one Gauss point each; one"
+        " Newton solution a load factor"
+    )
     spatial: bool = True
     own: bool = False
     turn: tuple = (0.8, -0.6, 0.88)
 
     def solve(self, problem, jump=False):
-        """An `Answer`: one step a load factor."""
+        """An `Answer`, with one step per load factor."""
         if problem.get("guided") or problem.get("follower"):
             raise NotForIt("written for a cantilever under dead loads")
         rod = Rod(problem, (8 if problem.get("coarse") else 32) * problem.get("finer", 1))

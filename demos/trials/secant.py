@@ -10,7 +10,7 @@ from trials.cells import Answer, NotForIt
 
 @dataclass(frozen=True)
 class Secant:
-    """A column of the map; see `methods`."""
+    """A column of the table; see `methods`."""
 
     key: str = "secant"
     title: str = "eq. (8),\nsecant formula"

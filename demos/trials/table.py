@@ -1,16 +1,21 @@
-"""The map as a Markdown table: a row a trial, a column a method, a legend, a sentence a trial."""
+"""The table in Markdown: a row per trial, a column per method, a legend, and a sentence on each trial."""
 
 import machine
 
 from trials import catalogue, methods
 from trials.cells import MISSING, NOT, RIGHT, SAID, SILENT, STOPPED
 
-#: What stands before a cell's number; the picture draws the same.
+#: Marks in front of a cell's number, also used in the picture.
 MARKS = {RIGHT: "\N{CHECK MARK}", SAID: "!", STOPPED: "\N{BLACK SQUARE}", SILENT: "\N{BALLOT X}", NOT: "", MISSING: ""}
 MEANINGS = {
     RIGHT: "the answer is right, as the trial means it",
-    SAID: "the answer is wrong, and the method itself says that it is not to be trusted (unstable, no number, a warning)",
-    STOPPED: "no answer: the method gave up, and said so, or had none in the time that the map gives it; the number is the load factor that it reached",
+    SAID: (
+        "the answer is wrong, and the method itself says that it is not to be trusted (unstable, no number, a warning)"
+    ),
+    STOPPED: (
+        "no answer: the method gave up, and said so, or had none in the time that the map gives it; the number is the"
+        " load factor that it reached"
+    ),
     SILENT: "an answer is returned as if it were right, and it is wrong",
     NOT: "the method does not have what the trial asks for",
     MISSING: "the program is not installed here (`make work-precision` installs it)",

@@ -1,4 +1,4 @@
-"""Trials of several ways to one end: numbers of steps, orders of loads, turned frames."""
+"""Trials that compare ways to one final state: numbers of steps, orders of loads, rotated frames."""
 
 import itertools
 from dataclasses import replace
@@ -9,12 +9,15 @@ from scipy.spatial.transform import Rotation
 from trials import problems
 from trials.cells import Stopped, judged
 
-#: How far apart the ends may be.
-SAME = "to 1e-6 of the length, or a difference that vanishes with the mesh and is a tenth at most of what twice the elements change"
+#: Largest difference of the final states, over the length.
+SAME = (
+    "to 1e-6 of the length, or a difference that vanishes with the mesh and is a tenth at most of what twice the"
+    " elements change"
+)
 
 
 def steps(method):
-    """How much the end depends on the number of steps."""
+    """Dependence of the final state on the number of steps."""
     if method.spatial:
         make, note = problems.twisted, "the twisted rod"
     else:
@@ -31,7 +34,7 @@ def steps(method):
 
 
 def order(method):
-    """How much the end depends on the order of the loads."""
+    """Dependence of the final state on the order of the loads."""
     ways = (
         [(k / 10, k / 10) for k in range(1, 11)],
         [*((k / 5, 0) for k in range(1, 6)), *((1, k / 5) for k in range(1, 6))],
@@ -46,7 +49,7 @@ def order(method):
 
 
 def objective(method):
-    """A loaded rod, and the same with its clamp and its loads turned."""
+    """Objectivity: a loaded rod, and the same with rotated clamp and loads."""
     problem, turn = problems.pushed_and_turned(not method.spatial), method.turn
     start, back = np.array([problem["length"], 0, 0]), Rotation.from_rotvec(turn).inv()
 
@@ -59,8 +62,8 @@ def objective(method):
 
 
 def _one_and_the_same(tips, length, note=""):
-    """The cell of several ways to one end: to 1e-6 of the length; or further apart, if that vanishes with the mesh and is a tenth at
-    most of what the mesh costs.
+    """The cell of several ways to one final state: they may differ by 1e-6 of the length; or by more, if the difference
+    vanishes under mesh refinement and is at most a tenth of the discretisation error.
 
     Args:
         tips: tips(**more) gives the answers by all ways; `more` goes into the problem.

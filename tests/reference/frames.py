@@ -1,4 +1,4 @@
-"""The frames and the arch of statics.json: shot and followed by arc length, and solved once more by solve_bvp."""
+"""The frames and the arch of statics.json: by shooting and arc length, checked by solve_bvp."""
 
 import numpy as np
 from checked import check
@@ -6,7 +6,7 @@ from planar_truth import Frame, Leg, Section
 
 
 def signed(frame, points, row):
-    """Rows with the sign of the determinant, which a limit point itself has not."""
+    """Rows with the sign of the determinant, which vanishes at a limit point."""
     return [row(frame.move(p, 0.0)) | {"determinant": int(p.sign)} for p in points]  # to round-off
 
 

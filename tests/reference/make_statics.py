@@ -1,7 +1,8 @@
-"""Writes statics.json beside itself: the classic problems to more digits than their papers give, by tests/ alone.
+"""Write statics.json into this folder: classic problems to more digits than in their papers, independent of the
+package.
 
-Run: python tests/reference/make_statics.py [name ...]. Every entry says what it was checked against; the checks are
-printed, and one that fails stops the script. Nothing here knows the package.
+Run: python tests/reference/make_statics.py [name ...]. Every entry names its checks; they are printed, and one that
+fails stops the script.
 """
 
 import json
@@ -136,7 +137,7 @@ def pendulum(load, angle):
 
 
 def follower_force():
-    """Tip to clamp is an initial value problem: the force is known where the frame is."""
+    """From tip to clamp it is an initial value problem, since the force is known in the frame of the tip."""
     values, checks = [], []
     for section in (Section(), Section(1.0, 400.0, 100.0)):
         for load in (0.01, 1, 2, 5, 10, 20, 40):

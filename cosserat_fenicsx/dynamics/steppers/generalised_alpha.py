@@ -21,9 +21,9 @@ from cosserat_fenicsx.dynamics.steppers.moving_ties import MovingTies
 from cosserat_fenicsx.dynamics.steppers.one_step import OneStep
 from cosserat_fenicsx.dynamics.steppers.step_problem import StepProblem
 
-# Loads at the end of a step are evaluated this share of it earlier, before a jump at the end.
+# Loads at the end of a step are evaluated this share of the step earlier, i.e. before a jump at its end.
 _BEFORE_END = 1e-6
-# Initial accelerations are those at the end of a trial step of this share of the first one.
+# Initial accelerations are those at the end of a trial step, whose length is this share of the first step's.
 _TRIAL_STEP = 0.1
 
 

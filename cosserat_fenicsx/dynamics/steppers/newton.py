@@ -1,8 +1,8 @@
 """Newton's method for a time step: full increments, with a factorised tangent that is reused over many time steps.
 
 An iteration with an old tangent costs one residual and one back-substitution: on a fine mesh a tenth of one with a new
-tangent. PETSc's SNES would evaluate one more residual a step, and norms that are not used. (Broyden's updates of the
-old tangent were tried: as many iterations, and more expensive ones.)
+tangent. PETSc's SNES would evaluate one more residual per step, and norms that are not used. (Broyden's updates of the
+old tangent were tried: they need as many iterations, and each costs more.)
 
 Convergence is tested on the increments of the nodal unknowns alone: contact forces and reactions have larger rounding
 errors, and the residual of a stiff rod cannot fall below its rounding.
@@ -22,7 +22,7 @@ from cosserat_fenicsx.algebra.newton import EXTERNAL, Solved
 INCREMENT, SMALLEST, ROUNDING = 1e-12, 2e-16, 1e-10
 # Contraction of increments with a new tangent, as measured.
 _NEW_TANGENT_RATE = 3e-4
-# Number of steps that each start with a new tangent after a tangent served for one step only.
+# Number of steps with a new tangent each, after a tangent that was useful for one step only.
 _STEPS_WITH_NEW_TANGENTS = 8
 # Iterations, and dimensionless increment, that are taken as divergence.
 _MOST_ITERATIONS, _DIVERGED = 15, 10.0

@@ -87,7 +87,7 @@ class OneStep:
     def error(self, early=False):
         """See `Stepper`: h^3/12 times the third derivative of the cubic through four states, the last one the current.
 
-        Of positions alone: differences of velocities are dominated by fast waves, which are not resolved, and small.
+        Only positions count: differences of velocities are dominated by fast waves, which are small and not resolved.
         """
         stride = min(_STRIDE, len(self._past) // 3) if early else _STRIDE
         past = self._past[-3 * stride :]

@@ -30,7 +30,7 @@ class Stepper(Protocol):
         """Start a motion from the current state of the problem's model."""
 
     def jump(self):
-        """Accelerations or velocities jump at the current time: earlier states serve no extrapolation any more."""
+        """Accelerations or velocities jump at the current time: earlier states can no longer be extrapolated."""
 
     def drive(self, t):
         """See `start.drive`, t in s; the change of kinetic energy counts as work of the supports."""
@@ -60,7 +60,7 @@ class Stepper(Protocol):
         """Return to the state before the last step."""
 
     def memory(self):
-        """All that later steps depend on beside the scene and the time: arrays, numbers, and dicts of them.
+        """All data, besides the scene and the time, that later steps depend on: arrays, numbers, and dicts of them.
 
         It includes the problem's own (`StepProblem.memory`): a motion continued from it has the same digits.
         """

@@ -59,7 +59,7 @@ class StepProblem(Equations):
         )
 
     def begin(self):
-        """Take the model's state and velocity as the start of the next step."""
+        """Use the model's current state and velocity as the start of the next step."""
         multipliers = self.ties.everywhere() if self.ties and self._begun else None
         self.numbering.from_local(self._state, self.x)
         if multipliers is not None:
@@ -166,8 +166,8 @@ class StepProblem(Equations):
         return self.load_factor
 
     def clamp_forces(self):
-        """(points, 6) what every clamped point was held with in the step that was taken last, less what joints exert
-        there; on all ranks."""
+        """(points, 6) force and moment that held every clamped point in the last step, those of other supports and
+        joints there included; on all ranks."""
         clamps = self.model.clamps
         if not clamps.count:
             return np.empty((0, 6))

@@ -2,7 +2,8 @@
 
 A symmetric scheme of order 2 gains two orders by steps gamma h, (1 - 2 gamma) h, gamma h with gamma = 1/(2 - 2^(1/3))
 (Yoshida, Phys. Lett. A 150 (1990) 262, doi:10.1016/0375-9601(90)90092-3). Momenta stay exact. Loads are evaluated in
-the middle of each of the three, inside the step; prescribed motions also about a third of a step beyond both ends.
+the middle of each of the three, which lies inside the whole step; prescribed motions are also evaluated up to about a
+third of a step before its start and after its end.
 """
 
 from cosserat_fenicsx.algebra.newton import Solved

@@ -19,7 +19,7 @@ class ContactForce:
 
     Attributes:
         words: the same as text.
-        carried: whether n at the Gauss points is stored beside the unknowns and updated in every Newton step.
+        carried: whether n at the Gauss points is stored separately from the unknowns and updated in every Newton step.
         unknown: whether n is a field of unknowns.
         of_motion: whether n is a function of the motion alone.
         stiff: bound on K in the second variation, in EI/L^2 of the rod (`rod_data.bounded`).
@@ -34,7 +34,7 @@ class ContactForce:
     rounding: float = 0.0
 
     def elements(self, mesh, degree, size):
-        """Finite elements beside the nodal one; `size`: components of n."""
+        """Finite elements in addition to the nodal one; `size`: components of n."""
         return [compat.lagrange(mesh, degree - 1, size, discontinuous=True)] if self.unknown else []
 
     def symbols(self, model, U, phi):

@@ -26,7 +26,7 @@ class UnitLength:
         return spatial.tests_of(phi, phi_s)
 
     def equations(self, state, test, U_node, phi):
-        """Residual terms beside eq. (1), to be integrated at the nodes; U_node: alias of the unknowns for that rule."""
+        """Residual terms added to eq. (1), integrated at the nodes; U_node: alias of the unknowns for that rule."""
         return spatial.unit_quaternion(state, test)
 
     def rows_of_moments(self, q):

@@ -134,7 +134,7 @@ class ArcLength:
     def _weigh_less(self):
         """Reduce the weight of the load factor where the path is stiffer than before.
 
-        Else the load factor dominates the metric, and a limit point is a sharp bend of the path.
+        Otherwise the load factor would dominate the metric, and a limit point would be a sharp bend of the path.
         """
         track = self.track
         here, weight = track.here, self._weight

@@ -151,7 +151,7 @@ class Chord:
             if found is None:
                 break
             values[found[0]] = value(found[1])
-            if values[found[0]] == 0 or not math.isfinite(values[found[0]]):  # singular to the last digit
+            if values[found[0]] == 0 or not math.isfinite(values[found[0]]):  # the tangent is exactly singular
                 break
             if values[found[0]] * values[low] > 0:
                 low = max(low, found[0])

@@ -177,8 +177,7 @@ class Tracing:
         strain = load / self.model.section.K.max()
         if strain > _ENORMOUS:
             return (
-                f"The loads are {strain:.1e} times EA there, which no rod bears: "
-                "are the units those of SI (N, m, Pa)?"
+                f"The loads are {strain:.1e} times EA there, which no rod bears: are the units those of SI (N, m, Pa)?"
             )
         where = "Try"
         if len(self.track.history) == 1 and self._options["control"] == "arc":
