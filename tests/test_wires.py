@@ -47,6 +47,7 @@ def test_what_is_advised_helps(control):
     assert path.stable.all()
 
 
+@pytest.mark.serial
 def test_loads_beyond_ea_are_asked_about():
     _, scene = column()
     with pytest.raises(cf.NotConverged, match="times EA there, which no rod bears: are the units those of SI"):
