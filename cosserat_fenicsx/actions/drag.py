@@ -8,7 +8,7 @@ from cosserat_fenicsx.actions.directed import store_coefficients
 from cosserat_fenicsx.checks import instance, store, vector
 from cosserat_fenicsx.scene import action
 from cosserat_fenicsx.scene.action import LineAction
-from cosserat_fenicsx.scene.along import along_or_vector, breaks_of, values_of
+from cosserat_fenicsx.scene.along import along_or_vector, breaks_of, kinks_of, values_of
 from cosserat_fenicsx.scene.loads import Load
 from cosserat_fenicsx.scene.rod import Rod
 
@@ -61,6 +61,10 @@ class Drag(Load, LineAction):
     def breaks(self, rod):
         """See `Action`."""
         return breaks_of(self.current)
+
+    def kinks(self, rod):
+        """See `Action`."""
+        return kinks_of(self.current)
 
     @staticmethod
     def work(point, test, c_n, c_t, current):

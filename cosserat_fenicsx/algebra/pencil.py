@@ -11,7 +11,7 @@ from cosserat_fenicsx.interrupts import interruptible, obey
 # Eigenvalues below this fraction of the shift are not resolved: the solver returns combinations of their vectors.
 _BLURRED = 1e-5
 # Values of x^T K x below this times a bound on their rounding error count as zero; errors reach a fifth of it.
-_SAFETY = 2.0
+_SAFETY, _TYPICAL = 2.0, 0.2
 # Eigenvalues with a smaller relative difference are counted as one multiple eigenvalue.
 _TOGETHER = 1e-6
 # Relative distance of a shift from the missing eigenvalue that it is to find.
@@ -50,7 +50,8 @@ class Pencil:
         inertia); missing ones are located by bisection with this count.
 
         Returns:
-            (values (n,) ascending, vectors (size, n)), n <= count; values that are zero to rounding are 0.0.
+            (values (n,) ascending, vectors (size, n), rounding errors (n,) of the values as a rule), n <= count; values
+            that are zero to rounding are 0.0.
 
         Raises:
             NotConverged: some were not found.
@@ -69,11 +70,12 @@ class Pencil:
             values, vectors = values[order], vectors[:, order]
             if len(values) >= count:
                 top = values[count - 1]
-                rounding = 10 * self._rounding(vectors[:, :count]).max()
+                bounds = self._rounding(vectors[:, :count])
+                rounding = 10 * bounds.max()
                 beyond = top + max(_TOGETHER * abs(top), rounding)
                 asked = self._below(beyond) - np.count_nonzero(values < beyond)
                 if asked <= 0:
-                    return values[:count], self._unknowns(vectors[:, :count])
+                    return values[:count], self._unknowns(vectors[:, :count]), _TYPICAL * bounds
                 shift = self._missing_next_to(values, beyond, rounding)
             else:
                 asked = count - len(values)

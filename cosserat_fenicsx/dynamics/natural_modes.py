@@ -17,6 +17,7 @@ from cosserat_fenicsx.errors import NotConverged
 from cosserat_fenicsx.models.rod_data import check_inertia, nodal_inertia
 from cosserat_fenicsx.quaternions import directors
 from cosserat_fenicsx.results.on_nodes import OnNodes
+from cosserat_fenicsx.scene.action import has_permanent
 from cosserat_fenicsx.scene.magnitudes import check_magnitudes
 from cosserat_fenicsx.scene.scene import Scene
 from cosserat_fenicsx.scene.statical import without_mechanism
@@ -129,7 +130,7 @@ def modes(scene, count=1, *, load_factor=0.0, tol=1e-6, elements=None, degree=4,
         if isinstance(value, bool) or not isinstance(value, numbers.Integral) or value < 1:
             refuse("modes", name, value, "a whole number above zero")
     number("modes", "tol", tol, "a number from 1e-12 to below 1", lambda x: 1e-12 <= x < 1)
-    if load_factor or _permanent(scene):
+    if load_factor or has_permanent(scene):
         check_arguments(without_mechanism(scene), tol, elements)
         check_magnitudes(scene, load_factor)
     comm = comm or MPI.COMM_WORLD
@@ -137,7 +138,7 @@ def modes(scene, count=1, *, load_factor=0.0, tol=1e-6, elements=None, degree=4,
     def apart(fine, coarse):
         return np.abs(fine - coarse) / np.where(fine == 0, np.inf, np.abs(fine))
 
-    (squares, _, shapes, negative, conservative), error, layout = until_two_meshes_agree(
+    (squares, _, rounding, shapes, negative, conservative), error, layout = until_two_meshes_agree(
         scene,
         lambda layout: _on_mesh(scene, layout, count, load_factor, degree, comm),
         apart,
@@ -147,7 +148,14 @@ def modes(scene, count=1, *, load_factor=0.0, tol=1e-6, elements=None, degree=4,
         elements=elements,
         degree=degree,
         advice="a larger tol or fewer modes",
+        gains=True,
     )
+    error = np.maximum(error, rounding)  # NaN stays
+    if (error > tol).any():
+        raise NotConverged(
+            f"the accuracy tol = {tol:g} is out of reach: rounding alone may change the squares by {error.max():.2g} of "
+            "themselves, since the rods are so slender. Ask for a larger tol."
+        )
     return Modes(scene, squares, error, shapes, negative, layout.counts, degree, conservative)
 
 
@@ -155,8 +163,8 @@ def _on_mesh(scene, layout, count, load_factor, degree, comm):
     """The result on one mesh.
 
     Returns:
-        Squares (n,), the lengths of boundary layers or None, shapes (n, N, 6), the number of negative modes, and
-        whether the loads have a potential.
+        Squares (n,), the lengths of boundary layers or None, relative rounding errors (n,), shapes (n, N, 6), the
+        number of negative modes, and whether the loads have a potential.
     """
     with _loaded(scene, layout, load_factor, degree, comm) as (problem, stability):
         found = _of_problem(problem, stability, count, load_factor)
@@ -166,18 +174,20 @@ def _on_mesh(scene, layout, count, load_factor, degree, comm):
 
 
 def _of_problem(problem, stability, count, load_factor):
-    negative = stability.count() if load_factor else 0
+    loaded = load_factor or has_permanent(problem.model.scene)
+    negative = stability.count() if loaded else 0
     K, rows, held = _stiffness(problem)
     unit = max(float(rod.profile.range[1].mass) for rod in problem.model.scene.rods)
     M = _mass(problem.model, rows, K.shape[0], unit)
-    squares, vectors = Pencil(K, M, held).lowest(count)
+    squares, vectors, rounding = Pencil(K, M, held).lowest(count)
     if (squares == 0).any():  # `stability` counts these by the sign of their rounding; all negative ones are known here
         negative = np.count_nonzero(squares < 0)
     scales = problem.model.scales
     shapes = np.array([_shape(vector, rows) for vector in vectors.T]).reshape(len(squares), -1, 6)
     shapes[:, :, 3:] /= scales.length
-    layers = layers_of(problem.model) if load_factor else None
-    return squares * scales.force / (unit * scales.length**2), layers, shapes, negative
+    layers = layers_of(problem.model) if loaded else None
+    rounding = np.where(squares == 0, 0.0, rounding / np.abs(np.where(squares == 0, 1.0, squares)))
+    return squares * scales.force / (unit * scales.length**2), layers, rounding, shapes, negative
 
 
 @contextlib.contextmanager
@@ -187,7 +197,7 @@ def _loaded(scene, layout, load_factor, degree, comm):
     A mechanism that its loads stabilise has no path from the unloaded state. Its equilibrium is first computed with
     added constraints (`without_mechanism`), then corrected by Newton's method without these.
     """
-    loaded = load_factor or _permanent(scene)
+    loaded = load_factor or has_permanent(scene)
     held = without_mechanism(scene) if loaded else scene
     with solvers_of(held, layout, degree=degree, comm=comm) as (problem, newton, stability):
         if loaded:
@@ -208,10 +218,6 @@ def _loaded(scene, layout, load_factor, degree, comm):
         if not solved.converged:
             _give_up(load_factor, f"{solved.reason} next to the reference, where the scene is a mechanism")
         yield problem, stability
-
-
-def _permanent(scene):
-    return any(action.permanent for action in scene.actions)
 
 
 def _give_up(load_factor, why):

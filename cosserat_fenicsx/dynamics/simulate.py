@@ -104,6 +104,11 @@ def simulate(
                 f"Rod '{rod.name}': an infinite axial or shear stiffness: expected finite ones, for a motion"
             )
     marks = marks_of(scene, duration, save_every)
+    if start is not None and path_dependent(scene):
+        raise SceneError(
+            "simulate.start: actions with a memory begin a motion with their initial one: expected None, and a motion "
+            "that applies the loads slowly"
+        )
     from_equilibrium = isinstance(start, numbers.Real) and not isinstance(start, bool)
     if load_factor is None:
         load_factor = start if from_equilibrium else 1.0

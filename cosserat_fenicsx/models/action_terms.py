@@ -5,6 +5,7 @@ import ufl
 from dolfinx import fem
 
 from cosserat_fenicsx import compat
+from cosserat_fenicsx.models.projection import nearest_polynomials
 from cosserat_fenicsx.models.rod_data import gauss_function
 from cosserat_fenicsx.models.signature import place_actions
 from cosserat_fenicsx.scene.signals import at, signals_of
@@ -153,7 +154,8 @@ class Term:
         along = np.where(rods.reversed[:, None], 1 - x, x)
         s = (begin[cells] * lengths[rods.cell_rod])[:, None] + size[cells][:, None] * along
         weight = np.zeros(self.weight.x.array.shape)
-        self._where = []  # (action, rod, rows of the values, arc lengths, mask over elements and points)
+        # (action, rod, rows of the values, arc lengths, mask over elements and points, starts and lengths of elements)
+        self._where = []
         for action, rod, vertex in members:
             here = np.broadcast_to((rods.cell_rod == rod)[:, None], s.shape)
             value = 1.0
@@ -162,7 +164,9 @@ class Term:
                 here = here & (rods.cell_inner == inner)[:, None] & (np.abs(along - (vertex - inner)) < _SAME)
                 value = 2 * model.scales.length / size[first[rod] + inner]
             weight[numbers[here]] = value
-            self._where.append((action, scene.rods[rod], numbers[here], s[here], here))
+            mine = here.any(axis=1)
+            elements = (begin[cells] * lengths[rods.cell_rod])[mine], size[cells][mine]
+            self._where.append((action, scene.rods[rod], numbers[here], s[here], here, elements))
         self.weight.x.array[:] = weight
         self.moves = any(signals_of(action) for action, _, _ in members)
         for k, function in enumerate((*self.data, *self.memory)):
@@ -172,7 +176,7 @@ class Term:
             function.x.array.reshape(-1, datum.size)[:] = self._scaled(datum, rod)
         self.put(0.0)
         for k, function in enumerate(self.memory):
-            for action, rod, rows, _, _ in self._where:
+            for action, rod, rows, *_ in self._where:
                 function.x.array.reshape(-1, action.memory[k].size)[rows] = self._scaled(action.memory[k], rod)
         if self._rest is not None:
             self._rest.x.array.reshape(-1, 3)[numbers] = self._interpolated(model.positions_at_rest()) @ model.axes.T
@@ -184,10 +188,12 @@ class Term:
 
     def put(self, t):
         """Fill in the data at the time t, s."""
-        for action, rod, rows, s, _ in self._where:
+        for action, rod, rows, s, _, elements in self._where:
             now = at(action, t)  # on all ranks, since a user's function of time may communicate
-            if len(rows):
-                self._take(now.data(rod, s), rod, rows)
+            if not len(rows):
+                continue
+            rough = self.kind.place == "line" and len(now.kinks(rod))
+            self._take(nearest_polynomials(now, rod, s, *elements) if rough else now.data(rod, s), rod, rows)
 
     def _take(self, data, rod, rows):
         for function, datum in zip(self.data, data, strict=True):
@@ -211,7 +217,7 @@ class Term:
         """Fill in the actions' data at the positions of the model's state."""
         model = self._model
         r = self._interpolated(model.positions())
-        for action, rod, rows, s, here in self._where:
+        for action, rod, rows, s, here, _ in self._where:
             if len(rows):
                 place = r[here] * model.scales.length + model.scene.origin(rod)
                 self._take(action.refreshed(rod, s, place), rod, rows)

@@ -65,6 +65,7 @@ def compile_conserving(model):
     of_step = virtual_work_of_step(model, of_stress, point_at)
     acting = action_work(model, dx, eq.tests_of(phi, along(phi)), point_at, {U, nodal}, end_point)
     live = booked(acting)
+    live_tangent = None if live is None else derivative(live)  # 0 where only data or memory see the state
     state = eq.state_of(U, along(U), U)
     n, m = inertia.contact(state, section, viscosity, lambda a: ufl.derivative(a, U, V))
     kappa = energy.angular_momentum(q1, spin, body)
@@ -73,7 +74,7 @@ def compile_conserving(model):
     others = {
         "momentum": inertia.momentum(r_t, kappa, body, eq.tests_of(phi, along(phi))) * dx.nodes,
         "live": live,
-        "live_tangent": None if live is None else derivative(live),
+        "live_tangent": live_tangent if isinstance(live_tangent, ufl.Form) else None,
         "kinetic": energy.kinetic_energy(r_t, spin, body) * dx.nodes,
         "strain": energy.strain_energy(after, section) * dx.gauss,
         "dissipated": lost,

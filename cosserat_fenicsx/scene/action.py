@@ -99,6 +99,10 @@ class Action:
         """Arc lengths (m) where a distributed action is not smooth: elements end there."""
         return ()
 
+    def kinks(self, rod):
+        """Arc lengths (m) where the data of a distributed action are not smooth, though elements need not end there."""
+        return ()
+
     def check_rod(self, rod):
         """Refuse a rod that it cannot act along.
 
@@ -138,6 +142,11 @@ class LineAction(Action):
     """An action along a `rod`, per unit of reference length; see `Action`."""
 
     station = None
+
+
+def has_permanent(scene):
+    """Whether a scene has permanent loads, so that its state at the load factor 0 is not the reference."""
+    return any(action.permanent for action in scene.actions)
 
 
 def path_dependent(scene):

@@ -11,8 +11,8 @@ import numpy as np
 from cosserat_fenicsx.checks import call, number, refuse, vector
 from cosserat_fenicsx.errors import SceneError
 
-# Elements end at the rows of tables of up to this length; for longer ones the error estimate resolves the kinks.
-_MOST_KINKS = 64
+# Elements end at the rows of tables of up to this length. Longer ones have kinks inside elements.
+_MOST_BREAKS = 64
 _SAMPLES = 33
 
 
@@ -83,7 +83,12 @@ class AlongTable:
     @property
     def breaks(self):
         """Where it is not smooth, m."""
-        return self.s if len(self.s) <= _MOST_KINKS else ()
+        return self.s if len(self.s) <= _MOST_BREAKS else ()
+
+    @property
+    def kinks(self):
+        """Where it is not smooth inside elements, m."""
+        return () if self.breaks else self.s
 
     def __call__(self, s):
         """(n, 3) at arc lengths s (n,), m."""
@@ -158,6 +163,11 @@ def values_of(value, s):
 def breaks_of(value):
     """Arc lengths (m) where a vector or a function of the arc length is not smooth."""
     return getattr(value, "breaks", ()) if isinstance(value, FUNCTIONS_ALONG) else ()
+
+
+def kinks_of(value):
+    """Arc lengths (m) where a function of the arc length is not smooth, though elements need not end there."""
+    return getattr(value, "kinks", ()) if isinstance(value, FUNCTIONS_ALONG) else ()
 
 
 def _read(file):

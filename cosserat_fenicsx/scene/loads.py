@@ -11,7 +11,7 @@ import numpy as np
 from cosserat_fenicsx.checks import instance, refuse, store, vector
 from cosserat_fenicsx.scene import action
 from cosserat_fenicsx.scene.action import LineAction, PointAction
-from cosserat_fenicsx.scene.along import along_or_vector, breaks_of, values_of
+from cosserat_fenicsx.scene.along import along_or_vector, breaks_of, kinks_of, values_of
 from cosserat_fenicsx.scene.rod import Rod, Station
 from cosserat_fenicsx.scene.signals import vector_or_signal
 
@@ -275,6 +275,10 @@ class LineForce(LineLoad):
         """See `Action`."""
         return breaks_of(self.force)
 
+    def kinks(self, rod):
+        """See `Action`."""
+        return kinks_of(self.force)
+
 
 @dataclass(frozen=True)
 class LineMoment(LineLoad):
@@ -306,6 +310,10 @@ class LineMoment(LineLoad):
     def breaks(self, rod):
         """See `Action`."""
         return breaks_of(self.moment)
+
+    def kinks(self, rod):
+        """See `Action`."""
+        return kinks_of(self.moment)
 
 
 #: Loads that scene files know.

@@ -11,6 +11,7 @@ from cosserat_fenicsx.algebra import eigen
 from cosserat_fenicsx.checks import number
 from cosserat_fenicsx.errors import NotConverged, SceneError
 from cosserat_fenicsx.results.on_nodes import OnNodes
+from cosserat_fenicsx.scene.action import has_permanent
 from cosserat_fenicsx.scene.magnitudes import check_magnitudes
 from cosserat_fenicsx.statics.circulatory import circulatory_part
 from cosserat_fenicsx.statics.divergence import static_bifurcations
@@ -28,8 +29,8 @@ _MOST_ELEMENTS = 256
 _STEP = 1e-3
 # Largest share of the error of bounded stiffnesses that remains after the correction by Rayleigh's quotient.
 _REMAINING = 0.1
-# Largest critical load, in the same units, where EA and GA are infinite. Else these bound it: the shear-flexible column
-# has a spurious root under tension at about GA.
+# Largest critical load, in the same units. It is also bounded by the load at which the force in a rod reaches the
+# smallest of its EA and GA: the shear-flexible column has a spurious root under tension at about GA.
 _HUGE = 1e8
 # Load factors that differ by less than this, relative, are one multiple eigenvalue.
 _SAME = 1e-6
@@ -51,10 +52,11 @@ class Buckling(OnNodes):
             moment has none where its section is free to rotate about two axes, nor has a follower load. Without a
             potential a structure may flutter below its first static bifurcation, or without one, which linear
             buckling does not detect.
-        bound: no static bifurcation lies below this load factor, whether conservative or not; infinite where there is
-            none. Where the loads have a potential it is the first of `load_factors`. Where they have none it is the
-            load factor at which the symmetric part of the second variation becomes singular, which is neither an
-            instability nor a bifurcation.
+        bound: no static bifurcation lies below this load factor, whether conservative or not. Where the loads have a
+            potential it is the first of `load_factors`. Where they have none it is the load factor at which the
+            symmetric part of the second variation becomes singular, which is neither an instability nor a bifurcation.
+            Where nothing is found it is the largest load factor that is considered: there the contact force of a rod
+            reaches the smallest of its axial and shear stiffnesses.
     """
 
     scene: object
@@ -134,7 +136,7 @@ def buckling(scene, count=1, *, load_factor=0.0, tol=1e-5, elements=None, degree
     def apart(fine, coarse):
         return np.abs(fine - coarse) / np.abs(fine - load_factor)
 
-    (load_factors, _, modes, softness, conservative), error, layout = until_two_meshes_agree(
+    (load_factors, _, modes, softness, conservative, most), error, layout = until_two_meshes_agree(
         scene,
         lambda layout: _critical(scene, layout, count, load_factor, degree, comm),
         apart,
@@ -151,7 +153,7 @@ def buckling(scene, count=1, *, load_factor=0.0, tol=1e-5, elements=None, degree
             f"the accuracy tol = {tol:g} was not reached: linear buckling bounds the stiffnesses against stretch and "
             f"shear, which may leave an error of {error.max():.2g}. Ask for a larger tol, or for the events of `solve`."
         )
-    bound = float(load_factors[0]) if len(load_factors) else math.inf
+    bound = float(load_factors[0]) if len(load_factors) else most
     found = slice(0 if conservative else 1, None)  # without a potential the first one is the bound alone
     return Buckling(scene, load_factors[found], modes, error[found], layout.counts, degree, conservative, bound)
 
@@ -161,7 +163,8 @@ def _critical(scene, layout, count, load_factor, degree, comm):
 
     Returns:
         Load factors (n,), the lengths of boundary layers or None, modes (m, N, 3), relative errors (n,) of bounded
-        stiffnesses, and whether the loads have a potential. Then n = m; else n = m + 1, and the bound comes first.
+        stiffnesses, whether the loads have a potential, and the largest load factor that is considered. With a
+        potential n = m; else n = m + 1, and the bound comes first.
     """
     with (
         solvers_of(scene, layout, degree=degree, comm=comm) as solvers,
@@ -178,7 +181,7 @@ def _critical_by(problem, newton, stability, circulatory, count, load_factor):
     if load_factor and not follower.to(load_factor, abs(load_factor)):
         raise NotConverged(f"no equilibrium was found at the load factor {load_factor:g}: {track.failure}")
     here = track.here
-    layers = layers_of(model) if load_factor else None
+    layers = layers_of(model) if load_factor or has_permanent(model.scene) else None
     if here.negative_modes:
         raise NotConverged(f"the structure is unstable at the load factor {load_factor:g}: expected a stable state")
     conservative = circulatory.vanishes(model.snapshot()[0], load_factor or 1.0)
@@ -190,24 +193,26 @@ def _critical_by(problem, newton, stability, circulatory, count, load_factor):
     slope = track.slope()
     unit = problem.load_derivative(problem.x).norm() or 1.0
     change = _STEP / unit
-    sides = []
+    sides, forces = [], []
     for step in (change, -change):
         numbers_there = [here.numbers[0] + step * slope, *(values.copy() for values in here.numbers[1:])]
         if not track.at_load(numbers_there, load_factor + step).converged:
             raise NotConverged(f"no equilibrium was found next to the load factor {load_factor:g}: {track.failure}")
         stability.whole.assemble(stress_alone=True)
         sides.append((stability.whole.K.copy(), skew()))
+        forces.append(model.snapshot()[1][..., : model.force_size])
     slack, of_skew = (_decrease(*parts, change) for parts in zip(*sides, strict=True))
+    most = _most(model, (forces[0] - forces[1]) / (2 * change), unit)
     track.restore()
     stability.whole.assemble()
-    symmetric, modes = _physical(*eigen.largest_of_pencil(slack, stability.whole.K, count + 2), model, unit)
+    symmetric, modes = _below(most, *eigen.largest_of_pencil(slack, stability.whole.K, count + 2))
     if conservative:
         values, vectors = symmetric, modes
         critical, corrected = values[:count], np.ones(len(values[:count]), dtype=bool)
     else:
         whole = (slack, of_skew), (stability.whole.K, skew())
         found = static_bifurcations(*whole, count) if len(symmetric) else (symmetric, modes)
-        values, vectors = _physical(*found, model, unit)
+        values, vectors = _below(most, *found)
         critical = np.append(symmetric[:1], values)
         corrected = np.arange(len(critical)) < 1
     softness = _softness(stability.whole, [*([] if conservative else modes[:1]), *vectors][: len(critical)])
@@ -216,7 +221,7 @@ def _critical_by(problem, newton, stability, circulatory, count, load_factor):
     softness = np.where(corrected, _REMAINING, 1.0) * softness
     shapes = np.array([model.shape_of(mode) for mode in _oriented(model, values, vectors)[:count]])
     nodes = sum(cells * model.signature.degree + 1 for cells in model.layout.counts)
-    return load_factor + critical, layers, shapes.reshape(-1, nodes, 3), softness, conservative
+    return load_factor + critical, layers, shapes.reshape(-1, nodes, 3), softness, conservative, load_factor + most
 
 
 def _decrease(ahead, behind, change):
@@ -228,13 +233,23 @@ def _decrease(ahead, behind, change):
     return ahead
 
 
-def _physical(values, vectors, model, unit):
-    """The eigenvalues (n,), descending, and eigenvectors with critical loads below the axial and shear stiffnesses.
+def _most(model, rates, unit):
+    """The largest change of the load factor for which critical loads are physical.
+
+    Args:
+        rates: (elements, points, 3) derivative of the contact force by the load factor, dimensionless; unit: the size
+            of the loads.
+    """
+    rates = np.maximum(np.linalg.norm(rates, axis=2), 1e-300)
+    return float(min(_HUGE / unit, (np.minimum(model.section.K, _HUGE).min(axis=2) / rates).min()))
+
+
+def _below(most, values, vectors):
+    """The eigenvalues (n,), descending, and eigenvectors with critical load factors 1/value up to `most`.
 
     The others are zero but for rounding, or negative: those of the opposite load.
     """
-    K = model.section.K
-    values = values[values * K[np.isfinite(K)].min(initial=_HUGE) > unit]
+    values = values[values * most > 1]
     return values, vectors[: len(values)]
 
 

@@ -82,6 +82,8 @@ class Problem(Equations):
             return False
         if self._remembers or not all(type(load).__module__.startswith("cosserat_fenicsx.") for load in scene.loads):
             return False
+        if any(map(callable, (value for load in scene.loads for value in vars(load).values()))):
+            return False
         return all(map(np.array_equal, self._loaded[1].breaks, layout.breaks))
 
     def set_load_factor(self, eta):

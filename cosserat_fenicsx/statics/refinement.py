@@ -203,7 +203,7 @@ class _Search:
         return self._keep(whole, None)
 
 
-def until_two_meshes_agree(scene, on_mesh, apart, tol, *, first, most, elements, degree, advice):
+def until_two_meshes_agree(scene, on_mesh, apart, tol, *, first, most, elements, degree, advice, gains=False):
     """Solve on successively halved meshes until the results of two of them agree.
 
     Args:
@@ -214,6 +214,8 @@ def until_two_meshes_agree(scene, on_mesh, apart, tol, *, first, most, elements,
         tol: largest relative difference.
         first, most: elements per rod of the first mesh and of the last; elements: those of a given mesh, or None.
         degree, advice: for error messages.
+        gains: whether the error is estimated by the gain of a halving, of order 2 p, instead of by the difference of
+            two meshes, which is larger. Without rounding errors among the numbers alone.
 
     Returns:
         (what `on_mesh` returned, estimated relative errors (n,) or NaN, layout).
@@ -248,7 +250,7 @@ def until_two_meshes_agree(scene, on_mesh, apart, tol, *, first, most, elements,
                     f"per rod: the estimated error stays at {min(reached, best):.2g}. Ask for {advice}."
                 )
             best = min(best, reached)
-        if elements:
+        if elements or (best <= tol and not gains):
             return found, error, layout
         if best <= tol:
             if before is None:

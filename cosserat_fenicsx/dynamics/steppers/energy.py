@@ -59,10 +59,7 @@ class TurnedStepProblem(StepProblem):
 
     def _pack(self):
         super()._pack()
-        if self.model.forms.live_tangent is not None:
-            state, *beginning = self._ends()
-            slow = (*beginning, *self.model.moving_loads)
-            self._live_tangent = Packed(self.model.forms.live_tangent, (state,), slow)
+        self._live_tangent = self._packed_within(self.model.forms.live_tangent)
 
     def _of_nodes(self, x):
         """(nodes, 4) q of the free nodes of this rank."""

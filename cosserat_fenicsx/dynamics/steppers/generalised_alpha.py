@@ -106,7 +106,7 @@ class CollocationProblem(StepProblem):
         rule: the `Rule` of the next steps.
     """
 
-    ties_class = EndTies
+    ties_class, acting_share = EndTies, 1.0
 
     def _ends(self):
         return (*super()._ends(), *self.model.known)

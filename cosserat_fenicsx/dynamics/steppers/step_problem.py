@@ -22,12 +22,15 @@ class StepProblem(Equations):
     """
 
     ties_class = MovingTies
+    #: where actions act, from the start (0) to the end (1) of a step
+    acting_share = 0.5
 
     def __init__(self, model):
         super().__init__(model)
         self._known, self._loads, self._momenta, self._vector = (self.numbering.vector() for _ in range(4))
         self._start = model.start.x.array
         self.load_factor, self.fresh = 1.0, True
+        self._refreshes = bool(model.actions.refreshed)
 
     def _kind(self):
         return "general" if self.ties or self.model.comm.size > 1 else "blocks"
@@ -48,15 +51,35 @@ class StepProblem(Equations):
 
     def _pack(self):
         """Pack the constants and coefficients of a scene for all forms; those that change in time are updated later."""
-        forms, moving, (state, *beginning) = self.model.forms, tuple(self.model.moving_loads), self._ends()
-        self._residual, self._tangent, self._live = (
-            None if form is None else Packed(form, (state,), (*beginning, *moving))
-            for form in (forms.residual, forms.tangent, forms.live)
+        forms, moving = self.model.forms, tuple(self.model.moving_loads)
+        self._residual, self._tangent, self._live = map(
+            self._packed_within, (forms.residual, forms.tangent, forms.live)
         )
         self._momentum = Packed(forms.momentum, self._ends())
         self._dead, self._permanent = (
             None if form is None else Packed(form, moving) for form in (forms.dead, forms.permanent)
         )
+
+    def _packed_within(self, form):
+        """A form of the state, for assembly in every Newton iteration; None where there is none.
+
+        The start of the step, loads that depend on time and the memory of actions are constant within a step.
+        """
+        if form is None:
+            return None
+        (state, *beginning), actions = self._ends(), self.model.actions
+        constant = (*beginning, *self.model.moving_loads, *actions.memory_functions)
+        return Packed(form, (state, *actions.refreshed), constant)
+
+    def _refresh(self, share):
+        """Evaluate data that depend on the position at this share of the way from the start of the step to the
+        state."""
+        if not self._refreshes:
+            return
+        end = self._state.copy()
+        self._state[:] = (1 - share) * self._start + share * end
+        self.model.actions.refresh()
+        self._state[:] = end
 
     def begin(self):
         """Use the model's current state and velocity as the start of the next step."""
@@ -109,6 +132,7 @@ class StepProblem(Equations):
     def function(self, snes, x, b):
         """Residual at x for SNES."""
         self.set_state(x)
+        self._refresh(self.acting_share)
         self._put_stresses(x, b)
         b.axpy(-1.0, self._known)
         if self.ties:
@@ -137,6 +161,7 @@ class StepProblem(Equations):
             self.numbering.from_local(model.passed(), self._vector)
             done = self._loads.dot(self._vector)
         if self._live:
+            self._refresh(0.5)
             self._assemble(self._live, self._known)
             done += self._known.dot(self._vector)
         if self.ties:

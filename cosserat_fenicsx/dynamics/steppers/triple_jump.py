@@ -29,11 +29,16 @@ class TripleJump:
         """See `Stepper`.
 
         Raises:
-            SceneError: a rod with damping, which would make the motion grow without bound back in time.
+            SceneError: a rod with damping, which would make the motion grow without bound back in time; or an action
+                with memory.
         """
         if self.problem.model.damped:
             raise SceneError(
                 "scheme = 'triple-jump' steps back in time: expected rods without damping, or another scheme"
+            )
+        if self.problem.model.actions.memory:
+            raise SceneError(
+                "scheme = 'triple-jump' steps back in time: expected actions without memory, or another scheme"
             )
         self._inner.begin()
 
