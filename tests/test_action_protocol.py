@@ -176,6 +176,91 @@ def test_data_that_follow_the_position():
             assert np.linalg.norm(place) - R == pytest.approx(u, rel=1e-4)
 
 
+@dataclass(frozen=True)
+class Lookup(cf.LineAction):
+    """A bed about the x axis, whose force is evaluated from the position."""
+
+    rod: object
+    stiffness: float
+
+    scaled = False
+    work = staticmethod(lambda point, test, f: ufl.dot(f, test.phi_r))
+
+    def data(self, rod, s):
+        return self.refreshed(rod, s, rod.curve.position(s))
+
+    def refreshed(self, rod, s, r):
+        return (action.vector(-self.stiffness * np.asarray(r) * (0, 1.0, 1.0), "N/m"),)
+
+
+FREE = cf.Rod(
+    cf.Line((0, 0, 0), (1.0, 0, 0)),
+    cf.Stiffness((1e5, 1e5), 1e5, (1e3, 1e3), 1e3, mass=1.0, inertia=(1e-3, 1e-3, 2e-3)),
+)
+
+
+def slid(duration, k=100.0, limit=1.0, steps=100000):
+    """Displacement of a mass of 1 kg at a slider, under 3 sin(2 pi t) N."""
+    x = v = slipped = 0.0
+    dt = duration / steps
+    for i in range(steps):
+        force = max(min(k * (x - slipped), limit), -limit)
+        slipped = x - force / k
+        v += dt * (3 * np.sin(2 * np.pi * i * dt) - force)
+        x += dt * v
+    return x
+
+
+@pytest.mark.serial
+@pytest.mark.parametrize("scheme", ["momentum", "energy", "generalised-alpha"])
+def test_memory_and_refreshed_data_in_motion(scheme):
+    scene = cf.Scene([FREE], [], [Slider(FREE.at(0.5), 100.0, 1.0), cf.Force(FREE.at(0.5), cf.Sine((3.0, 0, 0), 1.0))])
+    exact = slid(2.0)
+    for options in ({"tol": 1e-3}, {"dt": 0.005}):
+        history = cf.simulate(scene, 2.0, scheme=scheme, elements=1, degree=2, **options)
+        assert history.displacement(FREE.at(0.5))[-1, 0] == pytest.approx(exact, abs=1e-3 * abs(exact) + 5e-4)
+    pushed = [cf.InitialVelocity(FREE, linear=(0, 0, 1.0))]
+    history = cf.simulate(
+        cf.Scene([FREE], [], [Lookup(FREE, 4.0)], velocities=pushed), 0.7, dt=0.005, scheme=scheme, elements=2
+    )
+    assert history.displacement(FREE.end)[-1, 2] == pytest.approx(np.sin(1.4) / 2, rel=3e-5)
+
+
+def test_motions_without_a_place_for_memory():
+    scene = cf.Scene([FREE], [], [Slider(FREE.end, 100.0, 1.0)])
+    with pytest.raises(cf.SceneError, match="steps back in time: expected actions without memory"):
+        cf.simulate(scene, 0.1, dt=0.05, scheme="triple-jump", elements=1)
+    clamped = cf.Scene([FREE], [cf.Clamp(FREE.start)], [Slider(FREE.end, 100.0, 1.0), cf.Force(FREE.end, (1.0, 0, 0))])
+    with pytest.raises(cf.SceneError, match="simulate.start: actions with a memory"):
+        cf.simulate(clamped, 0.1, dt=0.05, start=1.0, elements=1)
+
+
+@pytest.mark.serial
+@pytest.mark.parametrize(("rows", "peak"), [(70, 56), (100, 81), (400, 201), (400, 324)])
+def test_no_peak_of_a_long_table_is_missed(rows, peak):
+    """It lies between all Gauss points of the first meshes; the tip moves by F a^2 (3 - a)/6, averaged over the peak."""
+    s, values, F = np.linspace(0, 1, rows), np.zeros((rows, 3)), 1e-4
+    values[peak, 2] = F * (rows - 1)
+    a, variance = s[peak], 1 / (6 * (rows - 1) ** 2)
+    tip = F * (3 * (a**2 + variance) - (a**3 + 3 * a * variance)) / 6
+    section = cf.Stiffness((1e9, 1e9), 1e9, (1.0, 1.0), 1.0)
+    rod = cf.Rod(cf.Line((0, 0, 0), (1.0, 0, 0)), section)
+    scene = cf.Scene([rod], [cf.Clamp(rod.start)], [cf.LineForce(rod, cf.AlongTable(s, values))])
+    for accuracy, options in ((1e-7, {"tol": 1e-4}), (3e-2, {"elements": 3, "degree": 2}),
+                              (1e-4, {"elements": 3, "model": "spatial"})):  # fmt: skip
+        path = cf.solve(scene, [1.0], **options)
+        assert path.displacement(rod.end)[0, 2] == pytest.approx(tip, rel=accuracy)
+        assert path.force(rod.start)[0, 2] == pytest.approx(F, rel=1e-9)
+
+
+def test_a_function_may_change_between_calls():
+    size = [1e-3]
+    scene = cf.Scene([ROD], [cf.Clamp(ROD.start)], [cf.LineForce(ROD, cf.Along(lambda s: (0, 0, size[0])))])
+    first = cf.solve(scene, [1.0], elements=4).displacement(ROD.end)[0, 2]
+    size[0] = 2e-3
+    assert cf.solve(scene, [1.0], elements=4).displacement(ROD.end)[0, 2] == pytest.approx(2 * first, rel=1e-6)
+
+
 def test_what_ufl_tells():
     station = ROD.end
     told = {

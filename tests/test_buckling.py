@@ -117,3 +117,34 @@ def test_refusals():
     column = cf.Scene([rod], [cf.Clamp(rod.start)], [cf.Force(rod.end, (0, 0, -cf.euler_load(rod)))])
     with pytest.raises(cf.NotConverged, match="unstable at the load factor 1.5"):
         cf.buckling(column, load_factor=1.5)
+
+
+@pytest.mark.serial
+@pytest.mark.parametrize("axial", [1e3, 10.0])
+def test_a_weak_rod_without_force_hides_no_critical_load(axial):
+    """A weak rod at the top of a column, whose own EA is below the load."""
+
+    def section(EA, EI):
+        return cf.Stiffness((EA, EA), EA, (EI, EI), EI)
+
+    column = cf.Rod(cf.Line((0, 0, 0), (0, 0, 1.0)), section(1e9, 1e3))
+    weak = cf.Rod(cf.Line((0, 0, 1.0), (1.0, 0, 1.0)), section(axial, 1e-4 * axial))
+    joint = cf.Joint(column.end, weak.start, release="all")
+    supports, load = [cf.Clamp(column.start), cf.Clamp(weak.end)], cf.Force(column.end, (0, 0, -1000.0))
+    found = cf.buckling(cf.Scene([column, weak], supports, [load], joints=[joint]), 2)
+    assert found.load_factors[0] == pytest.approx(np.pi**2 / 4, rel=1e-4) and found.bound == found.load_factors[0]
+
+
+@pytest.mark.serial
+def test_critical_loads_of_slender_frames_scatter_little():
+    """Their difference quotients are taken over a share of the critical load, not over a step so small that rounding
+    shows."""
+    steel = cf.Material(E=210e9, nu=0.3, density=7850.0)
+    upright = cf.Rod(cf.Line((0, 0, 0), (0, 0, 3.0)), cf.Circle(0.01), steel)
+    level = cf.Rod(cf.Line((0, 0, 3.0), (3.0, 0, 3.0)), cf.Circle(0.01), steel)
+    scene = cf.Scene(
+        [upright, level], [cf.Clamp(upright.start), cf.Pin(level.end)],
+        [cf.Force(upright.end, (0, 0, -1.0))], joints=[cf.Joint(upright.end, level.start)],
+    )  # fmt: skip
+    found = np.array([cf.buckling(scene, 1, elements=n).load_factors[0] for n in (8, 10, 12, 16, 24)])
+    assert np.ptp(found) < 1e-6 * found.mean()

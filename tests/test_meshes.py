@@ -105,6 +105,37 @@ def test_modes_of_taut_wires(slenderness, tol):
     assert error <= found.error[0] <= min(tol, max(30 * error, 2e-9)) and max(found.elements) <= 52
 
 
+@pytest.mark.serial
+def test_modes_about_a_state_of_permanent_loads():
+    """As about that of the same load with the load factor 1: boundary layers, estimates, negative modes."""
+    rod = cf.Rod(cf.Line((0, 0, 0), (10.0, 0, 0)), cf.Circle(1e-3), STEEL)
+    guides = [cf.Clamp(rod.start), cf.Roller(rod.end, (0, 1, 0)), cf.Roller(rod.end, (0, 0, 1))]
+    taut, permanent = (
+        cf.Scene([rod], guides, [cf.Force(rod.end, (2000.0, 0, 0), permanent=kind)]) for kind in (False, True)
+    )
+    exact, found = cf.modes(taut, 5, load_factor=1.0, tol=1e-6), cf.modes(permanent, 5, tol=1e-3)
+    assert (np.abs(found.squares / exact.squares - 1) <= found.error + exact.error).all()
+    section = cf.Stiffness((1e6, 1e6), 1e6, (1.0, 1.0), 1.0, mass=1.0, inertia=(1e-4, 1e-4, 2e-4))
+    column = cf.Rod(cf.Line((0, 0, 0), (0, 0, 1.0)), section)
+    heavy = cf.Scene([column], [cf.Clamp(column.start)], [cf.LineForce(column, (0, 0, -9.0), permanent=True)])
+    found = cf.modes(heavy, 2, elements=8)
+    assert (found.squares < 0).all() and found.negative_modes == 2
+
+
+@pytest.mark.serial
+def test_rounding_of_modes_is_told():
+    """Two rods of 30 m, 3 mm thick, at a right angle: squares scatter by 3e-5 from mesh to mesh."""
+    upright = cf.Rod(cf.Line((0, 0, 0), (0, 0, 30.0)), cf.Circle(0.003), STEEL)
+    level = cf.Rod(cf.Line((0, 0, 30.0), (30.0, 0, 30.0)), cf.Circle(0.003), STEEL)
+    supports = [cf.Clamp(upright.start), cf.Pin(level.end)]
+    scene = cf.Scene([upright, level], supports, joints=[cf.Joint(upright.end, level.start)])
+    with pytest.raises(cf.NotConverged, match="out of reach: rounding alone"):
+        cf.modes(scene, 1, tol=1e-5)
+    fixed = np.array([cf.modes(scene, 1, elements=n).squares[0] for n in (8, 10, 12, 16)])
+    found = cf.modes(scene, 1, tol=1e-3)
+    assert abs(found.squares[0] / fixed.mean() - 1) <= found.error[0] <= 1e-3
+
+
 def notched(width):
     """A cantilever of 1 m, 20 mm thick and half as thick at a notch with
     a Gaussian profile of this width (over the length)."""

@@ -15,6 +15,7 @@ from cosserat_fenicsx.models.rodmesh import Layout
 from cosserat_fenicsx.dynamics.time_loop import TimeLoop
 from cosserat_fenicsx.dynamics.pace import Adaptive, Fixed
 from cosserat_fenicsx.storage.runfolder import RunFolder
+from cosserat_fenicsx.scene.action import path_dependent
 from cosserat_fenicsx.scene.magnitudes import check_magnitudes
 from cosserat_fenicsx.scene.scene import Scene
 from cosserat_fenicsx.dynamics.initial_equilibrium import equilibrium

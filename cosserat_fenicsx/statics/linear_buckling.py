@@ -25,8 +25,9 @@ from cosserat_fenicsx.statics.solvers import solvers_of
 from cosserat_fenicsx.statics.stability import oriented
 
 _MOST_ELEMENTS = 256
-# Load step of the central difference of the second variation, in the units EI/L^2 and EI/L of the load.
-_STEP = 1e-3
+# Step of the load factor in the central difference of the second variation: first such that the load changes by this
+# much, in the units EI/L^2 and EI/L; then as a share of the lowest critical load factor, counted from the state.
+_STEP, _SHARE = 1e-3, 1e-2
 # Largest share of the error of bounded stiffnesses that remains after the correction by Rayleigh's quotient.
 _REMAINING = 0.1
 # Largest critical load, in the same units. It is also bounded by the load at which the force in a rod reaches the
@@ -56,7 +57,7 @@ class Buckling(OnNodes):
             potential it is the first of `load_factors`. Where they have none it is the load factor at which the
             symmetric part of the second variation becomes singular, which is neither an instability nor a bifurcation.
             Where nothing is found it is the largest load factor that is considered: there the contact force of a rod
-            reaches the smallest of its axial and shear stiffnesses.
+            reaches the smallest of its axial and shear stiffnesses, or 1e8 EI/L^2.
     """
 
     scene: object
@@ -192,20 +193,30 @@ def _critical_by(problem, newton, stability, circulatory, count, load_factor):
 
     slope = track.slope()
     unit = problem.load_derivative(problem.x).norm() or 1.0
-    change = _STEP / unit
-    sides, forces = [], []
-    for step in (change, -change):
-        numbers_there = [here.numbers[0] + step * slope, *(values.copy() for values in here.numbers[1:])]
-        if not track.at_load(numbers_there, load_factor + step).converged:
-            raise NotConverged(f"no equilibrium was found next to the load factor {load_factor:g}: {track.failure}")
-        stability.whole.assemble(stress_alone=True)
-        sides.append((stability.whole.K.copy(), skew()))
-        forces.append(model.snapshot()[1][..., : model.force_size])
-    slack, of_skew = (_decrease(*parts, change) for parts in zip(*sides, strict=True))
-    most = _most(model, (forces[0] - forces[1]) / (2 * change), unit)
-    track.restore()
-    stability.whole.assemble()
-    symmetric, modes = _below(most, *eigen.largest_of_pencil(slack, stability.whole.K, count + 2))
+
+    def pencil(change):
+        """-dK/deta by a central difference with this change of the load factor, that of the skew part, the largest
+        physical load factor, and the eigenvalues and modes of the symmetric pencil."""
+        sides, forces = [], []
+        for step in (change, -change):
+            numbers_there = [here.numbers[0] + step * slope, *(values.copy() for values in here.numbers[1:])]
+            if not track.at_load(numbers_there, load_factor + step).converged:
+                raise NotConverged(
+                    f"no equilibrium was found next to the load factor {load_factor:g}: {track.failure}"
+                )
+            stability.whole.assemble(stress_alone=True)
+            sides.append((stability.whole.K.copy(), skew()))
+            forces.append(model.snapshot()[1][..., : model.force_size])
+        slack, of_skew = (_decrease(*parts, change) for parts in zip(*sides, strict=True))
+        most = _most(model, (forces[0] - forces[1]) / (2 * change), unit)
+        track.restore()
+        stability.whole.assemble()
+        found = _below(most, *eigen.largest_of_pencil(slack, stability.whole.K, count + 2))
+        return slack, of_skew, most, *found
+
+    slack, of_skew, most, symmetric, modes = pencil(_STEP / unit)
+    if len(symmetric) and not 0.3 < symmetric[0] * _STEP / (unit * _SHARE) < 3:
+        slack, of_skew, most, symmetric, modes = pencil(_SHARE / symmetric[0])
     if conservative:
         values, vectors = symmetric, modes
         critical, corrected = values[:count], np.ones(len(values[:count]), dtype=bool)
