@@ -69,6 +69,8 @@ def direction(owner, field, value):
     size = math.hypot(*given)
     if size == 0.0:
         refuse(owner, field, value, "a direction, not zero")
+    if abs(size - 1.0) < 1e-15:  # a unit vector stays the same to the last digit
+        return given
     return tuple(x / size for x in given)
 
 

@@ -238,7 +238,7 @@ def test_motions_without_a_place_for_memory():
 @pytest.mark.serial
 @pytest.mark.parametrize(("rows", "peak"), [(70, 56), (100, 81), (400, 201), (400, 324)])
 def test_no_peak_of_a_long_table_is_missed(rows, peak):
-    """It lies between all Gauss points of the first meshes; the tip moves by F a^2 (3 - a)/6, averaged over the peak."""
+    """It lies between all Gauss points of the first meshes; the tip moves by F a^2 (3 - a)/6, averaged over it."""
     s, values, F = np.linspace(0, 1, rows), np.zeros((rows, 3)), 1e-4
     values[peak, 2] = F * (rows - 1)
     a, variance = s[peak], 1 / (6 * (rows - 1) ** 2)

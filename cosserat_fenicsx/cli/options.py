@@ -34,7 +34,7 @@ def parser(do):
     run.set_defaults(do=do["run"])
 
     resume = commands.add_parser("resume", help="continue a motion that was run with --folder, to the same digits")
-    resume.add_argument("folder", help="the DIR of --folder; it holds a pickle, so its source must be trusted")
+    resume.add_argument("folder", help="the DIR of --folder")
     resume.add_argument("--duration", type=float, help="s; longer than before")
     _outputs(resume)
     resume.set_defaults(do=do["resume"])

@@ -153,8 +153,8 @@ def modes(scene, count=1, *, load_factor=0.0, tol=1e-6, elements=None, degree=4,
     error = np.maximum(error, rounding)  # NaN stays
     if (error > tol).any():
         raise NotConverged(
-            f"the accuracy tol = {tol:g} is out of reach: rounding alone may change the squares by {error.max():.2g} of "
-            "themselves, since the rods are so slender. Ask for a larger tol."
+            f"the accuracy tol = {tol:g} is out of reach: rounding alone may change the squares by {error.max():.2g} "
+            "of themselves, since the rods are so slender. Ask for a larger tol."
         )
     return Modes(scene, squares, error, shapes, negative, layout.counts, degree, conservative)
 

@@ -32,8 +32,8 @@ def resume(folder, scene=None, *, duration=None, progress=None, comm=None):
     Args:
         folder: its name.
         scene: the `Scene` of the motion; it is compared with the fingerprint in the folder. None for the scene stored
-            in the folder, which is missing where functions of the scene cannot be pickled, such as a lambda. It is a
-            pickle: load no folder that you do not trust, or give the scene.
+            in the folder, which is missing where a part of it is a function written in Python or of a class of your
+            own. It is stored as data, so that a folder cannot run code.
         duration: s; None for the last one requested. With a longer one a step still ends at every earlier end, and the
             error may grow at the rate that `tol` set before; a motion computed in a plane must stay in it.
         progress, comm: as of `simulate`; with the same number of ranks.

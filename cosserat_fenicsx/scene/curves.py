@@ -170,7 +170,8 @@ class UniformCurvature(_Uniform):
         q = np.array(vector(self, "frame", frame, "unit quaternion, scalar first", size=4))
         if abs(np.linalg.norm(q) - 1) > 1e-3:
             refuse(self, "frame", frame, "a quaternion of length 1, scalar first")
-        q /= np.linalg.norm(q)
+        if abs(np.linalg.norm(q) - 1) > 1e-15:  # a unit quaternion stays the same to the last digit
+            q /= np.linalg.norm(q)
         store(self, quaternion=tuple(q.tolist()), _frame=rotation(q), _curvature=np.array(self.curvature))
 
 

@@ -137,7 +137,7 @@ def _scene(tables, folder):
     rods = [_rod(f"rods[{i}]", entry, materials, folder) for i, entry in _entries("rods", tables)]
     stations = {rod.name: rod for rod in rods}
     supports = [_build(f"supports[{i}]", entry, SUPPORTS, stations) for i, entry in _entries("supports", tables)]
-    loads = [_build(f"loads[{i}]", entry, _actions(), stations, folder) for i, entry in _entries("loads", tables)]
+    loads = [_build(f"loads[{i}]", entry, action_classes(), stations, folder) for i, entry in _entries("loads", tables)]
     joints = [_build(f"joints[{i}]", entry, (Joint,), stations) for i, entry in _entries("joints", tables)]
     velocities = [
         _build(f"velocities[{i}]", entry, (InitialVelocity,), stations) for i, entry in _entries("velocities", tables)
@@ -151,7 +151,7 @@ def _scene(tables, folder):
     return Scene(rods, supports, loads, joints, title, velocities), *settings
 
 
-def _actions():
+def action_classes():
     """The classes that [[loads]] may have: loads, and the public names of the subpackage `actions`."""
     import cosserat_fenicsx  # imports the modules of its names when they are first used
 

@@ -201,9 +201,7 @@ def _critical_by(problem, newton, stability, circulatory, count, load_factor):
         for step in (change, -change):
             numbers_there = [here.numbers[0] + step * slope, *(values.copy() for values in here.numbers[1:])]
             if not track.at_load(numbers_there, load_factor + step).converged:
-                raise NotConverged(
-                    f"no equilibrium was found next to the load factor {load_factor:g}: {track.failure}"
-                )
+                raise NotConverged(f"no equilibrium was found next to the load factor {load_factor:g}: {track.failure}")
             stability.whole.assemble(stress_alone=True)
             sides.append((stability.whole.K.copy(), skew()))
             forces.append(model.snapshot()[1][..., : model.force_size])

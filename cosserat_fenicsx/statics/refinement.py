@@ -224,7 +224,7 @@ def until_two_meshes_agree(scene, on_mesh, apart, tol, *, first, most, elements,
         NotConverged: the accuracy is not reached.
     """
     layout, coarse, best, worse = Layout.of(scene, elements or first), None, math.inf, 0
-    before = None  # relative differences of the halving before
+    before = coarse_layout = None  # relative differences of the halving before; the mesh of `coarse`
     while True:
         obey()
         found = on_mesh(layout)

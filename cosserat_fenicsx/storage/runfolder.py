@@ -1,7 +1,7 @@
 """The folder that a motion is written to during the run: its arguments, its saved states and its checkpoints.
 
 motion.json    the arguments of `simulate`, versions, and the fingerprint of the scene
-scene.pickle   the scene, where it can be pickled
+scene.json     the scene as data, where it has that form: no folder can run code of its own
 instants.npy   the saved states, see `instantfile`
 start.npz, checkpoint.npz   the data of all ranks that the solver continues from: at the start, and the latest
 """
@@ -9,7 +9,6 @@ start.npz, checkpoint.npz   the data of all ranks that the solver continues from
 import fcntl
 import json
 import os
-import pickle
 import time
 from pathlib import Path
 
@@ -17,13 +16,14 @@ from cosserat_fenicsx import __version__
 from cosserat_fenicsx.checks import instance
 from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.ranks import on_first
+from cosserat_fenicsx.scene.as_data import NotData, from_data, to_data
 from cosserat_fenicsx.storage import checkpoints
 from cosserat_fenicsx.storage.fingerprint import difference, fingerprint, fingerprint_at, times_ahead
 
 #: Least time between checkpoints: in s, and as a multiple of the time that it takes to write one.
 APART, SELDOM = 2.0, 50
 _FORMAT = 2
-_HEAD, _SCENE, _START, _LATEST = "motion.json", "scene.pickle", "start.npz", "checkpoint.npz"
+_HEAD, _SCENE, _START, _LATEST = "motion.json", "scene.json", "start.npz", "checkpoint.npz"
 
 
 class RunFolder:
@@ -81,9 +81,10 @@ class RunFolder:
         for name in ("instants.npy", _SCENE, _START, _LATEST):
             (place / name).unlink(missing_ok=True)
         try:
-            (place / _SCENE).write_bytes(pickle.dumps(scene))
-        except (pickle.PicklingError, AttributeError, TypeError):  # such as lambdas and local functions
-            (place / _SCENE).unlink(missing_ok=True)
+            data = to_data(scene)
+        except NotData as problem:
+            data = {"missing": str(problem)}
+        (place / _SCENE).write_text(_text(data), encoding="utf-8")
         (place / _HEAD).write_text(head, encoding="utf-8")
         self._hold()
 
@@ -134,10 +135,13 @@ class RunFolder:
 
     def _stored_scene(self):
         try:
-            return pickle.loads((self.place / _SCENE).read_bytes())
+            data = json.loads((self.place / _SCENE).read_text(encoding="utf-8"))
+            if "missing" not in data:
+                return from_data(data)
+            why = f"the folder does not hold it, since in {data['missing']}"
         except FileNotFoundError:
-            why = "the folder does not hold it, since its functions (a lambda, perhaps) cannot be pickled"
-        except Exception as problem:  # unpickling a damaged file, or with a missing module, may raise anything
+            why = "the folder does not hold it"
+        except (OSError, ValueError, TypeError, RecursionError, SceneError) as problem:  # a damaged file
             why = f"the folder's own cannot be loaded here ({type(problem).__name__}: {problem})"
         raise SceneError(f"resume.scene = None: expected the scene of {self.place}, because {why}")
 
