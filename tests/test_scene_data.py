@@ -85,7 +85,10 @@ def test_what_has_no_form_as_data_is_named():
 
     for scene, words in (
         (cf.Scene([cone]), r"rods\[0\] \(cone\): a function written in Python"),
-        (cf.Scene([rod], loads=[cf.Force(rod.end, lambda t: (t, 0, 0))]), r"loads\[0\] \(Force at rod.end\): a function"),
+        (
+            cf.Scene([rod], loads=[cf.Force(rod.end, lambda t: (t, 0, 0))]),
+            r"loads\[0\] \(Force at rod.end\): a function",
+        ),
         (cf.Scene([rod], loads=[Own()]), r"loads\[0\] \(Own at rod.end\): a part of the class Own cannot"),
     ):
         with pytest.raises(NotData, match=words):

@@ -85,6 +85,7 @@ class Term:
             because the end-point rule gives each end half that length; 0 elsewhere.
         data, memory: Functions of the data, and of the memory (history variables).
         moves: whether any of its data depend on time.
+        acting: (action, rod) of those that depend on time, with their values at the time of the last `put`.
     """
 
     def __init__(self, rods, signature, nodes, kind):
@@ -188,8 +189,11 @@ class Term:
 
     def put(self, t):
         """Fill in the data at the time t, s."""
+        self.acting = []
         for action, rod, rows, s, _, elements in self._where:
             now = at(action, t)  # on all ranks, since a user's function of time may communicate
+            if now is not action:
+                self.acting.append((now, rod))
             if not len(rows):
                 continue
             rough = self.kind.place == "line" and len(now.kinks(rod))

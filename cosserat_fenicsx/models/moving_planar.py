@@ -11,7 +11,7 @@ from cosserat_fenicsx.models.moving_forms import StepForms, along, compile_momen
 from cosserat_fenicsx.models.planar import PlanarModel
 from cosserat_fenicsx.scene.action import is_axial
 from cosserat_fenicsx.scene.describe import describe
-from cosserat_fenicsx.scene.signals import at, signals_of
+from cosserat_fenicsx.scene.signals import signals_of
 
 _OFF = 1e-9
 
@@ -60,15 +60,14 @@ class MovingPlanar(Moving, PlanarModel):
             SceneError: a load that leaves the plane at this time.
         """
         super().loads_at(t)
-        for load in self.scene.actions:
-            if not signals_of(load):
-                continue
-            for rod in [load.station.rod] if load.station else filter(load.acts_on, self.scene.rods):
-                for datum in at(load, t).data(rod, np.array([0.0, rod.length])):
-                    given = datum.value.reshape(-1, datum.size) @ self.axes.T if datum.size == 3 else np.zeros((1, 3))
-                    off = given[:, :2] if is_axial(datum.unit) else given[:, 2]
-                    if np.abs(off).max(initial=0.0) > _OFF * np.abs(given).max(initial=0.0):
-                        self._refuse(describe(load), t)
+        for load, rod in (pair for term in self.actions.terms for pair in term.acting):
+            for datum in load.data(rod, np.array([0.0, rod.length])):
+                if datum.size != 3:
+                    continue
+                given = datum.value.reshape(-1, 3) @ self.axes.T
+                off = given[:, :2] if is_axial(datum.unit) else given[:, 2]
+                if np.abs(off).max() > _OFF * np.abs(given).max():
+                    self._refuse(describe(load), t)
 
     def ties_at(self, t):
         """See `Moving`.

@@ -5,7 +5,7 @@ with `jumps` at the times where it is not smooth: time steps end there. The attr
 are linear between their jumps, and resolved by steps of any length.
 """
 
-import dataclasses
+import copy
 import itertools
 import math
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ from functools import cached_property
 
 import numpy as np
 
-from cosserat_fenicsx.checks import call, number, refuse, vector
+from cosserat_fenicsx.checks import call, number, refuse, store, vector
 from cosserat_fenicsx.errors import SceneError
 
 
@@ -293,7 +293,11 @@ def signals_of(item):
 def at(item, t):
     """A load or a support with its values at the time t (s); unchanged where it does not depend on time."""
     now = {name: signal(t) for name, signal in signals_of(item).items()}
-    return dataclasses.replace(item, **now, jumps=()) if now else item
+    if not now:
+        return item
+    item = copy.copy(item)  # not by its constructor, whose checks take longer than a signal's own
+    store(item, **now, jumps=())
+    return item
 
 
 def sample_times(item, until):

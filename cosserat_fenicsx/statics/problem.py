@@ -67,7 +67,7 @@ class Problem(Equations):
         else:
             model.rest()
         self.begins = any(kind.scaled == "permanent" for kind in model.signature.terms)
-        self._eta[...] = 0.0
+        self._eta[...] = self.eta = 0.0
         self.set_load_factor(0.0)
         self.numbering.from_local(self._state, self.x)
         self.set_state(self.x)
@@ -89,7 +89,10 @@ class Problem(Equations):
     def set_load_factor(self, eta):
         """Set the factor of loads and prescribed motions to eta; while `begins`, that of permanent loads."""
         self.load_factor = eta
-        (self._share if self.begins else self._eta)[...] = eta
+        if self.begins:
+            self._share[...] = eta
+        else:
+            self._eta[...] = self.eta = eta
 
     def end_beginning(self):
         """Set the factor of permanent loads to 1 and the load factor to 0."""
@@ -101,11 +104,6 @@ class Problem(Equations):
         """Accept the state: path-dependent loads update their history variables."""
         if self._remembers:
             self.model.actions.commit()
-
-    @property
-    def eta(self):
-        """The factor of loads and prescribed motions."""
-        return float(self._eta)
 
     def numbers(self):
         """Copies of all arrays that define the state: this rank's unknowns, then the carried fields."""
@@ -136,12 +134,11 @@ class Problem(Equations):
         if self._refreshes:
             self.model.actions.refresh()
         self._assemble(self._residual, b)
-        eta = self.eta
-        b.axpy(-eta, self._dead)
+        b.axpy(-self.eta, self._dead)
         if self._permanent_loads:
             b.axpy(-float(self._share), self._permanent)
         if self.ties:
-            self.ties.add_residual(b, eta)
+            self.ties.add_residual(b, self.eta)
 
     def load_derivative(self, x):
         """d residual/d load factor at x by a central difference, which is exact for loads, affine in the load factor.
