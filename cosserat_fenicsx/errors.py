@@ -54,7 +54,8 @@ class Interrupted(KeyboardInterrupt):
     """
 
     def __init__(self, path):
-        super().__init__(f"interrupted after {len(path)} {path.axis}{'' if len(path) == 1 else 's'}")
+        plural = "" if len(path) == 1 else "s"
+        super().__init__(f"interrupted after {len(path)} {path.axis}{plural}, which the exception's `path` holds")
         self.path = path
 
 

@@ -100,6 +100,14 @@ def test_a_body_that_turns():
     assert np.abs(omega / math.sqrt(0.8 / J) - 1).min() < 1e-6
 
 
+def test_a_rod_outside_its_wall_is_refused():
+    for point, along, words in (
+        ((0, 0, 0), (0, 0, 1), "at s = 1 m by 0.95 m"), ((0, 0, 0.2), (1, 0, 0), "at s = 0 m by 0.15 m"),
+    ):  # fmt: skip
+        with pytest.raises(cf.SceneError, match=f"lies outside it at rest, {words}: expected a point"):
+            cf.Wall(ROD, point, along, 0.05)
+
+
 @pytest.mark.parametrize("scheme", ["momentum", "energy", "generalised-alpha"])
 def test_a_falling_rod_reaches_its_terminal_speed(scheme):
     """A level rod that falls through a fluid: v' = g - (c/rho) v^2, so v = v_t tanh(g t/v_t), v_t = sqrt(rho g/c)."""

@@ -147,7 +147,7 @@ def test_explained_is_what_is_done(cosserat):
         (("run", DEMO, "--dt", "0.1"), "--dt is for a motion, and this scene is an equilibrium path"),
         (
             ("run", FLIGHT, "--static"),
-            "depends on time, which a static analysis excludes: expected a vector, or a motion",
+            "depends on time, which a static analysis excludes: expected a vector, a function of the arc length",
         ),
         (("run", FLIGHT, "--animate"), "expected a motion, and -o DIR"),
         (("run", FLIGHT, "--animate", "a.avi", "-o", "{tmp}"), "expected a name that ends in .gif or .mp4"),

@@ -243,3 +243,9 @@ def test_a_moving_scene_in_toml(tmp_path):
     file.write_text(file.read_text().replace('"Ramp"', '"Rampe"'))
     with pytest.raises(cf.SceneError, match=r"loads\[0\].force.type = 'Rampe': did you mean 'Ramp'"):
         cf.read_scene(file)
+
+
+def test_a_motion_may_start_under_permanent_loads_alone():
+    weight = cf.Scene([ROD], [cf.Clamp(ROD.start)], [cf.LineForce(ROD, (0, 0, -1.0), permanent=True)])
+    history = cf.simulate(weight, 0.2, dt=0.05, start=0.0, elements=2)
+    assert np.ptp(history.displacement(ROD.end), axis=0).max() < 1e-12 < np.abs(history.displacement(ROD.end)).max()

@@ -76,7 +76,7 @@ def _run(options):
     scene = moving[0] if moving else scene
     if options.station:
         scene.station(options.station)  # refused before the computation
-    for caution in scene.cautions:
+    for caution in scene.doubts if moving else scene.cautions:
         say(f"cosserat: {caution}")
 
     def computed():

@@ -5,6 +5,7 @@ import sys
 
 from cosserat_fenicsx.checks import number
 from cosserat_fenicsx.models.choose import not_flat
+from cosserat_fenicsx.scene.action import has_permanent
 from cosserat_fenicsx.scene.scene import Scene
 from cosserat_fenicsx.scene.signals import at
 from cosserat_fenicsx.statics.solve import solve
@@ -27,14 +28,18 @@ def equilibrium(scene, load_factor, *, model, elements, degree, comm):
 
     Args:
         scene: the scene of the motion.
-        load_factor: multiplies all its loads and prescribed motions; not zero.
+        load_factor: multiplies its loads and prescribed motions; zero only with permanent loads.
         model, elements, degree, comm: those of the motion.
 
     Raises:
         SceneError: a load factor that is zero or not finite, or a scene that has no equilibrium.
         NotConverged: the solver does not reach the equilibrium.
     """
-    number("simulate", "start", load_factor, "a load factor that is finite and not 0", lambda x: math.isfinite(x) and x)
     standing = before(scene)
+    if has_permanent(standing):
+        number("simulate", "start", load_factor, "a finite load factor", math.isfinite)
+    else:
+        expected = "a load factor that is finite and not 0"
+        number("simulate", "start", load_factor, expected, lambda x: math.isfinite(x) and x)
     model = "planar" if model != "spatial" and not not_flat(standing) else "spatial"
     return solve(standing, [load_factor], model=model, elements=elements, degree=degree, comm=comm, progress=False)

@@ -53,7 +53,7 @@ class History(Result):
         linear_momentum: (n, 3) kg m/s; angular_momentum: (n, 3) kg m^2/s about the inertial origin, inertial.
     """
 
-    axis = "time"
+    axis, counts_modes = "time", False
     more_fields = {"velocity": "velocity", "angular_velocity": "angular_velocity"}  # noqa: RUF012
     _computed = (*Result._computed, "_all_rates", "_all_gauss")
 

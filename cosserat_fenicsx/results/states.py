@@ -20,6 +20,8 @@ class States(OnNodes):
 
     #: name of the quantity in `along_axis`; fields in files in addition to `xdmf.FIELDS`
     axis, more_fields = "", {}
+    #: whether stability is judged by the number of negative modes
+    counts_modes = True
     #: cached properties, which are cleared when a state is added
     _computed = ("_all_rq",)
 
@@ -43,7 +45,7 @@ class States(OnNodes):
             formulation=formulation,
             degree=model.signature.degree,
             unknowns=model.unknowns,
-            why=[*why, *model.scene.cautions],
+            why=[*why, *(model.scene.cautions if cls.counts_modes else model.scene.doubts)],
             connections=model.signature.connections,
             expand=model.expansion(),
         )

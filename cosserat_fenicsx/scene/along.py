@@ -5,6 +5,7 @@ They have classes of their own, so that a function of the arc length cannot be t
 
 import math
 from dataclasses import dataclass, field
+from pathlib import PurePath
 
 import numpy as np
 
@@ -147,6 +148,8 @@ FUNCTIONS_ALONG = (Along, *ALONG)
 
 def along_or_vector(owner, field, value, rod):
     """`value` where it is a function of the arc length, checked along the rod; None where it is something else."""
+    if isinstance(value, str | PurePath):
+        refuse(owner, field, value, f"a vector, or AlongTable({str(value)!r}) for a file of s and three components")
     if not isinstance(value, FUNCTIONS_ALONG):
         return None
     if len(owner.jumps):

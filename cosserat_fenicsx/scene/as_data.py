@@ -1,8 +1,8 @@
 """Scenes as plain data, which JSON can hold, and back.
 
 An object of the package is {"type": its class, field: value, ...}, a rod of the scene {"rod": its number}, and a
-station {"rod": number, "s": m}. Reading data calls the constructors of the package's classes and nothing else. Functions
-written in Python and classes of the user's own have no such form.
+station {"rod": number, "s": m}. Reading data calls the constructors of the package's classes and nothing else.
+Functions written in Python and classes of the user's own have no such form.
 """
 
 import dataclasses

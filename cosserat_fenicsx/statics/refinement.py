@@ -288,6 +288,8 @@ def _rounding_hides(tol, rounding, elements, formulation):
 
 def _not_accurate(tol, reached, elements, degree, path):
     advice = "a larger tol" if degree == 4 else "a larger tol, or degree 4"
+    if any(action.at_nodes for action in path.scene.actions):
+        advice += " (the pressure at a wall has kinks, which meshes resolve slowly), or a softer wall"
     if path.scene.doubts:
         advice = f"{advice}, but first: {'; '.join(path.scene.doubts)}"
     return (

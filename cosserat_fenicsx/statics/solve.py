@@ -246,8 +246,8 @@ def check_arguments(scene, tol, elements):
     for item in scene.moving:
         raise SceneError(
             f"Scene: the {type(item).__name__} depends on time, which a static analysis excludes: expected a vector, "
-            "or a motion: cf.simulate(scene, duration) in Python, a duration under [simulate] in a scene file, "
-            "--duration on the command line"
+            "a function of the arc length as Along(function), or a motion: cf.simulate(scene, duration) in Python, a "
+            "duration under [simulate] in a scene file, --duration on the command line"
         )
     check_no_mechanism(scene)
     if isinstance(tol, bool) or not isinstance(tol, numbers.Real) or not 1e-12 <= tol < 1:

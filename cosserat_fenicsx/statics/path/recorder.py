@@ -189,7 +189,8 @@ class Tracing:
             )
         if here and self._options["control"] == "load":
             where = "There may be a limit point, which load control cannot pass (control='auto' can); otherwise try"
-        return f"{where} load factors in between, more elements, or {self.model.signature.formulation.advice}."
+        softer = ", a softer wall" if any(action.at_nodes for action in self.model.scene.actions) else ""
+        return f"{where} load factors in between, more elements{softer}, or {self.model.signature.formulation.advice}."
 
     def corrected(self, coarse):
         """The points of a path on a coarser mesh, corrected on this mesh by Newton's method at their load factors.
