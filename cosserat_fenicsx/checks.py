@@ -7,23 +7,39 @@ import numpy as np
 
 from cosserat_fenicsx.errors import SceneError
 
+#: Sizes beyond this, and below its inverse, are refused: their fourth powers would not be numbers.
+LARGEST = 1e60
+# Values with a longer text, such as that of a rod, are abbreviated in messages.
+_LONGEST = 100
+
 
 def refuse(owner, field, value, expected):
     """Raise a SceneError: 'owner.field = value: expected ...'."""
-    where = owner if isinstance(owner, str) else type(owner).__name__
-    raise SceneError(f"{where}.{field} = {value!r}: expected {expected}")
+    where, given = owner if isinstance(owner, str) else type(owner).__name__, repr(value)
+    if len(given) > _LONGEST:
+        given = f"{given[:_LONGEST]}..."
+    raise SceneError(f"{where}.{field} = {given}: expected {expected}")
 
 
 def number(owner, field, value, expected, accept):
     """`value` as a float where it is a number that `accept` accepts; refused otherwise."""
-    if isinstance(value, bool) or not isinstance(value, numbers.Real) or math.isnan(value) or not accept(value):
+    if isinstance(value, bool) or not isinstance(value, numbers.Real):
         refuse(owner, field, value, expected)
-    return float(value)
+    try:
+        given = float(value)
+    except OverflowError:  # an integer of more than 308 digits
+        refuse(owner, field, f"{str(value)[:10]}...", expected)
+    if math.isnan(given) or not accept(given):
+        refuse(owner, field, value, expected)
+    return given
 
 
 def positive(owner, field, value, unit):
-    """A finite number above zero."""
-    return number(owner, field, value, f"a positive number ({unit})", lambda x: 0 < x < math.inf)
+    """A number above zero, neither so small nor so large that its powers are not numbers."""
+    found = number(owner, field, value, f"a positive number ({unit})", lambda x: 0 < x < math.inf)
+    if not 1 / LARGEST <= found <= LARGEST:
+        refuse(owner, field, value, f"a positive number ({unit}) from {1 / LARGEST:g} to {LARGEST:g}")
+    return found
 
 
 def stiffness(owner, field, value, unit):
@@ -39,6 +55,8 @@ def finite_array(owner, field, value, expected):
         refuse(owner, field, value, expected)
     if array.dtype.kind not in "iuf" or not np.isfinite(array).all():
         refuse(owner, field, value, expected)
+    if np.abs(array).max(initial=0) > LARGEST:
+        refuse(owner, field, value, f"{expected}, none beyond {LARGEST:g}")
     return array.astype(float)
 
 

@@ -241,3 +241,28 @@ def test_soft_materials_are_asked_about(tmp_path, capsys):
     file.write_text(re.sub("E = .*", "E = 210000", DEMO.read_text()))
     cli.main(["run", str(file), "--load-factors", "1e-9"])
     assert "E = 210000 Pa is softer than rubber: are the units SI" in capsys.readouterr().err
+
+
+TITLE = "a [/red] title [bold] :smile: \u00e9"
+
+
+def test_titles_and_names_are_printed_as_they_are(tmp_path, monkeypatch):
+    """No markup, no emoji; and ASCII where standard output knows nothing else."""
+    import io
+
+    from cosserat_fenicsx.cli import main as cli
+
+    text = (
+        DEMO.read_text(encoding="utf-8")
+        .replace("Eccentrically compressed cantilever", TITLE)
+        .replace("column", "rod[/red]")
+    )
+    file = tmp_path / "scene.toml"
+    file.write_text(text, encoding="utf-8")
+    for encoding, title in (("utf-8", TITLE), ("ascii", "[bold] :smile: \\xe9")):
+        out = io.TextIOWrapper(io.BytesIO(), encoding=encoding, write_through=True)
+        monkeypatch.setattr(sys, "stdout", out)
+        assert cli.main(["run", str(file), "--load-factors", "0.1", "--elements", "4"]) == 0
+        monkeypatch.undo()
+        printed = out.buffer.getvalue().decode(encoding)
+        assert title in printed and "rod[/red].end" in printed

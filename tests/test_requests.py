@@ -19,8 +19,9 @@ DEMO = ROOT / "demos" / "eccentric_cantilever.toml"
 
 
 @pytest.mark.serial
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-@pytest.mark.parametrize("command", ["buckling", "modes"])
+@pytest.mark.parametrize(
+    ("command", "number"), [("buckling", signal.SIGINT), ("modes", signal.SIGTERM), ("modes", signal.SIGHUP)]
+)
 def test_long_eigenproblems_end_soon_after_a_signal(command, number):
     arguments = [sys.executable, "-m", "cosserat_fenicsx", command, str(DEMO), "--count", "3000"]
     process = subprocess.Popen(arguments, stdout=subprocess.PIPE, stderr=subprocess.PIPE, encoding="utf-8", cwd=ROOT)

@@ -47,6 +47,18 @@ def test_damaged_files(tmp_path, monkeypatch, never_ended):
         cf.resume(folder)
 
 
+def test_no_objects_are_read_from_a_file_of_states(tmp_path):
+    """They would be pointers of another process, which crash this one."""
+    folder = tmp_path / "motion"
+    run("plane", folder)
+    scene, states = flying_in_a_plane()[1], folder / "instants.npy"
+    whole = states.read_bytes()
+    for kind in (b"'|O'", b"'<U2'", b"'>f8'"):
+        states.write_bytes(whole.replace(b"'<f8'", kind.ljust(5), 1))
+        with pytest.raises(cf.SceneError, match="other columns than those of saved states|is damaged"):
+            cf.read_history(folder, scene)
+
+
 def test_another_scene_is_told_from_the_one_of_the_motion(tmp_path, monkeypatch):
     folder = tmp_path / "motion"
     rod, scene = flying_in_space()

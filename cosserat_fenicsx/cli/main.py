@@ -24,6 +24,9 @@ def main(arguments=None):
         whole.print_help()
         return BAD_INPUT
     interrupts.listen()
+    for stream in (sys.stdout, sys.stderr):  # a terminal may not know all letters of a title
+        if hasattr(stream, "reconfigure"):
+            stream.reconfigure(errors="backslashreplace")
     try:
         return options.do(options)
     except KeyboardInterrupt:  # of commands without partial results; `deliver` handles paths and motions

@@ -80,7 +80,12 @@ class Result(Extremes, Reactions, States):
             dict of arrays (nodes, ...): s (m), position, displacement (m), quaternion, d1, d2, d3, force (N), moment
             (N m), all inertial; strain (v - v_R: shear 1, shear 2, stretch) and curvature (u - u_R: bending 1,
             bending 2, twist; 1/m), both material; bending_moment (N m, its size).
+
+        Raises:
+            IndexError: there is no point k.
         """
+        if not -len(self) <= k < len(self):
+            raise IndexError(f"fields({k}): expected the number of a {self.axis}, from 0 to {len(self) - 1}")
         rod = self.rod(rod)
         i, rows = self._rows(rod)
         s = self.layout.node_s(self.rule.nodes)[i] * rod.length

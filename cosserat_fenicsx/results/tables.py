@@ -1,8 +1,10 @@
 """A path as a table for the screen and as CSV."""
 
 import csv
+import sys
 
 import numpy as np
+from rich import box
 from rich.console import Console
 from rich.table import Table
 
@@ -128,8 +130,16 @@ def stability(negative_modes):
 
 
 def as_text(table):
-    """A rich table as plain text, as wide as it needs."""
-    console = Console(width=140, color_system=None)  # fixed, since the size of the terminal is unknown under mpirun
+    """A rich table as plain text, as wide as it needs, with names and titles as they are.
+
+    Its lines are ASCII where standard output does not know others.
+    """
+    try:
+        "━┏┃".encode(sys.stdout.encoding or "utf-8")
+    except UnicodeEncodeError:
+        table.box = box.ASCII2
+    # a fixed width, since the size of the terminal is unknown under mpirun
+    console = Console(width=140, color_system=None, markup=False, emoji=False)
     with console.capture() as capture:
         console.print(table)
     return capture.get().rstrip()

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from cosserat_fenicsx.checks import refuse
+from cosserat_fenicsx.checks import LARGEST, refuse
 
 # Smallest distance of neighbouring points over the extent of all: nearer ones leave the curvature to rounding errors.
 _APART = 1e-7
@@ -40,9 +40,10 @@ def polyline(owner, field, given, *, closed):
     if points.ndim != 2 or points.shape[1] != 3 or points.dtype.kind not in "iuf":
         refuse(owner, field, what, "points of three numbers each (m)")
     points = points.astype(float)
-    if not np.isfinite(points).all():
-        row = int(np.argmin(np.isfinite(points).all(axis=1)))
-        refuse(owner, f"{field}[{row}]", tuple(points[row].tolist()), "finite numbers (m)")
+    usable = (np.abs(points) <= LARGEST).all(axis=1)
+    if not usable.all():
+        row = int(np.argmin(usable))
+        refuse(owner, f"{field}[{row}]", tuple(points[row].tolist()), f"finite numbers (m), none beyond {LARGEST:g}")
     if closed and len(points) > 1 and _coincide(points[-1:], points[:1], points)[0]:
         points = points[:-1]
     if len(points) < 2 + closed:

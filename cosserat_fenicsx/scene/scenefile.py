@@ -227,7 +227,7 @@ def _build(where, entry, classes, rods, folder=None):
     if "type" not in entry and len(classes) > 1:
         raise SceneError(f"{where}: 'type' is missing; known: {', '.join(names)}")
     name = entry.pop("type", classes[0].__name__)
-    if name not in names:
+    if not isinstance(name, str) or name not in names:
         raise SceneError(f"{where}.type = {name!r}: {nearest(name, names)}")
     kind = names[name]
     arguments = inspect.signature(kind).parameters

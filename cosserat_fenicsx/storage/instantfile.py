@@ -151,8 +151,11 @@ def _read_header(file):
         if not start.startswith(_MAGIC):
             raise ValueError("no .npy file")
         columns = [(name, kind, *map(tuple, shape)) for name, kind, *shape in told["descr"]]
+        expected = {**_OF_INSTANT, **dict.fromkeys((*Ledger._fields, *_ARRAYS), "<f8")}
+        if {name: kind for name, kind, *_ in columns} != expected:  # an object in a file would be a pointer
+            raise ValueError("other columns than those of saved states")
         return np.dtype(columns), len(start) + inside
-    except (ValueError, SyntaxError, struct.error, KeyError, TypeError) as problem:
+    except (ValueError, SyntaxError, struct.error, KeyError, TypeError, RecursionError, MemoryError) as problem:
         raise SceneError(
             f"{file} is damaged ({problem}): expected saved states; without the file, cosserat_fenicsx.resume computes "
             "them again"
