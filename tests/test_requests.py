@@ -24,7 +24,10 @@ DEMO = ROOT / "demos" / "eccentric_cantilever.toml"
 )
 def test_long_eigenproblems_end_soon_after_a_signal(command, number):
     arguments = [sys.executable, "-m", "cosserat_fenicsx", command, str(DEMO), "--count", "3000"]
-    process = subprocess.Popen(arguments, stdout=subprocess.PIPE, stderr=subprocess.PIPE, encoding="utf-8", cwd=ROOT)
+    process = subprocess.Popen(
+        arguments, stdout=subprocess.PIPE, stderr=subprocess.PIPE, encoding="utf-8", cwd=ROOT,
+        preexec_fn=lambda: signal.signal(number, signal.SIG_DFL),  # this one may be under nohup
+    )  # fmt: skip
     time.sleep(8)
     assert process.poll() is None, "it takes minutes"
     process.send_signal(number)
