@@ -15,15 +15,14 @@ _asked = False
 
 
 def listen():
-    """Let SIGINT, SIGTERM and SIGHUP (a closed terminal) request a stop; a second signal ends the process at once.
+    """Let SIGINT and SIGTERM request a stop; a second signal ends the process at once.
 
     Not under mpirun, which kills its ranks anyway, and where one rank must not stop without the others.
     """
     if any(os.environ.get(name, "1") != "1" for name in ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE")):
         return
-    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
-        if signal.getsignal(number) is not signal.SIG_IGN:  # as under nohup
-            signal.signal(number, _ask)
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, _ask)
 
 
 def _ask(number, frame):
