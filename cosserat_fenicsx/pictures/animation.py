@@ -5,6 +5,7 @@ import math
 import shutil
 import socket
 import subprocess
+import textwrap
 from pathlib import Path
 
 import numpy as np
@@ -23,8 +24,8 @@ FPS, SIZE = 25, (960, 720)
 _SHORTEST_REAL_TIME, _LONGEST_REAL_TIME, _LONGEST, _MOST_FRAMES = 4.0, 20.0, 10.0, 10_000
 # Colours of a .gif whose channels are all above this become white: quantisation would give nearly white stains.
 _WHITE = 244
-# Segments along a rod.
-_PIECES = 100
+# Segments along a rod; mean width of a letter of the title, pixels.
+_PIECES, _LETTER = 100, 16
 
 
 def film(history, file, *, fps=FPS, speed=None, magnify=1.0, size=SIZE, progress=None):
@@ -160,13 +161,13 @@ class _Stage:
         ]
         for line in resting:
             self._plotter.add_mesh(pyvista.lines_from_points(line), color="lightgrey", line_width=2)
-        self._head = history.scene.title or "Motion"
+        self._head, self._letters = history.scene.title or "Motion", size[0] // _LETTER
         self._notes = self._not_to_scale()
         frame(self._plotter, everywhere)
 
     def _not_to_scale(self):
         notes = [f"displacements magnified {self._magnify:g} times"] if self._magnify != 1 else []
-        thicker = sorted({f"{factor:.2g}" for factor in self._factors if factor > 1})
+        thicker = sorted({f"{float(f'{factor:.2g}'):g}" for factor in self._factors if factor > 1})
         notes += [f"sections drawn {' and '.join(thicker)} times their size"] if thicker else []
         if self._between.smooth < 1:
             notes.append("saved too seldom to be smooth")
@@ -181,8 +182,9 @@ class _Stage:
             mesh["moment"][:] = np.repeat(body.moment / self._scale, body.outline.shape[1])
             mesh.GetPoints().Modified()
             mesh.GetPointData().GetScalars().Modified()
+        text = f"{self._head}: t = {t:.{self._digits}f} s ({self._pace}){self._notes}"
         self._plotter.add_text(
-            f"{self._head}: t = {t:.{self._digits}f} s ({self._pace}){self._notes}",
+            "\n".join(textwrap.fill(line, self._letters) for line in text.split("\n")),
             position="upper_edge",
             color="black",
             font_size=10,

@@ -68,7 +68,7 @@ def _draw(path, points, magnify):
     for body in bodies.values():
         factor = thickening(body, size)
         if factor > 1:
-            thicker.add(f"{factor:.2g}")
+            thicker.add(f"{float(f'{factor:.2g}'):g}")
         add_body(plotter, pyvista, body, factor, peak)
     for line in resting:
         plotter.add_mesh(pyvista.lines_from_points(line), color="grey", line_width=2)
