@@ -58,7 +58,7 @@ ROOMS = {
     "actions": {"scene"},
     "algebra": set(),
     "models": {"scene", "forms"},
-    "results": {"scene", "storage", "pictures"},
+    "results": {"scene", "pictures"},
     "storage": {"scene", "results"},
     "pictures": {"scene", "results"},
     "statics": {"scene", "models", "algebra", "results"},

@@ -16,7 +16,7 @@ from cosserat_fenicsx.models.scales import Scales
 from cosserat_fenicsx.dynamics.time_loop import TimeLoop
 from cosserat_fenicsx.storage.runfolder import RunFolder
 from cosserat_fenicsx.scene.scene import Scene
-from cosserat_fenicsx.results.stored_history import StoredHistory
+from cosserat_fenicsx.storage.stored_history import StoredHistory
 
 
 def resume(folder, scene=None, *, duration=None, progress=None, comm=None):

@@ -22,7 +22,7 @@ from cosserat_fenicsx.dynamics.initial_equilibrium import equilibrium
 from cosserat_fenicsx.dynamics.solvers import chosen_model, solvers_of
 from cosserat_fenicsx.dynamics.start import put_start
 from cosserat_fenicsx.dynamics.steppers import SCHEMES
-from cosserat_fenicsx.results.stored_history import StoredHistory
+from cosserat_fenicsx.storage.stored_history import StoredHistory
 
 #: Default elements per rod, polynomial degree and tolerance.
 ELEMENTS, DEGREE, TOL = 8, 3, 1e-3
