@@ -6,6 +6,7 @@ Functions written in Python and classes of the user's own have no such form.
 """
 
 import dataclasses
+import functools
 
 import numpy as np
 
@@ -13,7 +14,7 @@ from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.scene.along import ALONG
 from cosserat_fenicsx.scene.curves import CURVES
 from cosserat_fenicsx.scene.damping import Damping
-from cosserat_fenicsx.scene.describe import describe
+from cosserat_fenicsx.scene.describe import name_of
 from cosserat_fenicsx.scene.initial import InitialVelocity
 from cosserat_fenicsx.scene.joints import Joint
 from cosserat_fenicsx.scene.materials import Material
@@ -41,10 +42,9 @@ def to_data(scene):
     """
     numbers = {rod: i for i, rod in enumerate(scene.rods)}
     data = {"title": scene.title}
-    data["rods"] = [_named(f"rods[{i}] ({rod.name})", rod, {}) for i, rod in enumerate(scene.rods)]
-    for part in _PARTS:
+    for part in ("rods", *_PARTS):
         items = getattr(scene, part)
-        data[part] = [_named(f"{part}[{i}] ({_words(item)})", item, numbers) for i, item in enumerate(items)]
+        data[part] = [_named(f"{part}[{i}] ({name_of(item)})", item, numbers) for i, item in enumerate(items)]
     return data
 
 
@@ -55,23 +55,21 @@ def from_data(data):
         SceneError: no data of a scene.
     """
     try:
-        rods = [_object(entry, [], _classes()) for entry in data["rods"]]
-        parts = {part: [_object(entry, rods, _classes()) for entry in data[part]] for part in _PARTS}
+        rods = [_object(entry, []) for entry in data["rods"]]
+        parts = {part: [_object(entry, rods) for entry in data[part]] for part in _PARTS}
         return Scene(rods, title=data["title"], **parts)
     except (KeyError, IndexError, TypeError, ValueError, AttributeError, RecursionError) as problem:
         raise SceneError(f"these are no data of a scene ({type(problem).__name__}: {problem})") from None
 
 
+@functools.cache
 def _classes():
+    """The classes of the package by their names; on the first call, since the names of actions load their modules."""
     known = (
         Rod, *CURVES, *SECTIONS, Material, Damping, *SIGNALS, *ALONG, *SUPPORTS, Joint, InitialVelocity,
         *action_classes(),
     )  # fmt: skip
     return {kind.__name__: kind for kind in known}
-
-
-def _words(item):
-    return describe(item) if hasattr(item, "station") else type(item).__name__
 
 
 def _named(where, item, rods):
@@ -103,13 +101,13 @@ def _value(value, rods, top=False):
     return {"type": kind.__name__, **{_ARGUMENTS.get(x, x): _value(getattr(value, x), rods) for x in fields}}
 
 
-def _object(data, rods, classes):
+def _object(data, rods):
     if isinstance(data, list):
-        return [_object(x, rods, classes) for x in data]
+        return [_object(x, rods) for x in data]
     if not isinstance(data, dict):
         return data
     if "type" in data:
-        arguments = {name: _object(value, rods, classes) for name, value in data.items() if name != "type"}
-        return classes[data["type"]](**arguments)
+        arguments = {name: _object(value, rods) for name, value in data.items() if name != "type"}
+        return _classes()[data["type"]](**arguments)
     rod = rods[data["rod"]]
-    return Station(rod, rod.at(data["s"]).s) if "s" in data else rod
+    return rod.at(data["s"]) if "s" in data else rod

@@ -10,6 +10,11 @@ def describe(item):
     return f"{type(item).__name__} on {item.rod.name}" if item.rod is not None else type(item).__name__
 
 
+def name_of(item):
+    """A part of a scene in messages: as `describe`, or by its name or class."""
+    return describe(item) if hasattr(item, "station") else getattr(item, "name", type(item).__name__)
+
+
 def actions_in_words(scene):
     """Sentences that list the actions on a scene's rods, by whether the load factor multiplies them."""
     groups = (
@@ -27,7 +32,7 @@ def unpicklable(scene):
         return ""
     for group in ("rods", "loads", "supports", "velocities"):  # all other parts only refer to rods
         items = list(enumerate(getattr(scene, group)))
-        names = [f"{group}[{i}] ({_name(item)})" for i, item in items if not _pickles(item)]
+        names = [f"{group}[{i}] ({name_of(item)})" for i, item in items if not _pickles(item)]
         if names:
             return ", ".join(names)
     return "the scene"
@@ -39,7 +44,3 @@ def _pickles(thing):
     except Exception:  # methods of user-defined parts may raise anything
         return False
     return True
-
-
-def _name(item):
-    return describe(item) if hasattr(item, "station") else getattr(item, "name", type(item).__name__)

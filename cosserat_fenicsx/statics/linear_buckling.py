@@ -120,8 +120,9 @@ def buckling(scene, count=1, *, load_factor=0.0, tol=1e-5, elements=None, degree
         comm: MPI communicator; default all ranks. Every rank calls.
 
     Returns:
-        Buckling. It holds fewer than `count` load factors where no more are positive (counted from eta) and below the
-        smallest EA and GA; or, without a potential, where the others are rounding error.
+        Buckling. It holds fewer than `count` load factors where no more are positive (counted from eta) and below that
+        at which the contact force of a rod reaches the smallest of its EA and GA; or, without a potential, where the
+        others are rounding error.
 
     Raises:
         SceneError: an argument outside its range.
