@@ -13,7 +13,7 @@ html_theme = "furo"
 html_static_path = ["site.css"]
 html_css_files = ["site.css"]
 templates_path = ["templates"]
-exclude_patterns = ["_build", "templates"]
+exclude_patterns = ["templates"]
 html_show_sourcelink = html_copy_source = False
 
 default_role = "py:obj"  # `Path` in a docstring becomes a link
