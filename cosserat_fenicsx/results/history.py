@@ -41,8 +41,9 @@ class History(Result):
     forces and moments include those of damping. If `simulate` was given a `folder`, the states are read from a file in
     it.
 
+    Beside those of `Result` it has these attributes.
+
     Attributes:
-        see `Result`;
         times: (n,) s.
         scheme: the scheme's name.
         steps: (n,) number of steps since the start.

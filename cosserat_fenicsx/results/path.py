@@ -11,8 +11,9 @@ from cosserat_fenicsx.results.result import Result
 class Path(Result):
     """An equilibrium path: a sequence of converged points.
 
+    Beside those of `Result` it has these attributes.
+
     Attributes:
-        see `Result`;
         load_factors: (n,).
         negative_modes: (n,) number of negative eigenvalues of the second variation; 0 at a stable point, -1 where it is
             singular. Where the loads have no potential (see `conservative`) its symmetric part is used, which does not

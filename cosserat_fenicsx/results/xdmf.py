@@ -2,7 +2,7 @@
 
 Written from the results with the system's h5py and with meshio, so that the files are the same for every release of
 dolfinx; an element of degree p becomes p straight lines. (meshio's own time series does not support quaternions, and
-some readers crash on dolfinx's XDMF or misinterpret it: README, Files.)
+some readers crash on dolfinx's XDMF or misinterpret it: docs/results.md.)
 """
 
 from pathlib import Path

@@ -80,8 +80,8 @@ class Action:
         work: a static method ``(point, virtual motion, *data)`` -> UFL, or the name of a function in `forms.loads`: the
             virtual work at a point, per reference length of a distributed action. None for an action with inertia
             alone.
-        memory: internal variables, kept from one accepted state to the next: a `Datum` each, its initial value, passed to
-            `work` after `data`.
+        memory: internal variables, kept from one accepted state to the next: a `Datum` each, its initial value, passed
+            to `work` after `data`.
         evolve: a static method ``(point, *data, *memory)`` -> a list of UFL expressions, the new values of the memory.
     """
 

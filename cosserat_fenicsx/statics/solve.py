@@ -58,12 +58,12 @@ def solve(
             which the solver chooses its steps; or one number.
         model: "determinate", "planar" or "spatial"; or "auto", the cheapest one that suffices, which changes to
             "spatial" where a planar solution buckles sideways. `Path.why` gives the reasons.
-        formulation: "mixed" (default), "displacement" or "multiplier"; see the README.
+        formulation: "mixed" (default), "displacement" or "multiplier": see docs/models.md.
         tol: largest estimated error of the positions along the rods, relative to the largest displacement of the
             scene at that load factor. Elements are refined until the estimate is below it, unless `elements` is given.
         elements: elements per rod; fixes the mesh, and `Path.error` is then not estimated (NaN).
         degree: 1 to 4, of r and q; default 4 (2 for "displacement").
-        gauss_points: per element; default `degree`, which does not lock. More of them lock (README, Formulations).
+        gauss_points: per element; default `degree`, which does not lock. More of them lock (docs/models.md).
         steps: a `StepControl`.
         control: "auto": load control, and arc length from a limit point on, through snap-through and snap-back, until
             the requested load factor is reached again. "load": load control alone; a limit point raises NotConverged.

@@ -1,4 +1,4 @@
-"""The README's tables of accuracy, on the eccentric cantilever in space (model "spatial"), in Markdown.
+"""The documentation's tables of accuracy, on the eccentric cantilever in space (model "spatial"), in Markdown.
 
 python demos/evidence/accuracy.py            writes out/accuracy.md and prints it
 python demos/evidence/accuracy.py --quick    two meshes and two slendernesses

@@ -1,0 +1,108 @@
+"""The documentation: its links lead somewhere, its programs run, its scenes are read, its site builds."""
+
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import cosserat_fenicsx as cf
+
+pytestmark = pytest.mark.serial
+ROOT = Path(__file__).parent.parent
+DOCS = ROOT / "docs"
+PAGES = [ROOT / "README.md", ROOT / "CHANGELOG.md", *sorted(DOCS.glob("**/*.md"))]
+
+
+def text_of(page):
+    return page.read_text(encoding="utf-8")
+
+
+def blocks(language):
+    """The fenced blocks of all pages in a language: (page's name, text)."""
+    found = [
+        (page.name, block) for page in PAGES for block in re.findall(rf"```{language}\n(.*?)```", text_of(page), re.S)
+    ]
+    assert found, language
+    return found
+
+
+def test_the_readme_is_short():
+    lines = text_of(ROOT / "README.md").splitlines()
+    assert len(lines) <= 160 and max(map(len, lines)) <= 120
+
+
+def headings(page):
+    """The anchors of a page, as in a browser."""
+    words = re.findall(r"^#+ (.*)$", text_of(page), re.M)
+    return {re.sub(r"[^\w\- ]", "", word.lower()).replace(" ", "-") for word in words}
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_links_lead_somewhere(page):
+    for link in re.findall(r"\]\(([^)\s]+)\)", re.sub(r"```.*?```", "", text_of(page), flags=re.S)):
+        name, _, anchor = link.partition("#")
+        if not link.startswith("https://"):
+            target = (page.parent / name).resolve() if name else page
+            assert target.exists() and ROOT in target.parents, link
+            assert not anchor or anchor in headings(target), link
+
+
+def test_pictures_are_small_and_shown():
+    shown = "".join(map(text_of, PAGES))
+    for picture in (DOCS / "pictures").iterdir():
+        assert picture.stat().st_size <= 150_000 and f"pictures/{picture.name}" in shown, picture
+
+
+def test_every_public_name_is_in_the_reference():
+    listed = re.findall(r"^   (\w+)$", text_of(DOCS / "api.md"), re.M)
+    assert sorted(listed) == sorted(cf.__all__)
+
+
+@pytest.mark.parametrize(
+    ("page", "program"), [found for found in blocks("python") if "import cosserat_fenicsx" in found[1]]
+)
+def test_programs_run(page, program, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    names = {"__name__": "program"}
+    exec(compile(program, page, "exec", dont_inherit=True), names)
+    if "path" in names:
+        assert "2.2006154" in capsys.readouterr().out and (tmp_path / "cantilever.png").stat().st_size > 20_000
+    if "history" in names:
+        end = names["history"].position(names["rod"].start)[-1]
+        assert end == pytest.approx((40.6897, 0.1578, -3.0316), abs=1e-4)
+
+
+@pytest.mark.parametrize(("page", "scene"), blocks("toml"))
+def test_scene_files_are_read(page, scene, tmp_path):
+    file = tmp_path / "scene.toml"
+    file.write_text(scene, encoding="utf-8")
+    found, _ = cf.read_scene(file)
+    assert found.title
+
+
+def test_the_notebook_prints_what_it_shows():
+    """`jupyter execute --inplace docs/notebook.ipynb` puts in what it prints today."""
+    nbformat, nbclient = pytest.importorskip("nbformat"), pytest.importorskip("nbclient")
+    stored = nbformat.read(DOCS / "notebook.ipynb", as_version=4)
+    ran = nbformat.read(DOCS / "notebook.ipynb", as_version=4)
+    nbclient.NotebookClient(ran, timeout=120, kernel_name="python3").execute()
+
+    def printed(notebook):
+        outputs = [output for cell in notebook.cells for output in cell.get("outputs", ())]
+        return "".join(output["text"] for output in outputs if output.get("name") == "stdout")
+
+    assert printed(ran) == printed(stored) and "2.200615 m" in printed(stored)
+
+
+@pytest.mark.slow
+def test_the_site_builds(tmp_path):
+    """Without warnings, and without anything from elsewhere. `make docs` installs what it takes."""
+    pytest.importorskip("myst_nb")
+    command = [sys.executable, "-m", "sphinx", "-q", "-W", "--keep-going", "-b", "html", "-d", tmp_path / "kept"]
+    done = subprocess.run([*command, DOCS, tmp_path / "site"], capture_output=True, encoding="utf-8", env=os.environ)
+    assert done.returncode == 0, done.stderr
+    for page in (tmp_path / "site").glob("**/*.html"):
+        assert not re.search(r'<(script|img|iframe)[^>]* src="https?:|<link[^>]* href="https?:', text_of(page)), page
