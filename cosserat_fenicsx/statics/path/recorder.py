@@ -125,7 +125,7 @@ class Tracing:
         self.path.append(Record(point.load_factor, *self.model.snapshot(), point.negative_modes, iterations,
                                 self.problem.multipliers(), track.neutral is not None,
                                 self.model.densities.here(), self.problem.tie_forces(),
-                                self.model.clamps.loads(point.load_factor)))  # fmt: skip
+                                self.model.clamps.loads(point.load_factor), track.steps))  # fmt: skip
         if self._until and self._until(self.path):
             raise _Enough
 
@@ -214,6 +214,7 @@ class Tracing:
                 found = track.point(solved)
                 if found.negative_modes != point.negative_modes:
                     return None
+                track.steps += 1
                 self._record(found)
                 self._bar.at(point)
         except KeyboardInterrupt:
