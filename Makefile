@@ -45,29 +45,29 @@ test: setup
 	$(MPIRUN) -n 4 $(PYTHON) -m pytest -p no:cacheprovider --color=no
 
 tables: setup
-	$(PYTHON) demos/accuracy.py
-	$(PYTHON) demos/overhead.py
-	$(PYTHON) demos/rungs.py
-	$(PYTHON) demos/choice.py
-	$(PYTHON) demos/scaling.py
-	$(PYTHON) demos/orders.py
-	$(PYTHON) demos/readme_tables.py
+	$(PYTHON) demos/evidence/accuracy.py
+	$(PYTHON) demos/evidence/overhead.py
+	$(PYTHON) demos/evidence/rungs.py
+	$(PYTHON) demos/evidence/choice.py
+	$(PYTHON) demos/evidence/scaling.py
+	$(PYTHON) demos/evidence/orders.py
+	$(PYTHON) demos/evidence/put_tables.py
 
 # What an interrupted run has finished is kept: the same command goes on from there.
 figure3: setup
-	$(PYTHON) demos/figure3.py
+	$(PYTHON) demos/evidence/figure3.py
 
 # The same; other programs take part where `make work-precision` has installed them.
 failures: setup
-	$(PYTHON) demos/failures.py
+	$(PYTHON) demos/evidence/failures.py
 
 random: setup
 	$(PYTHON) tests/random_comparison.py 200
 
-# Goes on where it was broken off; `$(PYTHON) demos/work_precision.py --fresh` forgets the samples that are there.
+# Goes on where it was broken off; `$(PYTHON) demos/evidence/work_precision.py --fresh` forgets the samples that are there.
 work-precision: setup
-	$(PYTHON) demos/work_precision.py
-	$(PYTHON) demos/work_precision_motion.py
+	$(PYTHON) demos/evidence/work_precision.py
+	$(PYTHON) demos/evidence/work_precision_motion.py
 
 setup: .venv/.stamp
 

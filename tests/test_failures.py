@@ -1,4 +1,4 @@
-"""The comparison of methods (demos/failures.py): this package's results are right, and the command works."""
+"""The comparison of methods (demos/evidence/failures.py): this package's results are right, and the command works."""
 
 import json
 import sys
@@ -10,7 +10,7 @@ import pytest
 import cosserat_fenicsx as cf
 
 pytestmark = pytest.mark.serial
-sys.path.append(str(Path(__file__).parent.parent / "demos"))
+sys.path.append(str(Path(__file__).parent.parent / "demos" / "evidence"))
 
 from trials import catalogue, cells, chains, methods, own, problems, secant
 from trials.rotation_vector import RotationVector

@@ -14,7 +14,7 @@ import cosserat_fenicsx as cf
 from cosserat_fenicsx import analytic
 
 pytestmark = pytest.mark.serial
-sys.path.append(str(Path(__file__).parent.parent / "demos"))
+sys.path.append(str(Path(__file__).parent.parent / "demos" / "evidence"))
 
 from comparison import bar_mesh, corotational, curves, mcre
 from comparison.column import Column

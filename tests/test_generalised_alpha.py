@@ -90,7 +90,7 @@ def test_order_in_time(rho):
 
 def test_the_ledger_of_all_that_there_is_closes_with_the_order_two(monkeypatch):
     """With joints, damping, drag, a prescribed motion and follower loads."""
-    monkeypatch.syspath_prepend(str(Path(__file__).parent.parent / "demos"))
+    monkeypatch.syspath_prepend(str(Path(__file__).parent.parent / "demos" / "evidence"))
     import orders
 
     b, scene = orders.chain()

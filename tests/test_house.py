@@ -137,7 +137,7 @@ def test_pictures_are_imported_only_when_asked_for():
 
 
 def test_only_compat_asks_for_a_version():
-    for file in [*PACKAGE.rglob("*.py"), *(ROOT / "forms").glob("*.py"), *(ROOT / "demos").glob("*.py")]:
+    for file in [*PACKAGE.rglob("*.py"), *(ROOT / "forms").glob("*.py"), *(ROOT / "demos").rglob("*.py")]:
         if file.name not in ("compat.py",):
             assert "dolfinx.__version__" not in file.read_text(encoding="utf-8"), file
 

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 pytestmark = pytest.mark.serial
-DEMOS = Path(__file__).parent.parent / "demos"
+EVIDENCE = Path(__file__).parent.parent / "demos" / "evidence"
 
 
 @pytest.fixture(autouse=True)
-def demos_on_the_path(monkeypatch):
-    monkeypatch.setattr(sys, "path", [str(DEMOS), *sys.path])
+def evidence_on_the_path(monkeypatch):
+    monkeypatch.setattr(sys, "path", [str(EVIDENCE), *sys.path])
 
 
 def test_quick(tmp_path, capsys):

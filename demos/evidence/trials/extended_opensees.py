@@ -1,4 +1,4 @@
-"""OpenSeesPy's runner of `demos/peers` with a history of loads, a held tip, a
+"""OpenSeesPy's runner of `demos/evidence/peers` with a history of loads, a held tip, a
 clamp that turns, and a test on the residual; see `peers.speak`."""
 
 import sys

@@ -1,8 +1,8 @@
 """Figure 3 of the paper: delta against eta from 0 to 2 for every model of the eccentrically compressed column.
 
-    python demos/figure3.py            about four minutes; writes to out/: figure3.png, figure3.md, figure3.json
-    python demos/figure3.py --quick    coarse meshes, for a test
-    python demos/figure3.py --fresh    from the start, without results of an earlier run
+    python demos/evidence/figure3.py            about four minutes; writes out/figure3.png, .md and .json
+    python demos/evidence/figure3.py --quick    coarse meshes, for a test
+    python demos/evidence/figure3.py --fresh    from the start, without results of an earlier run
 
 An interrupted run keeps all curves and points of the solid so far, in figure3.json and figure3-*.npz; the same command
 continues from there.

@@ -1,7 +1,7 @@
 """Processor time and memory of a Newton step against the number of unknowns, 1e2 .. 1e6, with the spatial model.
 
-    python demos/scaling.py             to 1e6 unknowns; writes out/scaling.md
-    python demos/scaling.py --quick     to 1e4
+    python demos/evidence/scaling.py             to 1e6 unknowns; writes out/scaling.md
+    python demos/evidence/scaling.py --quick     to 1e4
 
 Each size runs in a separate process: a thick cantilever under a small transverse force, degree 4, one Newton step
 (residual, tangent, factorisation, solution, update of n) repeated from rest, and one count of negative modes; medians.
@@ -18,7 +18,7 @@ import time
 from pathlib import Path
 
 import numpy as np
-from eccentric_cantilever import column
+from cantilever import column
 
 from cosserat_fenicsx import compat
 from cosserat_fenicsx.models.rodmesh import Layout

@@ -1,4 +1,4 @@
-"""Exudyn's runner of `demos/peers` with a history of loads, a held
+"""Exudyn's runner of `demos/evidence/peers` with a history of loads, a held
 tip, and a test on the residual; see `peers.speak`."""
 
 import sys

@@ -1,7 +1,7 @@
 """Time saved by the cheapest valid model: every scene with every valid model, on the same mesh.
 
-    python demos/rungs.py            medians of 9 alternating runs, processor time, warm
-    python demos/rungs.py --quick    one run each, to check that the models agree
+    python demos/evidence/rungs.py            medians of 9 alternating runs, processor time, warm
+    python demos/evidence/rungs.py --quick    one run each, to check that the models agree
 
 Times are those of `solve` and the query of the tip's position; ratios are to the spatial model in the same run. The
 error is that of the tip, the largest over the path, relative to its displacement, against the exact rod
@@ -14,7 +14,7 @@ import time
 from pathlib import Path
 
 import numpy as np
-from eccentric_cantilever import column, exact
+from cantilever import column, exact
 
 import cosserat_fenicsx as cf
 from cosserat_fenicsx import compat

@@ -139,7 +139,7 @@ def in_a_plane(problem):
 def shot(problem):
     """The tip's displacement at load factor 1, (1, 3) m, of any rod under dead loads:
     the strong form, by shooting and collocation to 1e-10 (tests/bvp.py)."""
-    sys.path.append(str(Path(__file__).resolve().parents[2] / "tests"))
+    sys.path.append(str(Path(__file__).resolve().parents[3] / "tests"))
     import bvp
 
     L, EI, GA, R = (problem[key] for key in ("length", "EI", "GA", "radius"))

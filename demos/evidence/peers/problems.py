@@ -103,7 +103,7 @@ def truth(name, model):
 
 def _shot(problem, GA):
     """The strong form of the bend, by shooting and collocation to 1e-10 (tests/bvp.py)."""
-    sys.path.append(str(Path(__file__).resolve().parents[2] / "tests"))
+    sys.path.append(str(Path(__file__).resolve().parents[3] / "tests"))
     import bvp
 
     R, L = problem["radius"], problem["length"]

@@ -1,8 +1,8 @@
 """Speed against accuracy in motion: the schemes of this package and Exudyn's geometrically exact rods, one chart.
 
-    python demos/work_precision_motion.py            everything, about six minutes; continues an interrupted run
-    python demos/work_precision_motion.py --fresh    discards existing samples
-    python demos/work_precision_motion.py --quick    a few configurations; nothing is installed
+    python demos/evidence/work_precision_motion.py            all, about six minutes; continues an interrupted run
+    python demos/evidence/work_precision_motion.py --fresh    discards existing samples
+    python demos/evidence/work_precision_motion.py --quick    a few configurations; nothing is installed
 
 Writes to out/: work_precision_motion.json (every sample), .md (the table), .png (the chart). For the measurement see
 `work_precision`. The error is that of the final positions of the rods' ends, over the length of a rod

@@ -9,7 +9,7 @@ import sys
 from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
-ROOT = HERE.parents[1]
+ROOT = HERE.parents[2]
 #: What pip installs; CalculiX comes from Debian.
 PINNED = {
     "Exudyn": ("exudyn==1.13.6", "numpy==2.4.6"),

@@ -1,4 +1,4 @@
-"""The peers of `demos/peers`, each in a separate process; cells of peers that are not installed say so.
+"""The peers of `demos/evidence/peers`, each in a separate process; cells of peers that are not installed say so.
 
 The files `extended_*.py` add to their runners: histories of loads, guided tips, convergence tests on residuals.
 """

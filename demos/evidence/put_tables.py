@@ -4,7 +4,7 @@ have left in out/ between their markers in README.md."""
 import re
 from pathlib import Path
 
-README = Path(__file__).parent.parent / "README.md"
+README = Path(__file__).parents[2] / "README.md"
 TABLES = (
     "accuracy",
     "overhead",
@@ -26,7 +26,7 @@ def main(out="out"):
         if file.exists():
             found = file.read_text(encoding="utf-8").strip()
             if name.startswith("work_precision"):
-                # the tables of all solvers stay in out/, and in demos/work_precision.md
+                # the tables of all solvers stay in out/, and in demos/evidence/work_precision.md
                 found = found.partition("\n\n| problem | solver")[0]
             table = f"<!-- {name} -->\n{found}\n<!-- /{name} -->"
             text = re.sub(f"<!-- {name} -->.*<!-- /{name} -->", lambda _, table=table: table, text, flags=re.DOTALL)

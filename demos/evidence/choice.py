@@ -1,7 +1,7 @@
 """What the choice of `solve` costs: "auto" with its error bar against the best model, degree and mesh picked by hand.
 
-    python demos/choice.py           every demo scene (about 3 minutes)
-    python demos/choice.py --quick   one scene, few meshes
+    python demos/evidence/choice.py           every demo scene (about 3 minutes)
+    python demos/evidence/choice.py --quick   one scene, few meshes
 
 By hand: every model valid for the scene, degrees 2 to 4, and 1, 2, 3, 4, 6, 8 .. elements per rod. Their errors are
 known from a fine mesh, so that the cheapest one below the tolerance can be picked, without an error estimate. Times are
@@ -113,7 +113,7 @@ def main(runs=9, out="out", scenes=SCENES, counts=COUNTS):
     ]
     found = {}
     for name in scenes:
-        scene, options = read_scene(Path(__file__).parent / f"{name}.toml")
+        scene, options = read_scene(Path(__file__).parents[1] / f"{name}.toml")
         tol = options.get("tol", 1e-6)
         rows, ratio = found[name] = compare(scene, load_factors_of(options["load_factors"]), tol, runs, counts)
         for who, model, degree, elements, unknowns, seconds, off, estimate in rows:

@@ -1,7 +1,7 @@
 """Overhead of `solve` over the dolfinx and PETSc calls that it makes: a sweep of 31 points, eta = 0.05 .. 1.5.
 
-    python demos/overhead.py            medians of 15 alternating runs, processor time
-    python demos/overhead.py --quick    one run each, to check that both give the same digits
+    python demos/evidence/overhead.py            medians of 15 alternating runs, processor time
+    python demos/evidence/overhead.py --quick    one run each, to check that both give the same digits
 
 The bare loop takes the same predicted starts and Newton iterations: residual and tangent assembled, KLU, the update of
 the carried contact force. The stability count (one more assembly and factorisation per point) is an addition of the
@@ -13,9 +13,9 @@ import time
 from pathlib import Path
 
 import numpy as np
+from cantilever import column
 from dolfinx import fem
 from dolfinx.fem import petsc as fem_petsc
-from eccentric_cantilever import column
 from petsc4py import PETSc
 
 import cosserat_fenicsx as cf

@@ -1,9 +1,9 @@
 """Speed against accuracy: this package and its peers on the same problems, one chart each (`make work-precision`).
 
-    python demos/work_precision.py            everything, at most half an hour; continues an interrupted run
-    python demos/work_precision.py --fresh    discards existing samples
-    python demos/work_precision.py --problems sweep
-    python demos/work_precision.py --quick    a few configurations, at most a minute; nothing is installed
+    python demos/evidence/work_precision.py            everything, at most half an hour; continues an interrupted run
+    python demos/evidence/work_precision.py --fresh    discards existing samples
+    python demos/evidence/work_precision.py --problems sweep
+    python demos/evidence/work_precision.py --quick    a few configurations, at most a minute; nothing is installed
 
 Writes to out/: work_precision.json (every sample), work_precision.md (the table), work_precision_*.png.
 

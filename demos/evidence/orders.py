@@ -1,7 +1,7 @@
 """The observed orders of convergence of motions in the time step and in the mesh.
 
-    python demos/orders.py             writes out/orders.md
-    python demos/orders.py --quick     fewer steps and elements
+    python demos/evidence/orders.py             writes out/orders.md
+    python demos/evidence/orders.py --quick     fewer steps and elements
 
 In time: changes of positions and rotations, velocities and angular velocities at the end when the steps are halved, for
 two scenes: a rod that swings between two pins, and a chain with joint, damping, prescribed motion and follower loads.

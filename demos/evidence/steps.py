@@ -1,8 +1,8 @@
 """Computing time of a simulated second: a hanging drill-pipe of 1 km, moved up and down, 200 P2 elements, steps of 5
 ms.
 
-    python demos/steps.py            medians of 7 runs of 5 s, processor time; writes out/steps.md
-    python demos/steps.py --quick    one run of 0.2 s
+    python demos/evidence/steps.py            medians of 7 runs of 5 s, processor time; writes out/steps.md
+    python demos/evidence/steps.py --quick    one run of 0.2 s
 
 Forms are compiled and the initial equilibrium is computed before; the time is that of the whole call of `simulate`,
 with the energy balance and the state saved every second.

@@ -1,8 +1,8 @@
 """Where methods fail: a table of methods and trials, each cell a number and a verdict (`make failures`).
 
-    python demos/failures.py            at most 15 minutes; writes to out/: failures.json, failures.md, failures.png
-    python demos/failures.py --quick    this package and the comparison models, with fewer steps; at most a minute
-    python demos/failures.py --fresh    from the start, without results of an earlier run
+    python demos/evidence/failures.py            at most 15 minutes; writes out/failures.json, .md and .png
+    python demos/evidence/failures.py --quick    this package and the comparison models, fewer steps; at most a minute
+    python demos/evidence/failures.py --fresh    from the start, without results of an earlier run
 
 An interrupted run keeps its cells; the same command continues from them. Programs that are not installed are shown as
 such: `make work-precision` installs them.
@@ -22,7 +22,8 @@ from trials import catalogue, methods, picture, programs, table
 from trials.cells import MISSING, SILENT, Cell
 from unfinished import command
 
-ROOT = Path(__file__).resolve().parents[1]
+HERE = Path(__file__).resolve().parent
+ROOT = HERE.parents[1]
 
 
 class Store:
@@ -65,9 +66,9 @@ class Store:
 
 def _fingerprint():
     """Hash of all files that the cells depend on."""
-    files = sorted([*ROOT.glob("cosserat_fenicsx/**/*.py"), *ROOT.glob("forms/*.py"), *ROOT.glob("demos/trials/*.py"),
-                    *ROOT.glob("demos/comparison/*.py"), *ROOT.glob("demos/peers/*.py")])  # fmt: skip
-    drawn = {ROOT / "demos" / "trials" / name for name in ("table.py", "picture.py")}
+    folders = [ROOT / "cosserat_fenicsx", ROOT / "forms", *(HERE / name for name in ("trials", "comparison", "peers"))]
+    files = sorted(file for folder in folders for file in folder.rglob("*.py"))
+    drawn = {HERE / "trials" / name for name in ("table.py", "picture.py")}
     return hashlib.sha256(b"".join(file.read_bytes() for file in files if file not in drawn)).hexdigest()[:16]
 
 

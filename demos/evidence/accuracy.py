@@ -1,7 +1,7 @@
 """The README's tables of accuracy, on the eccentric cantilever in space (model "spatial"), in Markdown.
 
-python demos/accuracy.py            writes out/accuracy.md and prints it
-python demos/accuracy.py --quick    two meshes and two slendernesses
+python demos/evidence/accuracy.py            writes out/accuracy.md and prints it
+python demos/evidence/accuracy.py --quick    two meshes and two slendernesses
 """
 
 import argparse
@@ -10,7 +10,7 @@ import platform
 from pathlib import Path
 
 import numpy as np
-from eccentric_cantilever import ECCENTRICITY, L, column, exact
+from cantilever import ECCENTRICITY, L, column, exact
 
 import cosserat_fenicsx as cf
 from cosserat_fenicsx import analytic, compat
