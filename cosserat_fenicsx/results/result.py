@@ -10,10 +10,11 @@ from cosserat_fenicsx.results.extremes import Extremes
 from cosserat_fenicsx.results.reactions import Reactions
 from cosserat_fenicsx.results.recovery import at_nodes
 from cosserat_fenicsx.results.states import States
+from cosserat_fenicsx.results.stresses import Stresses
 from cosserat_fenicsx.scene.rod import Station
 
 
-class Result(Extremes, Reactions, States):
+class Result(Extremes, Reactions, Stresses, States):
     """A sequence of states of a scene. Public methods return SI units. It can be copied and pickled, see `States`.
 
     Attributes:
@@ -79,7 +80,8 @@ class Result(Extremes, Reactions, States):
         Returns:
             dict of arrays (nodes, ...): s (m), position, displacement (m), quaternion, d1, d2, d3, force (N), moment
             (N m), all inertial; strain (v - v_R: shear 1, shear 2, stretch) and curvature (u - u_R: bending 1,
-            bending 2, twist; 1/m), both material; bending_moment (N m, its size).
+            bending 2, twist; 1/m), both material; bending_moment (N m, its size). Where a section of the scene knows
+            its shape, also von_mises, axial_max and axial_min (Pa), see `stress`; NaN along other sections.
 
         Raises:
             IndexError: there is no point k.
@@ -98,6 +100,7 @@ class Result(Extremes, Reactions, States):
         n_material, m_material = np.einsum("kij,ki->kj", d, n), np.einsum("kij,ki->kj", d, m)
         # at a jump those of the element before, as n and m
         strain, curvature = rod.stiffness_at(s, "left").strains(n_material, m_material)
+        stresses = rod.profile.stresses(s, "left", n_material, m_material) if self.knows_stresses else None
         return {
             "s": s,
             "position": rod.curve.position(s) + displacement,
@@ -111,6 +114,7 @@ class Result(Extremes, Reactions, States):
             "strain": strain,
             "curvature": curvature,
             "bending_moment": np.linalg.norm(m_material[:, :2], axis=1),
+            **(stresses._asdict() if stresses else {}),
         }
 
     def largest_displacement(self):
