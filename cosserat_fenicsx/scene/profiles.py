@@ -2,6 +2,7 @@
 
 from collections import namedtuple
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
@@ -149,7 +150,7 @@ class Profile:
         rows = self._rows(s.ravel(), self._index(s, side).ravel())
         return _split(rows.reshape(*s.shape, _NUMBERS), self.coupled)
 
-    @property
+    @cached_property
     def shaped(self):
         """Whether a section knows its shape, and so its stresses (of a function: at both ends of its piece)."""
         starts, zero = (0.0, *self.breaks), np.zeros(3)
