@@ -50,12 +50,6 @@ OF_HISTORY = {
 }
 
 
-def of_states(result):
-    """{name: (array (n, ...), its `Quantity`)} of what belongs to every state; the first is the load factor or time."""
-    table = OF_HISTORY if result.axis == "time" else OF_PATH
-    return {name: (getattr(result, attribute), quantity) for name, (attribute, quantity) in table.items()}
-
-
 def headings(quantity, before=""):
     """Headings of the columns of a quantity, such as 'position (m) x'."""
     name = f"{before}{quantity.label}" + ("" if quantity.unit == "1" else f" ({quantity.unit})")

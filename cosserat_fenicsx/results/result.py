@@ -6,6 +6,7 @@ import numpy as np
 
 from cosserat_fenicsx.checks import instance
 from cosserat_fenicsx.quaternions import directors
+from cosserat_fenicsx.results.exports import Exports
 from cosserat_fenicsx.results.extremes import Extremes
 from cosserat_fenicsx.results.fields import fields_at
 from cosserat_fenicsx.results.reactions import Reactions
@@ -14,7 +15,7 @@ from cosserat_fenicsx.results.stresses import Stresses
 from cosserat_fenicsx.scene.rod import Station
 
 
-class Result(Extremes, Reactions, Stresses, States):
+class Result(Exports, Extremes, Reactions, Stresses, States):
     """A sequence of states of a scene. Public methods return SI units. It can be copied and pickled, see `States`.
 
     Attributes:
