@@ -31,6 +31,7 @@ FIELDS = {
 #: What belongs to every state of a path, and of a motion, by names in files; the attributes behind them.
 OF_PATH = {
     "load_factor": ("load_factors", Quantity("load factor")),
+    "steps": ("steps", Quantity("steps")),
     "negative_modes": ("negative_modes", Quantity("negative modes")),
     "stable": ("stable", Quantity("stable")),
     "iterations": ("iterations", Quantity("Newton iterations")),
