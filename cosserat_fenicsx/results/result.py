@@ -192,11 +192,12 @@ class Result(Extremes, Reactions, States):
     # -- files and pictures ------------------------------------------------------------------------------------------
 
     def write(self, file, k=-1):
-        """Write all points as .xdmf (time axis: the load factor, or the time), or point k in a format of meshio.
+        """Write all points as .xdmf (time axis: the load factor, or the time) or interactive .html, or point k in a format
+        of meshio.
 
         Args:
-            file: its name, with the ending .xdmf, or .vtu, .vtk or another of meshio's.
-            k: the index of the point, for formats other than .xdmf.
+            file: its name, with the ending .xdmf, .html, or .vtu, .vtk or another of meshio's.
+            k: the index of the point, for formats other than .xdmf and .html.
 
         Raises:
             OSError: the file cannot be written.

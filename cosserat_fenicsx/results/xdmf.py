@@ -29,7 +29,7 @@ FIELDS = {
 
 
 def write(path, file, k=-1):
-    """Write a path: all points to .xdmf with the load factor as time axis, point k to any other format.
+    """Write a path: all points to .xdmf with the load factor as time axis or to .html, point k to any other format.
 
     Args:
         path: a `Path` with at least one point.
@@ -42,6 +42,11 @@ def write(path, file, k=-1):
     """
     if len(path) == 0:
         raise SceneError(f"{file}: the path has no point to write")
+    if Path(file).suffix == ".html":
+        from cosserat_fenicsx.pictures import viewer
+
+        viewer.write(path, file)
+        return
     on_first(path.comm, lambda: _write(path, Path(file), k))
 
 
@@ -51,7 +56,7 @@ def _write(path, file, k):
     file.parent.mkdir(parents=True, exist_ok=True)
     if file.suffix != ".xdmf":
         if file.suffix not in meshio.extension_to_filetypes:
-            known = ".xdmf, .vtu, .vtk, .ply or another ending that meshio knows"
+            known = ".xdmf, .html, .vtu, .vtk, .ply or another ending that meshio knows"
             raise SceneError(f"{file}: the ending '{file.suffix}' is not known: expected {known}")
         with open(file, "wb"):
             pass  # raises a plain OSError here if the file cannot be written
