@@ -163,6 +163,8 @@ def test_the_wheel_holds_the_forms_and_works(tmp_path):
     (wheel,) = tmp_path.glob("*.whl")
     names = zipfile.ZipFile(wheel).namelist()
     assert "cosserat_fenicsx/forms/spatial.py" in names and "cosserat_fenicsx/models/spatial.py" in names
+    page = PACKAGE / "pictures" / "page"
+    assert {f"cosserat_fenicsx/pictures/page/{file.name}" for file in page.iterdir()} <= set(names)
     zipfile.ZipFile(wheel).extractall(tmp_path / "site")
     code = "import cosserat_fenicsx.forms.spatial as f, cosserat_fenicsx as cf; print(f.__file__); cf.solve"
     done = subprocess.run([sys.executable, "-S", "-c",

@@ -6,9 +6,16 @@ from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.ranks import on_first
 from cosserat_fenicsx.results import columns, xdmf
 
+
+def _page(result, file, k=None):
+    from cosserat_fenicsx.pictures import viewer  # here, since pictures import results
+
+    viewer.write(result, file)
+
+
 #: By endings: functions of the result, the file, the index of a state or None, and options by name; all other endings
 #: are meshio's.
-WRITERS = {".csv": columns.write_csv, ".xdmf": xdmf.write_series}
+WRITERS = {".csv": columns.write_csv, ".xdmf": xdmf.write_series, ".html": _page}
 # Options of `Result.write` that only some endings have.
 _OPTIONS = {"rod": (".csv",), "station": (".csv",)}
 

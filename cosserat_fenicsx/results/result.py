@@ -183,11 +183,12 @@ class Result(Exports, Extremes, Reactions, Stresses, States):
 
         .xdmf: all points, with the load factor or the time as time axis, for ParaView. .csv: a table over load factors
         or time, of motion and contact forces at stations; or, given k or rod, all fields along the rods at point k.
+        .html: one interactive page with a slider over all points, which needs no network.
         .vtu, .vtk or another ending of meshio: point k. For all of a result, to read it again, see `save`.
 
         Args:
             file: its name.
-            k: the index of the point, for endings other than .xdmf; default the last.
+            k: the index of the point, for endings other than .xdmf and .html; default the last.
             rod: for .csv: the `Rod`, or its name, along which fields are written; None for all.
             station: for .csv: a station of the table beside the ends of rods and the places of loads and supports;
                 default the one that moves most.

@@ -39,7 +39,7 @@ def write_state(path, file, k=None):
     import meshio
 
     if file.suffix not in meshio.extension_to_filetypes:
-        known = ".xdmf, .csv, .vtu, .vtk, .ply or another ending that meshio knows"
+        known = ".xdmf, .csv, .html, .vtu, .vtk, .ply or another ending that meshio knows"
         raise SceneError(f"{file}: the ending '{file.suffix}' is not known: expected {known}")
     file.parent.mkdir(parents=True, exist_ok=True)
     with open(file, "wb"):
