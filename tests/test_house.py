@@ -52,6 +52,7 @@ SHARED = {
     "quadrature",
     "quaternions",
     "ranks",
+    "units",
 }
 ROOMS = {
     "scene": set(),

@@ -9,7 +9,8 @@ import numpy as np
 from cosserat_fenicsx.checks import instance, number, refuse, store
 from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.scene.materials import Material
-from cosserat_fenicsx.scene.sections import SECTIONS, Stiffness, inverse, representative
+from cosserat_fenicsx.scene.rolled import Profile
+from cosserat_fenicsx.scene.sections import Circle, Rectangle, Stiffness, Tube, inverse, representative
 from cosserat_fenicsx.scene.stresses import Stress
 
 
@@ -42,6 +43,9 @@ class Stiffnesses(namedtuple("Stiffnesses", "K J mass inertia matrix", defaults=
         return both[..., :3], both[..., 3:]
 
 
+#: Sections that scene files know.
+SECTIONS = (Circle, Tube, Rectangle, Profile, Stiffness)
+
 _SAMPLES = 33
 _DIAGONAL = 10  # numbers (GA1, GA2, EA, EI1, EI2, GJ, mass, inertia) of a section; the 36 of its matrix follow
 _NUMBERS = _DIAGONAL + 36
@@ -49,7 +53,7 @@ _UNKNOWN = [np.nan] * _NUMBERS  # stands for a piece given by a function
 
 
 @dataclass(frozen=True, eq=False)
-class Profile:
+class Sections:
     """The sections of a rod as a function of its arc length.
 
     Args:

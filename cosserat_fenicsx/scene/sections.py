@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from cosserat_fenicsx.checks import finite_array, number, positive, refuse, stiffness, store, vector
+from cosserat_fenicsx.scene.computed_sections import arguments_of
 from cosserat_fenicsx.scene.stresses import rectangle_fibres, round_stress
 
 _ZETA_5 = 1.0369277551433699263  # sum of 1/n^5
@@ -111,6 +112,31 @@ class Stiffness:
         strains = strains @ turn  # rotated to the principal axes, then taken at the two points
         stiffnesses = (*given.shear, given.axial, *given.bending, given.torsion)
         return cls(matrix=(strains.T * stiffnesses @ strains).tolist(), **others)
+
+    @classmethod
+    def from_section(cls, section, material=None, *, line=None, unit=1.0):
+        """A section of any shape, computed by the package sectionproperties after its geometric and warping analysis.
+
+        Its x is along d_1, its y along d_2. Where centroid or shear centre is off the rod's line, or the principal axes
+        are turned, it is a matrix, see `offset`.
+
+        Args:
+            section: a `Section` of sectionproperties, or any object with the same methods.
+            material: a `Material` for a section without materials; its shear stiffnesses then have a Poisson's ratio of
+                zero in the distribution of stresses. None where the section has its own materials.
+            line: (x, y) in the section, in its unit of length: the place of the rod's line; None for the centroid.
+            unit: the section's unit of length, m, such as 1e-3 for mm; its Young's moduli have N per square of it, its
+                densities kg per cube of it.
+
+        Mass is left out where the line is not through the centroid, and inertia also where the principal axes are
+        turned, or the materials differ in density over E: `Weight` or motions need them, and refuse such a section.
+
+        Raises:
+            SceneError: not such a section, an analysis that is missing, or materials that differ in Poisson's ratio.
+        """
+        arguments = arguments_of(section, material, line, unit)
+        off = {"centroid", "shear_centre", "angle"} & arguments.keys()
+        return cls.offset(**arguments) if off else cls(**arguments)
 
     def stiffness(self, material=None):
         """The section itself (a material is not needed)."""
@@ -301,7 +327,3 @@ def _rectangle_torsion(b, h):
     x = math.pi * long / (2 * short)
     series = 31 / 32 * _ZETA_5 - sum((1 - math.tanh(n * x)) / n**5 for n in range(1, 15, 2))
     return long * short**3 / 3 * (1 - 192 * short / (math.pi**5 * long) * series)
-
-
-#: Sections that scene files know.
-SECTIONS = (Circle, Tube, Rectangle, Stiffness)
