@@ -1,5 +1,7 @@
 """Cross-sections: d_1 and d_2 span the section, d_3 is the tangent.
 
+A section tells its `stiffness` and, where it knows its shape, its `stresses`, both in a material.
+
 Shear factors: Cowper, J. Appl. Mech. 33 (1966) 335, doi:10.1115/1.3625046; torsion of a rectangle: Saint-Venant's
 series.
 """
@@ -10,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from cosserat_fenicsx.checks import finite_array, number, positive, refuse, stiffness, store, vector
+from cosserat_fenicsx.scene.stresses import rectangle_fibres, round_stress
 
 _ZETA_5 = 1.0369277551433699263  # sum of 1/n^5
 # Asymmetry and smallest eigenvalue of a matrix, scaled to a unit diagonal, that are rounding.
@@ -113,6 +116,10 @@ class Stiffness:
         """The section itself (a material is not needed)."""
         return self
 
+    def stresses(self, material, force, moment):
+        """None: the shape is not known (the outline is that of pictures alone)."""
+        return None
+
 
 @dataclass(frozen=True)
 class Circle:
@@ -138,6 +145,10 @@ class Circle:
         A, I = math.pi * self.diameter**2 / 4, math.pi * self.diameter**4 / 64
         k = self.shear_factor or 6 * (1 + nu) / (7 + 6 * nu)
         return _isotropic(material, A, (I, I), 2 * I, k, _circle(self.diameter / 2))
+
+    def stresses(self, material, force, moment):
+        """The `Stress` for contact forces and moments (..., 3), N and N m, along d_1, d_2, d_3."""
+        return round_stress(self.diameter / 2, 0.0, material.nu, force, moment)
 
 
 @dataclass(frozen=True)
@@ -171,6 +182,10 @@ class Tube:
         k = self.shear_factor or cowper
         return _isotropic(material, A, (I, I), 2 * I, k, _circle(D / 2))
 
+    def stresses(self, material, force, moment):
+        """The `Stress` for contact forces and moments (..., 3), N and N m, along d_1, d_2, d_3."""
+        return round_stress(self.outer_diameter / 2, self.inner_diameter / 2, material.nu, force, moment)
+
 
 @dataclass(frozen=True)
 class Rectangle:
@@ -198,6 +213,11 @@ class Rectangle:
         k = self.shear_factor or 10 * (1 + nu) / (12 + 11 * nu)
         corners = ((b / 2, h / 2), (-b / 2, h / 2), (-b / 2, -h / 2), (b / 2, -h / 2))
         return _isotropic(material, b * h, (b * h**3 / 12, h * b**3 / 12), _rectangle_torsion(b, h), k, corners)
+
+    def stresses(self, material, force, moment):
+        """The `Stress` for contact forces and moments (..., 3), N and N m, along d_1, d_2, d_3."""
+        b, h = self.width, self.height
+        return rectangle_fibres(b, h, material.nu, _rectangle_torsion(b, h)).stress(force, moment)
 
 
 def _check_numbers(section, field, expected, unit, check, size):
