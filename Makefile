@@ -18,13 +18,15 @@ export VTK_DEFAULT_OPENGL_WINDOW = vtkEGLRenderWindow
 # A numpy in the user's own site directory would hide the distribution's.
 export PYTHONNOUSERSITE = 1
 
-.PHONY: help setup packages demo motion test tables figure3 work-precision failures random clean
+.PHONY: help setup packages demo motion gallery test docs tables figure3 work-precision failures random clean
 
 help:
 	@echo "make demo    solve the eccentric cantilever of the paper on two processes; writes out/"
 	@echo "make motion  seven motions, each a scene file, a picture and a number that must come out; writes out/ (a minute)"
+	@echo "make gallery the scene files of demos/, each with a picture and a number that must come out; writes out/"
+	@echo "make docs    the documentation as a site that needs no network; writes out/docs/index.html"
 	@echo "make test    all tests on one, two and four processes"
-	@echo "make tables  the README's tables of accuracy and cost, measured anew and put into it"
+	@echo "make tables  the tables of accuracy and cost in docs/, measured anew and put there"
 	@echo "make figure3 every curve of the paper's Figure 3, and what was found; writes out/ (about 4 minutes)"
 	@echo "make work-precision  speed against accuracy, beside Exudyn, OpenSeesPy, PyElastica and CalculiX (half an hour at most)"
 	@echo "make failures where methods fail: a map of methods against trials; writes out/ (at most a quarter of an hour)"
@@ -37,6 +39,13 @@ demo: setup
 
 motion: setup
 	$(PYTHON) demos/motion.py
+
+gallery: setup
+	$(PYTHON) demos/gallery.py
+
+# Warnings are errors. What Sphinx keeps between two builds lies beside the pages.
+docs: setup .venv/.docs
+	$(PYTHON) -m sphinx -q -W --keep-going -b html docs out/docs
 
 # pytest's cache directory is off in parallel: the ranks would write it all at once.
 test: setup
@@ -51,15 +60,17 @@ tables: setup
 	$(PYTHON) demos/evidence/choice.py
 	$(PYTHON) demos/evidence/scaling.py
 	$(PYTHON) demos/evidence/orders.py
-	$(PYTHON) demos/evidence/put_tables.py
+	$(PYTHON) demos/evidence/put_in_docs.py accuracy overhead rungs choice scaling orders
 
 # What an interrupted run has finished is kept: the same command goes on from there.
 figure3: setup
 	$(PYTHON) demos/evidence/figure3.py
+	$(PYTHON) demos/evidence/put_in_docs.py figure3
 
 # The same; other programs take part where `make work-precision` has installed them.
 failures: setup
 	$(PYTHON) demos/evidence/failures.py
+	$(PYTHON) demos/evidence/put_in_docs.py failures
 
 random: setup
 	$(PYTHON) tests/random_comparison.py 200
@@ -68,6 +79,7 @@ random: setup
 work-precision: setup
 	$(PYTHON) demos/evidence/work_precision.py
 	$(PYTHON) demos/evidence/work_precision_motion.py
+	$(PYTHON) demos/evidence/put_in_docs.py work_precision work_precision_motion
 
 setup: .venv/.stamp
 
@@ -80,6 +92,10 @@ setup: .venv/.stamp
 	$(PYTHON) -m pip install --disable-pip-version-check --constraint .venv/constraints.txt --editable '.[test]'
 	@touch $@
 
+.venv/.docs: .venv/.stamp
+	$(PYTHON) -m pip install --disable-pip-version-check --constraint .venv/constraints.txt --editable '.[docs]'
+	@touch $@
+
 packages:
 	@missing=$$(for name in $$(sed 's/#.*//' .ci/debian-packages.txt); do \
 	    dpkg-query --show --showformat='$${Status}' $$name 2>/dev/null | grep -q 'ok installed' || echo $$name; done); \
@@ -89,5 +105,5 @@ packages:
 	$$root apt-get update && $$root env DEBIAN_FRONTEND=noninteractive apt-get install -y --no-install-recommends $$missing
 
 clean:
-	rm -rf .venv out build dist *.egg-info .pytest_cache
+	rm -rf .venv out build dist *.egg-info .pytest_cache docs/api
 	find . -name __pycache__ -prune -exec rm -rf {} +

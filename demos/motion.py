@@ -11,24 +11,20 @@ Writes to out/: NAME.png (shapes over time and the track of a station, the curve
 import argparse
 import math
 import sys
-from collections import namedtuple
 from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
+from checked import Check, deviation, report
 from motion_chart import Curve, Shapes, draw
 from mpi4py import MPI
-from rich.table import Table
 from scipy.integrate import solve_ivp
 
 import cosserat_fenicsx as cf
 from cosserat_fenicsx import analytic
 from cosserat_fenicsx.dynamics.initial_equilibrium import before
-from cosserat_fenicsx.results.tables import as_text
 
 SCENES = Path(__file__).parent / "motions"
-#: A number, its expected value and the source of that, and the allowed deviation (absolute).
-Check = namedtuple("Check", "what found expected allowed source")
 
 
 def flying_spaghetti_2d(history):
@@ -217,29 +213,15 @@ def main(names=(), out="out", *, quick=False, film=False):
     for name in names:
         if name not in known:
             sys.exit(f"demos/motion.py: no demo is named '{name}': known: {', '.join(known)}")
-    table = Table(title="Motions: what must come out")
-    for heading in ("scene", "model", "steps", "number", "deviation", "allowed", "expected by"):
-        table.add_column(heading)
-    found = []
+    rows = []
     for name in names or known:
         history, check = run(known[name], out, quick=quick, film=film)
-        off = float(np.max(np.abs(np.subtract(check.found, check.expected))))
-        values = ", ".join(f"{x:.6g}" for x in np.atleast_1d(check.found))
-        table.add_row(
-            name,
-            history.model,
-            str(history.steps[-1]),
-            f"{check.what}: {values}",
-            f"{off:.2g}",
-            f"{check.allowed:.2g}",
-            check.source,
-        )
-        found.append((check, off))
+        rows.append((name, history.model, check, history.steps[-1]))
     if MPI.COMM_WORLD.rank == 0:
-        print(as_text(table))
+        print(report("Motions: what must come out", rows, ["steps"]))
         if out is not None and not quick:
             print(f"Pictures: {out}/")
-    return found
+    return [(check, deviation(check)) for _, _, check, _ in rows]
 
 
 if __name__ == "__main__":

@@ -18,7 +18,7 @@ _STILL = 1e-12
 
 @dataclass(frozen=True)
 class Drag(Load, LineAction):
-    """Quadratic drag of a fluid per unit of reference length: -c_n |w_n| w_n - c_t |w_t| w_t.
+    """Quadratic drag of a fluid per unit of reference length: ``-c_n |w_n| w_n - c_t |w_t| w_t``.
 
     w is the velocity of the rod relative to the fluid, w_t its part along the tangent and w_n that across it (Morison's
     equation, independence principle).

@@ -30,8 +30,8 @@ class Extremes(OnNodes):
         """The largest contact forces and moments over all points of a path (or times of a motion) and all rods.
 
         Both sides of jumps are included, and places between the nodes. Values are those of the mesh used: `tol` limits
-        the error of positions only. With t = d_3: bending |m - (m.t) t|, twisting |m.t|, shear |n - (n.t) t|, tension
-        n.t, compression -n.t.
+        the error of positions only. With t = d_3: bending ``|m - (m.t) t|``, twisting ``|m.t|``, shear
+        ``|n - (n.t) t|``, tension ``n.t``, compression ``-n.t``.
 
         Returns:
             {quantity: `Largest`}, the quantities "bending moment", "twisting moment" (N m), "shear force", "tension"

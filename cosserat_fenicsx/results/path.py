@@ -22,7 +22,7 @@ class Path(Result):
         stable: (n,) bool.
         error: (n,) estimated error of the positions, relative to the largest displacement; NaN where not estimated.
         rounding: the error of the positions that the rounding of the residual alone may cause, likewise relative.
-        events: the `Event`s of the path in order: limit points and bifurcations.
+        events: every `Event` of the path in order: limit points and bifurcations.
         left: whether the path continues on a branch from its first bifurcation.
         control: "load", or "arc" where the path, or a part of it, was followed in arc length.
     """

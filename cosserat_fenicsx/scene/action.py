@@ -77,12 +77,12 @@ class Action:
         permanent: for an action that is not scaled: whether it is applied in steps, from zero, before the scaled ones,
             such as a weight.
         follows: whether it depends on the rotation and has no potential.
-        work: a static method (point, virtual motion, *data) -> UFL, or the name of a function in `forms.loads`: the
+        work: a static method ``(point, virtual motion, *data)`` -> UFL, or the name of a function in `forms.loads`: the
             virtual work at a point, per reference length of a distributed action. None for an action with inertia
             alone.
-        memory: internal variables, kept from one accepted state to the next: `Datum`s of their initial values, passed
-            to `work` after `data`.
-        evolve: a static method (point, *data, *memory) -> a list of UFL expressions, the new values of the memory.
+        memory: internal variables, kept from one accepted state to the next: a `Datum` each, its initial value, passed to
+            `work` after `data`.
+        evolve: a static method ``(point, *data, *memory)`` -> a list of UFL expressions, the new values of the memory.
     """
 
     at_nodes, scaled, permanent, follows, memory, evolve = False, True, False, False, (), None

@@ -32,8 +32,8 @@ class Scene:
         loads: actions on the rods: `Force`, `Moment`, `EccentricForce`, `FollowerForce`, `FollowerMoment`, `LineForce`,
             `LineMoment`, `Weight`, which are multiplied by the load factor or `permanent`; `Spring`, `Foundation`,
             `Dashpot`, `Drag`, `PointMass`, `Wall`; or an `Action` of your own.
-        joints: `Joint`s between stations that touch; rods without a joint are independent of each other.
-        velocities: `InitialVelocity`s, at most one per rod; rods without one start at rest. For motions only.
+        joints: each a `Joint` between stations that touch; rods without a joint are independent of each other.
+        velocities: each an `InitialVelocity`, at most one per rod; rods without one start at rest. For motions only.
         title: for tables and pictures.
 
     Raises:

@@ -1,0 +1,77 @@
+"""Put into the documentation what the measurements and the gallery have left in out/.
+
+    python demos/evidence/put_in_docs.py accuracy orders      these tables and their pictures
+    python demos/evidence/put_in_docs.py gallery              the pictures of the gallery
+
+A table replaces what stands between <!-- name --> and <!-- /name --> in a page of docs/; one that is too long for that
+has a page of its own in docs/tables/. Pictures are cut to what is drawn, reduced to few colours and put in
+docs/pictures/.
+"""
+
+import argparse
+import re
+from pathlib import Path
+
+import numpy as np
+from PIL import Image
+
+ROOT = Path(__file__).resolve().parents[2]
+#: The tables that stand in a page, each with its page and pictures.
+PAGES = {
+    "accuracy": ("accuracy.md",),
+    "orders": ("accuracy.md",),
+    "figure3": ("accuracy.md", "figure3.png"),
+    "rungs": ("speed.md",),
+    "choice": ("speed.md",),
+    "scaling": ("speed.md",),
+    "overhead": ("speed.md",),
+    "work_precision": ("speed.md", "work_precision_sweep.png"),
+    "work_precision_motion": ("speed.md", "work_precision_motion.png"),
+}
+#: The tables with a page of their own: its title and pictures.
+ALONE = {
+    "failures": ("Where methods fail: the table", "failures.png"),
+    "work_precision": ("Speed against accuracy: all times",),
+}
+#: The pictures of the gallery, by the files of the scenes.
+GALLERY = [f"{file.stem}.png" for file in sorted((ROOT / "demos").glob("**/*.toml"))]
+WIDTH, COLOURS, MARGIN = 1100, 128, 12  # pixels, number, pixels
+
+
+def kept(picture, file):
+    """Write the picture as the documentation keeps it: without white margins, at most 1100 pixels wide, 128 colours."""
+    image = Image.open(picture).convert("RGB")
+    rows, columns = np.nonzero((np.asarray(image) < 250).any(axis=2))
+    box = columns.min() - MARGIN, rows.min() - MARGIN, columns.max() + MARGIN, rows.max() + MARGIN
+    image = image.crop((max(box[0], 0), max(box[1], 0), min(box[2], image.width), min(box[3], image.height)))
+    image.thumbnail((WIDTH, WIDTH))
+    image.quantize(COLOURS, dither=Image.Dither.NONE).save(file, optimize=True)
+
+
+def main(names, out="out", docs=ROOT / "docs"):
+    """Put the tables and pictures of these names into the documentation, where they exist in `out`."""
+    out, docs = Path(out), Path(docs)
+    for name in names:
+        page, *pictures = PAGES.get(name, (None,))
+        title, *more = ALONE.get(name, (None,))
+        for picture in GALLERY if name == "gallery" else pictures + more:
+            if (out / picture).exists():
+                kept(out / picture, docs / "pictures" / picture)
+        if not (out / f"{name}.md").exists():
+            continue
+        found = (out / f"{name}.md").read_text(encoding="utf-8").strip()
+        if title:
+            (docs / "tables" / f"{name}.md").write_text(f"# {title}\n\n{found}\n", encoding="utf-8")
+        if page:
+            # of the speed against accuracy only the summary: the times of all solvers follow it
+            found = found.partition("\n\n| problem | solver")[0]
+            table = f"<!-- {name} -->\n{found}\n<!-- /{name} -->"
+            text = (docs / page).read_text(encoding="utf-8")
+            text = re.sub(f"<!-- {name} -->.*<!-- /{name} -->", lambda _, table=table: table, text, flags=re.DOTALL)
+            (docs / page).write_text(text, encoding="utf-8")
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("names", nargs="+", choices=sorted({*PAGES, *ALONE, "gallery"}), metavar="NAME")
+    main(parser.parse_args().names)
