@@ -73,6 +73,7 @@ FITTERS = {
         "first_mesh",
         "grading",
         "linear_buckling",
+        "reading",
         "refinement",
         "solve",
         "solvers",
