@@ -71,6 +71,7 @@ _HOME = {
     "Weight": "scene.loads",
     "euler_load": "scene.rod",
     "read_motion": "scene.scenefile",
+    "read_path": "statics.reading",
     "read_scene": "scene.scenefile",
     "InitialVelocity": "scene.initial",
     "Ramp": "scene.signals",
