@@ -27,9 +27,9 @@ from cosserat_fenicsx.scene.as_data import NotData, from_data, to_data
 _FORMAT, _VERSION = "result of cosserat_fenicsx", 1
 # Fields of a record by the last dimensions of their arrays, in terms of the mesh: see `_sizes`.
 _OF_RECORD = {"load_factor": "", "rq": "N7", "gauss_fields": "EG9", "negative_modes": "", "iterations": "",
-              "reactions": "*", "neutral": "", "tie_forces": "T26"}  # fmt: skip
+              "steps": "", "reactions": "*", "neutral": "", "tie_forces": "T26"}  # fmt: skip
 _OF_POINT = _OF_RECORD | {"clamp_loads": "C6"}
-_OF_INSTANT = _OF_RECORD | {"time": "", "rates": "N6", "steps": "", "clamp_forces": "C6"}
+_OF_INSTANT = _OF_RECORD | {"time": "", "rates": "N6", "clamp_forces": "C6"}
 _OF_LEDGER = {name: "3" if "momentum" in name else "" for name in Ledger._fields}
 _DENSITIES = {"densities_at_gauss_points": "EG6", "densities_at_nodes": "EP6"}
 _OF_EVENT = ("load_factor", "after", "residual", "error")
