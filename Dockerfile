@@ -1,5 +1,7 @@
 # docker build -t cosserat . && docker run cosserat (the demo), or: docker run cosserat pytest
-FROM debian:trixie
+# On Debian's development branch, with a newer dolfinx: docker build --build-arg SUITE=sid -t cosserat .
+ARG SUITE=trixie
+FROM debian:${SUITE}
 
 # The long step comes first and depends on nothing but the list, so a change of the code does not repeat it.
 COPY .ci/debian-packages.txt /tmp/

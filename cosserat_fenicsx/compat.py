@@ -1,6 +1,6 @@
-"""Differences between releases of dolfinx: the only module that depends on the installed version.
+"""Differences between releases of dolfinx and PETSc: the only module that depends on the installed versions.
 
-Supported: 0.5.2 (Debian 12), 0.9.0 (Debian 13) and, by the same interface, 0.10 and later.
+Supported: dolfinx 0.5.2 (Debian 12), 0.9.0 (Debian 13), 0.11.0 (Debian's development branch) and those between.
 All other modules call the functions below and contain no version checks.
 """
 
@@ -48,6 +48,13 @@ def require_real_scalars(scalar_type=PETSc.ScalarType):
 
 
 require_real_scalars()
+
+
+_REASONS = PETSc.SNES.ConvergedReason
+#: SNES's reason for a residual that is not a number.
+RESIDUAL_NOT_A_NUMBER = (
+    _REASONS.DIVERGED_FNORM_NAN if PETSc.Sys.getVersion() < (3, 25) else _REASONS.DIVERGED_FUNCTION_NANORINF
+)
 
 
 @contextlib.contextmanager
@@ -149,7 +156,7 @@ else:
 
     def geometry_dofs(mesh):
         """Indices into `mesh.geometry.x` of the two ends of every local cell, shape (cells, 2)."""
-        return mesh.geometry.dofmap
+        return mesh.geometry.dofmap if _VERSION < (0, 11) else mesh.geometry.dofmaps[0]
 
 
 def alias(function):

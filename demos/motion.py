@@ -120,7 +120,7 @@ def _jeffcott(times, omega, drag, angle, eccentricity):
 def released_column(history):
     """The conserved energy of the released column: the work of a
     slowly growing load up to the start, by the exact rod."""
-    rod, eta = history.scene.rod("column"), history[0].load_factor
+    rod, eta = history.scene.rod("column"), history._records[0].load_factor
     P, e, k = float(cf.euler_load(rod)), 0.2, rod.stiffness
     held = _stored(eta, lambda x: _yielded(x, P, e, rod.length, k))
     off = history.energy[np.argmax(np.abs(history.energy - held))]

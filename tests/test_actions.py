@@ -148,7 +148,7 @@ def wall_forces(path):
     """Forces on the nodes of all elements of the only rod, along -y, N, and their arc lengths, m."""
     (rod,) = path.scene.rods
     sizes = np.diff(path.layout.breaks[0]) * rod.length
-    density = -path[0].densities[1][:, :, 1] * path.scales.force / path.scales.length
+    density = -path._records[0].densities[1][:, :, 1] * path.scales.force / path.scales.length
     places = path.layout.inside(path.rule.nodes)[0] * rod.length
     return (density * path.rule.lobatto * sizes[:, None]).ravel(), places.ravel()
 

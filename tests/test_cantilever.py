@@ -96,6 +96,9 @@ def test_newton_work(far, most, reference):
     path = cf.solve(scene, (0.0, far), elements=8)
     assert path.iterations.sum() <= most
     assert path.load_factors[0] == 0.0 and path.load_factors[-1] == far
+    np.testing.assert_array_equal(path.steps, range(len(path)))
+    landed = cf.solve(scene, [far], elements=8)  # the steps in between count
+    assert 5 < landed.steps[0] <= path.steps[-1] + 1
     assert path.displacement(rod.end)[-1, 0] == pytest.approx(reference[far]["reissner"]["delta"], rel=1e-6)
 
 

@@ -66,7 +66,7 @@ def test_the_table_picks_rows_and_the_csv_keeps_all(tmp_path):
     text = motion_tables.motion_table(history)
     assert "21 of 101 times" in text and len(re.findall(r"^│", text, re.MULTILINE)) == 21
     assert "speed: of spaghetti@2.5." in motion_tables.motion_table(history, "spaghetti@2.5")
-    motion_tables.write_motion_csv(history, tmp_path / "a.csv", "spaghetti@2.5")
+    history.write(tmp_path / "a.csv", station="spaghetti@2.5")
     lines = (tmp_path / "a.csv").read_text().splitlines()
     assert len(lines) == 102 and "spaghetti@2.5 velocity (m/s) x" in lines[0]
     middle = scene.rods[0].at(2.5)

@@ -68,7 +68,7 @@ def test_a_copy_is_apart():
     path = cf.solve(scene, [0.3, 0.6], elements=4)
     before = path.position(rod.end)
     other = copy.deepcopy(path)
-    other[0].rq[:] = 0.0
+    other._records[0].rq[:] = 0.0
     other.events.append("something")
     np.testing.assert_array_equal(path.position(rod.end), before)
     assert not path.events

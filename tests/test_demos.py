@@ -1,10 +1,14 @@
 """The demos run, under mpirun too, and give the numbers that they state."""
 
+import re
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 from conftest import COMM
+
+import cosserat_fenicsx as cf
 
 DEMOS = Path(__file__).parent.parent / "demos"
 
@@ -22,6 +26,10 @@ def test_eccentric_cantilever(tmp_path_all, capsys):
     printed = capsys.readouterr().out
     if COMM.rank == 0:
         assert "2.200615" in printed and "beyond its pole" in printed
+        # delta at eta = 0.9 with each of the four: on 8 P2 elements to 4e-5
+        (row,) = (line for line in printed.splitlines() if "eta = 0.9" in line)
+        np.testing.assert_allclose([float(x) for x in re.findall(r"2\.\d{7}", row)], 4 * [2.2006154], rtol=4e-5)
+        assert "a multiplier at every node" in printed and "steps of the continuation" in printed
         assert all(
             (tmp_path_all / f).stat().st_size > 5000
             for f in ("cantilever.xdmf", "cantilever.h5", "figure.png", "rod.png")
@@ -29,6 +37,32 @@ def test_eccentric_cantilever(tmp_path_all, capsys):
     else:
         assert printed == ""
     COMM.barrier()
+
+
+def test_eccentric_cantilever_in_one_way(tmp_path_all):
+    """The options of the command line choose the formulation, the degree and the mesh."""
+    import eccentric_cantilever
+
+    arguments = ["--formulation", "multiplier", "--degree", "3", "--elements", "4", "-o", str(tmp_path_all)]
+    path, error = eccentric_cantilever.main(**eccentric_cantilever.options(arguments), load_factors=(0.5, 1.0))
+    assert (path.formulation, path.degree, path.elements, path.model) == ("multiplier", 3, (4,), "spatial")
+    assert error < 1e-4
+    with pytest.raises(SystemExit):
+        eccentric_cantilever.options(["--formulation", "none"])
+
+
+def test_bare_dolfinx():
+    """dolfinx and SNES by hand find what the package finds with the same elements."""
+    import bare_dolfinx
+    import eccentric_cantilever
+
+    by_hand = {round(eta, 3): delta for eta, iterations, delta in bare_dolfinx.main() if iterations < 10}
+    rod, scene = eccentric_cantilever.column()
+    mesh = {"formulation": "multiplier", "degree": 2, "elements": 8, "model": "spatial"}
+    path = cf.solve(scene, [0.5, 0.9, 1.0, 2.0], **mesh)
+    delta = path.displacement(rod.end)[:, 0] / rod.length
+    np.testing.assert_allclose([by_hand[eta] for eta in path.load_factors], delta, rtol=1e-9)
+    assert len((DEMOS / "bare_dolfinx.py").read_text(encoding="utf-8").splitlines()) <= 70
 
 
 @pytest.mark.serial

@@ -52,6 +52,7 @@ SHARED = {
     "quadrature",
     "quaternions",
     "ranks",
+    "units",
 }
 ROOMS = {
     "scene": set(),
@@ -73,6 +74,7 @@ FITTERS = {
         "first_mesh",
         "grading",
         "linear_buckling",
+        "reading",
         "refinement",
         "solve",
         "solvers",
@@ -127,10 +129,10 @@ def test_no_module_takes_the_name_of_something_public():
     assert {name for name in dir(cf) if not name.startswith("__")} == set(cf.__all__)
 
 
-def test_pictures_are_imported_only_when_asked_for():
+def test_optional_libraries_are_imported_only_when_asked_for():
     code = (
-        "import sys, cosserat_fenicsx as cf; cf.solve, cf.Path; print({'pyvista', 'matplotlib', 'meshio', 'vtk'} &"
-        " set(sys.modules))"
+        "import sys, cosserat_fenicsx as cf; cf.solve, cf.read_path; print({'pyvista', 'matplotlib', 'meshio', 'vtk',"
+        " 'pandas', 'xarray', 'h5py'} & set(sys.modules))"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, encoding="utf-8", cwd=ROOT)
     assert done.stdout.strip() == "set()", done.stderr
@@ -163,6 +165,8 @@ def test_the_wheel_holds_the_forms_and_works(tmp_path):
     (wheel,) = tmp_path.glob("*.whl")
     names = zipfile.ZipFile(wheel).namelist()
     assert "cosserat_fenicsx/forms/spatial.py" in names and "cosserat_fenicsx/models/spatial.py" in names
+    page = PACKAGE / "pictures" / "page"
+    assert {f"cosserat_fenicsx/pictures/page/{file.name}" for file in page.iterdir()} <= set(names)
     zipfile.ZipFile(wheel).extractall(tmp_path / "site")
     code = "import cosserat_fenicsx.forms.spatial as f, cosserat_fenicsx as cf; print(f.__file__); cf.solve"
     done = subprocess.run([sys.executable, "-S", "-c",

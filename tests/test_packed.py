@@ -30,10 +30,7 @@ def test_packed_forms_are_the_forms(formulation, degree):
                 for function in moving:
                     function.x.array[:] = random.normal(size=len(function.x.array))
                     function.x.scatter_forward()
-                b = fem_petsc.create_vector(forms.residual)
-                with b.localForm() as local:
-                    local.set(0.0)
-                    fem_petsc.assemble_vector(b, forms.residual)
+                with fem_petsc.assemble_vector(forms.residual).localForm() as local:
                     found = np.zeros(len(local.array_r))
                     packed[0].add_to_vector(found)
                     np.testing.assert_array_equal(found, local.array_r)

@@ -136,7 +136,7 @@ def test_tables_tell_reactions():
         "Roller at b.end", "Clamp at a.start", "Prescribed at c.end", "Hinge at b@1"
     ]  # fmt: skip
     assert told[0].endswith("and (0, 0, 0) N m at the load factor 1.")
-    with pytest.raises(cf.SceneError, match="no support of this result's scene"):
+    with pytest.raises(cf.SceneError, match="no support of this scene"):
         path.reaction(cf.Clamp(path.scene.rods[0].start))
 
 

@@ -5,9 +5,8 @@ from dataclasses import dataclass
 import ufl
 
 from cosserat_fenicsx.actions.directed import Directed, store_coefficients
-from cosserat_fenicsx.checks import instance
 from cosserat_fenicsx.scene.action import PointAction, scalar
-from cosserat_fenicsx.scene.rod import Station
+from cosserat_fenicsx.scene.rod import Station, StationOrName, is_known
 
 
 @dataclass(frozen=True)
@@ -27,7 +26,7 @@ class Dashpot(Directed, PointAction):
         SceneError: not a station, numbers that are negative or both 0, or no direction.
     """
 
-    station: Station
+    station: StationOrName
     damping: float = 0.0
     rotational: float = 0.0
     direction: tuple | None = None
@@ -40,7 +39,7 @@ class Dashpot(Directed, PointAction):
         return _alike, _along
 
     def __post_init__(self):
-        instance(self, "station", self.station, Station, "a station such as rod.end")
+        is_known(self, "station", Station)
         units = {"damping": "N s/m", "rotational": "N m s/rad"}
         store_coefficients(self, units, "a damping (N s/m), or a rotational one (N m s/rad)")
         self._store_direction()

@@ -5,12 +5,12 @@ from dataclasses import dataclass
 import ufl
 
 from cosserat_fenicsx.actions.directed import store_coefficients
-from cosserat_fenicsx.checks import instance, store, vector
+from cosserat_fenicsx.checks import store, vector
 from cosserat_fenicsx.scene import action
 from cosserat_fenicsx.scene.action import LineAction
 from cosserat_fenicsx.scene.along import along_or_vector, breaks_of, kinks_of, values_of
 from cosserat_fenicsx.scene.loads import Load
-from cosserat_fenicsx.scene.rod import Rod
+from cosserat_fenicsx.scene.rod import Rod, RodOrName, is_known
 
 # |w| is replaced by this constant at smaller speeds (in units of speed), so that it is differentiable at w = 0.
 _STILL = 1e-12
@@ -37,7 +37,7 @@ class Drag(Load, LineAction):
         SceneError: not a rod, negative coefficients or both 0, or a current that is no velocity.
     """
 
-    rod: Rod
+    rod: RodOrName
     normal: float
     tangential: float = 0.0
     current: object = (0.0, 0.0, 0.0)
@@ -46,7 +46,7 @@ class Drag(Load, LineAction):
     jumps, follows = (), True
 
     def __post_init__(self):
-        instance(self, "rod", self.rod, Rod, "a Rod")
+        is_known(self, "rod", Rod)
         units = dict.fromkeys(("normal", "tangential"), "N s^2/m^3")
         store_coefficients(self, units, "a coefficient (N s^2/m^3)")
         if along_or_vector(self, "current", self.current, self.rod) is None:

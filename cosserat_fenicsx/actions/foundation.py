@@ -5,9 +5,9 @@ from dataclasses import dataclass
 import ufl
 
 from cosserat_fenicsx.actions.directed import Directed
-from cosserat_fenicsx.checks import instance, positive, store
+from cosserat_fenicsx.checks import positive, store
 from cosserat_fenicsx.scene.action import LineAction, scalar
-from cosserat_fenicsx.scene.rod import Rod
+from cosserat_fenicsx.scene.rod import Rod, RodOrName, is_known
 
 
 @dataclass(frozen=True)
@@ -27,7 +27,7 @@ class Foundation(Directed, LineAction):
         SceneError: not a rod, a stiffness that is not positive, or no direction.
     """
 
-    rod: Rod
+    rod: RodOrName
     stiffness: float
     direction: tuple | None = None
 
@@ -39,7 +39,7 @@ class Foundation(Directed, LineAction):
         return alike, along
 
     def __post_init__(self):
-        instance(self, "rod", self.rod, Rod, "a Rod")
+        is_known(self, "rod", Rod)
         store(self, stiffness=positive(self, "stiffness", self.stiffness, "N/m^2"))
         self._store_direction()
 

@@ -4,9 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cosserat_fenicsx.checks import instance, number, positive, refuse, store
+from cosserat_fenicsx.checks import number, positive, refuse, store
 from cosserat_fenicsx.scene.action import PointAction
-from cosserat_fenicsx.scene.rod import Station
+from cosserat_fenicsx.scene.rod import Station, StationOrName, is_known
 
 
 @dataclass(frozen=True)
@@ -22,14 +22,14 @@ class PointMass(PointAction):
         SceneError: not a station, or numbers that are not positive (moments: negative).
     """
 
-    station: Station
+    station: StationOrName
     mass: float
     moments: object = 0.0
 
     work, scaled = None, False
 
     def __post_init__(self):
-        instance(self, "station", self.station, Station, "a station such as rod.end")
+        is_known(self, "station", Station)
         store(self, mass=positive(self, "mass", self.mass, "kg"))
         given = np.atleast_1d(self.moments)
         if given.shape not in ((1,), (3,)):

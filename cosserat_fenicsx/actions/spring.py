@@ -7,9 +7,8 @@ import ufl
 
 from cosserat_fenicsx.actions.directed import Directed, store_coefficients
 from cosserat_fenicsx.actions.foundation import alike, along
-from cosserat_fenicsx.checks import instance
 from cosserat_fenicsx.scene.action import PointAction, scalar
-from cosserat_fenicsx.scene.rod import Station
+from cosserat_fenicsx.scene.rod import Station, StationOrName, is_known
 
 
 @dataclass(frozen=True)
@@ -31,7 +30,7 @@ class Spring(Directed, PointAction):
         SceneError: not a station, stiffnesses that are negative or both 0, or no direction.
     """
 
-    station: Station
+    station: StationOrName
     stiffness: float = 0.0
     rotational: float = 0.0
     direction: tuple | None = None
@@ -44,7 +43,7 @@ class Spring(Directed, PointAction):
         return _alike, _along
 
     def __post_init__(self):
-        instance(self, "station", self.station, Station, "a station such as rod.end")
+        is_known(self, "station", Station)
         units = {"stiffness": "N/m", "rotational": "N m/rad"}
         store_coefficients(self, units, "a stiffness (N/m), or a rotational one (N m/rad)")
         self._store_direction()

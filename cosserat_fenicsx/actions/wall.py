@@ -5,11 +5,11 @@ from dataclasses import dataclass
 import numpy as np
 import ufl
 
-from cosserat_fenicsx.checks import direction, instance, positive, store, vector
+from cosserat_fenicsx.checks import direction, positive, store, vector
 from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.scene import action
 from cosserat_fenicsx.scene.action import LineAction
-from cosserat_fenicsx.scene.rod import Rod
+from cosserat_fenicsx.scene.rod import Rod, RodOrName, is_known
 
 # Places along a rod, and share of its length by which it may lie outside the clearance at rest, for rounding.
 _SAMPLES, _OUTSIDE = 257, 1e-9
@@ -37,7 +37,7 @@ class Wall(LineAction):
         SceneError: not a rod, no direction, numbers that are not positive, or a rod that lies outside the wall at rest.
     """
 
-    rod: Rod
+    rod: RodOrName
     point: tuple
     direction: tuple
     clearance: float
@@ -46,13 +46,13 @@ class Wall(LineAction):
     scaled, at_nodes = False, True
 
     def __post_init__(self):
-        instance(self, "rod", self.rod, Rod, "a Rod")
         store(
             self, point=vector(self, "point", self.point, "m"), direction=direction(self, "direction", self.direction)
         )
         store(self, clearance=positive(self, "clearance", self.clearance, "m"))
         store(self, stiffness=positive(self, "stiffness", self.stiffness, "N/m^2"))
-        self._check_inside()
+        if is_known(self, "rod", Rod):
+            self._check_inside()
 
     def _check_inside(self):
         s = np.linspace(0.0, self.rod.length, _SAMPLES)

@@ -13,6 +13,7 @@ import numpy as np
 from petsc4py import PETSc
 
 from cosserat_fenicsx.algebra import linear
+from cosserat_fenicsx.compat import RESIDUAL_NOT_A_NUMBER
 from cosserat_fenicsx.errors import NotConverged
 
 #: Newton stops when the increment, or the remaining error estimated from the contraction, is below this (root mean
@@ -27,7 +28,7 @@ WORDS = {
     _Reason.CONVERGED_SNORM_RELATIVE: "converged",
     _Reason.DIVERGED_MAX_IT: "Newton's iterations ran out",
     _Reason.DIVERGED_DTOL: "Newton's steps grew without bound",
-    _Reason.DIVERGED_FNORM_NAN: "the residual is not a number",
+    RESIDUAL_NOT_A_NUMBER: "the residual is not a number",
     _Reason.DIVERGED_LINEAR_SOLVE: "the tangent is singular",
 }
 
@@ -135,7 +136,7 @@ class Newton:
     def _test(self, snes, iteration, norms):
         _, step, residual = norms
         if not math.isfinite(residual):
-            return _Reason.DIVERGED_FNORM_NAN
+            return RESIDUAL_NOT_A_NUMBER
         if iteration == 0:
             return _Reason.CONVERGED_ITERATING
         problem = self.problem

@@ -116,13 +116,8 @@ def _report(path, station):
 
 def _write(path, out, station, *, picture, magnify, shown, film, speed):
     moving = path.axis == "time"
-    if moving:
-        from cosserat_fenicsx.results.motion_tables import write_motion_csv as write_csv
-    else:
-        from cosserat_fenicsx.results.tables import write_csv
-
     name = "motion" if moving else "path"
-    write_csv(path, out / f"{name}.csv", station)
+    path.write(out / f"{name}.csv", station=station)
     path.write(out / f"{name}.xdmf")
     written = [f"{name}.{kind}" for kind in ("xdmf", "h5", "csv")]
     if picture:

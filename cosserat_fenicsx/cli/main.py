@@ -9,7 +9,7 @@ from cosserat_fenicsx import interrupts
 from cosserat_fenicsx.cli.deliver import deliver
 from cosserat_fenicsx.cli.options import parser
 from cosserat_fenicsx.cli.say import BAD_INPUT, DONE, INTERRUPTED, NOT_CONVERGED, say
-from cosserat_fenicsx.errors import CosseratError, NotConverged, SceneError
+from cosserat_fenicsx.errors import CosseratError, NotConverged
 
 
 def main(arguments=None):
@@ -43,31 +43,15 @@ def main(arguments=None):
 
 def _settings(options):
     """The scene and the arguments of `solve`: options of the command line replace those of the file."""
-    from cosserat_fenicsx.scene.scenefile import read_scene
+    from cosserat_fenicsx.scene.scenefile import load_factors_in, read_scene
 
     scene, settings = read_scene(options.scene)
     for name in ("tol", "elements", "degree", "formulation", "model", "control", "branch"):
         if getattr(options, name) is not None:
             settings[name] = getattr(options, name)
     if options.load_factors is not None:
-        settings["load_factors"] = options.load_factors
-    load_factors = settings.pop("load_factors", "0:1")
-    if isinstance(load_factors, str):
-        load_factors = _load_factors(load_factors)
-    return scene, load_factors, settings
-
-
-def _load_factors(text):
-    separator = ":" if ":" in text else ","
-    try:
-        values = [float(part) for part in text.split(separator)]
-    except ValueError:
-        values = []
-    if not values or (separator == ":" and len(values) != 2):
-        raise SceneError(
-            f"load factors '{text}': expected A:B (the solver chooses its steps) or A,B,... (reached exactly)"
-        )
-    return tuple(values) if separator == ":" else values
+        settings["load_factors"] = load_factors_in(options.load_factors)
+    return scene, settings.pop("load_factors", (0.0, 1.0)), settings
 
 
 def _run(options):

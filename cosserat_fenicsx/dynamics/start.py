@@ -71,7 +71,7 @@ def starts_in(scene, plane, start):
         return True
     path, k = _point(start)
     rods = [rod for rod in scene.rods if rod in path.scene.rods]
-    moved = np.concatenate([path.motion(rod, np.linspace(0, 1, 33), [path[k]])[0] for rod in rods])
+    moved = np.concatenate([path.motion(rod, np.linspace(0, 1, 33), [path._records[k]])[0] for rod in rods])
     return (
         max(np.abs(moved[:, :3] @ normal).max(), np.abs(moved[:, 4:] @ e1).max(), np.abs(moved[:, 4:] @ e2).max())
         < _OUT_OF_PLANE
@@ -100,7 +100,7 @@ def _of_path(model, path, k):
             raise SceneError(
                 f"simulate.start: the path has no rod '{rod.name}': expected one with the rods of the scene"
             )
-        moved = path.motion(rod, x, [path[k]])[0]
+        moved = path.motion(rod, x, [path._records[k]])[0]
         r = rod.curve.position(x * rod.length) - scene.origin(rod) + moved[:, :3] * path.scales.length
         parts.append(np.column_stack([r / length, moved[:, 3:]]))
     return np.concatenate(parts)

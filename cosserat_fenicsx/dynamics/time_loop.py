@@ -136,7 +136,7 @@ class TimeLoop:
         return True
 
     def _lose(self, t, why):
-        if self.history[-1].time < t:
+        if self.history._records[-1].time < t:
             self._save(t, stepped=False)
         raise NotConverged(f"the motion was lost at t = {t:.6g} s, where {why}", self.history)
 

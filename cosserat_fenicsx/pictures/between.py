@@ -31,7 +31,7 @@ class Between:
 
     def _read(self, k):
         """r and q of the saved state k, (N, 7), and their rates, (N, 7), 1/s."""
-        record = self._history[k]
+        record = self._history._records[k]
         rates = record.rates / self._history.time_unit
         return record.rq, np.concatenate([rates[:, :3], _turning(record.rq[:, 3:], rates[:, 3:])], axis=1)
 

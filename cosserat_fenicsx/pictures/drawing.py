@@ -70,12 +70,12 @@ def body_of(rod, x, line, directors, moment, magnify=1.0):
     """The `Body` of a rod whose centreline (n, 3) m, directors (n, 3, 3) and bending moment (n,) N m are known at arc
     lengths x (n,) over its length."""
     reference = rod.curve.position(x * rod.length)
-    outline = _outlines(rod, x * rod.length)
+    outline = outlines(rod, x * rod.length)
     radius = float(np.linalg.norm(outline, axis=2).max())
     return Body(reference + magnify * (line - reference), directors, outline, radius, moment)
 
 
-def _outlines(rod, s):
+def outlines(rod, s):
     """(n, corners, 2) corners of the sections at arc lengths s (n,), m; all are resampled to the largest number of
     corners."""
     sections = [rod.section_at(s[0])] * len(s) if rod.profile.constant else [rod.section_at(x, "left") for x in s]
@@ -95,7 +95,12 @@ def _resampled(outline, corners):
 
 def thickening(body, size):
     """The factor that the section of a `Body` is enlarged by in a drawing of extent `size`, m."""
-    return max(1.0, size * _SMALLEST_RADIUS / body.radius)
+    return thickness(body.radius, size)
+
+
+def thickness(radius, size):
+    """The factor that a section of a radius, m, is enlarged by in a drawing of extent `size`, m."""
+    return max(1.0, size * _SMALLEST_RADIUS / radius)
 
 
 def points_of(body, factor):

@@ -47,7 +47,7 @@ class Extremes(OnNodes):
             nodes = np.arange(self.elements[i])[:, None] * self.degree + np.arange(self.degree + 1)
             places.append((rod, s, rod.curve.frame(s)[:, :, 2], self._rows(rod)[1], self._cells(i), nodes))
         for k in range(len(self)):
-            contact, rq = self._contact_of(k), self[k].rq
+            contact, rq = self._contact_of(k), self._records[k].rq
             for rod, s, d3, rows, cells, nodes in places:
                 n, m = np.split(np.einsum("qj,cjk->cqk", basis, contact[cells]).reshape(-1, 6), 2, axis=1)
                 q = np.einsum("qj,cjk->cqk", basis, rq[rows, 3:][nodes]).reshape(-1, 4)

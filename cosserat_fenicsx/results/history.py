@@ -118,11 +118,12 @@ class History(Result):
         """The label of time k in pictures."""
         return f"{self.times[k]:.3g} s"
 
-    def fields(self, k, rod=None):
-        """See `Result`, at time k; with velocity (m/s) and angular_velocity (rad/s), inertial."""
-        rates = self._records[k].rates[self._rows(rod)[1]] / self._time_unit
-        velocity = rates[:, :3] * self.scales.length
-        return {**super().fields(k, rod), "velocity": velocity, "angular_velocity": rates[:, 3:]}
+    def fields_at(self, which, rod=None):
+        """See `Result`; with velocity (m/s) and angular_velocity (rad/s), inertial."""
+        rows = self._rows(rod)[1]
+        rates = np.array([self._records[k].rates[rows] for k in which]) / self._time_unit
+        velocity = rates[..., :3] * self.scales.length
+        return {**super().fields_at(which, rod), "velocity": velocity, "angular_velocity": rates[..., 3:]}
 
     def plot_energy(self, file=None):
         """Chart of the energies over time.

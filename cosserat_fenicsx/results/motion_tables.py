@@ -1,11 +1,11 @@
-"""A motion as a table for the screen and as CSV."""
+"""A motion as a table for the screen."""
 
 import numpy as np
 from rich.table import Table
 
 from cosserat_fenicsx.results.extremes import largest_in_words
 from cosserat_fenicsx.results.reactions import reactions_in_words
-from cosserat_fenicsx.results.tables import as_text, most_displaced, station_columns, write_columns
+from cosserat_fenicsx.results.tables import as_text, most_displaced
 
 #: Largest number of rows of the table.
 ROWS = 21
@@ -61,15 +61,3 @@ def _named(scene):
         for station in (rod.start, *scene.stations(rod), rod.end):
             places.setdefault(tuple(np.round(rod.curve.position(station.s), 9)), station)
     return places.values()
-
-
-def write_motion_csv(history, file, station=None):
-    """Times (s), steps, energies (J), momenta; displacement (m), quaternion, velocity (m/s), angular velocity (rad/s),
-    contact force n (N) and moment m (N m), inertial, at the stations of `tables.write_csv`."""
-    head = {"time (s)": history.times, "steps": history.steps}
-    head |= {f"{name} (J)": getattr(history, name) for name in _ENERGIES}
-    for quantity, unit in (("linear_momentum", "kg m/s"), ("angular_momentum", "kg m^2/s")):
-        values = getattr(history, quantity)
-        head |= {f"{quantity.replace('_', ' ')} ({unit}) {axis}": values[:, i] for i, axis in enumerate("xyz")}
-    more = (("velocity", "velocity (m/s)", "xyz"), ("angular_velocity", "angular velocity (rad/s)", "xyz"))
-    write_columns(history, file, head | station_columns(history, station, more))

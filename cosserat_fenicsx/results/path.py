@@ -15,6 +15,8 @@ class Path(Result):
 
     Attributes:
         load_factors: (n,).
+        steps: (n,) number of steps of the continuation since the start, on the mesh of the path: those to points in
+            between, which are not kept, count; where the points were corrected from a coarser mesh each is one step.
         negative_modes: (n,) number of negative eigenvalues of the second variation; 0 at a stable point, -1 where it is
             singular. Where the loads have no potential (see `conservative`) its symmetric part is used, which does not
             detect flutter.
@@ -74,6 +76,7 @@ class Path(Result):
         return f"<Path: {len(self)} points, {reach}, {self.model}, {self.unknowns} unknowns>"
 
     load_factors = property(lambda self: self._array("load_factor").astype(float))
+    steps = property(lambda self: self._array("steps").astype(int))
     negative_modes = property(lambda self: self._array("negative_modes").astype(int))
     stable = property(lambda self: self.negative_modes == 0)
 

@@ -25,7 +25,8 @@ class Reactions(OnNodes):
         motion was lost.
 
         Args:
-            support: one of `result.scene.supports`.
+            support: one of `result.scene.supports`; or a station with supports, or its name: the sum of their
+                reactions.
 
         Returns:
             force (n, 3), N, and moment (n, 3) about the station, N m, both inertial.
@@ -34,10 +35,11 @@ class Reactions(OnNodes):
             SceneError: not a support of the scene; or a clamp at whose point an action with memory acts, since its
                 force is not stored.
         """
-        which = [i for i, x in enumerate(self.scene.supports) if x is support]
-        if not which:
-            raise SceneError(f"{support!r} is no support of this result's scene: expected one of `scene.supports`")
-        exerted = self._of_clamp(support) if support.clamps else self._of_equations(which[0])
+        parts = []
+        for i in self.scene.supports_of(support):
+            held = self.scene.supports[i]
+            parts.append(self._of_clamp(held) if held.clamps else self._of_equations(i))
+        exerted = sum(parts)
         force, moment = np.split(exerted, 2, axis=1)
         return force * self.scales.force, moment * self.scales.moment
 

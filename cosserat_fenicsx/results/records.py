@@ -22,6 +22,7 @@ class Record:
         tie_forces: (equations, 2, 6) force and moment that each constraint equation exerts on its two stations.
         clamp_loads: (points, 6) force and moment of the loads at every clamped point. Both are in the order of
             `Connections`.
+        steps: see `Path`.
     """
 
     load_factor: float
@@ -34,6 +35,7 @@ class Record:
     densities: tuple = (None, None)
     tie_forces: np.ndarray | None = None
     clamp_loads: np.ndarray | None = None
+    steps: int = 0
 
 
 @dataclass(frozen=True, eq=False)

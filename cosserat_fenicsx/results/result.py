@@ -6,14 +6,16 @@ import numpy as np
 
 from cosserat_fenicsx.checks import instance
 from cosserat_fenicsx.quaternions import directors
+from cosserat_fenicsx.results.exports import Exports
 from cosserat_fenicsx.results.extremes import Extremes
+from cosserat_fenicsx.results.fields import fields_at
 from cosserat_fenicsx.results.reactions import Reactions
-from cosserat_fenicsx.results.recovery import at_nodes
 from cosserat_fenicsx.results.states import States
+from cosserat_fenicsx.results.stresses import Stresses
 from cosserat_fenicsx.scene.rod import Station
 
 
-class Result(Extremes, Reactions, States):
+class Result(Exports, Extremes, Reactions, Stresses, States):
     """A sequence of states of a scene. Public methods return SI units. It can be copied and pickled, see `States`.
 
     Attributes:
@@ -79,39 +81,24 @@ class Result(Extremes, Reactions, States):
         Returns:
             dict of arrays (nodes, ...): s (m), position, displacement (m), quaternion, d1, d2, d3, force (N), moment
             (N m), all inertial; strain (v - v_R: shear 1, shear 2, stretch) and curvature (u - u_R: bending 1,
-            bending 2, twist; 1/m), both material; bending_moment (N m, its size).
+            bending 2, twist; 1/m), both material; bending_moment (N m, its size). Where a section of the scene knows
+            its shape, also von_mises, axial_max and axial_min (Pa), see `stress`; NaN along other sections. Of a motion
+            also velocity (m/s) and angular_velocity (rad/s), inertial.
 
         Raises:
             IndexError: there is no point k.
         """
         if not -len(self) <= k < len(self):
             raise IndexError(f"fields({k}): expected the number of a {self.axis}, from 0 to {len(self) - 1}")
-        rod = self.rod(rod)
-        i, rows = self._rows(rod)
-        s = self.layout.node_s(self.rule.nodes)[i] * rod.length
-        record = self._records[k]
-        contact = at_nodes(self._contact_of(k)[self._cells(i)])
-        displacement = (record.rq[rows, :3] - self._rest[rows]) * self.scales.length
-        q = record.rq[rows, 3:] / np.linalg.norm(record.rq[rows, 3:], axis=1, keepdims=True)
-        d = directors(q) @ rod.curve.frame(s)
-        n, m = contact[:, :3] * self.scales.force, contact[:, 3:] * self.scales.moment
-        n_material, m_material = np.einsum("kij,ki->kj", d, n), np.einsum("kij,ki->kj", d, m)
-        # at a jump those of the element before, as n and m
-        strain, curvature = rod.stiffness_at(s, "left").strains(n_material, m_material)
-        return {
-            "s": s,
-            "position": rod.curve.position(s) + displacement,
-            "displacement": displacement,
-            "quaternion": q,
-            "d1": d[:, :, 0],
-            "d2": d[:, :, 1],
-            "d3": d[:, :, 2],
-            "force": n,
-            "moment": m,
-            "strain": strain,
-            "curvature": curvature,
-            "bending_moment": np.linalg.norm(m_material[:, :2], axis=1),
-        }
+        return {name: a if name == "s" else a[0] for name, a in self.fields_at([k], rod).items()}
+
+    def fields_at(self, which, rod=None):
+        """`fields` in several states at once: {name: array (n, nodes, ...)}, but s (nodes,).
+
+        Args:
+            which: their indices (n,).
+        """
+        return fields_at(self, which, self.rod(rod))
 
     def largest_displacement(self):
         """(n,) the largest displacement of any node, m."""
@@ -191,20 +178,28 @@ class Result(Extremes, Reactions, States):
 
     # -- files and pictures ------------------------------------------------------------------------------------------
 
-    def write(self, file, k=-1):
-        """Write all points as .xdmf (time axis: the load factor, or the time), or point k in a format of meshio.
+    def write(self, file, k=None, *, rod=None, station=None):
+        """Write a file whose ending says what it holds.
+
+        .xdmf: all points, with the load factor or the time as time axis, for ParaView. .csv: a table over load factors
+        or time, of motion and contact forces at stations; or, given k or rod, all fields along the rods at point k.
+        .html: one interactive page with a slider over all points, which needs no network.
+        .vtu, .vtk or another ending of meshio: point k. For all of a result, to read it again, see `save`.
 
         Args:
-            file: its name, with the ending .xdmf, or .vtu, .vtk or another of meshio's.
-            k: the index of the point, for formats other than .xdmf.
+            file: its name.
+            k: the index of the point, for endings other than .xdmf and .html; default the last.
+            rod: for .csv: the `Rod`, or its name, along which fields are written; None for all.
+            station: for .csv: a station of the table beside the ends of rods and the places of loads and supports;
+                default the one that moves most.
 
         Raises:
             OSError: the file cannot be written.
-            SceneError: an unknown format.
+            SceneError: an unknown format, or an option that it does not have.
         """
-        from cosserat_fenicsx.results import xdmf
+        from cosserat_fenicsx.results import files
 
-        xdmf.write(self, file, k)
+        files.write(self, file, k, rod=rod, station=station)
 
     def plot(self, file=None, points=None, *, magnify=1.0):
         """Picture of the deformed rods, coloured by bending moment, at some points (default up to five).

@@ -75,8 +75,18 @@ class States(OnNodes):
         return len(self._expanded) + len(self._appended)
 
     def __getitem__(self, k):
-        """State k: a `Record`."""
-        return self._records[k]
+        """State k, or the states of a slice: a result of the same kind with these states alone, in SI units as ever.
+
+        `at_points` takes a list of indices. Neither has events.
+
+        Raises:
+            IndexError: there is no state k.
+        """
+        if isinstance(k, slice):
+            return self.at_points(list(range(len(self))[k]))
+        if not -len(self) <= k < len(self):
+            raise IndexError(f"[{k}]: expected the number of a {self.axis}, from 0 to {len(self) - 1}")
+        return self.at_points([k])
 
     def at_points(self, which):
         """The result with some of its states only.
@@ -84,7 +94,7 @@ class States(OnNodes):
         Args:
             which: their indices.
         """
-        return self._with([self[k] for k in which])
+        return self._with([self._records[k] for k in which])
 
     def _with(self, records):
         """A copy with other states."""

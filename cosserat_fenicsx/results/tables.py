@@ -1,6 +1,5 @@
-"""A path as a table for the screen and as CSV."""
+"""A path as a table for the screen."""
 
-import csv
 import sys
 
 import numpy as np
@@ -8,7 +7,6 @@ from rich import box
 from rich.console import Console
 from rich.table import Table
 
-from cosserat_fenicsx.ranks import on_first
 from cosserat_fenicsx.results.extremes import largest_in_words
 from cosserat_fenicsx.results.reactions import reactions_in_words
 from cosserat_fenicsx.scene.describe import actions_in_words
@@ -143,51 +141,3 @@ def as_text(table):
     with console.capture() as capture:
         console.print(table)
     return capture.get().rstrip()
-
-
-def write_csv(path, file, station=None):
-    """Write load factors, negative modes, iterations and errors of a path, and its columns of stations, as CSV.
-
-    Displacement (m), quaternion, contact force n (N) and moment m (N m) at both ends of every rod, where loads and
-    supports act, and at the station of the table. n and m act from the part of larger s on the part of smaller s: the
-    reaction of a support at the start is their opposite.
-    """
-    head = {
-        "load_factor": path.load_factors,
-        "negative_modes": path.negative_modes,
-        "iterations": path.iterations,
-        "estimated_error": path.error,
-    }
-    write_columns(path, file, head | station_columns(path, station))
-
-
-def station_columns(path, station=None, more=()):
-    """{name: (n,)} displacement, quaternion, contact force and moment at the stations of `write_csv`.
-
-    Args:
-        station: of the table; default the one with the largest displacement.
-        more: further quantities, (method of the path, name, names of its components).
-    """
-    columns, of_table = {}, path.station(station or most_displaced(path))
-    quantities = (("displacement", "displacement (m)", "xyz"), ("rotation", "quaternion", "abcd"), *more,
-                  ("force", "contact force (N)", "xyz"), ("moment", "contact moment (N m)", "xyz"))  # fmt: skip
-    for rod in path.scene.rods:
-        stations = [rod.start, *path.scene.stations(rod), rod.end, *([of_table] if of_table.rod is rod else [])]
-        for station in {station.s: station for station in sorted(stations, key=lambda station: station.s)}.values():
-            for quantity, name, axes in quantities:
-                values = getattr(path, quantity)(station)
-                columns |= {f"{station} {name} {axis}": values[:, i] for i, axis in enumerate(axes)}
-    return columns
-
-
-def write_columns(path, file, columns):
-    """Write columns {name: (n,)} as CSV, on rank 0."""
-    rows = zip(*(column.tolist() for column in columns.values()), strict=True)
-    on_first(path.comm, lambda: _write_rows(file, list(columns), rows))
-
-
-def _write_rows(file, names, rows):
-    with open(file, "w", newline="", encoding="utf-8") as stream:
-        writer = csv.writer(stream)
-        writer.writerow(names)
-        writer.writerows(rows)

@@ -5,13 +5,11 @@ dolfinx; an element of degree p becomes p straight lines. (meshio's own time ser
 some readers crash on dolfinx's XDMF or misinterpret it: docs/results.md.)
 """
 
-from pathlib import Path
 from xml.etree import ElementTree as xml
 
 import numpy as np
 
 from cosserat_fenicsx.errors import SceneError
-from cosserat_fenicsx.ranks import on_first
 
 #: Names in the files, as in eq. (1), and the fields of `Path.fields` behind them.
 FIELDS = {
@@ -28,41 +26,32 @@ FIELDS = {
 }
 
 
-def write(path, file, k=-1):
-    """Write a path: all points to .xdmf with the load factor as time axis, point k to any other format.
+def write_state(path, file, k=None):
+    """Write one point in a format of meshio.
 
     Args:
-        path: a `Path` with at least one point.
-        file: the file's name, whose ending sets the format.
-        k: index of the point, for other formats than .xdmf.
+        file: a `pathlib.Path`, whose ending sets the format; k: index of the point, None for the last.
 
     Raises:
-        SceneError: an empty path, or an ending that meshio does not support.
+        SceneError: an ending that meshio does not support.
         OSError: the file cannot be written.
     """
-    if len(path) == 0:
-        raise SceneError(f"{file}: the path has no point to write")
-    on_first(path.comm, lambda: _write(path, Path(file), k))
-
-
-def _write(path, file, k):
     import meshio
 
+    if file.suffix not in meshio.extension_to_filetypes:
+        known = ".xdmf, .csv, .html, .vtu, .vtk, .ply or another ending that meshio knows"
+        raise SceneError(f"{file}: the ending '{file.suffix}' is not known: expected {known}")
     file.parent.mkdir(parents=True, exist_ok=True)
-    if file.suffix != ".xdmf":
-        if file.suffix not in meshio.extension_to_filetypes:
-            known = ".xdmf, .vtu, .vtk, .ply or another ending that meshio knows"
-            raise SceneError(f"{file}: the ending '{file.suffix}' is not known: expected {known}")
-        with open(file, "wb"):
-            pass  # raises a plain OSError here if the file cannot be written
-        points, cells, data = mesh_of(path, k)
-        meshio.write(file, meshio.Mesh(points, cells, point_data=data))
-        return
-    _write_series(path, file)
+    with open(file, "wb"):
+        pass  # raises a plain OSError here if the file cannot be written
+    points, cells, data = mesh_of(path, -1 if k is None else k)
+    meshio.write(file, meshio.Mesh(points, cells, point_data=data))
 
 
-def _write_series(path, file):
-    """Write the arrays to the .h5 file, then the .xdmf file that refers to them, so that every .xdmf is complete."""
+def write_series(path, file, k=None):
+    """Write all points, the arrays to the .h5 file, then the .xdmf file that refers to them, so that every .xdmf is
+    complete."""
+    file.parent.mkdir(parents=True, exist_ok=True)
     try:
         import h5py
     except ImportError:

@@ -154,7 +154,8 @@ def along_or_vector(owner, field, value, rod):
         return None
     if len(owner.jumps):
         refuse(owner, "jumps", owner.jumps, f"none, since {field} does not depend on time")
-    value.check(rod.length)
+    if not isinstance(rod, str):  # `Scene` looks a name up
+        value.check(rod.length)
     return value
 
 

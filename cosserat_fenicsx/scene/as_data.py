@@ -18,10 +18,10 @@ from cosserat_fenicsx.scene.describe import name_of
 from cosserat_fenicsx.scene.initial import InitialVelocity
 from cosserat_fenicsx.scene.joints import Joint
 from cosserat_fenicsx.scene.materials import Material
+from cosserat_fenicsx.scene.profiles import SECTIONS
 from cosserat_fenicsx.scene.rod import Rod, Station
 from cosserat_fenicsx.scene.scene import Scene
 from cosserat_fenicsx.scene.scenefile import action_classes
-from cosserat_fenicsx.scene.sections import SECTIONS
 from cosserat_fenicsx.scene.signals import SIGNALS, Signal
 from cosserat_fenicsx.scene.supports import SUPPORTS
 

@@ -4,9 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cosserat_fenicsx.checks import instance, refuse, store, vector
+from cosserat_fenicsx.checks import refuse, store, vector
 from cosserat_fenicsx.errors import SceneError
-from cosserat_fenicsx.scene.rod import Rod
+from cosserat_fenicsx.scene.rod import Rod, RodOrName, is_known
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,13 +26,13 @@ class InitialVelocity:
         SceneError: not a rod, not three finite numbers, or `about` without a rigid motion.
     """
 
-    rod: Rod
+    rod: RodOrName
     linear: object = (0.0, 0.0, 0.0)
     angular: object = (0.0, 0.0, 0.0)
     about: tuple | None = None
 
     def __post_init__(self):
-        instance(self, "rod", self.rod, Rod, "a Rod")
+        is_known(self, "rod", Rod)
         for field, unit in (("linear", "m/s"), ("angular", "rad/s")):
             if not callable(getattr(self, field)):
                 store(self, **{field: vector(self, field, getattr(self, field), unit)})

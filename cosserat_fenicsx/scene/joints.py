@@ -4,10 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cosserat_fenicsx.checks import direction, instance, refuse, store
+from cosserat_fenicsx.checks import direction, refuse, store
 from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.scene import ties
-from cosserat_fenicsx.scene.rod import Station
+from cosserat_fenicsx.scene.rod import Station, StationOrName, is_known
 
 
 @dataclass(frozen=True)
@@ -23,13 +23,20 @@ class Joint:
         SceneError: not two stations, stations apart from each other, or a release that is none of these.
     """
 
-    first: Station
-    second: Station
+    first: StationOrName
+    second: StationOrName
     release: object = None
 
     def __post_init__(self):
-        for field in ("first", "second"):
-            instance(self, field, getattr(self, field), Station, "a station such as rod.end")
+        if all([is_known(self, field, Station) for field in ("first", "second")]):
+            self._check_place()
+        if isinstance(self.release, str):
+            if self.release != "all":
+                refuse(self, "release", self.release, "None, the direction of an axis, or 'all'")
+        elif self.release is not None:
+            store(self, release=direction(self, "release", self.release))
+
+    def _check_place(self):
         if (self.first.rod, self.first.s) == (self.second.rod, self.second.s):
             refuse(self, "second", self.second, f"another station than first = {self.first}")
         a, b = (end.rod.curve.position(end.s) for end in (self.first, self.second))
@@ -39,11 +46,6 @@ class Joint:
                 f"Joint of {self.first} at ({_point(a)}) with {self.second} at ({_point(b)}): they are {apart:.3g} m "
                 "apart: expected stations that touch"
             )
-        if isinstance(self.release, str):
-            if self.release != "all":
-                refuse(self, "release", self.release, "None, the direction of an axis, or 'all'")
-        elif self.release is not None:
-            store(self, release=direction(self, "release", self.release))
 
     @property
     def rigid(self):

@@ -12,7 +12,7 @@ from cosserat_fenicsx.checks import instance, refuse, store, vector
 from cosserat_fenicsx.scene import action
 from cosserat_fenicsx.scene.action import LineAction, PointAction
 from cosserat_fenicsx.scene.along import along_or_vector, breaks_of, kinks_of, values_of
-from cosserat_fenicsx.scene.rod import Rod, Station
+from cosserat_fenicsx.scene.rod import Rod, RodOrName, Station, StationOrName, is_known
 from cosserat_fenicsx.scene.signals import vector_or_signal
 
 
@@ -34,7 +34,7 @@ class PointLoad(Load, PointAction):
     """A load at a station."""
 
     def _check(self, field, unit):
-        instance(self, "station", self.station, Station, "a station such as rod.end")
+        is_known(self, "station", Station)
         store(self, **{field: vector_or_signal(self, field, getattr(self, field), unit, self.jumps)})
         self._check_permanent()
 
@@ -56,7 +56,7 @@ class Force(PointLoad):
         SceneError: not a station, or not three finite numbers nor a function of time.
     """
 
-    station: Station
+    station: StationOrName
     force: object
     jumps: tuple = ()
     permanent: bool = False
@@ -84,7 +84,7 @@ class Moment(PointLoad):
         SceneError: not a station, or not three finite numbers nor a function of time.
     """
 
-    station: Station
+    station: StationOrName
     moment: object
     jumps: tuple = ()
     permanent: bool = False
@@ -113,7 +113,7 @@ class EccentricForce(PointLoad):
         SceneError: not a station, or numbers that are not finite.
     """
 
-    station: Station
+    station: StationOrName
     force: object
     offset: tuple
     jumps: tuple = ()
@@ -143,7 +143,7 @@ class FollowerForce(PointLoad):
         SceneError: not a station, or not three finite numbers nor a function of time.
     """
 
-    station: Station
+    station: StationOrName
     force: object
     jumps: tuple = ()
     permanent: bool = False
@@ -171,7 +171,7 @@ class FollowerMoment(PointLoad):
         SceneError: not a station, or not three finite numbers nor a function of time.
     """
 
-    station: Station
+    station: StationOrName
     moment: object
     jumps: tuple = ()
     permanent: bool = False
@@ -235,7 +235,7 @@ class LineLoad(Load, LineAction):
     """A dead load along a rod, per unit of reference length."""
 
     def _check(self, field, unit):
-        instance(self, "rod", self.rod, Rod, "a Rod")
+        is_known(self, "rod", Rod)
         given = along_or_vector(self, field, getattr(self, field), self.rod)
         if given is None:
             given = vector_or_signal(self, field, getattr(self, field), unit, self.jumps)
@@ -257,7 +257,7 @@ class LineForce(LineLoad):
         SceneError: not a rod, or not three finite numbers nor a function.
     """
 
-    rod: Rod
+    rod: RodOrName
     force: object
     jumps: tuple = ()
     permanent: bool = False
@@ -293,7 +293,7 @@ class LineMoment(LineLoad):
         SceneError: not a rod, or not three finite numbers nor a function.
     """
 
-    rod: Rod
+    rod: RodOrName
     moment: object
     jumps: tuple = ()
     permanent: bool = False

@@ -2,13 +2,16 @@
 
 from collections import namedtuple
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
 from cosserat_fenicsx.checks import instance, number, refuse, store
 from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.scene.materials import Material
-from cosserat_fenicsx.scene.sections import SECTIONS, Stiffness, inverse, representative
+from cosserat_fenicsx.scene.rolled import Profile
+from cosserat_fenicsx.scene.sections import Circle, Rectangle, Stiffness, Tube, inverse, representative
+from cosserat_fenicsx.scene.stresses import Stress
 
 
 class Stiffnesses(namedtuple("Stiffnesses", "K J mass inertia matrix", defaults=(None,))):
@@ -40,6 +43,9 @@ class Stiffnesses(namedtuple("Stiffnesses", "K J mass inertia matrix", defaults=
         return both[..., :3], both[..., 3:]
 
 
+#: Sections that scene files know.
+SECTIONS = (Circle, Tube, Rectangle, Profile, Stiffness)
+
 _SAMPLES = 33
 _DIAGONAL = 10  # numbers (GA1, GA2, EA, EI1, EI2, GJ, mass, inertia) of a section; the 36 of its matrix follow
 _NUMBERS = _DIAGONAL + 36
@@ -47,7 +53,7 @@ _UNKNOWN = [np.nan] * _NUMBERS  # stands for a piece given by a function
 
 
 @dataclass(frozen=True, eq=False)
-class Profile:
+class Sections:
     """The sections of a rod as a function of its arc length.
 
     Args:
@@ -147,6 +153,32 @@ class Profile:
             return _split(np.broadcast_to(self._fixed[0], (*s.shape, _NUMBERS)), self.coupled)
         rows = self._rows(s.ravel(), self._index(s, side).ravel())
         return _split(rows.reshape(*s.shape, _NUMBERS), self.coupled)
+
+    @cached_property
+    def shaped(self):
+        """Whether a section knows its shape, and so its stresses (of a function: at both ends of its piece)."""
+        starts, zero = (0.0, *self.breaks), np.zeros(3)
+        sections = [
+            self._piece(s, i)
+            for i, (end, _) in enumerate(self.pieces)
+            for s in ([starts[i], end] if self._law[i] else [end])
+        ]
+        return any(section.stresses(self.material, zero, zero) is not None for section in sections)
+
+    def stresses(self, s, side, force, moment):
+        """`Stress` at arc lengths s (n,), m, NaN where the section does not know its shape.
+
+        Args:
+            side: as for `Rod.stiffness_at`; force, moment: (..., n, 3), N and N m, along d_1, d_2, d_3.
+        """
+        found, index = np.full((3, *force.shape[:-1]), np.nan), self._index(s, side)
+        groups = [(int(i), np.flatnonzero(index == i)) for i in np.unique(index)]
+        alike = [(i, part) for i, own in groups for part in (own[:, None] if self._law[i] else [own])]
+        for i, here in alike:
+            told = self._piece(float(s[here[0]]), i).stresses(self.material, force[..., here, :], moment[..., here, :])
+            if told is not None:
+                found[..., here] = told
+        return Stress(*found)
 
     def _index(self, s, side):
         if side not in ("left", "right"):

@@ -12,7 +12,7 @@ from cosserat_fenicsx.quadrature import gauss
 from cosserat_fenicsx.scene.curves import CURVES
 from cosserat_fenicsx.scene.damping import Damping
 from cosserat_fenicsx.scene.materials import Material
-from cosserat_fenicsx.scene.profiles import Profile
+from cosserat_fenicsx.scene.profiles import Sections
 from cosserat_fenicsx.scene.sections import Stiffness
 
 _unnamed = itertools.count(1)
@@ -33,7 +33,7 @@ class Rod:
 
     Attributes:
         stiffness: the `Stiffness` at s = 0, which is that of the whole rod where `profile.constant`.
-        profile: the `Profile` of its sections.
+        profile: the `Sections` along it.
 
     Raises:
         SceneError: a part of the wrong kind, a missing material, or pieces that do not ascend to the length.
@@ -45,7 +45,7 @@ class Rod:
     name: str | None = None
     damping: Damping | None = None
     stiffness: Stiffness = field(init=False, repr=False)
-    profile: Profile = field(init=False, repr=False)
+    profile: Sections = field(init=False, repr=False)
 
     def __post_init__(self):
         if self.name is None:
@@ -58,8 +58,11 @@ class Rod:
             instance(self, "material", self.material, Material, "a Material")
         if self.damping is not None:
             instance(self, "damping", self.damping, Damping, "a Damping")
-        store(self, profile=Profile(self, self.section, self.material))
+        store(self, profile=Sections(self, self.section, self.material))
         store(self, stiffness=self.profile.start)
+
+    def __repr__(self):
+        return f"<Rod '{self.name}': {type(self.curve).__name__}, length {self.length:g} m>"
 
     @property
     def length(self):
@@ -161,6 +164,23 @@ def station_named(where, text, rods):
         return rods[name].at(place)
     except SceneError as problem:
         raise SceneError(f"{where} = '{text}': {problem}") from None
+
+
+#: What the fields of supports, loads and joints take that say where they act: names are looked up by `Scene`.
+StationOrName, RodOrName = Station | str, Rod | str
+
+
+def is_known(owner, field, kind):
+    """Whether a field holds a `Station` or a `Rod`; False where it holds a name, which `Scene` looks up.
+
+    Args:
+        kind: `Station` or `Rod`.
+
+    Raises:
+        SceneError: neither of the two.
+    """
+    expected = "a station such as rod.end" if kind is Station else "a Rod"
+    return not isinstance(instance(owner, field, getattr(owner, field), kind | str, f"{expected}, or its name"), str)
 
 
 def euler_load(rod):

@@ -7,11 +7,13 @@ from functools import cached_property
 from cosserat_fenicsx.checks import instance
 from cosserat_fenicsx.errors import SceneError, nearest
 from cosserat_fenicsx.scene.action import Action
+from cosserat_fenicsx.scene.describe import describe
 from cosserat_fenicsx.scene.initial import InitialVelocity
 from cosserat_fenicsx.scene.joints import Joint
 from cosserat_fenicsx.scene.magnitudes import magnitudes
+from cosserat_fenicsx.scene.names import with_names
 from cosserat_fenicsx.scene.planes import find_plane
-from cosserat_fenicsx.scene.rod import Rod, station_named
+from cosserat_fenicsx.scene.rod import Rod, Station, station_named
 from cosserat_fenicsx.scene.signals import signals_of
 from cosserat_fenicsx.scene.statical import check_held_once, touching
 from cosserat_fenicsx.scene.supports import SUPPORTS
@@ -63,6 +65,11 @@ class Scene:
         for name in names:
             if names.count(name) > 1:
                 raise SceneError(f"Scene.rods: {names.count(name)} rods are named '{name}': expected one each")
+        object.__setattr__(self, "_given", self.supports)
+        rods = {rod.name: rod for rod in self.rods}
+        for field in ("supports", "loads", "joints", "velocities"):
+            items = [with_names(f"Scene.{field}[{i}]", x, rods) for i, x in enumerate(getattr(self, field))]
+            object.__setattr__(self, field, tuple(items))
         for i, support in enumerate(self.supports):
             instance("Scene", f"supports[{i}]", support, SUPPORTS, "a support such as Clamp(rod.start)")
             self._check_rod(f"supports[{i}]", support.station, support.station.rod)
@@ -81,6 +88,11 @@ class Scene:
                 )
         check_held_once(self)
         object.__setattr__(self, "_leaders", self._find_leaders())
+
+    def __repr__(self):
+        counts = (f"{len(getattr(self, part))} {part}" for part in ("supports", "loads", "joints"))
+        rods = ", ".join(rod.name for rod in self.rods)
+        return f"<Scene{f' {self.title!r}' if self.title else ''}: rods {rods}; {', '.join(counts)}>"
 
     def _check_load(self, field, load):
         instance("Scene", field, load, Action, "a load such as Force(rod.end, (0, 0, -1)), or another Action")
@@ -228,6 +240,30 @@ class Scene:
             SceneError: there is none of that name.
         """
         return station_named("station", name, {rod.name: rod for rod in self.rods})
+
+    def supports_of(self, which):
+        """Indices of the supports that `which` stands for.
+
+        Args:
+            which: one of `supports`, as it was given or as it is listed; or a station or its name, for all that act
+                there.
+
+        Raises:
+            SceneError: there is none.
+        """
+        if isinstance(which, str):
+            which = self.station(which)
+        if isinstance(which, Station):
+            found = [i for i, x in enumerate(self.supports) if x.station == which]
+        else:
+            found = [i for i, x in enumerate(self.supports) if x is which or self._given[i] is which]
+        if not found:
+            known = ", ".join(map(describe, self.supports)) or "none"
+            what = which if isinstance(which, Station) else f"this {type(which).__name__}"
+            raise SceneError(
+                f"{what} is no support of this scene: expected one of its `supports` ({known}), or a station of one"
+            )
+        return found
 
     def rod(self, name):
         """The rod of that name.

@@ -50,9 +50,10 @@ from cosserat_fenicsx.scene.initial import InitialVelocity
 from cosserat_fenicsx.scene.joints import Joint
 from cosserat_fenicsx.scene.loads import LOADS
 from cosserat_fenicsx.scene.materials import Material
-from cosserat_fenicsx.scene.rod import Rod, Station, station_named
+from cosserat_fenicsx.scene.names import kind_of, look_up
+from cosserat_fenicsx.scene.profiles import SECTIONS
+from cosserat_fenicsx.scene.rod import Rod
 from cosserat_fenicsx.scene.scene import Scene
-from cosserat_fenicsx.scene.sections import SECTIONS
 from cosserat_fenicsx.scene.signals import SIGNALS
 from cosserat_fenicsx.scene.supports import SUPPORTS
 
@@ -82,7 +83,7 @@ def read_scene(file):
         file: path of the file.
 
     Returns:
-        (Scene, dict of the [solve] table).
+        (Scene, dict of the [solve] table): `solve(scene, **settings)` does what the file says.
 
     Raises:
         SceneError: the file is missing or not TOML, a key or a type is unknown (named, with the nearest known one), or
@@ -148,7 +149,27 @@ def _scene(tables, folder):
     settings = [_settings(name, tables, keys) for name, keys in (("solve", SOLVE_KEYS), ("simulate", SIMULATE_KEYS))]
     if "simulate" in tables and "duration" not in settings[1]:
         raise SceneError("[simulate]: 'duration' is missing: expected how long the motion lasts (s)")
+    if isinstance(settings[0].get("load_factors"), str):
+        settings[0]["load_factors"] = load_factors_in(settings[0]["load_factors"])
     return Scene(rods, supports, loads, joints, title, velocities), *settings
+
+
+def load_factors_in(text):
+    """The load factors of a text: "0:1" is a tuple (0.0, 1.0), "0.5,1" a list [0.5, 1.0], see `solve`.
+
+    Raises:
+        SceneError: it is neither.
+    """
+    separator = ":" if ":" in text else ","
+    try:
+        values = [float(part) for part in text.split(separator)]
+    except ValueError:
+        values = []
+    if not values or (separator == ":" and len(values) != 2):
+        raise SceneError(
+            f"load factors '{text}': expected A:B (the solver chooses its steps) or A,B,... (reached exactly)"
+        )
+    return tuple(values) if separator == ":" else values
 
 
 def action_classes():
@@ -239,22 +260,14 @@ def _build(where, entry, classes, rods, folder=None):
         if field.metadata.get("file") and isinstance(entry.get(field.name), str):
             entry[field.name] = folder / entry[field.name]
     for name in [name for name in arguments if name in entry]:
-        if arguments[name].annotation is Station:
-            entry[name] = station_named(f"{where}.{name}", entry[name], rods)
-        elif arguments[name].annotation is Rod:
-            entry[name] = _known_rod(f"{where}.{name}", entry[name], rods)
+        if kind_of(arguments[name].annotation):
+            entry[name] = look_up(f"{where}.{name}", entry[name], kind_of(arguments[name].annotation), rods)
         elif isinstance(entry[name], dict):
             entry[name] = _build(f"{where}.{name}", entry[name], (*SIGNALS, *ALONG), {}, folder)
     try:
         return kind(**entry)
     except SceneError as problem:
         raise SceneError(f"{where}: {problem}") from None
-
-
-def _known_rod(where, name, rods):
-    if not isinstance(name, str) or name not in rods:
-        raise SceneError(f"{where} = {name!r}: no rod has this name, {nearest(name, rods)}")
-    return rods[name]
 
 
 def _entries(key, tables):

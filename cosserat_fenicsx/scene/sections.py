@@ -1,5 +1,7 @@
 """Cross-sections: d_1 and d_2 span the section, d_3 is the tangent.
 
+A section tells its `stiffness` and, where it knows its shape, its `stresses`, both in a material.
+
 Shear factors: Cowper, J. Appl. Mech. 33 (1966) 335, doi:10.1115/1.3625046; torsion of a rectangle: Saint-Venant's
 series.
 """
@@ -10,6 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from cosserat_fenicsx.checks import finite_array, number, positive, refuse, stiffness, store, vector
+from cosserat_fenicsx.scene.computed_sections import arguments_of
+from cosserat_fenicsx.scene.stresses import rectangle_fibres, round_stress
 
 _ZETA_5 = 1.0369277551433699263  # sum of 1/n^5
 # Asymmetry and smallest eigenvalue of a matrix, scaled to a unit diagonal, that are rounding.
@@ -109,9 +113,38 @@ class Stiffness:
         stiffnesses = (*given.shear, given.axial, *given.bending, given.torsion)
         return cls(matrix=(strains.T * stiffnesses @ strains).tolist(), **others)
 
+    @classmethod
+    def from_section(cls, section, material=None, *, line=None, unit=1.0):
+        """A section of any shape, computed by the package sectionproperties after its geometric and warping analysis.
+
+        Its x is along d_1, its y along d_2. Where centroid or shear centre is off the rod's line, or the principal axes
+        are turned, it is a matrix, see `offset`.
+
+        Args:
+            section: a `Section` of sectionproperties, or any object with the same methods.
+            material: a `Material` for a section without materials; its shear stiffnesses then have a Poisson's ratio of
+                zero in the distribution of stresses. None where the section has its own materials.
+            line: (x, y) in the section, in its unit of length: the place of the rod's line; None for the centroid.
+            unit: the section's unit of length, m, such as 1e-3 for mm; its Young's moduli have N per square of it, its
+                densities kg per cube of it.
+
+        Mass is left out where the line is not through the centroid, and inertia also where the principal axes are
+        turned, or the materials differ in density over E: `Weight` or motions need them, and refuse such a section.
+
+        Raises:
+            SceneError: not such a section, an analysis that is missing, or materials that differ in Poisson's ratio.
+        """
+        arguments = arguments_of(section, material, line, unit)
+        off = {"centroid", "shear_centre", "angle"} & arguments.keys()
+        return cls.offset(**arguments) if off else cls(**arguments)
+
     def stiffness(self, material=None):
         """The section itself (a material is not needed)."""
         return self
+
+    def stresses(self, material, force, moment):
+        """None: the shape is not known (the outline is that of pictures alone)."""
+        return None
 
 
 @dataclass(frozen=True)
@@ -138,6 +171,10 @@ class Circle:
         A, I = math.pi * self.diameter**2 / 4, math.pi * self.diameter**4 / 64
         k = self.shear_factor or 6 * (1 + nu) / (7 + 6 * nu)
         return _isotropic(material, A, (I, I), 2 * I, k, _circle(self.diameter / 2))
+
+    def stresses(self, material, force, moment):
+        """The `Stress` for contact forces and moments (..., 3), N and N m, along d_1, d_2, d_3."""
+        return round_stress(self.diameter / 2, 0.0, material.nu, force, moment)
 
 
 @dataclass(frozen=True)
@@ -171,6 +208,10 @@ class Tube:
         k = self.shear_factor or cowper
         return _isotropic(material, A, (I, I), 2 * I, k, _circle(D / 2))
 
+    def stresses(self, material, force, moment):
+        """The `Stress` for contact forces and moments (..., 3), N and N m, along d_1, d_2, d_3."""
+        return round_stress(self.outer_diameter / 2, self.inner_diameter / 2, material.nu, force, moment)
+
 
 @dataclass(frozen=True)
 class Rectangle:
@@ -198,6 +239,11 @@ class Rectangle:
         k = self.shear_factor or 10 * (1 + nu) / (12 + 11 * nu)
         corners = ((b / 2, h / 2), (-b / 2, h / 2), (-b / 2, -h / 2), (b / 2, -h / 2))
         return _isotropic(material, b * h, (b * h**3 / 12, h * b**3 / 12), _rectangle_torsion(b, h), k, corners)
+
+    def stresses(self, material, force, moment):
+        """The `Stress` for contact forces and moments (..., 3), N and N m, along d_1, d_2, d_3."""
+        b, h = self.width, self.height
+        return rectangle_fibres(b, h, material.nu, _rectangle_torsion(b, h)).stress(force, moment)
 
 
 def _check_numbers(section, field, expected, unit, check, size):
@@ -281,7 +327,3 @@ def _rectangle_torsion(b, h):
     x = math.pi * long / (2 * short)
     series = 31 / 32 * _ZETA_5 - sum((1 - math.tanh(n * x)) / n**5 for n in range(1, 15, 2))
     return long * short**3 / 3 * (1 - 192 * short / (math.pi**5 * long) * series)
-
-
-#: Sections that scene files know.
-SECTIONS = (Circle, Tube, Rectangle, Stiffness)

@@ -6,12 +6,10 @@ part of the package refers to a support by name.
 
 from dataclasses import dataclass
 
-from cosserat_fenicsx.checks import direction, instance, refuse, store
+from cosserat_fenicsx.checks import direction, refuse, store
 from cosserat_fenicsx.scene import ties
-from cosserat_fenicsx.scene.rod import Station
+from cosserat_fenicsx.scene.rod import Station, StationOrName, is_known
 from cosserat_fenicsx.scene.signals import at, vector_or_signal
-
-_A_STATION = "a station such as rod.start"
 
 
 @dataclass(frozen=True)
@@ -22,12 +20,12 @@ class Clamp:
         SceneError: not a station.
     """
 
-    station: Station
+    station: StationOrName
 
     clamps = True
 
     def __post_init__(self):
-        instance(self, "station", self.station, Station, _A_STATION)
+        is_known(self, "station", Station)
 
     def ties(self):
         """No constraints: the station has no unknowns left."""
@@ -42,12 +40,12 @@ class Pin:
         SceneError: not a station.
     """
 
-    station: Station
+    station: StationOrName
 
     clamps = False
 
     def __post_init__(self):
-        instance(self, "station", self.station, Station, _A_STATION)
+        is_known(self, "station", Station)
 
     def ties(self):
         """The scalar constraints."""
@@ -66,13 +64,13 @@ class Hinge:
         SceneError: not a station, or an axis that is no direction.
     """
 
-    station: Station
+    station: StationOrName
     axis: tuple
 
     clamps = False
 
     def __post_init__(self):
-        instance(self, "station", self.station, Station, _A_STATION)
+        is_known(self, "station", Station)
         store(self, axis=direction(self, "axis", self.axis))
 
     def ties(self):
@@ -92,13 +90,13 @@ class Roller:
         SceneError: not a station, or a normal that is no direction.
     """
 
-    station: Station
+    station: StationOrName
     normal: tuple
 
     clamps = False
 
     def __post_init__(self):
-        instance(self, "station", self.station, Station, _A_STATION)
+        is_known(self, "station", Station)
         store(self, normal=direction(self, "normal", self.normal))
 
     def ties(self):
@@ -121,7 +119,7 @@ class Prescribed:
         SceneError: not a station, numbers that are not finite, or neither of the two.
     """
 
-    station: Station
+    station: StationOrName
     displacement: object = None
     rotation: object = None
     jumps: tuple = ()
@@ -129,7 +127,7 @@ class Prescribed:
     clamps = False
 
     def __post_init__(self):
-        instance(self, "station", self.station, Station, _A_STATION)
+        is_known(self, "station", Station)
         if self.displacement is None and self.rotation is None:
             refuse(self, "displacement", None, "a displacement (m) or a rotation (rad), or both")
         given = [("displacement", self.displacement, "m"), ("rotation", self.rotation, "rad")]

@@ -35,7 +35,7 @@ _LARGEST_TURN = 1.0
 
 def solve(
     scene,
-    load_factors,
+    load_factors=(0.0, 1.0),
     *,
     model="auto",
     formulation=None,
@@ -55,7 +55,8 @@ def solve(
     Args:
         scene: a `Scene`.
         load_factors: a list or array, whose values are reached exactly and in this order; or a tuple (a, b), between
-            which the solver chooses its steps; or one number.
+            which the solver chooses its steps, by default from 0 to 1; or one number. (A tuple of any other length is
+            refused.)
         model: "determinate", "planar" or "spatial"; or "auto", the cheapest one that suffices, which changes to
             "spatial" where a planar solution buckles sideways. `Path.why` gives the reasons.
         formulation: "mixed" (default), "displacement" or "multiplier": see docs/models.md.
@@ -214,7 +215,12 @@ def _until(until, free):
 
 def _targets(load_factors):
     """([load factors], whether the solver may choose the steps between the two)."""
-    free = isinstance(load_factors, tuple) and len(load_factors) == 2
+    if isinstance(load_factors, str) or (isinstance(load_factors, tuple) and len(load_factors) != 2):
+        raise SceneError(
+            f"load_factors = {load_factors!r}: expected a tuple (a, b), between which the solver chooses its steps, or "
+            "a list [a, b, c], whose values are reached exactly"
+        )
+    free = isinstance(load_factors, tuple)
     if isinstance(load_factors, numbers.Real | np.ndarray):
         load_factors = np.atleast_1d(load_factors).tolist()
     try:

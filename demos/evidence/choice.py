@@ -94,8 +94,8 @@ def compare(scene, etas, tol, runs, counts=COUNTS):
 
 def load_factors_of(options):
     """The load factors of a scene file; a range in ten steps."""
-    if isinstance(options, str):
-        return np.linspace(*map(float, options.split(":")), 11)[1:].tolist()
+    if isinstance(options, tuple):
+        return np.linspace(*options, 11)[1:].tolist()
     return list(options)
 
 

@@ -34,7 +34,7 @@ class BareLoop:
         forms = model.forms
         self.A, self.K = fem_petsc.create_matrix(forms.tangent), fem_petsc.create_matrix(forms.second_variations[0])
         self.K.setOption(PETSc.Mat.Option.SYMMETRIC, True)
-        self.b, self.x = fem_petsc.create_vector(forms.residual), self.A.createVecRight()
+        self.b, self.x = fem_petsc.assemble_vector(forms.residual), self.A.createVecRight()
         self.dead = fem_petsc.assemble_vector(forms.dead)
         (node,) = np.flatnonzero(model._slots == 0).astype(np.int32)  # the clamped one
         self.clamped = model._nodal[node]

@@ -125,7 +125,7 @@ class Tracing:
         self.path.append(Record(point.load_factor, *self.model.snapshot(), point.negative_modes, iterations,
                                 self.problem.multipliers(), track.neutral is not None,
                                 self.model.densities.here(), self.problem.tie_forces(),
-                                self.model.clamps.loads(point.load_factor)))  # fmt: skip
+                                self.model.clamps.loads(point.load_factor), track.steps))  # fmt: skip
         if self._until and self._until(self.path):
             raise _Enough
 
@@ -214,6 +214,7 @@ class Tracing:
                 found = track.point(solved)
                 if found.negative_modes != point.negative_modes:
                     return None
+                track.steps += 1
                 self._record(found)
                 self._bar.at(point)
         except KeyboardInterrupt:
@@ -223,7 +224,7 @@ class Tracing:
     def _starts(self, coarse):
         """(point, values, n) for each point of a path on a coarser mesh: the arguments of `Problem.begin_at`."""
         rq, n = on_mesh(coarse, self.path.layout)
-        return zip(coarse, self.model.unknowns_of(rq), n, strict=True)
+        return zip(coarse._records, self.model.unknowns_of(rq), n, strict=True)
 
     def again(self, coarse):
         """The points of a path on a coarser mesh, corrected on this mesh.
@@ -252,7 +253,7 @@ class Tracing:
                     track.put(point.numbers, 0.0)
                 else:
                     still = k in (0, last) or not track.square(normal)
-                    point = self._found(*guesses[k], normal, weight * change, coarse[k].neutral, at_load=still)
+                    point = self._found(*guesses[k], normal, weight * change, coarse._records[k].neutral, at_load=still)
                 track.set_tangent(point, track.slope(), normal, change, weight)
                 if before is not None and k > left + 1:  # nothing changes sign in the step onto a branch
                     for crossing in self._follower.locator.crossings(Chord(track, before, point, weight)):

@@ -51,6 +51,7 @@ class Track:
         origin: the first `PathPoint` of the path.
         history: the last points, at most three.
         iterations: Newton iterations so far, those of rejected steps included.
+        steps: number of accepted steps so far.
         failure: the reason why the last step was rejected, in words.
         neutral: owned entries of a neutral motion, which leaves the energy unchanged (such as the rotation of a buckled
             round column about its axis), or None.
@@ -59,7 +60,7 @@ class Track:
     def __init__(self, problem, newton: Newton, stability: NegativeModes, max_iterations, *, from_rest=True):
         self.problem, self.model = problem, problem.model
         self.newton, self.stability, self.max_iterations = newton, stability, max_iterations
-        self.iterations, self.failure, self.neutral = 0, "", None
+        self.iterations, self.steps, self.failure, self.neutral = 0, 0, "", None
         self.origin, self.history = None, []
         if from_rest:
             self.begin_here()
@@ -77,6 +78,7 @@ class Track:
     def keep(self, point):
         """Accept a point, the problem's state; path-dependent loads update their history variables."""
         self.problem.commit()
+        self.steps += 1
         self.history = [*self.history[-2:], point]
 
     def put(self, numbers, load_factor):

@@ -54,7 +54,7 @@ class Loop:
         forms, nodal, slots = self.model.forms, self.model._nodal, self.model._slots
         (clamp,), (self._tip,) = nodal[slots == 0], nodal[slots == slots.max(), :3]
         self.held = clamp[list(held)].astype(np.int32)
-        self.A, self.b = fem_petsc.create_matrix(forms.tangent), fem_petsc.create_vector(forms.residual)
+        self.A, self.b = fem_petsc.create_matrix(forms.tangent), fem_petsc.assemble_vector(forms.residual)
         self.dead = fem_petsc.assemble_vector(forms.dead)
         self.x = self.A.createVecRight()
         self.x.array_w[:] = self._at_rest = self.model.state.x.array.copy()
@@ -111,7 +111,7 @@ class Loop:
         _, step, residual = norms
         reason = PETSc.SNES.ConvergedReason
         if not np.isfinite(residual):
-            return reason.DIVERGED_FNORM_NAN
+            return compat.RESIDUAL_NOT_A_NUMBER
         if iteration and step <= 1e-11 * np.sqrt(len(self._at_rest)):
             return reason.CONVERGED_SNORM_RELATIVE
         return reason.DIVERGED_MAX_IT if iteration >= 60 else reason.CONVERGED_ITERATING

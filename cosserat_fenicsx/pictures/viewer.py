@@ -1,0 +1,175 @@
+"""A result as one interactive file: HTML that needs no library and no network, drawn by the browser's WebGL 2."""
+
+import base64
+import html
+import json
+import math
+import string
+from importlib import resources
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from cosserat_fenicsx.pictures.axes import axes_of
+from cosserat_fenicsx.pictures.colours import MAPS, known, rounding
+from cosserat_fenicsx.pictures.drawing import at_rest, outlines, thickness, view_of
+
+#: Fields that can be chosen in the file: the first is shown at first. They fill the five channels of `page/rods.js`.
+FIELDS = ("bending_moment", "m.3", "n.3", "shear_force", "displacement")
+# Largest number of states, of sections of a rod (per element, in all), and of states times sections of all rods:
+# 64 bytes each.
+_STATES, _PER_ELEMENT, _SECTIONS, _MOST = 400, 8, 121, 50_000
+_FEWEST = 9
+# Duration (s) of the play of a path, and of motions that are not shown in real time; the latter take 4 to 20 s.
+_PLAY, _REAL_TIME = 8.0, (4.0, 20.0)
+_PARTS = ("rods.js", "camera.js", "axes.js", "app.js")
+
+
+def write(result, file):
+    """Write a path or a motion as an interactive .html file: a slider over the states, turning, zooming
+    and moving by mouse and touch, a play button, and a choice of the field that colours the rods.
+
+    States beyond some hundreds are left out evenly, which the file says.
+
+    Raises:
+        OSError: the file cannot be written.
+    """
+    file.parent.mkdir(parents=True, exist_ok=True)
+    file.write_text(page(result), encoding="utf-8")
+
+
+def page(result):
+    """The text of the file."""
+    place = resources.files(__package__) / "page"
+    data = json.dumps(_data(result), allow_nan=False, ensure_ascii=False).replace("<", "\\u003c")
+    return string.Template((place / "page.html").read_text("utf-8")).substitute(
+        title=html.escape(_title(result)),
+        style=(place / "style.css").read_text("utf-8"),
+        data=data,
+        script='"use strict";\n' + "".join((place / part).read_text("utf-8") for part in _PARTS),
+    )
+
+
+def _title(result):
+    return result.scene.title or ("Deformed rods" if result.axis != "time" else "Motion")
+
+
+def _data(result):
+    rods = result.scene.rods
+    counts = [min(_SECTIONS, _PER_ELEMENT * n + 1) for n in result.elements]
+    while sum(counts) > _MOST // min(len(result), 20) and max(counts) > _FEWEST:
+        counts = [max(_FEWEST, n * 2 // 3) for n in counts]
+    most = max(2, min(_STATES, _MOST // sum(counts)))
+    shown = np.unique(np.linspace(0, len(result) - 1, min(len(result), most)).round().astype(int))
+    every = known(result)
+    colours = [every[name] for name in FIELDS]
+    shapes = [_Shapes(result, rod, colours, np.linspace(0, 1, n), shown) for rod, n in zip(rods, counts, strict=True)]
+    everywhere = np.concatenate([*at_rest(result.scene), *(shape.positions.reshape(-1, 3) for shape in shapes)])
+    low, high = everywhere.min(axis=0), everywhere.max(axis=0)
+    middle, size = (low + high) / 2, float(np.linalg.norm(high - low)) / 2
+    factors = [thickness(shape.radius, float((high - low).max())) for shape in shapes]
+    axes = axes_of(everywhere)
+    peaks = [max(float(np.abs(shape.values[i]).max()) for shape in shapes) for i in range(len(FIELDS))]
+    return {
+        "title": _title(result),
+        "notes": _notes(result, shown, factors),
+        "axis": _along(result, shown),
+        "axes": [
+            {
+                "name": axis.name,
+                "low": (axis.low - middle[i]) / size,
+                "high": (axis.high - middle[i]) / size,
+                "ticks": [((x - middle[i]) / size, text) for x, text in axis.ticks],
+            }
+            for i, axis in enumerate(axes)
+        ],
+        "box": [[(getattr(axis, end) - middle[i]) / size for i, axis in enumerate(axes)] for end in ("low", "high")],
+        "view": _view(high - low),
+        "fields": [_field(result, i, colour, peaks[i]) for i, colour in enumerate(colours)],
+        "maps": MAPS,
+        "rods": [shape.packed(middle, size, factor) for shape, factor in zip(shapes, factors, strict=True)],
+    }
+
+
+class _Shapes:
+    """One rod in all states shown, at arc lengths x (n,) over its length."""
+
+    def __init__(self, result, rod, colours, x, shown):
+        self.name, self._outlines = rod.name, outlines(rod, x * rod.length)
+        self.radius = float(np.linalg.norm(self._outlines, axis=2).max())
+        if rod.profile.constant:
+            self._outlines = self._outlines[:1]
+        positions, turns, values = [], [], []
+        for k in map(int, shown):
+            line, directors = result.sample(k, rod, x)
+            fields = result.fields(k, rod)
+            positions.append(line)
+            turns.append(np.roll(Rotation.from_matrix(directors).as_quat(), 1, axis=1))
+            values.append([np.interp(x, fields["s"] / rod.length, colour.of(fields)) for colour in colours])
+        self.positions, self._turns = np.array(positions), np.array(turns)
+        self.values = np.array(values).swapaxes(0, 1)  # (fields, states, n)
+
+    def packed(self, middle, size, factor):
+        """Its data for the file: positions relative to `middle` over `size`, m; sections enlarged by a factor."""
+        places = (self.positions - middle) / size
+        first, *others = self.values[..., None]
+        states = np.concatenate([places, first, self._turns, *others], axis=-1)
+        return {
+            "name": self.name,
+            "nodes": states.shape[1],
+            "corners": self._outlines.shape[1],
+            "outline": _floats(factor / size * self._outlines),
+            "states": _floats(states),
+        }
+
+
+def _floats(array):
+    return base64.b64encode(np.ascontiguousarray(array, "<f4").tobytes()).decode()
+
+
+def _along(result, shown):
+    values = result.along_axis[shown]
+    timed = result.axis == "time"
+    duration = float(values[-1] - values[0])
+    real = timed and _REAL_TIME[0] <= duration <= _REAL_TIME[1]
+    return {
+        "name": "t =" if timed else result.axis,
+        "unit": " s" if timed else "",
+        "timed": timed,
+        "digits": max(0, 2 - math.floor(math.log10(duration))) if duration > 0 else 0,
+        "values": values.tolist(),
+        "stable": [bool(result.stable[k]) for k in shown] if result.counts_modes else [True] * len(shown),
+        "seconds": duration if real else _PLAY,
+    }
+
+
+def _notes(result, shown, factors):
+    kind = f"{result.axis}s"
+    notes = [
+        f"{len(shown)} of {len(result)} {kind} shown, evenly chosen"
+        if len(shown) < len(result)
+        else f"{len(result)} {kind}"
+    ]
+    notes[0] += ", straight lines between them"
+    thicker = sorted({f"{float(f'{factor:.2g}'):g}" for factor in factors if factor > 1})
+    return notes + ([f"sections drawn {' and '.join(thicker)} times their size"] if thicker else [])
+
+
+def _view(span):
+    """(yaw, pitch) of the first view, rad."""
+    to_camera, right, _, _ = view_of(span)
+    return [math.atan2(-right[0], right[1]), math.asin(np.clip(to_camera[2], -1, 1))]
+
+
+def _field(result, channel, colour, peak):
+    peak = peak if peak > rounding(result, colour) else 0.0
+    low, high = colour.limits(peak)
+    return {
+        "words": colour.words,
+        "unit": colour.unit,
+        "channel": channel,
+        "map": colour.map,
+        "low": low,
+        "high": high,
+        "peak": peak,
+    }

@@ -1,0 +1,82 @@
+"""Stresses on the outline of sections, against textbooks, and along solved rods."""
+
+import numpy as np
+import pytest
+
+import cosserat_fenicsx as cf
+
+pytestmark = pytest.mark.serial
+STEEL = cf.Material(E=210e9, nu=0.25)
+ZERO = np.zeros(3)
+
+
+def test_shear_stresses_of_a_rectangle_are_those_of_the_tables():
+    """Timoshenko & Goodier: torsion tau = T/(alpha a b^2), flexure relative to 3 V/(2 A) at nu = 1/4."""
+    for width, height, alpha, wide, narrow in ((1, 1, 0.208, 1.126, 1.126), (2, 1, 0.246, 1.396, 1.033),
+                                               (4, 1, 0.282, 1.988, 1.008)):  # fmt: skip
+        section = cf.Rectangle(width, height)
+        tau = section.stresses(STEEL, ZERO, np.array([0, 0, 7.0])).von_mises / np.sqrt(3)
+        assert 7.0 / (tau * width * height**2) == pytest.approx(alpha, abs=6e-4)
+        for force, ratio in (((0, 5.0, 0), wide), ((5.0, 0, 0), narrow)):
+            found = section.stresses(STEEL, np.array(force), ZERO)
+            assert found.von_mises / np.sqrt(3) / (1.5 * 5.0 / (width * height)) == pytest.approx(ratio, abs=1e-3)
+            assert found.axial_max == found.axial_min == 0.0
+
+
+def test_turning_a_rectangle_changes_nothing():
+    rng = np.random.default_rng(1)
+    force, moment = rng.normal(size=(2, 20, 3))
+    turn = np.array([[0, -1, 0], [1, 0, 0], [0, 0, 1.0]])  # d_1 where -d_2 was
+    one = cf.Rectangle(0.3, 0.7).stresses(STEEL, force, moment)
+    other = cf.Rectangle(0.7, 0.3).stresses(STEEL, force @ turn.T, moment @ turn.T)
+    np.testing.assert_allclose(one, other, rtol=1e-12)
+
+
+@pytest.mark.parametrize("section, R, r", [(cf.Circle(0.6), 0.3, 0.0), (cf.Tube(0.6, 0.5), 0.3, 0.25)])
+def test_the_von_mises_stress_is_the_largest_around_a_circle(section, R, r):
+    rng = np.random.default_rng(2)
+    force, moment = rng.normal(size=(200, 3)), 0.3 * rng.normal(size=(200, 3))
+    theta = np.linspace(0, 2 * np.pi, 20001)[:, None]
+    A, I, nu = np.pi * (R**2 - r**2), np.pi * (R**4 - r**4) / 4, 0.25
+    shear = ((3 + 2 * nu) * r**2 + (1 + 2 * nu) * R**2) / (4 * (1 + nu) * I)
+    sigma = force[:, 2] / A + R / I * (moment[:, 0] * np.sin(theta) - moment[:, 1] * np.cos(theta))
+    tau = R / (2 * I) * moment[:, 2] + shear * (force[:, 1] * np.cos(theta) - force[:, 0] * np.sin(theta))
+    found = section.stresses(STEEL, force, moment)
+    np.testing.assert_allclose(found.von_mises, np.sqrt(sigma**2 + 3 * tau**2).max(axis=0), rtol=1e-7)
+    np.testing.assert_allclose(found.axial_max, sigma.max(axis=0), rtol=1e-6, atol=1e-5)
+    np.testing.assert_allclose(found.axial_min, sigma.min(axis=0), rtol=1e-6, atol=1e-5)
+
+
+def test_tension_bending_and_torsion_of_a_solved_rod():
+    """N/A, M c/I, T r/J, and sqrt(sigma^2 + 3 tau^2) of all at once: loads so small that the rod stays straight."""
+    N, M, T, R = 3.0, 0.4, 0.5, 0.05
+    rod = cf.Rod(cf.Line((0, 0, 0), (0, 0, 2)), cf.Circle(2 * R), STEEL, name="rod")
+    loads = [cf.Force(rod.end, (0, 0, N)), cf.Moment(rod.end, (0.6 * M, 0.8 * M, T))]
+    path = cf.solve(cf.Scene([rod], [cf.Clamp(rod.start)], loads), [1.0], elements=2, model="spatial")
+    axial, bending, tau = N / (np.pi * R**2), M * R / (np.pi * R**4 / 4), T * R / (np.pi * R**4 / 2)
+    fields, (at_station,) = path.fields(0), zip(*path.stress("rod@1.3"), strict=True)
+    expected = np.hypot(axial + bending, np.sqrt(3) * tau), axial + bending, axial - bending
+    np.testing.assert_allclose(at_station, expected, rtol=1e-5)
+    for name, value in zip(("von_mises", "axial_max", "axial_min"), expected, strict=True):
+        np.testing.assert_allclose(fields[name], value, rtol=1e-5)
+
+
+def test_a_cantilever_of_pieces_and_of_a_section_without_shape():
+    """M c/I of a beam under a force at its end, on either side of a step; none where the shape is not known."""
+    P, b, h = 2.0, 0.04, 0.06
+    thick, thin = cf.Rectangle(b, 2 * h), cf.Rectangle(b, h)
+    rod = cf.Rod(cf.Line((0, 0, 0), (3, 0, 0), d1=(0, 1, 0)), [(1.0, thick), (2.0, thin.stiffness(STEEL)), (3.0, thin)],
+                 STEEL, name="beam")  # fmt: skip
+    path = cf.solve(cf.Scene([rod], [cf.Clamp(rod.start)], [cf.Force(rod.end, (0, 0, -P))]), [1.0], elements=6)
+    for s, height in ((0.0, 2 * h), (1.0, 2 * h), (2.5, h)):
+        stress = path.stress(rod.at(s))
+        np.testing.assert_allclose(stress.axial_max, P * (3 - s) * (height / 2) / (b * height**3 / 12), rtol=1e-4)
+        np.testing.assert_allclose(stress.axial_min, -stress.axial_max, rtol=1e-4)
+    fields = path.fields(0)
+    inside = (fields["s"] > 1.0 + 1e-9) & (fields["s"] < 2.0 + 1e-9)
+    assert (np.isnan(fields["von_mises"]) == inside).all()
+    with pytest.raises(cf.SceneError, match="stress at beam@1.5: the section there is a Stiffness"):
+        path.stress("beam@1.5")
+    bare = cf.Rod(rod.curve, thin.stiffness(STEEL), name="bare")
+    path = cf.solve(cf.Scene([bare], [cf.Clamp(bare.start)], [cf.Force(bare.end, (0, 0, -P))]), [1.0], elements=2)
+    assert "von_mises" not in path.fields(0) and not path.knows_stresses
