@@ -42,7 +42,7 @@ def test_run_of_a_motion(tmp_path, cosserat):
     code, said, trouble = cosserat("run", FLIGHT, *SHORT, "-o", tmp_path, *film, "--at", "0,1", "--save-every", "0.1")
     assert code == 0 and trouble == ""
     assert {f.name for f in tmp_path.iterdir()} == {
-        "motion.xdmf", "motion.h5", "motion.csv", "rods.png", "energy.png", "motion.gif",
+        "motion.xdmf", "motion.h5", "motion.csv", "rods.png", "rods.html", "energy.png", "motion.gif",
     }  # fmt: skip
     assert all(f.stat().st_size > 3000 for f in tmp_path.iterdir()), sorted(tmp_path.iterdir())
     scene, settings = cf.read_motion(FLIGHT)

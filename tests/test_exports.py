@@ -3,6 +3,7 @@
 import csv
 import json
 import sys
+from xml.etree import ElementTree as xml
 
 import numpy as np
 import pytest
@@ -89,6 +90,23 @@ def test_dicts(path, history):
     told = history.to_dict()
     assert told["time"][-1] == 0.1 and told["rods"]["rod"]["velocity"].shape == (3, 5, 3)
     assert told["units"]["angular_momentum"] == "kg m^2/s" and told["scheme"] == history.scheme
+
+
+def test_notebooks_show_a_table_and_a_picture(path, history):
+    """Titles and names are text; the last line ends where the tip is, in the plane that shows most."""
+    rod, scene = column()
+    wild = cf.Scene([rod], scene.supports, scene.loads, title="<script>&")
+    found = cf.solve(wild, np.linspace(0.1, 1.5, 12).tolist(), elements=2)
+    for result, rows in ((path, 2), (history, 3), (found, 8)):
+        text = result._repr_html_()
+        page = xml.fromstring(text)
+        assert len(text) < 4000 and len(page.findall(".//tr")) == rows + 1
+    assert page.find(".//b").text == "<script>&" and "8 of 12 shown" in text
+    *_, last = page.findall(".//polyline")
+    corners = np.array([corner.split(",") for corner in last.get("points").split()], dtype=float)
+    drawn, moved = corners[-1] - corners[0], found.position(rod.end)[-1]
+    assert -drawn[1] / drawn[0] == pytest.approx(moved[2] / moved[0], abs=0.01)
+    assert "&lt;Path: 0 points, empty" in found.at_points([])._repr_html_()
 
 
 @pytest.mark.serial

@@ -55,7 +55,7 @@ SHARED = {
     "units",
 }
 ROOMS = {
-    "scene": set(),
+    "scene": {"pictures"},
     "actions": {"scene"},
     "algebra": set(),
     "models": {"scene", "forms"},
@@ -111,6 +111,7 @@ def test_data_flows_one_way():
 def test_scenes_know_no_solver_library():
     for file in (PACKAGE / "scene").glob("*.py"):
         assert outside(file).isdisjoint({"dolfinx", "ufl", "petsc4py", "mpi4py"}), file
+        assert file.name == "scene.py" or "pictures" not in rooms_known_in(file), "only for Scene.plot"
 
 
 def test_solvers_know_the_protocol_of_models_alone():

@@ -42,7 +42,7 @@ def test_the_file_holds_positions_and_moments(solved, tmp_path_all):
     data, rod = data_of(text), solved.scene.rods[0]
     assert data["title"] == TITLE and data["axis"]["values"] == [0.3, 0.9, 1.5]
     (stored,) = data["rods"]
-    states = floats(stored["states"]).reshape(3, stored["nodes"], 12)
+    states = floats(stored["states"]).reshape(3, stored["nodes"], -1)
     low, high = (np.array([axis[end] for axis in data["axes"]]) for end in ("low", "high"))
     assert (states[..., :3] <= high + 1e-6).all() and (states[..., :3] >= low - 1e-6).all()
     ticks = [(x, float(label)) for x, label in data["axes"][2]["ticks"]]

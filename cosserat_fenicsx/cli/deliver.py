@@ -20,6 +20,7 @@ def deliver(computed, options, moving):
         the exit code.
     """
     from cosserat_fenicsx.checks import positive
+    from cosserat_fenicsx.pictures.colours import colour_of
 
     out, at = None, _numbers(options.at)
     if options.output:
@@ -27,6 +28,7 @@ def deliver(computed, options, moving):
         _prepare(out)  # fail before the computation, not after it
     _check_film(options, moving)
     positive("plot", "magnify", options.magnify, "-")
+    colour_of(options.color)
     if at is not None and out is None:
         say("cosserat: --at has no effect without -o DIR, which pictures are written to")
 
@@ -49,7 +51,8 @@ def deliver(computed, options, moving):
             if code == INTERRUPTED:
                 say("cosserat: interrupted; writing the partial result, Ctrl-C again skips what is not written yet")
             try:
-                look = {"magnify": options.magnify, "shown": _shown(path, at), "film": film, "speed": options.speed}
+                look = {"magnify": options.magnify, "color": options.color, "shown": _shown(path, at)}
+                look |= {"film": film, "speed": options.speed}
                 _write(path, out, station, picture=not options.no_picture, **look)
             except KeyboardInterrupt:
                 trouble, code = "interrupted; the file that was being written is incomplete", INTERRUPTED
@@ -114,15 +117,16 @@ def _report(path, station):
         print(text, flush=True)  # before the messages on stderr that follow
 
 
-def _write(path, out, station, *, picture, magnify, shown, film, speed):
+def _write(path, out, station, *, picture, magnify, shown, film, speed, color):
     moving = path.axis == "time"
     name = "motion" if moving else "path"
     path.write(out / f"{name}.csv", station=station)
     path.write(out / f"{name}.xdmf")
     written = [f"{name}.{kind}" for kind in ("xdmf", "h5", "csv")]
     if picture:
-        path.plot(out / "rods.png", shown, magnify=magnify)
-        written.append("rods.png")
+        path.plot(out / "rods.png", shown, magnify=magnify, color=color)
+        path.write(out / "rods.html")
+        written += ["rods.png", "rods.html"]
     if moving and len(path) > 1:
         if picture:
             path.plot_energy(out / "energy.png")

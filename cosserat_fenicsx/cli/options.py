@@ -62,10 +62,16 @@ def _outputs(parser):
         "-o",
         "--output",
         metavar="DIR",
-        help="write path.xdmf, path.h5, path.csv and rods.png there, or of a motion motion.xdmf, .h5, .csv, rods.png "
-        "and energy.png; without it only the table is shown",
+        help="write path.xdmf, path.h5, path.csv, rods.png and rods.html there, or of a motion motion.xdmf, .h5, .csv, "
+        "rods.png, rods.html and energy.png; without it only the table is shown",
     )
     parser.add_argument("--no-picture", action="store_true", help="write no pictures")
+    parser.add_argument(
+        "--color",
+        metavar="FIELD",
+        default="bending_moment",
+        help="rods.png: what colours the rods, such as shear_force, displacement, n.3 or m.x [bending_moment]",
+    )
     parser.add_argument("--magnify", type=float, default=1.0, help="pictures: factor on displacements [1]")
     parser.add_argument(
         "--station",

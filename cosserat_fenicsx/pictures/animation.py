@@ -149,7 +149,7 @@ class _Stage:
         bodies = [self._between.bodies(t, self._x, magnify) for t in times]
         everywhere = np.concatenate([*resting, *(body.line for made in bodies for body in made)])
         extent = float(np.ptp(everywhere, axis=0).max())
-        peak = max(body.moment.max() for made in bodies for body in made)
+        peak = max(body.values.max() for made in bodies for body in made)
         self._scale, _ = prefix(peak)
         self._plotter = pyvista.Plotter(off_screen=True, window_size=size)
         self._plotter.set_background("white")
@@ -179,7 +179,7 @@ class _Stage:
             self._meshes, self._between.bodies(t, self._x, self._magnify), self._factors, strict=True
         ):
             mesh.points[:] = points_of(body, factor)
-            mesh["moment"][:] = np.repeat(body.moment / self._scale, body.outline.shape[1])
+            mesh["value"][:] = np.repeat(body.values / self._scale, body.outline.shape[1])
             mesh.GetPoints().Modified()
             mesh.GetPointData().GetScalars().Modified()
         text = f"{self._head}: t = {t:.{self._digits}f} s ({self._pace}){self._notes}"

@@ -13,22 +13,29 @@ MAPS = {
     "coolwarm": ("#3b4cc0", "#6282ea", "#8db0fe", "#b8d0f9", "#dddddd", "#f5c4ad", "#f49a7b", "#de604d", "#b40426"),
 }  # fmt: skip
 
-# Name: (the field of `Result.fields`, words, unit). Each has a size, and components along x, y, z.
+# Fields of `Result.fields`: words, unit, and frames of their components: "xyz", inertial, or "123", along d1, d2, d3.
 _VECTORS = {
-    "displacement": ("displacement", "displacement", "m"),
-    "force": ("force", "contact force", "N"),
-    "moment": ("moment", "contact moment", "N m"),
-    "n": ("force", "contact force", "N"),
-    "m": ("moment", "contact moment", "N m"),
-    "velocity": ("velocity", "velocity", "m/s"),
-    "angular_velocity": ("angular_velocity", "angular velocity", "rad/s"),
+    "displacement": ("displacement", "m", ("xyz",)),
+    "force": ("contact force", "N", ("xyz", "123")),
+    "moment": ("contact moment", "N m", ("xyz", "123")),
+    "strain": ("strain", "1", ("123",)),
+    "curvature": ("curvature", "1/m", ("123",)),
+    "velocity": ("velocity", "m/s", ("xyz",)),
+    "angular_velocity": ("angular velocity", "rad/s", ("xyz",)),
 }
-# Likewise with components along the directors alone.
-_MATERIAL = {"strain": ("strain", "strain", "1"), "curvature": ("curvature", "curvature", "1/m")}
-_DIRECTED = ("force", "moment", "n", "m", "strain", "curvature")
+# Those with components along d1, d2, d3 already.
+_MATERIAL = ("strain", "curvature")
+_SHORT = {"n": "force", "m": "moment"}
+# Words, unit, and whether there are values of either sign.
+_SCALARS = {
+    "bending_moment": ("bending moment", "N m", False),
+    "von_mises": ("von Mises stress", "Pa", False),
+    "axial_max": ("largest axial stress", "Pa", True),
+    "axial_min": ("smallest axial stress", "Pa", True),
+}
 _WORDS = {
-    "n.3": "tension",
-    "m.3": "twisting moment",
+    "force.3": "tension",
+    "moment.3": "twisting moment",
     "strain.1": "shear strain along d1",
     "strain.2": "shear strain along d2",
     "strain.3": "stretch",
@@ -36,10 +43,7 @@ _WORDS = {
     "curvature.2": "bending about d2",
     "curvature.3": "twist",
 }
-_SIZES = {"shear_force": ("n", "shear force", "N"), "bending_moment": ("m", "bending moment", "N m")}
-# Units of further scalar fields, by the beginning or end of their names.
-_STRESS = ("stress", "mises")
-# Values below this share of the scene's force or moment are rounding.
+# Values below this share of the scene's force, moment or length are rounding.
 _ROUNDING = 1e-11
 
 
@@ -49,6 +53,7 @@ class Colour:
 
     Attributes:
         name: as a user gives it; words, unit: on the colour bar.
+        field: of `Result.fields` that it is computed from.
         signed: whether it has values of either sign.
         of: a function from the dict of `Result.fields` to one number per node.
     """
@@ -56,6 +61,7 @@ class Colour:
     name: str
     words: str
     unit: str
+    field: str
     signed: bool
     of: object
 
@@ -70,66 +76,69 @@ class Colour:
         return (-top if self.signed else 0.0), top
 
 
+def _every():
+    """{name: `Colour`} of all that rods can be coloured by."""
+    every = {
+        name: Colour(name, words, unit, name, signed, lambda f, name=name: f[name])
+        for name, (words, unit, signed) in _SCALARS.items()
+    }
+    every["shear_force"] = Colour("shear_force", "shear force", "N", "force", False, _shear)
+    for name in (*_VECTORS, *_SHORT):
+        field = _SHORT.get(name, name)
+        words, unit, frames = _VECTORS[field]
+        every[name] = Colour(name, words, unit, field, False, lambda f, field=field: np.linalg.norm(f[field], axis=1))
+        for part in "".join(frames):
+            told = _WORDS.get(f"{field}.{part}", f"{words} along {part if part in 'xyz' else f'd{part}'}")
+            every[f"{name}.{part}"] = Colour(f"{name}.{part}", told, unit, field, True, _component(field, part))
+    return every
+
+
+def _component(field, part):
+    """A function from the dict of `Result.fields` to a component of a vector."""
+    if part in "xyz" or field in _MATERIAL:
+        i = ("xyz" if part in "xyz" else "123").index(part)
+        return lambda f: f[field][:, i]
+    return lambda f: np.einsum("ni,ni->n", f[field], f[f"d{part}"])
+
+
+def _shear(fields):
+    """The size of the contact force across the tangent."""
+    return np.hypot(*(np.einsum("ni,ni->n", fields["force"], fields[d]) for d in ("d1", "d2")))
+
+
+#: {name: `Colour`} of all that rods can be coloured by; and the one they have unless something else is asked for.
+EVERY = _every()
+BENDING = EVERY["bending_moment"]
+
+
 def known(path):
-    """{name: `Colour`} of everything that the rods of a path or a motion can be coloured by."""
+    """{name: `Colour`} of all that the rods of a path or a motion can be coloured by."""
     given = path.fields(0)
-    found = {name: _size_across(name) for name in _SIZES}
-    for name, (field, words, unit) in {**_VECTORS, **_MATERIAL}.items():
-        if field not in given:
-            continue
-        found[name] = Colour(name, words, unit, False, lambda f, field=field: np.linalg.norm(f[field], axis=1))
-        if name not in _MATERIAL:
-            for i, axis in enumerate("xyz"):
-                of = lambda f, field=field, i=i: f[field][:, i]
-                found[f"{name}.{axis}"] = Colour(f"{name}.{axis}", f"{words} along {axis}", unit, True, of)
-        if name in _DIRECTED:
-            for i in range(3):
-                found[f"{name}.{i + 1}"] = _component(name, field, words, unit, i)
-    for name, values in given.items():
-        if np.ndim(values) == 1 and name not in ("s", *found):
-            unit = "Pa" if any(part in name for part in _STRESS) else "1"
-            signed = any(np.min(path.fields(len(path) - 1, rod)[name]) < 0 for rod in path.scene.rods)
-            found[name] = Colour(name, name.replace("_", " "), unit, signed, lambda f, name=name: f[name])
-    return found
+    return {name: colour for name, colour in EVERY.items() if colour.field in given}
 
 
-def colour_of(path, name):
+def colour_of(name, among=EVERY):
     """The `Colour` of that name.
+
+    Args:
+        among: those there are, see `known`.
 
     Raises:
         SceneError: there is none; lists the names.
     """
-    every = known(path)
-    if name not in every:
-        listed = ", ".join(x for x in every if "." not in x)
-        hint = nearest(name, every) if isinstance(name, str) else ""
-        hint = f"; {hint}" if hint.startswith("did") else ""
-        raise SceneError(
-            f"plot.color = {name!r}: expected one of {listed}; or a component of a vector such as n.x, or n.1 along d1 "
-            f"(n, m, strain and curvature){hint}"
-        )
-    return every[name]
+    if isinstance(name, str) and name in among:
+        return among[name]
+    plain = ", ".join(x for x in among if "." not in x)
+    hint = nearest(name, among)
+    hint = f"; {hint}" if hint.startswith("did") else ""
+    raise SceneError(
+        f"plot.color = {name!r}: expected {plain}, or a component such as n.x or n.3 (x, y, z: inertial; 1, 2, 3: "
+        f"along d1, d2, d3, which strain and curvature have alone){hint}"
+    )
 
 
-def rounding(path, colour):
-    """The size below which values of a `Colour` are rounding."""
+def peak_of(path, colour, values):
+    """The largest size of a list of arrays of values, 0 where it is rounding; NaN where there is no value."""
+    peak = max(float(np.nan_to_num(np.abs(array)).max()) for array in values)
     scale = {"N": path.scales.force, "N m": path.scales.moment, "m": path.scales.length}.get(colour.unit, 0.0)
-    return _ROUNDING * scale
-
-
-def _component(name, field, words, unit, i):
-    short = {"force": "n", "moment": "m"}.get(name, name)
-    told = _WORDS.get(f"{short}.{i + 1}", f"{words} along d{i + 1}")
-    if name in _MATERIAL:
-        return Colour(f"{name}.{i + 1}", told, unit, True, lambda f: f[field][:, i])
-    return Colour(f"{name}.{i + 1}", told, unit, True, lambda f: np.einsum("ni,ni->n", f[field], f[f"d{i + 1}"]))
-
-
-def _size_across(name):
-    """The size of a force or moment across the tangent."""
-    short, words, unit = _SIZES[name]
-    field = _VECTORS[short][0]
-    return Colour(
-        name, words, unit, False,
-        lambda f: np.hypot(np.einsum("ni,ni->n", f[field], f["d1"]), np.einsum("ni,ni->n", f[field], f["d2"])),
-    )  # fmt: skip
+    return peak if peak > _ROUNDING * scale else 0.0

@@ -7,10 +7,21 @@ from dataclasses import dataclass
 import numpy as np
 
 from cosserat_fenicsx.errors import SceneError
+from cosserat_fenicsx.pictures.axes import axes_of, draw_axes, round_step
+from cosserat_fenicsx.pictures.colours import BENDING
+from cosserat_fenicsx.pictures.labels import Labels
+from cosserat_fenicsx.pictures.view import View
 from cosserat_fenicsx.scene.materials import Material
 from cosserat_fenicsx.scene.sections import Circle
 
-_PREFIXES = ((1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "µ"))
+_PREFIXES = ((1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"), (1e-12, "p"),
+             (1e-15, "f"), (1e-18, "a"))  # fmt: skip
+# The first letters of units that take such a prefix, unlike 1/m.
+_PREFIXED = ("N", "m", "Pa", "rad")
+# At most this many intervals between the numbers of the colour bar.
+_BAR = 6
+# Up to so many digits after the point, smaller numbers have a power of ten.
+_MOST_DIGITS = 3
 # Rods whose radius is below this share of the extent of the drawing are drawn thicker, and the picture says so.
 _SMALLEST_RADIUS = 1 / 120
 
@@ -35,21 +46,29 @@ def load_pyvista():
     return pyvista
 
 
-def prefix(value):
-    """(scale, SI prefix) that suit a value."""
-    return next(((s, p) for s, p in _PREFIXES if abs(value) >= s), (1.0, ""))
+def prefix(value, unit="N m"):
+    """(scale, SI prefix) that suit a value in a unit."""
+    if not unit.startswith(_PREFIXED):
+        return 1.0, ""
+    return next(((s, p) for s, p in _PREFIXES if abs(value) >= s * (1 - 1e-9)), (1.0, ""))
+
+
+def quantity(value, unit):
+    """A value as text, to three digits, with its unit."""
+    scale, letter = prefix(value, unit)
+    return f"{value / scale:.3g} {letter}{unit}"
 
 
 @dataclass(frozen=True)
 class Body:
-    """A deformed rod: centreline (n, 3) m, directors (n, 3, 3), outline (n, corners, 2) m, radius m, bending moment
-    (n,) N m."""
+    """A deformed rod: centreline (n, 3) m, directors (n, 3, 3), outline (n, corners, 2) m, radius m, and the values
+    (n,) that colour it, in SI units."""
 
     line: np.ndarray
     directors: np.ndarray
     outline: np.ndarray
     radius: float
-    moment: np.ndarray
+    values: np.ndarray
 
 
 def at_rest(scene):
@@ -57,22 +76,22 @@ def at_rest(scene):
     return [rod.curve.position(np.linspace(0, rod.length, 201)) for rod in scene.rods]
 
 
-def swept(path, k, rod, magnify, pieces=200):
-    """The `Body` of a rod at point k of a path."""
+def swept(path, k, rod, magnify, colour, pieces=200):
+    """The `Body` of a rod at point k of a path; `colour`: the `Colour` of its values."""
     x = np.linspace(0, 1, pieces + 1)
     line, directors = path.sample(k, rod, x)
     fields = path.fields(k, rod)
-    moment = np.interp(x, fields["s"] / rod.length, fields["bending_moment"])
-    return body_of(rod, x, line, directors, moment, magnify)
+    values = np.interp(x, fields["s"] / rod.length, colour.of(fields))
+    return body_of(rod, x, line, directors, values, magnify)
 
 
-def body_of(rod, x, line, directors, moment, magnify=1.0):
-    """The `Body` of a rod whose centreline (n, 3) m, directors (n, 3, 3) and bending moment (n,) N m are known at arc
-    lengths x (n,) over its length."""
+def body_of(rod, x, line, directors, values, magnify=1.0):
+    """The `Body` of a rod whose centreline (n, 3) m, directors (n, 3, 3) and values (n,) are known at arc lengths x
+    (n,) over its length."""
     reference = rod.curve.position(x * rod.length)
     outline = outlines(rod, x * rod.length)
     radius = float(np.linalg.norm(outline, axis=2).max())
-    return Body(reference + magnify * (line - reference), directors, outline, radius, moment)
+    return Body(reference + magnify * (line - reference), directors, outline, radius, values)
 
 
 def outlines(rod, s):
@@ -109,38 +128,53 @@ def points_of(body, factor):
     return points.reshape(-1, 3)
 
 
-def add_body(plotter, pyvista, body, factor, peak, moving=False):
-    """Draw the surface of a `Body`, closed at both ends, coloured by bending moment from 0 to `peak`, N m.
-
-    Returns:
-        The mesh; its points may be changed later where `moving`.
-    """
+def surface_of(pyvista, body, factor):
+    """The surface of a `Body` as a mesh, closed at both ends, its sections enlarged by a factor."""
     corners = body.outline.shape[1]
     rings = np.arange(len(body.line) * corners).reshape(-1, corners)
     right = np.roll(rings, -1, axis=1)
     quads = np.stack([rings[:-1], right[:-1], right[1:], rings[1:]], axis=-1).reshape(-1, 4)
     faces = np.column_stack([np.full(len(quads), 4), quads]).ravel()
     caps = np.concatenate([[corners, *rings[0][::-1]], [corners, *rings[-1]]])
-    surface = pyvista.PolyData(points_of(body, factor), np.concatenate([faces, caps]))
-    scale, unit = prefix(peak)
+    return pyvista.PolyData(points_of(body, factor), np.concatenate([faces, caps]))
+
+
+def add_body(plotter, pyvista, body, factor, peak, moving=False, colour=BENDING):
+    """Draw the surface of a `Body`, closed at both ends, coloured by its values.
+
+    Args:
+        factor: enlarges its sections.
+        peak: the largest size of the values in the picture, which the colours reach up to.
+        moving: whether the mesh's points will be changed.
+        colour: the `Colour` of its values.
+
+    Returns:
+        The mesh.
+    """
+    surface = surface_of(pyvista, body, factor)
+    scale, letter = prefix(peak, colour.unit)
+    step = round_step((2 if colour.signed else 1) * peak / scale or 1.0, _BAR)
+    low, high = colour.limits(math.ceil(peak / scale / step - 1e-9) * step)
     font = round(plotter.window_size[0] / 70)
-    surface["moment"] = np.repeat(body.moment / scale, corners)
+    unit = "" if colour.unit == "1" else f" ({letter}{colour.unit})"
+    surface["value"] = np.repeat(body.values / scale, body.outline.shape[1])
     plotter.add_mesh(
         surface,
-        scalars="moment",
-        cmap="viridis",
-        clim=(0, peak / scale or 1),
+        scalars="value",
+        cmap=colour.map,
+        clim=(low, high),
         smooth_shading=not moving,
         split_sharp_edges=not moving,
         scalar_bar_args={
-            "title": f"bending moment ({unit}N m)\n",
+            "title": f"{colour.words}{unit}\n",
             "color": "black",
             "vertical": True,
             "position_x": 0.86,
-            "position_y": 0.2,
-            "height": 0.6,
+            "position_y": 0.25,
+            "height": 0.55,
             "width": 0.05,
-            "fmt": "%.3g",
+            "n_labels": round((high - low) / step) + 1,
+            "fmt": _format(step),
             "title_font_size": font,
             "label_font_size": font,
         },
@@ -148,62 +182,33 @@ def add_body(plotter, pyvista, body, factor, peak, moving=False):
     return surface
 
 
-def frame(plotter, everywhere):
-    """Draw axes with units around points (n, 3), m, and place the camera so that it shows them all."""
-    span = np.ptp(everywhere, axis=0)
-    bounds, counts = _bounds(everywhere, float(span.max()))
-    plotter.show_bounds(
-        bounds=bounds, xtitle="x (m)", ytitle="y (m)", ztitle="z (m)", color="black", font_size=8,
-        location="outer", fmt="%.4g", use_3d_text=False, **counts,
-    )  # fmt: skip
-    _place_camera(plotter, np.reshape(bounds, (3, 2)), span)
+def _format(step):
+    """How multiples of a round step are written."""
+    digits = max(0, -math.floor(math.log10(step) + 1e-9))
+    return f"%.{digits}f" if digits <= _MOST_DIGITS else "%.3g"
 
 
-def _bounds(points, size):
-    """Round limits of the axes, and the number of labels on each."""
-    step = 10 ** math.floor(math.log10(size / 5))
-    step *= next(f for f in (1, 2, 5, 10) if size / (f * step) <= 6)
-    low, high = step * np.floor(points.min(axis=0) / step + 1e-9), step * np.ceil(points.max(axis=0) / step - 1e-9)
-    counts = np.round((high - low) / step).astype(int) + 1
-    flat = counts == 1
-    low, high = low - 0.03 * size * flat, high + 0.03 * size * flat
-    labels = {f"n_{axis}labels": int(max(n, 2)) for axis, n in zip("xyz", counts, strict=True)}
-    return tuple(np.column_stack([low, high]).ravel()), labels
+def frame(plotter, everywhere, panel=False, *, more=None, labels=None, span=None):
+    """Place the camera so that it shows points (n, 3), m, and draw axes with units around them.
 
-
-def view_of(span):
-    """Directions for a drawing whose extents along x, y and z are `span` (3,).
+    Args:
+        panel: whether it is one of several drawings side by side, without a colour bar.
+        more: further points that the picture shows, such as those of arrows, m.
+        span: (3,) the extents that decide on the view, see `view.view_of`; None for those of the points.
+        labels: a function of the `View` that makes the `Labels` of the drawing; None for those of the axes alone.
 
     Returns:
-        Unit vectors (3,): to the camera, to the right and upwards in the picture; and the upward direction in space.
+        The `View` and the `Labels`, which are still to be drawn if they were given.
     """
-    thin = int(np.argmin(span))
-    if span[thin] < 0.05 * span.max():
-        view = np.zeros(3)
-        view[thin] = -1.0 if thin == 1 else 1.0
-        up = np.array([0.0, 0.0, 1.0]) if thin != 2 else np.array([0.0, 1.0, 0.0])
-    else:
-        view, up = np.array([1.0, -1.6, 0.8]), np.array([0.0, 0.0, 1.0])
-    view = view / np.linalg.norm(view)
-    right = np.cross(up, view)
-    right /= np.linalg.norm(right)
-    return view, right, np.cross(view, right), up
-
-
-def _place_camera(plotter, bounds, span):
-    """View a plane scene along its normal, others from a corner, with margins for labels, title and colour bar."""
-    view, right, above, up = view_of(span)
-    corners = np.array(np.meshgrid(*bounds)).reshape(3, -1).T
-    across, high = corners @ right, corners @ above
-    width, height = np.ptp(across), np.ptp(high)
-    aspect = plotter.window_size[0] / plotter.window_size[1]
-    # the drawing fills 62 % of the width, left of the bar, and 64 % of the height, between title and axis
-    half = max(height / 0.64, width / (0.62 * aspect)) / 2
-    centre = (across.max() + across.min()) / 2 * right + (high.max() + high.min()) / 2 * above
-    focus = centre + 0.12 * half * aspect * right - 0.03 * half * above
-    plotter.enable_parallel_projection()
-    plotter.camera.focal_point = tuple(focus)
-    plotter.camera.position = tuple(focus + 4 * (width + height) * view)
-    plotter.camera.up = tuple(up)
-    plotter.camera.parallel_scale = half
-    plotter.reset_camera_clipping_range()
+    axes = axes_of(everywhere)
+    corners = np.array(np.meshgrid(*((axis.low, axis.high) for axis in axes))).reshape(3, -1).T
+    shown = corners if more is None else np.concatenate([corners, more])
+    left, bottom, right, top = plotter.renderer.viewport  # the whole window, or a panel of it
+    window = plotter.window_size[0] * (right - left), plotter.window_size[1] * (top - bottom)
+    view = View.of(shown, np.ptp(everywhere, axis=0) if span is None else span, window, panel)
+    texts = labels(view) if labels else Labels(view)
+    draw_axes(plotter, load_pyvista(), axes, view, texts)
+    if labels is None:
+        texts.draw(plotter, load_pyvista())
+    view.place(plotter)
+    return view, texts

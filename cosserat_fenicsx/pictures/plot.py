@@ -1,4 +1,4 @@
-"""Pictures: the deformed rods in space by pyvista (off-screen), charts of curves by matplotlib."""
+"""Pictures: the rods in space by pyvista (off-screen), deformed or before anything is solved; charts by matplotlib."""
 
 import math
 import textwrap
@@ -8,44 +8,88 @@ import numpy as np
 
 from cosserat_fenicsx.checks import positive
 from cosserat_fenicsx.errors import SceneError
-from cosserat_fenicsx.pictures.drawing import add_body, at_rest, frame, load_pyvista, swept, thickening, view_of
+from cosserat_fenicsx.pictures.colours import colour_of, known, peak_of
+from cosserat_fenicsx.pictures.drawing import (
+    add_body,
+    at_rest,
+    body_of,
+    frame,
+    load_pyvista,
+    surface_of,
+    swept,
+    thickening,
+)
+from cosserat_fenicsx.pictures.labels import Labels
+from cosserat_fenicsx.pictures.signs import Deformed, Resting, signs_of, without_sign
 from cosserat_fenicsx.ranks import on_first
 
-# As shares of the extent of the drawing: height of a label, width of a letter, smallest visible displacement.
-_LABEL_HEIGHT, _LETTER_WIDTH, _VISIBLE = 0.035, 0.016, 0.01
-# Letters per line of the title.
-_TITLE_WIDTH = 88
+# Smallest visible displacement as a share of the extent of the drawing.
+_VISIBLE = 0.01
+# Letters per line of the title; width and height of a picture, pixels; sizes of fonts: of labels, and of the title.
+_TITLE_WIDTH, _WINDOW, _FONT, _TITLE_FONT = 88, (1400, 1000), 20, 12
+# Up to this number of rods are named in the picture of a scene, in smaller letters if there are more than a few.
+_NAMED, _FEW = 40, 8
+_AT_REST = "#9db4cc"
 
 
-def rods(path, file=None, points=None, magnify=1.0):
-    """The deformed rods at some points of a path, coloured by bending moment, with the reference as a grey line.
+def rods(path, file=None, points=None, magnify=1.0, color="bending_moment"):
+    """The deformed rods at some points of a path, with the reference as a grey line, supports, joints and loads.
+
+    Supports and joints are drawn on the last shape, each load on the last shape where it is not zero.
 
     Args:
         path: a `Path` with at least one point.
         file: where to write a .png (rank 0 writes); None returns the plotter.
         points: indices of the points to show; None for up to five, evenly spread.
         magnify: factor on displacements.
+        color: name of the field that colours the rods, see `colours.known`.
 
     Returns:
         The pyvista Plotter where `file` is None.
 
     Raises:
-        SceneError: an empty path, a file that is no .png, or pyvista is missing.
+        SceneError: an empty path, an unknown field, a file that is no .png, or pyvista is missing.
         OSError: the file cannot be written.
     """
     if len(path) == 0:
         raise SceneError("the path has no point to draw")
     positive("plot", "magnify", magnify, "-")
+    colour = colour_of(color, known(path))
+    return _deliver(path.comm, file, lambda: _draw(path, points, magnify, colour))
+
+
+def scene(scene, file=None):
+    """The rods of a scene before anything is solved, with their names, supports, joints and loads.
+
+    Args:
+        scene: a `Scene`.
+        file: where to write a .png (rank 0 writes); None returns the plotter.
+
+    Returns:
+        The pyvista Plotter where `file` is None.
+
+    Raises:
+        SceneError: a file that is no .png, or pyvista is missing.
+        OSError: the file cannot be written.
+    """
+    from mpi4py import MPI
+
+    return _deliver(MPI.COMM_WORLD, file, lambda: _draw_scene(scene))
+
+
+def _deliver(comm, file, draw):
+    """The plotter that `draw` returns, or a .png of it."""
     if file is None:
-        return _draw(path, points, magnify)
+        return draw()
     file = Path(file)
     if file.suffix != ".png":
         raise SceneError(f"{file}: expected a name that ends in .png")
-    on_first(path.comm, lambda: _save(_draw(path, points, magnify), file))
+    on_first(comm, lambda: _save(draw, file))
     return None
 
 
-def _save(plotter, file):
+def _save(draw, file):
+    plotter = draw()
     file.parent.mkdir(parents=True, exist_ok=True)
     with open(file, "wb"):
         pass  # raises a plain OSError where the file cannot be written
@@ -53,30 +97,89 @@ def _save(plotter, file):
     plotter.close()
 
 
-def _draw(path, points, magnify):
-    pyvista = load_pyvista()
-    shown = _spread(path) if points is None else [range(len(path))[k] for k in points]
-    plotter = pyvista.Plotter(off_screen=True, window_size=(1400, 1000))
+def _stage(pyvista):
+    plotter = pyvista.Plotter(off_screen=True, window_size=_WINDOW)
     plotter.set_background("white")
     plotter.enable_anti_aliasing("ssaa")
+    return plotter
+
+
+def _draw(path, points, magnify, colour):
+    pyvista = load_pyvista()
+    shown = _spread(path) if points is None else [range(len(path))[k] for k in points]
+    plotter = _stage(pyvista)
     resting = at_rest(path.scene)
-    bodies = {(k, rod): swept(path, k, rod, magnify) for k in shown for rod in path.scene.rods}
+    bodies = {(k, rod): swept(path, k, rod, magnify, colour) for k in shown for rod in path.scene.rods}
     everywhere = np.concatenate([*resting, *(body.line for body in bodies.values())])
     size = float(np.ptp(everywhere, axis=0).max())
-    peak = max(body.moment.max() for body in bodies.values())
-    thicker = set()
-    for body in bodies.values():
-        factor = thickening(body, size)
-        if factor > 1:
-            thicker.add(f"{float(f'{factor:.2g}'):g}")
-        add_body(plotter, pyvista, body, factor, peak)
+    peak = peak_of(path, colour, [body.values for body in bodies.values()])
+    factors = {key: thickening(body, size) for key, body in bodies.items()}
+    for key, body in bodies.items():
+        add_body(plotter, pyvista, body, factors[key], peak, colour=colour)
     for line in resting:
         plotter.add_mesh(pyvista.lines_from_points(line), color="grey", line_width=2)
-    _label(plotter, path, shown, bodies, np.ptp(everywhere, axis=0))
-    note = _note(path, shown, thicker, magnify, _small(path, shown, size, magnify))
-    plotter.add_text(note, position="upper_edge", color="black", font_size=12)
-    frame(plotter, everywhere)
+    radii = {rod: factors[shown[-1], rod] * bodies[shown[-1], rod].radius for rod in path.scene.rods}
+    shapes = [Deformed(path, k, radii, magnify) for k in shown]
+    symbols = signs_of(pyvista, path.scene, shapes, everywhere)
+    lines = [body.line for body in bodies.values()]
+    title = _title(path, shown, factors.values(), magnify, _small(path, shown, size, magnify))
+    _finish(plotter, pyvista, everywhere, symbols, lines, title + _undrawn(path.scene),
+            lambda labels: _label(labels, path, shown, bodies))  # fmt: skip
     return plotter
+
+
+def _draw_scene(scene):
+    pyvista = load_pyvista()
+    plotter = _stage(pyvista)
+    everywhere = np.concatenate(at_rest(scene))
+    size, radii, factors = float(np.ptp(everywhere, axis=0).max()), {}, []
+    x = np.linspace(0, 1, 201)
+    for rod in scene.rods:
+        line, directors = rod.curve.position(x * rod.length), rod.curve.frame(x * rod.length)
+        body = body_of(rod, x, line, directors, np.zeros(len(x)))
+        factors.append(thickening(body, size))
+        radii[rod] = factors[-1] * body.radius
+        plotter.add_mesh(
+            surface_of(pyvista, body, factors[-1]), color=_AT_REST, split_sharp_edges=True, smooth_shading=True
+        )
+    symbols = signs_of(pyvista, scene, [Resting(radii)], everywhere)
+    title = [scene.title or "Scene", *_thicker(factors)]
+    if any(load.scaled for load in scene.loads):
+        title[0] += ": loads at load factor 1"
+    _finish(plotter, pyvista, everywhere, symbols, at_rest(scene), title + _undrawn(scene),
+            lambda labels: _name(labels, scene))  # fmt: skip
+    return plotter
+
+
+def _finish(plotter, pyvista, everywhere, symbols, lines, title, label):
+    """Draw signs, axes, labels, key and title, and place the camera.
+
+    Args:
+        lines: centrelines that labels keep off. title: lines of text. label: puts the first labels into the `Labels`.
+    """
+    symbols.draw(plotter)
+    width, height = plotter.window_size
+    lettered = [line for text in title for line in textwrap.wrap(text, _TITLE_WIDTH)]
+
+    def prepared(view):
+        labels = Labels(view, [*lines, *symbols.covers])
+        labels.reserve((0, height - 2.4 * _TITLE_FONT * (len(lettered) + 0.5)), (width, height))
+        labels.reserve((0.8 * width, 0), (width, 0.85 * height))
+        return labels
+
+    _, labels = frame(plotter, everywhere, more=symbols.points, labels=prepared, span=symbols.span)
+    label(labels)
+    for text, point, towards, colour in symbols.texts:
+        if text:
+            labels.near(text, point, towards, size=_FONT - 4, colour=colour)
+    labels.draw(plotter, pyvista)
+    if labels.left_out:
+        lettered.append(
+            f"(no room for {len(labels.left_out)} labels: {textwrap.shorten(', '.join(labels.left_out), 60)})"
+        )
+    for i, (words, colour) in enumerate(reversed(symbols.groups.items())):
+        plotter.add_text(words, position=(0.84 * width, (0.02 + 0.025 * i) * height), color=colour, font_size=8)
+    plotter.add_text("\n".join(lettered), position="upper_edge", color="black", font_size=_TITLE_FONT)
 
 
 def _small(path, shown, size, magnify):
@@ -90,8 +193,8 @@ def _small(path, shown, size, magnify):
     return f"displacements are at most {largest:.2g} m, magnify={decade:g} (--magnify {decade:g}) shows them"
 
 
-def _note(path, shown, thicker, magnify, small):
-    """The title: the points shown, and what is not to scale."""
+def _title(path, shown, factors, magnify, small):
+    """The lines of the title: the points shown, and what is not to scale."""
     some = "" if len(shown) == len(path) else f" (of {len(path)})"
     values = ", ".join(path.label(k) for k in shown)
     title = f"{path.scene.title or 'Deformed rods'}:"
@@ -101,9 +204,19 @@ def _note(path, shown, thicker, magnify, small):
         lines.append(f"(displacements magnified {magnify:g} times)")
     if small:
         lines.append(f"({small})")
-    if thicker:
-        lines.append(f"(sections drawn {' and '.join(sorted(thicker))} times their size)")
-    return "\n".join(textwrap.fill(line, _TITLE_WIDTH) for line in lines)
+    return lines + _thicker(factors)
+
+
+def _thicker(factors):
+    thicker = sorted({f"{float(f'{factor:.2g}'):g}" for factor in factors if factor > 1}, key=float)
+    if len(thicker) > 3:
+        thicker = [f"{thicker[0]} to {thicker[-1]}"]
+    return [f"(sections drawn {' and '.join(thicker)} times their size)"] if thicker else []
+
+
+def _undrawn(scene):
+    words = without_sign(scene)
+    return [f"(not drawn: {textwrap.shorten(words, _TITLE_WIDTH, placeholder=' ...')})"] if words else []
 
 
 def chart(file, curves, *, xlabel, ylabel, title, ylim=None):
@@ -144,31 +257,25 @@ def _spread(path, most=5):
     return sorted({int(np.argmin(np.abs(way - w))) for w in wanted})
 
 
-def _label(plotter, path, shown, bodies, span):
-    """Label each shape (`path.label`) at the place where the shapes lie farthest apart; labels that overlap are left
-    out."""
-    rods, size = path.scene.rods, float(span.max())
-    _, right, above, _ = view_of(span)
+def _label(labels, path, shown, bodies):
+    """Label each shape (`path.label`) where the shapes lie farthest apart, or else at the end of another rod."""
+    rods = path.scene.rods
+    size = max(np.ptp(body.line) for body in bodies.values())
     spread = [np.ptp([bodies[k, rod].line for k in shown], axis=0).max(axis=1) for rod in rods]
     rod = max(range(len(rods)), key=lambda i: (round(spread[i].max() / size, 6), -i))
     place = len(spread[rod]) - 1 - int(np.argmax(spread[rod][::-1]))  # the last one of equal maxima, nearest to the end
-    end = 1 if place == len(spread[rod]) - 1 else -1 if place == 0 else 0
-    placed = []
     for k in reversed(shown):
         body = bodies[k, rods[rod]]
-        at = body.line[place] + 0.03 * size * (1 if end else 1.3) * _beyond(body.directors[place, :, 2], end)
-        text = path.label(k)
-        across, high = at @ right / size, at @ above / size
-        if any(
-            abs(high - y) < _LABEL_HEIGHT and abs(across - x) < _LETTER_WIDTH * (len(text) + n) / 2
-            for x, y, n in placed
-        ):
-            continue
-        placed.append((across, high, len(text)))
-        plotter.add_point_labels(
-            [at], [text], font_size=20, text_color="black", shape=None, show_points=False, always_visible=True,
-            bold=False, justification_horizontal="center", justification_vertical="center",
-        )  # fmt: skip
+        end = 1 if place == len(body.line) - 1 else -1 if place == 0 else 0
+        labels.near(path.label(k), body.line[place], _beyond(body.directors[place, :, 2], end), size=_FONT)
+
+
+def _name(labels, scene):
+    """Label the rods by their names, in the middle."""
+    size = _FONT - 2 if len(scene.rods) <= _FEW else _FONT - 6
+    for rod in scene.rods[:_NAMED]:
+        s = rod.length / 2
+        labels.near(rod.name, rod.curve.position(s), _beyond(rod.curve.frame(s)[:, 2], 0), size=size)
 
 
 def _beyond(tangent, end):

@@ -11,11 +11,14 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from cosserat_fenicsx.pictures.axes import axes_of
-from cosserat_fenicsx.pictures.colours import MAPS, known, rounding
-from cosserat_fenicsx.pictures.drawing import at_rest, outlines, thickness, view_of
+from cosserat_fenicsx.pictures.colours import MAPS, known, peak_of
+from cosserat_fenicsx.pictures.drawing import at_rest, outlines, thickness
+from cosserat_fenicsx.pictures.view import view_of
 
-#: Fields that can be chosen in the file: the first is shown at first. They fill the five channels of `page/rods.js`.
-FIELDS = ("bending_moment", "m.3", "n.3", "shear_force", "displacement")
+#: Fields that can be chosen in the file, where the result has them; the first is shown at first.
+FIELDS = ("bending_moment", "m.3", "n.3", "shear_force", "displacement", "von_mises")
+# Stands for "no value", which is drawn grey.
+_NONE = 1e30
 # Largest number of states, of sections of a rod (per element, in all), and of states times sections of all rods:
 # 64 bytes each.
 _STATES, _PER_ELEMENT, _SECTIONS, _MOST = 400, 8, 121, 50_000
@@ -62,14 +65,13 @@ def _data(result):
     most = max(2, min(_STATES, _MOST // sum(counts)))
     shown = np.unique(np.linspace(0, len(result) - 1, min(len(result), most)).round().astype(int))
     every = known(result)
-    colours = [every[name] for name in FIELDS]
+    colours = [every[name] for name in FIELDS if name in every]
     shapes = [_Shapes(result, rod, colours, np.linspace(0, 1, n), shown) for rod, n in zip(rods, counts, strict=True)]
     everywhere = np.concatenate([*at_rest(result.scene), *(shape.positions.reshape(-1, 3) for shape in shapes)])
     low, high = everywhere.min(axis=0), everywhere.max(axis=0)
     middle, size = (low + high) / 2, float(np.linalg.norm(high - low)) / 2
     factors = [thickness(shape.radius, float((high - low).max())) for shape in shapes]
     axes = axes_of(everywhere)
-    peaks = [max(float(np.abs(shape.values[i]).max()) for shape in shapes) for i in range(len(FIELDS))]
     return {
         "title": _title(result),
         "notes": _notes(result, shown, factors),
@@ -85,7 +87,9 @@ def _data(result):
         ],
         "box": [[(getattr(axis, end) - middle[i]) / size for i, axis in enumerate(axes)] for end in ("low", "high")],
         "view": _view(high - low),
-        "fields": [_field(result, i, colour, peaks[i]) for i, colour in enumerate(colours)],
+        "fields": [
+            _field(result, i, colour, [shape.values[i] for shape in shapes]) for i, colour in enumerate(colours)
+        ],
         "maps": MAPS,
         "rods": [shape.packed(middle, size, factor) for shape, factor in zip(shapes, factors, strict=True)],
     }
@@ -112,11 +116,13 @@ class _Shapes:
     def packed(self, middle, size, factor):
         """Its data for the file: positions relative to `middle` over `size`, m; sections enlarged by a factor."""
         places = (self.positions - middle) / size
-        first, *others = self.values[..., None]
+        first, *others = np.nan_to_num(self.values, nan=_NONE)[..., None]
         states = np.concatenate([places, first, self._turns, *others], axis=-1)
+        states = np.concatenate([states, np.zeros((*states.shape[:2], -states.shape[2] % 4))], axis=-1)
         return {
             "name": self.name,
             "nodes": states.shape[1],
+            "texels": states.shape[2] // 4,
             "corners": self._outlines.shape[1],
             "outline": _floats(factor / size * self._outlines),
             "states": _floats(states),
@@ -161,8 +167,8 @@ def _view(span):
     return [math.atan2(-right[0], right[1]), math.asin(np.clip(to_camera[2], -1, 1))]
 
 
-def _field(result, channel, colour, peak):
-    peak = peak if peak > rounding(result, colour) else 0.0
+def _field(result, channel, colour, values):
+    peak = peak_of(result, colour, values)
     low, high = colour.limits(peak)
     return {
         "words": colour.words,

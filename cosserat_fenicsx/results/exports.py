@@ -90,6 +90,11 @@ class Exports(OnNodes):
             tree[f"/{group}"] = _dataset(xarray, contents.of_rod(self, rod), axis, {"rod": rod.name})
         return xarray.DataTree.from_dict(tree)
 
+    def _repr_html_(self):
+        from cosserat_fenicsx.results.notebook import as_html
+
+        return as_html(self)
+
 
 def _values(variables):
     return {name: variable.values for name, variable in variables.items()}

@@ -201,14 +201,20 @@ class Result(Exports, Extremes, Reactions, Stresses, States):
 
         files.write(self, file, k, rod=rod, station=station)
 
-    def plot(self, file=None, points=None, *, magnify=1.0):
-        """Picture of the deformed rods, coloured by bending moment, at some points (default up to five).
+    def plot(self, file=None, points=None, *, magnify=1.0, color="bending_moment"):
+        """Picture of the deformed rods with supports, joints and loads, at some points (default up to five).
 
         Args:
             file: a .png; None returns the pyvista plotter.
             points: indices of points of a path, or of times.
             magnify: factor of the displacements in the picture.
+            color: what colours the rods: bending_moment, shear_force, n, m, displacement, strain, curvature, of a
+                motion velocity and angular_velocity too; n.x, n.y, n.z for an inertial component, n.1, n.2, n.3 for one
+                along d_1, d_2, d_3.
+
+        Raises:
+            SceneError: an unknown field (lists the names), or pyvista is missing.
         """
         from cosserat_fenicsx.pictures import plot
 
-        return plot.rods(self, file, points, magnify)
+        return plot.rods(self, file, points, magnify, color)

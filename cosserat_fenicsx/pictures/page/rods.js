@@ -1,29 +1,32 @@
 // Rods by WebGL 2: their surfaces are made once, all states lie in textures, and the shader interpolates between two.
-// A state of a node takes three texels: position and first field, quaternion of its directors, four more fields.
+// The first texel of a node's state holds its position and a field, the second the quaternion of its directors, the
+// others more fields.
 
 const VERTEX = `#version 300 es
 precision highp float; precision highp sampler2D;
 in vec3 place, normal;  // number of the node and the point of its section; normal along d1, d2, d3
 uniform sampler2D states; uniform ivec2 frames; uniform float share; uniform mat4 camera; uniform mat3 turned;
-uniform int field; uniform vec2 range;
+uniform int field, texels; uniform vec2 range;
 out vec3 across; out float value;
 vec4 at(int part) {
-  int i = 3 * int(place.x) + part;
+  int i = texels * int(place.x) + part;
   vec4 one = texelFetch(states, ivec2(i, frames.x), 0), two = texelFetch(states, ivec2(i, frames.y), 0);
   return mix(one, part == 1 && dot(one, two) < 0. ? -two : two, share);
 }
 vec3 turn(vec4 q, vec3 v) { return v + 2. * cross(q.yzw, cross(q.yzw, v) + q.x * v); }
 void main() {
-  vec4 first = at(0), q = normalize(at(1)), more = at(2);
+  vec4 first = at(0), q = normalize(at(1));
   gl_Position = camera * vec4(first.xyz + turn(q, vec3(place.yz, 0.)), 1.);
   across = turned * turn(q, normal);
-  value = ((field == 0 ? first.w : more[max(field - 1, 0)]) - range.x) / (range.y - range.x);
+  float held = field == 0 ? first.w : at(2 + (field - 1) / 4)[max(field - 1, 0) % 4];
+  value = held > 1e20 ? -1e9 : (held - range.x) / (range.y - range.x);  // no value: far below 0
 }`, FRAGMENT = `#version 300 es
 precision highp float;
 in vec3 across; in float value; uniform sampler2D map; out vec4 colour;
 void main() {
   float light = .5 + .5 * abs(normalize(across).z);
-  colour = vec4(texture(map, vec2(clamp(value, 0., 1.) * 255. / 256. + .5 / 256., .5)).rgb * light, 1.);
+  vec3 known = texture(map, vec2(clamp(value, 0., 1.) * 255. / 256. + .5 / 256., .5)).rgb;
+  colour = vec4((value < -1e3 ? vec3(.7) : known) * light, 1.);
 }`, LINE_VERTEX = `#version 300 es
 in vec3 point; uniform mat4 camera; void main() { gl_Position = camera * vec4(point, 1.); }`,
 LINE_FRAGMENT = `#version 300 es
@@ -57,8 +60,8 @@ class Painter {
     gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, indices, gl.STATIC_DRAW);
     gl.bindVertexArray(null);
     const states = texture(gl, gl.NEAREST);
-    gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA32F, 3 * rod.nodes, frames, 0, gl.RGBA, gl.FLOAT, floats(rod.states));
-    return { holder, count: indices.length, states };
+    gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA32F, rod.texels * rod.nodes, frames, 0, gl.RGBA, gl.FLOAT, floats(rod.states));
+    return { holder, count: indices.length, states, texels: rod.texels };
   }
 
   // camera: 4 x 4 and 3 x 3 matrices, column by column; field: {channel, map, low, high}; lines: points of the box
@@ -87,6 +90,7 @@ class Painter {
     gl.bindTexture(gl.TEXTURE_2D, this.maps[field.map]);
     gl.activeTexture(gl.TEXTURE0);
     for (const rod of this.rods) {
+      gl.uniform1i(at("texels"), rod.texels);
       gl.bindTexture(gl.TEXTURE_2D, rod.states);
       gl.bindVertexArray(rod.holder);
       gl.drawElements(gl.TRIANGLES, rod.count, gl.UNSIGNED_INT, 0);
