@@ -123,7 +123,7 @@ def test_order_of_loads_does_not_matter():
             problem.begin_at(problem.model.unknowns_of(rq), n, alone._records[0].reactions)
             assert newton.solve().converged
             rq, _ = problem.model.snapshot()
-            np.testing.assert_allclose(rq, together[0].rq, atol=1e-12)
+            np.testing.assert_allclose(rq, together._records[0].rq, atol=1e-12)
 
 
 @pytest.mark.parametrize(
