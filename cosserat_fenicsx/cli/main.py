@@ -10,7 +10,7 @@ from cosserat_fenicsx.cli.deliver import deliver
 from cosserat_fenicsx.cli.options import parser
 from cosserat_fenicsx.cli.say import BAD_INPUT, DONE, INTERRUPTED, NOT_CONVERGED, in_words, say
 from cosserat_fenicsx.cli.together import together
-from cosserat_fenicsx.errors import CosseratError, NotConverged, SceneError
+from cosserat_fenicsx.errors import CosseratError, NotConverged
 
 
 def main(arguments=None):

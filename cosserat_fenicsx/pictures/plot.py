@@ -19,9 +19,9 @@ from cosserat_fenicsx.pictures.drawing import (
     swept,
     thickening,
 )
+from cosserat_fenicsx.pictures.figures import save
 from cosserat_fenicsx.pictures.labels import Labels
 from cosserat_fenicsx.pictures.signs import Deformed, Resting, signs_of, without_sign
-from cosserat_fenicsx.pictures.figures import save
 from cosserat_fenicsx.ranks import on_first
 from cosserat_fenicsx.results.beside import replaced
 
