@@ -120,10 +120,10 @@ def test_order_of_loads_does_not_matter():
             problem.load(held(rod, force, moment), together.layout)
             problem.set_load_factor(1.0)
             (rq,), (n,) = on_mesh(alone, together.layout)
-            problem.begin_at(problem.model.unknowns_of(rq), n, alone[0].reactions)
+            problem.begin_at(problem.model.unknowns_of(rq), n, alone._records[0].reactions)
             assert newton.solve().converged
             rq, _ = problem.model.snapshot()
-            np.testing.assert_allclose(rq, together[0].rq, atol=1e-12)
+            np.testing.assert_allclose(rq, together._records[0].rq, atol=1e-12)
 
 
 @pytest.mark.parametrize(

@@ -106,7 +106,7 @@ def test_every_support_joint_and_load_as_mixed_has_them(name):
         reactions = [path.reaction(support) for path in paths]
         for one, other in zip(*reactions, strict=True):
             np.testing.assert_allclose(other, one, atol=2e-7)
-    q = paths[1][-1].rq[:, 3:]
+    q = paths[1]._records[-1].rq[:, 3:]
     assert np.abs(np.linalg.norm(q, axis=1) - 1).max() < 1e-12
     assert paths[1].iterations.sum() <= 1.3 * paths[0].iterations.sum() + 2
 

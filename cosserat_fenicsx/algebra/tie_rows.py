@@ -185,6 +185,7 @@ def reactions_by_nodes(test, change, trial):
 
 def reactions_by_multipliers(test, gradient):
     """Gradients (ties, tied nodes, 6) as columns on the rows of the nodes."""
+    # sizes in full, since there may be no ties; one map may serve all nodes
     return (test @ gradient.transpose(1, 2, 0)).reshape(gradient.shape[1] * test.shape[1], len(gradient))
 
 

@@ -19,9 +19,11 @@ from cosserat_fenicsx.pictures.drawing import (
     swept,
     thickening,
 )
+from cosserat_fenicsx.pictures.figures import save
 from cosserat_fenicsx.pictures.labels import Labels
 from cosserat_fenicsx.pictures.signs import Deformed, Resting, signs_of, without_sign
 from cosserat_fenicsx.ranks import on_first
+from cosserat_fenicsx.results.beside import replaced
 
 # Smallest visible displacement as a share of the extent of the drawing.
 _VISIBLE = 0.01
@@ -90,11 +92,11 @@ def _deliver(comm, file, draw):
 
 def _save(draw, file):
     plotter = draw()
-    file.parent.mkdir(parents=True, exist_ok=True)
-    with open(file, "wb"):
-        pass  # raises a plain OSError where the file cannot be written
-    plotter.screenshot(str(file))
-    plotter.close()
+    try:
+        with replaced(file) as fresh:
+            plotter.screenshot(str(fresh))
+    finally:
+        plotter.close()
 
 
 def _stage(pyvista):
@@ -243,8 +245,7 @@ def chart(file, curves, *, xlabel, ylabel, title, ylim=None):
     axes.set(xlabel=xlabel, ylabel=ylabel, title=title, ylim=ylim)
     axes.grid(alpha=0.3)
     axes.legend()
-    Path(file).parent.mkdir(parents=True, exist_ok=True)
-    figure.savefig(file, dpi=150)
+    save(figure, file)
 
 
 def _spread(path, most=5):

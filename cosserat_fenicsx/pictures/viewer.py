@@ -14,6 +14,7 @@ from cosserat_fenicsx.pictures.axes import axes_of
 from cosserat_fenicsx.pictures.colours import MAPS, known, peak_of
 from cosserat_fenicsx.pictures.drawing import at_rest, outlines, thickness
 from cosserat_fenicsx.pictures.view import view_of
+from cosserat_fenicsx.results.beside import replaced
 
 #: Fields that can be chosen in the file, where the result has them; the first is shown at first.
 FIELDS = ("bending_moment", "m.3", "n.3", "shear_force", "displacement", "von_mises")
@@ -37,8 +38,8 @@ def write(result, file):
     Raises:
         OSError: the file cannot be written.
     """
-    file.parent.mkdir(parents=True, exist_ok=True)
-    file.write_text(page(result), encoding="utf-8")
+    with replaced(file) as fresh:
+        fresh.write_text(page(result), encoding="utf-8")
 
 
 def page(result):
