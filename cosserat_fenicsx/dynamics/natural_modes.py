@@ -14,6 +14,7 @@ from cosserat_fenicsx.checks import instance, number, refuse
 from cosserat_fenicsx.element import lobatto_weights
 from cosserat_fenicsx.errors import NotConverged
 from cosserat_fenicsx.models.rod_data import check_inertia, nodal_inertia
+from cosserat_fenicsx.progress import MeshProgress
 from cosserat_fenicsx.quaternions import directors
 from cosserat_fenicsx.results.modes import Modes
 from cosserat_fenicsx.results.shapes import Equilibrium
@@ -36,7 +37,7 @@ _MOST_ELEMENTS = 128
 _CORRECTIONS = 10
 
 
-def modes(scene, count=1, *, load_factor=0.0, tol=1e-6, elements=None, degree=4, comm=None):
+def modes(scene, count=1, *, load_factor=0.0, tol=1e-6, elements=None, degree=4, comm=None, progress=None):
     """Natural frequencies and shapes of small undamped vibrations about a static state.
 
     K x = omega^2 M x under the constraints of supports and joints, with K the second variation in (r, theta) and M the
@@ -53,6 +54,7 @@ def modes(scene, count=1, *, load_factor=0.0, tol=1e-6, elements=None, degree=4,
         elements: elements per rod; fixes the mesh.
         degree: 1 to 4, of r and q.
         comm: MPI communicator; default all ranks. Every rank calls; each solves the whole eigenproblem.
+        progress: True, False, or None to show it in runs of more than two seconds.
 
     Returns:
         Modes. It holds fewer than `count` where the mesh has fewer degrees of freedom.
@@ -76,18 +78,20 @@ def modes(scene, count=1, *, load_factor=0.0, tol=1e-6, elements=None, degree=4,
     def apart(fine, coarse):
         return np.abs(fine - coarse) / np.where(fine == 0, np.inf, np.abs(fine))
 
-    (squares, _, rounding, shapes, negative, state, conservative), error, _ = until_two_meshes_agree(
-        scene,
-        lambda layout: _on_mesh(scene, layout, count, load_factor, degree, comm),
-        apart,
-        tol,
-        first=FIRST_ELEMENTS,
-        most=_MOST_ELEMENTS,
-        elements=elements,
-        degree=degree,
-        advice="a larger tol or fewer modes",
-        gains=True,
-    )
+    with MeshProgress("modes", tol, progress, comm) as bar:
+        (squares, _, rounding, shapes, negative, state, conservative), error, _ = until_two_meshes_agree(
+            scene,
+            lambda layout: _on_mesh(scene, layout, count, load_factor, degree, comm),
+            apart,
+            tol,
+            first=FIRST_ELEMENTS,
+            most=_MOST_ELEMENTS,
+            elements=elements,
+            degree=degree,
+            progress=bar,
+            advice="a larger tol or fewer modes",
+            gains=True,
+        )
     error = np.maximum(error, rounding)  # NaN stays
     if (error > tol).any():
         raise NotConverged(

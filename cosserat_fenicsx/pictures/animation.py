@@ -54,13 +54,17 @@ def film(history, file, *, fps=FPS, speed=None, magnify=1.0, size=SIZE, progress
         raise SceneError(f"{file}: expected a history with at least two times")
     fps = number("animate", "fps", fps, "a number from 1 to 100", lambda x: 1 <= x <= 100)
     positive("animate", "magnify", magnify, "-")
-    width, height = _pixels(size)
+    width, height = pixels(size)
     if file.suffix == ".gif":
         fps = 100 / round(100 / fps)
     duration = history.times[-1] - history.times[0]
     speed = _round_speed(duration) if speed is None else positive("animate", "speed", speed, "-")
     times = _times(history.times[0], duration, speed, fps)
-    on_first(history.comm, lambda: _make(history, file, times, fps, speed, magnify, (width, height), progress))
+    pace = _pace_in_words(speed)
+    on_first(
+        history.comm,
+        lambda: record(lambda: _Stage(history, times, magnify, (width, height), pace), file, times, fps, progress),
+    )
 
 
 def check_name(file):
@@ -76,7 +80,8 @@ def check_name(file):
     return file
 
 
-def _pixels(size):
+def pixels(size):
+    """(width, height) of a film, checked."""
     expected = "(width, height), even numbers of pixels from 100 to 4000"
     if not isinstance(size, tuple | list) or len(size) != 2:
         refuse("animate", "size", size, expected)
@@ -110,16 +115,26 @@ def _pace_in_words(speed):
     return f"{speed:g} times faster than real" if speed > 1 else f"{1 / speed:g} times slower than real"
 
 
-def _make(history, file, times, fps, speed, magnify, size, progress):
-    """Draw and write all frames, on one rank."""
+def record(make_stage, file, times, fps, progress):
+    """Draw and write all frames, on one rank.
+
+    Args:
+        make_stage: function that returns the stage: `at(t)` is the picture (height, width, 3) at t, and `close()` frees
+            it.
+        file: .gif or .mp4, a Path; times: t of each frame; fps: frames per second; progress: as of `film`.
+
+    Raises:
+        OSError: the file cannot be written.
+        KeyboardInterrupt: Ctrl-C; the film ends with the frames drawn so far.
+    """
     file.parent.mkdir(parents=True, exist_ok=True)
     with open(file, "wb"):
         pass  # raises a plain OSError where the file cannot be written
-    stage = _Stage(history, times, magnify, size, _pace_in_words(speed))
+    stage = make_stage()
     try:
         samples = [stage.at(t) for t in times[:: max(1, len(times) // 6)]]
         with (
-            _WRITERS[file.suffix](file, fps, size, samples) as writer,
+            _WRITERS[file.suffix](file, fps, samples[0].shape[1::-1], samples) as writer,
             Progress([len(times)], progress, _Alone, "frame") as bar,
         ):
             bar.start(file.name)

@@ -104,22 +104,27 @@ def points_of(body, factor):
     return points.reshape(-1, 3)
 
 
-def add_body(plotter, pyvista, body, factor, peak, moving=False):
-    """Draw the surface of a `Body`, closed at both ends, coloured by bending moment from 0 to `peak`, N m.
-
-    Returns:
-        The mesh; its points may be changed later where `moving`.
-    """
+def surface_of(pyvista, body, factor):
+    """The surface of a `Body`, closed at both ends, its sections enlarged by a factor, as pyvista's PolyData."""
     corners = body.outline.shape[1]
     rings = np.arange(len(body.line) * corners).reshape(-1, corners)
     right = np.roll(rings, -1, axis=1)
     quads = np.stack([rings[:-1], right[:-1], right[1:], rings[1:]], axis=-1).reshape(-1, 4)
     faces = np.column_stack([np.full(len(quads), 4), quads]).ravel()
     caps = np.concatenate([[corners, *rings[0][::-1]], [corners, *rings[-1]]])
-    surface = pyvista.PolyData(points_of(body, factor), np.concatenate([faces, caps]))
+    return pyvista.PolyData(points_of(body, factor), np.concatenate([faces, caps]))
+
+
+def add_body(plotter, pyvista, body, factor, peak, moving=False):
+    """Draw the surface of a `Body`, closed at both ends, coloured by bending moment from 0 to `peak`, N m.
+
+    Returns:
+        The mesh; its points may be changed later where `moving`.
+    """
+    surface = surface_of(pyvista, body, factor)
     scale, unit = prefix(peak)
     font = round(plotter.window_size[0] / 70)
-    surface["moment"] = np.repeat(body.moment / scale, corners)
+    surface["moment"] = np.repeat(body.moment / scale, body.outline.shape[1])
     plotter.add_mesh(
         surface,
         scalars="moment",
@@ -143,15 +148,19 @@ def add_body(plotter, pyvista, body, factor, peak, moving=False):
     return surface
 
 
-def frame(plotter, everywhere):
-    """Draw axes with units around points (n, 3), m, and place the camera so that it shows them all."""
+def frame(plotter, everywhere, bar=True):
+    """Draw axes with units around points (n, 3), m, and place the camera so that it shows them all.
+
+    Args:
+        bar: whether a colour bar needs room on the right.
+    """
     span = np.ptp(everywhere, axis=0)
     bounds, counts = _bounds(everywhere, float(span.max()))
     plotter.show_bounds(
         bounds=bounds, xtitle="x (m)", ytitle="y (m)", ztitle="z (m)", color="black", font_size=8,
         location="outer", fmt="%.4g", use_3d_text=False, **counts,
     )  # fmt: skip
-    _place_camera(plotter, np.reshape(bounds, (3, 2)), span)
+    _place_camera(plotter, np.reshape(bounds, (3, 2)), span, bar)
 
 
 def _bounds(points, size):
@@ -185,17 +194,19 @@ def view_of(span):
     return view, right, np.cross(view, right), up
 
 
-def _place_camera(plotter, bounds, span):
+def _place_camera(plotter, bounds, span, bar):
     """View a plane scene along its normal, others from a corner, with margins for labels, title and colour bar."""
     view, right, above, up = view_of(span)
     corners = np.array(np.meshgrid(*bounds)).reshape(3, -1).T
     across, high = corners @ right, corners @ above
     width, height = np.ptp(across), np.ptp(high)
-    aspect = plotter.window_size[0] / plotter.window_size[1]
+    left, bottom, right_side, top = plotter.renderer.viewport  # the whole window, or a panel of it
+    aspect = plotter.window_size[0] * (right_side - left) / (plotter.window_size[1] * (top - bottom))
     # the drawing fills 62 % of the width, left of the bar, and 64 % of the height, between title and axis
-    half = max(height / 0.64, width / (0.62 * aspect)) / 2
+    half = max(height / (0.64 if bar else 0.58), width / (0.62 * aspect)) / 2
     centre = (across.max() + across.min()) / 2 * right + (high.max() + high.min()) / 2 * above
-    focus = centre + 0.12 * half * aspect * right - 0.03 * half * above
+    shift = (0.12 * aspect, -0.03) if bar else (-0.06 * aspect, 0.02)
+    focus = centre + half * (shift[0] * right + shift[1] * above)
     plotter.enable_parallel_projection()
     plotter.camera.focal_point = tuple(focus)
     plotter.camera.position = tuple(focus + 4 * (width + height) * view)

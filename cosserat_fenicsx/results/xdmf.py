@@ -62,7 +62,25 @@ def _write(path, file, k):
 
 
 def _write_series(path, file):
-    """Write the arrays to the .h5 file, then the .xdmf file that refers to them, so that every .xdmf is complete."""
+    write_series(file, "path", ((time, *_state(path, k)) for k, time in enumerate(path.along_axis)))
+
+
+def _state(path, k):
+    """Nodes, lines and fields of point k as `write_series` takes them."""
+    points, cells, data = mesh_of(path, k)
+    q = data.pop("quaternion")  # some readers support no arrays of four components
+    fields = {"position": points, **data, "quaternion_a": q[:, 0], "quaternion_bcd": q[:, 1:]}
+    return points - data["displacement"], cells[0][1], fields
+
+
+def write_series(file, name, states):
+    """Write the arrays to the .h5 file, then the .xdmf file that refers to them, so that every .xdmf is complete.
+
+    Args:
+        file: the .xdmf; name: of the series.
+        states: of each state its time, nodes (n, 3) in m, lines (cells, 2) and fields {name: (n,) or (n, 3)}; all have
+            the same nodes and lines.
+    """
     try:
         import h5py
     except ImportError:
@@ -72,7 +90,7 @@ def _write_series(path, file):
     numbers = file.with_suffix(".h5")
     root = xml.Element("Xdmf", Version="3.0")
     series = xml.SubElement(
-        xml.SubElement(root, "Domain"), "Grid", Name="path", GridType="Collection", CollectionType="Temporal"
+        xml.SubElement(root, "Domain"), "Grid", Name=name, GridType="Collection", CollectionType="Temporal"
     )
     with h5py.File(numbers, "w") as store:
 
@@ -89,24 +107,16 @@ def _write_series(path, file):
                 Format="HDF",
             ).text = f"{numbers.name}:/{name}"
 
-        for k, eta in enumerate(path.along_axis):
-            points, cells, data = mesh_of(path, k)
+        for k, (time, reference, lines, fields) in enumerate(states):
             grid = xml.SubElement(series, "Grid", Name=f"point {k}", GridType="Uniform")
-            xml.SubElement(grid, "Time", Value=repr(float(eta)))
+            xml.SubElement(grid, "Time", Value=repr(float(time)))
             geometry = xml.SubElement(grid, "Geometry", GeometryType="XYZ")
-            item(geometry, "reference", points - data["displacement"])
-            lines = cells[0][1]
+            item(geometry, "reference", reference)
             topology = xml.SubElement(
                 grid, "Topology", TopologyType="Polyline", NodesPerElement="2", NumberOfElements=str(len(lines))
             )
             item(topology, "lines", lines)
-            q = data.pop("quaternion")  # some readers support no arrays of four components
-            for name, array in {
-                "position": points,
-                **data,
-                "quaternion_a": q[:, 0],
-                "quaternion_bcd": q[:, 1:],
-            }.items():
+            for name, array in fields.items():
                 kind = {1: "Scalar", 2: "Vector"}[array.ndim]
                 attribute = xml.SubElement(grid, "Attribute", Name=name, AttributeType=kind, Center="Node")
                 item(attribute, f"{name}_{k}", array)

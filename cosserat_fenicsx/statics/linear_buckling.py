@@ -9,6 +9,7 @@ from mpi4py import MPI
 from cosserat_fenicsx.algebra import eigen
 from cosserat_fenicsx.checks import number
 from cosserat_fenicsx.errors import NotConverged, SceneError
+from cosserat_fenicsx.progress import MeshProgress
 from cosserat_fenicsx.results.buckling import Buckling
 from cosserat_fenicsx.results.shapes import Equilibrium
 from cosserat_fenicsx.scene.action import has_permanent
@@ -35,7 +36,7 @@ _REMAINING = 0.1
 _HUGE = 1e8
 
 
-def buckling(scene, count=1, *, load_factor=0.0, tol=1e-5, elements=None, degree=4, comm=None):
+def buckling(scene, count=1, *, load_factor=0.0, tol=1e-5, elements=None, degree=4, comm=None, progress=None):
     """Critical load factors and modes by linear buckling.
 
     The critical load factors are eta + lambda where K(eta) + lambda dK/deta is singular. K is the second variation at
@@ -59,6 +60,7 @@ def buckling(scene, count=1, *, load_factor=0.0, tol=1e-5, elements=None, degree
         elements: elements per rod; fixes the mesh.
         degree: 1 to 4, of r and q.
         comm: MPI communicator; default all ranks. Every rank calls.
+        progress: True, False, or None to show it in runs of more than two seconds.
 
     Returns:
         Buckling. It holds fewer than `count` load factors where no more are positive (counted from eta) and below that
@@ -79,17 +81,19 @@ def buckling(scene, count=1, *, load_factor=0.0, tol=1e-5, elements=None, degree
     def apart(fine, coarse):
         return np.abs(fine - coarse) / np.abs(fine - load_factor)
 
-    (load_factors, _, state, shapes, softness, conservative, most), error, _ = until_two_meshes_agree(
-        scene,
-        lambda layout: _critical(scene, layout, count, load_factor, degree, comm),
-        apart,
-        tol,
-        first=FIRST_ELEMENTS,
-        most=_MOST_ELEMENTS,
-        elements=elements,
-        degree=degree,
-        advice="a larger tol",
-    )
+    with MeshProgress("buckling", tol, progress, comm) as bar:
+        (load_factors, _, state, shapes, softness, conservative, most), error, _ = until_two_meshes_agree(
+            scene,
+            lambda layout: _critical(scene, layout, count, load_factor, degree, comm),
+            apart,
+            tol,
+            first=FIRST_ELEMENTS,
+            most=_MOST_ELEMENTS,
+            elements=elements,
+            degree=degree,
+            progress=bar,
+            advice="a larger tol",
+        )
     error = np.maximum(error, softness)  # an error that both meshes share; NaN stays
     if (error > tol).any():
         raise NotConverged(
