@@ -148,28 +148,30 @@ def add_body(plotter, pyvista, body, factor, peak, moving=False):
     return surface
 
 
-def frame(plotter, everywhere, bar=True):
+def frame(plotter, everywhere, panel=False):
     """Draw axes with units around points (n, 3), m, and place the camera so that it shows them all.
 
     Args:
-        bar: whether a colour bar needs room on the right.
+        panel: whether it is one of several drawings side by side, with fewer labels, and without a colour bar.
     """
     span = np.ptp(everywhere, axis=0)
-    bounds, counts = _bounds(everywhere, float(span.max()))
+    bounds, counts = _bounds(everywhere, float(span.max()), sparse=panel)
     plotter.show_bounds(
         bounds=bounds, xtitle="x (m)", ytitle="y (m)", ztitle="z (m)", color="black", font_size=8,
         location="outer", fmt="%.4g", use_3d_text=False, **counts,
     )  # fmt: skip
-    _place_camera(plotter, np.reshape(bounds, (3, 2)), span, bar)
+    _place_camera(plotter, np.reshape(bounds, (3, 2)), span, panel)
 
 
-def _bounds(points, size):
-    """Round limits of the axes, and the number of labels on each."""
+def _bounds(points, size, sparse):
+    """Round limits of the axes, and the number of labels on each; where `sparse`, at most four."""
     step = 10 ** math.floor(math.log10(size / 5))
     step *= next(f for f in (1, 2, 5, 10) if size / (f * step) <= 6)
     low, high = step * np.floor(points.min(axis=0) / step + 1e-9), step * np.ceil(points.max(axis=0) / step - 1e-9)
     counts = np.round((high - low) / step).astype(int) + 1
     flat = counts == 1
+    if sparse:
+        counts = [next(n for n in (count, 4, 3, 2) if n <= 4 and (count - 1) % max(n - 1, 1) == 0) for count in counts]
     low, high = low - 0.03 * size * flat, high + 0.03 * size * flat
     labels = {f"n_{axis}labels": int(max(n, 2)) for axis, n in zip("xyz", counts, strict=True)}
     return tuple(np.column_stack([low, high]).ravel()), labels
@@ -194,7 +196,7 @@ def view_of(span):
     return view, right, np.cross(view, right), up
 
 
-def _place_camera(plotter, bounds, span, bar):
+def _place_camera(plotter, bounds, span, panel):
     """View a plane scene along its normal, others from a corner, with margins for labels, title and colour bar."""
     view, right, above, up = view_of(span)
     corners = np.array(np.meshgrid(*bounds)).reshape(3, -1).T
@@ -203,9 +205,9 @@ def _place_camera(plotter, bounds, span, bar):
     left, bottom, right_side, top = plotter.renderer.viewport  # the whole window, or a panel of it
     aspect = plotter.window_size[0] * (right_side - left) / (plotter.window_size[1] * (top - bottom))
     # the drawing fills 62 % of the width, left of the bar, and 64 % of the height, between title and axis
-    half = max(height / (0.64 if bar else 0.58), width / (0.62 * aspect)) / 2
+    half = max(height / (0.58 if panel else 0.64), width / (0.62 * aspect)) / 2
     centre = (across.max() + across.min()) / 2 * right + (high.max() + high.min()) / 2 * above
-    shift = (0.12 * aspect, -0.03) if bar else (-0.06 * aspect, 0.02)
+    shift = (-0.08 * aspect, 0.02) if panel else (0.12 * aspect, -0.03)
     focus = centre + half * (shift[0] * right + shift[1] * above)
     plotter.enable_parallel_projection()
     plotter.camera.focal_point = tuple(focus)

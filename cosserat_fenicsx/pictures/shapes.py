@@ -2,6 +2,7 @@
 
 import math
 import textwrap
+from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -9,16 +10,20 @@ import numpy as np
 from cosserat_fenicsx.checks import number, positive, refuse
 from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.pictures.animation import check_name, pixels, record
-from cosserat_fenicsx.pictures.drawing import body_of, frame, load_pyvista, points_of, surface_of, thickening
+from cosserat_fenicsx.pictures.drawing import body_of, frame, load_pyvista, points_of, surface_of, thickening, view_of
 from cosserat_fenicsx.ranks import on_first
 from cosserat_fenicsx.results.shapes import require_modes
 
-# Panels of a picture, and in a row of it; width and height of a panel, height of the title, pixels.
-_MOST_PANELS, _IN_A_ROW, _PANEL, _TITLE = 6, 3, (640, 620), 70
+# Panels of a picture, and in a row of it.
+_MOST_PANELS, _IN_A_ROW = 6, 3
+# Width of a panel, its least and largest height, height of the title, pixels.
+_WIDTH, _HEIGHTS, _TITLE = 640, (520, 640), 70
 # Largest rotation that is drawn, as the tangent of its angle.
 _STEEPEST = 1.0
+# Memory for frames of a film, which are drawn once, bytes.
+_MEMORY = 200_000_000
 # Pieces along a rod; mean width of a letter of the titles, pixels.
-_PIECES, _LETTER = 100, 11
+_PIECES, _LETTER = 200, 11
 
 
 def draw(found, file, which, amplitude):
@@ -61,7 +66,7 @@ def film(found, file, k, *, fps, seconds, cycles, amplitude, size, progress):
     if repeats:
         fps = 100 / round(100 / fps)
     frames = 2 * max(2, round(fps * seconds / 2))  # even: the frame in the middle is the opposite of the first
-    shares = np.cos(2 * math.pi * np.arange(frames * cycles) / frames)
+    shares = np.round(np.cos(2 * math.pi * np.arange(frames * cycles) / frames), 12)  # equal ones are drawn once
     on_first(found.comm, lambda: record(lambda: _Stage(found, k, amplitude, size), file, shares, fps, progress))
 
 
@@ -129,29 +134,39 @@ def _panels(found, shown, amplitude):
     pyvista = load_pyvista()
     across = len(shown) if len(shown) <= _IN_A_ROW else _IN_A_ROW if len(shown) > 4 else 2
     down = math.ceil(len(shown) / across)
-    width, height = across * _PANEL[0], down * _PANEL[1] + _TITLE
+    drawn = [Drawn(found, k, amplitude) for k in shown]
+    everywhere = np.concatenate([shape.everywhere() for shape in drawn])
+    panel = _height(everywhere)
+    width, height = across * _WIDTH, down * panel + _TITLE
     plotter = pyvista.Plotter(
         off_screen=True, window_size=(width, height), border=False, shape=(down + 1, across),
-        row_weights=[_TITLE, *[_PANEL[1]] * down], groups=[(0, slice(None))],
+        row_weights=[_TITLE, *[panel] * down], groups=[(0, slice(None))],
     )  # fmt: skip
     plotter.set_background("white")
     plotter.enable_anti_aliasing("msaa", multi_samples=8)  # supersampling leaves all panels but one black
     plotter.subplot(0, 0)
     plotter.add_text(_head(found, width), position="upper_edge", color="black", font_size=12)
-    drawn = [Drawn(found, k, amplitude) for k in shown]
-    everywhere = np.concatenate([shape.everywhere() for shape in drawn])
     for i, (k, shape) in enumerate(zip(shown, drawn, strict=True)):
         plotter.subplot(1 + i // across, i % across)
         _add(plotter, pyvista, shape, shape.bodies(), everywhere)
-        text = f"k = {k}: {found.label(k)}\n{_below(shape, shape.bodies(), everywhere, _PANEL[0])}"
+        text = f"k = {k}: {found.label(k)}\n{_below(shape, shape.bodies(), everywhere, _WIDTH)}"
         plotter.add_text(text, position="upper_edge", color="black", font_size=9)
-        frame(plotter, everywhere, bar=False)
+        frame(plotter, everywhere, panel=True)
     return plotter
+
+
+def _height(everywhere):
+    """The height of a panel that suits a drawing of points (n, 3), pixels."""
+    _, right, above, _ = view_of(np.ptp(everywhere, axis=0))
+    across, high = np.ptp(everywhere @ right), np.ptp(everywhere @ above)
+    return int(np.clip(_WIDTH * high / max(across, 1e-9 * high), *_HEIGHTS))
 
 
 def _head(found, width):
     at = f" about the equilibrium at the load factor {found.load_factor:g}" if found.load_factor else ""
-    return textwrap.fill(f"{found.scene.title or 'Shapes'}: {found.title.lower()}{at}", width // _LETTER)
+    what = f"{found.scene.title}: {found.title.lower()}" if found.scene.title else found.title
+    title = textwrap.fill(f"{what}{at}", width // _LETTER)
+    return f"{title}\ncoloured by the size of the motion: none is dark, the largest bright"
 
 
 def _below(shape, bodies, everywhere, width):
@@ -176,7 +191,7 @@ def _add(plotter, pyvista, shape, bodies, everywhere):
 
 
 class _Stage:
-    """The scene of a film: `at(share)` is the picture at a share of the amplitude."""
+    """The scene of a film: `at(share)` is the picture (height, width, 3) at a share of the amplitude, from -1 to 1."""
 
     def __init__(self, found, k, amplitude, size):
         pyvista = load_pyvista()
@@ -192,10 +207,10 @@ class _Stage:
         below = _below(self._shape, bodies, self._everywhere, size[0])
         text = f"{_head(found, size[0])}\nk = {k}: {found.label(k)}\n{below}"
         self._plotter.add_text(text, position="upper_edge", color="black", font_size=10)
-        frame(self._plotter, self._everywhere, bar=False)
+        frame(self._plotter, self._everywhere, panel=True)
+        self.at = lru_cache(maxsize=max(1, _MEMORY // (3 * size[0] * size[1])))(self._draw)
 
-    def at(self, share):
-        """(height, width, 3) the picture at a share of the amplitude, from -1 to 1."""
+    def _draw(self, share):
         for surface, body, factor in zip(self._surfaces, self._shape.bodies(share), self._factors, strict=True):
             surface.points[:] = points_of(body, factor)
             surface["values"][:] = np.repeat(body.moment, body.outline.shape[1])
