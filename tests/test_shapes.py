@@ -104,12 +104,12 @@ def test_modes_of_a_pinned_column_by_the_command_line(command, tmp_path, capsys)
         assert float(row["frequency (Hz)"]) == pytest.approx(frequency, rel=1e-4)
         assert float(row["period (s)"]) == pytest.approx(1 / frequency, rel=1e-4)
     assert not (tmp_path / "modes.png").exists()
-    assert f"load factor {eta:g} is stable: no negative mode" in capsys.readouterr().out
+    assert f"load factor {eta:g} has no negative mode (stable)" in capsys.readouterr().out
     assert command("modes", "--count", 1, "--elements", 3, "--degree", 2) == 0
     said = capsys.readouterr().out
     assert "unknown" in said and "degree 2, 3 elements" in said
     assert command("modes", "--count", 2, "--load-factor", 15, "--elements", 3) == 0
-    assert "is unstable: 1 negative mode" in capsys.readouterr().out
+    assert "has 1 negative mode(s) (unstable)" in capsys.readouterr().out
 
 
 @pytest.mark.serial
@@ -128,6 +128,22 @@ def test_modes_of_a_pinned_column_by_the_command_line(command, tmp_path, capsys)
 def test_refused_by_the_command_line(arguments, code, words, command, capsys):
     assert command(*arguments) == code
     assert words in capsys.readouterr().err
+
+
+@pytest.mark.serial
+def test_ctrl_c_between_two_files(command, tmp_path, capsys, monkeypatch):
+    """What is written is complete, and is said."""
+    from cosserat_fenicsx.cli import eigen
+
+    def obey():
+        if (tmp_path / "modes.csv").exists():
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr(eigen, "obey", obey)
+    assert command("modes", "--elements", 3, "-o", tmp_path) == 130
+    told = capsys.readouterr()
+    assert "frequency (Hz)" in told.out and "interrupted; completely written" in told.err and "modes.csv" in told.err
+    assert not (tmp_path / "modes.xdmf").exists()
 
 
 def test_nothing_found_is_written_as_such(tmp_path_all):
@@ -190,7 +206,8 @@ def test_unknown_modes_are_refused(bent, tmp_path_all):
         with pytest.raises(cf.SceneError, match=words.format(7)):
             ask()
     for more, said in (({"cycles": 0}, "animate.cycles = 0"), ({"seconds": 0}, "animate.seconds = 0"),
-                       ({"amplitude": -1}, "animate.amplitude = -1"), ({"fps": 1e9}, "animate.fps")):  # fmt: skip
+                       ({"amplitude": -1}, "animate.amplitude = -1"), ({"fps": 1e9}, "animate.fps"),
+                       ({"seconds": 60, "cycles": 10}, "at most 10000 frames, not 15000")):  # fmt: skip
         with pytest.raises(cf.SceneError, match=said):
             found.animate(film, **more)
     assert not film.exists()

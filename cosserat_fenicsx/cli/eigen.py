@@ -6,6 +6,7 @@ from pathlib import Path
 from cosserat_fenicsx.cli.deliver import prepare
 from cosserat_fenicsx.cli.say import DONE, INTERRUPTED, NOT_CONVERGED, say
 from cosserat_fenicsx.errors import NotConverged
+from cosserat_fenicsx.interrupts import obey
 
 
 def run_buckling(options):
@@ -42,24 +43,24 @@ def _deliver(options, compute, table):
         say(f"cosserat: {failure}")
         return NOT_CONVERGED
     say(table(found), file=sys.stdout)
-    if out is None:
-        return DONE
-    try:
-        _write(found, out, options.command, picture=not options.no_picture)
-    except KeyboardInterrupt:
-        say("cosserat: interrupted; the file that was being written is incomplete")
-        return INTERRUPTED
-    return DONE
+    return DONE if out is None else _write(found, out, options.command, picture=not options.no_picture)
 
 
 def _write(found, out, name, *, picture):
-    """Write the table, and the shapes where there are any."""
-    written = [f"{name}.csv"]
-    found.write(out / f"{name}.csv")
+    """Write the table, and the shapes where there are any; returns the exit code."""
+    tasks = [(f"{name}.csv", found.write)]
     if len(found):
-        found.write(out / f"{name}.xdmf")
-        written += [f"{name}.xdmf", f"{name}.h5"]
+        tasks.append((f"{name}.xdmf", found.write))
         if picture:
-            found.plot(out / f"{name}.png")
-            written.append(f"{name}.png")
+            tasks.append((f"{name}.png", found.plot))
+    written = []
+    try:
+        for file, task in tasks:
+            obey()
+            task(out / file)
+            written.append(f"{file} with .h5" if file.endswith(".xdmf") else file)
+    except KeyboardInterrupt:
+        say(f"cosserat: interrupted; completely written to {out}/: {', '.join(written) or 'nothing'}")
+        return INTERRUPTED
     say(f"written to {out}/: {', '.join(written)}", file=sys.stdout)
+    return DONE

@@ -21,7 +21,7 @@ from cosserat_fenicsx.ranks import on_first
 #: Default frames per second, and width and height in pixels.
 FPS, SIZE = 25, (960, 720)
 # Least and largest duration (s) of a film in real time, largest duration (s) of others, and largest number of frames.
-_SHORTEST_REAL_TIME, _LONGEST_REAL_TIME, _LONGEST, _MOST_FRAMES = 4.0, 20.0, 10.0, 10_000
+_SHORTEST_REAL_TIME, _LONGEST_REAL_TIME, _LONGEST, MOST_FRAMES = 4.0, 20.0, 10.0, 10_000
 # Colours of a .gif whose channels are all above this become white: quantisation would give nearly white stains.
 _WHITE = 244
 # Segments along a rod; mean width of a letter of the title, pixels.
@@ -103,8 +103,8 @@ def _times(start, duration, speed, fps):
     """The times (s) of the frames, the last one at the end."""
     step = speed / fps
     count = math.ceil(duration / step - 1e-6)
-    if count > _MOST_FRAMES:
-        expected = f"one that needs at most {_MOST_FRAMES} frames, not {count}: more, or fewer fps"
+    if count > MOST_FRAMES:
+        expected = f"one that needs at most {MOST_FRAMES} frames, not {count}: more, or fewer fps"
         refuse("animate", "speed", speed, expected)
     return start + np.append(step * np.arange(count), duration)
 

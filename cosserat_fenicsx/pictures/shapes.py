@@ -9,7 +9,7 @@ import numpy as np
 
 from cosserat_fenicsx.checks import number, positive, refuse
 from cosserat_fenicsx.errors import SceneError
-from cosserat_fenicsx.pictures.animation import check_name, pixels, record
+from cosserat_fenicsx.pictures.animation import MOST_FRAMES, check_name, pixels, record
 from cosserat_fenicsx.pictures.drawing import body_of, frame, load_pyvista, points_of, surface_of, thickening, view_of
 from cosserat_fenicsx.ranks import on_first
 from cosserat_fenicsx.results.shapes import require_modes
@@ -66,6 +66,8 @@ def film(found, file, k, *, fps, seconds, cycles, amplitude, size, progress):
     if repeats:
         fps = 100 / round(100 / fps)
     frames = 2 * max(2, round(fps * seconds / 2))  # even: the frame in the middle is the opposite of the first
+    if frames * cycles > MOST_FRAMES:
+        refuse("animate", "cycles", cycles, f"fewer: at most {MOST_FRAMES} frames, not {frames * cycles}")
     shares = np.round(np.cos(2 * math.pi * np.arange(frames * cycles) / frames), 12)  # equal ones are drawn once
     on_first(found.comm, lambda: record(lambda: _Stage(found, k, amplitude, size), file, shares, fps, progress))
 

@@ -10,9 +10,9 @@ from cosserat_fenicsx.scene.describe import actions_in_words
 def buckling_table(found):
     """Text: critical load factors by linear buckling, where each mode moves most, and the limits of the result."""
     caption = (
-        f"Load factors at which the state at the load factor {found.load_factor:g}, extrapolated linearly, loses its "
-        "stability.\n"
-        "est. error: relative, of the load factor. A structure that bends much before it buckles needs `cosserat run`."
+        f"The equilibrium at the load factor {found.load_factor:g}, extrapolated linearly, becomes critical there.\n"
+        "est. error: relative, of the load factor.\n"
+        "A structure that bends much before it buckles needs `cosserat run`."
     )
     headings = ("critical load factor", "est. error")
     rows = [(f"{eta:.7g}", _error(error)) for eta, error in zip(found.load_factors, found.error, strict=True)]
@@ -26,15 +26,15 @@ def buckling_table(found):
 def modes_table(found):
     """Text: natural frequencies, where each mode moves most, and whether the state is stable."""
     caption = (
-        "est. error: relative, of the square of the frequency. 0 Hz: a free motion, or one that grows as exp(growth t)."
+        "est. error: relative, of the square of the frequency.\n"
+        "0 Hz: a free motion, or one that grows as exp(growth t)."
     )
     numbers = zip(found.frequencies, found.periods, found.growth, found.error, strict=True)
     rows = [(f"{f:.7g}", f"{T:.5g}" if f else "-", f"{growth:.4g}", _error(e)) for f, T, growth, e in numbers]
     text = _table(found, ("frequency (Hz)", "period (s)", "growth (1/s)", "est. error"), rows, caption)
-    state = f"The state at the load factor {found.load_factor:g}"
-    negative = found.negative_modes
-    verdict = "is stable: no negative mode" if not negative else f"is unstable: {negative} negative mode(s)"
-    return f"{text}\n{state} {verdict}.\n{found.caution}".rstrip()
+    verdict = {0: "no negative mode (stable)" if found.conservative else "no negative mode", -1: "a singular stiffness"}
+    counted = verdict.get(found.negative_modes, f"{found.negative_modes} negative mode(s) (unstable)")
+    return f"{text}\nThe equilibrium at the load factor {found.load_factor:g} has {counted}.\n{found.caution}".rstrip()
 
 
 def _table(found, headings, rows, caption):

@@ -89,7 +89,7 @@ class Shapes(OnNodes):
     conservative: bool
     comm: object
 
-    #: what the shapes are, in titles, and what the first column of tables is called
+    #: what the shapes are, in titles
     title = ""
 
     scene = property(lambda self: self.equilibrium.scene)
