@@ -31,7 +31,7 @@ _BLOCK = 256
 _HEAD = """<?xml version='1.0' encoding='utf-8'?>
 <Xdmf Version="3.0">
   <Domain>
-    <Grid Name="path" GridType="Collection" CollectionType="Temporal">
+    <Grid Name="{name}" GridType="Collection" CollectionType="Temporal">
 """
 _TAIL = """    </Grid>
   </Domain>
@@ -60,30 +60,47 @@ def write_state(path, file, k=None):
 
 
 def write_series(path, file, k=None):
-    """Write all points: the arrays to the .h5 file, and the .xdmf file that refers to them. Both appear when they are
-    complete, the .xdmf last.
+    """Write all points of a path or a motion, over the load factor or the time; see `write_blocks`."""
+    write_blocks(file, "path", path.along_axis, _blocks(path))
+
+
+def _blocks(path):
+    """Reference, lines and fields of some states after others, as `write_blocks` takes them."""
+    for first in range(0, len(path), _BLOCK):
+        points, cells, data = meshes_of(path, range(first, min(first + _BLOCK, len(path))))
+        q = data.pop("quaternion")  # some readers support no arrays of four components
+        fields = {"position": points, **data, "quaternion_a": q[..., 0], "quaternion_bcd": q[..., 1:]}
+        yield points[0] - data["displacement"][0], cells[0][1], fields
+
+
+def write_blocks(file, name, along, blocks):
+    """Write states on one mesh: the arrays to the .h5 file, and the .xdmf file that refers to them.
+
+    Both appear when they are complete, the .xdmf last.
+
+    Args:
+        file: the .xdmf; name: of the series.
+        along: (states,) their times.
+        blocks: of some states after others: nodes (n, 3) in m, lines (elements, 2) and fields {name: (states, n) or
+            (states, n, 3)}; nodes and lines are the same in all of them.
 
     Raises:
         OSError: they cannot be written; the old ones stay.
     """
-    numbers, along = file.with_suffix(".h5"), path.along_axis
+    numbers, k = file.with_suffix(".h5"), 0
     with replaced(file) as text, replaced(numbers) as fresh:
         with arrays_in(fresh) as put, open(text, "w", encoding="utf-8") as stream:
-            stream.write(_HEAD)
-            for first in range(0, len(path), _BLOCK):
-                which = range(first, min(first + _BLOCK, len(path)))
-                points, cells, data = meshes_of(path, which)
-                if first == 0:
-                    lines = cells[0][1]
-                    put("reference", points[0] - data["displacement"][0])
+            stream.write(_HEAD.format(name=name))
+            for nodes, lines, fields in blocks:
+                if k == 0:
+                    put("reference", nodes)
                     put("lines", lines)
-                q = data.pop("quaternion")  # some readers support no arrays of four components
-                fields = {"position": points, **data, "quaternion_a": q[..., 0], "quaternion_bcd": q[..., 1:]}
-                for k, *arrays in zip(which, *fields.values(), strict=True):
-                    for name, array in zip(fields, arrays, strict=True):
-                        put(f"{name}_{k}", array)
                 grid = _grid(numbers.name, lines, fields)
-                stream.writelines(grid.format(k=k, along=repr(float(along[k]))) for k in which)
+                for arrays in zip(*fields.values(), strict=True):
+                    for field, array in zip(fields, arrays, strict=True):
+                        put(f"{field}_{k}", array)
+                    stream.write(grid.format(k=k, along=repr(float(along[k]))))
+                    k += 1
             stream.write(_TAIL)
 
 
