@@ -8,7 +8,7 @@ import numpy as np
 _LETTER, _LINE, _GAP, _EDGE = 0.56, 1.15, 3, 4
 # Distances (pixels) from what a label belongs to, and turns (deg) of its direction, in the order of preference; from
 # the last distances a thin line leads back.
-_DISTANCES, _TURNS, _LEADER = (16, 26, 42, 64, 92), (0, 40, -40, 80, -80, 120, -120, 180), 40
+_DISTANCES, _TURNS, _LEADER = (16, 26, 42, 64, 92, 128), (0, 40, -40, 80, -80, 120, -120, 180), 40
 # Pixels between a label and the middle of a rod.
 _CLEAR = 10
 
@@ -59,6 +59,11 @@ class Labels:
                 return True
         self.left_out.append(text)
         return False
+
+    @property
+    def boxes(self):
+        """The rectangles of the labels and of what is reserved: (left, bottom, right, top), pixels."""
+        return list(self._placed)
 
     def draw(self, plotter, pyvista):
         """Put all labels into the drawing."""
