@@ -6,7 +6,6 @@ import json
 import math
 import string
 from importlib import resources
-from pathlib import Path
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -15,7 +14,6 @@ from cosserat_fenicsx.pictures.axes import axes_of
 from cosserat_fenicsx.pictures.colours import MAPS, known, peak_of
 from cosserat_fenicsx.pictures.drawing import at_rest, outlines, thickness
 from cosserat_fenicsx.pictures.view import view_of
-from cosserat_fenicsx.ranks import on_first
 
 #: Fields that can be chosen in the file, where the result has them; the first is shown at first.
 FIELDS = ("bending_moment", "m.3", "n.3", "shear_force", "displacement", "von_mises")
@@ -31,18 +29,17 @@ _PARTS = ("rods.js", "camera.js", "axes.js", "app.js")
 
 
 def write(result, file):
-    """Write a path or a motion as an interactive .html file (rank 0 writes): a slider over the states, turning, zooming
+    """Write a path or a motion as an interactive .html file, on one rank: a slider over the states, turning, zooming
     and moving by mouse and touch, a play button, and a choice of the field that colours the rods.
 
     States beyond some hundreds are left out evenly, which the file says.
 
+    Args:
+        file: a `pathlib.Path`.
+
     Raises:
         OSError: the file cannot be written.
     """
-    on_first(result.comm, lambda: _write(result, Path(file)))
-
-
-def _write(result, file):
     file.parent.mkdir(parents=True, exist_ok=True)
     file.write_text(page(result), encoding="utf-8")
 

@@ -45,7 +45,7 @@ def write(path, file, k=-1):
     if Path(file).suffix == ".html":
         from cosserat_fenicsx.pictures import viewer
 
-        viewer.write(path, file)
+        on_first(path.comm, lambda: viewer.write(path, Path(file)))
         return
     on_first(path.comm, lambda: _write(path, Path(file), k))
 
