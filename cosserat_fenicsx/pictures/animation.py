@@ -15,6 +15,7 @@ from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.interrupts import obey
 from cosserat_fenicsx.pictures.between import Between
 from cosserat_fenicsx.pictures.drawing import add_body, at_rest, frame, load_pyvista, points_of, prefix, thickening
+from cosserat_fenicsx.pictures.labels import plain
 from cosserat_fenicsx.progress import Progress
 from cosserat_fenicsx.ranks import on_first
 from cosserat_fenicsx.results.beside import replaced
@@ -204,7 +205,7 @@ class _Stage:
             mesh.GetPointData().GetScalars().Modified()
         text = f"{self._head}: t = {t:.{self._digits}f} s ({self._pace}){self._notes}"
         self._plotter.add_text(
-            "\n".join(textwrap.fill(line, self._letters) for line in text.split("\n")),
+            plain("\n".join(textwrap.fill(line, self._letters) for line in text.split("\n"))),
             position="upper_edge",
             color="black",
             font_size=10,
