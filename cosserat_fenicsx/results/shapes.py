@@ -147,6 +147,12 @@ class Shapes(OnNodes):
         place = int(np.argmax(size))
         return rod.at(self.equilibrium.s(rod)[place]), self.mode(k, rod)[place] / size[place]
 
+    def _repr_html_(self):
+        """A table for notebooks."""
+        from cosserat_fenicsx.results.shape_tables import html_table
+
+        return html_table(self)
+
     # -- files and pictures ------------------------------------------------------------------------------------------
 
     def write(self, file, k=0):
