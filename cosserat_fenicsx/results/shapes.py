@@ -129,9 +129,8 @@ class Shapes(OnNodes):
             SceneError: there is no such mode.
         """
         if isinstance(k, bool) or not isinstance(k, numbers.Integral) or not -len(self) <= k < len(self):
-            refuse(
-                self, "k", k, f"the number of a mode, from 0 to {len(self) - 1}" if len(self) else "nothing: no mode"
-            )
+            known = f"from 0 to {len(self) - 1}" if len(self) else "of which there are none"
+            refuse(self, "k", k, f"the number of a mode, {known}")
         return int(k) % len(self)
 
     def twists(self, k):
