@@ -6,6 +6,7 @@ import pickle
 import numpy as np
 import pytest
 from conftest import COMM, column
+from test_progress import Terminal
 
 import cosserat_fenicsx as cf
 from cosserat_fenicsx import interrupts, progress
@@ -163,6 +164,7 @@ def test_the_words_of_a_result(bent):
     assert "Hz, squares with error not estimated, at the load factor 0.5" in repr(found)
     buckled = cf.buckling(column(eccentricity=0.0)[1], elements=4)
     assert repr(buckled).startswith("<Buckling: critical load factors 0.9999")
+    assert "<td>0</td><td>0.99995" in buckled._repr_html_()
     assert found.label(0).endswith(" Hz") and buckled.label(0) == "critical load factor 0.99995"
 
 
@@ -202,6 +204,8 @@ def test_unknown_modes_are_refused(bent, tmp_path_all):
     for k, ask in ((3, found.mode), (-4, found.turns), (1.0, found.mode)):
         with pytest.raises(cf.SceneError, match=words.format(k)):
             ask(k)
+    with pytest.raises(cf.SceneError, match="plot.which = 2: expected a list of the numbers of one to 6 modes"):
+        found.plot(film.with_suffix(".png"), 2)
     for ask in (lambda: found.animate(film, 7), lambda: found.plot(film.with_suffix(".png"), [7])):
         with pytest.raises(cf.SceneError, match=words.format(7)):
             ask()
@@ -286,3 +290,7 @@ def test_progress_tells_meshes_and_the_time(capsys, monkeypatch):
     assert "buckling: " in capsys.readouterr().err
     cf.buckling(scene, progress=False)
     assert capsys.readouterr().err == ""
+    screen = Terminal()
+    monkeypatch.setattr(progress.sys, "stderr", screen)
+    cf.buckling(scene, progress=True)
+    assert " buckling" in screen.getvalue() and screen.getvalue().endswith("\x1b[2K"), "the line is removed at the end"

@@ -2,6 +2,7 @@
 
 import math
 import textwrap
+from collections.abc import Collection
 from functools import lru_cache
 from pathlib import Path
 
@@ -32,9 +33,10 @@ def draw(found, file, which, amplitude):
     """Picture of some shapes, a panel each; see `Shapes.plot`."""
     require_modes(found, file)
     positive("plot", "amplitude", amplitude, "-")
-    shown = [found.number(k) for k in (range(min(len(found), _MOST_PANELS)) if which is None else which)]
-    if not 1 <= len(shown) <= _MOST_PANELS:
-        refuse("plot", "which", which, f"the numbers of at least one mode and at most {_MOST_PANELS}")
+    which = range(min(len(found), _MOST_PANELS)) if which is None else which
+    if not isinstance(which, Collection) or not 1 <= len(which) <= _MOST_PANELS:
+        refuse("plot", "which", which, f"a list of the numbers of one to {_MOST_PANELS} modes")
+    shown = [found.number(k) for k in which]
     if file is None:
         return _panels(found, shown, amplitude)
     file = Path(file)

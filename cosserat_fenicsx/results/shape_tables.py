@@ -1,5 +1,7 @@
 """Results of buckling and of natural vibrations as tables for the screen."""
 
+from html import escape
+
 import numpy as np
 from rich.table import Table
 
@@ -35,6 +37,17 @@ def modes_table(found):
     verdict = {0: "no negative mode (stable)" if found.conservative else "no negative mode", -1: "a singular stiffness"}
     counted = verdict.get(found.negative_modes, f"{found.negative_modes} negative mode(s) (unstable)")
     return f"{text}\nThe equilibrium at the load factor {found.load_factor:g} has {counted}.\n{found.caution}".rstrip()
+
+
+def html_table(found):
+    """The numbers of all modes as a table in HTML, with the limits of the result."""
+    head = "".join(f"<th>{name}</th>" for name in ("k", *found.columns))
+    rows = "".join(
+        f"<tr>{''.join(f'<td>{value:.7g}</td>' for value in (k, *values))}</tr>"
+        for k, values in enumerate(zip(*found.columns.values(), strict=True))
+    )
+    title = f"{found.scene.title}: {found.title.lower()}" if found.scene.title else found.title
+    return f"<table><caption>{escape(title)}</caption><tr>{head}</tr>{rows}</table><p>{escape(found.caution)}</p>"
 
 
 def _table(found, headings, rows, caption):

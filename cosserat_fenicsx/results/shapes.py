@@ -129,9 +129,8 @@ class Shapes(OnNodes):
             SceneError: there is no such mode.
         """
         if isinstance(k, bool) or not isinstance(k, numbers.Integral) or not -len(self) <= k < len(self):
-            refuse(
-                self, "k", k, f"the number of a mode, from 0 to {len(self) - 1}" if len(self) else "nothing: no mode"
-            )
+            known = f"from 0 to {len(self) - 1}" if len(self) else "of which there are none"
+            refuse(self, "k", k, f"the number of a mode, {known}")
         return int(k) % len(self)
 
     def twists(self, k):
@@ -146,6 +145,12 @@ class Shapes(OnNodes):
         size, rod = max(sizes, key=lambda item: round(item[0].max(), 9))
         place = int(np.argmax(size))
         return rod.at(self.equilibrium.s(rod)[place]), self.mode(k, rod)[place] / size[place]
+
+    def _repr_html_(self):
+        """A table for notebooks."""
+        from cosserat_fenicsx.results.shape_tables import html_table
+
+        return html_table(self)
 
     # -- files and pictures ------------------------------------------------------------------------------------------
 
