@@ -185,9 +185,9 @@ def reactions_by_nodes(test, change, trial):
 
 def reactions_by_multipliers(test, gradient):
     """Gradients (ties, tied nodes, 6) as columns on the rows of the nodes."""
-    return (test @ gradient.transpose(1, 2, 0)).reshape(len(test) * test.shape[1], len(gradient))
+    return (test @ gradient.transpose(1, 2, 0)).reshape(gradient.shape[1] * test.shape[1], len(gradient))
 
 
 def by_nodes(gradient, trial):
     """Gradients (ties, tied nodes, 6) as rows on the columns of the nodes."""
-    return (gradient.swapaxes(0, 1) @ trial).swapaxes(0, 1).reshape(len(gradient), len(trial) * trial.shape[2])
+    return (gradient.swapaxes(0, 1) @ trial).swapaxes(0, 1).reshape(len(gradient), gradient.shape[1] * trial.shape[2])
