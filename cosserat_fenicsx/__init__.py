@@ -4,14 +4,14 @@ Modules are imported when their names are first used, so that `import cosserat_f
 """
 
 import importlib
-from pathlib import Path as _FilePath
+from os import path as _path
 
 __version__ = "0.1.0"
 
-_checkout = _FilePath(__file__).resolve().parent.parent
-if (_checkout / "forms" / "spatial.py").is_file() and (_checkout / "pyproject.toml").is_file():
+_checkout = _path.dirname(_path.dirname(_path.realpath(__file__)))
+if all(_path.isfile(_path.join(_checkout, *file)) for file in (("forms", "spatial.py"), ("pyproject.toml",))):
     # A plain checkout: forms/ lies beside the package; an installation has it inside.
-    __path__.append(str(_checkout))
+    __path__.append(_checkout)
 
 _HOME = {
     "analytic": None,
