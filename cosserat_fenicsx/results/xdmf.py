@@ -12,6 +12,8 @@ import numpy as np
 from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.results.arrays import arrays_in
 from cosserat_fenicsx.results.beside import replaced
+from cosserat_fenicsx.results.quantities import FIELDS as QUANTITIES
+from cosserat_fenicsx.scene.stresses import Stress
 
 #: Names in the files, as in eq. (1), and the fields of `Path.fields` behind them.
 FIELDS = {
@@ -26,11 +28,13 @@ FIELDS = {
     "curvature": "curvature",
     "bending_moment": "bending_moment",
 }
+_STRESSES = {name: name for name in Stress._fields}
 # States that are computed at once.
 _BLOCK = 256
 _HEAD = """<?xml version='1.0' encoding='utf-8'?>
 <Xdmf Version="3.0">
   <Domain>
+    {about}
     <Grid Name="path" GridType="Collection" CollectionType="Temporal">
 """
 _TAIL = """    </Grid>
@@ -69,7 +73,10 @@ def write_series(path, file, k=None):
     numbers, along = file.with_suffix(".h5"), path.along_axis
     with replaced(file) as text, replaced(numbers) as fresh:
         with arrays_in(fresh) as put, open(text, "w", encoding="utf-8") as stream:
-            stream.write(_HEAD)
+            stream.write(_HEAD.format(about=_about(path)))
+            constants = constants_of(path)
+            for name, array in constants.items():
+                put(name, array)
             for first in range(0, len(path), _BLOCK):
                 which = range(first, min(first + _BLOCK, len(path)))
                 points, cells, data = meshes_of(path, which)
@@ -82,16 +89,28 @@ def write_series(path, file, k=None):
                 for k, *arrays in zip(which, *fields.values(), strict=True):
                     for name, array in zip(fields, arrays, strict=True):
                         put(f"{name}_{k}", array)
-                grid = _grid(numbers.name, lines, fields)
+                grid = _grid(numbers.name, lines, fields, constants)
                 stream.writelines(grid.format(k=k, along=repr(float(along[k]))) for k in which)
             stream.write(_TAIL)
 
 
-def _grid(store, lines, fields):
+def _about(path):
+    """The text of Information elements: the names of the rods by their numbers, and the units of the fields."""
+    rods = "; ".join(f"{i}: {rod.name}" for i, rod in enumerate(path.scene.rods))
+    fields = {**_names(path), "arc_length": "s", "position": "position"}
+    units = "; ".join(f"{name}: {QUANTITIES[field].unit}" for name, field in fields.items())
+    along = "s" if path.axis == "time" else "1"
+    told = {"rods": rods, "units": f"{units}; time axis ({path.axis}): {along}"}
+    elements = (xml.Element("Information", Name=name, Value=value) for name, value in told.items())
+    return "\n    ".join(xml.tostring(element, encoding="unicode") for element in elements)
+
+
+def _grid(store, lines, fields, constants):
     """The text of one state, with {k} for its number and {along} for its load factor or time.
 
     Args:
-        store: the name of the .h5 file; lines: (elements, 2); fields: {name: (states, nodes, ...)}.
+        store: the name of the .h5 file; lines: (elements, 2); fields: {name: (states, nodes, ...)}; constants: {name:
+            (nodes,)} of all states.
     """
     grid, store = xml.Element("Grid", Name="point {k}", GridType="Uniform"), store.replace("{", "{{").replace("}", "}}")
 
@@ -107,6 +126,8 @@ def _grid(store, lines, fields):
     for name, array in fields.items():
         kind = {2: "Scalar", 3: "Vector"}[array.ndim]
         item(xml.SubElement(grid, "Attribute", Name=name, AttributeType=kind, Center="Node"), f"{name}_{{k}}", array[0])
+    for name, array in constants.items():
+        item(xml.SubElement(grid, "Attribute", Name=name, AttributeType="Scalar", Center="Node"), name, array)
     xml.indent(grid, level=3)
     return f"      {xml.tostring(grid, encoding='unicode').rstrip()}\n"
 
@@ -118,12 +139,26 @@ def mesh_of(path, k):
         points (n, 3), m; cells in meshio's format; dict of arrays (n, ...).
     """
     points, cells, data = meshes_of(path, [k])
-    return points[0], cells, {name: values[0] for name, values in data.items()}
+    return points[0], cells, {name: values[0] for name, values in data.items()} | constants_of(path)
+
+
+def constants_of(path):
+    """{name: (n,)} at all nodes: the arc length, m, and the number of the rod, from 0."""
+    nodes = path.layout.node_s(path.rule.nodes)
+    return {
+        "arc_length": np.concatenate([x * rod.length for x, rod in zip(nodes, path.scene.rods, strict=True)]),
+        "rod": np.concatenate([np.full(len(x), i) for i, x in enumerate(nodes)]),
+    }
+
+
+def _names(path):
+    """Names in the files, and the fields of `Path.fields` behind them."""
+    return {**FIELDS, **path.more_fields, **(_STRESSES if path.knows_stresses else {})}
 
 
 def meshes_of(path, which):
     """`mesh_of` at several points: arrays (points, n, ...)."""
-    names = {**FIELDS, **path.more_fields}
+    names = _names(path)
     points, lines, data, first = [], [], {name: [] for name in names}, 0
     for rod in path.scene.rods:
         fields = path.fields_at(which, rod)
