@@ -84,7 +84,7 @@ def test_buckling_of_a_pinned_column_leaves_the_program(command, tmp_path, capsy
             time, data, _ = reader.read_data(k)
             sign = np.sign(data["displacement"][1, 1])
             wave = (k + 1) * np.pi
-            assert time == k and set(data) == {"displacement", "rotation", "position"}
+            assert time == k and set(data) == {"displacement", "rotation", "position", "arc_length", "rod"}
             np.testing.assert_allclose(data["displacement"][:, 1] * sign, np.sin(wave * z), atol=2e-3)
             np.testing.assert_allclose(data["rotation"][:, 0] * sign, -wave * np.cos(wave * z), atol=6e-3 * wave)
             np.testing.assert_allclose(data["position"], points)

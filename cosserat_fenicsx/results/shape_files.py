@@ -11,6 +11,14 @@ from cosserat_fenicsx.results.columns import write_columns
 from cosserat_fenicsx.results.shapes import require_modes
 from cosserat_fenicsx.results.xdmf import write_blocks
 
+_UNITS = {
+    "displacement": "m",
+    "rotation": "rad",
+    "position": "m",
+    "arc_length": "m",
+    "time axis (number of a mode)": "1",
+}
+
 
 def write(found, file, k=0):
     """Write shapes to a file; see `Shapes.write`."""
@@ -37,7 +45,8 @@ def _write(found, file, k):
 
     points, lines = _mesh(found)
     if file.suffix == ".xdmf":
-        write_blocks(file, "modes", range(len(found)), [(points, lines, _fields(found, points, slice(None)))])
+        block = points, lines, _fields(found, points, slice(None))
+        write_blocks(file, "modes", found.equilibrium, range(len(found)), [block], _UNITS)
         return
     if file.suffix not in meshio.extension_to_filetypes:
         known = ".xdmf, .csv, .vtu, .vtk or another ending that meshio knows"
