@@ -96,14 +96,14 @@ def folding_ring(path):
 #: The scenes, in the order of the gallery, with the load factors that are solved for (None: the file's) and drawn.
 GALLERY = {
     eccentric_cantilever: (None, (0.5, 0.9, 1.0, 1.1, 1.5)),
-    lees_frame: ((0.0, 2.0), (0.0, 1.2, 1.854, 0.0, 2.0)),
+    lees_frame: ((0.0, 2.0), (0.0, 1.2, 1.854, 2.0)),
     bend_45: (None, (0.25, 0.5, 1.0)),
-    helical_spring: ((0.0, 1.0), (0.0, 0.5, 1.0)),
-    riser: ((0.0, 1.0), (0.0, 0.5, 1.0)),
+    helical_spring: (None, (0.0, 0.5, 1.0)),
+    riser: (None, (0.0, 0.5, 1.0)),
     cable: (None, (0.1, 0.5, 1.0)),
     soft_arm: (None, (0.25, 0.5, 0.75, 1.0)),
     tripod: (None, (1.0,)),
-    folding_ring: ((0.0, 1.0), (0.0, 0.34, 0.58, 0.68, 1.0)),
+    folding_ring: (None, (0.0, 0.34, 0.58, 0.68, 1.0)),
 }
 
 
