@@ -1,10 +1,13 @@
 """Progress of long runs on rank 0: a bar in a terminal, lines of text elsewhere, nothing for short runs."""
 
+import math
 import sys
+import threading
 import time
 
 _PATIENCE = 2.0  # s before a bar appears
 _LINE_EVERY = 10.0  # s between plain lines
+_REDRAWN = 0.5  # s between texts of `MeshProgress` in a terminal
 
 
 class Progress:
@@ -71,3 +74,59 @@ class Progress:
     def __exit__(self, *exception):
         if self._bar is not None:
             self._bar.stop()
+
+
+class MeshProgress:
+    """Context manager that says which mesh an eigenproblem is solved on, and for how long it has run.
+
+    The number of meshes is not known in advance, and one may take minutes: a thread tells the time.
+
+    Args:
+        what: name of the computation; tol: its relative accuracy.
+        wanted, comm: see `Progress`.
+    """
+
+    def __init__(self, what, tol, wanted, comm):
+        self._what, self._tol, self._now = what, tol, wanted is True
+        self._terminal = sys.stderr.isatty()
+        self._text, self._ended = what, threading.Event()
+        show = comm.rank == 0 and wanted is not False
+        self._thread = threading.Thread(target=self._tell, daemon=True) if show else None
+
+    def __enter__(self):
+        self._began = time.monotonic()
+        if self._thread:
+            self._thread.start()
+        return self
+
+    def on(self, elements, reached):
+        """The computation begins on a mesh.
+
+        Args:
+            elements: the largest number per rod; reached: estimated relative error so far, infinite where unknown.
+        """
+        error = f", estimated error {reached:.1e} of {self._tol:g}" if math.isfinite(reached) else ""
+        self._text = f"{self._what}: {elements} elements per rod{error}"
+        if self._now and self._thread and not self._terminal:
+            print(self._line(), file=sys.stderr, flush=True)
+
+    def _line(self):
+        return f"{self._text}, {time.monotonic() - self._began:.0f} s"
+
+    def _tell(self):
+        if self._terminal:
+            if self._ended.wait(0.0 if self._now else _PATIENCE):
+                return
+            from rich.console import Console
+
+            with Console(stderr=True).status(self._line()) as status:
+                while not self._ended.wait(_REDRAWN):
+                    status.update(self._line())
+            return
+        while not self._ended.wait(_LINE_EVERY):
+            print(self._line(), file=sys.stderr, flush=True)
+
+    def __exit__(self, *exception):
+        self._ended.set()
+        if self._thread:
+            self._thread.join()

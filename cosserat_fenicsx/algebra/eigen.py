@@ -156,9 +156,9 @@ def _solve(solver, kind, which, count, like, *, room=None, tolerance=_TOLERANCE)
     solver.setInitialSpace([start])
     try:
         solver.solve()
-    except (KeyboardInterrupt, PETSc.Error):
+    except (KeyboardInterrupt, PETSc.Error, SystemError):
         solver.incRef()  # destroying an interrupted solver would raise an error
-        obey()  # recent releases of petsc4py replace an exception of a callback by one of their own
+        obey()  # recent petsc4py replaces an exception of a callback by its own, and slepc4py 3.25 that by SystemError
         raise
     found = min(solver.getConverged(), count)
     values, vectors = np.zeros(found, dtype=complex), []

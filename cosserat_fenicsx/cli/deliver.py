@@ -27,7 +27,7 @@ def deliver(computed, options, moving):
     out, at = None, _numbers(options.at)
     if options.output:
         out = Path(options.output)
-        _prepare(out)  # fail before the computation, not after it
+        prepare(out)  # fail before the computation, not after it
     _check_film(options, moving)
     positive("plot", "magnify", options.magnify, "-")
     colour_of(options.color)
@@ -83,8 +83,12 @@ def _shown(path, at):
     return sorted({int(abs(along - x).argmin()) for x in at})
 
 
-def _prepare(out):
-    """Make the output folder, and check that it can be written to."""
+def prepare(out):
+    """Make the output folder, and check that it can be written to.
+
+    Raises:
+        SceneError: it cannot.
+    """
     try:
         out.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=out):

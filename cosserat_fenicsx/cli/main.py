@@ -7,10 +7,11 @@ import sys
 
 from cosserat_fenicsx import interrupts
 from cosserat_fenicsx.cli.deliver import deliver
+from cosserat_fenicsx.cli.eigen import run_buckling, run_modes
 from cosserat_fenicsx.cli.options import parser
-from cosserat_fenicsx.cli.say import BAD_INPUT, DONE, INTERRUPTED, NOT_CONVERGED, in_words, say
+from cosserat_fenicsx.cli.say import BAD_INPUT, DONE, INTERRUPTED, in_words, say
 from cosserat_fenicsx.cli.together import together
-from cosserat_fenicsx.errors import CosseratError, NotConverged
+from cosserat_fenicsx.errors import CosseratError
 
 
 def main(arguments=None):
@@ -19,7 +20,7 @@ def main(arguments=None):
     Returns:
         0 done, 1 not converged (the partial path is written), 2 bad input, 130 interrupted (likewise written).
     """
-    whole = parser({"run": _run, "resume": _resume, "buckling": _buckling, "modes": _modes, "explain": _explain})
+    whole = parser({"run": _run, "resume": _resume, "buckling": run_buckling, "modes": run_modes, "explain": _explain})
     options = whole.parse_args(arguments)
     if options.command is None:
         whole.print_help()
@@ -92,35 +93,6 @@ def _resume(options):
         return resume(options.folder, duration=options.duration)
 
     return deliver(computed, options, True)
-
-
-def _buckling(options):
-    from cosserat_fenicsx.results.tables import buckling_table
-    from cosserat_fenicsx.statics.linear_buckling import buckling
-
-    return _tabulate(options, lambda scene: buckling_table(buckling(scene, options.count)))
-
-
-def _modes(options):
-    from cosserat_fenicsx.dynamics.natural_modes import modes
-    from cosserat_fenicsx.results.tables import modes_table
-
-    return _tabulate(options, lambda scene: modes_table(modes(scene, options.count, load_factor=options.load_factor)))
-
-
-def _tabulate(options, table_of):
-    """Print the table of a scene that `table_of` makes; returns the exit code."""
-    from cosserat_fenicsx.scene.scenefile import read_scene
-
-    scene, _ = read_scene(options.scene)
-    try:
-        with interrupts.patience():
-            table = table_of(scene)
-        say(table, file=sys.stdout)
-    except NotConverged as failure:
-        say(f"cosserat: {failure}")
-        return NOT_CONVERGED
-    return DONE
 
 
 def _explain(options):

@@ -40,20 +40,34 @@ def parser(do):
     resume.set_defaults(do=do["resume"])
 
     buckling = commands.add_parser("buckling", help="critical load factors by linear buckling")
-    buckling.add_argument("scene", help="scene file (TOML)")
-    buckling.add_argument("--count", type=int, default=3, help="how many [3]")
+    _eigenvalues(buckling, "buckling", 3, "1e-5")
     buckling.set_defaults(do=do["buckling"])
 
     modes = commands.add_parser("modes", help="natural frequencies about any equilibrium")
-    modes.add_argument("scene", help="scene file (TOML)")
-    modes.add_argument("--count", type=int, default=5, help="how many [5]")
-    modes.add_argument("--load-factor", type=float, default=0.0, help="of the equilibrium [0: the unloaded rods]")
+    _eigenvalues(modes, "modes", 5, "1e-6")
     modes.set_defaults(do=do["modes"])
 
     explain = commands.add_parser("explain", help="say which model would be solved and how large it is")
     _common(explain)
     explain.set_defaults(do=do["explain"])
     return whole
+
+
+def _eigenvalues(parser, name, count, tol):
+    """Add the options of `buckling` or `modes`, with their defaults."""
+    parser.add_argument("scene", help="scene file (TOML)")
+    parser.add_argument("--count", type=int, default=count, help=f"how many [{count}]")
+    parser.add_argument("--load-factor", type=float, default=0.0, help="of the equilibrium [0: the unloaded rods]")
+    parser.add_argument("--tol", type=float, help=f"estimated relative error of the eigenvalues [{tol}]")
+    parser.add_argument("--elements", type=int, help="elements per rod; fixes the mesh, no error estimate")
+    parser.add_argument("--degree", type=int, help="polynomial degree of r and q, 1 to 4 [4]")
+    parser.add_argument(
+        "-o",
+        "--output",
+        metavar="DIR",
+        help=f"write {name}.csv, {name}.xdmf, {name}.h5 and {name}.png there; without it only the table is shown",
+    )
+    parser.add_argument("--no-picture", action="store_true", help="write no picture")
 
 
 def _outputs(parser):

@@ -3,7 +3,6 @@
 import contextlib
 import math
 import numbers
-from dataclasses import dataclass
 
 import numpy as np
 from mpi4py import MPI
@@ -15,8 +14,10 @@ from cosserat_fenicsx.checks import instance, number, refuse
 from cosserat_fenicsx.element import lobatto_weights
 from cosserat_fenicsx.errors import NotConverged
 from cosserat_fenicsx.models.rod_data import check_inertia, nodal_inertia
+from cosserat_fenicsx.progress import MeshProgress
 from cosserat_fenicsx.quaternions import directors
-from cosserat_fenicsx.results.on_nodes import OnNodes
+from cosserat_fenicsx.results.modes import Modes
+from cosserat_fenicsx.results.shapes import Equilibrium
 from cosserat_fenicsx.scene.action import has_permanent
 from cosserat_fenicsx.scene.magnitudes import check_magnitudes
 from cosserat_fenicsx.scene.scene import Scene
@@ -27,78 +28,16 @@ from cosserat_fenicsx.statics.grading import layers_of
 from cosserat_fenicsx.statics.path.follower import Follower
 from cosserat_fenicsx.statics.path.load_control import StepControl
 from cosserat_fenicsx.statics.refinement import until_two_meshes_agree
+from cosserat_fenicsx.statics.shapes import shapes_of
 from cosserat_fenicsx.statics.solve import check_arguments
 from cosserat_fenicsx.statics.solvers import solvers_of
 
 _MOST_ELEMENTS = 128
 # Newton iterations allowed after the added constraints of a mechanism are removed.
 _CORRECTIONS = 10
-# Largest displacement of a mode of pure twist, over its largest rotation times the longest rod's length.
-_TWIST = 1e-6
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class Modes(OnNodes):
-    """Result of `modes`.
-
-    Attributes:
-        scene: the scene.
-        squares: (n,) omega^2, rad^2/s^2, ascending; below zero the state is unstable; zero for free rigid motions.
-        error: (n,) estimated relative error of the squares; NaN where the mesh was given.
-        shapes: (n, N, 6) displacements (m) and rotations (rad), inertial, of all nodes of all rods in the scene's
-            order; the largest displacement has length 1, or the largest rotation times the longest rod's length where
-            nothing is displaced.
-        negative_modes: number of negative eigenvalues of the second variation at that state, as `Path.negative_modes`.
-        elements: number of elements of each rod; degree: of the elements.
-        conservative: whether the loads have a potential near that state, for all motions that the supports allow. Where
-            they have none, `squares` are those of the symmetric part of K: the smallest is a lower bound of the real
-            parts of omega^2, but the vibrations differ, and flutter is not detected.
-    """
-
-    scene: object
-    squares: np.ndarray
-    error: np.ndarray
-    shapes: np.ndarray
-    negative_modes: int
-    elements: tuple
-    degree: int
-    conservative: bool
-
-    @property
-    def caution(self):
-        """The limits of the result, in a sentence; "" where the loads have a potential."""
-        if self.conservative:
-            return ""
-        return (
-            "The loads have no potential: these are the vibrations of the symmetric part of the stiffness alone, and "
-            "the structure may flutter, which a motion shows (`simulate`)."
-        )
-
-    def __repr__(self):
-        names = ("squares", "error", "negative_modes", "elements", "degree", "conservative")
-        values = ", ".join(f"{name}={getattr(self, name)!r}" for name in names)
-        return f"<Modes: {values}. {self.caution}>" if self.caution else f"<Modes: {values}>"
-
-    @property
-    def frequencies(self):
-        """(n,) Hz; 0 for unstable modes."""
-        return np.sqrt(np.maximum(self.squares, 0.0)) / (2 * math.pi)
-
-    @property
-    def growth(self):
-        """(n,) rates 1/s: unstable modes grow as exp(growth t); 0 for stable modes."""
-        return np.sqrt(np.maximum(-self.squares, 0.0))
-
-    def mode(self, k, rod=None):
-        """(nodes, 3) displacements of the k-th mode at the nodes of a rod (default the first)."""
-        return self.shapes[k, self._rows(rod)[1], :3]
-
-    def turns(self, k, rod=None):
-        """(nodes, 3) small rotations of the k-th mode at the nodes of a rod (default the first), rad."""
-        return self.shapes[k, self._rows(rod)[1], 3:]
-
-
-def modes(scene, count=1, *, load_factor=0.0, tol=1e-6, elements=None, degree=4, comm=None):
+def modes(scene, count=1, *, load_factor=0.0, tol=1e-6, elements=None, degree=4, comm=None, progress=None):
     """Natural frequencies and shapes of small undamped vibrations about a static state.
 
     K x = omega^2 M x under the constraints of supports and joints, with K the second variation in (r, theta) and M the
@@ -115,6 +54,7 @@ def modes(scene, count=1, *, load_factor=0.0, tol=1e-6, elements=None, degree=4,
         elements: elements per rod; fixes the mesh.
         degree: 1 to 4, of r and q.
         comm: MPI communicator; default all ranks. Every rank calls; each solves the whole eigenproblem.
+        progress: True, False, or None to show it in runs of more than two seconds.
 
     Returns:
         Modes. It holds fewer than `count` where the mesh has fewer degrees of freedom.
@@ -138,25 +78,27 @@ def modes(scene, count=1, *, load_factor=0.0, tol=1e-6, elements=None, degree=4,
     def apart(fine, coarse):
         return np.abs(fine - coarse) / np.where(fine == 0, np.inf, np.abs(fine))
 
-    (squares, _, rounding, shapes, negative, conservative), error, layout = until_two_meshes_agree(
-        scene,
-        lambda layout: _on_mesh(scene, layout, count, load_factor, degree, comm),
-        apart,
-        tol,
-        first=FIRST_ELEMENTS,
-        most=_MOST_ELEMENTS,
-        elements=elements,
-        degree=degree,
-        advice="a larger tol or fewer modes",
-        gains=True,
-    )
+    with MeshProgress("modes", tol, progress, comm) as bar:
+        (squares, _, rounding, shapes, negative, state, conservative), error, _ = until_two_meshes_agree(
+            scene,
+            lambda layout: _on_mesh(scene, layout, count, load_factor, degree, comm),
+            apart,
+            tol,
+            first=FIRST_ELEMENTS,
+            most=_MOST_ELEMENTS,
+            elements=elements,
+            degree=degree,
+            progress=bar,
+            advice="a larger tol or fewer modes",
+            gains=True,
+        )
     error = np.maximum(error, rounding)  # NaN stays
     if (error > tol).any():
         raise NotConverged(
             f"the accuracy tol = {tol:g} is out of reach: rounding alone may change the squares by {error.max():.2g} "
             "of themselves, since the rods are so slender. Ask for a larger tol."
         )
-    return Modes(scene, squares, error, shapes, negative, layout.counts, degree, conservative)
+    return Modes(state, shapes, error, conservative, comm, squares, negative)
 
 
 def _on_mesh(scene, layout, count, load_factor, degree, comm):
@@ -164,13 +106,13 @@ def _on_mesh(scene, layout, count, load_factor, degree, comm):
 
     Returns:
         Squares (n,), the lengths of boundary layers or None, relative rounding errors (n,), shapes (n, N, 6), the
-        number of negative modes, and whether the loads have a potential.
+        number of negative modes, the `Equilibrium`, and whether the loads have a potential.
     """
     with _loaded(scene, layout, load_factor, degree, comm) as (problem, stability):
         found = _of_problem(problem, stability, count, load_factor)
-        rq = problem.model.snapshot()[0]
+        state, rq = Equilibrium.of(problem.model, load_factor), problem.model.snapshot()[0]
     with circulatory_part(scene, layout, degree, comm) as circulatory:
-        return *found, circulatory.vanishes(rq, load_factor)
+        return *found, state, circulatory.vanishes(rq, load_factor)
 
 
 def _of_problem(problem, stability, count, load_factor):
@@ -183,8 +125,7 @@ def _of_problem(problem, stability, count, load_factor):
     if (squares == 0).any():  # `stability` counts these by the sign of their rounding; all negative ones are known here
         negative = np.count_nonzero(squares < 0)
     scales = problem.model.scales
-    shapes = np.array([_shape(vector, rows) for vector in vectors.T]).reshape(len(squares), -1, 6)
-    shapes[:, :, 3:] /= scales.length
+    shapes = shapes_of(vectors.T, squares, rows, scales.length)
     layers = layers_of(problem.model) if loaded else None
     rounding = np.where(squares == 0, 0.0, rounding / np.abs(np.where(squares == 0, 1.0, squares)))
     return squares * scales.force / (unit * scales.length**2), layers, rounding, shapes, negative
@@ -222,19 +163,6 @@ def _loaded(scene, layout, load_factor, degree, comm):
 
 def _give_up(load_factor, why):
     raise NotConverged(f"no equilibrium was found at the load factor {load_factor:g}: {why}")
-
-
-def _shape(vector, rows):
-    """(N, 6) motion of the nodes, scaled as `Modes.shapes`.
-
-    The sign is such that the largest component of the first node with the largest motion is positive.
-    """
-    shape = np.where(rows >= 0, vector[rows], 0.0)
-    moved, turned = shape[:, :3], shape[:, 3:]
-    part = moved if np.abs(moved).max() > _TWIST * np.abs(turned).max() else turned
-    sizes = np.linalg.norm(part, axis=1)
-    farthest = part[np.flatnonzero(sizes >= (1 - 1e-6) * sizes.max())[0]]
-    return shape * (np.sign(farthest[np.argmax(np.abs(farthest))]) / sizes.max())
 
 
 def _stiffness(problem):

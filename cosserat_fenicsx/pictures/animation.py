@@ -15,6 +15,7 @@ from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.interrupts import obey
 from cosserat_fenicsx.pictures.between import Between
 from cosserat_fenicsx.pictures.drawing import add_body, at_rest, frame, load_pyvista, points_of, prefix, thickening
+from cosserat_fenicsx.pictures.labels import plain
 from cosserat_fenicsx.progress import Progress
 from cosserat_fenicsx.ranks import on_first
 from cosserat_fenicsx.results.beside import replaced
@@ -23,7 +24,7 @@ from cosserat_fenicsx.results.beside import replaced
 FPS, SIZE = 25, (960, 720)
 # Least and largest duration (s) of a film in real time, largest duration (s) of others, and largest number of frames.
 # A frame takes about 0.1 s to draw without a graphics card.
-_SHORTEST_REAL_TIME, _LONGEST_REAL_TIME, _LONGEST, _MOST_FRAMES = 2.0, 10.0, 5.0, 10_000
+_SHORTEST_REAL_TIME, _LONGEST_REAL_TIME, _LONGEST, MOST_FRAMES = 2.0, 10.0, 5.0, 10_000
 # Colours of a .gif whose channels are all above this become white: quantisation would give nearly white stains.
 _WHITE = 244
 # Segments along a rod; mean width of a letter of the title, pixels.
@@ -56,13 +57,17 @@ def film(history, file, *, fps=FPS, speed=None, magnify=1.0, size=SIZE, progress
         raise SceneError(f"{file}: expected a history with at least two times")
     fps = number("animate", "fps", fps, "a number from 1 to 100", lambda x: 1 <= x <= 100)
     positive("animate", "magnify", magnify, "-")
-    width, height = _pixels(size)
+    width, height = pixels(size)
     if file.suffix == ".gif":
         fps = 100 / round(100 / fps)
     duration = history.times[-1] - history.times[0]
     speed = _round_speed(duration) if speed is None else positive("animate", "speed", speed, "-")
     times = _times(history.times[0], duration, speed, fps)
-    on_first(history.comm, lambda: _make(history, file, times, fps, speed, magnify, (width, height), progress))
+    pace = _pace_in_words(speed)
+    on_first(
+        history.comm,
+        lambda: record(lambda: _Stage(history, times, magnify, (width, height), pace), file, times, fps, progress),
+    )
 
 
 def check_name(file):
@@ -78,7 +83,8 @@ def check_name(file):
     return file
 
 
-def _pixels(size):
+def pixels(size):
+    """(width, height) of a film, checked."""
     expected = "(width, height), even numbers of pixels from 100 to 4000"
     if not isinstance(size, tuple | list) or len(size) != 2:
         refuse("animate", "size", size, expected)
@@ -100,8 +106,8 @@ def _times(start, duration, speed, fps):
     """The times (s) of the frames, the last one at the end."""
     step = speed / fps
     count = math.ceil(duration / step - 1e-6)
-    if count > _MOST_FRAMES:
-        expected = f"one that needs at most {_MOST_FRAMES} frames, not {count}: more, or fewer fps"
+    if count > MOST_FRAMES:
+        expected = f"one that needs at most {MOST_FRAMES} frames, not {count}: more, or fewer fps"
         refuse("animate", "speed", speed, expected)
     return start + np.append(step * np.arange(count), duration)
 
@@ -112,15 +118,24 @@ def _pace_in_words(speed):
     return f"{speed:g} times faster than real" if speed > 1 else f"{1 / speed:g} times slower than real"
 
 
-def _make(history, file, times, fps, speed, magnify, size, progress):
-    """Draw and write all frames, on one rank."""
-    stage = _Stage(history, times, magnify, size, _pace_in_words(speed))
-    stopped = None
+def record(make_stage, file, times, fps, progress):
+    """Draw and write all frames, on one rank.
+
+    Args:
+        make_stage: function that returns the stage: `at(t)` is the picture (height, width, 3) at t, and `close()` frees
+            it.
+        file: .gif or .mp4, a Path; times: t of each frame; fps: frames per second; progress: as of `film`.
+
+    Raises:
+        OSError: the file cannot be written.
+        KeyboardInterrupt: Ctrl-C; the film ends with the frames drawn so far.
+    """
+    stage, stopped = make_stage(), None
     try:
         samples = [stage.at(t) for t in times[:: max(1, len(times) // 6)]]
         with (
             replaced(file) as fresh,
-            _WRITERS[file.suffix](fresh, fps, size, samples) as writer,
+            _WRITERS[file.suffix](fresh, fps, samples[0].shape[1::-1], samples) as writer,
             Progress([len(times)], progress, _Alone, "frame") as bar,
         ):
             bar.start(file.name)
@@ -190,7 +205,7 @@ class _Stage:
             mesh.GetPointData().GetScalars().Modified()
         text = f"{self._head}: t = {t:.{self._digits}f} s ({self._pace}){self._notes}"
         self._plotter.add_text(
-            "\n".join(textwrap.fill(line, self._letters) for line in text.split("\n")),
+            plain("\n".join(textwrap.fill(line, self._letters) for line in text.split("\n"))),
             position="upper_edge",
             color="black",
             font_size=10,

@@ -97,7 +97,9 @@ def body_of(rod, x, line, directors, values, magnify=1.0):
 def outlines(rod, s):
     """(n, corners, 2) corners of the sections at arc lengths s (n,), m; all are resampled to the largest number of
     corners."""
-    sections = [rod.section_at(s[0])] * len(s) if rod.profile.constant else [rod.section_at(x, "left") for x in s]
+    if rod.profile.constant and len(s) > 1:
+        return np.repeat(outlines(rod, s[:1]), len(s), axis=0)
+    sections = [rod.section_at(x, "left") for x in s]
     given = [section.stiffness(rod.material).outline for section in sections]
     drawn = [np.array(x or Circle(0.02 * rod.length).stiffness(Material(E=1.0)).outline) for x in given]
     most = max(map(len, drawn))

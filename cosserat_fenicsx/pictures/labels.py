@@ -8,9 +8,9 @@ import numpy as np
 _LETTER, _LINE, _GAP, _EDGE = 0.56, 1.15, 3, 4
 # Distances (pixels) from what a label belongs to, and turns (deg) of its direction, in the order of preference; from
 # the last distances a thin line leads back.
-_DISTANCES, _TURNS, _LEADER = (16, 26, 42, 64, 92), (0, 40, -40, 80, -80, 120, -120, 180), 40
-# Pixels between a label and the middle of a rod.
-_CLEAR = 10
+_DISTANCES, _TURNS, _LEADER = (16, 26, 42, 64, 92, 128), (0, 40, -40, 80, -80, 120, -120, 180), 40
+# Pixels between a label and the middle of a rod; size of the cells in which lines are looked up, pixels.
+_CLEAR, _CELL = 10, 4
 
 
 class Labels:
@@ -23,7 +23,7 @@ class Labels:
 
     def __init__(self, view, lines=()):
         self._view, self._placed, self._texts, self._leaders = view, [], [], []
-        self._rods = np.concatenate([view.pixels(_dense(line)) for line in lines]) if len(lines) else np.empty((0, 2))
+        self._covered = _cells_of([view.pixels(_dense(line)) for line in lines], view.window)
         #: texts for which there was no room
         self.left_out = []
 
@@ -55,21 +55,28 @@ class Labels:
             if self._free(box) and (not strict or self._clear(box)):
                 self._keep(text, point, box, size, colour)
                 if distance > _LEADER:
-                    self._leaders.append((point, point + self._view.offset(*((distance - _GAP) * way))))
+                    self._leaders.append([point, point + self._view.offset(*((distance - _GAP) * way))])
                 return True
         self.left_out.append(text)
         return False
 
+    @property
+    def boxes(self):
+        """The rectangles of the labels and of what is reserved: (left, bottom, right, top), pixels."""
+        return list(self._placed)
+
     def draw(self, plotter, pyvista):
         """Put all labels into the drawing."""
-        for start, end in self._leaders:
-            plotter.add_mesh(pyvista.Line(start, end), color="grey", line_width=1)
+        if self._leaders:
+            leaders = pyvista.line_segments_from_points(np.concatenate(self._leaders))
+            plotter.add_mesh(leaders, color="grey", line_width=1)
         key = lambda label: label[2:]
         for (size, colour), group in itertools.groupby(sorted(self._texts, key=key), key):
             texts, points = zip(*((text, point) for text, point, *_ in group), strict=True)
             plotter.add_point_labels(
-                list(points), list(texts), font_size=size, text_color=colour, shape=None, show_points=False,
-                always_visible=True, bold=False, justification_horizontal="center", justification_vertical="center",
+                list(points), [plain(text) for text in texts], font_size=size, text_color=colour, shape=None,
+                show_points=False, always_visible=True, bold=False, justification_horizontal="center",
+                justification_vertical="center",
             )  # fmt: skip
 
     def _keep(self, text, point, box, size, colour):
@@ -89,13 +96,29 @@ class Labels:
 
     def _clear(self, box):
         """Whether a rectangle lies off all rods."""
-        low, high = np.array(box[:2]) - _CLEAR, np.array(box[2:]) + _CLEAR
-        return not ((self._rods > low) & (self._rods < high)).all(axis=1).any()
+        low = np.maximum(np.array(box[:2]) - _CLEAR, 0) // _CELL
+        high = np.maximum(np.array(box[2:]) + _CLEAR, 0) // _CELL
+        return not self._covered[int(low[0]) : int(high[0]) + 1, int(low[1]) : int(high[1]) + 1].any()
 
 
 def _box(text, at, size):
     width, height = _LETTER * size * len(text), _LINE * size
     return at[0] - width / 2, at[1] - height / 2, at[0] + width / 2, at[1] + height / 2
+
+
+def plain(text):
+    """A text that VTK takes literally; it reads formulas between dollar signs otherwise."""
+    return text.replace("$", "\\$")
+
+
+def _cells_of(lines, window):
+    """Which cells of a picture points (n, 2) of lines, pixels, lie in: a boolean array over columns and rows."""
+    covered = np.zeros([int(side // _CELL) + 1 for side in window], dtype=bool)
+    for line in lines:
+        cells = (line // _CELL).astype(int)
+        cells = cells[((cells >= 0) & (cells < covered.shape)).all(axis=1)]
+        covered[cells[:, 0], cells[:, 1]] = True
+    return covered
 
 
 def _dense(line):

@@ -20,7 +20,7 @@ from cosserat_fenicsx.pictures.drawing import (
     thickening,
 )
 from cosserat_fenicsx.pictures.figures import save
-from cosserat_fenicsx.pictures.labels import Labels
+from cosserat_fenicsx.pictures.labels import Labels, plain
 from cosserat_fenicsx.pictures.signs import Deformed, Resting, signs_of, without_sign
 from cosserat_fenicsx.ranks import on_first
 from cosserat_fenicsx.results.beside import replaced
@@ -145,11 +145,12 @@ def _draw_scene(scene):
             surface_of(pyvista, body, factors[-1]), color=_AT_REST, split_sharp_edges=True, smooth_shading=True
         )
     symbols = signs_of(pyvista, scene, [Resting(radii)], everywhere)
-    title = [scene.title or "Scene", *_thicker(factors)]
+    named = len(scene.rods) <= _NAMED
+    title = [scene.title or "Scene", *_thicker(factors), *([] if named else [f"({len(scene.rods)} rods, not named)"])]
     if any(load.scaled for load in scene.loads):
         title[0] += ": loads at load factor 1"
     _finish(plotter, pyvista, everywhere, symbols, at_rest(scene), title + _undrawn(scene),
-            lambda labels: _name(labels, scene))  # fmt: skip
+            lambda labels: _name(labels, scene) if named else None)  # fmt: skip
     return plotter
 
 
@@ -171,9 +172,8 @@ def _finish(plotter, pyvista, everywhere, symbols, lines, title, label):
 
     _, labels = frame(plotter, everywhere, more=symbols.points, labels=prepared, span=symbols.span)
     label(labels)
-    for text, point, towards, colour in symbols.texts:
-        if text:
-            labels.near(text, point, towards, size=_FONT - 4, colour=colour)
+    for text, point, towards, colour in symbols.grouped_texts():
+        labels.near(text, point, towards, size=_FONT - 4, colour=colour)
     labels.draw(plotter, pyvista)
     if labels.left_out:
         lettered.append(
@@ -181,7 +181,7 @@ def _finish(plotter, pyvista, everywhere, symbols, lines, title, label):
         )
     for i, (words, colour) in enumerate(reversed(symbols.groups.items())):
         plotter.add_text(words, position=(0.84 * width, (0.02 + 0.025 * i) * height), color=colour, font_size=8)
-    plotter.add_text("\n".join(lettered), position="upper_edge", color="black", font_size=_TITLE_FONT)
+    plotter.add_text(plain("\n".join(lettered)), position="upper_edge", color="black", font_size=_TITLE_FONT)
 
 
 def _small(path, shown, size, magnify):
@@ -274,7 +274,7 @@ def _label(labels, path, shown, bodies):
 def _name(labels, scene):
     """Label the rods by their names, in the middle."""
     size = _FONT - 2 if len(scene.rods) <= _FEW else _FONT - 6
-    for rod in scene.rods[:_NAMED]:
+    for rod in scene.rods:
         s = rod.length / 2
         labels.near(rod.name, rod.curve.position(s), _beyond(rod.curve.frame(s)[:, 2], 0), size=size)
 

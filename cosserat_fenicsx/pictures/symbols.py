@@ -1,7 +1,7 @@
 """Signs for supports, joints and loads, of a size that suits the drawing."""
 
 import itertools
-from collections import defaultdict
+from collections import Counter, defaultdict
 from dataclasses import dataclass
 
 import numpy as np
@@ -28,6 +28,8 @@ _GROUPS = {
 _ASIDE = 0.4
 # Arrows along a rod: one per so many sizes of a sign, and at most this number.
 _SPACING, _MOST = 1.3, 16
+# Up to this number of loads, each has its label.
+_MOST_TEXTS = 24
 # Lengths over the size of a sign: of an arrow, of the shortest one beside others, of those along rods; of a spring.
 _ARROW, _SHORTEST, _COMB, _SPRING = 1.9, 0.9, 1.0, 1.6
 
@@ -75,6 +77,16 @@ class Symbols:
         """{words: colour} of the signs that there are."""
         used = {*self._meshes, *self._lines}
         return {words: colour for words, colour in COLOURS.items() if words in used}
+
+    def grouped_texts(self):
+        """The texts that are not empty; where there are many, those that are alike only once, with their number."""
+        texts = [text for text in self.texts if text[0]]
+        if len(texts) <= _MOST_TEXTS:
+            return texts
+        alike = Counter((text, colour) for text, *_, colour in texts)
+        first = {(text[0], text[3]): text for text in reversed(texts)}
+        return [(f"{text} (each of {alike[text, colour]})" if alike[text, colour] > 1 else text, *place, colour)
+                for (text, colour), (_, *place, _) in first.items()]  # fmt: skip
 
     def draw(self, plotter):
         """Put all signs into the drawing."""

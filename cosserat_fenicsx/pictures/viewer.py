@@ -30,10 +30,13 @@ _PARTS = ("rods.js", "camera.js", "axes.js", "app.js")
 
 
 def write(result, file):
-    """Write a path or a motion as an interactive .html file: a slider over the states, turning, zooming
+    """Write a path or a motion as an interactive .html file, on one rank: a slider over the states, turning, zooming
     and moving by mouse and touch, a play button, and a choice of the field that colours the rods.
 
     States beyond some hundreds are left out evenly, which the file says.
+
+    Args:
+        file: a `pathlib.Path`.
 
     Raises:
         OSError: the file cannot be written.

@@ -9,32 +9,47 @@ from cosserat_fenicsx.errors import SceneError
 
 
 @contextlib.contextmanager
-def arrays_in(file):
-    """Context manager: a function `put(name, array)` that writes an array to a new HDF5 file.
+def new_hdf5(file):
+    """Context manager: a new `h5py.File`.
 
     Raises:
         SceneError: h5py is missing.
         OSError: the file cannot be written.
     """
-    try:
-        import h5py
-        from h5py import h5d, h5s, h5t
-    except ImportError:
-        raise SceneError(
-            f"{file}: writing .xdmf needs h5py: install the system's, 'apt install python3-h5py'"
-        ) from None
-
-    def put(name, array):  # a third of the time of `store[name] = array`, which matters for thousands of states
-        array = np.ascontiguousarray(array)
-        space, kind = h5s.create_simple(array.shape), h5t.py_create(array.dtype)
-        h5d.create(store.id, name.encode(), kind, space).write(h5s.ALL, h5s.ALL, array)
-
+    h5py = h5py_for(file)
     with open(file, "w+b", buffering=0) as stream:
         patient = _Patient(stream)
         with h5py.File(patient, "w") as store:
-            yield put
+            yield store
     if patient.trouble is not None:
         raise patient.trouble
+
+
+@contextlib.contextmanager
+def arrays_in(file):
+    """Context manager: a function `put(name, array)` that writes an array to a `new_hdf5`."""
+    with new_hdf5(file) as store:
+        from h5py import h5d, h5s, h5t
+
+        def put(name, array):  # a third of the time of `store[name] = array`, which matters for thousands of states
+            array = np.ascontiguousarray(array)
+            space, kind = h5s.create_simple(array.shape), h5t.py_create(array.dtype)
+            h5d.create(store.id, name.encode(), kind, space).write(h5s.ALL, h5s.ALL, array)
+
+        yield put
+
+
+def h5py_for(file):
+    """The module h5py, needed for a file.
+
+    Raises:
+        SceneError: it is missing.
+    """
+    try:
+        import h5py
+    except ImportError:
+        raise SceneError(f"{file}: this needs h5py: install the system's, 'apt install python3-h5py'") from None
+    return h5py
 
 
 class _Patient:

@@ -79,8 +79,12 @@ def table(result, k=None, rod=None, station=None):
 
 
 def write_csv(result, file, k=None, rod=None, station=None):
-    """Write the columns of `table` as CSV; a file that was there is replaced once the new one is complete."""
-    columns = table(result, k, rod, station)
+    """Write the columns of `table` as CSV."""
+    write_columns(file, table(result, k, rod, station))
+
+
+def write_columns(file, columns):
+    """Write columns {heading: (n,)} as CSV; a file that was there is replaced once the new one is complete."""
     with replaced(file) as fresh, open(fresh, "w", newline="", encoding="utf-8") as stream:
         writer = csv.writer(stream)
         writer.writerow(columns)

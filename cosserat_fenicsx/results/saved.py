@@ -18,6 +18,7 @@ from cosserat_fenicsx import __version__
 from cosserat_fenicsx.element import ElementRule
 from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.results import contents
+from cosserat_fenicsx.results.arrays import h5py_for, new_hdf5
 from cosserat_fenicsx.results.beside import replaced
 from cosserat_fenicsx.results.history import History, Instant, Ledger
 from cosserat_fenicsx.results.path import Path
@@ -37,7 +38,6 @@ _OF_EVENT = ("load_factor", "after", "residual", "error")
 
 def save(result, file):
     """See `Result.save`; on one rank."""
-    h5py = _h5py(file)
     try:
         scene = json.dumps(to_data(result.scene))
     except NotData as problem:
@@ -46,19 +46,17 @@ def save(result, file):
             "and pieces instead of functions, such as Table, Ramp and AlongTable; write(), to_dict() and to_xarray() "
             "need no scene"
         ) from None
-    with replaced(file) as fresh, h5py.File(fresh, "w") as store:
+    with replaced(file) as fresh, new_hdf5(fresh) as store:
         store.attrs.update(format=_FORMAT, version=_VERSION, written_by=f"cosserat_fenicsx {__version__}",
                            kind=_kind(result), title=result.scene.title)  # fmt: skip
         for name, text in (("scene", scene), ("settings", json.dumps(_settings(result)))):
             store[name] = text
             store[name].attrs["crc32"] = zlib.crc32(text.encode())
-        _write_variables(
-            h5py, store, contents.of_states(result) | contents.of_supports(result) | contents.of_events(result)
-        )
+        _write_variables(store, contents.of_states(result) | contents.of_supports(result) | contents.of_events(result))
         for rod, group in zip(result.scene.rods, contents.group_names(result.scene), strict=True):
             place = store.create_group(f"rods/{group}")
             place.attrs["rod"] = rod.name
-            _write_variables(h5py, place, contents.of_rod(result, rod))
+            _write_variables(place, contents.of_rod(result, rod))
         solution = store.create_group("solution")
         solution.attrs["units"] = "1: lengths, forces and moments over the scales of the settings, inertial components"
         for name, values in _solution(result).items():
@@ -66,7 +64,7 @@ def save(result, file):
             solution[name].attrs["crc32"] = zlib.crc32(np.ascontiguousarray(values))
 
 
-def _write_variables(h5py, place, variables):
+def _write_variables(place, variables):
     for name, variable in (variables | contents.component_names(variables)).items():
         values = variable.values
         place[name] = values.astype(object) if values.dtype.kind == "U" else values
@@ -118,7 +116,7 @@ def read(file, kind, assemble, comm):
     Raises:
         SceneError: it cannot be read, is damaged, holds something else, or is of a newer release.
     """
-    h5py = _h5py(file)
+    h5py = h5py_for(file)
     try:
         store = h5py.File(file, "r")
     except OSError as problem:
@@ -213,11 +211,3 @@ def _events(numbers):
         Event(kind, mode=mode, **dict(zip(_OF_EVENT, values, strict=True)))
         for kind, mode, values in zip(kinds, numbers["event_mode"], columns, strict=True)
     ]
-
-
-def _h5py(file):
-    try:
-        import h5py
-    except ImportError:
-        raise SceneError(f"{file}: this needs h5py: install the system's, 'apt install python3-h5py'") from None
-    return h5py

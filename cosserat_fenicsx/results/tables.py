@@ -13,8 +13,6 @@ from cosserat_fenicsx.scene.describe import actions_in_words
 
 # A named station is shown if its displacement is at least this share of the largest one.
 _WORTH_SHOWING = 0.2
-# Largest displacement of a mode of pure twist (the largest displacement or rotation of a mode is 1).
-_TWIST = 1e-6
 
 
 def path_table(path, station=None):
@@ -74,50 +72,6 @@ def most_displaced(path):
         inside.append(rod.at(x[np.argmax(moved)] * rod.length))
     other = max(inside, key=moves)
     return named if moves(named) >= _WORTH_SHOWING * moves(other) else other
-
-
-def buckling_table(found):
-    """Text: critical load factors by linear buckling, and where each mode moves most."""
-    table = Table(
-        title=f"{found.scene.title or 'Linear buckling'}: degree {found.degree}, "
-        f"{' + '.join(map(str, found.elements))} elements",
-        caption="Load factors at which the unloaded state, extrapolated, loses its stability; estimated relative "
-        "error. A structure that bends much before it buckles needs `cosserat run` instead.",
-    )
-    for heading in ("critical load factor", "est. error", "mode moves most at (m)", "there along"):
-        table.add_column(heading, justify="right")
-    for k, (eta, error) in enumerate(zip(found.load_factors, found.error, strict=True)):
-        table.add_row(f"{eta:.7g}", f"{error:.1e}", *_farthest(found, k))
-    text = as_text(table) if len(found.load_factors) else "No buckling under positive load factors."
-    return f"{text}\n{found.caution}".rstrip()
-
-
-def modes_table(found):
-    """Text: natural frequencies, and where each mode moves most."""
-    table = Table(
-        title=f"{found.scene.title or 'Natural frequencies'}: degree {found.degree}, "
-        f"{' + '.join(map(str, found.elements))} elements",
-        caption="Estimated relative error of the square of the frequency. 0 Hz: a free motion, or one that grows as "
-        "exp(growth t).",
-    )
-    for heading in ("frequency (Hz)", "growth (1/s)", "est. error", "mode moves most at (m)", "there along"):
-        table.add_column(heading, justify="right")
-    for k, (frequency, growth, error) in enumerate(zip(found.frequencies, found.growth, found.error, strict=True)):
-        table.add_row(f"{frequency:.7g}", f"{growth:.4g}", f"{error:.1e}", *_farthest(found, k))
-    return f"{as_text(table)}\n{found.caution}".rstrip()
-
-
-def _farthest(found, k):
-    """Texts: the station with the largest displacement of a mode, and its direction there, inertial."""
-    sizes = [(np.linalg.norm(found.mode(k, rod), axis=1), rod) for rod in found.scene.rods]
-    size, rod = max(sizes, key=lambda item: item[0].max())
-    if size.max() < _TWIST:
-        return "sections turn", "-"
-    place = int(np.argmax(size))
-    along = found.mode(k, rod)[place] / size[place]
-    return f"{rod.name}@{rod.length * place / (len(size) - 1):.4g}", "({:.2f}, {:.2f}, {:.2f})".format(
-        *(np.round(along, 2) + 0.0)
-    )
 
 
 def stability(negative_modes):

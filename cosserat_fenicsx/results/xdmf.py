@@ -12,6 +12,8 @@ import numpy as np
 from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.results.arrays import arrays_in
 from cosserat_fenicsx.results.beside import replaced
+from cosserat_fenicsx.results.quantities import FIELDS as QUANTITIES
+from cosserat_fenicsx.scene.stresses import Stress
 
 #: Names in the files, as in eq. (1), and the fields of `Path.fields` behind them.
 FIELDS = {
@@ -26,12 +28,14 @@ FIELDS = {
     "curvature": "curvature",
     "bending_moment": "bending_moment",
 }
+_STRESSES = {name: name for name in Stress._fields}
 # States that are computed at once.
 _BLOCK = 256
 _HEAD = """<?xml version='1.0' encoding='utf-8'?>
 <Xdmf Version="3.0">
   <Domain>
-    <Grid Name="path" GridType="Collection" CollectionType="Temporal">
+    {about}
+    <Grid Name="{name}" GridType="Collection" CollectionType="Temporal">
 """
 _TAIL = """    </Grid>
   </Domain>
@@ -60,38 +64,71 @@ def write_state(path, file, k=None):
 
 
 def write_series(path, file, k=None):
-    """Write all points: the arrays to the .h5 file, and the .xdmf file that refers to them. Both appear when they are
-    complete, the .xdmf last.
+    """Write all points of a path or a motion, over the load factor or the time; see `write_blocks`."""
+    fields = {**_names(path), "arc_length": "s", "position": "position"}
+    units = {name: QUANTITIES[field].unit for name, field in fields.items()}
+    units[f"time axis ({path.axis})"] = "s" if path.axis == "time" else "1"
+    write_blocks(file, "path", path, path.along_axis, _blocks(path), units)
+
+
+def _blocks(path):
+    """Reference, lines and fields of some states after others, as `write_blocks` takes them."""
+    for first in range(0, len(path), _BLOCK):
+        points, cells, data = meshes_of(path, range(first, min(first + _BLOCK, len(path))))
+        q = data.pop("quaternion")  # some readers support no arrays of four components
+        fields = {"position": points, **data, "quaternion_a": q[..., 0], "quaternion_bcd": q[..., 1:]}
+        yield points[0] - data["displacement"][0], cells[0][1], fields
+
+
+def write_blocks(file, name, meshed, along, blocks, units):
+    """Write states on one mesh: the arrays to the .h5 file, and the .xdmf file that refers to them.
+
+    Both appear when they are complete, the .xdmf last.
+
+    Args:
+        file: the .xdmf; name: of the series.
+        meshed: what has the `scene`, `layout` and `rule` of the nodes.
+        along: (states,) their times.
+        blocks: of some states after others: nodes (n, 3) in m, lines (elements, 2) and fields {name: (states, n) or
+            (states, n, 3)}; nodes and lines are the same in all of them.
+        units: {name of a field: its unit}, for information in the file.
 
     Raises:
         OSError: they cannot be written; the old ones stay.
     """
-    numbers, along = file.with_suffix(".h5"), path.along_axis
+    numbers, constants, k = file.with_suffix(".h5"), constants_of(meshed), 0
     with replaced(file) as text, replaced(numbers) as fresh:
         with arrays_in(fresh) as put, open(text, "w", encoding="utf-8") as stream:
-            stream.write(_HEAD)
-            for first in range(0, len(path), _BLOCK):
-                which = range(first, min(first + _BLOCK, len(path)))
-                points, cells, data = meshes_of(path, which)
-                if first == 0:
-                    lines = cells[0][1]
-                    put("reference", points[0] - data["displacement"][0])
+            stream.write(_HEAD.format(name=name, about=_about(meshed.scene, units)))
+            for name, array in constants.items():
+                put(name, array)
+            for nodes, lines, fields in blocks:
+                if k == 0:
+                    put("reference", nodes)
                     put("lines", lines)
-                q = data.pop("quaternion")  # some readers support no arrays of four components
-                fields = {"position": points, **data, "quaternion_a": q[..., 0], "quaternion_bcd": q[..., 1:]}
-                for k, *arrays in zip(which, *fields.values(), strict=True):
-                    for name, array in zip(fields, arrays, strict=True):
-                        put(f"{name}_{k}", array)
-                grid = _grid(numbers.name, lines, fields)
-                stream.writelines(grid.format(k=k, along=repr(float(along[k]))) for k in which)
+                grid = _grid(numbers.name, lines, fields, constants)
+                for arrays in zip(*fields.values(), strict=True):
+                    for field, array in zip(fields, arrays, strict=True):
+                        put(f"{field}_{k}", array)
+                    stream.write(grid.format(k=k, along=repr(float(along[k]))))
+                    k += 1
             stream.write(_TAIL)
 
 
-def _grid(store, lines, fields):
+def _about(scene, units):
+    """The text of Information elements: the names of the rods by their numbers, and the units of the fields."""
+    told = {"rods": {i: rod.name for i, rod in enumerate(scene.rods)}, "units": units}
+    words = {name: "; ".join(f"{key}: {value}" for key, value in values.items()) for name, values in told.items()}
+    elements = (xml.Element("Information", Name=name, Value=value) for name, value in words.items())
+    return "\n    ".join(xml.tostring(element, encoding="unicode") for element in elements)
+
+
+def _grid(store, lines, fields, constants):
     """The text of one state, with {k} for its number and {along} for its load factor or time.
 
     Args:
-        store: the name of the .h5 file; lines: (elements, 2); fields: {name: (states, nodes, ...)}.
+        store: the name of the .h5 file; lines: (elements, 2); fields: {name: (states, nodes, ...)}; constants: {name:
+            (nodes,)} of all states.
     """
     grid, store = xml.Element("Grid", Name="point {k}", GridType="Uniform"), store.replace("{", "{{").replace("}", "}}")
 
@@ -107,6 +144,8 @@ def _grid(store, lines, fields):
     for name, array in fields.items():
         kind = {2: "Scalar", 3: "Vector"}[array.ndim]
         item(xml.SubElement(grid, "Attribute", Name=name, AttributeType=kind, Center="Node"), f"{name}_{{k}}", array[0])
+    for name, array in constants.items():
+        item(xml.SubElement(grid, "Attribute", Name=name, AttributeType="Scalar", Center="Node"), name, array)
     xml.indent(grid, level=3)
     return f"      {xml.tostring(grid, encoding='unicode').rstrip()}\n"
 
@@ -118,12 +157,26 @@ def mesh_of(path, k):
         points (n, 3), m; cells in meshio's format; dict of arrays (n, ...).
     """
     points, cells, data = meshes_of(path, [k])
-    return points[0], cells, {name: values[0] for name, values in data.items()}
+    return points[0], cells, {name: values[0] for name, values in data.items()} | constants_of(path)
+
+
+def constants_of(meshed):
+    """{name: (n,)} at all nodes: the arc length, m, and the number of the rod, from 0."""
+    nodes = meshed.layout.node_s(meshed.rule.nodes)
+    return {
+        "arc_length": np.concatenate([x * rod.length for x, rod in zip(nodes, meshed.scene.rods, strict=True)]),
+        "rod": np.concatenate([np.full(len(x), i) for i, x in enumerate(nodes)]),
+    }
+
+
+def _names(path):
+    """Names in the files, and the fields of `Path.fields` behind them."""
+    return {**FIELDS, **path.more_fields, **(_STRESSES if path.knows_stresses else {})}
 
 
 def meshes_of(path, which):
     """`mesh_of` at several points: arrays (points, n, ...)."""
-    names = {**FIELDS, **path.more_fields}
+    names = _names(path)
     points, lines, data, first = [], [], {name: [] for name in names}, 0
     for rod in path.scene.rods:
         fields = path.fields_at(which, rod)

@@ -2,7 +2,6 @@
 
 import math
 import numbers
-from dataclasses import dataclass
 
 import numpy as np
 from mpi4py import MPI
@@ -10,7 +9,9 @@ from mpi4py import MPI
 from cosserat_fenicsx.algebra import eigen
 from cosserat_fenicsx.checks import number
 from cosserat_fenicsx.errors import NotConverged, SceneError
-from cosserat_fenicsx.results.on_nodes import OnNodes
+from cosserat_fenicsx.progress import MeshProgress
+from cosserat_fenicsx.results.buckling import Buckling
+from cosserat_fenicsx.results.shapes import Equilibrium
 from cosserat_fenicsx.scene.action import has_permanent
 from cosserat_fenicsx.scene.magnitudes import check_magnitudes
 from cosserat_fenicsx.statics.circulatory import circulatory_part
@@ -20,9 +21,9 @@ from cosserat_fenicsx.statics.grading import layers_of
 from cosserat_fenicsx.statics.path.follower import Follower
 from cosserat_fenicsx.statics.path.load_control import StepControl
 from cosserat_fenicsx.statics.refinement import until_two_meshes_agree
+from cosserat_fenicsx.statics.shapes import shapes_of
 from cosserat_fenicsx.statics.solve import check_arguments
 from cosserat_fenicsx.statics.solvers import solvers_of
-from cosserat_fenicsx.statics.stability import oriented
 
 _MOST_ELEMENTS = 256
 # Step of the load factor in the central difference of the second variation: first such that the load changes by this
@@ -33,68 +34,9 @@ _REMAINING = 0.1
 # Largest critical load, in the same units. It is also bounded by the load at which the force in a rod reaches the
 # smallest of its EA and GA: the shear-flexible column has a spurious root under tension at about GA.
 _HUGE = 1e8
-# Load factors that differ by less than this, relative, are one multiple eigenvalue.
-_SAME = 1e-6
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class Buckling(OnNodes):
-    """Result of `buckling`.
-
-    Attributes:
-        scene: the scene.
-        load_factors: (n,) critical load factors, ascending from that of the state.
-        modes: (n, N, 3) displacements, inertial, of all nodes of all rods in the scene's order; the largest has
-            length 1.
-        error: (n,) estimated relative error of the load factors; NaN where the mesh was given.
-        elements: number of elements of each rod.
-        degree: of the elements.
-        conservative: whether the loads have a potential near the state, for all motions that the supports allow. A dead
-            moment has none where its section is free to rotate about two axes, nor has a follower load. Without a
-            potential a structure may flutter below its first static bifurcation, or without one, which linear
-            buckling does not detect.
-        bound: no static bifurcation lies below this load factor, whether conservative or not. Where the loads have a
-            potential it is the first of `load_factors`. Where they have none it is the load factor at which the
-            symmetric part of the second variation becomes singular, which is neither an instability nor a bifurcation.
-            Where nothing is found it is the largest load factor that is considered: there the contact force of a rod
-            reaches the smallest of its axial and shear stiffnesses, or 1e8 EI/L^2.
-    """
-
-    scene: object
-    load_factors: np.ndarray
-    modes: np.ndarray
-    error: np.ndarray
-    elements: tuple
-    degree: int
-    conservative: bool
-    bound: float
-
-    @property
-    def caution(self):
-        """The limits of the result, in a sentence; "" where the loads have a potential."""
-        if self.conservative:
-            return ""
-        found = (
-            "the load factors are those of its static bifurcations (divergence) alone"
-            if len(self.load_factors)
-            else "no static bifurcation (divergence) was found"
-        )
-        return (
-            f"The loads have no potential: {found}, and there is none below {self.bound:.7g}. The structure may "
-            "flutter at a lower load, which a motion shows (`simulate`), and linear buckling does not."
-        )
-
-    def __repr__(self):
-        names = ("load_factors", "error", "elements", "degree", "conservative", "bound")
-        values = ", ".join(f"{name}={getattr(self, name)!r}" for name in names)
-        return f"<Buckling: {values}. {self.caution}>" if self.caution else f"<Buckling: {values}>"
-
-    def mode(self, k, rod=None):
-        """(nodes, 3) the k-th mode at the nodes of a rod (default the first)."""
-        return self.modes[k, self._rows(rod)[1]]
-
-
-def buckling(scene, count=1, *, load_factor=0.0, tol=1e-5, elements=None, degree=4, comm=None):
+def buckling(scene, count=1, *, load_factor=0.0, tol=1e-5, elements=None, degree=4, comm=None, progress=None):
     """Critical load factors and modes by linear buckling.
 
     The critical load factors are eta + lambda where K(eta) + lambda dK/deta is singular. K is the second variation at
@@ -118,6 +60,7 @@ def buckling(scene, count=1, *, load_factor=0.0, tol=1e-5, elements=None, degree
         elements: elements per rod; fixes the mesh.
         degree: 1 to 4, of r and q.
         comm: MPI communicator; default all ranks. Every rank calls.
+        progress: True, False, or None to show it in runs of more than two seconds.
 
     Returns:
         Buckling. It holds fewer than `count` load factors where no more are positive (counted from eta) and below that
@@ -138,17 +81,19 @@ def buckling(scene, count=1, *, load_factor=0.0, tol=1e-5, elements=None, degree
     def apart(fine, coarse):
         return np.abs(fine - coarse) / np.abs(fine - load_factor)
 
-    (load_factors, _, modes, softness, conservative, most), error, layout = until_two_meshes_agree(
-        scene,
-        lambda layout: _critical(scene, layout, count, load_factor, degree, comm),
-        apart,
-        tol,
-        first=FIRST_ELEMENTS,
-        most=_MOST_ELEMENTS,
-        elements=elements,
-        degree=degree,
-        advice="a larger tol",
-    )
+    with MeshProgress("buckling", tol, progress, comm) as bar:
+        (load_factors, _, state, shapes, softness, conservative, most), error, _ = until_two_meshes_agree(
+            scene,
+            lambda layout: _critical(scene, layout, count, load_factor, degree, comm),
+            apart,
+            tol,
+            first=FIRST_ELEMENTS,
+            most=_MOST_ELEMENTS,
+            elements=elements,
+            degree=degree,
+            progress=bar,
+            advice="a larger tol",
+        )
     error = np.maximum(error, softness)  # an error that both meshes share; NaN stays
     if (error > tol).any():
         raise NotConverged(
@@ -157,16 +102,16 @@ def buckling(scene, count=1, *, load_factor=0.0, tol=1e-5, elements=None, degree
         )
     bound = float(load_factors[0]) if len(load_factors) else most
     found = slice(0 if conservative else 1, None)  # without a potential the first one is the bound alone
-    return Buckling(scene, load_factors[found], modes, error[found], layout.counts, degree, conservative, bound)
+    return Buckling(state, shapes, error[found], conservative, comm, load_factors[found], bound)
 
 
 def _critical(scene, layout, count, load_factor, degree, comm):
     """The result on one mesh.
 
     Returns:
-        Load factors (n,), the lengths of boundary layers or None, modes (m, N, 3), relative errors (n,) of bounded
-        stiffnesses, whether the loads have a potential, and the largest load factor that is considered. With a
-        potential n = m; else n = m + 1, and the bound comes first.
+        Load factors (n,), the lengths of boundary layers or None, the `Equilibrium`, shapes (m, N, 6), relative errors
+        (n,) of bounded stiffnesses, whether the loads have a potential, and the largest load factor that is considered.
+        With a potential n = m; else n = m + 1, and the bound comes first.
     """
     with (
         solvers_of(scene, layout, degree=degree, comm=comm) as solvers,
@@ -229,9 +174,10 @@ def _critical_by(problem, newton, stability, circulatory, count, load_factor):
     # For a symmetric pencil, Rayleigh's quotient without that share of the energy is more accurate.
     critical = np.where(corrected, 1 + softness, 1.0) / critical
     softness = np.where(corrected, _REMAINING, 1.0) * softness
-    shapes = np.array([model.shape_of(mode) for mode in _oriented(model, values, vectors)[:count]])
-    nodes = sum(cells * model.signature.degree + 1 for cells in model.layout.counts)
-    return load_factor + critical, layers, shapes.reshape(-1, nodes, 3), softness, conservative, load_factor + most
+    whole = [np.concatenate(model.comm.allgather(vector.array_r)) for vector in vectors]
+    shapes = shapes_of(whole, values, model.rows_of_nodes, model.scales.length)[:count]
+    state = Equilibrium.of(model, load_factor)
+    return load_factor + critical, layers, state, shapes, softness, conservative, load_factor + most
 
 
 def _decrease(ahead, behind, change):
@@ -261,16 +207,6 @@ def _below(most, values, vectors):
     """
     values = values[values * most > 1]
     return values, vectors[: len(values)]
-
-
-def _oriented(model, values, vectors):
-    """The modes of eigenvalues (n,), descending, those of a multiple eigenvalue `oriented` together."""
-    modes, k = [], 0
-    while k < len(values):
-        same = int(np.count_nonzero(np.abs(values[k:] - values[k]) <= _SAME * values[k]))
-        modes += oriented(model, vectors[k : k + same])
-        k += same
-    return modes
 
 
 def _softness(part, vectors):

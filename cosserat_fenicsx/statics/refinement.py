@@ -203,7 +203,7 @@ class _Search:
         return self._keep(whole, None)
 
 
-def until_two_meshes_agree(scene, on_mesh, apart, tol, *, first, most, elements, degree, advice, gains=False):
+def until_two_meshes_agree(scene, on_mesh, apart, tol, *, first, most, elements, degree, advice, progress, gains=False):
     """Solve on successively halved meshes until the results of two of them agree.
 
     Args:
@@ -214,6 +214,7 @@ def until_two_meshes_agree(scene, on_mesh, apart, tol, *, first, most, elements,
         tol: largest relative difference.
         first, most: elements per rod of the first mesh and of the last; elements: those of a given mesh, or None.
         degree, advice: for error messages.
+        progress: a `MeshProgress`.
         gains: whether the error is estimated by the gain of a halving, of order 2 p, instead of by the difference of
             two meshes, which is larger. Without rounding errors among the numbers alone.
 
@@ -227,6 +228,7 @@ def until_two_meshes_agree(scene, on_mesh, apart, tol, *, first, most, elements,
     before = coarse_layout = None  # relative differences of the halving before; the mesh of `coarse`
     while True:
         obey()
+        progress.on(max(layout.counts), best)
         found = on_mesh(layout)
         numbers, lengths = found[:2]
         error = np.full(len(numbers), np.nan)

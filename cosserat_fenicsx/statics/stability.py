@@ -172,26 +172,40 @@ class Part:
 
 
 def oriented(model, vectors):
-    """Modes of one eigenvalue as changes of the unknowns (owned entries), in a basis independent of the eigensolver.
+    """Modes of one eigenvalue as changes of the unknowns (owned entries), combined as by `orienting`.
 
-    The basis of the eigenspace is rotated so that the node with the largest displacement moves along the first
-    inertial axis possible, in the positive direction, in the first mode alone; likewise for the remaining modes. A
-    single mode gets its sign thereby. The largest displacement of each is 1 (in the model's unit of length).
+    The largest displacement of each is 1 (in the model's unit of length).
     """
     if not vectors:  # the eigensolver has not converged
         return []
     modes = np.array([model.change_of(vector) for vector in vectors])
     shapes = np.array([model.shape_of(mode) for mode in modes])
-    for k in range(len(modes)):
+    turn = orienting(shapes)
+    modes, shapes = turn @ modes, np.tensordot(turn, shapes, 1)
+    size = np.linalg.norm(shapes, axis=2).max(axis=1, initial=0)
+    return [mode / (s or 1.0) for mode, s in zip(modes, size, strict=True)]
+
+
+def orienting(shapes):
+    """An orthogonal matrix (m, m) to combine the shapes of one eigenvalue by, in a way independent of the eigensolver.
+
+    The node with the largest displacement then moves along the first inertial axis possible, in the positive
+    direction, in the first shape alone; likewise for the remaining shapes. A single shape gets its sign thereby.
+
+    Args:
+        shapes: (m, N, 3) displacements of all nodes.
+    """
+    whole = np.eye(len(shapes))
+    for k in range(len(shapes)):
         moved = np.einsum("mni,mni->n", shapes[k:], shapes[k:])
         node = np.flatnonzero(moved >= (1 - 1e-6) * moved.max())[0]
         by = shapes[k:, node, :]  # (modes, axes)
         sizes = np.linalg.norm(by, axis=0)
         axis = np.flatnonzero(sizes >= 0.1 * sizes.max())[0]
-        turn = _towards(by[:, axis])
-        modes[k:], shapes[k:] = turn @ modes[k:], np.tensordot(turn, shapes[k:], 1)
-    size = np.linalg.norm(shapes, axis=2).max(axis=1, initial=0)
-    return [mode / (s or 1.0) for mode, s in zip(modes, size, strict=True)]
+        turn = np.eye(len(shapes))
+        turn[k:, k:] = _towards(by[:, axis])
+        whole, shapes = turn @ whole, np.tensordot(turn, shapes, 1)
+    return whole
 
 
 def _towards(a):

@@ -1,0 +1,229 @@
+"""Pictures and films of shapes about an equilibrium: modes of buckling and of natural vibrations."""
+
+import math
+import textwrap
+from collections.abc import Collection
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+
+from cosserat_fenicsx.checks import number, positive, refuse
+from cosserat_fenicsx.errors import SceneError
+from cosserat_fenicsx.pictures.animation import MOST_FRAMES, check_name, pixels, record
+from cosserat_fenicsx.pictures.drawing import body_of, frame, load_pyvista, points_of, surface_of, thickening
+from cosserat_fenicsx.pictures.view import view_of
+from cosserat_fenicsx.ranks import on_first
+from cosserat_fenicsx.results.beside import replaced
+from cosserat_fenicsx.results.shapes import require_modes
+
+# Panels of a picture, and in a row of it.
+_MOST_PANELS, _IN_A_ROW = 6, 3
+# Width of a panel, its least and largest height, height of the title, pixels.
+_WIDTH, _HEIGHTS, _TITLE = 640, (520, 640), 70
+# Largest rotation that is drawn, as the tangent of its angle.
+_STEEPEST = 1.0
+# Memory for frames of a film, which are drawn once, bytes.
+_MEMORY = 200_000_000
+# Pieces along a rod; mean width of a letter of the titles, pixels.
+_PIECES, _LETTER = 200, 11
+
+
+def draw(found, file, which, amplitude):
+    """Picture of some shapes, a panel each; see `Shapes.plot`."""
+    require_modes(found, file)
+    positive("plot", "amplitude", amplitude, "-")
+    which = range(min(len(found), _MOST_PANELS)) if which is None else which
+    if not isinstance(which, Collection) or not 1 <= len(which) <= _MOST_PANELS:
+        refuse("plot", "which", which, f"a list of the numbers of one to {_MOST_PANELS} modes")
+    shown = [found.number(k) for k in which]
+    if file is None:
+        return _panels(found, shown, amplitude)
+    file = Path(file)
+    if file.suffix != ".png":
+        raise SceneError(f"{file}: expected a name that ends in .png")
+
+    def save():
+        plotter = _panels(found, shown, amplitude)
+        try:
+            with replaced(file) as fresh:
+                plotter.screenshot(str(fresh))
+        finally:
+            plotter.close()
+
+    on_first(found.comm, save)
+    return None
+
+
+def film(found, file, k, *, fps, seconds, cycles, amplitude, size, progress):
+    """Film of one shape that swings to both sides; see `Shapes.animate`."""
+    file = check_name(file)
+    require_modes(found, file)
+    k, size = found.number(k), pixels(size)
+    fps = number("animate", "fps", fps, "a number from 1 to 100", lambda x: 1 <= x <= 100)
+    number("animate", "seconds", seconds, "a number from 0.2 to 60", lambda x: 0.2 <= x <= 60)
+    positive("animate", "amplitude", amplitude, "-")
+    repeats = file.suffix == ".gif"
+    cycles = (1 if repeats else 3) if cycles is None else cycles
+    if isinstance(cycles, bool) or not isinstance(cycles, int) or not 1 <= cycles <= 100:
+        refuse("animate", "cycles", cycles, "a whole number from 1 to 100")
+    if repeats:
+        fps = 100 / round(100 / fps)
+    frames = 2 * max(2, round(fps * seconds / 2))  # even: the frame in the middle is the opposite of the first
+    if frames * cycles > MOST_FRAMES:
+        refuse("animate", "cycles", cycles, f"fewer: at most {MOST_FRAMES} frames, not {frames * cycles}")
+    shares = np.round(np.cos(2 * math.pi * np.arange(frames * cycles) / frames), 12)  # equal ones are drawn once
+    on_first(found.comm, lambda: record(lambda: _Stage(found, k, amplitude, size), file, shares, fps, progress))
+
+
+class Drawn:
+    """A shape as it is drawn: scaled, about its equilibrium.
+
+    Args:
+        found: the `Shapes`; k: the number of the mode.
+        amplitude: largest displacement as a share of the structure's size. Shapes with large rotations are smaller: the
+            tangent of their largest rotation is `_STEEPEST`.
+
+    Attributes:
+        factor: of displacements and rotations; note: how large they are drawn, in words.
+    """
+
+    def __init__(self, found, k, amplitude):
+        self._found, self._k = found, k
+        self.lines = [found.equilibrium.sample(rod, np.linspace(0, 1, 201))[0] for rod in found.scene.rods]
+        size = float(np.ptp(np.concatenate(self.lines), axis=0).max())
+        moved, turned = (np.linalg.norm(found.shapes[k, :, part], axis=1).max() for part in (slice(0, 3), slice(3, 6)))
+        self.factor = min(amplitude * size / (moved or 1e-300), _STEEPEST / (turned or 1e-300))
+        self._by_turning = found.twists(k)
+        self._peak = turned if self._by_turning else moved
+        if self._by_turning:
+            angle = math.degrees(math.atan(self.factor * turned))
+            self.note = f"largest rotation drawn as {angle:.0f} degrees"
+        else:
+            share = 100 * self.factor * moved / size
+            self.note = f"largest displacement drawn as {share:.2g} % of the structure's size"
+
+    def bodies(self, share=1.0):
+        """The `Body` of every rod, displaced by `share` of the amplitude, from -1 to 1. Its values, in the place of the
+        bending moment, are displacements (rotations, where nothing is displaced), 1 at most."""
+        equilibrium, shape, made = self._found.equilibrium, self._found.shapes[self._k], []
+        x = np.linspace(0, 1, _PIECES + 1)
+        for rod in self._found.scene.rods:
+            line, frames = equilibrium.sample(rod, x)
+            motion = equilibrium.between(rod, x, shape)
+            moved, turned = motion[:, :3], motion[:, 3:]
+            values = np.abs(share) * np.linalg.norm(turned if self._by_turning else moved, axis=1) / self._peak
+            directors = _turned(frames, share * self.factor * turned)
+            made.append(body_of(rod, x, line + share * self.factor * moved, directors, values))
+        return made
+
+    def everywhere(self):
+        """(n, 3) points of the equilibrium and of the shape on both sides."""
+        return np.concatenate([*self.lines, *(body.line for share in (1, -1) for body in self.bodies(share))])
+
+
+def _turned(frames, slopes):
+    """Frames (n, 3, 3) rotated about the directions of `slopes` (n, 3) by angles whose tangents are their sizes.
+
+    So sections stay at right angles to a line whose displacements are drawn large, as far as they were.
+    """
+    sizes = np.linalg.norm(slopes, axis=1)
+    angles = np.arctan(sizes)
+    axes = slopes / np.maximum(sizes, 1e-300)[:, None]
+    cos, sin = np.cos(angles)[:, None, None], np.sin(angles)[:, None, None]
+    around = np.cross(axes[:, None, :], frames.transpose(0, 2, 1)).transpose(0, 2, 1)
+    along = axes[:, :, None] * np.einsum("ni,nij->nj", axes, frames)[:, None, :]
+    return cos * frames + sin * around + (1 - cos) * along
+
+
+def _panels(found, shown, amplitude):
+    pyvista = load_pyvista()
+    across = len(shown) if len(shown) <= _IN_A_ROW else _IN_A_ROW if len(shown) > 4 else 2
+    down = math.ceil(len(shown) / across)
+    drawn = [Drawn(found, k, amplitude) for k in shown]
+    everywhere = np.concatenate([shape.everywhere() for shape in drawn])
+    panel = _height(everywhere)
+    width, height = across * _WIDTH, down * panel + _TITLE
+    plotter = pyvista.Plotter(
+        off_screen=True, window_size=(width, height), border=False, shape=(down + 1, across),
+        row_weights=[_TITLE, *[panel] * down], groups=[(0, slice(None))],
+    )  # fmt: skip
+    plotter.set_background("white")
+    plotter.enable_anti_aliasing("msaa", multi_samples=8)  # supersampling leaves all panels but one black
+    plotter.subplot(0, 0)
+    plotter.add_text(_head(found, width), position="upper_edge", color="black", font_size=12)
+    for i, (k, shape) in enumerate(zip(shown, drawn, strict=True)):
+        plotter.subplot(1 + i // across, i % across)
+        _add(plotter, pyvista, shape, shape.bodies(), everywhere)
+        text = f"k = {k}: {found.label(k)}\n{_below(shape, shape.bodies(), everywhere, _WIDTH)}"
+        plotter.add_text(text, position="upper_edge", color="black", font_size=9)
+        frame(plotter, everywhere, panel=True)
+    return plotter
+
+
+def _height(everywhere):
+    """The height of a panel that suits a drawing of points (n, 3), pixels."""
+    _, right, above, _ = view_of(np.ptp(everywhere, axis=0))
+    across, high = np.ptp(everywhere @ right), np.ptp(everywhere @ above)
+    return int(np.clip(_WIDTH * high / max(across, 1e-9 * high), *_HEIGHTS))
+
+
+def _head(found, width):
+    at = f" about the equilibrium at the load factor {found.load_factor:g}" if found.load_factor else ""
+    what = f"{found.scene.title}: {found.title.lower()}" if found.scene.title else found.title
+    title = textwrap.fill(f"{what}{at}", width // _LETTER)
+    return f"{title}\ncoloured by the size of the motion: none is dark, the largest bright"
+
+
+def _below(shape, bodies, everywhere, width):
+    """The lines under a title: what is not to scale."""
+    extent = float(np.ptp(everywhere, axis=0).max())
+    thicker = sorted({f"{float(f'{thickening(body, extent):.2g}'):g}" for body in bodies} - {"1"})
+    notes = [shape.note, *([f"sections drawn {' and '.join(thicker)} times their size"] if thicker else [])]
+    return "\n".join(textwrap.fill(note, width // _LETTER * 2) for note in notes)
+
+
+def _add(plotter, pyvista, shape, bodies, everywhere):
+    """Draw the equilibrium as grey lines, and rods whose surfaces are returned."""
+    extent, surfaces = float(np.ptp(everywhere, axis=0).max()), []
+    for body in bodies:
+        surface = surface_of(pyvista, body, thickening(body, extent))
+        surface["values"] = np.repeat(body.values, body.outline.shape[1])
+        plotter.add_mesh(surface, scalars="values", cmap="viridis", clim=(0, 1), show_scalar_bar=False)
+        surfaces.append(surface)
+    for line in shape.lines:
+        plotter.add_mesh(pyvista.lines_from_points(line), color="grey", line_width=2)
+    return surfaces
+
+
+class _Stage:
+    """The scene of a film: `at(share)` is the picture (height, width, 3) at a share of the amplitude, from -1 to 1."""
+
+    def __init__(self, found, k, amplitude, size):
+        pyvista = load_pyvista()
+        self._shape = Drawn(found, k, amplitude)
+        self._everywhere = self._shape.everywhere()
+        bodies = self._shape.bodies()
+        self._plotter = pyvista.Plotter(off_screen=True, window_size=size)
+        self._plotter.set_background("white")
+        self._plotter.enable_anti_aliasing("msaa")
+        self._surfaces = _add(self._plotter, pyvista, self._shape, bodies, self._everywhere)
+        extent = float(np.ptp(self._everywhere, axis=0).max())
+        self._factors = [thickening(body, extent) for body in bodies]
+        below = _below(self._shape, bodies, self._everywhere, size[0])
+        text = f"{_head(found, size[0])}\nk = {k}: {found.label(k)}\n{below}"
+        self._plotter.add_text(text, position="upper_edge", color="black", font_size=10)
+        frame(self._plotter, self._everywhere, panel=True)
+        self.at = lru_cache(maxsize=max(1, _MEMORY // (3 * size[0] * size[1])))(self._draw)
+
+    def _draw(self, share):
+        for surface, body, factor in zip(self._surfaces, self._shape.bodies(share), self._factors, strict=True):
+            surface.points[:] = points_of(body, factor)
+            surface["values"][:] = np.repeat(body.values, body.outline.shape[1])
+            surface.GetPoints().Modified()
+            surface.GetPointData().GetScalars().Modified()
+        self._plotter.render()
+        return self._plotter.screenshot(return_img=True)
+
+    def close(self):
+        self._plotter.close()

@@ -1,0 +1,72 @@
+"""The result of linear buckling."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from cosserat_fenicsx.results.shapes import Shapes, in_words, largest_error
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Buckling(Shapes):
+    """Result of `buckling`.
+
+    Attributes:
+        see `Shapes`;
+        load_factors: (n,) critical load factors, ascending from that of the state.
+        modes: (n, N, 3) displacements, inertial, of all nodes of all rods in the scene's order; the largest has
+            length 1.
+        error: (n,) estimated relative error of the load factors; NaN where the mesh was given.
+        elements: number of elements of each rod; degree: of the elements.
+        conservative: whether the loads have a potential near the state, for all motions that the supports allow. A dead
+            moment has none where its section is free to rotate about two axes, nor has a follower load. Without a
+            potential a structure may flutter below its first static bifurcation, or without one, which linear
+            buckling does not detect.
+        bound: no static bifurcation lies below this load factor, whether conservative or not. Where the loads have a
+            potential it is the first of `load_factors`. Where they have none it is the load factor at which the
+            symmetric part of the second variation becomes singular, which is neither an instability nor a bifurcation.
+            Where nothing is found it is the largest load factor that is considered: there the contact force of a rod
+            reaches the smallest of its axial and shear stiffnesses, or 1e8 EI/L^2.
+    """
+
+    load_factors: np.ndarray
+    bound: float
+
+    title = "Linear buckling"
+
+    @property
+    def modes(self):
+        """(n, N, 3) see the class."""
+        return self.shapes[:, :, :3]
+
+    @property
+    def caution(self):
+        """The limits of the result, in a sentence; "" where the loads have a potential."""
+        if self.conservative:
+            return ""
+        found = (
+            "the load factors are those of its static bifurcations (divergence) alone"
+            if len(self.load_factors)
+            else "no static bifurcation (divergence) was found"
+        )
+        return (
+            f"The loads have no potential: {found}, and there is none below {self.bound:.7g}. The structure may "
+            "flutter at a lower load, which a motion shows (`simulate`), and linear buckling does not."
+        )
+
+    def __repr__(self):
+        if len(self):
+            text = f"critical load factors {in_words(self.load_factors)}, {largest_error(self.error)}"
+        else:
+            text = f"no critical load factor up to {self.bound:.7g}"
+        text += f", from the load factor {self.load_factor:g}" if self.load_factor else ""
+        return f"<Buckling: {text}. {self.caution}>" if self.caution else f"<Buckling: {text}>"
+
+    def label(self, k):
+        """See `Shapes`."""
+        return f"critical load factor {self.load_factors[k]:.5g}"
+
+    @property
+    def columns(self):
+        """See `Shapes`."""
+        return {"critical load factor": self.load_factors, "estimated relative error": self.error}
