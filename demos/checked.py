@@ -26,7 +26,8 @@ def report(title, rows, headings=()):
     for heading in ("scene", "model", *headings, "number", "deviation", "allowed", "expected by"):
         table.add_column(heading)
     for name, model, check, *more in rows:
-        values = ", ".join(f"{x:.6g}" for x in np.atleast_1d(check.found))
+        found = np.atleast_1d(check.found)
+        values = ", ".join(f"{x:.6g}" for x in np.where(abs(found) > 1e-12 * abs(found).max(), found, 0))
         table.add_row(
             name,
             model,

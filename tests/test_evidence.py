@@ -89,3 +89,35 @@ def test_orders_quick(tmp_path):
     for degree, order in spatial.items():
         assert order > 2 * degree - (0.1 if degree < 3 else 1.0), degree
     assert "| 4 | 4, 8 |" in (tmp_path / "orders.md").read_text(encoding="utf-8")
+
+
+def test_tables_and_pictures_are_put_into_the_documentation(tmp_path):
+    import put_in_docs
+    from PIL import Image
+
+    out, docs = tmp_path / "out", tmp_path / "docs"
+    for folder in (out, docs / "pictures", docs / "tables"):
+        folder.mkdir(parents=True)
+    (docs / "accuracy.md").write_text("before\n<!-- figure3 -->\nold\n<!-- /figure3 -->\nafter\n", encoding="utf-8")
+    for name in ("figure3", "failures"):
+        (out / f"{name}.md").write_text(f"| {name} |\n", encoding="utf-8")
+    image = np.full((300, 400, 3), 255, dtype=np.uint8)
+    image[100:200, 150:250] = 0
+    Image.fromarray(image).save(out / "figure3.png")
+    put_in_docs.main(["figure3", "failures", "orders"], out, docs)
+    page = (docs / "accuracy.md").read_text(encoding="utf-8")
+    assert page == "before\n<!-- figure3 -->\n| figure3 |\n<!-- /figure3 -->\nafter\n"
+    assert "# Where methods fail" in (docs / "tables" / "failures.md").read_text(encoding="utf-8")
+    assert Image.open(docs / "pictures" / "figure3.png").size == (123, 123)
+
+
+def test_every_table_has_its_place_in_the_documentation():
+    import put_in_docs
+
+    for name, (page, *pictures) in put_in_docs.PAGES.items():
+        assert text_in(page).count(f"<!-- {name} -->\n") == text_in(page).count(f"<!-- /{name} -->\n") == 1
+        assert all(picture in text_in(page) for picture in pictures)
+
+
+def text_in(page):
+    return (EVIDENCE.parents[1] / "docs" / page).read_text(encoding="utf-8")
