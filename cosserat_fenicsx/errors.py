@@ -8,7 +8,7 @@ class CosseratError(Exception):
 
 
 class InstallationError(CosseratError, ImportError):
-    """dolfinx is missing, too old, or built for complex numbers."""
+    """dolfinx is missing, too old, built for complex numbers, or cannot compile."""
 
 
 class SceneError(CosseratError, ValueError):

@@ -211,6 +211,7 @@ def slid(duration, k=100.0, limit=1.0, steps=100000):
     return x
 
 
+@pytest.mark.slow
 @pytest.mark.serial
 @pytest.mark.parametrize("scheme", ["momentum", "energy", "generalised-alpha"])
 def test_memory_and_refreshed_data_in_motion(scheme):

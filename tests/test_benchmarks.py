@@ -126,6 +126,7 @@ def test_order_of_loads_does_not_matter():
             np.testing.assert_allclose(rq, together._records[0].rq, atol=1e-12)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "drawn", [*random_scenes.scenes(10, first=20), random_scenes.draw(5097)], ids=lambda drawn: str(drawn.seed)
 )

@@ -179,6 +179,7 @@ def test_a_second_process_compiles_nothing(tmp_path):
     assert counts[0] == counts[1] > 0
 
 
+@pytest.mark.slow
 def test_ctrl_c_keeps_what_is_done(tmp_path):
     """SIGINT in the middle of a long list of load factors: table, files, exit code."""
     scene = tmp_path / "scene.toml"

@@ -56,6 +56,7 @@ def damped(**damping):
         yield cf.Rod(rod.curve, rod.section, name="rod", damping=cf.Damping(**damping))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scheme", ["momentum", "energy", "generalised-alpha"])
 def test_turned_principal_axes_move_as_turned_directors(scheme):
     """To rounding, energies and dissipation included."""
@@ -108,6 +109,7 @@ def test_energy_is_exact_and_momentum_too():
         assert np.abs(history.balance).max() < (1e-9 if scheme == "energy" else 2e-2) * history.energy[-1]
 
 
+@pytest.mark.slow
 @STEADY
 def test_a_mode_of_a_rope_decays_as_it_should():
     """Viscosity proportional to the matrix: the energy of every mode decays as exp(-time omega^2 t)."""

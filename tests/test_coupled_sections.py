@@ -112,6 +112,7 @@ def offset_and_shifted(P):
         yield rod, cf.Scene([rod], [cf.Clamp(rod.start)], acting)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("model", "formulation"), [("determinate", "mixed"), ("spatial", "mixed"), ("spatial", "displacement")]
 )
@@ -131,6 +132,7 @@ def test_a_line_off_the_centroid_is_a_shifted_rod(model, formulation):
     np.testing.assert_allclose(fa["strain"], stretched, atol=1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("load", [cf.Force, cf.FollowerForce])
 @pytest.mark.parametrize("formulation", ["mixed", "displacement"])
 def test_turned_principal_axes_are_turned_directors(load, formulation):

@@ -23,6 +23,7 @@ def test_overhead_quick(tmp_path):
     assert np.max(difference) < 1e-10
 
 
+@pytest.mark.slow
 def test_accuracy_quick(tmp_path):
     import accuracy
 
@@ -41,6 +42,7 @@ def test_rungs_quick(tmp_path):
         assert all(error < 2e-6 for _, _, _, _, error, _ in rows), rows
 
 
+@pytest.mark.slow
 def test_choice_quick(tmp_path):
     """The automatic choice and the choice by hand are as accurate as requested."""
     import choice
@@ -54,6 +56,7 @@ def test_choice_quick(tmp_path):
     assert error <= estimate <= 1e-6 and picked <= 1e-6
 
 
+@pytest.mark.slow
 def test_scaling_quick(tmp_path):
     """The numbers of unknowns; times are not tested."""
     import scaling
@@ -62,6 +65,7 @@ def test_scaling_quick(tmp_path):
     assert rows[:, 0].tolist() == [112, 448, 1792] and (rows[:, 1:] > 0).all()
 
 
+@pytest.mark.slow
 def test_steps_quick(tmp_path):
     """Models and schemes give the same motion; most steps reuse a tangent. Times are not tested."""
     import steps
@@ -72,6 +76,7 @@ def test_steps_quick(tmp_path):
     assert all(iterations < 6 for _, iterations, _ in found)
 
 
+@pytest.mark.slow
 def test_orders_quick(tmp_path):
     """Schemes have their orders with joints, damping and driven supports too; meshes 2p."""
     import orders

@@ -30,6 +30,7 @@ ALLOWED = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", own.OWN, ids=lambda method: method.key)
 @pytest.mark.parametrize(
     "trial",
@@ -81,6 +82,7 @@ def test_a_word_on_stability_is_held_against_becks_column():
     assert verdict([True] * 5, "it may flutter") == cells.SAID and verdict([True] * 5) == cells.SILENT
 
 
+@pytest.mark.slow
 def test_what_is_written_for_comparison_fails_as_it_is_known_to():
     """Rotation vectors, truncated rotations and bare loops fail as expected, so that the comparison has a meaning."""
     vector, (beam, mcre), bare = RotationVector(), chains.CHAINS, methods.BY_KEY["bare"]
@@ -102,6 +104,7 @@ def test_what_is_written_for_comparison_fails_as_it_is_known_to():
         assert methods.cell(of[trial], bare).verdict == verdict, trial
 
 
+@pytest.mark.slow
 def test_the_command_is_broken_off_and_goes_on(tmp_path, monkeypatch, capsys):
     """The quick comparison of a few methods; programs that are not installed are marked as such."""
     import failures

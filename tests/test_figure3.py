@@ -142,6 +142,7 @@ def test_the_mcre_before_and_beyond_its_limit_point():
     assert len(curve.eta) == 2 and "beyond the load factor 0.61" in curve.stopped
 
 
+@pytest.mark.slow
 def test_ever_more_elements_tend_to_the_truncated_energy():
     """The limit point of forms/truncated.py on two meshes; those of the elements converge to it with second order."""
     limit = mcre.limit(TruncatedColumn())
@@ -161,6 +162,7 @@ def test_the_mesh_of_the_bar():
     assert np.linalg.norm(points, axis=1).max() == pytest.approx(0.1, rel=4e-4)
 
 
+@pytest.mark.slow
 def test_the_solid_bar():
     """Its tangent is the derivative of its residual; a small load bends it as it bends the rod."""
     bar = SolidBar(Column(arm=True), along=8, refinement=1)
@@ -178,6 +180,7 @@ def test_the_solid_bar():
     assert delta == pytest.approx(truth.delta, rel=1e-3) and shortening == pytest.approx(truth.shortening, rel=1e-3)
 
 
+@pytest.mark.slow
 def test_figure3_is_broken_off_and_goes_on(tmp_path, monkeypatch, capsys):
     import figure3
 

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from moving_scenes import drift, flying_in_space
+from test_action_protocol import FREE, Lookup
 from test_schemes import smooth
 
 import cosserat_fenicsx as cf
@@ -216,3 +217,13 @@ def test_refusals():
         with pytest.raises(cf.SceneError) as refusal:
             cf.simulate(scene, 1, dt=0.1, **settings)
         assert words in str(refusal.value)
+
+
+def test_clamps_at_the_end_of_a_step_hold_against_data_of_that_moment():
+    """Under generalised-alpha a bed whose force is evaluated from the position loads the clamp as the built-in one."""
+    clamp, force, reactions = cf.Clamp(FREE.start), cf.Force(FREE.end, (0, 0, 1.0)), []
+    asked = {"dt": 0.0025, "elements": 2, "degree": 2, "model": "spatial", "scheme": "generalised-alpha"}
+    for bed in (Lookup, cf.Foundation):
+        motion = cf.simulate(cf.Scene([FREE], [clamp], [force, bed(FREE, 3e4)]), 0.02, **asked)
+        reactions.append(motion.reaction(clamp)[0][1:, 2])
+    np.testing.assert_allclose(*reactions, rtol=1e-4)

@@ -138,6 +138,7 @@ def test_loads_with_a_potential(case):
         assert found.bound == pytest.approx(exact, rel=1e-5)
 
 
+@pytest.mark.slow
 def test_paths_and_vibrations_say_so_too():
     """For motions in space, whichever model computed the path."""
     dead, arm, moment, follower, line = (

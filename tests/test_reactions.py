@@ -244,6 +244,7 @@ def push_of_wall(displacements, result, clearance, stiffness):
     return -(weights * pressure / np.where(rho, rho, 1.0)) @ away
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("what", ["bed", "wall"])
 def test_what_acts_along_rods_and_sees_the_state(what):
     """A foundation, and a wall, which is integrated at the nodes: with two

@@ -22,6 +22,7 @@ SCENES = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SCENES)
 def test_against_the_strong_form(name):
     section, loads = SCENES[name]

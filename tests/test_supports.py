@@ -204,6 +204,7 @@ def test_one_jump_of_more_than_half_a_turn_is_refused():
         cf.solve(scene, [5.0], elements=4, steps=cf.StepControl(adaptive=False))
 
 
+@pytest.mark.slow
 @pytest.mark.serial
 @pytest.mark.parametrize("load_factors", [[1.0], [0.3, 0.6, 1.0]])
 def test_many_turns_are_not_mistaken_for_fewer(load_factors):

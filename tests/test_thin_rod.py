@@ -36,6 +36,7 @@ def free(history):
 TRAPEZOIDAL_TOO = {"scheme": "generalised-alpha", "rho_inf": 1}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("factor", "dt", "lost", "kept"),
     [

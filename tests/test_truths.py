@@ -119,6 +119,7 @@ def energy(problem, x, q, first):
     return 0.5 * h * (np.array(problem.J) @ k**2).sum() - h * (work.sum() - (work[0] + work[-1]) / 2)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["random", "unstable"])
 def test_the_energy_is_stationary_and_its_negative_modes_are_counted(name):
     if name == "random":
@@ -154,6 +155,7 @@ def test_the_energy_is_stationary_and_its_negative_modes_are_counted(name):
     assert (np.linalg.eigvalsh(hessian) < 0).sum() == found.index
 
 
+@pytest.mark.slow
 def test_what_is_not_reached_is_refused():
     problem = column((1.0, 1.0, 1.0), (4, 0, 0))
     with pytest.raises(bvp.NoTruth, match="stopped at load factor 0"):
@@ -164,6 +166,7 @@ def test_what_is_not_reached_is_refused():
         bvp.at(problem, bvp.equilibrium(problem).clamp_moment, tol=1e-13, nodes=1000)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(10))
 def test_random_scenes_are_what_they_say(seed):
     drawn = draw(seed)

@@ -17,6 +17,7 @@ def evidence_on_the_path(monkeypatch):
     monkeypatch.setattr(sys, "path", [str(EVIDENCE), *sys.path])
 
 
+@pytest.mark.slow
 def test_quick(tmp_path, capsys):
     """This package's results are as accurate as their degree allows; every peer gives a result or a reason why not."""
     import work_precision
@@ -45,6 +46,7 @@ def test_quick(tmp_path, capsys):
         assert (tmp_path / f"work_precision_quick_{name}.png").stat().st_size > 20000
 
 
+@pytest.mark.slow
 def test_quick_motion(tmp_path, capsys):
     """Every scheme is as accurate as its step allows; Exudyn is included if installed."""
     import work_precision_motion
@@ -65,6 +67,7 @@ def test_quick_motion(tmp_path, capsys):
     assert "| Flying spaghetti in space, ends at t = 10 s | cosserat_fenicsx: energy |" in capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_broken_off_run_goes_on(tmp_path, monkeypatch):
     """Samples are kept, unless sources have changed; an interruption prints how to continue."""
     import work_precision

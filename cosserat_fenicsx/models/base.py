@@ -12,6 +12,7 @@ from cosserat_fenicsx.element import ElementRule
 from cosserat_fenicsx.forms.law import stiffness_for
 from cosserat_fenicsx.models.action_terms import ActionTerms
 from cosserat_fenicsx.models.clamps import Clamps
+from cosserat_fenicsx.models.compiling import compiling
 from cosserat_fenicsx.models.connections import ties_of
 from cosserat_fenicsx.models.densities import Densities
 from cosserat_fenicsx.models.laws import stretch_values
@@ -70,7 +71,7 @@ class RodModel:
 
     def __init__(self, comm, signature):
         self.comm, self.signature, self.axes = comm, signature, np.eye(3)
-        with compat.quiet_compiler():
+        with compiling():
             self._build()
 
     # -- for subclasses to define ------------------------------------------------------------------------------------

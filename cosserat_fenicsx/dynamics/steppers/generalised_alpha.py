@@ -134,6 +134,7 @@ class CollocationProblem(StepProblem):
         """See `StepProblem`: at the end of the step."""
         if self.model.clamps.count:
             self._take_loads(self._end)
+            self._refresh(self.acting_share)
         return super().clamp_forces()
 
     def free_velocities(self, t, h):

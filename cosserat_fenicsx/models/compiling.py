@@ -1,0 +1,40 @@
+"""What can go wrong where dolfinx compiles forms, in words: its cache, or the C compiler."""
+
+import contextlib
+import os
+from pathlib import Path
+
+from cosserat_fenicsx import compat
+from cosserat_fenicsx.errors import CosseratError, InstallationError
+
+
+@contextlib.contextmanager
+def compiling():
+    """Context manager in which dolfinx compiles forms or loads them from its cache.
+
+    Raises:
+        InstallationError: the cache cannot be written or read, or there is no C compiler that works.
+    """
+    try:
+        with compat.quiet_compiler():
+            yield
+    except CosseratError:
+        raise
+    except Exception as problem:
+        said = str(problem).strip().partition("\n")[0] or type(problem).__name__
+        if type(problem).__name__ == "VerificationError" or "VerificationError" in said or "CompileError" in said:
+            raise InstallationError(
+                f"the C compiler that dolfinx calls has failed ({said}): expected one that works, such as by 'apt "
+                f"install gcc python3-dev', room for its files in {cache()}, and no CC set to another"
+            ) from problem
+        if isinstance(problem, OSError | ImportError) or "just-in-time" in said:
+            raise InstallationError(
+                f"dolfinx cannot use its cache of compiled forms, {cache()} ({said}): make room there, remove what is "
+                "damaged, or set XDG_CACHE_HOME to a folder that can be written to"
+            ) from problem
+        raise
+
+
+def cache():
+    """The folder of dolfinx's compiled forms."""
+    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "fenics"
