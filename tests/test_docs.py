@@ -83,6 +83,7 @@ def test_scene_files_are_read(page, scene, tmp_path):
     assert found.title
 
 
+@pytest.mark.slow
 def test_the_notebook_prints_what_it_shows():
     """`jupyter execute --inplace docs/notebook.ipynb` puts in what it prints today."""
     nbformat, nbclient = pytest.importorskip("nbformat"), pytest.importorskip("nbclient")
