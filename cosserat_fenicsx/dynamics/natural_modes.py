@@ -98,7 +98,16 @@ class Modes(OnNodes):
         return self.shapes[k, self._rows(rod)[1], 3:]
 
 
-def modes(scene, count=1, *, load_factor=0.0, tol=1e-6, elements=None, degree=4, comm=None):
+def modes(
+    scene: Scene,
+    count: int = 1,
+    *,
+    load_factor: float = 0.0,
+    tol: float = 1e-6,
+    elements: int | None = None,
+    degree: int = 4,
+    comm: MPI.Comm | None = None,
+) -> Modes:
     """Natural frequencies and shapes of small undamped vibrations about a static state.
 
     K x = omega^2 M x under the constraints of supports and joints, with K the second variation in (r, theta) and M the

@@ -5,6 +5,7 @@ import cosserat_fenicsx.compat  # noqa: F401, I001  first: its message says what
 import numpy as np
 from mpi4py import MPI
 
+from cosserat_fenicsx.annotations import File
 from cosserat_fenicsx.checks import instance, refuse
 from cosserat_fenicsx.dynamics.simulate import check_counts, pace_of, positive_time
 from cosserat_fenicsx.dynamics.solvers import solvers_of
@@ -14,12 +15,20 @@ from cosserat_fenicsx.models.connections import Connections
 from cosserat_fenicsx.models.rodmesh import Layout
 from cosserat_fenicsx.models.scales import Scales
 from cosserat_fenicsx.dynamics.time_loop import TimeLoop
+from cosserat_fenicsx.results.history import History
 from cosserat_fenicsx.storage.runfolder import RunFolder
 from cosserat_fenicsx.scene.scene import Scene
 from cosserat_fenicsx.storage.stored_history import StoredHistory
 
 
-def resume(folder, scene=None, *, duration=None, progress=None, comm=None):
+def resume(
+    folder: File,
+    scene: Scene | None = None,
+    *,
+    duration: float | None = None,
+    progress: bool | None = None,
+    comm: MPI.Comm | None = None,
+) -> History:
     """Continue a motion from the folder that `simulate(..., folder=...)` writes, to the same digits.
 
     It does not matter what ended the run: a killed process, Ctrl-C, a full disk. All saved states are kept. The run
@@ -108,7 +117,7 @@ def _go_on(kept, scene, until, comm, progress):
         return motion.over(marks, asked["save_every"] is None, progress)
 
 
-def read_history(folder, scene=None, *, comm=None):
+def read_history(folder: File, scene: Scene | None = None, *, comm: MPI.Comm | None = None) -> History:
     """The states that a motion has saved so far; another process may still be computing it.
 
     Args:

@@ -6,6 +6,7 @@ import numpy as np
 
 from cosserat_fenicsx.quaternions import directors
 from cosserat_fenicsx.results.on_nodes import OnNodes
+from cosserat_fenicsx.scene.rod import Station
 
 # Sampling intervals of an element, per degree of its polynomials.
 _PLACES = 6
@@ -19,14 +20,14 @@ class Largest:
     """The largest value of a quantity: its size (N m or N), its station, and the index of the point or time."""
 
     size: float
-    station: object
+    station: Station
     point: int
 
 
 class Extremes(OnNodes):
     """The largest contact forces and moments of a path or a motion."""
 
-    def largest(self):
+    def largest(self) -> dict[str, "Largest"]:
         """The largest contact forces and moments over all points of a path (or times of a motion) and all rods.
 
         Both sides of jumps are included, and places between the nodes. Values are those of the mesh used: `tol` limits

@@ -1,8 +1,11 @@
 """A scene: rods, joints, supports and actions, independent of solvers and meshes."""
 
 import copy
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+
+import numpy as np
 
 from cosserat_fenicsx.checks import instance
 from cosserat_fenicsx.errors import SceneError, nearest
@@ -13,10 +16,10 @@ from cosserat_fenicsx.scene.joints import Joint
 from cosserat_fenicsx.scene.magnitudes import magnitudes
 from cosserat_fenicsx.scene.names import with_names
 from cosserat_fenicsx.scene.planes import find_plane
-from cosserat_fenicsx.scene.rod import Rod, Station, station_named
+from cosserat_fenicsx.scene.rod import Rod, Station, StationOrName, station_named
 from cosserat_fenicsx.scene.signals import signals_of
 from cosserat_fenicsx.scene.statical import check_held_once, touching
-from cosserat_fenicsx.scene.supports import SUPPORTS
+from cosserat_fenicsx.scene.supports import SUPPORTS, Support
 
 # Young's moduli below this, Pa, are those of gels, or mistakes in units.
 _SOFTEST = 1e6
@@ -41,12 +44,12 @@ class Scene:
             statics refuses them.)
     """
 
-    rods: tuple
-    supports: tuple = ()
-    loads: tuple = ()
-    joints: tuple = ()
+    rods: Sequence[Rod]
+    supports: Sequence[Support] = ()
+    loads: Sequence[Action] = ()
+    joints: Sequence[Joint] = ()
     title: str = ""
-    velocities: tuple = ()
+    velocities: Sequence[InitialVelocity] = ()
 
     #: time (s) up to which functions of time are sampled, see `over`
     horizon = 1.0
@@ -126,11 +129,11 @@ class Scene:
             leaders[other] = one
         return {rod: find(rod) for rod in self.rods}
 
-    def leader(self, rod):
+    def leader(self, rod: Rod) -> Rod:
         """The first rod of the structure that a rod belongs to."""
         return self._leaders[rod]
 
-    def origin(self, rod):
+    def origin(self, rod: Rod) -> np.ndarray:
         """The start of the structure that a rod belongs to, (3,), m.
 
         Solvers take positions relative to it, so that a large distance from the inertial origin costs no accuracy.
@@ -179,7 +182,7 @@ class Scene:
         return [station for station in named if station.rod is rod]
 
     @property
-    def cautions(self):
+    def cautions(self) -> list[str]:
         """Warnings that belong to every result, a list of sentences."""
         return [*self.doubts, *self._following()]
 
@@ -233,7 +236,7 @@ class Scene:
             "20.05 EI/L^2), one with none may flutter, which only dynamics can show"
         ]
 
-    def station(self, name):
+    def station(self, name: str) -> Station:
         """The station 'rod.start', 'rod.end' or 'rod@s', s in m, as scene files name it.
 
         Raises:
@@ -241,7 +244,7 @@ class Scene:
         """
         return station_named("station", name, {rod.name: rod for rod in self.rods})
 
-    def supports_of(self, which):
+    def supports_of(self, which: Support | StationOrName) -> list[int]:
         """Indices of the supports that `which` stands for.
 
         Args:
@@ -265,7 +268,7 @@ class Scene:
             )
         return found
 
-    def rod(self, name):
+    def rod(self, name: str) -> Rod:
         """The rod of that name.
 
         Raises:

@@ -41,7 +41,9 @@ import dataclasses
 import inspect
 import tomllib
 from pathlib import Path
+from typing import Any
 
+from cosserat_fenicsx.annotations import File
 from cosserat_fenicsx.errors import SceneError, nearest
 from cosserat_fenicsx.scene.along import ALONG
 from cosserat_fenicsx.scene.curves import CURVES
@@ -76,7 +78,7 @@ SIMULATE_KEYS = {
 }
 
 
-def read_scene(file):
+def read_scene(file: File) -> tuple[Scene, dict[str, Any]]:
     """A scene and its solver settings from a TOML file.
 
     Args:
@@ -93,7 +95,7 @@ def read_scene(file):
     return scene, settings
 
 
-def read_motion(file):
+def read_motion(file: File) -> tuple[Scene, dict[str, Any]]:
     """A scene and the arguments of its motion from a TOML file: `simulate(scene, **arguments)`.
 
     Args:
