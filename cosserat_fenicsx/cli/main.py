@@ -126,11 +126,14 @@ def _explain(options):
     if moving:
         from cosserat_fenicsx.cli.explain_motion import explain_motion
 
-        text = explain_motion(*moving)
+        scene, text = moving[0], explain_motion(*moving)
     else:
         from cosserat_fenicsx.cli.explain import explain
 
-        text = explain(*_settings(options))
+        scene, *asked = _settings(options)
+        text = explain(scene, *asked)
+    for doubt in scene.doubts:
+        say(f"cosserat: {doubt}")
     say(text, file=sys.stdout)
     return DONE
 

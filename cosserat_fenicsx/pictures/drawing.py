@@ -117,6 +117,7 @@ def add_body(plotter, pyvista, body, factor, peak, moving=False):
     faces = np.column_stack([np.full(len(quads), 4), quads]).ravel()
     caps = np.concatenate([[corners, *rings[0][::-1]], [corners, *rings[-1]]])
     surface = pyvista.PolyData(points_of(body, factor), np.concatenate([faces, caps]))
+    surface = surface.triangulate()  # the caps of an I section are not convex
     scale, unit = prefix(peak)
     font = round(plotter.window_size[0] / 70)
     surface["moment"] = np.repeat(body.moment / scale, corners)
