@@ -4,17 +4,17 @@ Modules are imported when their names are first used, so that `import cosserat_f
 """
 
 import importlib
-from pathlib import Path as _FilePath
+from os import path as _path
 
 __version__ = "0.1.0"
 
 # As `typing.TYPE_CHECKING`, without that import: True to type checkers and editors alone.
 TYPE_CHECKING = False
 
-_checkout = _FilePath(__file__).resolve().parent.parent
-if (_checkout / "forms" / "spatial.py").is_file() and (_checkout / "pyproject.toml").is_file():
+_checkout = _path.dirname(_path.dirname(_path.realpath(__file__)))
+if all(_path.isfile(_path.join(_checkout, *file)) for file in (("forms", "spatial.py"), ("pyproject.toml",))):
     # A plain checkout: forms/ lies beside the package; an installation has it inside.
-    __path__.append(str(_checkout))
+    __path__.append(_checkout)
 
 _HOME = {
     "analytic": None,
@@ -74,6 +74,7 @@ _HOME = {
     "Weight": "scene.loads",
     "euler_load": "scene.rod",
     "read_motion": "scene.scenefile",
+    "read_path": "statics.reading",
     "read_scene": "scene.scenefile",
     "InitialVelocity": "scene.initial",
     "Ramp": "scene.signals",
@@ -159,6 +160,7 @@ if TYPE_CHECKING:  # the same names, for editors and type checkers
     from cosserat_fenicsx.statics.linear_buckling import Buckling as Buckling
     from cosserat_fenicsx.statics.linear_buckling import buckling as buckling
     from cosserat_fenicsx.statics.path.load_control import StepControl as StepControl
+    from cosserat_fenicsx.statics.reading import read_path as read_path
     from cosserat_fenicsx.statics.solve import solve as solve
 
 __all__ = sorted(_HOME)

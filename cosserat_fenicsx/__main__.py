@@ -1,7 +1,28 @@
-"""`python -m cosserat_fenicsx` is the command line."""
+"""`cosserat`, and `python -m cosserat_fenicsx`: the command line, which answers to signals from the first moment on."""
 
+import os
 import sys
 
-from cosserat_fenicsx.cli.main import main
 
-sys.exit(main())
+def main():
+    """Entry point; returns the exit code, see `cli.main`."""
+    try:
+        from cosserat_fenicsx import interrupts
+
+        interrupts.listen()
+        from cosserat_fenicsx.cli.main import main as whole
+
+        code = whole()
+        interrupts.ignore()
+    except KeyboardInterrupt:  # while modules are imported
+        sys.stderr.write("cosserat: interrupted\n")
+        code = 130
+    if code == 130:  # at once: Python would end by SIGINT itself where that came during an import in C
+        sys.stdout.flush()
+        sys.stderr.flush()
+        os._exit(code)
+    return code
+
+
+if __name__ == "__main__":
+    sys.exit(main())

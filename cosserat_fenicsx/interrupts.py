@@ -1,34 +1,74 @@
 """Ctrl-C on the command line: a signal sets a flag, which solvers check between steps, so that results stay consistent.
 
 Python runs signal handlers only between its own instructions. So long computations in C either call back (`obey` at
-every step of an eigensolver), or run in a second thread, which the main thread waits for.
+every step of an eigensolver), or run in a second thread, which the main thread waits for. Before and between
+computations, a signal ends what is done at once.
 """
 
+import contextlib
 import os
-import queue
 import signal
-import threading
 
 # Time (s) between checks for a requested stop while another thread computes.
 _CHECK_INTERVAL = 0.2
-_asked = False
+_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)  # the last one where a terminal is closed
+_asked = _waits = False
 
 
 def listen():
-    """Let SIGINT and SIGTERM request a stop; a second signal ends the process at once.
+    """Let SIGINT, SIGTERM and SIGHUP request a stop; a second signal ends the process at once. To be called before
+    dolfinx is imported, since PETSc would take SIGHUP for an error.
 
     Not under mpirun, which kills its ranks anyway, and where one rank must not stop without the others.
     """
     if any(os.environ.get(name, "1") != "1" for name in ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE")):
         return
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, _ask)
+    if signal.getsignal(signal.SIGINT) is _ask:
+        return
+    os.environ["PETSC_OPTIONS"] = f"{os.environ.get('PETSC_OPTIONS', '')} -no_signal_handler"
+    for number in _SIGNALS:
+        if signal.getsignal(number) is not signal.SIG_IGN:  # as SIGHUP under nohup
+            signal.signal(number, _ask)
+
+
+def ignore():
+    """Ignore signals from now on: what was asked for is done, and the process ends."""
+    for number in _SIGNALS:
+        signal.signal(number, signal.SIG_IGN)
 
 
 def _ask(number, frame):
     global _asked
     _asked = True
     signal.signal(number, signal.SIG_DFL)
+    _leave_closed_terminals()
+    if not _waits:
+        raise KeyboardInterrupt
+
+
+def _leave_closed_terminals():
+    """Let what is printed to a terminal that is gone vanish, instead of raising errors that would end the writing."""
+    for stream in (1, 2):
+        try:
+            os.write(stream, b"")
+        except OSError:
+            os.dup2(os.open(os.devnull, os.O_WRONLY), stream)
+
+
+@contextlib.contextmanager
+def patience():
+    """Context manager of computations that call `obey`: within it a signal only sets the flag."""
+    global _waits
+    before, _waits = _waits, True
+    try:
+        yield
+    finally:
+        _waits = before
+
+
+def asked():
+    """Whether a stop has been requested."""
+    return _asked
 
 
 def obey():
@@ -42,6 +82,9 @@ def interruptible(action):
 
     The action may be abandoned at any point, and must release Python's global lock, as numpy's linear algebra does.
     """
+    import queue
+    import threading  # here, since the command line listens before it does anything else
+
     results = queue.SimpleQueue()
 
     def work():

@@ -34,7 +34,7 @@ class Progress:
         """Start a run over all targets; `what` describes it."""
         self._what, self._done, self._eta = what, 0.0, 0.0
         if self._bar is not None:
-            self._bar.reset(self._task, description=what)
+            self._bar.reset(self._task)
 
     def at(self, point):
         """The run has reached a point of a path."""
@@ -56,15 +56,17 @@ class Progress:
             )
 
     def _draw(self):
+        from rich.markup import escape
+
         if self._bar is None:
             from rich.console import Console
             from rich.progress import Progress as Bar
 
             self._bar = Bar(console=Console(stderr=True), transient=True)
             self._bar.start()
-            self._task = self._bar.add_task(self._what, total=1.0)
+            self._task = self._bar.add_task("", total=1.0)
         self._bar.update(self._task, completed=min(self._done / self._way, 1.0),
-                         description=f"{self._what}, {self._quantity} {self._eta:.4g}")  # fmt: skip
+                         description=f"{escape(self._what)}, {self._quantity} {self._eta:.4g}")  # fmt: skip
 
     def __exit__(self, *exception):
         if self._bar is not None:

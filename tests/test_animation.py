@@ -71,7 +71,7 @@ def test_mp4(flight, tmp_path):
 
 def test_time_scales():
     assert [animation._round_speed(d) for d in (10.0, 4.0, 60.0, 1000.0, 0.5, 0.003)] == [
-        pytest.approx(x) for x in (1, 1, 10, 100, 0.05, 5e-4)
+        pytest.approx(x) for x in (1, 1, 20, 200, 0.1, 1e-3)
     ]
     times = animation._times(0.0, 1.03, 1.0, 10)
     np.testing.assert_allclose(np.diff(times)[:-1], 0.1)

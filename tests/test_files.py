@@ -1,5 +1,7 @@
 """Files and pictures, read back with the usual libraries."""
 
+from xml.etree import ElementTree as xml
+
 import numpy as np
 import pytest
 from conftest import COMM, column
@@ -30,7 +32,8 @@ def check(data, rod, path, k):
     data["quaternion"] = np.column_stack([data["quaternion_a"], data["quaternion_bcd"]])
     for name, field in (("position", "position"), ("displacement", "displacement"), ("quaternion", "quaternion"),
                         ("d1", "d1"), ("d2", "d2"), ("d3", "d3"), ("n", "force"), ("m", "moment"),
-                        ("strain", "strain"), ("curvature", "curvature")):  # fmt: skip
+                        ("strain", "strain"), ("curvature", "curvature"), ("arc_length", "s"),
+                        *((name, name) for name in ("von_mises", "axial_max", "axial_min"))):  # fmt: skip
         scale = np.abs(expected[field]).max()
         np.testing.assert_allclose(data[name], expected[field], atol=1e-6 * scale, err_msg=name)
     d = [np.asarray(data[name]) for name in ("d1", "d2", "d3")]
@@ -67,6 +70,28 @@ def test_pyvista_reads_the_xdmf(solved, xdmf):
     for k, eta in enumerate(ETAS):
         reader.set_active_time_value(eta)
         check(reader.read().point_data, rod, path, k)
+
+
+@pytest.mark.serial
+def test_rods_are_told_apart(tmp_path):
+    """By a number at every node; names and units stand at the top. Without a shape there are no stresses."""
+    import meshio
+    import pyvista
+
+    rod, scene = column()
+    bare = cf.Rod(cf.Line((0, 0, 20), (1, 0, 20)), rod.stiffness, name='bare {k} & "<arm>"')
+    joints = [cf.Joint(rod.end, bare.start)]
+    path = cf.solve(cf.Scene([rod, bare], scene.supports, scene.loads, joints), [0.3], elements=2, degree=2)
+    path.write(tmp_path / "two.xdmf")
+    with meshio.xdmf.TimeSeriesReader(tmp_path / "two.xdmf") as reader:
+        reader.read_points_cells()
+        assert reader.read_data(0)[1]["rod"].tolist() == [0] * 5 + [1] * 5
+    data = pyvista.get_reader(str(tmp_path / "two.xdmf")).read().point_data
+    assert (np.isnan(data["von_mises"]) == (data["rod"] == 1)).all() and data["arc_length"][-1] == 1.0
+    top = xml.parse(tmp_path / "two.xdmf").getroot().find("Domain")
+    told = {entry.get("Name"): entry.get("Value") for entry in top.findall("Information")}
+    assert told["rods"] == '0: column; 1: bare {k} & "<arm>"'
+    assert "von_mises: Pa" in told["units"] and "arc_length: m" in told["units"]
 
 
 @pytest.mark.serial

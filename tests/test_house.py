@@ -76,6 +76,7 @@ FITTERS = {
         "first_mesh",
         "grading",
         "linear_buckling",
+        "reading",
         "refinement",
         "solve",
         "solvers",
@@ -130,10 +131,10 @@ def test_no_module_takes_the_name_of_something_public():
     assert {name for name in dir(cf) if not name.startswith("__")} == set(cf.__all__)
 
 
-def test_pictures_are_imported_only_when_asked_for():
+def test_optional_libraries_are_imported_only_when_asked_for():
     code = (
-        "import sys, cosserat_fenicsx as cf; cf.solve, cf.Path; print({'pyvista', 'matplotlib', 'meshio', 'vtk'} &"
-        " set(sys.modules))"
+        "import sys, cosserat_fenicsx as cf; cf.solve, cf.read_path; print({'pyvista', 'matplotlib', 'meshio', 'vtk',"
+        " 'pandas', 'xarray', 'h5py'} & set(sys.modules))"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, encoding="utf-8", cwd=ROOT)
     assert done.stdout.strip() == "set()", done.stderr

@@ -29,3 +29,13 @@ def test_bar_in_a_terminal(monkeypatch):
     _, scene = column()
     cf.solve(scene, [0.5, 1.0], elements=4)
     assert ("16 unknowns" in screen.getvalue()) == (COMM.rank == 0)
+
+
+def test_the_bar_shows_names_as_they_are(monkeypatch):
+    """A name such as that of a film is no markup."""
+    screen = Terminal()
+    monkeypatch.setattr(progress.sys, "stderr", screen)
+    with progress.Progress([2.0], True, COMM) as bar:
+        bar.start("a [/red] film [bold].gif")
+        bar.reached(1.0)
+    assert ("a [/red] film [bold].gif" in screen.getvalue()) == (COMM.rank == 0)

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from conftest import column
 from scipy.integrate import quad
 from scipy.spatial.transform import Rotation
 
@@ -213,3 +214,12 @@ def test_many_turns_are_not_mistaken_for_fewer(load_factors):
         path = cf.solve(cf.Scene([rod], [cf.Clamp(rod.start), turns]), load_factors, elements=32)
         expected = 20 * np.pi * stiffness * np.outer(path.load_factors, axis)
         np.testing.assert_allclose(path.moment(rod.start), expected, atol=1e-5)
+
+
+def test_a_roller_across_the_plane_alone_changes_nothing_in_it():
+    """The planar model has then no constraint equation at all."""
+    rod, scene = column()
+    held = cf.Scene([rod], [cf.Clamp(rod.start), cf.Roller(rod.at(5.0), (0, 1, 0))], scene.loads)
+    paths = [cf.solve(x, [0.5], elements=4, model="planar") for x in (scene, held)]
+    np.testing.assert_array_equal(*(path.centreline() for path in paths))
+    np.testing.assert_array_equal(paths[1].reaction(held.supports[1]), np.zeros((2, 1, 3)))

@@ -5,6 +5,8 @@ import threading
 
 from mpi4py import MPI
 
+from cosserat_fenicsx.algebra.release import release, sweep
+
 #: Largest number of idle problems kept for each communicator; the least recently used one is dropped first.
 MOST_IDLE = 24
 
@@ -47,9 +49,13 @@ class ProblemPool:
         try:
             yield problem
         except outcomes:
-            self._give_back(idle, key, problem)
+            self._give_back(idle, key, problem, comm)
             raise
-        self._give_back(idle, key, problem)
+        except Exception:  # under mpirun the other ranks may not have raised it
+            if comm.size == 1:
+                release(problem)
+            raise
+        self._give_back(idle, key, problem, comm)
 
     def _idle_on(self, comm):
         """The list of idle problems on a communicator; None for one created by the user."""
@@ -65,12 +71,17 @@ class ProblemPool:
             self.made += 1
         return None
 
-    def _give_back(self, idle, key, problem):
-        if idle is None:
-            return
+    def _give_back(self, idle, key, problem, comm):
         with self._lock:
-            idle.append((key, problem))
-            del idle[: max(0, len(idle) - self._most_idle)]
+            if idle is None:
+                dropped = [problem]
+            else:
+                idle.append((key, problem))
+                dropped = [old for _, old in idle[: max(0, len(idle) - self._most_idle)]]
+                del idle[: len(dropped)]
+        for old in dropped:
+            release(old)
+        sweep(comm)
 
 
 #: Where `solve`, `simulate`, `buckling` and `modes` borrow their problems.

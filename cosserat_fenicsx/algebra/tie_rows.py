@@ -103,7 +103,7 @@ class TieRows:
             nodal, multipliers = self.seen
             c, gradient, _ = self._evaluate(eta)
             _, test = self.model.tie_maps(nodal)
-            reactions = (multipliers[list(self._added)] @ gradient.reshape(len(c), -1)).reshape(-1, 6)
+            reactions = np.tensordot(multipliers[list(self._added)], gradient, 1)
             b.setValues(self._free_rows, (test @ reactions[:, :, None]).ravel()[self._free], _ADD)
             b.setValues(self._multipliers, c, _ADD)
         b.assemble()
@@ -130,7 +130,7 @@ class TieRows:
         trial, test = self.model.tie_maps(nodal)
         of_nodes = reactions_by_nodes(test, change, trial)
         if self.model.rows_turn:
-            reactions = (multipliers[list(self._added)] @ gradient.reshape(len(gradient), -1)).reshape(-1, 6)
+            reactions = np.tensordot(multipliers[list(self._added)], gradient, 1)
             places = np.arange(len(of_nodes)).reshape(len(nodal), -1)
             of_nodes[places[:, :, None], places[:, None, :]] += self.model.turned_reactions(nodal, reactions)
         return of_nodes, reactions_by_multipliers(test, gradient), by_nodes(gradient, trial)
@@ -185,9 +185,9 @@ def reactions_by_nodes(test, change, trial):
 
 def reactions_by_multipliers(test, gradient):
     """Gradients (ties, tied nodes, 6) as columns on the rows of the nodes."""
-    return (test @ gradient.transpose(1, 2, 0)).reshape(-1, len(gradient))
+    return (test @ gradient.transpose(1, 2, 0)).reshape(gradient.shape[1] * test.shape[1], len(gradient))
 
 
 def by_nodes(gradient, trial):
     """Gradients (ties, tied nodes, 6) as rows on the columns of the nodes."""
-    return (gradient.swapaxes(0, 1) @ trial).swapaxes(0, 1).reshape(len(gradient), -1)
+    return (gradient.swapaxes(0, 1) @ trial).swapaxes(0, 1).reshape(len(gradient), gradient.shape[1] * trial.shape[2])

@@ -4,8 +4,10 @@ import sys
 import tempfile
 from pathlib import Path
 
-from cosserat_fenicsx.cli.say import BAD_INPUT, DONE, INTERRUPTED, NOT_CONVERGED, first_rank, say
+from cosserat_fenicsx.cli.say import BAD_INPUT, DONE, INTERRUPTED, NOT_CONVERGED, first_rank, in_words, say
+from cosserat_fenicsx.cli.together import together
 from cosserat_fenicsx.errors import Interrupted, NotConverged, NotStored, SceneError
+from cosserat_fenicsx.interrupts import obey, patience
 
 
 def deliver(computed, options, moving):
@@ -32,7 +34,8 @@ def deliver(computed, options, moving):
 
     code, trouble = DONE, None
     try:
-        path = computed()
+        with patience():
+            path = together(computed)
     except (NotConverged, NotStored) as failure:
         path, trouble, code = failure.path, failure, NOT_CONVERGED
     except SceneError as failure:
@@ -50,9 +53,13 @@ def deliver(computed, options, moving):
                 say("cosserat: interrupted; writing the partial result, Ctrl-C again skips what is not written yet")
             try:
                 look = {"magnify": options.magnify, "shown": _shown(path, at), "film": film, "speed": options.speed}
-                _write(path, out, station, picture=not options.no_picture, **look)
+                with patience():
+                    _write(path, out, station, picture=not options.no_picture, stops=code != INTERRUPTED, **look)
             except KeyboardInterrupt:
-                trouble, code = "interrupted; the file that was being written is incomplete", INTERRUPTED
+                trouble, code = "interrupted; what is not written yet is left out", INTERRUPTED
+            except (OSError, SceneError) as problem:
+                say(f"cosserat: {in_words(problem)}")
+                code = code or BAD_INPUT
     if trouble is not None:
         say(f"cosserat: {trouble}")
         if options.folder and not isinstance(trouble, NotConverged | SceneError):
@@ -114,23 +121,27 @@ def _report(path, station):
         print(text, flush=True)  # before the messages on stderr that follow
 
 
-def _write(path, out, station, *, picture, magnify, shown, film, speed):
+def _write(path, out, station, *, picture, stops, magnify, shown, film, speed):
     moving = path.axis == "time"
     name = "motion" if moving else "path"
-    path.write(out / f"{name}.csv", station=station)
-    path.write(out / f"{name}.xdmf")
-    written = [f"{name}.{kind}" for kind in ("xdmf", "h5", "csv")]
-    if picture:
-        path.plot(out / "rods.png", shown, magnify=magnify)
-        written.append("rods.png")
-    if moving and len(path) > 1:
-        if picture:
-            path.plot_energy(out / "energy.png")
-            written.append("energy.png")
-        if film:
-            path.animate(out / film, speed=speed, magnify=magnify)
-            written.append(film)
-    say(f"written to {out}/: {', '.join(written)}", file=sys.stdout)
+    files = {
+        f"{name}.csv": lambda file: path.write(file, station=station),
+        f"{name}.xdmf": path.write,
+        "rods.png": picture and (lambda file: path.plot(file, shown, magnify=magnify)),
+        "energy.png": picture and moving and len(path) > 1 and path.plot_energy,
+        film: film and len(path) > 1 and (lambda file: path.animate(file, speed=speed, magnify=magnify)),
+    }
+    written = []
+    try:
+        for file, write in files.items():
+            if stops:
+                obey()
+            if write:
+                write(out / file)
+                written += [file, f"{name}.h5"] if file.endswith(".xdmf") else [file]
+    finally:
+        if written:
+            say(f"written to {out}/: {', '.join(written)}", file=sys.stdout)
 
 
 def _numbers(text):

@@ -8,7 +8,8 @@ import sys
 from cosserat_fenicsx import interrupts
 from cosserat_fenicsx.cli.deliver import deliver
 from cosserat_fenicsx.cli.options import parser
-from cosserat_fenicsx.cli.say import BAD_INPUT, DONE, INTERRUPTED, NOT_CONVERGED, say
+from cosserat_fenicsx.cli.say import BAD_INPUT, DONE, INTERRUPTED, NOT_CONVERGED, in_words, say
+from cosserat_fenicsx.cli.together import together
 from cosserat_fenicsx.errors import CosseratError, NotConverged
 
 
@@ -28,16 +29,17 @@ def main(arguments=None):
         if hasattr(stream, "reconfigure"):
             stream.reconfigure(errors="backslashreplace")
     try:
-        return options.do(options)
+        return together(lambda: options.do(options))
     except KeyboardInterrupt:  # of commands without partial results; `deliver` handles paths and motions
         say("cosserat: interrupted")
         return INTERRUPTED
-    except CosseratError as problem:
-        say(f"cosserat: {problem}")
-        return BAD_INPUT
-    except OSError as problem:
-        where = f"{problem.filename}: " if problem.filename else ""
-        say(f"cosserat: {where}{problem.strerror or problem}")
+    except Exception as problem:
+        if interrupts.asked():  # Ctrl-C also ends a compiler at work, and imports in C raise other exceptions then
+            say("cosserat: interrupted")
+            return INTERRUPTED
+        if not isinstance(problem, CosseratError | OSError):
+            raise
+        say(f"cosserat: {in_words(problem)}")
         return BAD_INPUT
 
 
@@ -112,7 +114,9 @@ def _tabulate(options, table_of):
 
     scene, _ = read_scene(options.scene)
     try:
-        say(table_of(scene), file=sys.stdout)
+        with interrupts.patience():
+            table = table_of(scene)
+        say(table, file=sys.stdout)
     except NotConverged as failure:
         say(f"cosserat: {failure}")
         return NOT_CONVERGED

@@ -84,7 +84,7 @@ def _outputs(parser):
         help="motions: write a film too, .gif or .mp4 [motion.gif]",
     )
     parser.add_argument(
-        "--speed", type=float, help="films: seconds of the motion per second [1 for motions of 4 to 20 s]"
+        "--speed", type=float, help="films: seconds of the motion per second [1 for motions of 2 to 10 s]"
     )
 
 

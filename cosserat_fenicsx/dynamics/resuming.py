@@ -1,6 +1,9 @@
-"""`resume` continues a motion from the folder it was written to; `read_history` reads the states saved there so far."""
+"""`resume` continues a motion from the folder it was written to; `read_history` reads the states saved so far."""
 
 import cosserat_fenicsx.compat  # noqa: F401, I001  first: its message says what is missing where dolfinx is
+
+import os
+from pathlib import Path as FilePath
 
 import numpy as np
 from mpi4py import MPI
@@ -15,9 +18,11 @@ from cosserat_fenicsx.models.connections import Connections
 from cosserat_fenicsx.models.rodmesh import Layout
 from cosserat_fenicsx.models.scales import Scales
 from cosserat_fenicsx.dynamics.time_loop import TimeLoop
+from cosserat_fenicsx.results import saved
 from cosserat_fenicsx.results.history import History
 from cosserat_fenicsx.storage.runfolder import RunFolder
 from cosserat_fenicsx.scene.scene import Scene
+from cosserat_fenicsx.statics.reading import assembled
 from cosserat_fenicsx.storage.stored_history import StoredHistory
 
 
@@ -121,16 +126,21 @@ def read_history(folder: File, scene: Scene | None = None, *, comm: MPI.Comm | N
     """The states that a motion has saved so far; another process may still be computing it.
 
     Args:
-        folder, scene: as of `resume`.
+        folder: as of `resume`; or the file that `History.save` wrote.
+        scene: as of `resume`; None for a file, which holds its scene.
         comm: MPI communicator with any number of ranks; default all.
 
     Returns:
         History.
 
     Raises:
-        SceneError: no such folder, or another scene.
+        SceneError: no such folder or file, another scene, or a file that is damaged or of a newer release.
     """
     comm = comm or MPI.COMM_WORLD
+    if isinstance(folder, str | os.PathLike) and FilePath(folder).is_file():
+        if scene is not None:
+            refuse("read_history", "scene", scene, f"None, since the file {folder} holds its scene")
+        return saved.read(folder, "History", assembled, comm)
     return _history(*_open(folder, scene, comm), comm)
 
 

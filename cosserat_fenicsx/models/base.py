@@ -194,7 +194,7 @@ class RodModel:
         leaders = {slot(a): slot(b) for a, b in links.leaders}
         self._held = slots, clamped, leaders
         self.tied_slots = np.array([slot(x) for x in links.tied], dtype=np.int64)
-        self.numbering = Numbering(self.space, nodal, self._owned_nodes, *self._held, len(links.equations))
+        self.numbering = Numbering(self.comm, self.space, nodal, self._owned_nodes, *self._held, len(links.equations))
         others = compat.cell_nodes(self.space)[:owned_cells, size * (p + 1) :] if self.space is not V else None
         of_nodes = nodal[cell_nodes[:owned_cells]].reshape(owned_cells, size * (p + 1))
         self.cell_dofs = of_nodes if others is None else np.concatenate([of_nodes, others], axis=1)
@@ -205,7 +205,7 @@ class RodModel:
         owned = len(self._owned_cells)
         for form, space, (size, sideways) in zip(self.forms.second_variations, spaces, self.variations, strict=True):
             dofs = np.arange(size * len(self._slots)).reshape(-1, size)
-            numbering = Numbering(space, dofs, self._owned_nodes, *self._held)
+            numbering = Numbering(self.comm, space, dofs, self._owned_nodes, *self._held)
             cell_dofs = dofs[self.cell_nodes[:owned]].reshape(owned, size * (self.signature.degree + 1))
             tied = self._rows_of_tied(numbering, dofs)
             self._variations.append(SecondVariation(form, numbering, cell_dofs, tied, None, sideways))

@@ -15,6 +15,8 @@ class Numbering:
     """The unknowns on one space.
 
     Args:
+        comm: MPI communicator of the vectors and matrices: that of the caller and not the mesh's copy, on which nobody
+            would free what PETSc puts aside.
         space: dolfinx's space; `node_dofs` (local nodes, block): its local degrees of freedom of every node.
         owned: number of the local nodes that this rank owns.
         slots: the scene's number of every local node.
@@ -29,9 +31,8 @@ class Numbering:
         first_multiplier: index of the first multiplier.
     """
 
-    def __init__(self, space, node_dofs, owned, slots, clamped, leaders, multipliers=0):
-        self.space, self.comm = space, space.mesh.comm
-        comm, self.block = self.comm, node_dofs.shape[1]
+    def __init__(self, comm, space, node_dofs, owned, slots, clamped, leaders, multipliers=0):
+        self.space, self.comm, self.block = space, comm, node_dofs.shape[1]
         dofmap = space.dofmap
         self._blocked = dofmap.index_map_bs > 1
         lead = np.array([leaders.get(slot, slot) for slot in slots.tolist()], dtype=np.int64)

@@ -17,11 +17,13 @@ from cosserat_fenicsx.pictures.between import Between
 from cosserat_fenicsx.pictures.drawing import add_body, at_rest, frame, load_pyvista, points_of, prefix, thickening
 from cosserat_fenicsx.progress import Progress
 from cosserat_fenicsx.ranks import on_first
+from cosserat_fenicsx.results.beside import replaced
 
 #: Default frames per second, and width and height in pixels.
 FPS, SIZE = 25, (960, 720)
 # Least and largest duration (s) of a film in real time, largest duration (s) of others, and largest number of frames.
-_SHORTEST_REAL_TIME, _LONGEST_REAL_TIME, _LONGEST, _MOST_FRAMES = 4.0, 20.0, 10.0, 10_000
+# A frame takes about 0.1 s to draw without a graphics card.
+_SHORTEST_REAL_TIME, _LONGEST_REAL_TIME, _LONGEST, _MOST_FRAMES = 2.0, 10.0, 5.0, 10_000
 # Colours of a .gif whose channels are all above this become white: quantisation would give nearly white stains.
 _WHITE = 244
 # Segments along a rod; mean width of a letter of the title, pixels.
@@ -37,7 +39,7 @@ def film(history, file, *, fps=FPS, speed=None, magnify=1.0, size=SIZE, progress
         history: a `History` with at least two times.
         file: .gif or .mp4 (rank 0 writes). The time between frames of a .gif is rounded to 0.01 s.
         fps: frames per second, 1 to 100.
-        speed: seconds of the motion per second of the film; None for 1 where the film then takes 4 to 20 s, and
+        speed: seconds of the motion per second of the film; None for 1 where the film then takes 2 to 10 s, and
             otherwise for 1, 2 or 5 times a power of ten.
         magnify: factor on displacements.
         size: (width, height), pixels, even.
@@ -112,23 +114,27 @@ def _pace_in_words(speed):
 
 def _make(history, file, times, fps, speed, magnify, size, progress):
     """Draw and write all frames, on one rank."""
-    file.parent.mkdir(parents=True, exist_ok=True)
-    with open(file, "wb"):
-        pass  # raises a plain OSError where the file cannot be written
     stage = _Stage(history, times, magnify, size, _pace_in_words(speed))
+    stopped = None
     try:
         samples = [stage.at(t) for t in times[:: max(1, len(times) // 6)]]
         with (
-            _WRITERS[file.suffix](file, fps, size, samples) as writer,
+            replaced(file) as fresh,
+            _WRITERS[file.suffix](fresh, fps, size, samples) as writer,
             Progress([len(times)], progress, _Alone, "frame") as bar,
         ):
             bar.start(file.name)
-            for i, t in enumerate(times):
-                obey()
-                writer.add(stage.at(t))
-                bar.reached(i + 1)
+            try:
+                for i, t in enumerate(times):
+                    obey()
+                    writer.add(stage.at(t))
+                    bar.reached(i + 1)
+            except KeyboardInterrupt as stop:  # raised again once the frames so far are in the file
+                stopped = stop
     finally:
         stage.close()
+    if stopped:
+        raise stopped
 
 
 class _Alone:
@@ -264,7 +270,7 @@ class _Mp4:
             raise
 
     def __exit__(self, kind, *exception):
-        if kind is None or issubclass(kind, KeyboardInterrupt):
+        if kind is None:
             self._end()
         else:
             self._socket.close()

@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from cosserat_fenicsx.errors import SceneError
+from cosserat_fenicsx.pictures.figures import save
 from cosserat_fenicsx.ranks import on_first
 
 _CURVES = (
@@ -40,8 +41,7 @@ def _save(history, file):
     known = figure.canvas.get_supported_filetypes()
     if file.suffix.removeprefix(".") not in known:
         raise SceneError(f"{file}: expected a name that ends in .{', .'.join(sorted(known))}")
-    file.parent.mkdir(parents=True, exist_ok=True)
-    figure.savefig(file, dpi=150)
+    save(figure, file)
 
 
 def _figure(history):

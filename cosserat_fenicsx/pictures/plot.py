@@ -9,7 +9,9 @@ import numpy as np
 from cosserat_fenicsx.checks import positive
 from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.pictures.drawing import add_body, at_rest, frame, load_pyvista, swept, thickening, view_of
+from cosserat_fenicsx.pictures.figures import save
 from cosserat_fenicsx.ranks import on_first
+from cosserat_fenicsx.results.beside import replaced
 
 # As shares of the extent of the drawing: height of a label, width of a letter, smallest visible displacement.
 _LABEL_HEIGHT, _LETTER_WIDTH, _VISIBLE = 0.035, 0.016, 0.01
@@ -46,11 +48,11 @@ def rods(path, file=None, points=None, magnify=1.0):
 
 
 def _save(plotter, file):
-    file.parent.mkdir(parents=True, exist_ok=True)
-    with open(file, "wb"):
-        pass  # raises a plain OSError where the file cannot be written
-    plotter.screenshot(str(file))
-    plotter.close()
+    try:
+        with replaced(file) as fresh:
+            plotter.screenshot(str(fresh))
+    finally:
+        plotter.close()
 
 
 def _draw(path, points, magnify):
@@ -130,8 +132,7 @@ def chart(file, curves, *, xlabel, ylabel, title, ylim=None):
     axes.set(xlabel=xlabel, ylabel=ylabel, title=title, ylim=ylim)
     axes.grid(alpha=0.3)
     axes.legend()
-    Path(file).parent.mkdir(parents=True, exist_ok=True)
-    figure.savefig(file, dpi=150)
+    save(figure, file)
 
 
 def _spread(path, most=5):

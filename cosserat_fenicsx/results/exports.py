@@ -1,12 +1,30 @@
 """Results for other libraries: dicts of arrays, pandas and xarray."""
 
 from cosserat_fenicsx.errors import InstallationError, SceneError
+from cosserat_fenicsx.ranks import on_first
 from cosserat_fenicsx.results import columns, contents
 from cosserat_fenicsx.results.on_nodes import OnNodes
 
 
 class Exports(OnNodes):
     """A result as data of other libraries. All values are in SI units."""
+
+    def save(self, file):
+        """Write all of the result to one HDF5 file, from which `read_path` or `read_history` makes it again.
+
+        Every query then gives the same digits. Other programs find, with units, what belongs to every state in the
+        root, and fields along each rod in rods/<name>, see `results.saved`. An old file is replaced once the new one is
+        complete.
+
+        Raises:
+            OSError: the file cannot be written; an old one stays.
+            SceneError: an empty result, or a scene with functions written in Python, or with actions of your own,
+                which are code: no file holds any.
+        """
+        from cosserat_fenicsx.results import saved
+
+        _refuse_empty(self, "save")
+        on_first(self.comm, lambda: saved.save(self, file))
 
     def to_dict(self):
         """All of the result as a dict of numpy arrays, numbers and texts.
@@ -71,6 +89,11 @@ class Exports(OnNodes):
         for rod, group in zip(self.scene.rods, contents.group_names(self.scene), strict=True):
             tree[f"/{group}"] = _dataset(xarray, contents.of_rod(self, rod), axis, {"rod": rod.name})
         return xarray.DataTree.from_dict(tree)
+
+    def _repr_html_(self):
+        from cosserat_fenicsx.results.notebook import as_html
+
+        return as_html(self)
 
 
 def _values(variables):

@@ -10,6 +10,10 @@ from xml.etree import ElementTree as xml
 import numpy as np
 
 from cosserat_fenicsx.errors import SceneError
+from cosserat_fenicsx.results.arrays import arrays_in
+from cosserat_fenicsx.results.beside import replaced
+from cosserat_fenicsx.results.quantities import FIELDS as QUANTITIES
+from cosserat_fenicsx.scene.stresses import Stress
 
 #: Names in the files, as in eq. (1), and the fields of `Path.fields` behind them.
 FIELDS = {
@@ -24,6 +28,19 @@ FIELDS = {
     "curvature": "curvature",
     "bending_moment": "bending_moment",
 }
+_STRESSES = {name: name for name in Stress._fields}
+# States that are computed at once.
+_BLOCK = 256
+_HEAD = """<?xml version='1.0' encoding='utf-8'?>
+<Xdmf Version="3.0">
+  <Domain>
+    {about}
+    <Grid Name="path" GridType="Collection" CollectionType="Temporal">
+"""
+_TAIL = """    </Grid>
+  </Domain>
+</Xdmf>
+"""
 
 
 def write_state(path, file, k=None):
@@ -41,66 +58,78 @@ def write_state(path, file, k=None):
     if file.suffix not in meshio.extension_to_filetypes:
         known = ".xdmf, .csv, .vtu, .vtk, .ply or another ending that meshio knows"
         raise SceneError(f"{file}: the ending '{file.suffix}' is not known: expected {known}")
-    file.parent.mkdir(parents=True, exist_ok=True)
-    with open(file, "wb"):
-        pass  # raises a plain OSError here if the file cannot be written
     points, cells, data = mesh_of(path, -1 if k is None else k)
-    meshio.write(file, meshio.Mesh(points, cells, point_data=data))
+    with replaced(file) as fresh:
+        meshio.write(fresh, meshio.Mesh(points, cells, point_data=data))
 
 
 def write_series(path, file, k=None):
-    """Write all points, the arrays to the .h5 file, then the .xdmf file that refers to them, so that every .xdmf is
-    complete."""
-    file.parent.mkdir(parents=True, exist_ok=True)
-    try:
-        import h5py
-    except ImportError:
-        raise SceneError(
-            f"{file}: writing .xdmf needs h5py: install the system's, 'apt install python3-h5py'"
-        ) from None
-    numbers = file.with_suffix(".h5")
-    root = xml.Element("Xdmf", Version="3.0")
-    series = xml.SubElement(
-        xml.SubElement(root, "Domain"), "Grid", Name="path", GridType="Collection", CollectionType="Temporal"
-    )
-    with h5py.File(numbers, "w") as store:
+    """Write all points: the arrays to the .h5 file, and the .xdmf file that refers to them. Both appear when they are
+    complete, the .xdmf last.
 
-        def item(parent, name, array):
-            array = np.ascontiguousarray(array)
-            if name not in store:
-                store[name] = array
-            xml.SubElement(
-                parent,
-                "DataItem",
-                Dimensions=" ".join(map(str, array.shape)),
-                NumberType="Int" if array.dtype.kind == "i" else "Float",
-                Precision="8",
-                Format="HDF",
-            ).text = f"{numbers.name}:/{name}"
+    Raises:
+        OSError: they cannot be written; the old ones stay.
+    """
+    numbers, along = file.with_suffix(".h5"), path.along_axis
+    with replaced(file) as text, replaced(numbers) as fresh:
+        with arrays_in(fresh) as put, open(text, "w", encoding="utf-8") as stream:
+            stream.write(_HEAD.format(about=_about(path)))
+            constants = constants_of(path)
+            for name, array in constants.items():
+                put(name, array)
+            for first in range(0, len(path), _BLOCK):
+                which = range(first, min(first + _BLOCK, len(path)))
+                points, cells, data = meshes_of(path, which)
+                if first == 0:
+                    lines = cells[0][1]
+                    put("reference", points[0] - data["displacement"][0])
+                    put("lines", lines)
+                q = data.pop("quaternion")  # some readers support no arrays of four components
+                fields = {"position": points, **data, "quaternion_a": q[..., 0], "quaternion_bcd": q[..., 1:]}
+                for k, *arrays in zip(which, *fields.values(), strict=True):
+                    for name, array in zip(fields, arrays, strict=True):
+                        put(f"{name}_{k}", array)
+                grid = _grid(numbers.name, lines, fields, constants)
+                stream.writelines(grid.format(k=k, along=repr(float(along[k]))) for k in which)
+            stream.write(_TAIL)
 
-        for k, eta in enumerate(path.along_axis):
-            points, cells, data = mesh_of(path, k)
-            grid = xml.SubElement(series, "Grid", Name=f"point {k}", GridType="Uniform")
-            xml.SubElement(grid, "Time", Value=repr(float(eta)))
-            geometry = xml.SubElement(grid, "Geometry", GeometryType="XYZ")
-            item(geometry, "reference", points - data["displacement"])
-            lines = cells[0][1]
-            topology = xml.SubElement(
-                grid, "Topology", TopologyType="Polyline", NodesPerElement="2", NumberOfElements=str(len(lines))
-            )
-            item(topology, "lines", lines)
-            q = data.pop("quaternion")  # some readers support no arrays of four components
-            for name, array in {
-                "position": points,
-                **data,
-                "quaternion_a": q[:, 0],
-                "quaternion_bcd": q[:, 1:],
-            }.items():
-                kind = {1: "Scalar", 2: "Vector"}[array.ndim]
-                attribute = xml.SubElement(grid, "Attribute", Name=name, AttributeType=kind, Center="Node")
-                item(attribute, f"{name}_{k}", array)
-    xml.indent(root)
-    xml.ElementTree(root).write(file, encoding="utf-8", xml_declaration=True)
+
+def _about(path):
+    """The text of Information elements: the names of the rods by their numbers, and the units of the fields."""
+    rods = "; ".join(f"{i}: {rod.name}" for i, rod in enumerate(path.scene.rods))
+    fields = {**_names(path), "arc_length": "s", "position": "position"}
+    units = "; ".join(f"{name}: {QUANTITIES[field].unit}" for name, field in fields.items())
+    along = "s" if path.axis == "time" else "1"
+    told = {"rods": rods, "units": f"{units}; time axis ({path.axis}): {along}"}
+    elements = (xml.Element("Information", Name=name, Value=value) for name, value in told.items())
+    return "\n    ".join(xml.tostring(element, encoding="unicode") for element in elements)
+
+
+def _grid(store, lines, fields, constants):
+    """The text of one state, with {k} for its number and {along} for its load factor or time.
+
+    Args:
+        store: the name of the .h5 file; lines: (elements, 2); fields: {name: (states, nodes, ...)}; constants: {name:
+            (nodes,)} of all states.
+    """
+    grid, store = xml.Element("Grid", Name="point {k}", GridType="Uniform"), store.replace("{", "{{").replace("}", "}}")
+
+    def item(parent, name, array):
+        size, kind = " ".join(map(str, array.shape)), "Int" if array.dtype.kind == "i" else "Float"
+        entry = xml.SubElement(parent, "DataItem", Dimensions=size, NumberType=kind, Precision="8", Format="HDF")
+        entry.text = f"{store}:/{name}"
+
+    xml.SubElement(grid, "Time", Value="{along}")
+    item(xml.SubElement(grid, "Geometry", GeometryType="XYZ"), "reference", next(iter(fields.values()))[0])
+    about = {"TopologyType": "Polyline", "NodesPerElement": "2", "NumberOfElements": str(len(lines))}
+    item(xml.SubElement(grid, "Topology", about), "lines", lines)
+    for name, array in fields.items():
+        kind = {2: "Scalar", 3: "Vector"}[array.ndim]
+        item(xml.SubElement(grid, "Attribute", Name=name, AttributeType=kind, Center="Node"), f"{name}_{{k}}", array[0])
+    for name, array in constants.items():
+        item(xml.SubElement(grid, "Attribute", Name=name, AttributeType="Scalar", Center="Node"), name, array)
+    xml.indent(grid, level=3)
+    return f"      {xml.tostring(grid, encoding='unicode').rstrip()}\n"
 
 
 def mesh_of(path, k):
@@ -109,15 +138,35 @@ def mesh_of(path, k):
     Returns:
         points (n, 3), m; cells in meshio's format; dict of arrays (n, ...).
     """
-    names = {**FIELDS, **path.more_fields}
+    points, cells, data = meshes_of(path, [k])
+    return points[0], cells, {name: values[0] for name, values in data.items()} | constants_of(path)
+
+
+def constants_of(path):
+    """{name: (n,)} at all nodes: the arc length, m, and the number of the rod, from 0."""
+    nodes = path.layout.node_s(path.rule.nodes)
+    return {
+        "arc_length": np.concatenate([x * rod.length for x, rod in zip(nodes, path.scene.rods, strict=True)]),
+        "rod": np.concatenate([np.full(len(x), i) for i, x in enumerate(nodes)]),
+    }
+
+
+def _names(path):
+    """Names in the files, and the fields of `Path.fields` behind them."""
+    return {**FIELDS, **path.more_fields, **(_STRESSES if path.knows_stresses else {})}
+
+
+def meshes_of(path, which):
+    """`mesh_of` at several points: arrays (points, n, ...)."""
+    names = _names(path)
     points, lines, data, first = [], [], {name: [] for name in names}, 0
     for rod in path.scene.rods:
-        fields = path.fields(k, rod)
+        fields = path.fields_at(which, rod)
         n = len(fields["s"])
         points.append(fields["position"])
         lines.append(first + np.column_stack([np.arange(n - 1), np.arange(1, n)]))
         for name, field in names.items():
             data[name].append(fields[field])
         first += n
-    joined = {name: np.concatenate(values) for name, values in data.items()}
-    return np.concatenate(points), [("line", np.concatenate(lines))], joined
+    joined = {name: np.concatenate(values, axis=1) for name, values in data.items()}
+    return np.concatenate(points, axis=1), [("line", np.concatenate(lines))], joined

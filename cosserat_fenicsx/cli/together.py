@@ -1,0 +1,54 @@
+"""Under mpirun: what only one rank raises ends all of them, which would wait for it for ever otherwise."""
+
+import os
+import sys
+import time
+
+# Time (s) within which ranks that fail together get here.
+_PATIENCE = 10.0
+
+
+def ranks():
+    """(rank, number of ranks) of this process, without loading MPI."""
+    for rank, size in (("OMPI_COMM_WORLD_RANK", "OMPI_COMM_WORLD_SIZE"), ("PMI_RANK", "PMI_SIZE")):
+        if size in os.environ:
+            return int(os.environ.get(rank, 0)), int(os.environ[size])
+    return 0, 1
+
+
+def together(action):
+    """The result of `action()`. Where this rank alone raises, it says so and ends all ranks; where all do, each raises.
+
+    Ranks that raise meet at a barrier, which those that still compute do not reach. Every rank calls.
+    """
+    rank, size = ranks()
+    if size == 1:
+        return action()
+    from mpi4py import MPI
+
+    own = MPI.COMM_WORLD.Dup()
+    try:
+        return action()
+    except Exception as problem:
+        if not _all_are_here(own):
+            print(f"cosserat: rank {rank} of {size} alone: {_in_full(problem)}", file=sys.stderr, flush=True)
+            MPI.COMM_WORLD.Abort(1)
+        raise
+
+
+def _in_full(problem):
+    from cosserat_fenicsx.cli.say import in_words
+    from cosserat_fenicsx.errors import CosseratError
+
+    if isinstance(problem, CosseratError | OSError):
+        return in_words(problem)
+    return f"{type(problem).__name__}: {problem}"
+
+
+def _all_are_here(comm):
+    met, until = comm.Ibarrier(), time.monotonic() + _PATIENCE
+    while not met.Test():
+        if time.monotonic() > until:
+            return False
+        time.sleep(0.01)
+    return True

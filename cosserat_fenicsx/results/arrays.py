@@ -1,0 +1,101 @@
+"""An HDF5 file of many arrays."""
+
+import contextlib
+import os
+
+import numpy as np
+
+from cosserat_fenicsx.errors import SceneError
+
+
+@contextlib.contextmanager
+def new_hdf5(file):
+    """Context manager: a new `h5py.File`.
+
+    Raises:
+        SceneError: h5py is missing.
+        OSError: the file cannot be written.
+    """
+    h5py = h5py_for(file)
+    with open(file, "w+b", buffering=0) as stream:
+        patient = _Patient(stream)
+        with h5py.File(patient, "w") as store:
+            yield store
+    if patient.trouble is not None:
+        raise patient.trouble
+
+
+@contextlib.contextmanager
+def arrays_in(file):
+    """Context manager: a function `put(name, array)` that writes an array to a `new_hdf5`."""
+    with new_hdf5(file) as store:
+        from h5py import h5d, h5s, h5t
+
+        def put(name, array):  # a third of the time of `store[name] = array`, which matters for thousands of states
+            array = np.ascontiguousarray(array)
+            space, kind = h5s.create_simple(array.shape), h5t.py_create(array.dtype)
+            h5d.create(store.id, name.encode(), kind, space).write(h5s.ALL, h5s.ALL, array)
+
+        yield put
+
+
+def h5py_for(file):
+    """The module h5py, needed for a file.
+
+    Raises:
+        SceneError: it is missing.
+    """
+    try:
+        import h5py
+    except ImportError:
+        raise SceneError(f"{file}: this needs h5py: install the system's, 'apt install python3-h5py'") from None
+    return h5py
+
+
+class _Patient:
+    """A file that HDF5 writes to through Python.
+
+    HDF5 cannot even close a file on a full disk: it prints its errors and may end the process. Here the first error is
+    kept, and everything after it is discarded.
+    """
+
+    def __init__(self, stream):
+        self._stream, self._place, self.trouble = stream, 0, None
+
+    def write(self, data):
+        rest = memoryview(data)
+        size = len(rest)
+        try:
+            while len(rest) and self.trouble is None:
+                done = os.pwrite(self._stream.fileno(), rest, self._place)
+                rest, self._place = rest[done:], self._place + done
+        except OSError as problem:
+            self.trouble = problem
+        return size
+
+    def readinto(self, room):
+        done = os.preadv(self._stream.fileno(), [room], self._place)
+        self._place += done
+        return done
+
+    def read(self, size=-1):
+        """Not used: h5py tells a file by it."""
+        raise NotImplementedError
+
+    def seek(self, place, whence=os.SEEK_SET):
+        self._place = place if whence == os.SEEK_SET else self._stream.seek(place, whence)
+        return self._place
+
+    def tell(self):
+        return self._place
+
+    def truncate(self, size=None):
+        try:
+            if self.trouble is None:
+                self._stream.truncate(self._place if size is None else size)
+        except OSError as problem:
+            self.trouble = problem
+        return size
+
+    def flush(self):
+        """All writing is direct."""

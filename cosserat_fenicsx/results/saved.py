@@ -1,0 +1,213 @@
+"""A result in one HDF5 file that other programs can read, and back to the last digit.
+
+scene, settings   JSON texts: the scene as data, see `scene.as_data`, and what the result was computed with
+the root          what belongs to every state, reactions and events, in SI units
+rods/<name>       the fields along each rod, in SI units
+solution          dimensionless: what the result is made from again
+
+Datasets have the attributes units and, where they have components, frame; their dimensions have labels. Only the texts
+and the solution are read back, and their check sums compared; no code is ever stored or run.
+"""
+
+import json
+import zlib
+
+import numpy as np
+
+from cosserat_fenicsx import __version__
+from cosserat_fenicsx.element import ElementRule
+from cosserat_fenicsx.errors import SceneError
+from cosserat_fenicsx.results import contents
+from cosserat_fenicsx.results.arrays import h5py_for, new_hdf5
+from cosserat_fenicsx.results.beside import replaced
+from cosserat_fenicsx.results.history import History, Instant, Ledger
+from cosserat_fenicsx.results.path import Path
+from cosserat_fenicsx.results.records import Event, Record
+from cosserat_fenicsx.scene.as_data import NotData, from_data, to_data
+
+_FORMAT, _VERSION = "result of cosserat_fenicsx", 1
+# Fields of a record by the last dimensions of their arrays, in terms of the mesh: see `_sizes`.
+_OF_RECORD = {"load_factor": "", "rq": "N7", "gauss_fields": "EG9", "negative_modes": "", "iterations": "",
+              "reactions": "*", "neutral": "", "tie_forces": "T26"}  # fmt: skip
+_OF_POINT = _OF_RECORD | {"clamp_loads": "C6"}
+_OF_INSTANT = _OF_RECORD | {"time": "", "rates": "N6", "steps": "", "clamp_forces": "C6"}
+_OF_LEDGER = {name: "3" if "momentum" in name else "" for name in Ledger._fields}
+_DENSITIES = {"densities_at_gauss_points": "EG6", "densities_at_nodes": "EP6"}
+_OF_EVENT = ("load_factor", "after", "residual", "error")
+
+
+def save(result, file):
+    """See `Result.save`; on one rank."""
+    try:
+        scene = json.dumps(to_data(result.scene))
+    except NotData as problem:
+        raise SceneError(
+            f"{file}: {problem}: a result is saved with its scene, and code is never stored. Expected tables, signals "
+            "and pieces instead of functions, such as Table, Ramp and AlongTable; write(), to_dict() and to_xarray() "
+            "need no scene"
+        ) from None
+    with replaced(file) as fresh, new_hdf5(fresh) as store:
+        store.attrs.update(format=_FORMAT, version=_VERSION, written_by=f"cosserat_fenicsx {__version__}",
+                           kind=_kind(result), title=result.scene.title)  # fmt: skip
+        for name, text in (("scene", scene), ("settings", json.dumps(_settings(result)))):
+            store[name] = text
+            store[name].attrs["crc32"] = zlib.crc32(text.encode())
+        _write_variables(store, contents.of_states(result) | contents.of_supports(result) | contents.of_events(result))
+        for rod, group in zip(result.scene.rods, contents.group_names(result.scene), strict=True):
+            place = store.create_group(f"rods/{group}")
+            place.attrs["rod"] = rod.name
+            _write_variables(place, contents.of_rod(result, rod))
+        solution = store.create_group("solution")
+        solution.attrs["units"] = "1: lengths, forces and moments over the scales of the settings, inertial components"
+        for name, values in _solution(result).items():
+            solution[name] = values
+            solution[name].attrs["crc32"] = zlib.crc32(np.ascontiguousarray(values))
+
+
+def _write_variables(place, variables):
+    for name, variable in (variables | contents.component_names(variables)).items():
+        values = variable.values
+        place[name] = values.astype(object) if values.dtype.kind == "U" else values
+        place[name].attrs.update(variable.attributes)
+        for i, dim in enumerate(variable.dims):
+            place[name].dims[i].label = dim
+
+
+def _kind(result):
+    return "History" if result.axis == "time" else "Path"
+
+
+def _settings(result):
+    names = ["model", "formulation", "degree", "unknowns", "why"]
+    names += ["scheme", "time_unit"] if result.axis == "time" else ["control", "left", "rounding", "galerkin"]
+    scales = {name: getattr(result.scales, name) for name in ("length", "force", "moment")}
+    return {name: getattr(result, name) for name in names} | {"elements": list(result.elements), "scales": scales}
+
+
+def _solution(result):
+    """{name: array} the numbers that the result is made of."""
+    moving, records = result.axis == "time", list(result._records)
+    rule = {name: getattr(result.rule, name) for name in ("nodes", "gauss", "weights")}
+    found = {"element_ends": np.concatenate(result.layout.breaks), **rule}
+    for name in _OF_INSTANT if moving else _OF_POINT:
+        found[name] = [getattr(record, name) for record in records]
+    if moving:
+        found |= {name: [getattr(record.ledger, name) for record in records] for name in Ledger._fields}
+    else:
+        found |= {name: [record.densities[i] for record in records] for i, name in enumerate(_DENSITIES)}
+        found["error"] = result._error
+        found |= {f"event_{name}": [getattr(event, name) for event in result.events] for name in _OF_EVENT}
+        found["event_mode"] = [event.mode for event in result.events] or np.empty((0, result._rest.shape[0], 3))
+        found["event_is_limit"] = [event.kind == "limit" for event in result.events]
+    missing = [name for name, values in found.items() if values is None or any(x is None for x in values)]
+    return {name: np.array(values) for name, values in found.items() if name not in missing}
+
+
+def read(file, kind, assemble, comm):
+    """The result that `save` wrote; every rank reads the file.
+
+    Args:
+        file: its name.
+        kind: "Path" or "History".
+        assemble: function of the scene, the element ends of every rod and the units of length, force and moment, that
+            returns the layout, the scales and the connections.
+        comm: the MPI communicator of the result.
+
+    Raises:
+        SceneError: it cannot be read, is damaged, holds something else, or is of a newer release.
+    """
+    h5py = h5py_for(file)
+    try:
+        store = h5py.File(file, "r")
+    except OSError as problem:
+        raise SceneError(
+            f"{file}: it cannot be read ({problem}): expected a file that `save` of a Path or a History wrote"
+        ) from None
+    with store:
+        _check_kind(file, store.attrs, kind)
+        try:
+            settings, data = (json.loads(_checked(store, name)) for name in ("settings", "scene"))
+            numbers = {name: _checked(store["solution"], name) for name in store["solution"]}
+            return _restored(kind, from_data(data), settings, numbers, assemble, comm)
+        except (KeyError, ValueError, TypeError, AttributeError, IndexError, OSError, RuntimeError, RecursionError,
+                MemoryError) as problem:  # fmt: skip
+            raise SceneError(f"{file} is damaged ({type(problem).__name__}: {problem})") from None
+
+
+def _check_kind(file, attributes, kind):
+    """Refuse other files than those of a kind of result."""
+    if attributes.get("format") != _FORMAT:
+        raise SceneError(f"{file}: it is of another program: expected a file that `save` of a {kind} wrote")
+    version = attributes.get("version")
+    if not isinstance(version, np.integer) or version > _VERSION:
+        raise SceneError(
+            f"{file}: its format is {version}, and this release reads up to {_VERSION}: expected a newer one"
+        )
+    if attributes.get("kind") != kind:
+        reader = {"Path": "read_path", "History": "read_history"}.get(attributes.get("kind"), "another function")
+        raise SceneError(f"{file}: it holds a {attributes.get('kind')}: expected {reader} to read it, or a {kind}")
+
+
+def _checked(place, name):
+    """A text or an array of numbers, whose check sum agrees."""
+    stored = place[name]
+    text = stored.dtype.kind == "O" and stored.shape == ()
+    if not text and (stored.dtype.kind not in "fib" or stored.id.get_storage_size() < stored.nbytes):
+        raise ValueError(f"{name} is neither a text nor an array of numbers")
+    values = stored[()]
+    if zlib.crc32(values if text else np.ascontiguousarray(values)) != stored.attrs["crc32"]:
+        raise ValueError(f"the check sum of {name} is wrong")
+    return values
+
+
+def _restored(kind, scene, settings, numbers, assemble, comm):
+    counts, rule = settings["elements"], ElementRule(*(numbers[name] for name in ("nodes", "gauss", "weights")))
+    breaks = np.split(numbers["element_ends"], np.cumsum(np.add(counts, 1))[:-1])
+    layout, scales, connections = assemble(scene, breaks, settings["scales"])
+    p, moving = settings["degree"], kind == "History"
+    sizes = {"N": sum(p * count + 1 for count in counts), "E": sum(counts), "G": len(rule.gauss), "P": p + 1,
+             "T": len(connections.ties), "C": len(connections.clamped)}  # fmt: skip
+    expected = (_OF_INSTANT | _OF_LEDGER if moving else _OF_POINT | _DENSITIES).items()
+    states = len(numbers["load_factor"])
+    for name, dims in expected:
+        if name in numbers:
+            _check_shape(name, numbers[name].shape, (states, *(sizes.get(x, x) for x in dims)))
+    common = {name: settings[name] for name in ("model", "formulation", "degree", "unknowns", "why")}
+    result = (History if moving else Path)(scene, layout, scales, rule, comm=comm, **common, connections=connections,
+                                           expand=None)  # fmt: skip
+    result._expanded = [_record(numbers, k, moving) for k in range(states)]
+    if moving:
+        result.scheme, result._time_unit = settings["scheme"], settings["time_unit"]
+    else:
+        for name in ("control", "left", "rounding", "galerkin"):
+            setattr(result, name, settings[name])
+        result._error, result.events = numbers.get("error"), _events(numbers)
+    return result
+
+
+def _check_shape(name, shape, expected):
+    """Refuse another shape than the expected one, with "*" for any size."""
+    if len(shape) != len(expected) or any(str(b) not in ("*", str(a)) for a, b in zip(shape, expected, strict=True)):
+        raise ValueError(f"the shape of {name} is {shape}")
+
+
+def _record(numbers, k, moving):
+    """State k from the arrays of all states."""
+
+    def of(names):
+        rows = {name: numbers[name][k] for name in names if name in numbers}
+        return {name: row if row.ndim else row.item() for name, row in rows.items()}
+
+    if moving:
+        return Instant(**of(_OF_INSTANT), ledger=Ledger(**of(_OF_LEDGER)))
+    densities = of(_DENSITIES)
+    return Record(**of(_OF_POINT), densities=tuple(densities.get(name) for name in _DENSITIES))
+
+
+def _events(numbers):
+    columns = zip(*(numbers[f"event_{name}"].tolist() for name in _OF_EVENT), strict=True)
+    kinds = ["limit" if limit else "bifurcation" for limit in numbers["event_is_limit"]]
+    return [
+        Event(kind, mode=mode, **dict(zip(_OF_EVENT, values, strict=True)))
+        for kind, mode, values in zip(kinds, numbers["event_mode"], columns, strict=True)
+    ]

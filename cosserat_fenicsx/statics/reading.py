@@ -1,0 +1,36 @@
+"""Saved paths, read again; and the parts of any saved result that models define."""
+
+import cosserat_fenicsx.compat  # noqa: F401, I001  first: its message says what is missing where dolfinx is
+
+from mpi4py import MPI
+
+from cosserat_fenicsx.annotations import File
+from cosserat_fenicsx.models.connections import Connections
+from cosserat_fenicsx.models.rodmesh import Layout
+from cosserat_fenicsx.models.scales import Scales
+from cosserat_fenicsx.results import saved
+from cosserat_fenicsx.results.path import Path
+from cosserat_fenicsx.statics.circulatory import conservative_along
+
+
+def read_path(file: File, *, comm: MPI.Comm | None = None) -> Path:
+    """The `Path` that `Path.save` wrote, with the same digits.
+
+    Its scene is a copy: stations are those of `path.rod(name)`, or are given by name.
+
+    Args:
+        file: its name.
+        comm: MPI communicator of the path, whose ranks all read the file; default all.
+
+    Raises:
+        SceneError: it cannot be read, is damaged, holds something else, or is of a newer release.
+    """
+    path = saved.read(file, "Path", assembled, comm or MPI.COMM_WORLD)
+    path._potential = conservative_along
+    return path
+
+
+def assembled(scene, breaks, scales):
+    """The `Layout`, the `Scales` and the `Connections` of a result from what `saved.read` passes."""
+    layout = Layout(tuple(breaks))
+    return layout, Scales(**scales), Connections.of(scene, layout)
