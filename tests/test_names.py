@@ -1,5 +1,7 @@
 """Stations and rods by their names in Python, requests in the forms that files have, and short messages."""
 
+from dataclasses import dataclass
+
 import numpy as np
 import pytest
 
@@ -82,6 +84,19 @@ def test_a_support_given_by_name_is_known_as_it_was_given():
     # the same parts belong to another scene too
     other = rods()[0]
     assert cf.Scene([other], [held], loads).loads[0].station.rod is other
+
+
+@dataclass(frozen=True)
+class Own(cf.PointAction):
+    station: object
+
+
+@pytest.mark.serial
+def test_a_class_of_ones_own_has_names_too():
+    post = rods()[0]
+    assert cf.Scene([post], (), [Own("post.end")]).loads[0].station == post.end
+    with pytest.raises(cf.SceneError, match=r"Scene.loads\[0\].station = 3: expected a station"):
+        cf.Scene([post], (), [Own(3)])
 
 
 REFUSED = {

@@ -100,6 +100,7 @@ class Scene:
     def _check_load(self, field, load):
         instance("Scene", field, load, Action, "a load such as Force(rod.end, (0, 0, -1)), or another Action")
         if load.station is not None:
+            instance("Scene", f"{field}.station", load.station, Station, "a station such as rod.end")
             self._check_rod(field, load.station, load.station.rod)
             return
         if load.rod is not None:
