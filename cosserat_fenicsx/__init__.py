@@ -63,6 +63,7 @@ _HOME = {
     "Roller": "scene.supports",
     "Scene": "scene.scene",
     "SceneError": "errors",
+    "SceneWarning": "errors",
     "Spline": "scene.curves",
     "Spring": "actions.spring",
     "StepControl": "statics.path.load_control",
@@ -110,6 +111,7 @@ if TYPE_CHECKING:  # the same names, for editors and type checkers
     from cosserat_fenicsx.errors import NotConverged as NotConverged
     from cosserat_fenicsx.errors import NotStored as NotStored
     from cosserat_fenicsx.errors import SceneError as SceneError
+    from cosserat_fenicsx.errors import SceneWarning as SceneWarning
     from cosserat_fenicsx.results.history import History as History
     from cosserat_fenicsx.results.path import Path as Path
     from cosserat_fenicsx.results.records import Event as Event

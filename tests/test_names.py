@@ -153,6 +153,19 @@ def test_one_point_of_a_path_is_a_path():
         path[2]
 
 
+def soft():
+    rod = cf.Rod(cf.Line((0, 0, 0), (0, 0, 1)), cf.Circle(0.02), cf.Material(E=210.0, density=1.0), name="rod")
+    return cf.Scene([rod], [cf.Clamp("rod.start")], [cf.Force("rod.end", (1e-9, 0, 0))])
+
+
+@pytest.mark.serial
+def test_a_probable_mistake_in_units_is_a_warning_where_the_caller_is():
+    for call in (lambda: cf.solve(soft(), 1.0, elements=1), lambda: cf.simulate(soft(), 0.01, dt=0.01, elements=1)):
+        with pytest.warns(cf.SceneWarning, match="E = 210 Pa is softer than rubber") as told:
+            call()
+        assert told[0].filename == __file__
+
+
 def test_scenes_and_rods_in_one_line():
     assert repr(by_objects()) == "<Scene: rods post, beam; 2 supports, 6 loads, 1 joints>"
     assert repr(rods()[0]) == "<Rod 'post': Line, length 2 m>"

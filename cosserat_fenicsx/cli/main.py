@@ -4,13 +4,14 @@ Modules beyond the standard library are imported by the commands that need them,
 """
 
 import sys
+import warnings
 
 from cosserat_fenicsx import interrupts
 from cosserat_fenicsx.cli.deliver import deliver
 from cosserat_fenicsx.cli.options import parser
 from cosserat_fenicsx.cli.say import BAD_INPUT, DONE, INTERRUPTED, NOT_CONVERGED, in_words, say
 from cosserat_fenicsx.cli.together import together
-from cosserat_fenicsx.errors import CosseratError, NotConverged
+from cosserat_fenicsx.errors import CosseratError, NotConverged, SceneWarning
 
 
 def main(arguments=None):
@@ -77,7 +78,9 @@ def _run(options):
 
         return solve(scene, load_factors, **settings)
 
-    return deliver(computed, options, bool(moving))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", SceneWarning)  # said above, in the words of the command line
+        return deliver(computed, options, bool(moving))
 
 
 def _resume(options):

@@ -118,6 +118,8 @@ def simulate(
     number("simulate", "load_factor", load_factor, "a finite number", math.isfinite)
     scene_over = scene.over(duration)
     check_magnitudes(scene_over, load_factor)
+    if comm.rank == 0:
+        scene.warn()
     cautions = []
     if from_equilibrium:
         start = equilibrium(scene_over, start, model=model, elements=elements, degree=degree, comm=comm)

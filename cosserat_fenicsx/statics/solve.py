@@ -93,6 +93,8 @@ def solve(
     degree = formulation.default_degree if degree is None else degree
     check_arguments(scene, tol, elements)
     check_magnitudes(scene, max(map(abs, targets)))
+    if comm.rank == 0:
+        scene.warn()
     choice = choose(
         scene,
         model=model,
