@@ -5,6 +5,7 @@ from functools import cached_property
 
 import numpy as np
 
+from cosserat_fenicsx.annotations import File
 from cosserat_fenicsx.checks import instance
 from cosserat_fenicsx.quaternions import directors
 from cosserat_fenicsx.results.exports import Exports
@@ -179,7 +180,14 @@ class Result(Exports, Extremes, Reactions, Stresses, States):
 
     # -- files and pictures ------------------------------------------------------------------------------------------
 
-    def write(self, file, k=None, *, rod=None, station=None):
+    def write(
+        self,
+        file: File,
+        k: int | None = None,
+        *,
+        rod: RodOrName | None = None,
+        station: StationOrName | None = None,
+    ) -> None:
         """Write a file whose ending says what it holds.
 
         .xdmf: all points, with the load factor or the time as time axis, for ParaView. .csv: a table over load factors

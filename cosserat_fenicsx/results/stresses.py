@@ -40,6 +40,6 @@ class Stresses(OnNodes):
         return Stress(*(x[:, 0] for x in profile.stresses(np.array([station.s]), "left", n, m)))
 
     @property
-    def knows_stresses(self):
+    def knows_stresses(self) -> bool:
         """Whether a section of any rod knows its shape; else `fields` and files have no stresses."""
         return any(rod.profile.shaped for rod in self.scene.rods)
