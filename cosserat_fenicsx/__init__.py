@@ -8,6 +8,9 @@ from os import path as _path
 
 __version__ = "0.1.0"
 
+# As `typing.TYPE_CHECKING`, without that import: True to type checkers and editors alone.
+TYPE_CHECKING = False
+
 _checkout = _path.dirname(_path.dirname(_path.realpath(__file__)))
 if all(_path.isfile(_path.join(_checkout, *file)) for file in (("forms", "spatial.py"), ("pyproject.toml",))):
     # A plain checkout: forms/ lies beside the package; an installation has it inside.
@@ -60,6 +63,7 @@ _HOME = {
     "Roller": "scene.supports",
     "Scene": "scene.scene",
     "SceneError": "errors",
+    "SceneWarning": "errors",
     "Spline": "scene.curves",
     "Spring": "actions.spring",
     "StepControl": "statics.path.load_control",
@@ -86,22 +90,99 @@ _HOME = {
     "resume": "dynamics.resuming",
     "solve": "statics.solve",
 }
+
+if TYPE_CHECKING:  # the same names, for editors and type checkers
+    from cosserat_fenicsx import analytic as analytic
+    from cosserat_fenicsx import units as units
+    from cosserat_fenicsx.actions.dashpot import Dashpot as Dashpot
+    from cosserat_fenicsx.actions.drag import Drag as Drag
+    from cosserat_fenicsx.actions.foundation import Foundation as Foundation
+    from cosserat_fenicsx.actions.point_mass import PointMass as PointMass
+    from cosserat_fenicsx.actions.spring import Spring as Spring
+    from cosserat_fenicsx.actions.wall import Wall as Wall
+    from cosserat_fenicsx.dynamics.natural_modes import Modes as Modes
+    from cosserat_fenicsx.dynamics.natural_modes import modes as modes
+    from cosserat_fenicsx.dynamics.resuming import read_history as read_history
+    from cosserat_fenicsx.dynamics.resuming import resume as resume
+    from cosserat_fenicsx.dynamics.simulate import simulate as simulate
+    from cosserat_fenicsx.errors import CosseratError as CosseratError
+    from cosserat_fenicsx.errors import InstallationError as InstallationError
+    from cosserat_fenicsx.errors import Interrupted as Interrupted
+    from cosserat_fenicsx.errors import NotConverged as NotConverged
+    from cosserat_fenicsx.errors import NotStored as NotStored
+    from cosserat_fenicsx.errors import SceneError as SceneError
+    from cosserat_fenicsx.errors import SceneWarning as SceneWarning
+    from cosserat_fenicsx.results.history import History as History
+    from cosserat_fenicsx.results.path import Path as Path
+    from cosserat_fenicsx.results.records import Event as Event
+    from cosserat_fenicsx.scene.action import Action as Action
+    from cosserat_fenicsx.scene.action import LineAction as LineAction
+    from cosserat_fenicsx.scene.action import PointAction as PointAction
+    from cosserat_fenicsx.scene.along import Along as Along
+    from cosserat_fenicsx.scene.along import AlongPieces as AlongPieces
+    from cosserat_fenicsx.scene.along import AlongTable as AlongTable
+    from cosserat_fenicsx.scene.curves import Arc as Arc
+    from cosserat_fenicsx.scene.curves import Helix as Helix
+    from cosserat_fenicsx.scene.curves import Line as Line
+    from cosserat_fenicsx.scene.curves import Spline as Spline
+    from cosserat_fenicsx.scene.curves import UniformCurvature as UniformCurvature
+    from cosserat_fenicsx.scene.damping import Damping as Damping
+    from cosserat_fenicsx.scene.initial import InitialVelocity as InitialVelocity
+    from cosserat_fenicsx.scene.joints import Joint as Joint
+    from cosserat_fenicsx.scene.loads import EccentricForce as EccentricForce
+    from cosserat_fenicsx.scene.loads import FollowerForce as FollowerForce
+    from cosserat_fenicsx.scene.loads import FollowerMoment as FollowerMoment
+    from cosserat_fenicsx.scene.loads import Force as Force
+    from cosserat_fenicsx.scene.loads import LineForce as LineForce
+    from cosserat_fenicsx.scene.loads import LineMoment as LineMoment
+    from cosserat_fenicsx.scene.loads import Moment as Moment
+    from cosserat_fenicsx.scene.loads import Weight as Weight
+    from cosserat_fenicsx.scene.materials import Material as Material
+    from cosserat_fenicsx.scene.rod import Rod as Rod
+    from cosserat_fenicsx.scene.rod import euler_load as euler_load
+    from cosserat_fenicsx.scene.rolled import Profile as Profile
+    from cosserat_fenicsx.scene.scene import Scene as Scene
+    from cosserat_fenicsx.scene.scenefile import read_motion as read_motion
+    from cosserat_fenicsx.scene.scenefile import read_scene as read_scene
+    from cosserat_fenicsx.scene.sections import Circle as Circle
+    from cosserat_fenicsx.scene.sections import Rectangle as Rectangle
+    from cosserat_fenicsx.scene.sections import Stiffness as Stiffness
+    from cosserat_fenicsx.scene.sections import Tube as Tube
+    from cosserat_fenicsx.scene.signals import Ramp as Ramp
+    from cosserat_fenicsx.scene.signals import RunUp as RunUp
+    from cosserat_fenicsx.scene.signals import Sine as Sine
+    from cosserat_fenicsx.scene.signals import Step as Step
+    from cosserat_fenicsx.scene.signals import Table as Table
+    from cosserat_fenicsx.scene.signals import Triangle as Triangle
+    from cosserat_fenicsx.scene.supports import Clamp as Clamp
+    from cosserat_fenicsx.scene.supports import Hinge as Hinge
+    from cosserat_fenicsx.scene.supports import Pin as Pin
+    from cosserat_fenicsx.scene.supports import Prescribed as Prescribed
+    from cosserat_fenicsx.scene.supports import Roller as Roller
+    from cosserat_fenicsx.statics.linear_buckling import Buckling as Buckling
+    from cosserat_fenicsx.statics.linear_buckling import buckling as buckling
+    from cosserat_fenicsx.statics.path.load_control import StepControl as StepControl
+    from cosserat_fenicsx.statics.reading import read_path as read_path
+    from cosserat_fenicsx.statics.solve import solve as solve
+
 __all__ = sorted(_HOME)
 
 
-def names_in(subpackage):
+def names_in(subpackage: str) -> list[str]:
     """The public names defined in a subpackage."""
     return [name for name, home in _HOME.items() if home and home.startswith(f"{subpackage}.")]
 
 
-def __getattr__(name):
-    if name not in _HOME:
-        raise AttributeError(f"module 'cosserat_fenicsx' has no attribute '{name}'")
-    if _HOME[name] is None:
-        return importlib.import_module(f"cosserat_fenicsx.{name}")
-    value = getattr(importlib.import_module(f"cosserat_fenicsx.{_HOME[name]}"), name)
-    globals()[name] = value
-    return value
+if not TYPE_CHECKING:  # to type checkers it would say that every name exists
+
+    def __getattr__(name):
+        if name not in _HOME:
+            raise AttributeError(f"module 'cosserat_fenicsx' has no attribute '{name}'")
+        if _HOME[name] is None:
+            return importlib.import_module(f"cosserat_fenicsx.{name}")
+        value = getattr(importlib.import_module(f"cosserat_fenicsx.{_HOME[name]}"), name)
+        globals()[name] = value
+        return value
 
 
 def __dir__():

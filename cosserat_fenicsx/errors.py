@@ -21,6 +21,10 @@ class SceneError(CosseratError, ValueError):
     path = None
 
 
+class SceneWarning(UserWarning):
+    """A probable mistake in a scene, such as a unit that is not SI; `warnings.simplefilter` silences it."""
+
+
 class NotConverged(CosseratError, RuntimeError):
     """A solver did not converge.
 

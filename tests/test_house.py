@@ -4,6 +4,7 @@ import ast
 import shutil
 import subprocess
 import sys
+import tomllib
 import zipfile
 from pathlib import Path
 
@@ -43,6 +44,7 @@ def test_forms_know_ufl_alone():
 #: Modules that all subpackages may import; and the other subpackages that each subpackage may import.
 SHARED = {
     "analytic",
+    "annotations",
     "checks",
     "compat",
     "element",
@@ -168,12 +170,21 @@ def test_the_wheel_holds_the_forms_and_works(tmp_path):
     assert "cosserat_fenicsx/forms/spatial.py" in names and "cosserat_fenicsx/models/spatial.py" in names
     page = PACKAGE / "pictures" / "page"
     assert {f"cosserat_fenicsx/pictures/page/{file.name}" for file in page.iterdir()} <= set(names)
+    assert "cosserat_fenicsx/py.typed" in names and "cosserat_fenicsx/scene/rolled_profiles.csv" in names
     zipfile.ZipFile(wheel).extractall(tmp_path / "site")
     code = "import cosserat_fenicsx.forms.spatial as f, cosserat_fenicsx as cf; print(f.__file__); cf.solve"
     done = subprocess.run([sys.executable, "-S", "-c",
                            f"import sys; sys.path[:0] = {[str(tmp_path / 'site'), *sys.path]!r}; {code}"],
                           capture_output=True, encoding="utf-8", cwd=tmp_path)  # fmt: skip
     assert str(tmp_path / "site") in done.stdout, done.stderr
+
+
+def test_the_citation_and_the_metadata_agree():
+    citation = (ROOT / "CITATION.cff").read_text(encoding="utf-8").splitlines()
+    told = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    assert f"version: {cf.__version__}" in citation and f"license: {told['license']['text']}" in citation
+    assert [f"  - name: {author['name']}" for author in told["authors"]] == [x for x in citation if "- name" in x]
+    assert (ROOT / "LICENSE").read_text(encoding="utf-8").startswith(told["license"]["text"])
 
 
 def test_a_plain_checkout_works(tmp_path):

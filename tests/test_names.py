@@ -1,5 +1,7 @@
 """Stations and rods by their names in Python, requests in the forms that files have, and short messages."""
 
+from dataclasses import dataclass
+
 import numpy as np
 import pytest
 
@@ -84,6 +86,19 @@ def test_a_support_given_by_name_is_known_as_it_was_given():
     assert cf.Scene([other], [held], loads).loads[0].station.rod is other
 
 
+@dataclass(frozen=True)
+class Own(cf.PointAction):
+    station: object
+
+
+@pytest.mark.serial
+def test_a_class_of_ones_own_has_names_too():
+    post = rods()[0]
+    assert cf.Scene([post], (), [Own("post.end")]).loads[0].station == post.end
+    with pytest.raises(cf.SceneError, match=r"Scene.loads\[0\].station = 3: expected a station"):
+        cf.Scene([post], (), [Own(3)])
+
+
 REFUSED = {
     "an unknown station": (lambda r: cf.Scene(r, [cf.Clamp("pots.start")]), "Scene.supports[0].station = 'pots.start'"),
     "its nearest": (lambda r: cf.Scene(r, [cf.Clamp("pots.start")]), "did you mean 'post'?"),
@@ -136,6 +151,19 @@ def test_one_point_of_a_path_is_a_path():
     assert [part.load_factors[0] for part in path] == [0.5, 1.0]
     with pytest.raises(IndexError, match=r"\[2\]: expected the number of a load factor, from 0 to 1"):
         path[2]
+
+
+def soft():
+    rod = cf.Rod(cf.Line((0, 0, 0), (0, 0, 1)), cf.Circle(0.02), cf.Material(E=210.0, density=1.0), name="rod")
+    return cf.Scene([rod], [cf.Clamp("rod.start")], [cf.Force("rod.end", (1e-9, 0, 0))])
+
+
+@pytest.mark.serial
+def test_a_probable_mistake_in_units_is_a_warning_where_the_caller_is():
+    for call in (lambda: cf.solve(soft(), 1.0, elements=1), lambda: cf.simulate(soft(), 0.01, dt=0.01, elements=1)):
+        with pytest.warns(cf.SceneWarning, match="E = 210 Pa is softer than rubber") as told:
+            call()
+        assert told[0].filename == __file__
 
 
 def test_scenes_and_rods_in_one_line():

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import ufl
 
 from cosserat_fenicsx.actions.directed import Directed, store_coefficients
+from cosserat_fenicsx.annotations import Numbers
 from cosserat_fenicsx.scene.action import PointAction, scalar
 from cosserat_fenicsx.scene.rod import Station, StationOrName, is_known
 
@@ -29,7 +30,7 @@ class Dashpot(Directed, PointAction):
     station: StationOrName
     damping: float = 0.0
     rotational: float = 0.0
-    direction: tuple | None = None
+    direction: Numbers | None = None
 
     scaled = False
 

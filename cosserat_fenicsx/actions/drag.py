@@ -5,10 +5,11 @@ from dataclasses import dataclass
 import ufl
 
 from cosserat_fenicsx.actions.directed import store_coefficients
+from cosserat_fenicsx.annotations import Numbers
 from cosserat_fenicsx.checks import store, vector
 from cosserat_fenicsx.scene import action
 from cosserat_fenicsx.scene.action import LineAction
-from cosserat_fenicsx.scene.along import along_or_vector, breaks_of, kinks_of, values_of
+from cosserat_fenicsx.scene.along import FunctionAlong, along_or_vector, breaks_of, kinks_of, values_of
 from cosserat_fenicsx.scene.loads import Load
 from cosserat_fenicsx.scene.rod import Rod, RodOrName, is_known
 
@@ -40,7 +41,7 @@ class Drag(Load, LineAction):
     rod: RodOrName
     normal: float
     tangential: float = 0.0
-    current: object = (0.0, 0.0, 0.0)
+    current: Numbers | FunctionAlong = (0.0, 0.0, 0.0)
     permanent: bool = False
 
     jumps, follows = (), True

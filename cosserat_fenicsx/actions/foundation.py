@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import ufl
 
 from cosserat_fenicsx.actions.directed import Directed
+from cosserat_fenicsx.annotations import Numbers
 from cosserat_fenicsx.checks import positive, store
 from cosserat_fenicsx.scene.action import LineAction, scalar
 from cosserat_fenicsx.scene.rod import Rod, RodOrName, is_known
@@ -29,7 +30,7 @@ class Foundation(Directed, LineAction):
 
     rod: RodOrName
     stiffness: float
-    direction: tuple | None = None
+    direction: Numbers | None = None
 
     scaled = False
 

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cosserat_fenicsx.annotations import Numbers
 from cosserat_fenicsx.checks import number, positive, refuse, store
 from cosserat_fenicsx.scene.action import PointAction
 from cosserat_fenicsx.scene.rod import Station, StationOrName, is_known
@@ -24,7 +25,7 @@ class PointMass(PointAction):
 
     station: StationOrName
     mass: float
-    moments: object = 0.0
+    moments: float | Numbers = 0.0
 
     work, scaled = None, False
 

@@ -7,6 +7,7 @@ import ufl
 
 from cosserat_fenicsx.actions.directed import Directed, store_coefficients
 from cosserat_fenicsx.actions.foundation import alike, along
+from cosserat_fenicsx.annotations import Numbers
 from cosserat_fenicsx.scene.action import PointAction, scalar
 from cosserat_fenicsx.scene.rod import Station, StationOrName, is_known
 
@@ -33,7 +34,7 @@ class Spring(Directed, PointAction):
     station: StationOrName
     stiffness: float = 0.0
     rotational: float = 0.0
-    direction: tuple | None = None
+    direction: Numbers | None = None
 
     scaled = False
 

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 import ufl
 
+from cosserat_fenicsx.annotations import Numbers
 from cosserat_fenicsx.checks import direction, positive, store, vector
 from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.scene import action
@@ -38,8 +39,8 @@ class Wall(LineAction):
     """
 
     rod: RodOrName
-    point: tuple
-    direction: tuple
+    point: Numbers
+    direction: Numbers
     clearance: float
     stiffness: float = 1e9
 

@@ -11,6 +11,7 @@ from cosserat_fenicsx.models.signature import Signature
 from cosserat_fenicsx.scene.curves import Line, Spline
 from cosserat_fenicsx.scene.describe import actions_in_words, describe
 from cosserat_fenicsx.scene.magnitudes import check_magnitudes
+from cosserat_fenicsx.scene.rolled import Profile
 from cosserat_fenicsx.scene.sections import Rectangle, Stiffness
 from cosserat_fenicsx.statics.first_mesh import FIRST_ELEMENTS
 from cosserat_fenicsx.statics.solve import check_arguments
@@ -127,6 +128,8 @@ def _release(joint):
 
 def _section(section):
     """The type of a section and its dimensions."""
+    if isinstance(section, Profile):
+        return f"Profile {section.name}"
     given = ((f.name, getattr(section, f.name)) for f in dataclasses.fields(section))
     measures = ", ".join(
         f"{name} {value:g} m" for name, value in given if isinstance(value, float) and "factor" not in name
@@ -154,6 +157,7 @@ def _directions(rod):
     """The directions of d_1 and d_2 at the start, which orient sections that are not circular."""
     d1, d2 = (", ".join(f"{x:.3g}" for x in rod.curve.frame(0.0)[:, i] + 0.0) for i in (0, 1))
     at = "" if isinstance(rod.curve, Line) else " at the start"
-    if isinstance(rod.section_at(0.0), Rectangle):
-        return f"Its width runs along d1 = ({d1}), its height along d2 = ({d2}){at}."
+    for kind, across, up in ((Rectangle, "width runs", "height"), (Profile, "flanges run", "web")):
+        if isinstance(rod.section_at(0.0), kind):
+            return f"Its {across} along d1 = ({d1}), its {up} along d2 = ({d2}){at}."
     return f"d1 = ({d1}), d2 = ({d2}){at}."

@@ -4,6 +4,7 @@ Modules beyond the standard library are imported by the commands that need them,
 """
 
 import sys
+import warnings
 
 from cosserat_fenicsx import interrupts
 from cosserat_fenicsx.cli.deliver import deliver
@@ -11,7 +12,7 @@ from cosserat_fenicsx.cli.eigen import run_buckling, run_modes
 from cosserat_fenicsx.cli.options import parser
 from cosserat_fenicsx.cli.say import BAD_INPUT, DONE, INTERRUPTED, in_words, say
 from cosserat_fenicsx.cli.together import together
-from cosserat_fenicsx.errors import CosseratError
+from cosserat_fenicsx.errors import CosseratError, SceneWarning
 
 
 def main(arguments=None):
@@ -78,7 +79,9 @@ def _run(options):
 
         return solve(scene, load_factors, **settings)
 
-    return deliver(computed, options, bool(moving))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", SceneWarning)  # said above, in the words of the command line
+        return deliver(computed, options, bool(moving))
 
 
 def _resume(options):
@@ -102,11 +105,14 @@ def _explain(options):
     if moving:
         from cosserat_fenicsx.cli.explain_motion import explain_motion
 
-        text = explain_motion(*moving)
+        scene, text = moving[0], explain_motion(*moving)
     else:
         from cosserat_fenicsx.cli.explain import explain
 
-        text = explain(*_settings(options))
+        scene, *asked = _settings(options)
+        text = explain(scene, *asked)
+    for doubt in scene.doubts:
+        say(f"cosserat: {doubt}")
     say(text, file=sys.stdout)
     return DONE
 

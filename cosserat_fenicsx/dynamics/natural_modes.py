@@ -37,7 +37,17 @@ _MOST_ELEMENTS = 128
 _CORRECTIONS = 10
 
 
-def modes(scene, count=1, *, load_factor=0.0, tol=1e-6, elements=None, degree=4, comm=None, progress=None):
+def modes(
+    scene: Scene,
+    count: int = 1,
+    *,
+    load_factor: float = 0.0,
+    tol: float = 1e-6,
+    elements: int | None = None,
+    degree: int = 4,
+    comm: MPI.Comm | None = None,
+    progress: bool | None = None,
+) -> Modes:
     """Natural frequencies and shapes of small undamped vibrations about a static state.
 
     K x = omega^2 M x under the constraints of supports and joints, with K the second variation in (r, theta) and M the

@@ -3,11 +3,12 @@
 import cosserat_fenicsx.compat  # noqa: F401, I001  first: its message says what is missing where dolfinx is
 
 import os
-from pathlib import Path as File
+from pathlib import Path as FilePath
 
 import numpy as np
 from mpi4py import MPI
 
+from cosserat_fenicsx.annotations import File
 from cosserat_fenicsx.checks import instance, refuse
 from cosserat_fenicsx.dynamics.simulate import check_counts, pace_of, positive_time
 from cosserat_fenicsx.dynamics.solvers import solvers_of
@@ -18,13 +19,21 @@ from cosserat_fenicsx.models.rodmesh import Layout
 from cosserat_fenicsx.models.scales import Scales
 from cosserat_fenicsx.dynamics.time_loop import TimeLoop
 from cosserat_fenicsx.results import saved
+from cosserat_fenicsx.results.history import History
 from cosserat_fenicsx.storage.runfolder import RunFolder
 from cosserat_fenicsx.scene.scene import Scene
 from cosserat_fenicsx.statics.reading import assembled
 from cosserat_fenicsx.storage.stored_history import StoredHistory
 
 
-def resume(folder, scene=None, *, duration=None, progress=None, comm=None):
+def resume(
+    folder: File,
+    scene: Scene | None = None,
+    *,
+    duration: float | None = None,
+    progress: bool | None = None,
+    comm: MPI.Comm | None = None,
+) -> History:
     """Continue a motion from the folder that `simulate(..., folder=...)` writes, to the same digits.
 
     It does not matter what ended the run: a killed process, Ctrl-C, a full disk. All saved states are kept. The run
@@ -113,7 +122,7 @@ def _go_on(kept, scene, until, comm, progress):
         return motion.over(marks, asked["save_every"] is None, progress)
 
 
-def read_history(folder, scene=None, *, comm=None):
+def read_history(folder: File, scene: Scene | None = None, *, comm: MPI.Comm | None = None) -> History:
     """The states that a motion has saved so far; another process may still be computing it.
 
     Args:
@@ -128,7 +137,7 @@ def read_history(folder, scene=None, *, comm=None):
         SceneError: no such folder or file, another scene, or a file that is damaged or of a newer release.
     """
     comm = comm or MPI.COMM_WORLD
-    if isinstance(folder, str | os.PathLike) and File(folder).is_file():
+    if isinstance(folder, str | os.PathLike) and FilePath(folder).is_file():
         if scene is not None:
             refuse("read_history", "scene", scene, f"None, since the file {folder} holds its scene")
         return saved.read(folder, "History", assembled, comm)

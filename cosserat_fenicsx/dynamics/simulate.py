@@ -9,7 +9,9 @@ from mpi4py import MPI
 
 from cosserat_fenicsx.checks import instance, number, refuse
 from cosserat_fenicsx.errors import SceneError, nearest
+from cosserat_fenicsx.annotations import File
 from cosserat_fenicsx.results.history import History
+from cosserat_fenicsx.results.path import Path
 from cosserat_fenicsx.dynamics.marks import marks_of
 from cosserat_fenicsx.models.rodmesh import Layout
 from cosserat_fenicsx.dynamics.time_loop import TimeLoop
@@ -31,23 +33,23 @@ MOST_STEPS, MOST_SAVED = 1e9, 1e6
 
 
 def simulate(
-    scene,
-    duration,
+    scene: Scene,
+    duration: float,
     *,
-    tol=None,
-    dt=None,
-    model="auto",
-    scheme="momentum",
-    rho_inf=None,
-    save_every=None,
-    start=None,
-    load_factor=None,
-    elements=ELEMENTS,
-    degree=DEGREE,
-    folder=None,
-    progress=None,
-    comm=None,
-):
+    tol: float | None = None,
+    dt: float | None = None,
+    model: str = "auto",
+    scheme: str = "momentum",
+    rho_inf: float | None = None,
+    save_every: float | None = None,
+    start: float | Path | tuple[Path, int] | None = None,
+    load_factor: float | None = None,
+    elements: int = ELEMENTS,
+    degree: int = DEGREE,
+    folder: File | None = None,
+    progress: bool | None = None,
+    comm: MPI.Comm | None = None,
+) -> History:
     """Compute the motion of a scene from the time 0.
 
     Loads and prescribed motions are those of the scene at every time (`signals`), times `load_factor`; the initial
@@ -116,6 +118,8 @@ def simulate(
     number("simulate", "load_factor", load_factor, "a finite number", math.isfinite)
     scene_over = scene.over(duration)
     check_magnitudes(scene_over, load_factor)
+    if comm.rank == 0:
+        scene.warn()
     cautions = []
     if from_equilibrium:
         start = equilibrium(scene_over, start, model=model, elements=elements, degree=degree, comm=comm)

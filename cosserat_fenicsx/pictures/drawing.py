@@ -138,7 +138,8 @@ def surface_of(pyvista, body, factor):
     quads = np.stack([rings[:-1], right[:-1], right[1:], rings[1:]], axis=-1).reshape(-1, 4)
     faces = np.column_stack([np.full(len(quads), 4), quads]).ravel()
     caps = np.concatenate([[corners, *rings[0][::-1]], [corners, *rings[-1]]])
-    return pyvista.PolyData(points_of(body, factor), np.concatenate([faces, caps]))
+    surface = pyvista.PolyData(points_of(body, factor), np.concatenate([faces, caps]))
+    return surface.triangulate()  # the caps of an I section are not convex
 
 
 def add_body(plotter, pyvista, body, factor, peak, moving=False, colour=BENDING):

@@ -1,15 +1,19 @@
 """Results for other libraries: dicts of arrays, pandas and xarray."""
 
+from typing import Any
+
+from cosserat_fenicsx.annotations import File
 from cosserat_fenicsx.errors import InstallationError, SceneError
 from cosserat_fenicsx.ranks import on_first
 from cosserat_fenicsx.results import columns, contents
 from cosserat_fenicsx.results.on_nodes import OnNodes
+from cosserat_fenicsx.scene.rod import RodOrName, StationOrName
 
 
 class Exports(OnNodes):
     """A result as data of other libraries. All values are in SI units."""
 
-    def save(self, file):
+    def save(self, file: File) -> None:
         """Write all of the result to one HDF5 file, from which `read_path` or `read_history` makes it again.
 
         Every query then gives the same digits. Other programs find, with units, what belongs to every state in the
@@ -26,7 +30,7 @@ class Exports(OnNodes):
         _refuse_empty(self, "save")
         on_first(self.comm, lambda: saved.save(self, file))
 
-    def to_dict(self):
+    def to_dict(self) -> dict[str, Any]:
         """All of the result as a dict of numpy arrays, numbers and texts.
 
         Returns:
@@ -51,7 +55,9 @@ class Exports(OnNodes):
             },
         }
 
-    def to_dataframe(self, k=None, rod=None, station=None):
+    def to_dataframe(
+        self, k: int | None = None, rod: RodOrName | None = None, station: StationOrName | None = None
+    ) -> Any:
         """A pandas DataFrame with the columns of the .csv of `write`, whose arguments it has.
 
         Without k and rod it has a row per load factor or time, and the index `point` counts them, since load factors
@@ -66,7 +72,7 @@ class Exports(OnNodes):
         along = k is not None or rod is not None
         return pandas.DataFrame(columns.table(self, k, rod, station)).rename_axis("node" if along else "point")
 
-    def to_xarray(self):
+    def to_xarray(self) -> Any:
         """An xarray DataTree: what belongs to every state in its root, and a group per rod with the fields along it.
 
         Dimensions are `point` (load factors or times) and, in the group of a rod, `s` (m), an index. `load_factor` or

@@ -6,6 +6,7 @@ import numpy as np
 
 from cosserat_fenicsx.quaternions import directors
 from cosserat_fenicsx.results.on_nodes import OnNodes
+from cosserat_fenicsx.scene.rod import Station
 
 # Sampling intervals of an element, per degree of its polynomials.
 _PLACES = 6
@@ -28,14 +29,14 @@ class Largest:
     """The largest value of a quantity: its size (N m, N or Pa), its station, and the index of the point or time."""
 
     size: float
-    station: object
+    station: Station
     point: int
 
 
 class Extremes(OnNodes):
     """The largest contact forces, moments and stresses of a path or a motion."""
 
-    def largest(self):
+    def largest(self) -> dict[str, "Largest"]:
         """The largest contact forces, moments and stresses over all points of a path (or times of a motion) and all
         rods.
 

@@ -1,6 +1,7 @@
 """A motion as arrays with named fields, in SI units. Imports no solver; other packages make files and pictures."""
 
 from collections import namedtuple
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -9,6 +10,7 @@ import numpy as np
 from cosserat_fenicsx.quaternions import directors
 from cosserat_fenicsx.results.records import Record
 from cosserat_fenicsx.results.result import Result
+from cosserat_fenicsx.scene.rod import RodOrName, StationOrName
 
 #: Energies (J), work and dissipation since the start (J), linear and angular momentum (kg m/s, kg m^2/s), inertial, the
 #: latter about the inertial origin.
@@ -69,39 +71,70 @@ class History(Result):
         reach = f"t = {self.times[0]:g} .. {self.times[-1]:g} s" if len(self) else "empty"
         return f"<History: {len(self)} times, {reach}, {self.model}, {self.unknowns} unknowns, scheme {self.scheme}>"
 
-    times = property(lambda self: self._array("time"))
-    steps = property(lambda self: self._array("steps"))
-    kinetic = property(lambda self: self._booked("kinetic"))
-    strain = property(lambda self: self._booked("strain"))
-    work = property(lambda self: self._booked("work"))
-    dissipated = property(lambda self: self._booked("dissipated"))
-    linear_momentum = property(lambda self: self._booked("linear_momentum"))
-    angular_momentum = property(lambda self: self._booked("angular_momentum"))
+    @property
+    def times(self) -> np.ndarray:
+        """(n,), see the class."""
+        return self._array("time")
+
+    @property
+    def steps(self) -> np.ndarray:
+        """(n,), see the class."""
+        return self._array("steps")
+
+    @property
+    def kinetic(self) -> np.ndarray:
+        """(n,), see the class."""
+        return self._booked("kinetic")
+
+    @property
+    def strain(self) -> np.ndarray:
+        """(n,), see the class."""
+        return self._booked("strain")
+
+    @property
+    def work(self) -> np.ndarray:
+        """(n,), see the class."""
+        return self._booked("work")
+
+    @property
+    def dissipated(self) -> np.ndarray:
+        """(n,), see the class."""
+        return self._booked("dissipated")
+
+    @property
+    def linear_momentum(self) -> np.ndarray:
+        """(n, 3), see the class."""
+        return self._booked("linear_momentum")
+
+    @property
+    def angular_momentum(self) -> np.ndarray:
+        """(n, 3), see the class."""
+        return self._booked("angular_momentum")
 
     def _booked(self, name):
         return np.array([getattr(ledger, name) for ledger in (x.ledger for x in self._records)])
 
     @property
-    def time_unit(self):
+    def time_unit(self) -> float:
         """The unit of time of the dimensionless rates of an `Instant`, s."""
         return self._time_unit
 
     @property
-    def energy(self):
+    def energy(self) -> np.ndarray:
         """(n,) kinetic + strain, J."""
         return self.kinetic + self.strain
 
     @property
-    def balance(self):
+    def balance(self) -> np.ndarray:
         """(n,) J, see the class."""
         total = self.energy - self.work + self.dissipated
         return total - total[:1]
 
-    def velocity(self, station):
+    def velocity(self, station: StationOrName) -> np.ndarray:
         """(n, 3) m/s, inertial."""
         return self._at(station, self._all_rates[:, :, :3]) * (self.scales.length / self._time_unit)
 
-    def angular_velocity(self, station, *, material=False):
+    def angular_velocity(self, station: StationOrName, *, material: bool = False) -> np.ndarray:
         """(n, 3) rad/s, inertial; or along d_1, d_2, d_3 of the moving section."""
         angular = self._at(station, self._all_rates[:, :, 3:]) / self._time_unit
         if not material:
@@ -110,15 +143,15 @@ class History(Result):
         return np.einsum("nij,ni->nj", directors(self.rotation(station)) @ station.rod.curve.frame(station.s), angular)
 
     @property
-    def along_axis(self):
+    def along_axis(self) -> np.ndarray:
         """(n,) the times, s."""
         return self.times
 
-    def label(self, k):
+    def label(self, k: int) -> str:
         """The label of time k in pictures."""
         return f"{self.times[k]:.3g} s"
 
-    def fields_at(self, which, rod=None):
+    def fields_at(self, which: Sequence[int] | np.ndarray, rod: RodOrName | None = None) -> dict[str, np.ndarray]:
         """See `Result`; with velocity (m/s) and angular_velocity (rad/s), inertial."""
         rows = self._rows(rod)[1]
         rates = np.array([self._records[k].rates[rows] for k in which]) / self._time_unit

@@ -1,12 +1,13 @@
 """Base class of results with values at the nodes of a scene's rods."""
 
 from cosserat_fenicsx.errors import SceneError
+from cosserat_fenicsx.scene.rod import Rod, RodOrName
 
 
 class OnNodes:
     """A result on a mesh; subclasses have the `scene`, the `elements` of each rod and their `degree`."""
 
-    def rod(self, rod=None):
+    def rod(self, rod: RodOrName | None = None) -> Rod:
         """A rod of the scene, given as a `Rod` or by its name; default the first.
 
         Raises:

@@ -1,11 +1,15 @@
 """An equilibrium path as arrays with named fields. Imports no solver; other packages make files and pictures."""
 
+from collections.abc import Sequence
 from functools import cached_property
+from typing import Self
 
 import numpy as np
 
+from cosserat_fenicsx.results.records import Event
 from cosserat_fenicsx.results.recovery import element_contact
 from cosserat_fenicsx.results.result import Result
+from cosserat_fenicsx.scene.rod import RodOrName
 
 
 class Path(Result):
@@ -37,7 +41,8 @@ class Path(Result):
 
     def __init__(self, *args, **more):
         super().__init__(*args, **more)
-        self.events, self.control, self.left = [], "load", False
+        self.events: list[Event] = []
+        self.control, self.left = "load", False
         self.rounding, self._error = 0.0, None
 
     @classmethod
@@ -49,7 +54,7 @@ class Path(Result):
         path._potential = potential
         return path
 
-    def at_points(self, which):
+    def at_points(self, which: Sequence[int] | np.ndarray) -> Self:
         """A path of some of the points, without events.
 
         Args:
@@ -75,13 +80,28 @@ class Path(Result):
         reach = f"load factors {self.load_factors[0]:g} .. {self.load_factors[-1]:g}" if len(self) else "empty"
         return f"<Path: {len(self)} points, {reach}, {self.model}, {self.unknowns} unknowns>"
 
-    load_factors = property(lambda self: self._array("load_factor").astype(float))
-    steps = property(lambda self: self._array("steps").astype(int))
-    negative_modes = property(lambda self: self._array("negative_modes").astype(int))
-    stable = property(lambda self: self.negative_modes == 0)
+    @property
+    def load_factors(self) -> np.ndarray:
+        """(n,), see the class."""
+        return self._array("load_factor").astype(float)
+
+    @property
+    def steps(self) -> np.ndarray:
+        """(n,) whole numbers, see the class."""
+        return self._array("steps").astype(int)
+
+    @property
+    def negative_modes(self) -> np.ndarray:
+        """(n,) whole numbers, see the class."""
+        return self._array("negative_modes").astype(int)
+
+    @property
+    def stable(self) -> np.ndarray:
+        """(n,) bool."""
+        return self.negative_modes == 0
 
     @cached_property
-    def conservative(self):
+    def conservative(self) -> bool:
         """Whether the loads have a potential near every point, for all motions in space that the supports allow.
 
         A dead moment has none where its section can turn about two axes. It is computed on first use, which may take a
@@ -89,16 +109,16 @@ class Path(Result):
         return self._potential(self)
 
     @property
-    def along_axis(self):
+    def along_axis(self) -> np.ndarray:
         """(n,) the load factors."""
         return self.load_factors
 
-    def label(self, k):
+    def label(self, k: int) -> str:
         """The label of point k in pictures."""
         return f"{self.load_factors[k]:.3g}" + ("" if self.stable[k] else " (unstable)")
 
     @property
-    def error(self):
+    def error(self) -> np.ndarray:
         """(n,) estimated error, see the class."""
         return np.full(len(self), np.nan) if self._error is None else self._error
 
@@ -106,7 +126,7 @@ class Path(Result):
         """Set the estimated error, which is at least that of rounding."""
         self._error = np.maximum(error, self.rounding)
 
-    def mode(self, event, rod=None):
+    def mode(self, event: Event, rod: RodOrName | None = None) -> np.ndarray:
         """(nodes, 3) the mode of an event at the nodes of a rod (default the first), see `Event`."""
         return event.mode[self._rows(rod)[1]]
 

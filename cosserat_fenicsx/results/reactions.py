@@ -5,6 +5,8 @@ import numpy as np
 from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.results.on_nodes import OnNodes
 from cosserat_fenicsx.scene.describe import describe
+from cosserat_fenicsx.scene.rod import StationOrName
+from cosserat_fenicsx.scene.supports import Support
 
 # Components below this times the largest force or moment are rounding.
 _ROUNDING = 1e-6
@@ -13,7 +15,7 @@ _ROUNDING = 1e-6
 class Reactions(OnNodes):
     """Reactions of a result, from the residual of the equations that it solves."""
 
-    def reaction(self, support):
+    def reaction(self, support: Support | StationOrName) -> tuple[np.ndarray, np.ndarray]:
         """Force and moment that a support exerts on its rod in every state.
 
         They are the multipliers of the support's constraint equations. A clamp has none: its reaction balances the

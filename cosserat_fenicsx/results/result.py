@@ -1,9 +1,11 @@
 """Base class of equilibrium paths and motions: queries of a sequence of states."""
 
+from collections.abc import Sequence
 from functools import cached_property
 
 import numpy as np
 
+from cosserat_fenicsx.annotations import File
 from cosserat_fenicsx.checks import instance
 from cosserat_fenicsx.quaternions import directors
 from cosserat_fenicsx.results.exports import Exports
@@ -12,7 +14,7 @@ from cosserat_fenicsx.results.fields import fields_at
 from cosserat_fenicsx.results.reactions import Reactions
 from cosserat_fenicsx.results.states import States
 from cosserat_fenicsx.results.stresses import Stresses
-from cosserat_fenicsx.scene.rod import Station
+from cosserat_fenicsx.scene.rod import RodOrName, Station, StationOrName
 
 
 class Result(Exports, Extremes, Reactions, Stresses, States):
@@ -30,7 +32,7 @@ class Result(Exports, Extremes, Reactions, Stresses, States):
     state, in inertial components unless stated otherwise.
     """
 
-    def station(self, station):
+    def station(self, station: StationOrName) -> Station:
         """The `Station` given as one or by its name.
 
         Raises:
@@ -40,42 +42,42 @@ class Result(Exports, Extremes, Reactions, Stresses, States):
             return self.scene.station(station)
         return instance(type(self).__name__, "station", station, Station, "a station such as rod.end, or its name")
 
-    def position(self, station):
+    def position(self, station: StationOrName) -> np.ndarray:
         """(n, 3) positions, m, inertial."""
         station = self.station(station)
         return self.displacement(station) + station.rod.curve.position(station.s)
 
-    def displacement(self, station):
+    def displacement(self, station: StationOrName) -> np.ndarray:
         """(n, 3) displacements from the reference, m, inertial."""
         return self._at(station, self._all_rq[:, :, :3], self._rest) * self.scales.length
 
-    def rotation(self, station):
+    def rotation(self, station: StationOrName) -> np.ndarray:
         """(n, 4) unit quaternion (scalar first) from the reference to the current section; its sign is continuous
         from point to point and along the rod."""
         q = self._at(station, self._all_rq[:, :, 3:])
         return q / np.linalg.norm(q, axis=1, keepdims=True)
 
-    def rotation_angle(self, station):
+    def rotation_angle(self, station: StationOrName) -> np.ndarray:
         """(n,) angle of `rotation`, rad, in [0, 2 pi]: since q is continuous, it exceeds pi and decreases again after
         2 pi."""
         q = self.rotation(station)
         half = np.arctan2(np.linalg.norm(q[:, 1:], axis=1), q[:, 0])
         return 2 * half
 
-    def force(self, station):
+    def force(self, station: StationOrName) -> np.ndarray:
         """(n, 3) contact force n, N, inertial, exerted by the part with larger s on the part with smaller s. At a
         station with a point load it is the value just before it; at rod.start the value just after."""
         return self._contact_at(station)[:, :3] * self.scales.force
 
-    def moment(self, station):
+    def moment(self, station: StationOrName) -> np.ndarray:
         """(n, 3) contact moment m, N m, inertial; sign and side as in `force`."""
         return self._contact_at(station)[:, 3:] * self.scales.moment
 
-    def centreline(self, k=-1, rod=None):
+    def centreline(self, k: int = -1, rod: RodOrName | None = None) -> np.ndarray:
         """(nodes, 3) m, inertial: the nodes of a rod (default the first) at point k."""
         return self.fields(k, rod)["position"]
 
-    def fields(self, k, rod=None):
+    def fields(self, k: int, rod: RodOrName | None = None) -> dict[str, np.ndarray]:
         """All fields at the nodes of a rod (a `Rod` or its name; default the first) at point k.
 
         Returns:
@@ -92,7 +94,7 @@ class Result(Exports, Extremes, Reactions, Stresses, States):
             raise IndexError(f"fields({k}): expected the number of a {self.axis}, from 0 to {len(self) - 1}")
         return {name: a if name == "s" else a[0] for name, a in self.fields_at([k], rod).items()}
 
-    def fields_at(self, which, rod=None):
+    def fields_at(self, which: Sequence[int] | np.ndarray, rod: RodOrName | None = None) -> dict[str, np.ndarray]:
         """`fields` in several states at once: {name: array (n, nodes, ...)}, but s (nodes,).
 
         Args:
@@ -100,7 +102,7 @@ class Result(Exports, Extremes, Reactions, Stresses, States):
         """
         return fields_at(self, which, self.rod(rod))
 
-    def largest_displacement(self):
+    def largest_displacement(self) -> np.ndarray:
         """(n,) the largest displacement of any node, m."""
         return np.array(
             [max(np.linalg.norm(self.fields(k, rod)["displacement"], axis=1).max() for rod in self.scene.rods)
@@ -178,7 +180,14 @@ class Result(Exports, Extremes, Reactions, Stresses, States):
 
     # -- files and pictures ------------------------------------------------------------------------------------------
 
-    def write(self, file, k=None, *, rod=None, station=None):
+    def write(
+        self,
+        file: File,
+        k: int | None = None,
+        *,
+        rod: RodOrName | None = None,
+        station: StationOrName | None = None,
+    ) -> None:
         """Write a file whose ending says what it holds.
 
         .xdmf: all points, with the load factor or the time as time axis, for ParaView. .csv: a table over load factors

@@ -2,6 +2,8 @@
 
 import copy
 import pickle
+from collections.abc import Sequence
+from typing import Self
 
 import numpy as np
 from mpi4py import MPI
@@ -71,10 +73,10 @@ class States(OnNodes):
                 self._expanded.append(x)
         return self._expanded
 
-    def __len__(self):
+    def __len__(self) -> int:
         return len(self._expanded) + len(self._appended)
 
-    def __getitem__(self, k):
+    def __getitem__(self, k: int | slice) -> Self:
         """State k, or the states of a slice: a result of the same kind with these states alone, in SI units as ever.
 
         `at_points` takes a list of indices. Neither has events.
@@ -88,7 +90,7 @@ class States(OnNodes):
             raise IndexError(f"[{k}]: expected the number of a {self.axis}, from 0 to {len(self) - 1}")
         return self.at_points([k])
 
-    def at_points(self, which):
+    def at_points(self, which: Sequence[int] | np.ndarray) -> Self:
         """The result with some of its states only.
 
         Args:
@@ -111,14 +113,17 @@ class States(OnNodes):
         """(states, ..) arrays of all records."""
         return np.array([getattr(record, name) for record in self._records])
 
-    iterations = property(lambda self: self._array("iterations").astype(int))
+    @property
+    def iterations(self) -> np.ndarray:
+        """(n,) Newton iterations since the previous state, rejected steps included."""
+        return self._array("iterations").astype(int)
 
     @property
-    def along_axis(self):
+    def along_axis(self) -> np.ndarray:
         """(n,) the load factor or the time (s) of each state."""
         raise NotImplementedError
 
-    def label(self, k):
+    def label(self, k: int) -> str:
         """The label of state k in pictures."""
         raise NotImplementedError
 

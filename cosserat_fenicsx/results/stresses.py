@@ -5,13 +5,14 @@ import numpy as np
 from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.quaternions import directors
 from cosserat_fenicsx.results.on_nodes import OnNodes
+from cosserat_fenicsx.scene.rod import StationOrName
 from cosserat_fenicsx.scene.stresses import Stress
 
 
 class Stresses(OnNodes):
     """Stresses from the contact forces and moments, where sections know their shape."""
 
-    def stress(self, station):
+    def stress(self, station: StationOrName) -> Stress:
         """Stresses on the outline of the section at a station, Pa; see `scene.stresses` for the theory.
 
         They are those of tension, bending, torsion and shear by Saint-Venant, on the outer surface (of a tube: not on
@@ -39,6 +40,6 @@ class Stresses(OnNodes):
         return Stress(*(x[:, 0] for x in profile.stresses(np.array([station.s]), "left", n, m)))
 
     @property
-    def knows_stresses(self):
+    def knows_stresses(self) -> bool:
         """Whether a section of any rod knows its shape; else `fields` and files have no stresses."""
         return any(rod.profile.shaped for rod in self.scene.rods)

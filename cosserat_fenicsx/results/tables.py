@@ -11,6 +11,8 @@ from cosserat_fenicsx.results.extremes import largest_in_words
 from cosserat_fenicsx.results.reactions import reactions_in_words
 from cosserat_fenicsx.scene.describe import actions_in_words
 
+#: Tables with more rows than this leave out some in the middle.
+ROWS = 40
 # A named station is shown if its displacement is at least this share of the largest one.
 _WORTH_SHOWING = 0.2
 
@@ -33,9 +35,13 @@ def path_table(path, station=None):
     headings = ("load factor", "dx (m)", "dy (m)", "dz (m)", "rotation (rad)", "stable", "iterations", "est. error")
     for heading in headings:
         table.add_column(heading, justify="right")
-    for k, eta in enumerate(path.load_factors):
+    before = -1
+    for k in _shown(path):
+        if k > before + 1:
+            table.add_row(*["..."] * len(headings))
+        before = k
         table.add_row(
-            f"{eta:.6g}",
+            f"{path.load_factors[k]:.6g}",
             *(f"{x:.9g}" if abs(x) > 1e-12 * path.scales.length else "0" for x in tip[k]),
             f"{angle[k]:.9g}" if angle[k] > 1e-12 else "0",
             stability(path.negative_modes[k]),
@@ -44,6 +50,10 @@ def path_table(path, station=None):
         )
     kinds = {"limit": "limit point", "bifurcation": "bifurcation"}
     lines = [as_text(table)]
+    if len(path) > ROWS:
+        lines.append(
+            f"{len(_shown(path))} of {len(path)} points: path.csv has all (-o DIR; path.write('path.csv') in Python)."
+        )
     lines += [f"{kinds[event.kind]} at the load factor {event.load_factor:.7g}" for event in path.events]
     if not path.left and any(event.kind == "bifurcation" for event in path.events):
         lines.append(
@@ -53,6 +63,12 @@ def path_table(path, station=None):
     return "\n".join(
         [*lines, largest_in_words(path), *reactions_in_words(path), f"{path.model} model: {'; '.join(path.why)}."]
     )
+
+
+def _shown(path):
+    """Indices of the points of the table: the first ones, the last ones, and those on both sides of events."""
+    beside = {k for event in path.events for k in (event.after, event.after + 1)}
+    return [k for k in range(len(path)) if k < ROWS // 2 or k >= len(path) - ROWS // 2 or k in beside]
 
 
 def most_displaced(path):

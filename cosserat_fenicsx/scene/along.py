@@ -4,11 +4,13 @@ They have classes of their own, so that a function of the arc length cannot be t
 """
 
 import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import PurePath
 
 import numpy as np
 
+from cosserat_fenicsx.annotations import File, Numbers, Rows
 from cosserat_fenicsx.checks import call, number, refuse, vector
 from cosserat_fenicsx.errors import SceneError
 
@@ -25,7 +27,7 @@ class Along:
         function: s (m) -> three numbers, inertial; smooth.
     """
 
-    function: object
+    function: Callable[[float], Numbers]
 
     breaks = ()
 
@@ -62,8 +64,8 @@ class AlongTable:
         SceneError: arc lengths that do not ascend, not one vector per arc length, or a file that cannot be read.
     """
 
-    s: object = field(metadata={"file": True})
-    values: object = None
+    s: Numbers | File = field(metadata={"file": True})
+    values: Rows | None = None
 
     def __post_init__(self):
         s, values = self.s, self.values
@@ -112,7 +114,7 @@ class AlongPieces:
         SceneError: ends that do not ascend, or vectors that are not three finite numbers.
     """
 
-    pieces: tuple
+    pieces: Sequence[tuple[float, Numbers]]
 
     def __post_init__(self):
         if not isinstance(self.pieces, list | tuple) or not self.pieces:
@@ -144,6 +146,7 @@ class AlongPieces:
 #: Functions of the arc length in scene files, and all functions of the arc length.
 ALONG = (AlongTable, AlongPieces)
 FUNCTIONS_ALONG = (Along, *ALONG)
+FunctionAlong = Along | AlongTable | AlongPieces
 
 
 def along_or_vector(owner, field, value, rod):

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from cosserat_fenicsx.annotations import Numbers
 from cosserat_fenicsx.checks import number, positive, refuse, store, vector
 from cosserat_fenicsx.scene.frames import carried, exponential, level_axis, rotation, start_frame
 from cosserat_fenicsx.scene.splines import Spline
@@ -28,9 +29,9 @@ class Line:
         SceneError: points that coincide, or d1 along the line.
     """
 
-    start: tuple
-    end: tuple
-    d1: tuple | None = None
+    start: Numbers
+    end: Numbers
+    d1: Numbers | None = None
     length: float = field(init=False)
 
     breaks, uniform = (), True
@@ -45,12 +46,12 @@ class Line:
         d3 = chord / length
         store(self, length=length, _frame=start_frame(self, d3, level_axis(d3)))
 
-    def position(self, s):
+    def position(self, s: float | Numbers) -> np.ndarray:
         """Inertial points at the arc lengths s (n,), m; shape (n, 3)."""
         x = np.asarray(s, dtype=float)[..., None] / self.length
         return (1 - x) * self.start + x * self.end
 
-    def frame(self, s):
+    def frame(self, s: float | Numbers) -> np.ndarray:
         """R_R at the arc lengths s (n,); shape (n, 3, 3), the directors as columns, inertial components."""
         return np.broadcast_to(self._frame, (*np.shape(s), 3, 3))
 
@@ -63,12 +64,12 @@ class _Uniform:
 
     breaks, uniform = (), True
 
-    def position(self, s):
+    def position(self, s: float | Numbers) -> np.ndarray:
         """Inertial points at the arc lengths s (n,), m; shape (n, 3)."""
         s = np.asarray(s, dtype=float)[..., None]
         return self.start + s * (carried(s * self._curvature) @ self._frame.T)
 
-    def frame(self, s):
+    def frame(self, s: float | Numbers) -> np.ndarray:
         """R_R at the arc lengths s (n,); shape (n, 3, 3), the directors as columns, inertial components."""
         return self._frame @ exponential(np.asarray(s, dtype=float)[..., None] * self._curvature)
 
@@ -95,11 +96,11 @@ class Arc(_Uniform):
         SceneError: no angle, no axis, a start on the axis, or d1 along the tangent.
     """
 
-    centre: tuple
-    start: tuple
+    centre: Numbers
+    start: Numbers
     angle: float
-    axis: tuple = (0.0, 0.0, 1.0)
-    d1: tuple | None = None
+    axis: Numbers = (0.0, 0.0, 1.0)
+    d1: Numbers | None = None
     length: float = field(init=False)
 
     def __post_init__(self):
@@ -126,12 +127,12 @@ class Helix(_Uniform):
         SceneError: no turns, no axis, a start on the axis, or d1 along the tangent.
     """
 
-    centre: tuple
-    start: tuple
+    centre: Numbers
+    start: Numbers
     turns: float
     pitch: float
-    axis: tuple = (0.0, 0.0, 1.0)
-    d1: tuple | None = None
+    axis: Numbers = (0.0, 0.0, 1.0)
+    d1: Numbers | None = None
     length: float = field(init=False)
 
     def __post_init__(self):
@@ -160,11 +161,17 @@ class UniformCurvature(_Uniform):
     """
 
     length: float
-    curvature: tuple
-    start: tuple
+    curvature: Numbers
+    start: Numbers
     quaternion: tuple  # the argument `frame`, whose name belongs to the method
 
-    def __init__(self, length, curvature, start=(0.0, 0.0, 0.0), frame=(1.0, 0.0, 0.0, 0.0)):
+    def __init__(
+        self,
+        length: float,
+        curvature: Numbers,
+        start: Numbers = (0.0, 0.0, 0.0),
+        frame: Numbers = (1.0, 0.0, 0.0, 0.0),
+    ):
         store(self, length=positive(self, "length", length, "m"))
         store(self, curvature=vector(self, "curvature", curvature, "1/m"), start=vector(self, "start", start, "m"))
         q = np.array(vector(self, "frame", frame, "unit quaternion, scalar first", size=4))
@@ -205,3 +212,4 @@ def _axis_and_arm(curve):
 
 #: Curves that scene files know.
 CURVES = (Line, Arc, Helix, Spline, UniformCurvature)
+Curve = Line | Arc | Helix | Spline | UniformCurvature

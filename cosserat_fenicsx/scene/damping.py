@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cosserat_fenicsx.annotations import Numbers
 from cosserat_fenicsx.checks import number, refuse, store
 
 
@@ -44,7 +45,7 @@ class Damping:
             store(self, **{field: tuple(_not_negative(self, field, value, unit) for value in values)})
 
     @classmethod
-    def ratio(cls, ratio, frequencies):
+    def ratio(cls, ratio: float, frequencies: Numbers) -> "Damping":
         """The damping with a given damping ratio drag/(2 omega) + time omega/2 at two frequencies.
 
         Args:

@@ -2,6 +2,8 @@
 
 import pickle
 
+from cosserat_fenicsx.scene.supports import Prescribed
+
 
 def describe(item):
     """A support or a load as text: its class and its station."""
@@ -16,9 +18,10 @@ def name_of(item):
 
 
 def actions_in_words(scene):
-    """Sentences that list the actions on a scene's rods, by whether the load factor multiplies them."""
+    """Sentences that list the actions and prescribed motions of a scene, by whether the load factor multiplies them."""
     groups = (
         ("Loads, times the load factor", [x for x in scene.loads if x.scaled]),
+        ("Prescribed motions, times the load factor", [x for x in scene.supports if isinstance(x, Prescribed)]),
         ("Permanent loads, applied in full before", [x for x in scene.loads if x.permanent]),
         ("Not multiplied by the load factor", [x for x in scene.loads if not x.scaled and not x.permanent]),
     )

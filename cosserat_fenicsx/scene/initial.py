@@ -1,9 +1,11 @@
 """Initial velocities of a motion."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
+from cosserat_fenicsx.annotations import Numbers
 from cosserat_fenicsx.checks import refuse, store, vector
 from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.scene.rod import Rod, RodOrName, is_known
@@ -27,9 +29,9 @@ class InitialVelocity:
     """
 
     rod: RodOrName
-    linear: object = (0.0, 0.0, 0.0)
-    angular: object = (0.0, 0.0, 0.0)
-    about: tuple | None = None
+    linear: Numbers | Callable[[float], Numbers] = (0.0, 0.0, 0.0)
+    angular: Numbers | Callable[[float], Numbers] = (0.0, 0.0, 0.0)
+    about: Numbers | None = None
 
     def __post_init__(self):
         is_known(self, "rod", Rod)

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cosserat_fenicsx.annotations import Numbers
 from cosserat_fenicsx.checks import direction, refuse, store
 from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.scene import ties
@@ -25,7 +26,7 @@ class Joint:
 
     first: StationOrName
     second: StationOrName
-    release: object = None
+    release: Numbers | str | None = None
 
     def __post_init__(self):
         if all([is_known(self, field, Station) for field in ("first", "second")]):

@@ -8,10 +8,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cosserat_fenicsx.annotations import Numbers, NumbersInTime
 from cosserat_fenicsx.checks import instance, refuse, store, vector
 from cosserat_fenicsx.scene import action
 from cosserat_fenicsx.scene.action import LineAction, PointAction
-from cosserat_fenicsx.scene.along import along_or_vector, breaks_of, kinks_of, values_of
+from cosserat_fenicsx.scene.along import FunctionAlong, along_or_vector, breaks_of, kinks_of, values_of
 from cosserat_fenicsx.scene.rod import Rod, RodOrName, Station, StationOrName, is_known
 from cosserat_fenicsx.scene.signals import vector_or_signal
 
@@ -57,8 +58,8 @@ class Force(PointLoad):
     """
 
     station: StationOrName
-    force: object
-    jumps: tuple = ()
+    force: NumbersInTime
+    jumps: Numbers = ()
     permanent: bool = False
 
     work = "force"
@@ -85,8 +86,8 @@ class Moment(PointLoad):
     """
 
     station: StationOrName
-    moment: object
-    jumps: tuple = ()
+    moment: NumbersInTime
+    jumps: Numbers = ()
     permanent: bool = False
 
     work = "moment"
@@ -114,9 +115,9 @@ class EccentricForce(PointLoad):
     """
 
     station: StationOrName
-    force: object
-    offset: tuple
-    jumps: tuple = ()
+    force: NumbersInTime
+    offset: Numbers
+    jumps: Numbers = ()
     permanent: bool = False
 
     work = "eccentric_force"
@@ -144,8 +145,8 @@ class FollowerForce(PointLoad):
     """
 
     station: StationOrName
-    force: object
-    jumps: tuple = ()
+    force: NumbersInTime
+    jumps: Numbers = ()
     permanent: bool = False
 
     work, follows = "follower_force", True
@@ -172,8 +173,8 @@ class FollowerMoment(PointLoad):
     """
 
     station: StationOrName
-    moment: object
-    jumps: tuple = ()
+    moment: NumbersInTime
+    jumps: Numbers = ()
     permanent: bool = False
 
     work, follows = "follower_moment", True
@@ -198,7 +199,7 @@ class Weight(Load, LineAction):
         SceneError: not three finite numbers; a rod without mass (raised by `Scene`).
     """
 
-    gravity: tuple = (0.0, 0.0, -9.81)
+    gravity: Numbers = (0.0, 0.0, -9.81)
     permanent: bool = False
 
     work, rod = "force", None
@@ -258,8 +259,8 @@ class LineForce(LineLoad):
     """
 
     rod: RodOrName
-    force: object
-    jumps: tuple = ()
+    force: NumbersInTime | FunctionAlong
+    jumps: Numbers = ()
     permanent: bool = False
 
     work = "force"
@@ -294,8 +295,8 @@ class LineMoment(LineLoad):
     """
 
     rod: RodOrName
-    moment: object
-    jumps: tuple = ()
+    moment: NumbersInTime | FunctionAlong
+    jumps: Numbers = ()
     permanent: bool = False
 
     work = "moment"

@@ -29,6 +29,6 @@ class Material:
             store(self, density=positive(self, "density", self.density, "kg/m^3"))
 
     @property
-    def G(self):
+    def G(self) -> float:
         """Shear modulus E/(2(1 + nu)), Pa."""
         return self.E / (2 * (1 + self.nu))

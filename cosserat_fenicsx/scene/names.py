@@ -6,6 +6,8 @@ from cosserat_fenicsx.errors import SceneError, nearest
 from cosserat_fenicsx.scene.rod import Rod, RodOrName, Station, StationOrName, station_named
 from cosserat_fenicsx.scene.signals import Signal
 
+# The fields of actions, whatever the annotations of a class of the user's own are.
+_OF_ACTIONS = {"station": Station, "rod": Rod}
 _KINDS = {Station: Station, StationOrName: Station, Rod: Rod, RodOrName: Rod}
 
 
@@ -37,9 +39,9 @@ def with_names(where, item, rods):
         SceneError: there is none of that name, or the part refuses what it stands for.
     """
     found = {
-        field.name: look_up(f"{where}.{field.name}", getattr(item, field.name), kind_of(field.type), rods)
+        field.name: look_up(f"{where}.{field.name}", getattr(item, field.name), kind, rods)
         for field in _fields(item)
-        if kind_of(field.type) and isinstance(getattr(item, field.name), str)
+        if (kind := kind_of(field.type) or _OF_ACTIONS.get(field.name)) and isinstance(getattr(item, field.name), str)
     }
     if not found:
         return item

@@ -1,6 +1,7 @@
 """The sections along a rod: one for all, in pieces, or by a function of the arc length."""
 
 from collections import namedtuple
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -45,6 +46,8 @@ class Stiffnesses(namedtuple("Stiffnesses", "K J mass inertia matrix", defaults=
 
 #: Sections that scene files know.
 SECTIONS = (Circle, Tube, Rectangle, Profile, Stiffness)
+Section = Circle | Tube | Rectangle | Profile | Stiffness
+SectionOfLength = Callable[[float], Section]
 
 _SAMPLES = 33
 _DIAGONAL = 10  # numbers (GA1, GA2, EA, EI1, EI2, GJ, mass, inertia) of a section; the 36 of its matrix follow

@@ -2,17 +2,19 @@
 
 import itertools
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
+from cosserat_fenicsx.annotations import Numbers
 from cosserat_fenicsx.checks import instance, number, refuse, store
 from cosserat_fenicsx.errors import SceneError, nearest
 from cosserat_fenicsx.quadrature import gauss
-from cosserat_fenicsx.scene.curves import CURVES
+from cosserat_fenicsx.scene.curves import CURVES, Curve
 from cosserat_fenicsx.scene.damping import Damping
 from cosserat_fenicsx.scene.materials import Material
-from cosserat_fenicsx.scene.profiles import Sections
+from cosserat_fenicsx.scene.profiles import Section, SectionOfLength, Sections, Stiffnesses
 from cosserat_fenicsx.scene.sections import Stiffness
 
 _unnamed = itertools.count(1)
@@ -39,8 +41,8 @@ class Rod:
         SceneError: a part of the wrong kind, a missing material, or pieces that do not ascend to the length.
     """
 
-    curve: object
-    section: object
+    curve: Curve
+    section: Section | SectionOfLength | Sequence[tuple[float | None, Section | SectionOfLength]]
     material: Material | None = None
     name: str | None = None
     damping: Damping | None = None
@@ -65,12 +67,12 @@ class Rod:
         return f"<Rod '{self.name}': {type(self.curve).__name__}, length {self.length:g} m>"
 
     @property
-    def length(self):
+    def length(self) -> float:
         """Reference arc length, m."""
         return self.curve.length
 
     @property
-    def breaks(self):
+    def breaks(self) -> tuple[float, ...]:
         """Arc lengths inside the rod where its curve is not smooth or its section may jump, ascending, m."""
         breaks = []
         for s in sorted({*self.curve.breaks, *self.profile.breaks}):
@@ -79,11 +81,11 @@ class Rod:
         return tuple(breaks)
 
     @property
-    def uniform(self):
+    def uniform(self) -> bool:
         """Whether curvature, twist and section are constant between the `breaks`: no splines, no functions of s."""
         return self.curve.uniform and self.profile.uniform
 
-    def stiffness_at(self, s, side="right"):
+    def stiffness_at(self, s: float | Numbers, side: str = "right") -> Stiffnesses:
         """Stiffnesses and mass at reference arc lengths.
 
         Args:
@@ -98,21 +100,21 @@ class Rod:
         """
         return self.profile.stiffness(s, side)
 
-    def section_at(self, s, side="right"):
+    def section_at(self, s: float, side: str = "right") -> Section:
         """The section at one reference arc length, m; `side` as for `stiffness_at`."""
         return self.profile.section(s, side)
 
     @property
-    def start(self):
+    def start(self) -> "Station":
         """The station at s = 0."""
         return Station(self, 0.0)
 
     @property
-    def end(self):
+    def end(self) -> "Station":
         """The station at s = length."""
         return Station(self, self.length)
 
-    def at(self, s):
+    def at(self, s: float) -> "Station":
         """The station at reference arc length s, m, in [0, length]."""
         L = self.length
         s = number(self, "at(s)", s, f"an arc length in [0, {L:g}] m", lambda s: -1e-12 * L <= s <= L * (1 + 1e-12))
@@ -167,7 +169,8 @@ def station_named(where, text, rods):
 
 
 #: What the fields of supports, loads and joints take that say where they act: names are looked up by `Scene`.
-StationOrName, RodOrName = Station | str, Rod | str
+StationOrName = Station | str
+RodOrName = Rod | str
 
 
 def is_known(owner, field, kind):
@@ -183,7 +186,7 @@ def is_known(owner, field, kind):
     return not isinstance(instance(owner, field, getattr(owner, field), kind | str, f"{expected}, or its name"), str)
 
 
-def euler_load(rod):
+def euler_load(rod: Rod) -> float:
     """Critical load of the cantilever column, N: pi^2 EI/(2L)^2 with the smaller bending stiffness.
 
     Where the section changes, the least P with m' + P theta = 0, theta(0) = m(L) = 0 and theta' = F m, F the

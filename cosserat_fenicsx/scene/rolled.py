@@ -22,6 +22,7 @@ from numpy.polynomial.legendre import legvander
 from cosserat_fenicsx.checks import instance
 from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.quadrature import gauss
+from cosserat_fenicsx.scene.materials import Material
 from cosserat_fenicsx.scene.sections import Stiffness
 
 _TABLE = Path(__file__).with_name("rolled_profiles.csv")
@@ -135,7 +136,7 @@ class Profile:
         half = ((b / 2, h / 2), (-b / 2, h / 2), (-b / 2, inner), (-tw / 2, inner), (-tw / 2, -inner), (-b / 2, -inner))
         return (*half, *((-x, -y) for x, y in half))
 
-    def stiffness(self, material):
+    def stiffness(self, material: Material) -> Stiffness:
         """The section's `Stiffness` in a material."""
         A, (I1, I2), rho = self.area, self.second_moments, material.density
         return Stiffness(

@@ -1,11 +1,15 @@
 """A scene: rods, joints, supports and actions, independent of solvers and meshes."""
 
 import copy
+import warnings
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
+import numpy as np
+
 from cosserat_fenicsx.checks import instance
-from cosserat_fenicsx.errors import SceneError, nearest
+from cosserat_fenicsx.errors import SceneError, SceneWarning, nearest
 from cosserat_fenicsx.scene.action import Action
 from cosserat_fenicsx.scene.describe import describe
 from cosserat_fenicsx.scene.initial import InitialVelocity
@@ -13,10 +17,10 @@ from cosserat_fenicsx.scene.joints import Joint
 from cosserat_fenicsx.scene.magnitudes import magnitudes
 from cosserat_fenicsx.scene.names import with_names
 from cosserat_fenicsx.scene.planes import find_plane
-from cosserat_fenicsx.scene.rod import Rod, Station, station_named
+from cosserat_fenicsx.scene.rod import Rod, Station, StationOrName, station_named
 from cosserat_fenicsx.scene.signals import signals_of
 from cosserat_fenicsx.scene.statical import check_held_once, touching
-from cosserat_fenicsx.scene.supports import SUPPORTS
+from cosserat_fenicsx.scene.supports import SUPPORTS, Support
 
 # Young's moduli below this, Pa, are those of gels, or mistakes in units.
 _SOFTEST = 1e6
@@ -41,12 +45,12 @@ class Scene:
             statics refuses them.)
     """
 
-    rods: tuple
-    supports: tuple = ()
-    loads: tuple = ()
-    joints: tuple = ()
+    rods: Sequence[Rod]
+    supports: Sequence[Support] = ()
+    loads: Sequence[Action] = ()
+    joints: Sequence[Joint] = ()
     title: str = ""
-    velocities: tuple = ()
+    velocities: Sequence[InitialVelocity] = ()
 
     #: time (s) up to which functions of time are sampled, see `over`
     horizon = 1.0
@@ -97,6 +101,7 @@ class Scene:
     def _check_load(self, field, load):
         instance("Scene", field, load, Action, "a load such as Force(rod.end, (0, 0, -1)), or another Action")
         if load.station is not None:
+            instance("Scene", f"{field}.station", load.station, Station, "a station such as rod.end")
             self._check_rod(field, load.station, load.station.rod)
             return
         if load.rod is not None:
@@ -126,11 +131,11 @@ class Scene:
             leaders[other] = one
         return {rod: find(rod) for rod in self.rods}
 
-    def leader(self, rod):
+    def leader(self, rod: Rod) -> Rod:
         """The first rod of the structure that a rod belongs to."""
         return self._leaders[rod]
 
-    def origin(self, rod):
+    def origin(self, rod: Rod) -> np.ndarray:
         """The start of the structure that a rod belongs to, (3,), m.
 
         Solvers take positions relative to it, so that a large distance from the inertial origin costs no accuracy.
@@ -179,7 +184,7 @@ class Scene:
         return [station for station in named if station.rod is rod]
 
     @property
-    def cautions(self):
+    def cautions(self) -> list[str]:
         """Warnings that belong to every result, a list of sentences."""
         return [*self.doubts, *self._following()]
 
@@ -187,6 +192,11 @@ class Scene:
     def doubts(self):
         """Warnings about probable mistakes in the scene, sentences."""
         return (*self._softness(), *self._thickness(), *self._unjoined())
+
+    def warn(self):
+        """Raise a `SceneWarning` for each of `doubts`, on behalf of the caller of the function that calls this."""
+        for doubt in self.doubts:
+            warnings.warn(doubt, SceneWarning, stacklevel=3)
 
     @property
     def follows(self):
@@ -246,7 +256,7 @@ class Scene:
 
         return plot.scene(self, file)
 
-    def station(self, name):
+    def station(self, name: str) -> Station:
         """The station 'rod.start', 'rod.end' or 'rod@s', s in m, as scene files name it.
 
         Raises:
@@ -254,7 +264,7 @@ class Scene:
         """
         return station_named("station", name, {rod.name: rod for rod in self.rods})
 
-    def supports_of(self, which):
+    def supports_of(self, which: Support | StationOrName) -> list[int]:
         """Indices of the supports that `which` stands for.
 
         Args:
@@ -278,7 +288,7 @@ class Scene:
             )
         return found
 
-    def rod(self, name):
+    def rod(self, name: str) -> Rod:
         """The rod of that name.
 
         Raises:

@@ -41,7 +41,9 @@ import dataclasses
 import inspect
 import tomllib
 from pathlib import Path
+from typing import Any
 
+from cosserat_fenicsx.annotations import File
 from cosserat_fenicsx.errors import SceneError, nearest
 from cosserat_fenicsx.scene.along import ALONG
 from cosserat_fenicsx.scene.curves import CURVES
@@ -54,6 +56,7 @@ from cosserat_fenicsx.scene.names import kind_of, look_up
 from cosserat_fenicsx.scene.profiles import SECTIONS
 from cosserat_fenicsx.scene.rod import Rod
 from cosserat_fenicsx.scene.scene import Scene
+from cosserat_fenicsx.scene.sections import Stiffness
 from cosserat_fenicsx.scene.signals import SIGNALS
 from cosserat_fenicsx.scene.supports import SUPPORTS
 
@@ -76,7 +79,7 @@ SIMULATE_KEYS = {
 }
 
 
-def read_scene(file):
+def read_scene(file: File) -> tuple[Scene, dict[str, Any]]:
     """A scene and its solver settings from a TOML file.
 
     Args:
@@ -93,7 +96,7 @@ def read_scene(file):
     return scene, settings
 
 
-def read_motion(file):
+def read_motion(file: File) -> tuple[Scene, dict[str, Any]]:
     """A scene and the arguments of its motion from a TOML file: `simulate(scene, **arguments)`.
 
     Args:
@@ -231,14 +234,31 @@ def _damping(where, entry):
 def _section(where, entry):
     """A section, or the pieces (s_end, section) from an array of sections, the last with or without `to`."""
     if not isinstance(entry, list):
-        return _build(where, entry, SECTIONS, {})
+        return _one_section(where, entry)
     pieces = []
     for i, piece in enumerate(entry):
         piece = dict(_table(f"{where}[{i}]", piece))
         if "to" not in piece and i < len(entry) - 1:
             raise SceneError(f"{where}[{i}]: 'to' is missing: expected the arc length (m) where this piece ends")
-        pieces.append((piece.pop("to", None), _build(f"{where}[{i}]", piece, SECTIONS, {})))
+        pieces.append((piece.pop("to", None), _one_section(f"{where}[{i}]", piece)))
     return pieces
+
+
+def _one_section(where, entry):
+    """A section; a `Stiffness` with a centroid, a shear centre or an angle is that of `Stiffness.offset`."""
+    given = dict(_table(where, entry))
+    if given.get("type") != "Stiffness" or given.keys().isdisjoint({"centroid", "shear_centre", "angle"}):
+        return _build(where, entry, SECTIONS, {})
+    del given["type"]
+    arguments = inspect.signature(Stiffness.offset).parameters.keys() - {"others"}
+    _known_keys(f"{where} (Stiffness, offset)", given, {*arguments, "mass", "inertia", "outline"})
+    for name in ("shear", "axial", "bending", "torsion"):
+        if name not in given:
+            raise SceneError(f"{where} (Stiffness, offset): '{name}' is missing")
+    try:
+        return Stiffness.offset(**given)
+    except SceneError as problem:
+        raise SceneError(f"{where}: {problem}") from None
 
 
 def _build(where, entry, classes, rods, folder=None):

@@ -8,11 +8,14 @@ series.
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
+from cosserat_fenicsx.annotations import Numbers, Rows
 from cosserat_fenicsx.checks import finite_array, number, positive, refuse, stiffness, store, vector
 from cosserat_fenicsx.scene.computed_sections import arguments_of
+from cosserat_fenicsx.scene.materials import Material
 from cosserat_fenicsx.scene.stresses import rectangle_fibres, round_stress
 
 _ZETA_5 = 1.0369277551433699263  # sum of 1/n^5
@@ -47,14 +50,14 @@ class Stiffness:
             stiffnesses given twice or not at all.
     """
 
-    shear: tuple | None = None
+    shear: Numbers | None = None
     axial: float | None = None
-    bending: tuple | None = None
+    bending: Numbers | None = None
     torsion: float | None = None
     mass: float | None = None
-    outline: tuple | None = None
-    inertia: tuple | None = None
-    matrix: tuple | None = None
+    outline: Rows | None = None
+    inertia: Numbers | None = None
+    matrix: Rows | None = None
 
     def __post_init__(self):
         if self.matrix is None:
@@ -79,8 +82,17 @@ class Stiffness:
 
     @classmethod
     def offset(
-        cls, shear, axial, bending, torsion, *, centroid=(0.0, 0.0), shear_centre=(0.0, 0.0), angle=0.0, **others
-    ):
+        cls,
+        shear: Numbers,
+        axial: float,
+        bending: Numbers,
+        torsion: float,
+        *,
+        centroid: Numbers = (0.0, 0.0),
+        shear_centre: Numbers = (0.0, 0.0),
+        angle: float = 0.0,
+        **others: Any,
+    ) -> "Stiffness":
         """A section whose centroid and shear centre are off the rod's line.
 
         A point (x1, x2) of the section has the strains e + k x (x1, x2, 0), where e and k are those at the line. EA
@@ -114,7 +126,9 @@ class Stiffness:
         return cls(matrix=(strains.T * stiffnesses @ strains).tolist(), **others)
 
     @classmethod
-    def from_section(cls, section, material=None, *, line=None, unit=1.0):
+    def from_section(
+        cls, section: Any, material: Material | None = None, *, line: Numbers | None = None, unit: float = 1.0
+    ) -> "Stiffness":
         """A section of any shape, computed by the package sectionproperties after its geometric and warping analysis.
 
         Its x is along d_1, its y along d_2. Where centroid or shear centre is off the rod's line, or the principal axes
@@ -138,7 +152,7 @@ class Stiffness:
         off = {"centroid", "shear_centre", "angle"} & arguments.keys()
         return cls.offset(**arguments) if off else cls(**arguments)
 
-    def stiffness(self, material=None):
+    def stiffness(self, material: Material | None = None) -> "Stiffness":
         """The section itself (a material is not needed)."""
         return self
 
@@ -165,7 +179,7 @@ class Circle:
     def __post_init__(self):
         _check_lengths(self, "diameter")
 
-    def stiffness(self, material):
+    def stiffness(self, material: Material) -> Stiffness:
         """The section's `Stiffness` in a material."""
         nu = material.nu
         A, I = math.pi * self.diameter**2 / 4, math.pi * self.diameter**4 / 64
@@ -199,7 +213,7 @@ class Tube:
         if self.inner_diameter >= self.outer_diameter:
             refuse(self, "inner_diameter", self.inner_diameter, f"less than outer_diameter = {self.outer_diameter}")
 
-    def stiffness(self, material):
+    def stiffness(self, material: Material) -> Stiffness:
         """The section's `Stiffness` in a material."""
         D, d, nu = self.outer_diameter, self.inner_diameter, material.nu
         A, I = math.pi * (D**2 - d**2) / 4, math.pi * (D**4 - d**4) / 64
@@ -233,7 +247,7 @@ class Rectangle:
     def __post_init__(self):
         _check_lengths(self, "width", "height")
 
-    def stiffness(self, material):
+    def stiffness(self, material: Material) -> Stiffness:
         """The section's `Stiffness` in a material."""
         b, h, nu = self.width, self.height, material.nu
         k = self.shear_factor or 10 * (1 + nu) / (12 + 11 * nu)

@@ -13,6 +13,7 @@ from functools import cached_property
 
 import numpy as np
 
+from cosserat_fenicsx.annotations import Numbers, Rows
 from cosserat_fenicsx.checks import call, number, refuse, store, vector
 from cosserat_fenicsx.errors import SceneError
 
@@ -25,7 +26,7 @@ class Step:
         SceneError: numbers that are not finite, or an end that is not after the start.
     """
 
-    value: tuple
+    value: Numbers
     start: float = 0.0
     end: float | None = None
 
@@ -39,7 +40,7 @@ class Step:
         """Where it is not smooth, s."""
         return (self.start,) if self.end is None else (self.start, self.end)
 
-    def __call__(self, t):
+    def __call__(self, t: float) -> tuple:
         """The vector at t."""
         return _times(self.start <= t and (self.end is None or t < self.end), self.value)
 
@@ -48,7 +49,7 @@ class Step:
 class _FromTo:
     """Base of functions that change between two times, s."""
 
-    value: tuple
+    value: Numbers
     start: float = 0.0
     end: float = 1.0
 
@@ -71,7 +72,7 @@ class Ramp(_FromTo):
 
     straight = True
 
-    def __call__(self, t):
+    def __call__(self, t: float) -> tuple:
         """The vector at t."""
         return _times(min(max((t - self.start) / (self.end - self.start), 0.0), 1.0), self.value)
 
@@ -90,7 +91,7 @@ class RunUp(_FromTo):
         SceneError: numbers that are not finite, or an end that is not after the start.
     """
 
-    def __call__(self, t):
+    def __call__(self, t: float) -> tuple:
         """The vector at t."""
         whole = self.end - self.start
         x = min(max((t - self.start) / whole, 0.0), 1.0)
@@ -106,7 +107,7 @@ class Triangle:
         SceneError: numbers that are not finite, or times that do not ascend.
     """
 
-    value: tuple
+    value: Numbers
     start: float = 0.0
     peak: float = 1.0
     end: float = 2.0
@@ -121,7 +122,7 @@ class Triangle:
         """Where it is not smooth, s."""
         return self.start, self.peak, self.end
 
-    def __call__(self, t):
+    def __call__(self, t: float) -> tuple:
         """The vector at t."""
         up, down = (t - self.start) / (self.peak - self.start), (self.end - t) / (self.end - self.peak)
         return _times(max(min(up, down), 0.0), self.value)
@@ -138,7 +139,7 @@ class Sine:
         SceneError: numbers that are not finite, or an end that is not after the start.
     """
 
-    value: tuple
+    value: Numbers
     frequency: float
     phase: float = 0.0
     start: float = 0.0
@@ -154,7 +155,7 @@ class Sine:
         """Where it is not smooth, s."""
         return (self.start,) if self.end is None else (self.start, self.end)
 
-    def __call__(self, t):
+    def __call__(self, t: float) -> tuple:
         """The vector at t."""
         on = self.start <= t and (self.end is None or t < self.end)
         return _times(on and math.sin(2 * math.pi * self.frequency * (t - self.start) + self.phase), self.value)
@@ -171,8 +172,8 @@ class Table:
         SceneError: times that do not ascend, or not one value for each.
     """
 
-    times: tuple
-    values: tuple
+    times: Numbers
+    values: Rows
 
     straight = True
 
@@ -197,7 +198,7 @@ class Table:
         """Where it is not smooth, s."""
         return tuple(float(t) for t in self.times)
 
-    def __call__(self, t):
+    def __call__(self, t: float) -> tuple:
         """The vector at t."""
         times, columns = self._numbers
         return tuple(float(np.interp(t, times, column)) for column in columns)
@@ -244,7 +245,7 @@ class Signal:
     size: int = 3
     place: str = ""
 
-    def __call__(self, t):
+    def __call__(self, t: float) -> tuple:
         """The vector at t, s.
 
         Raises:

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.polynomial import legendre
 
+from cosserat_fenicsx.annotations import File, Numbers, Rows
 from cosserat_fenicsx.checks import instance, refuse, store, vector
 from cosserat_fenicsx.quadrature import gauss
 from cosserat_fenicsx.scene.frames import level_axis, start_frame
@@ -45,8 +46,8 @@ class Spline:
             that turns back on itself in a cusp, or d1 along the tangent.
     """
 
-    points: tuple = field(repr=False, metadata={"file": True})
-    d1: tuple | None = None
+    points: Rows | File = field(repr=False, metadata={"file": True})
+    d1: Numbers | None = None
     closed: bool = False
     length: float = field(init=False)
     breaks: tuple = field(init=False, repr=False, compare=False)
@@ -174,12 +175,12 @@ class Spline:
                 break
         return panel, x, span, middle + half * x
 
-    def position(self, s):
+    def position(self, s: float | Numbers) -> np.ndarray:
         """Inertial points at the arc lengths s (n,), m; shape (n, 3)."""
         _, _, span, t = self._locate(np.ravel(s).astype(float))
         return (self._origin + self._cubic(span, t)).reshape(*np.shape(s), 3)
 
-    def frame(self, s):
+    def frame(self, s: float | Numbers) -> np.ndarray:
         """R_R at the arc lengths s (n,); shape (n, 3, 3), the directors as columns, inertial components."""
         panel, x, span, t = self._locate(np.ravel(s).astype(float))
         t = self._tangent(span, t)

@@ -6,6 +6,7 @@ part of the package refers to a support by name.
 
 from dataclasses import dataclass
 
+from cosserat_fenicsx.annotations import Numbers, NumbersInTime
 from cosserat_fenicsx.checks import direction, refuse, store
 from cosserat_fenicsx.scene import ties
 from cosserat_fenicsx.scene.rod import Station, StationOrName, is_known
@@ -65,7 +66,7 @@ class Hinge:
     """
 
     station: StationOrName
-    axis: tuple
+    axis: Numbers
 
     clamps = False
 
@@ -91,7 +92,7 @@ class Roller:
     """
 
     station: StationOrName
-    normal: tuple
+    normal: Numbers
 
     clamps = False
 
@@ -120,9 +121,9 @@ class Prescribed:
     """
 
     station: StationOrName
-    displacement: object = None
-    rotation: object = None
-    jumps: tuple = ()
+    displacement: NumbersInTime | None = None
+    rotation: NumbersInTime | None = None
+    jumps: Numbers = ()
 
     clamps = False
 
@@ -146,3 +147,4 @@ class Prescribed:
 
 #: Supports that scene files know.
 SUPPORTS = (Clamp, Pin, Hinge, Roller, Prescribed)
+Support = Clamp | Pin | Hinge | Roller | Prescribed

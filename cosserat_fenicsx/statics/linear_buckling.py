@@ -14,6 +14,7 @@ from cosserat_fenicsx.results.buckling import Buckling
 from cosserat_fenicsx.results.shapes import Equilibrium
 from cosserat_fenicsx.scene.action import has_permanent
 from cosserat_fenicsx.scene.magnitudes import check_magnitudes
+from cosserat_fenicsx.scene.scene import Scene
 from cosserat_fenicsx.statics.circulatory import circulatory_part
 from cosserat_fenicsx.statics.divergence import static_bifurcations
 from cosserat_fenicsx.statics.first_mesh import FIRST_ELEMENTS
@@ -36,7 +37,17 @@ _REMAINING = 0.1
 _HUGE = 1e8
 
 
-def buckling(scene, count=1, *, load_factor=0.0, tol=1e-5, elements=None, degree=4, comm=None, progress=None):
+def buckling(
+    scene: Scene,
+    count: int = 1,
+    *,
+    load_factor: float = 0.0,
+    tol: float = 1e-5,
+    elements: int | None = None,
+    degree: int = 4,
+    comm: MPI.Comm | None = None,
+    progress: bool | None = None,
+) -> Buckling:
     """Critical load factors and modes by linear buckling.
 
     The critical load factors are eta + lambda where K(eta) + lambda dK/deta is singular. K is the second variation at

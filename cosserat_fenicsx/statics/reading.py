@@ -4,14 +4,16 @@ import cosserat_fenicsx.compat  # noqa: F401, I001  first: its message says what
 
 from mpi4py import MPI
 
+from cosserat_fenicsx.annotations import File
 from cosserat_fenicsx.models.connections import Connections
 from cosserat_fenicsx.models.rodmesh import Layout
 from cosserat_fenicsx.models.scales import Scales
 from cosserat_fenicsx.results import saved
+from cosserat_fenicsx.results.path import Path
 from cosserat_fenicsx.statics.circulatory import conservative_along
 
 
-def read_path(file, *, comm=None):
+def read_path(file: File, *, comm: MPI.Comm | None = None) -> Path:
     """The `Path` that `Path.save` wrote, with the same digits.
 
     Its scene is a copy: stations are those of `path.rod(name)`, or are given by name.

@@ -6,6 +6,7 @@ import contextlib
 import itertools
 import math
 import numbers
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -18,6 +19,7 @@ from cosserat_fenicsx.errors import NotConverged, SceneError, nearest
 from cosserat_fenicsx.statics.path.follower import CONTROLS
 from cosserat_fenicsx.models.formulations import formulation_of
 from cosserat_fenicsx.models.rodmesh import Layout
+from cosserat_fenicsx.results.path import Path
 from cosserat_fenicsx.progress import Progress
 from cosserat_fenicsx.statics.first_mesh import first_layout
 from cosserat_fenicsx.statics.solvers import solvers_of
@@ -34,22 +36,22 @@ _LARGEST_TURN = 1.0
 
 
 def solve(
-    scene,
-    load_factors=(0.0, 1.0),
+    scene: Scene,
+    load_factors: float | tuple[float, float] | list[float] | list[int] | np.ndarray | Iterator[float] = (0.0, 1.0),
     *,
-    model="auto",
-    formulation=None,
-    tol=1e-6,
-    elements=None,
-    degree=None,
-    gauss_points=None,
-    steps=None,
-    control="auto",
-    branch=None,
-    until=None,
-    progress=None,
-    comm=None,
-):
+    model: str = "auto",
+    formulation: str | None = None,
+    tol: float = 1e-6,
+    elements: int | None = None,
+    degree: int | None = None,
+    gauss_points: int | None = None,
+    steps: StepControl | None = None,
+    control: str = "auto",
+    branch: int | None = None,
+    until: Callable[[Path], object] | None = None,
+    progress: bool | None = None,
+    comm: MPI.Comm | None = None,
+) -> Path:
     """Equilibrium path of a scene from its unloaded reference over the load factors.
 
     Args:
@@ -91,6 +93,8 @@ def solve(
     degree = formulation.default_degree if degree is None else degree
     check_arguments(scene, tol, elements)
     check_magnitudes(scene, max(map(abs, targets)))
+    if comm.rank == 0:
+        scene.warn()
     choice = choose(
         scene,
         model=model,

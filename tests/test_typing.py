@@ -1,0 +1,46 @@
+"""What editors and type checkers see of the public interface."""
+
+import ast
+import inspect
+import sys
+from pathlib import Path
+
+import pytest
+
+import cosserat_fenicsx as cf
+
+pytestmark = pytest.mark.serial
+HERE = Path(__file__).parent
+
+
+def test_the_block_and_the_table_of_names_agree():
+    (block,) = (
+        node
+        for node in ast.parse(Path(cf.__file__).read_text(encoding="utf-8")).body
+        if isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING"
+    )
+    seen = {name.asname: (line.module, name.name) for line in block.body for name in line.names}
+    assert seen == {name: ("cosserat_fenicsx" + (f".{home}" if home else ""), name) for name, home in cf._HOME.items()}
+    assert (Path(cf.__file__).parent / "py.typed").is_file()
+
+
+@pytest.mark.parametrize("name", [name for name in cf.__all__ if inspect.isfunction(getattr(cf, name))])
+def test_functions_are_annotated(name):
+    signature = inspect.signature(getattr(cf, name))
+    for parameter in (*signature.parameters.values(),):
+        assert parameter.annotation is not inspect.Parameter.empty, parameter
+    assert signature.return_annotation is not inspect.Signature.empty
+
+
+def test_a_type_checker_finds_the_mistakes_and_no_others(monkeypatch):
+    api = pytest.importorskip("mypy.api")
+    monkeypatch.setenv("MYPYPATH", str(Path(cf.__file__).parent.parent))
+    files = [HERE / "typing" / f"{name}.py" for name in ("right", "wrong")]
+    options = ["--cache-dir=/dev/null", "--follow-imports=silent", "--no-error-summary", "--hide-error-context"]
+    found, problem, _ = api.run([*options, f"--python-executable={sys.executable}", *map(str, files)])
+    assert not problem, problem
+    for file in files:
+        own = [line for line in found.splitlines() if f"{file.name}:" in line and ": error: " in line]
+        lines = sorted({int(line.split(f"{file.name}:")[1].split(":")[0]) for line in own})
+        text = file.read_text(encoding="utf-8").splitlines()
+        assert lines == [i for i, line in enumerate(text, 1) if "# wrong" in line], found
