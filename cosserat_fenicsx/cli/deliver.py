@@ -127,6 +127,7 @@ def _write(path, out, station, *, picture, stops, magnify, shown, film, speed):
     files = {
         f"{name}.csv": lambda file: path.write(file, station=station),
         f"{name}.xdmf": path.write,
+        "result.h5": path.save,
         "rods.png": picture and (lambda file: path.plot(file, shown, magnify=magnify)),
         "energy.png": picture and moving and len(path) > 1 and path.plot_energy,
         film: film and len(path) > 1 and (lambda file: path.animate(file, speed=speed, magnify=magnify)),

@@ -63,7 +63,8 @@ def _outputs(parser):
         "--output",
         metavar="DIR",
         help="write path.xdmf, path.h5, path.csv and rods.png there, or of a motion motion.xdmf, .h5, .csv, rods.png "
-        "and energy.png; without it only the table is shown",
+        "and energy.png, and result.h5, which read_path or read_history of Python reads; without it only the table is "
+        "shown",
     )
     parser.add_argument("--no-picture", action="store_true", help="write no pictures")
     parser.add_argument("--magnify", type=float, default=1.0, help="pictures: factor on displacements [1]")
