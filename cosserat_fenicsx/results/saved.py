@@ -49,7 +49,7 @@ def save(result, file):
         ) from None
     with replaced(file) as fresh, new_hdf5(fresh) as store:
         store.attrs.update(format=_FORMAT, version=_VERSION, written_by=f"cosserat_fenicsx {__version__}",
-                           kind=_kind(result), title=result.scene.title)  # fmt: skip
+                           kind=contents.about(result)["kind"], title=result.scene.title)  # fmt: skip
         for name, text in (
             ("scene", scene),
             ("settings", json.dumps(_settings(result), default=lambda number: number.item())),
@@ -75,10 +75,6 @@ def _write_variables(place, variables):
         place[name].attrs.update(variable.attributes)
         for i, dim in enumerate(variable.dims):
             place[name].dims[i].label = dim
-
-
-def _kind(result):
-    return "History" if result.axis == "time" else "Path"
 
 
 def _settings(result):
