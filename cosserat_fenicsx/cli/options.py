@@ -77,7 +77,8 @@ def _outputs(parser):
         "--output",
         metavar="DIR",
         help="write path.xdmf, path.h5, path.csv, rods.png and rods.html there, or of a motion motion.xdmf, .h5, .csv, "
-        "rods.png, rods.html and energy.png; without it only the table is shown",
+        "rods.png, rods.html and energy.png, and result.h5, which read_path or read_history of Python reads; without "
+        "it only the table is shown",
     )
     parser.add_argument("--no-picture", action="store_true", help="write no pictures")
     parser.add_argument(
