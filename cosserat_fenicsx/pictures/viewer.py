@@ -140,7 +140,6 @@ def _along(result, shown):
     values = result.along_axis[shown]
     timed = result.axis == "time"
     duration = float(values[-1] - values[0])
-    real = timed and _REAL_TIME[0] <= duration <= _REAL_TIME[1]
     return {
         "name": "t =" if timed else result.axis,
         "unit": " s" if timed else "",
@@ -148,18 +147,25 @@ def _along(result, shown):
         "digits": max(0, 2 - math.floor(math.log10(duration))) if duration > 0 else 0,
         "values": values.tolist(),
         "stable": [bool(result.stable[k]) for k in shown] if result.counts_modes else [True] * len(shown),
-        "seconds": duration if real else _PLAY,
+        "seconds": _seconds(result),
     }
 
 
+def _seconds(result):
+    """How long the play takes, s."""
+    duration = float(result.along_axis[-1] - result.along_axis[0])
+    real = result.axis == "time" and _REAL_TIME[0] <= duration <= _REAL_TIME[1]
+    return duration if real else _PLAY
+
+
 def _notes(result, shown, factors):
-    kind = f"{result.axis}s"
-    notes = [
-        f"{len(shown)} of {len(result)} {kind} shown, evenly chosen"
-        if len(shown) < len(result)
-        else f"{len(result)} {kind}"
-    ]
+    """What the file says under its title: which states it shows, how fast, and what is not to scale."""
+    kind, whole = f"{result.axis}s", len(result)
+    notes = [f"{len(shown)} of {whole} {kind} shown, evenly chosen" if len(shown) < whole else f"{whole} {kind}"]
     notes[0] += ", straight lines between them"
+    duration = float(result.along_axis[-1] - result.along_axis[0])
+    if result.axis == "time" and duration > 0:
+        notes.append(f"played at {float(f'{duration / _seconds(result):.3g}'):g} times the real speed")
     thicker = sorted({f"{float(f'{factor:.2g}'):g}" for factor in factors if factor > 1})
     return notes + ([f"sections drawn {' and '.join(thicker)} times their size"] if thicker else [])
 
