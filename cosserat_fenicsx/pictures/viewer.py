@@ -165,7 +165,8 @@ def _notes(result, shown, factors):
     notes[0] += ", straight lines between them"
     duration = float(result.along_axis[-1] - result.along_axis[0])
     if result.axis == "time" and duration > 0:
-        notes.append(f"played at {float(f'{duration / _seconds(result):.3g}'):g} times the real speed")
+        speed = duration / _seconds(result)
+        notes.append("played in real time" if speed == 1 else f"played at {speed:.3g} times the real speed")
     thicker = sorted({f"{float(f'{factor:.2g}'):g}" for factor in factors if factor > 1})
     return notes + ([f"sections drawn {' and '.join(thicker)} times their size"] if thicker else [])
 
