@@ -16,7 +16,7 @@ from cosserat_fenicsx.pictures.drawing import at_rest, outlines, thickness
 from cosserat_fenicsx.pictures.view import view_of
 
 #: Fields that can be chosen in the file, where the result has them; the first is shown at first.
-FIELDS = ("bending_moment", "m.3", "n.3", "shear_force", "displacement", "von_mises")
+FIELDS = ("bending_moment", "twisting_moment", "tension", "shear_force", "displacement", "von_mises")
 # Stands for "no value", which is drawn grey.
 _NONE = 1e30
 # Largest number of states, of sections of a rod (per element, in all), and of states times sections of all rods:
