@@ -85,7 +85,7 @@ def _outputs(parser):
         "--color",
         metavar="FIELD",
         default="bending_moment",
-        help="rods.png: what colours the rods, such as shear_force, displacement, n.3 or m.x [bending_moment]",
+        help="rods.png: what colours the rods, such as shear_force, tension, displacement or m.x [bending_moment]",
     )
     parser.add_argument("--magnify", type=float, default=1.0, help="pictures: factor on displacements [1]")
     parser.add_argument(
