@@ -32,6 +32,7 @@ def test_eccentric_cantilever(tmp_path_all, capsys):
     COMM.barrier()
 
 
+@pytest.mark.slow
 @pytest.mark.serial
 def test_motion_quick(capsys):
     """All seven motions."""
