@@ -35,17 +35,17 @@ ALONE = {
 }
 #: The pictures of the gallery, by the files of the scenes.
 GALLERY = [f"{file.stem}.png" for file in sorted((ROOT / "demos").glob("**/*.toml"))]
-WIDTH, COLOURS, MARGIN = 1100, 128, 12  # pixels, number, pixels
+WIDTH, COLOURS, MARGIN = 1100, 256, 12  # pixels, number, pixels
 
 
 def kept(picture, file):
-    """Write the picture as the documentation keeps it: without white margins, at most 1100 pixels wide, 128 colours."""
+    """Write the picture as the documentation keeps it: without white margins, at most 1100 pixels wide, 256 colours."""
     image = Image.open(picture).convert("RGB")
     rows, columns = np.nonzero((np.asarray(image) < 250).any(axis=2))
     box = columns.min() - MARGIN, rows.min() - MARGIN, columns.max() + MARGIN, rows.max() + MARGIN
     image = image.crop((max(box[0], 0), max(box[1], 0), min(box[2], image.width), min(box[3], image.height)))
     image.thumbnail((WIDTH, WIDTH))
-    image.quantize(COLOURS, dither=Image.Dither.NONE).save(file, optimize=True)
+    image.quantize(COLOURS, Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE).save(file, optimize=True)
 
 
 def main(names, out="out", docs=ROOT / "docs"):
