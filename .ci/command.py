@@ -13,7 +13,8 @@ def sh(*command, **options):
     try:
         return subprocess.run(words, check=True, stdin=subprocess.DEVNULL, **options)
     except subprocess.CalledProcessError as error:
-        print(error.stdout or "", flush=True)  # what was to be read, and now explains
+        if error.stdout:  # what was to be read, and now explains
+            print(error.stdout, flush=True)
         raise Failed(f"exit code {error.returncode} from: {shlex.join(words)}") from None
     except subprocess.TimeoutExpired as error:
         raise Failed(f"not done after {error.timeout / 60:g} minutes: {shlex.join(words)}") from None

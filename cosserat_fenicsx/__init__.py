@@ -100,7 +100,6 @@ if TYPE_CHECKING:  # the same names, for editors and type checkers
     from cosserat_fenicsx.actions.point_mass import PointMass as PointMass
     from cosserat_fenicsx.actions.spring import Spring as Spring
     from cosserat_fenicsx.actions.wall import Wall as Wall
-    from cosserat_fenicsx.dynamics.natural_modes import Modes as Modes
     from cosserat_fenicsx.dynamics.natural_modes import modes as modes
     from cosserat_fenicsx.dynamics.resuming import read_history as read_history
     from cosserat_fenicsx.dynamics.resuming import resume as resume
@@ -112,7 +111,9 @@ if TYPE_CHECKING:  # the same names, for editors and type checkers
     from cosserat_fenicsx.errors import NotStored as NotStored
     from cosserat_fenicsx.errors import SceneError as SceneError
     from cosserat_fenicsx.errors import SceneWarning as SceneWarning
+    from cosserat_fenicsx.results.buckling import Buckling as Buckling
     from cosserat_fenicsx.results.history import History as History
+    from cosserat_fenicsx.results.modes import Modes as Modes
     from cosserat_fenicsx.results.path import Path as Path
     from cosserat_fenicsx.results.records import Event as Event
     from cosserat_fenicsx.scene.action import Action as Action
@@ -159,7 +160,6 @@ if TYPE_CHECKING:  # the same names, for editors and type checkers
     from cosserat_fenicsx.scene.supports import Pin as Pin
     from cosserat_fenicsx.scene.supports import Prescribed as Prescribed
     from cosserat_fenicsx.scene.supports import Roller as Roller
-    from cosserat_fenicsx.statics.linear_buckling import Buckling as Buckling
     from cosserat_fenicsx.statics.linear_buckling import buckling as buckling
     from cosserat_fenicsx.statics.path.load_control import StepControl as StepControl
     from cosserat_fenicsx.statics.reading import read_path as read_path

@@ -3,6 +3,7 @@
 import base64
 import json
 import os
+import select
 import shutil
 import subprocess
 import tempfile
@@ -77,6 +78,7 @@ class Page:
 
     def _read(self):
         while b"\0" not in self._rest:
+            assert select.select([self._from], [], [], 60)[0], "Chromium has not answered for a minute"
             more = os.read(self._from, 1 << 20)
             assert more, "Chromium ended"
             self._rest += more

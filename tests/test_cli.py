@@ -12,6 +12,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import cosserat_fenicsx as cf
+
 pytestmark = pytest.mark.serial
 ROOT = Path(__file__).parent.parent
 DEMO = ROOT / "demos" / "eccentric_cantilever.toml"
@@ -45,7 +47,9 @@ def test_run_prints_a_table_and_writes_files(tmp_path):
     done = cosserat("run", DEMO, "--load-factors", "0.5,0.9", "-o", out)
     assert done.returncode == 0, done.stderr
     assert "2.20061545" in done.stdout and "est. error" in done.stdout
-    assert {f.name for f in out.iterdir()} == {"path.xdmf", "path.h5", "path.csv", "rods.png", "rods.html"}
+    names = {"path.xdmf", "path.h5", "path.csv", "result.h5", "rods.png", "rods.html"}
+    assert {f.name for f in out.iterdir()} == names
+    assert cf.read_path(out / "result.h5").load_factors.tolist() == [0.5, 0.9]
     rows = list(csv.DictReader((out / "path.csv").open()))
     assert [row["load_factor"] for row in rows] == ["0.5", "0.9"]
     assert float(rows[1]["column.end displacement (m) x"]) == pytest.approx(2.200615447827733, rel=1e-8)

@@ -42,12 +42,13 @@ def test_run_of_a_motion(tmp_path, cosserat):
     code, said, trouble = cosserat("run", FLIGHT, *SHORT, "-o", tmp_path, *film, "--at", "0,1", "--save-every", "0.1")
     assert code == 0 and trouble == ""
     assert {f.name for f in tmp_path.iterdir()} == {
-        "motion.xdmf", "motion.h5", "motion.csv", "rods.png", "rods.html", "energy.png", "motion.gif",
+        "motion.xdmf", "motion.h5", "motion.csv", "result.h5", "rods.png", "rods.html", "energy.png", "motion.gif",
     }  # fmt: skip
     assert all(f.stat().st_size > 3000 for f in tmp_path.iterdir()), sorted(tmp_path.iterdir())
     scene, settings = cf.read_motion(FLIGHT)
     history = cf.simulate(scene, **{**settings, "duration": 1.0, "dt": 0.05, "save_every": 0.1})
     end = history.position(scene.rods[0].start)[-1]
+    np.testing.assert_array_equal(cf.read_history(tmp_path / "result.h5").position("spaghetti.start")[-1], end)
     assert f"spaghetti.start at ({', '.join(f'{x:.6g}' for x in end)}) m" in said
     assert "20 steps, 11 times" in said and "balance" in said and "spatial model:" in said
     with (tmp_path / "motion.csv").open() as stream:

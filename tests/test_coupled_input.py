@@ -95,6 +95,7 @@ def in_plane(centroid, **more):
     return cf.Stiffness.offset((2e3, 3e3), 4e3, (1.0, 3.0), 0.5, centroid=centroid, **more)
 
 
+@pytest.mark.slow
 def test_a_matrix_keeps_to_a_plane_if_it_couples_nothing_with_what_leaves_it():
     rod, flat = scene(in_plane((0.05, 0)))
     path = cf.solve(flat, [1.0, 2.0], elements=6)
@@ -111,6 +112,7 @@ def test_a_matrix_keeps_to_a_plane_if_it_couples_nothing_with_what_leaves_it():
         )
 
 
+@pytest.mark.slow
 def test_determinate_rungs_agree_with_space():
     """In a plane that is not a coordinate plane, and in space."""
     turn = np.array([np.cos(0.4), np.sin(0.4), 0])

@@ -125,6 +125,7 @@ def test_a_mode_of_a_rope_decays_as_it_should():
         assert rate == pytest.approx(time * omega**2, rel=1e-2)
 
 
+@pytest.mark.slow
 @STEADY
 def test_a_plane_motion_of_a_coupled_section_is_one_in_space():
     section = cf.Stiffness.offset((3e2, 5e2), 8e2, (1.0, 2.5), 0.7, centroid=(0.05, 0), **MOVING)

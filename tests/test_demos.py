@@ -65,6 +65,7 @@ def test_bare_dolfinx():
     assert len((DEMOS / "bare_dolfinx.py").read_text(encoding="utf-8").splitlines()) <= 70
 
 
+@pytest.mark.slow
 @pytest.mark.serial
 def test_motion_quick(capsys):
     """All seven motions."""

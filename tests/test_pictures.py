@@ -33,7 +33,8 @@ def test_colours_are_the_fields(solved):
     P, fields = cf.euler_load(solved.scene.rods[0]), solved.fields(2)
     np.testing.assert_allclose(values(solved, "n.z"), -1.5 * P, rtol=1e-6)
     np.testing.assert_allclose(values(solved, "n"), 1.5 * P, rtol=1e-6)
-    np.testing.assert_allclose(values(solved, "n.3"), -1.5 * P * fields["d3"][:, 2], rtol=1e-6)
+    for name in ("n.3", "tension"):
+        np.testing.assert_allclose(values(solved, name), -1.5 * P * fields["d3"][:, 2], rtol=1e-6)
     np.testing.assert_allclose(values(solved, "shear_force"), 1.5 * P * np.abs(fields["d3"][:, 0]), atol=1e-6 * P)
     np.testing.assert_allclose(values(solved, "curvature.2"), fields["curvature"][:, 1])
     assert peak_of(solved, colour_of("m.3"), [values(solved, "m.3")]) == 0, "rounding has no colour"

@@ -200,6 +200,7 @@ FORCE, BOTH = slice(0, 3), slice(0, 6)
 STEPS = {"dt": 0.02, "elements": 3, "degree": 3}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("scheme", "model"), [("momentum", "planar"), ("momentum", "spatial"), ("energy", "spatial")])
 def test_rate_of_momentum(scheme, model):
     """The scheme "energy" conserves angular momentum to second order only."""

@@ -156,7 +156,7 @@ def test_damaged_and_foreign_files_are_refused(tmp_path):
     (tmp_path / "half.h5").write_bytes(whole[: len(whole) // 2])
     (tmp_path / "text.h5").write_text("load factor, position\n")
     for name, expected in {"half.h5": "half.h5: it cannot be read", "text.h5": "text.h5: it cannot be read",
-                           "none.h5": "none.h5: it cannot be read"}.items():  # fmt: skip
+                           "none.h5": "none.h5: there is no such file"}.items():  # fmt: skip
         with pytest.raises(cf.SceneError, match=expected):
             cf.read_path(tmp_path / name)
     for change, expected in {

@@ -134,6 +134,7 @@ def _write(path, out, station, *, picture, stops, magnify, shown, film, speed, c
     files = {
         f"{name}.csv": lambda file: path.write(file, station=station),
         f"{name}.xdmf": path.write,
+        "result.h5": path.save,
         "rods.png": picture and (lambda file: path.plot(file, shown, magnify=magnify, color=color)),
         "rods.html": picture and path.write,
         "energy.png": picture and moving and len(path) > 1 and path.plot_energy,

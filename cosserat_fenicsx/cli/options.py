@@ -77,14 +77,15 @@ def _outputs(parser):
         "--output",
         metavar="DIR",
         help="write path.xdmf, path.h5, path.csv, rods.png and rods.html there, or of a motion motion.xdmf, .h5, .csv, "
-        "rods.png, rods.html and energy.png; without it only the table is shown",
+        "rods.png, rods.html and energy.png, and result.h5, which read_path or read_history of Python reads; without "
+        "it only the table is shown",
     )
     parser.add_argument("--no-picture", action="store_true", help="write no pictures")
     parser.add_argument(
         "--color",
         metavar="FIELD",
         default="bending_moment",
-        help="rods.png: what colours the rods, such as shear_force, displacement, n.3 or m.x [bending_moment]",
+        help="rods.png: what colours the rods, such as shear_force, tension, displacement or m.x [bending_moment]",
     )
     parser.add_argument("--magnify", type=float, default=1.0, help="pictures: factor on displacements [1]")
     parser.add_argument(

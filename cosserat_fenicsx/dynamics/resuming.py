@@ -12,7 +12,8 @@ from cosserat_fenicsx.annotations import File
 from cosserat_fenicsx.checks import instance, refuse
 from cosserat_fenicsx.dynamics.simulate import check_counts, pace_of, positive_time
 from cosserat_fenicsx.dynamics.solvers import solvers_of
-from cosserat_fenicsx.errors import SceneError
+from cosserat_fenicsx.dynamics.steppers import SCHEMES
+from cosserat_fenicsx.errors import SceneError, nearest
 from cosserat_fenicsx.dynamics.marks import marks_of
 from cosserat_fenicsx.models.connections import Connections
 from cosserat_fenicsx.models.rodmesh import Layout
@@ -149,6 +150,8 @@ def _open(folder, scene, comm, duration=None):
     if scene is not None:
         instance("resume", "scene", scene, Scene, "a Scene, or None for the folder's own")
     kept = RunFolder(folder, comm).open()
+    if kept.asked["scheme"] not in SCHEMES:
+        raise SceneError(f"{kept.place}: scheme '{kept.asked['scheme']}': {nearest(kept.asked['scheme'], SCHEMES)}")
     last = kept.durations[-1]
     if duration is not None and duration < last:
         refuse("resume", "duration", duration, f"None or at least {last:g} s, the last duration requested")

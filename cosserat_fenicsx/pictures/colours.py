@@ -1,6 +1,6 @@
 """What rods are coloured by in pictures: a field of a result as one number per section."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -26,6 +26,7 @@ _VECTORS = {
 # Those with components along d1, d2, d3 already.
 _MATERIAL = ("strain", "curvature")
 _SHORT = {"n": "force", "m": "moment"}
+_ALIASES = {"tension": "n.3", "twisting_moment": "m.3"}
 # Words, unit, and whether there are values of either sign.
 _SCALARS = {
     "bending_moment": ("bending moment", "N m", False),
@@ -90,6 +91,7 @@ def _every():
         for part in "".join(frames):
             told = _WORDS.get(f"{field}.{part}", f"{words} along {part if part in 'xyz' else f'd{part}'}")
             every[f"{name}.{part}"] = Colour(f"{name}.{part}", told, unit, field, True, _component(field, part))
+    every.update({name: replace(every[other], name=name) for name, other in _ALIASES.items()})
     return every
 
 

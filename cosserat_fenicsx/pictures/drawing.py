@@ -159,7 +159,7 @@ def add_body(plotter, pyvista, body, factor, peak, moving=False, colour=BENDING)
     step = round_step((2 if colour.signed else 1) * peak / scale or 1.0, _BAR)
     low, high = colour.limits(math.ceil(peak / scale / step - 1e-9) * step)
     font = round(plotter.window_size[0] / 70)
-    unit = "" if colour.unit == "1" else f" ({letter}{colour.unit})"
+    unit = ": zero" if peak == 0 else "" if colour.unit == "1" else f" ({letter}{colour.unit})"
     surface["value"] = np.repeat(body.values / scale, body.outline.shape[1])
     plotter.add_mesh(
         surface,
@@ -176,7 +176,7 @@ def add_body(plotter, pyvista, body, factor, peak, moving=False, colour=BENDING)
             "position_y": 0.25,
             "height": 0.55,
             "width": 0.05,
-            "n_labels": round((high - low) / step) + 1,
+            "n_labels": round((high - low) / step) + 1 if peak else 0,
             "fmt": _format(step),
             "title_font_size": font,
             "label_font_size": font,

@@ -68,8 +68,9 @@ class Labels:
     def draw(self, plotter, pyvista):
         """Put all labels into the drawing."""
         if self._leaders:
-            leaders = pyvista.line_segments_from_points(np.concatenate(self._leaders))
-            plotter.add_mesh(leaders, color="grey", line_width=1)
+            ends = np.concatenate(self._leaders) + self._view.half * self._view.to_camera  # in front of the rods
+            plotter.add_mesh(pyvista.line_segments_from_points(ends), color="darkgrey", line_width=1)
+            plotter.reset_camera_clipping_range()
         key = lambda label: label[2:]
         for (size, colour), group in itertools.groupby(sorted(self._texts, key=key), key):
             texts, points = zip(*((text, point) for text, point, *_ in group), strict=True)

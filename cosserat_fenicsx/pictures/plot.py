@@ -265,10 +265,14 @@ def _label(labels, path, shown, bodies):
     spread = [np.ptp([bodies[k, rod].line for k in shown], axis=0).max(axis=1) for rod in rods]
     rod = max(range(len(rods)), key=lambda i: (round(spread[i].max() / size, 6), -i))
     place = len(spread[rod]) - 1 - int(np.argmax(spread[rod][::-1]))  # the last one of equal maxima, nearest to the end
+    middle = np.mean([bodies[k, rods[rod]].line[place] for k in shown], axis=0)
     for k in reversed(shown):
         body = bodies[k, rods[rod]]
         end = 1 if place == len(body.line) - 1 else -1 if place == 0 else 0
-        labels.near(path.label(k), body.line[place], _beyond(body.directors[place, :, 2], end), size=_FONT)
+        towards = _beyond(body.directors[place, :, 2], end)
+        if not end and (body.line[place] - middle) @ towards < 0:
+            towards = -towards  # off the other shapes
+        labels.near(path.label(k), body.line[place], towards, size=_FONT)
 
 
 def _name(labels, scene):

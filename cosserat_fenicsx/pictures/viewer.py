@@ -17,7 +17,7 @@ from cosserat_fenicsx.pictures.view import view_of
 from cosserat_fenicsx.results.beside import replaced
 
 #: Fields that can be chosen in the file, where the result has them; the first is shown at first.
-FIELDS = ("bending_moment", "m.3", "n.3", "shear_force", "displacement", "von_mises")
+FIELDS = ("bending_moment", "twisting_moment", "tension", "shear_force", "displacement", "von_mises")
 # Stands for "no value", which is drawn grey.
 _NONE = 1e30
 # Largest number of states, of sections of a rod (per element, in all), and of states times sections of all rods:
@@ -141,7 +141,6 @@ def _along(result, shown):
     values = result.along_axis[shown]
     timed = result.axis == "time"
     duration = float(values[-1] - values[0])
-    real = timed and _REAL_TIME[0] <= duration <= _REAL_TIME[1]
     return {
         "name": "t =" if timed else result.axis,
         "unit": " s" if timed else "",
@@ -149,18 +148,26 @@ def _along(result, shown):
         "digits": max(0, 2 - math.floor(math.log10(duration))) if duration > 0 else 0,
         "values": values.tolist(),
         "stable": [bool(result.stable[k]) for k in shown] if result.counts_modes else [True] * len(shown),
-        "seconds": duration if real else _PLAY,
+        "seconds": _seconds(result),
     }
 
 
+def _seconds(result):
+    """How long the play takes, s."""
+    duration = float(result.along_axis[-1] - result.along_axis[0])
+    real = result.axis == "time" and _REAL_TIME[0] <= duration <= _REAL_TIME[1]
+    return duration if real else _PLAY
+
+
 def _notes(result, shown, factors):
-    kind = f"{result.axis}s"
-    notes = [
-        f"{len(shown)} of {len(result)} {kind} shown, evenly chosen"
-        if len(shown) < len(result)
-        else f"{len(result)} {kind}"
-    ]
+    """What the file says under its title: which states it shows, how fast, and what is not to scale."""
+    kind, whole = f"{result.axis}s", len(result)
+    notes = [f"{len(shown)} of {whole} {kind} shown, evenly chosen" if len(shown) < whole else f"{whole} {kind}"]
     notes[0] += ", straight lines between them"
+    duration = float(result.along_axis[-1] - result.along_axis[0])
+    if result.axis == "time" and duration > 0:
+        speed = duration / _seconds(result)
+        notes.append("played in real time" if speed == 1 else f"played at {speed:.3g} times the real speed")
     thicker = sorted({f"{float(f'{factor:.2g}'):g}" for factor in factors if factor > 1})
     return notes + ([f"sections drawn {' and '.join(thicker)} times their size"] if thicker else [])
 

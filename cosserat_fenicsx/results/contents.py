@@ -29,7 +29,7 @@ _OF_EVENT = {
 
 def about(result):
     """What a result is, as texts, numbers and lists of these."""
-    told = {"kind": type(result).__name__ if result.axis != "time" else "History", "title": result.scene.title}
+    told = {"kind": "History" if result.axis == "time" else "Path", "title": result.scene.title}
     for name in ("model", "formulation", "degree", "unknowns", *(["scheme"] if result.axis == "time" else ["control"])):
         told[name] = getattr(result, name)
     return told | {"elements": list(result.elements), "why": list(result.why)}

@@ -131,5 +131,5 @@ def _import(library, method, needed=None):
         problem = f"is too old: version {found.__version__} has no {needed}"
     raise InstallationError(
         f"{method} needs {library}, which {problem}: pip install 'cosserat-fenicsx[data]', or pip install {library}; "
-        "with Debian's dolfinx keep its numpy: pip install --constraint with the numpy that is installed"
+        "where dolfinx is the distribution's, hold its numpy fixed by pip's --constraint"
     )

@@ -217,9 +217,9 @@ class Result(Exports, Extremes, Reactions, Stresses, States):
             file: a .png; None returns the pyvista plotter.
             points: indices of points of a path, or of times.
             magnify: factor of the displacements in the picture.
-            color: what colours the rods: bending_moment, shear_force, n, m, displacement, strain, curvature, of a
-                motion velocity and angular_velocity too; n.x, n.y, n.z for an inertial component, n.1, n.2, n.3 for one
-                along d_1, d_2, d_3.
+            color: what colours the rods: bending_moment, twisting_moment, tension, shear_force, n, m, displacement,
+                strain, curvature, of a motion velocity and angular_velocity too; n.x, n.y, n.z for an inertial
+                component, n.1, n.2, n.3 for one along d_1, d_2, d_3.
 
         Raises:
             SceneError: an unknown field (lists the names), or pyvista is missing.

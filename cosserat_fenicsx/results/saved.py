@@ -10,6 +10,7 @@ and the solution are read back, and their check sums compared; no code is ever s
 """
 
 import json
+import os
 import zlib
 
 import numpy as np
@@ -48,8 +49,11 @@ def save(result, file):
         ) from None
     with replaced(file) as fresh, new_hdf5(fresh) as store:
         store.attrs.update(format=_FORMAT, version=_VERSION, written_by=f"cosserat_fenicsx {__version__}",
-                           kind=_kind(result), title=result.scene.title)  # fmt: skip
-        for name, text in (("scene", scene), ("settings", json.dumps(_settings(result)))):
+                           kind=contents.about(result)["kind"], title=result.scene.title)  # fmt: skip
+        for name, text in (
+            ("scene", scene),
+            ("settings", json.dumps(_settings(result), default=lambda number: number.item())),
+        ):
             store[name] = text
             store[name].attrs["crc32"] = zlib.crc32(text.encode())
         _write_variables(store, contents.of_states(result) | contents.of_supports(result) | contents.of_events(result))
@@ -71,10 +75,6 @@ def _write_variables(place, variables):
         place[name].attrs.update(variable.attributes)
         for i, dim in enumerate(variable.dims):
             place[name].dims[i].label = dim
-
-
-def _kind(result):
-    return "History" if result.axis == "time" else "Path"
 
 
 def _settings(result):
@@ -116,13 +116,13 @@ def read(file, kind, assemble, comm):
     Raises:
         SceneError: it cannot be read, is damaged, holds something else, or is of a newer release.
     """
-    h5py = h5py_for(file)
+    h5py, expected = h5py_for(file), f"expected a file that `save` of a {kind} wrote"
+    if not os.path.isfile(file):
+        raise SceneError(f"{file}: there is no such file: {expected}")
     try:
         store = h5py.File(file, "r")
     except OSError as problem:
-        raise SceneError(
-            f"{file}: it cannot be read ({problem}): expected a file that `save` of a Path or a History wrote"
-        ) from None
+        raise SceneError(f"{file}: it cannot be read ({problem}): {expected}") from None
     with store:
         _check_kind(file, store.attrs, kind)
         try:

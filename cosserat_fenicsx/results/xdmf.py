@@ -57,6 +57,7 @@ def write_state(path, file, k=None):
 
     if file.suffix not in meshio.extension_to_filetypes:
         known = ".xdmf, .csv, .html, .vtu, .vtk, .ply or another ending that meshio knows"
+        known += "; `save` writes a whole result as .h5"
         raise SceneError(f"{file}: the ending '{file.suffix}' is not known: expected {known}")
     points, cells, data = mesh_of(path, -1 if k is None else k)
     with replaced(file) as fresh:

@@ -58,7 +58,7 @@ def from_data(data):
         rods = [_object(entry, []) for entry in data["rods"]]
         parts = {part: [_object(entry, rods) for entry in data[part]] for part in _PARTS}
         return Scene(rods, title=data["title"], **parts)
-    except (KeyError, IndexError, TypeError, ValueError, AttributeError, RecursionError) as problem:
+    except (KeyError, IndexError, TypeError, ValueError, AttributeError, ArithmeticError, RecursionError) as problem:
         raise SceneError(f"these are no data of a scene ({type(problem).__name__}: {problem})") from None
 
 

@@ -187,7 +187,7 @@ class Table:
     def _array(self, field, dimensions):
         try:
             array = np.asarray(getattr(self, field), dtype=float)
-        except (ValueError, TypeError):
+        except (ValueError, TypeError, OverflowError):
             array = np.empty(0)
         if array.ndim != dimensions or len(array) == 0 or not np.isfinite(array).all():
             refuse(self, field, getattr(self, field), "finite numbers, one row a time")

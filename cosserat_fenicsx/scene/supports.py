@@ -1,7 +1,7 @@
 """Supports of rods.
 
-A support either removes all unknowns of a station (`clamps`) or defines scalar constraints there (`ties`); no other
-part of the package refers to a support by name.
+A support either removes all unknowns of a station (`clamps`) or defines scalar constraints there (`ties`); no model
+or solver refers to a support by name.
 """
 
 from dataclasses import dataclass

@@ -53,6 +53,16 @@ class InstantFile:
             self._dtype, self._first = _read_header(self.file)
         self._count = max(0, size - self._first) // self._dtype.itemsize if self._dtype else 0
 
+    def expect(self, **shapes):
+        """Refuse rows whose arrays have other shapes.
+
+        Raises:
+            SceneError: naming the first of them.
+        """
+        for name, shape in shapes.items() if self._dtype is not None else ():
+            if self._dtype[name].shape != shape:
+                raise SceneError(f"{self.file}: {name} has the shape {self._dtype[name].shape}: expected {shape}")
+
     def put(self, k, instant):
         """Write row k, an existing one or the next after the last; the first row makes the file. `look` makes it
         visible.

@@ -19,6 +19,7 @@ from cosserat_fenicsx.ranks import on_first
 from cosserat_fenicsx.scene.as_data import NotData, from_data, to_data
 from cosserat_fenicsx.storage import checkpoints
 from cosserat_fenicsx.storage.fingerprint import difference, fingerprint, fingerprint_at, times_ahead
+from cosserat_fenicsx.storage.head import checked
 
 #: Least time between checkpoints: in s, and as a multiple of the time that it takes to write one.
 APART, SELDOM = 2.0, 50
@@ -100,6 +101,8 @@ class RunFolder:
                 raise SceneError(
                     f"{self.place}: its format is {head['format']}: expected {_FORMAT}, that of this release"
                 )
+            head.setdefault("ahead", [])
+            checked(head)
             self.asked, self.told, self.durations = (head[name] for name in ("asked", "told", "durations"))
             self.ranks, self._fingerprint, self._head = head["ranks"], head["scene"], head
         except OSError as problem:
@@ -107,8 +110,12 @@ class RunFolder:
                 f"{self.place}: no motion was found there ({_HEAD}: {problem.strerror}): expected a folder that "
                 "simulate(..., folder=...) wrote"
             ) from None
-        except (ValueError, KeyError, TypeError) as problem:
-            raise SceneError(f"{self.place / _HEAD} is damaged ({problem!r})") from None
+        except SceneError:
+            raise
+        except (ValueError, KeyError, TypeError, RecursionError) as problem:
+            raise SceneError(
+                f"{self.place / _HEAD} is damaged ({problem}): expected the file that simulate wrote"
+            ) from None
         self._last = None
         return self
 
@@ -122,7 +129,7 @@ class RunFolder:
             SceneError: no scene is given or stored, or it disagrees with the fingerprint.
         """
         scene = given if given is not None else self._stored_scene()
-        ahead = [(t, told) for t, told in self._head.get("ahead", ()) if self.durations[-1] < t <= until]
+        ahead = [(t, told) for t, told in self._head["ahead"] if self.durations[-1] < t <= until]
         given, expected = fingerprint_at(scene, [t for t, _ in ahead]), dict(self._fingerprint)
         for duration in self.durations:
             given |= fingerprint(scene, duration)

@@ -39,8 +39,14 @@ class StoredHistory(History):
 
         Args:
             folder: a `pathlib.Path`; states that are already in it belong to the history.
+
+        Raises:
+            SceneError: these are the states of other rods, or on another mesh.
         """
         self.folder, self._file, self._done = folder, InstantFile(folder / "instants.npy"), 0
+        cells, rule = sum(self.elements), self.rule
+        nodes = cells * self.degree + len(self.elements)
+        self._file.expect(rq=(nodes, 7), rates=(nodes, 6), gauss_fields=(cells, len(rule.gauss), 9))
         return self
 
     def go_on_after(self, count):

@@ -1,7 +1,7 @@
 // A parallel projection that turns about the middle of the box; z points upwards. Positions are those of the data.
 
 const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-const MARGIN = { left: 90, right: 150, top: 80, bottom: 110 };
+const margin = () => ({ ...(innerWidth < 600 ? { left: 60, right: 80 } : { left: 90, right: 150 }), top: 80, bottom: 110 });
 
 class Camera {
   constructor(box, view) {
@@ -27,12 +27,13 @@ class Camera {
     [this.yaw, this.pitch] = this.first;
     const spans = this.axes.map((a) => Math.max(...this.corners.map((x) => dot(a, x))) - Math.min(...this.corners.map((x) => dot(a, x))));
     [this.yaw, this.pitch] = now;
-    const wide = Math.max(innerWidth - MARGIN.left - MARGIN.right, 80), high = Math.max(innerHeight - MARGIN.top - MARGIN.bottom, 80);
+    const m = margin(), wide = Math.max(innerWidth - m.left - m.right, 80), high = Math.max(innerHeight - m.top - m.bottom, 80);
     return this.zoom * Math.min(wide / Math.max(spans[0], 1e-9), high / Math.max(spans[1], 1e-9));
   }
 
   get centre() {
-    return [(innerWidth + MARGIN.left - MARGIN.right) / 2 + this.pan[0], (innerHeight + MARGIN.top - MARGIN.bottom) / 2 + this.pan[1]];
+    const m = margin();
+    return [(innerWidth + m.left - m.right) / 2 + this.pan[0], (innerHeight + m.top - m.bottom) / 2 + this.pan[1]];
   }
 
   project(x) {  // to pixels from the upper left corner
