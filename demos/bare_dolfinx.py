@@ -37,10 +37,9 @@ def main(elements=8, load_factors=np.linspace(0.025, 2.0, 80)):
     def function(snes, x, b):
         U.x.array[: 8 * nodes] = x.array_r
         U.x.scatter_forward()
-        with b.localForm() as with_ghosts:
-            with_ghosts.set(0)
-        assemble_vector(b, residual)
-        b.ghostUpdate(addv=InsertMode.ADD, mode=ScatterMode.REVERSE)
+        assembled = assemble_vector(residual)
+        assembled.ghostUpdate(addv=InsertMode.ADD, mode=ScatterMode.REVERSE)
+        b.array = assembled.array_r
         b.array[clamped] = 0  # no step changes the values of the clamp, which are those of the start
 
     def jacobian(snes, x, A, _):
@@ -51,10 +50,10 @@ def main(elements=8, load_factors=np.linspace(0.025, 2.0, 80)):
     snes = SNES().create(line.comm)
     snes.setFunction(function, assemble_vector(residual))
     snes.setJacobian(jacobian, create_matrix(tangent))
-    Options().insertString(
-        "-snes_linesearch_type basic -snes_rtol 0 -snes_stol 1e-11 -snes_atol 1e-8 -ksp_type preonly"
-    )
-    Options().insertString("-snes_error_if_not_converged -pc_type lu -pc_factor_mat_solver_type mumps")
+    snes.setOptionsPrefix("bare_")
+    newton = "snes_linesearch_type=basic snes_rtol=0 snes_stol=1e-11 snes_atol=1e-8 snes_error_if_not_converged=true"
+    for option in f"{newton} ksp_type=preonly pc_type=lu pc_factor_mat_solver_type=mumps".split():
+        Options("bare_").setValue(*option.split("="))
     snes.setFromOptions()
     x = now = Vec().createWithArray(U.x.array[: 8 * nodes].copy(), comm=line.comm)
     for eta.value in load_factors:

@@ -45,8 +45,8 @@ def ways(degree=2, elements=8, tol=1e-6):
         "multiplier": Way(
             f"P{degree} (r, q), multiplier",
             {"formulation": "multiplier", **mesh},
-            "The unknowns are r, q and a multiplier at every node that holds |q| = 1; eq. (1) is then the first "
-            "variation of the strain energy under this constraint.",
+            "The unknowns are r, q and a multiplier at every node that holds |q| = 1; what eq. (1) says of n and m is "
+            "then the first variation of the strain energy under this constraint.",
         ),
         "displacement": Way(
             f"P{degree} (r, q), eq. (1)",
@@ -59,13 +59,14 @@ def ways(degree=2, elements=8, tol=1e-6):
             f"P{degree} (r, q), mixed",
             {"formulation": "mixed", **mesh},
             "The same discrete solution, with the contact force n carried at the Gauss points from one iteration to "
-            "the next: a third of the iterations. It is the package's default.",
+            "the next: half the iterations a step, and longer steps. It is the package's default.",
         ),
         "auto": Way(
             "auto, with an error bar",
             {"tol": tol},
             "The package's own choice of model and mesh, the mesh refined until the estimated error is below "
-            f"{tol:g}; its iterations and steps are those of the last mesh.",
+            f"{tol:g}. Its seconds are those of all meshes; its iterations and steps correct, on the last mesh, what "
+            "a coarser one has found.",
         ),
     }
 
