@@ -11,7 +11,7 @@ import sys
 from pathlib import Path
 
 import numpy as np
-from checked import Check, deviation, report
+from known_numbers import Check, deviation, report
 from mpi4py import MPI
 from scipy.optimize import brentq
 

@@ -15,7 +15,7 @@ from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
-from checked import Check, deviation, report
+from known_numbers import Check, deviation, report
 from motion_chart import Curve, Shapes, draw
 from mpi4py import MPI
 from scipy.integrate import solve_ivp
