@@ -54,9 +54,9 @@ class Progress:
             self._draw()
         elif now - self._last >= _LINE_EVERY or (self._now and self._last == self._began):
             self._last = now
-            print(
-                f"{self._what}: {self._quantity} {self._eta:.6g}, {100 * self._done / self._way:.0f} %", file=sys.stderr
-            )
+            # a path that turns back is longer than its targets tell
+            share = f"{100 * self._done / self._way:.0f} %" if self._done <= 1.001 * self._way else "it turns back"
+            print(f"{self._what}: {self._quantity} {self._eta:.6g}, {share}", file=sys.stderr)
 
     def _draw(self):
         from rich.markup import escape
