@@ -1,5 +1,6 @@
 """Files on a full disk: an OSError in words, the old file as it was, nothing half written; and exit code 2."""
 
+import contextlib
 import resource
 import subprocess
 import sys
@@ -24,12 +25,15 @@ def results():
     }
 
 
-@pytest.fixture
+@contextlib.contextmanager
 def full_disk():
+    """For as short as possible: pytest's own output may be a file that is longer."""
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (ROOM, hard))
-    yield
-    resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
 
 
 FILES = {
@@ -44,11 +48,12 @@ FILES = {
 
 @pytest.mark.few_ranks
 @pytest.mark.parametrize("name", FILES)
-def test_a_full_disk(name, results, full_disk, tmp_path_all):
+def test_a_full_disk(name, results, tmp_path_all):
     if COMM.rank == 0:
         (tmp_path_all / name).write_text("old")
     COMM.barrier()
-    with pytest.raises(OSError, match="it cannot be written .File too large.: make room there") as refusal:
+    told = "it cannot be written .File too large.: make room there"
+    with pytest.raises(OSError, match=told) as refusal, full_disk():
         FILES[name](results, tmp_path_all / name)
     assert Path(refusal.value.filename).parent == tmp_path_all
     COMM.barrier()
