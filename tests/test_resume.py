@@ -129,6 +129,14 @@ def test_a_stored_history_answers_as_one_in_memory(tmp_path):
     assert (tmp_path / "energy.png").stat().st_size > 10000
 
 
+def test_neither_tol_nor_dt(tmp_path):
+    """The default tolerance; a folder may be prolonged."""
+    _, scene = flying_in_space()
+    history = cf.simulate(scene, 0.02, folder=tmp_path / "flight", elements=1, degree=1)
+    assert (cf.read_history(tmp_path / "flight").times == history.times).all()
+    assert cf.resume(tmp_path / "flight", duration=0.04).times[-1] == 0.04
+
+
 def test_none_of_its_states_stays_in_memory(tmp_path):
     def instants():
         gc.collect()

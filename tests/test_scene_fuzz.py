@@ -61,7 +61,7 @@ def test_damaged_files(seed, monkeypatch):
     for _ in range(200):
         file = chance.choice(FILES)
         table = damaged(tables[file], chance)
-        monkeypatch.setattr(scenefile.tomllib, "load", lambda stream, table=table: copy.deepcopy(table))
+        monkeypatch.setattr(scenefile.tomllib, "loads", lambda stream, table=table: copy.deepcopy(table))
         with warnings.catch_warnings():
             warnings.simplefilter("error", RuntimeWarning)
             try:

@@ -59,3 +59,13 @@ def test_refused(case, tmp_path):
 def test_missing_file(tmp_path):
     with pytest.raises(cf.SceneError, match="nowhere.toml: cannot be read"):
         cf.read_scene(tmp_path / "nowhere.toml")
+
+
+def test_marks_and_encodings_of_editors(tmp_path):
+    """A mark at the beginning of UTF-8 is skipped; other encodings are named."""
+    text = DEMO.read_text(encoding="utf-8").replace("Eccentrically", "B\u00fcgel")
+    (tmp_path / "marked.toml").write_text(text, encoding="utf-8-sig")
+    assert cf.read_scene(tmp_path / "marked.toml")[0].title.startswith("B\u00fcgel")
+    (tmp_path / "latin.toml").write_text(text, encoding="latin-1")
+    with pytest.raises(cf.SceneError, match="latin.toml: not UTF-8 .*: save it as UTF-8"):
+        cf.read_scene(tmp_path / "latin.toml")

@@ -34,7 +34,7 @@ def _deliver(options, compute, table):
     if out is not None:
         prepare(out)  # fail before the computation, not after it
     for caution in scene.doubts:
-        say(f"cosserat: {caution}")
+        say(f"cosserat: warning: {caution}")
     given = {name: getattr(options, name) for name in ("tol", "elements", "degree")}
     given = {name: value for name, value in given.items() if value is not None}
     try:

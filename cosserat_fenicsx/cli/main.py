@@ -68,7 +68,7 @@ def _run(options):
     if options.station:
         scene.station(options.station)  # refused before the computation
     for caution in scene.doubts if moving else scene.cautions:
-        say(f"cosserat: {caution}")
+        say(f"cosserat: warning: {caution}")
 
     def computed():
         if moving:
@@ -112,7 +112,7 @@ def _explain(options):
         scene, *asked = _settings(options)
         text = explain(scene, *asked)
     for doubt in scene.doubts:
-        say(f"cosserat: {doubt}")
+        say(f"cosserat: warning: {doubt}")
     say(text, file=sys.stdout)
     return DONE
 

@@ -116,11 +116,12 @@ def _read(file):
     """Scene, [solve] and [simulate] of a file."""
     file = Path(file)
     try:
-        with file.open("rb") as stream:
-            tables = tomllib.load(stream)
+        tables = tomllib.loads(file.read_text(encoding="utf-8-sig"))  # some editors begin a file with a mark
     except OSError as problem:
         raise SceneError(f"{file}: cannot be read ({problem.strerror}): expected a scene file in TOML") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as problem:
+    except UnicodeDecodeError as problem:
+        raise SceneError(f"{file}: not UTF-8 ({problem.reason} at byte {problem.start}): save it as UTF-8") from None
+    except tomllib.TOMLDecodeError as problem:
         raise SceneError(f"{file}: not valid TOML: {problem}") from None
     try:
         return _scene(tables, file.parent)
