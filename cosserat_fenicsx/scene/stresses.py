@@ -125,10 +125,10 @@ def rectangle_fibres(width, height, nu, torsion):
 
 def _places(a, short):
     """Places from -a to a, denser over the length 5 `short` at the ends, and whether each is one of those inside."""
-    even = np.linspace(-a, a, _INTERVALS + 1)
-    corner = a - 5 * short * np.linspace(0, 1, _NEAR + 1)[1:] ** 1.5
-    every = np.unique(np.concatenate([even, corner[corner > 0], -corner[corner > 0]]))
-    return every, np.arange(-(len(every) // 2), len(every) // 2 + 1) % _INSIDE == 0
+    corner = 1 - 5 * short / a * np.linspace(0, 1, _NEAR + 1)[1:] ** 1.5
+    half = np.unique(np.round(np.concatenate([np.linspace(0, 1, _INTERVALS // 2 + 1), corner[corner > 0]]), 9))
+    inside = np.arange(1 - len(half), len(half)) % _INSIDE == 0
+    return a * np.concatenate([-half[:0:-1], half]), inside
 
 
 def _shear(a, b, nu, x, y):
