@@ -118,3 +118,36 @@ def test_a_cantilever_of_pieces_and_of_a_section_without_shape():
     bare = cf.Rod(rod.curve, thin.stiffness(STEEL), name="bare")
     path = cf.solve(cf.Scene([bare], [cf.Clamp(bare.start)], [cf.Force(bare.end, (0, 0, -P))]), [1.0], elements=2)
     assert "von_mises" not in path.fields(0) and not path.knows_stresses
+
+
+def test_both_sides_of_a_step_and_of_a_point_moment():
+    """32 M/(pi D^3): the thin side of a step governs, the loaded side of a moment; a side without shape is left out."""
+    sections = {
+        "stepped": [(1.0, cf.Circle(0.1)), (None, cf.Circle(0.05))],
+        "turned": cf.Circle(0.1),
+        "partly": [(1.0, cf.Circle(0.1).stiffness(STEEL)), (None, cf.Circle(0.05))],
+    }
+    rods = [cf.Rod(cf.Line((0, i, 0), (2, i, 0)), sections[x], STEEL, name=x) for i, x in enumerate(sections)]
+    loads = [cf.Force(rod.end, (0, 0, -10.0)) for rod in rods] + [cf.Moment("turned@1", (0, -10.0, 0))]
+    path = cf.solve(cf.Scene(rods, [cf.Clamp(rod.start) for rod in rods], loads), [1.0], elements=2)
+    thick, thin = (32 * 10.0 / (np.pi * D**3) for D in (0.1, 0.05))
+    for station, worst, left, right in (("stepped@1", thin, thick, thin), ("turned@1", thick, 0.0, thick)):
+        for side, expected in ((None, worst), ("left", left), ("right", right)):
+            stress = path.stress(station, side)
+            np.testing.assert_allclose(stress.axial_max, expected, rtol=1e-4, atol=1e-4 * thick)
+            np.testing.assert_allclose(stress.axial_min, -expected, rtol=1e-4, atol=1e-4 * thick)
+        assert path.stress(station).von_mises == pytest.approx(worst, rel=1e-4)
+    assert path.stress("partly@1") == path.stress("partly@1", "right")
+    with pytest.raises(cf.SceneError, match="stress at partly@1: the section there is a Stiffness"):
+        path.stress("partly@1", "left")
+    with pytest.raises(cf.SceneError, match="side = 'both': expected 'left', 'right', or None"):
+        path.stress("turned@1", "both")
+    found = path.largest()["von Mises stress"]  # beside the foot it is the thin side of the step
+    assert found.size == pytest.approx(thin, rel=1e-4) and found.station.s == pytest.approx(1.0)
+
+
+def test_normal_stresses_of_a_rolled_profile():
+    """By the elastic section moduli of the table, 194 and 28.5 cm^3; von Mises stresses are not computed."""
+    stress = cf.Profile("IPE 200").stresses(STEEL, np.array([1.0, 2.0, 0.0]), np.array([-3.0, 0.7, 5.0]))
+    assert stress.axial_max == pytest.approx(3.0 / 194e-6 + 0.7 / 28.5e-6, rel=3e-3) == -stress.axial_min
+    assert np.isnan(stress.von_mises)

@@ -16,6 +16,9 @@ from cosserat_fenicsx.results.states import States
 from cosserat_fenicsx.results.stresses import Stresses
 from cosserat_fenicsx.scene.rod import RodOrName, Station, StationOrName
 
+# How far beyond a jump its right side is taken, over the rod's length.
+_BEYOND = 1e-9
+
 
 class Result(Exports, Extremes, Reactions, Stresses, States):
     """A sequence of states of a scene. Public methods return SI units. It can be copied and pickled, see `States`.
@@ -85,7 +88,8 @@ class Result(Exports, Extremes, Reactions, Stresses, States):
             (N m), all inertial; strain (v - v_R: shear 1, shear 2, stretch) and curvature (u - u_R: bending 1,
             bending 2, twist; 1/m), both material; bending_moment (N m, its size). Where a section of the scene knows
             its shape, also von_mises, axial_max and axial_min (Pa), see `stress`; NaN along other sections. Of a motion
-            also velocity (m/s) and angular_velocity (rad/s), inertial.
+            also velocity (m/s) and angular_velocity (rad/s), inertial. Where a section changes or a point load acts,
+            what jumps is that of the side of smaller s; `stress` and `largest` cover both sides.
 
         Raises:
             IndexError: there is no point k.
@@ -122,11 +126,12 @@ class Result(Exports, Extremes, Reactions, Stresses, States):
             for rod, x in zip(self.scene.rods, self.layout.node_s(self.rule.nodes), strict=True)
         ])  # fmt: skip
 
-    def _contact_at(self, station):
-        """(points, 6) n and m at a station, dimensionless."""
+    def _contact_at(self, station, side="left"):
+        """(points, 6) n and m at a station, dimensionless; at a jump those of the "left" or the "right" side."""
         station = self.station(station)
         i, _ = self._rows(station.rod)
-        cell, weights = self.rule.locate(self.layout.breaks[i], station.s / station.rod.length)
+        x = station.s / station.rod.length + (_BEYOND if side == "right" else 0.0)
+        cell, weights = self.rule.locate(self.layout.breaks[i], x)
         return np.einsum("j,njk->nk", weights, self._contact_in(self._cells(i).start + cell))
 
     def _contact_of(self, k):

@@ -24,6 +24,7 @@ from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.quadrature import gauss
 from cosserat_fenicsx.scene.materials import Material
 from cosserat_fenicsx.scene.sections import Stiffness
+from cosserat_fenicsx.scene.stresses import Stress
 
 _TABLE = Path(__file__).with_name("rolled_profiles.csv")
 _POINTS = 24  # Gauss points per piece of the integrals of shear areas
@@ -150,8 +151,12 @@ class Profile:
         )
 
     def stresses(self, material, force, moment):
-        """None: those of rolled profiles are not computed."""
-        return None
+        """The `Stress` for contact forces and moments (..., 3), N and N m, along d_1, d_2, d_3: normal stresses at the
+        flanges' edges; von Mises stresses are NaN, since shear stresses of rolled profiles are not computed."""
+        I1, I2 = self.second_moments
+        axial = force[..., 2] / self.area
+        bending = np.abs(moment[..., 0]) * self.height / (2 * I1) + np.abs(moment[..., 1]) * self.width / (2 * I2)
+        return Stress(np.full_like(axial, np.nan), axial + bending, axial - bending)
 
 
 def _flow(pieces):
