@@ -53,7 +53,8 @@ def arguments_of(section, material, line, unit):
         if np.abs(away).max() > _OFFSET * radius:
             turned = np.array([[math.cos(angle), math.sin(angle)], [-math.sin(angle), math.cos(angle)]]) if skew else 1
             offsets[name] = tuple((unit * (turned @ away if skew else away)).tolist())
-    if found.mass is not None and "centroid" not in offsets:
+    heavy = centroid if found.heaviness is not None else _centre_of_mass(section)
+    if found.mass is not None and heavy is not None and np.abs(heavy - line).max() <= _OFFSET * radius:
         arguments["mass"] = found.mass / unit
         if found.heaviness is not None and not skew:
             first, second = (found.heaviness * EI * unit for EI in found.about)
@@ -105,6 +106,15 @@ def _with_materials(section, material):
         section.get_mass(),
         heaviness.pop() if len(heaviness) == 1 else None,
     )
+
+
+def _centre_of_mass(section):
+    """Of a section whose materials differ in density over E, from its regions; None where they are not known."""
+    parts = getattr(getattr(section, "geometry", None), "geoms", None)
+    if not parts:
+        return None
+    masses = [part.material.density * part.geom.area for part in parts]
+    return np.average([(part.geom.centroid.x, part.geom.centroid.y) for part in parts], axis=0, weights=masses)
 
 
 def _outline(section, line, unit):

@@ -142,8 +142,10 @@ class Stiffness:
             unit: the section's unit of length, m, such as 1e-3 for mm; its Young's moduli have N per square of it, its
                 densities kg per cube of it.
 
-        Mass is left out where the line is not through the centroid, and inertia also where the principal axes are
-        turned, or the materials differ in density over E: `Weight` or motions need them, and refuse such a section.
+        Mass is left out where the line is not through the centre of mass (where materials differ in density over E, it
+        is not the centroid; it is taken from the regions of `section.geometry`), and inertia also where the principal
+        axes are turned, or the materials differ in density over E: `Weight` or motions need them, and refuse such a
+        section.
 
         Raises:
             SceneError: not such a section, an analysis that is missing, or materials that differ in Poisson's ratio.
