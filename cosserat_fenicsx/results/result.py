@@ -142,6 +142,10 @@ class Result(Exports, Extremes, Reactions, Stresses, States):
         """(points, nodes per element, 6) n and m in one element, dimensionless."""
         raise NotImplementedError
 
+    def _viscous(self, which, rod):
+        """The viscous parts of n and m at the nodes of a rod in several states, material, N and N m: none at rest."""
+        return 0.0, 0.0
+
     def _cells(self, i):
         """Slice of the elements of the i-th rod."""
         first = sum(self.elements[:i])
