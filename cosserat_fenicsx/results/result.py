@@ -93,10 +93,10 @@ class Result(Exports, Extremes, Reactions, Stresses, States):
 
         Raises:
             IndexError: there is no point k.
+            SceneError: k is no whole number.
         """
-        if not -len(self) <= k < len(self):
-            raise IndexError(f"fields({k}): expected the number of a {self.axis}, from 0 to {len(self) - 1}")
-        return {name: a if name == "s" else a[0] for name, a in self.fields_at([k], rod).items()}
+        which = [self._index(k, f"fields({k!r})")]
+        return {name: a if name == "s" else a[0] for name, a in self.fields_at(which, rod).items()}
 
     def fields_at(self, which: Sequence[int] | np.ndarray, rod: RodOrName | None = None) -> dict[str, np.ndarray]:
         """`fields` in several states at once: {name: array (n, nodes, ...)}, but s (nodes,).

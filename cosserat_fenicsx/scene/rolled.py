@@ -184,6 +184,9 @@ def _near(name):
     series, size = name[:3], name[3:]
     sizes = [int(known.split()[1]) for known in _table() if known.startswith(f"{series} ")]
     if not sizes or not size.isdigit():
-        return "expected IPE, HEA, HEB or HEM with its size, such as 'IPE 200'"
+        return (
+            "expected IPE, HEA, HEB or HEM with its size, such as 'IPE 200'; other series, such as IPE A, HE AA "
+            "and UPN, are not in the table: see Stiffness.from_section"
+        )
     near = sorted(sorted(sizes, key=lambda known: abs(known - int(size)))[:3])
     return f"did you mean {' or '.join(f'{series} {known}' for known in near)}?"
