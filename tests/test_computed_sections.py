@@ -99,6 +99,13 @@ def test_an_angle_in_mm():
     EIx, EIy, EIxy = (value * 1e-6 for value in ANGLE.get_eic())
     np.testing.assert_allclose(np.array(k.matrix)[3:5, 3:5], [[EIx, -EIxy], [-EIxy, EIy]], rtol=1e-8)
     assert k.mass == pytest.approx(21.60260909) and k.inertia is None
+    # the shear flexibility along x and y and along the principal axes, whose coupling cannot be told from either alone
+    flexible = np.linalg.inv(np.array(k.matrix)[:2, :2])
+    angle = np.radians(ANGLE.get_phi())
+    turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
+    for axes, areas in ((np.eye(2), ANGLE.get_eas()), (turn, ANGLE.get_eas_p())):
+        expected = 210 / 80.76923077 / np.array(areas)
+        np.testing.assert_allclose(np.diag(axes @ flexible @ axes.T), expected, rtol=1e-8)
 
 
 def test_the_line_elsewhere():

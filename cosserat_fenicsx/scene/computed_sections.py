@@ -39,8 +39,9 @@ def arguments_of(section, material, line, unit):
         ) from None
     line = np.array(centroid if line is None else vector(_WHERE, "line", line, "its coordinates in the section", 2))
     skew = abs(found.product) > _SKEW * max(found.about)
+    shear, coupling = _principal_shear(found, angle) if skew else (found.shear, 0.0)
     arguments = {
-        "shear": found.principal_shear if skew else found.shear,
+        "shear": shear,
         "axial": found.axial,
         "bending": tuple(EI * unit**2 for EI in (found.principal if skew else found.about)),
         "torsion": found.torsion * unit**2,
@@ -59,7 +60,18 @@ def arguments_of(section, material, line, unit):
         if found.heaviness is not None and not skew:
             first, second = (found.heaviness * EI * unit for EI in found.about)
             arguments["inertia"] = (first, second, first + second)
-    return arguments | offsets | ({"angle": angle} if skew else {})
+    return arguments | offsets | ({"angle": angle, "shear_coupling": coupling} if skew else {})
+
+
+def _principal_shear(found, angle):
+    """GA along the principal axes of bending, which are not those of shear, and their coupling.
+
+    The flexibilities along both pairs of axes are the diagonals of one tensor, which gives its product term.
+    """
+    (x, y), (one, two) = 1 / np.array(found.shear), 1 / np.array(found.principal_shear)
+    product = (math.cos(2 * angle) * (one - two) - (x - y)) / (2 * math.sin(2 * angle))
+    stiff = np.linalg.inv([[one, product], [product, two]])
+    return (stiff[0, 0], stiff[1, 1]), stiff[0, 1]
 
 
 def _of_shape(section, material, unit):

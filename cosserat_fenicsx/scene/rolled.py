@@ -4,9 +4,12 @@ Dimensions: EN 10365 (Euronorm 19-57 and 53-62), in rolled_profiles.csv. The rad
 flanges counts in all properties.
 
 - Area and second moments: sums over web, flanges and fillets, exact.
-- Torsion constant: El Darwish & Johnston, J. Struct. Div. ASCE 91 (1965) ST1, 203, as in the tables of EN 10365.
+- Torsion constant: El Darwish & Johnston, J. Struct. Div. ASCE 91 (1965) ST1, 203, as in the tables of EN 10365; -2.4
+  to +4.3 % from finite elements.
 - Shear areas: I^2/(integral of S^2/t), with the shear flow V S/I of Jourawski over the thickness t, in the flanges
-  along both axes. Within 5 % of finite elements.
+  along both axes. They are those of Timoshenko's stiffness, V^2/(2 G A_s) the energy, and not the areas A_v of EN 1993
+  for the resistance to shear. Poisson's ratio is not in them. Of ten sizes they are 3 to 5 % above finite elements
+  along d_1 with nu = 0, and up to 6.6 % with nu = 0.3; along d_2 0 to 4.4 % with either.
 """
 
 import csv
@@ -54,7 +57,8 @@ class Profile:
 
     Attributes:
         height, width, web, flange, fillet: h, b, t_w, t_f, r, m.
-        area: m^2. second_moments: about d_1 and d_2, m^4. torsion_constant: m^4. shear_areas: along d_1 and d_2, m^2.
+        area: m^2. second_moments: about d_1 and d_2, m^4. torsion_constant: m^4. shear_areas: along d_1 and d_2, m^2,
+            of Timoshenko's stiffness, which are not A_v of EN 1993.
 
     Raises:
         SceneError: an unknown name, with those that are near.
