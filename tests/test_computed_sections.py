@@ -99,6 +99,13 @@ def test_an_angle_in_mm():
     EIx, EIy, EIxy = (value * 1e-6 for value in ANGLE.get_eic())
     np.testing.assert_allclose(np.array(k.matrix)[3:5, 3:5], [[EIx, -EIxy], [-EIxy, EIy]], rtol=1e-8)
     assert k.mass == pytest.approx(21.60260909) and k.inertia is None
+    # the shear flexibility along x and y and along the principal axes, whose coupling cannot be told from either alone
+    flexible = np.linalg.inv(np.array(k.matrix)[:2, :2])
+    angle = np.radians(ANGLE.get_phi())
+    turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
+    for axes, areas in ((np.eye(2), ANGLE.get_eas()), (turn, ANGLE.get_eas_p())):
+        expected = 210 / 80.76923077 / np.array(areas)
+        np.testing.assert_allclose(np.diag(axes @ flexible @ axes.T), expected, rtol=1e-8)
 
 
 def test_the_line_elsewhere():
@@ -114,9 +121,19 @@ def test_the_line_elsewhere():
 
 
 def test_two_materials():
+    """The centre of mass is not the centroid of E: mass is kept for a line through it alone."""
     k = cf.Stiffness.from_section(PAIR, unit=1e-3)
-    assert k.mass == pytest.approx(0.5 * 0.01 * (7850 + 2700)) and k.inertia is None
+    assert k.mass is None and k.inertia is None  # regions unknown
     assert np.diag(k.matrix)[2:5] == pytest.approx([1.4e9, 1166666.667, 947916.6667])
+    halves = [
+        SimpleNamespace(material=material, geom=SimpleNamespace(area=5000.0, centroid=SimpleNamespace(x=x, y=50.0)))
+        for material, x in ((_STEEL_MM, 25.0), (_ALUMINIUM_MM, 75.0))
+    ]
+    known = Computed(PAIR.materials, **{name: get() for name, get in vars(PAIR).items() if name.startswith("get_")})
+    known.geometry.geoms = halves
+    assert cf.Stiffness.from_section(known, unit=1e-3).mass is None
+    k = cf.Stiffness.from_section(known, unit=1e-3, line=((7850 * 25 + 2700 * 75) / 10550, 50.0))
+    assert k.mass == pytest.approx(0.5 * 0.01 * (7850 + 2700)) and k.inertia is None
 
 
 def raising(message):

@@ -96,3 +96,21 @@ def test_refusals():
         with pytest.raises(cf.SceneError) as refusal:
             make()
         assert words in str(refusal.value)
+
+
+@pytest.mark.parametrize("damping", [cf.Damping(time=5e-3), cf.Damping(Kt=(1e3, 1e3, 2e3), Jt=(2.0, 0.5, 1.0))])
+def test_curvatures_are_those_of_the_shape_and_not_moments_over_stiffness(damping):
+    """The curvature along a cantilever in a plane sums up to the angle of its end, while damping adds to the moment."""
+    rod = cf.Rod(cf.Line((0, 0, 0), (1, 0, 0)), cf.Rectangle(0.01, 0.01), cf.Material(210e9, 0.3, 7850.0), name="rod",
+                 damping=damping)  # fmt: skip
+    loads = [cf.Force(rod.end, cf.Ramp((0, 0, 1.0), 0, 0.05))]
+    history = cf.simulate(cf.Scene([rod], [cf.Clamp(rod.start)], loads), 0.04, dt=2e-3, elements=3)
+    fields = history.fields(-1)
+    nodes = np.arange(3)[:, None] * history.degree + np.arange(history.degree + 1)
+
+    def summed(curvature):
+        return np.linalg.norm(curvature[nodes].swapaxes(1, 2) @ history.rule.lobatto, axis=1).sum() / 3
+
+    angle = history.rotation_angle(rod.end)[-1]
+    assert summed(fields["curvature"]) == pytest.approx(angle, rel=2e-3)
+    assert summed(fields["moment"] / rod.stiffness.bending[0]) > 1.2 * angle

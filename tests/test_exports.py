@@ -55,8 +55,8 @@ def test_profiles_as_csv(path, tmp_path_all):
     path.write(file, 0, rod="column")
     rows, fields = rows_of(file), path.fields(0, "column")
     assert len(rows) == len(fields["s"]) and {row["rod"] for row in rows} == {"column"}
-    for heading, values in (("s (m)", fields["s"]), ("contact force (N) z", fields["force"][:, 2]),
-                            ("change of curvature (1/m) bending 2", fields["curvature"][:, 1]),
+    for heading, values in (("s (m)", fields["s"]), ("inertial contact force (N) z", fields["force"][:, 2]),
+                            ("material change of curvature (1/m) bending 2", fields["curvature"][:, 1]),
                             ("von Mises stress (Pa)", fields["von_mises"])):  # fmt: skip
         assert [float(row[heading]) for row in rows] == values.tolist()
     COMM.barrier()
@@ -70,6 +70,8 @@ def test_what_does_not_fit_is_refused(path, tmp_path_all):
     for options, expected in (({"rod": "mast"}, "no rod is named 'mast'|mast"), ({"k": 7}, "expected .* from -2 to 1")):
         with pytest.raises(cf.SceneError, match=expected):
             path.write(tmp_path_all / "profile.csv", **options)
+    with pytest.raises(cf.SceneError, match="station = 'column.end': expected None beside k or rod"):
+        path.write(tmp_path_all / "profile.csv", 0, station="column.end")
     with pytest.raises(cf.SceneError, match="path.vtu: rod is not for the ending '.vtu': expected a file .csv"):
         path.write(tmp_path_all / "path.vtu", rod="column")
     if COMM.rank == 0:
@@ -79,6 +81,18 @@ def test_what_does_not_fit_is_refused(path, tmp_path_all):
     assert [file.name for file in tmp_path_all.iterdir()] == ["folder.csv"]
 
 
+def test_indices_are_whole_numbers(path):
+    for wrong in ("x", 1.0, True):
+        for asked in (lambda k: path[k], lambda k: path.at_points([k]), lambda k: path.fields(k)):
+            with pytest.raises(cf.SceneError, match="expected the index of a load factor, a whole number from -2 to 1"):
+                asked(wrong)
+    with pytest.raises(IndexError, match=r"at_points\(\[99\]\): expected the index"):
+        path.at_points([99])
+    assert path[np.int64(1)].load_factors == [0.8]
+    with pytest.raises(cf.SceneError, match="station = 'zz': expected 'rod.start', .* the rod one of column, an/arm"):
+        path.stress("zz")
+
+
 def test_dicts(path, history):
     told = path.to_dict()
     assert told["kind"] == "Path" and told["title"] == "two" and told["units"]["curvature"] == "1/m"
@@ -86,6 +100,7 @@ def test_dicts(path, history):
     np.testing.assert_array_equal(told["rods"]["an/arm"]["moment"][1], path.fields(1, "an/arm")["moment"])
     np.testing.assert_array_equal(told["reaction_moment"][0], path.reaction(path.scene.supports[0])[1])
     again = json.loads(json.dumps(told, default=lambda array: array.tolist()))
+    assert len(told["event_kind"]) == 0 and "event_kind" not in history.to_dict()
     assert again["load_factor"] == [0.4, 0.8] and again["support"] == ["Clamp at column.start"]
     told = history.to_dict()
     assert told["time"][-1] == 0.1 and told["rods"]["rod"]["velocity"].shape == (3, 5, 3)

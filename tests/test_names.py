@@ -149,7 +149,7 @@ def test_one_point_of_a_path_is_a_path():
     assert type(last) is type(path) and last.load_factors.tolist() == [1.0] and len(both) == 2
     np.testing.assert_array_equal(last.position("post.end")[0], path.position("post.end")[1])
     assert [part.load_factors[0] for part in path] == [0.5, 1.0]
-    with pytest.raises(IndexError, match=r"\[2\]: expected the number of a load factor, from 0 to 1"):
+    with pytest.raises(IndexError, match=r"\[2\]: expected the index of a load factor, a whole number from -2 to 1"):
         path[2]
 
 

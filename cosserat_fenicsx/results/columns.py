@@ -4,6 +4,7 @@ import csv
 
 import numpy as np
 
+from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.results.beside import replaced
 from cosserat_fenicsx.results.quantities import FIELDS, headings
 from cosserat_fenicsx.results.tables import most_displaced
@@ -75,6 +76,10 @@ def table(result, k=None, rod=None, station=None):
     """The columns of `Result.write` for .csv and of `to_dataframe`."""
     if k is None and rod is None:
         return over_states(result, station)
+    if station is not None:
+        raise SceneError(
+            f"station = {station!r}: expected None beside k or rod, since a table along rods has no station"
+        )
     return along_rods(result, -1 if k is None else k, result.scene.rods if rod is None else [result.rod(rod)])
 
 

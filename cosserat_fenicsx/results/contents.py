@@ -68,13 +68,13 @@ def _reaction(result, support):
         return np.full((2, len(result), 3), np.nan)
 
 
-def of_events(result):
-    """{name: `Variable`} of the events of a path; empty without events."""
+def of_events(result, *, empty=False):
+    """{name: `Variable`} of the events of a path; without events nothing, or with `empty` empty arrays."""
     events = [] if result.axis == "time" else result.events
     return {
         f"event_{name}": _variable(("event",), np.array([getattr(event, name) for event in events]), quantity)
         for name, quantity in _OF_EVENT.items()
-        if events
+        if events or (empty and result.axis != "time")
     }
 
 

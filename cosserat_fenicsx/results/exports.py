@@ -38,11 +38,12 @@ class Exports(OnNodes):
             negative_modes, stable, iterations, error and control of a path, or time, steps, iterations, scheme,
             energies and momenta of a motion, arrays (n, ...); support, texts, reaction_force and reaction_moment
             (supports, n, 3), inertial, NaN where unknown; event_kind, event_load_factor, event_after, event_residual
-            and event_error, where a path has events; rods, {name: {field: array}} with those of `fields` (n, nodes,
-            ...), s (nodes,) and the modes of events (events, nodes, 3); units and frames, {name: text} of all these.
+            and event_error of a path, empty where it has no events; rods, {name: {field: array}} with those of `fields`
+            (n, nodes, ...), s (nodes,) and the modes of events (events, nodes, 3); units and frames, {name: text} of
+            all these.
             `json.dumps(result.to_dict(), default=lambda a: a.tolist())` makes text of it, with NaN for the unknown.
         """
-        whole = contents.of_states(self) | contents.of_supports(self) | contents.of_events(self)
+        whole = contents.of_states(self) | contents.of_supports(self) | contents.of_events(self, empty=True)
         rods = {rod.name: contents.of_rod(self, rod) for rod in self.scene.rods}
         told = {name: variable for variables in (whole, *rods.values()) for name, variable in variables.items()}
         return {
@@ -61,11 +62,11 @@ class Exports(OnNodes):
         """A pandas DataFrame with the columns of the .csv of `write`, whose arguments it has.
 
         Without k and rod it has a row per load factor or time, and the index `point` counts them, since load factors
-        repeat where a path turns back. Else it has a row per node along the rods, at point k.
+        repeat where a path turns back. Else it has a row per node along the rods, at point k, and takes no station.
 
         Raises:
             InstallationError: pandas is missing.
-            SceneError: an empty result, no such rod or station.
+            SceneError: an empty result, no such rod or station, or a station beside k or rod.
         """
         pandas = _import("pandas", "to_dataframe")
         _refuse_empty(self, "to_dataframe")

@@ -25,7 +25,8 @@ def fields_at(result, which, rod):
     n, m = contact[..., :3] * result.scales.force, contact[..., 3:] * result.scales.moment
     n_material, m_material = np.einsum("nkij,nki->nkj", d, n), np.einsum("nkij,nki->nkj", d, m)
     # at a jump those of the element before, as n and m
-    strain, curvature = rod.stiffness_at(s, "left").strains(n_material, m_material)
+    viscous = result._viscous(which, rod)
+    strain, curvature = rod.stiffness_at(s, "left").strains(n_material - viscous[0], m_material - viscous[1])
     found = {
         "s": s,
         "position": rod.curve.position(s) + displacement,

@@ -25,10 +25,11 @@ def write(result, file, k=None, **options):
     file = Path(file)
     if len(result) == 0:
         raise SceneError(f"{file}: the {type(result).__name__.lower()} has no point to write")
-    if k is not None and not -len(result) <= k < len(result):
-        raise SceneError(
-            f"{file}: k = {k}: expected the number of a {result.axis}, from {-len(result)} to {len(result) - 1}"
-        )
+    if k is not None:
+        try:
+            result._index(k, f"{file}: k = {k!r}")
+        except IndexError as problem:
+            raise SceneError(str(problem)) from None
     options = {name: value for name, value in options.items() if value is not None}
     for name in options:
         if file.suffix not in _OPTIONS[name]:

@@ -10,6 +10,7 @@ import numpy as np
 from cosserat_fenicsx.quaternions import directors
 from cosserat_fenicsx.results.records import Record
 from cosserat_fenicsx.results.result import Result
+from cosserat_fenicsx.results.viscous import viscous_contact
 from cosserat_fenicsx.scene.rod import RodOrName, StationOrName
 
 #: Energies (J), work and dissipation since the start (J), linear and angular momentum (kg m/s, kg m^2/s), inertial, the
@@ -40,8 +41,8 @@ class History(Result):
     """A motion: its states at the saved times, energies and momenta.
 
     All station queries (`position`, `displacement`, `rotation`, `force`, `moment`, ...) give one row per time. Contact
-    forces and moments include those of damping. If `simulate` was given a `folder`, the states are read from a file in
-    it.
+    forces and moments, and so stresses, include those of damping; strains and curvatures are those of the shape. If
+    `simulate` was given a `folder`, the states are read from a file in it.
 
     Beside those of `Result` it has these attributes.
 
@@ -195,6 +196,9 @@ class History(Result):
 
     def _at_clamp(self, point, joined):
         return self._stacked("clamp_forces")[:, point]
+
+    def _viscous(self, which, rod):
+        return super()._viscous(which, rod) if rod.damping is None else viscous_contact(self, which, rod)
 
     # n and m at the nodes are extrapolated by the polynomials through the Gauss points
 

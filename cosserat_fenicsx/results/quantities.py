@@ -14,11 +14,11 @@ FIELDS = {
     "d1": Quantity("d1", "1", "xyz", "inertial"),
     "d2": Quantity("d2", "1", "xyz", "inertial"),
     "d3": Quantity("d3", "1", "xyz", "inertial"),
-    "force": Quantity("contact force", "N", "xyz", "inertial"),
-    "moment": Quantity("contact moment", "N m", "xyz", "inertial"),
-    "strain": Quantity("strain", "1", ("shear 1", "shear 2", "stretch"), "material: along d1, d2, d3"),
+    "force": Quantity("inertial contact force", "N", "xyz", "inertial"),
+    "moment": Quantity("inertial contact moment", "N m", "xyz", "inertial"),
+    "strain": Quantity("material strain", "1", ("shear 1", "shear 2", "stretch"), "material: along d1, d2, d3"),
     "curvature": Quantity(
-        "change of curvature", "1/m", ("bending 1", "bending 2", "twist"), "material: about d1, d2, d3"
+        "material change of curvature", "1/m", ("bending 1", "bending 2", "twist"), "material: about d1, d2, d3"
     ),
     "bending_moment": Quantity("bending moment", "N m"),
     "von_mises": Quantity("von Mises stress", "Pa"),

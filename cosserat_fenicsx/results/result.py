@@ -16,6 +16,9 @@ from cosserat_fenicsx.results.states import States
 from cosserat_fenicsx.results.stresses import Stresses
 from cosserat_fenicsx.scene.rod import RodOrName, Station, StationOrName
 
+# How far beyond a jump its right side is taken, over the rod's length.
+_BEYOND = 1e-9
+
 
 class Result(Exports, Extremes, Reactions, Stresses, States):
     """A sequence of states of a scene. Public methods return SI units. It can be copied and pickled, see `States`.
@@ -85,14 +88,15 @@ class Result(Exports, Extremes, Reactions, Stresses, States):
             (N m), all inertial; strain (v - v_R: shear 1, shear 2, stretch) and curvature (u - u_R: bending 1,
             bending 2, twist; 1/m), both material; bending_moment (N m, its size). Where a section of the scene knows
             its shape, also von_mises, axial_max and axial_min (Pa), see `stress`; NaN along other sections. Of a motion
-            also velocity (m/s) and angular_velocity (rad/s), inertial.
+            also velocity (m/s) and angular_velocity (rad/s), inertial. Where a section changes or a point load acts,
+            what jumps is that of the side of smaller s; `stress` and `largest` cover both sides.
 
         Raises:
             IndexError: there is no point k.
+            SceneError: k is no whole number.
         """
-        if not -len(self) <= k < len(self):
-            raise IndexError(f"fields({k}): expected the number of a {self.axis}, from 0 to {len(self) - 1}")
-        return {name: a if name == "s" else a[0] for name, a in self.fields_at([k], rod).items()}
+        which = [self._index(k, f"fields({k!r})")]
+        return {name: a if name == "s" else a[0] for name, a in self.fields_at(which, rod).items()}
 
     def fields_at(self, which: Sequence[int] | np.ndarray, rod: RodOrName | None = None) -> dict[str, np.ndarray]:
         """`fields` in several states at once: {name: array (n, nodes, ...)}, but s (nodes,).
@@ -122,11 +126,12 @@ class Result(Exports, Extremes, Reactions, Stresses, States):
             for rod, x in zip(self.scene.rods, self.layout.node_s(self.rule.nodes), strict=True)
         ])  # fmt: skip
 
-    def _contact_at(self, station):
-        """(points, 6) n and m at a station, dimensionless."""
+    def _contact_at(self, station, side="left"):
+        """(points, 6) n and m at a station, dimensionless; at a jump those of the "left" or the "right" side."""
         station = self.station(station)
         i, _ = self._rows(station.rod)
-        cell, weights = self.rule.locate(self.layout.breaks[i], station.s / station.rod.length)
+        x = station.s / station.rod.length + (_BEYOND if side == "right" else 0.0)
+        cell, weights = self.rule.locate(self.layout.breaks[i], x)
         return np.einsum("j,njk->nk", weights, self._contact_in(self._cells(i).start + cell))
 
     def _contact_of(self, k):
@@ -136,6 +141,10 @@ class Result(Exports, Extremes, Reactions, Stresses, States):
     def _contact_in(self, cell):
         """(points, nodes per element, 6) n and m in one element, dimensionless."""
         raise NotImplementedError
+
+    def _viscous(self, which, rod):
+        """The viscous parts of n and m at the nodes of a rod in several states, material, N and N m: none at rest."""
+        return 0.0, 0.0
 
     def _cells(self, i):
         """Slice of the elements of the i-th rod."""

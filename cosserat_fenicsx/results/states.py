@@ -8,6 +8,7 @@ from typing import Self
 import numpy as np
 from mpi4py import MPI
 
+from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.results.on_nodes import OnNodes
 from cosserat_fenicsx.scene.describe import unpicklable
 
@@ -83,20 +84,31 @@ class States(OnNodes):
 
         Raises:
             IndexError: there is no state k.
+            SceneError: k is no whole number.
         """
         if isinstance(k, slice):
             return self.at_points(list(range(len(self))[k]))
-        if not -len(self) <= k < len(self):
-            raise IndexError(f"[{k}]: expected the number of a {self.axis}, from 0 to {len(self) - 1}")
-        return self.at_points([k])
+        return self.at_points([self._index(k, f"[{k!r}]")])
 
     def at_points(self, which: Sequence[int] | np.ndarray) -> Self:
         """The result with some of its states only.
 
         Args:
             which: their indices.
+
+        Raises:
+            IndexError, SceneError: as of `result[k]`.
         """
-        return self._with([self._records[k] for k in which])
+        return self._with([self._records[self._index(k, f"at_points([{k!r}])")] for k in which])
+
+    def _index(self, k, where):
+        """The index k of a state, checked; `where` for messages."""
+        expected = f"expected the index of a {self.axis}, a whole number from {-len(self)} to {len(self) - 1}"
+        if isinstance(k, bool | np.bool_) or not hasattr(k, "__index__"):
+            raise SceneError(f"{where}: {expected}")
+        if not -len(self) <= k < len(self):
+            raise IndexError(f"{where}: {expected}")
+        return k
 
     def _with(self, records):
         """A copy with other states."""

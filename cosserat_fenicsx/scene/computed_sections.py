@@ -39,8 +39,9 @@ def arguments_of(section, material, line, unit):
         ) from None
     line = np.array(centroid if line is None else vector(_WHERE, "line", line, "its coordinates in the section", 2))
     skew = abs(found.product) > _SKEW * max(found.about)
+    shear, coupling = _principal_shear(found, angle) if skew else (found.shear, 0.0)
     arguments = {
-        "shear": found.principal_shear if skew else found.shear,
+        "shear": shear,
         "axial": found.axial,
         "bending": tuple(EI * unit**2 for EI in (found.principal if skew else found.about)),
         "torsion": found.torsion * unit**2,
@@ -53,12 +54,24 @@ def arguments_of(section, material, line, unit):
         if np.abs(away).max() > _OFFSET * radius:
             turned = np.array([[math.cos(angle), math.sin(angle)], [-math.sin(angle), math.cos(angle)]]) if skew else 1
             offsets[name] = tuple((unit * (turned @ away if skew else away)).tolist())
-    if found.mass is not None and "centroid" not in offsets:
+    heavy = centroid if found.heaviness is not None else _centre_of_mass(section)
+    if found.mass is not None and heavy is not None and np.abs(heavy - line).max() <= _OFFSET * radius:
         arguments["mass"] = found.mass / unit
         if found.heaviness is not None and not skew:
             first, second = (found.heaviness * EI * unit for EI in found.about)
             arguments["inertia"] = (first, second, first + second)
-    return arguments | offsets | ({"angle": angle} if skew else {})
+    return arguments | offsets | ({"angle": angle, "shear_coupling": coupling} if skew else {})
+
+
+def _principal_shear(found, angle):
+    """GA along the principal axes of bending, which are not those of shear, and their coupling.
+
+    The flexibilities along both pairs of axes are the diagonals of one tensor, which gives its product term.
+    """
+    (x, y), (one, two) = 1 / np.array(found.shear), 1 / np.array(found.principal_shear)
+    product = (math.cos(2 * angle) * (one - two) - (x - y)) / (2 * math.sin(2 * angle))
+    stiff = np.linalg.inv([[one, product], [product, two]])
+    return (stiff[0, 0], stiff[1, 1]), stiff[0, 1]
 
 
 def _of_shape(section, material, unit):
@@ -105,6 +118,15 @@ def _with_materials(section, material):
         section.get_mass(),
         heaviness.pop() if len(heaviness) == 1 else None,
     )
+
+
+def _centre_of_mass(section):
+    """Of a section whose materials differ in density over E, from its regions; None where they are not known."""
+    parts = getattr(getattr(section, "geometry", None), "geoms", None)
+    if not parts:
+        return None
+    masses = [part.material.density * part.geom.area for part in parts]
+    return np.average([(part.geom.centroid.x, part.geom.centroid.y) for part in parts], axis=0, weights=masses)
 
 
 def _outline(section, line, unit):

@@ -36,6 +36,13 @@ class Stiffnesses(namedtuple("Stiffnesses", "K J mass inertia matrix", defaults=
             return np.eye(2) / self.J[..., None, :2]
         return inverse(self.matrix)[..., 3:5, 3:5]
 
+    def contact(self, e, k):
+        """n and m (..., 3) of strains e and k, all material; without the forces of infinite stiffnesses."""
+        if self.matrix is None:
+            return np.where(np.isinf(self.K), 0.0, self.K) * e, self.J * k
+        both = np.einsum("...ij,...j->...i", self.matrix, np.concatenate([e, k], axis=-1))
+        return both[..., :3], both[..., 3:]
+
     def strains(self, n, m):
         """The strains v - v_R and u - u_R, (..., 3) each, for contact forces n and moments m (..., 3), all material."""
         if self.matrix is None:

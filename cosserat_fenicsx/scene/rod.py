@@ -18,6 +18,8 @@ from cosserat_fenicsx.scene.profiles import Section, SectionOfLength, Sections, 
 from cosserat_fenicsx.scene.sections import Stiffness
 
 _unnamed = itertools.count(1)
+# Rods that a message lists.
+_NAMED = 8
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,7 +147,8 @@ def station_named(where, text, rods):
     Raises:
         SceneError: it is none of these, or no rod has this name, or it lies beyond its rod.
     """
-    expected = "expected 'rod.start', 'rod.end' or 'rod@s' with s in m"
+    known = ", ".join([*rods][:_NAMED]) + (", ..." if len(rods) > _NAMED else "")
+    expected = f"expected 'rod.start', 'rod.end' or 'rod@s' with s in m and the rod one of {known}"
     if not isinstance(text, str):
         raise SceneError(f"{where} = {text!r}: {expected}")
     if "@" in text:

@@ -4,9 +4,12 @@ Dimensions: EN 10365 (Euronorm 19-57 and 53-62), in rolled_profiles.csv. The rad
 flanges counts in all properties.
 
 - Area and second moments: sums over web, flanges and fillets, exact.
-- Torsion constant: El Darwish & Johnston, J. Struct. Div. ASCE 91 (1965) ST1, 203, as in the tables of EN 10365.
+- Torsion constant: El Darwish & Johnston, J. Struct. Div. ASCE 91 (1965) ST1, 203, as in the tables of EN 10365; -2.4
+  to +4.3 % from finite elements.
 - Shear areas: I^2/(integral of S^2/t), with the shear flow V S/I of Jourawski over the thickness t, in the flanges
-  along both axes. Within 5 % of finite elements.
+  along both axes. They are those of Timoshenko's stiffness, V^2/(2 G A_s) the energy, and not the areas A_v of EN 1993
+  for the resistance to shear. Poisson's ratio is not in them. Of ten sizes they are 3 to 5 % above finite elements
+  along d_1 with nu = 0, and up to 6.6 % with nu = 0.3; along d_2 0 to 4.4 % with either.
 """
 
 import csv
@@ -24,6 +27,7 @@ from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.quadrature import gauss
 from cosserat_fenicsx.scene.materials import Material
 from cosserat_fenicsx.scene.sections import Stiffness
+from cosserat_fenicsx.scene.stresses import Stress
 
 _TABLE = Path(__file__).with_name("rolled_profiles.csv")
 _POINTS = 24  # Gauss points per piece of the integrals of shear areas
@@ -53,7 +57,8 @@ class Profile:
 
     Attributes:
         height, width, web, flange, fillet: h, b, t_w, t_f, r, m.
-        area: m^2. second_moments: about d_1 and d_2, m^4. torsion_constant: m^4. shear_areas: along d_1 and d_2, m^2.
+        area: m^2. second_moments: about d_1 and d_2, m^4. torsion_constant: m^4. shear_areas: along d_1 and d_2, m^2,
+            of Timoshenko's stiffness, which are not A_v of EN 1993.
 
     Raises:
         SceneError: an unknown name, with those that are near.
@@ -150,8 +155,12 @@ class Profile:
         )
 
     def stresses(self, material, force, moment):
-        """None: those of rolled profiles are not computed."""
-        return None
+        """The `Stress` for contact forces and moments (..., 3), N and N m, along d_1, d_2, d_3: normal stresses at the
+        flanges' edges; von Mises stresses are NaN, since shear stresses of rolled profiles are not computed."""
+        I1, I2 = self.second_moments
+        axial = force[..., 2] / self.area
+        bending = np.abs(moment[..., 0]) * self.height / (2 * I1) + np.abs(moment[..., 1]) * self.width / (2 * I2)
+        return Stress(np.full_like(axial, np.nan), axial + bending, axial - bending)
 
 
 def _flow(pieces):
@@ -179,6 +188,9 @@ def _near(name):
     series, size = name[:3], name[3:]
     sizes = [int(known.split()[1]) for known in _table() if known.startswith(f"{series} ")]
     if not sizes or not size.isdigit():
-        return "expected IPE, HEA, HEB or HEM with its size, such as 'IPE 200'"
+        return (
+            "expected IPE, HEA, HEB or HEM with its size, such as 'IPE 200'; other series, such as IPE A, HE AA "
+            "and UPN, are not in the table: see Stiffness.from_section"
+        )
     near = sorted(sorted(sizes, key=lambda known: abs(known - int(size)))[:3])
     return f"did you mean {' or '.join(f'{series} {known}' for known in near)}?"

@@ -246,9 +246,9 @@ def _section(where, entry):
 
 
 def _one_section(where, entry):
-    """A section; a `Stiffness` with a centroid, a shear centre or an angle is that of `Stiffness.offset`."""
-    given = dict(_table(where, entry))
-    if given.get("type") != "Stiffness" or given.keys().isdisjoint({"centroid", "shear_centre", "angle"}):
+    """A section; a `Stiffness` with an argument that `Stiffness.offset` alone has is made by it."""
+    given, offsets = dict(_table(where, entry)), {"centroid", "shear_centre", "angle", "shear_coupling"}
+    if given.get("type") != "Stiffness" or given.keys().isdisjoint(offsets):
         return _build(where, entry, SECTIONS, {})
     del given["type"]
     arguments = inspect.signature(Stiffness.offset).parameters.keys() - {"others"}

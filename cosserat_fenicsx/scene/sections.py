@@ -91,6 +91,7 @@ class Stiffness:
         centroid: Numbers = (0.0, 0.0),
         shear_centre: Numbers = (0.0, 0.0),
         angle: float = 0.0,
+        shear_coupling: float = 0.0,
         **others: Any,
     ) -> "Stiffness":
         """A section whose centroid and shear centre are off the rod's line.
@@ -105,6 +106,8 @@ class Stiffness:
                 axes through the centroid.
             centroid, shear_centre: (x1, x2) along the principal axes, m, from the rod's line.
             angle: of the first principal axis, from d_1 towards d_2, rad.
+            shear_coupling: GA12, N: the shear force along one axis per shear along the other; zero where the section is
+                symmetric.
             others: mass, outline and inertia as of `Stiffness`, along d_1 and d_2.
 
         Raises:
@@ -118,12 +121,14 @@ class Stiffness:
             for field, place in (("centroid", centroid), ("shear_centre", shear_centre))
         )
         angle = number("Stiffness.offset", "angle", angle, "a number (rad)", math.isfinite)
+        coupling = number("Stiffness.offset", "shear_coupling", shear_coupling, "a number (N)", math.isfinite)
         cos, sin = math.cos(angle), math.sin(angle)
         strains, turn = np.eye(6), np.kron(np.eye(2), [[cos, sin, 0], [-sin, cos, 0], [0, 0, 1]])
         strains[:3, 3:] = [[0, 0, -s2], [0, 0, s1], [c2, -c1, 0]]
         strains = strains @ turn  # rotated to the principal axes, then taken at the two points
-        stiffnesses = (*given.shear, given.axial, *given.bending, given.torsion)
-        return cls(matrix=(strains.T * stiffnesses @ strains).tolist(), **others)
+        diagonal = np.diag((*given.shear, given.axial, *given.bending, given.torsion))
+        diagonal[0, 1] = diagonal[1, 0] = coupling
+        return cls(matrix=(strains.T @ diagonal @ strains).tolist(), **others)
 
     @classmethod
     def from_section(
@@ -142,8 +147,10 @@ class Stiffness:
             unit: the section's unit of length, m, such as 1e-3 for mm; its Young's moduli have N per square of it, its
                 densities kg per cube of it.
 
-        Mass is left out where the line is not through the centroid, and inertia also where the principal axes are
-        turned, or the materials differ in density over E: `Weight` or motions need them, and refuse such a section.
+        Mass is left out where the line is not through the centre of mass (where materials differ in density over E, it
+        is not the centroid; it is taken from the regions of `section.geometry`), and inertia also where the principal
+        axes are turned, or the materials differ in density over E: `Weight` or motions need them, and refuse such a
+        section.
 
         Raises:
             SceneError: not such a section, an analysis that is missing, or materials that differ in Poisson's ratio.

@@ -1,10 +1,10 @@
-"""Stresses on the outline of sections, by Saint-Venant's theory of tension, bending, torsion and flexure.
+"""Stresses of sections, by Saint-Venant's theory of tension, bending, torsion and flexure.
 
-Shear stresses are exact for long rods: torsion and flexure of a rectangle by their series (Timoshenko & Goodier, Theory
-of Elasticity, 3rd ed., articles 109 and 124), flexure of circle and tube by Love's solution (Mathematical Theory of
-Elasticity, 4th ed., article 230). They are of the same theory as Cowper's shear factors. Stresses are per area of the
-reference; the small effect of the curvature of a curved rod on its section is left out, and so are stresses near point
-loads and supports.
+Shear stresses are exact for long rods, inside the section and on its outline: torsion and flexure of a rectangle by
+their series (Timoshenko & Goodier, Theory of Elasticity, 3rd ed., articles 109 and 124), flexure of circle and tube by
+Love's solution (Mathematical Theory of Elasticity, 4th ed., article 230). They are of the same theory as Cowper's shear
+factors. Stresses are per area of the reference; the small effect of the curvature of a curved rod on its section is
+left out, and so are stresses near point loads and supports.
 """
 
 import functools
@@ -12,24 +12,24 @@ from collections import namedtuple
 
 import numpy as np
 
-#: Stresses at sections (...), Pa. von_mises: the largest on the outline, sqrt(sigma^2 + 3 tau^2); axial_max, axial_min:
+#: Stresses at sections (...), Pa. von_mises: the largest of the section, sqrt(sigma^2 + 3 tau^2); axial_max, axial_min:
 #: the largest and the smallest normal stress sigma of the section, tension positive.
 Stress = namedtuple("Stress", "von_mises axial_max axial_min")
 
-# Iterations of Newton's method for the largest von Mises stress around a circle.
-_ITERATIONS = 6
+# Iterations of Newton's method for the largest von Mises stress around a circle, and intervals of the radius.
+_ITERATIONS, _RINGS = 6, 8
 # Rows of forces and moments whose stresses at all fibres are in the processor's cache.
-_BLOCK = 512
-# Intervals of every side of a rectangle, and terms of its series.
-_INTERVALS, _TERMS = 24, 300
+_BLOCK = 256
+# Intervals of every side of a rectangle, places near each corner beside, of both every third inside; terms of series.
+_INTERVALS, _NEAR, _INSIDE, _TERMS = 24, 12, 3, 300
 
 
 class Fibres:
-    """Places on the outline of a section, and the stresses there per force and moment.
+    """Places in a section, and the stresses there per force and moment.
 
     Args:
         normal: (places, 3) normal stress per contact force along d_3 (1/m^2), and per moment about d_1 and d_2 (1/m^3).
-        shear: (places, 3) shear stress along the outline, counterclockwise, per contact force along d_1 and d_2
+        shear: (2, places, 3) shear stress along two directions at right angles, per contact force along d_1 and d_2
             (1/m^2), and per moment about d_3 (1/m^3).
     """
 
@@ -43,39 +43,52 @@ class Fibres:
         return Stress(*np.concatenate(parts, axis=1).reshape(3, *shape))
 
     def _stress(self, rows):
-        sigma, tau = rows[:, 2:5] @ self.normal.T, rows[:, [0, 1, 5]] @ self.shear.T
+        sigma = rows[:, 2:5] @ self.normal.T
         most, least = sigma.max(axis=1), sigma.min(axis=1)
-        return np.array([np.sqrt((np.square(sigma, out=sigma) + 3 * np.square(tau, out=tau)).max(axis=1)), most, least])
+        square = np.square(sigma, out=sigma)
+        for direction in self.shear:
+            tau = rows[:, [0, 1, 5]] @ direction.T
+            square += 3 * np.square(tau, out=tau)
+        return np.array([np.sqrt(square.max(axis=1)), most, least])
 
 
 def round_stress(outer, inner, nu, force, moment):
-    """The `Stress` of a tube or, with `inner` = 0, of a circle, on its outer circumference.
+    """The `Stress` of a tube or, with `inner` = 0, of a circle.
 
-    At the angle theta from d_1, sigma = n_3/A + R (m_1 sin theta - m_2 cos theta)/I, and
-    tau = R m_3/J + c (n_2 cos theta - n_1 sin theta)/I.
+    Von Mises stresses are taken on rings from the inner radius, or the centre, to the outer one. Of a circle they may
+    be larger by 0.3 % between them.
+
+    At the angle theta from d_1 and the radius r, sigma = n_3/A + r (m_1 sin theta - m_2 cos theta)/I,
+    tau_theta = r m_3/J + c (n_2 cos theta - n_1 sin theta)/I and tau_r = e (n_1 cos theta + n_2 sin theta)/I.
 
     Args:
         outer, inner: radii, m; nu: Poisson's ratio.
         force, moment: (..., 3), N and N m, along d_1, d_2, d_3.
     """
     A, I = np.pi * (outer**2 - inner**2), np.pi * (outer**4 - inner**4) / 4
-    c = ((3 + 2 * nu) * inner**2 + (1 + 2 * nu) * outer**2) / (4 * (1 + nu))
-    n, m = force, moment
-    sigma = n[..., 2] / A, -m[..., 1] * (outer / I), m[..., 0] * (outer / I)
-    tau = m[..., 2] * (outer / (2 * I)), n[..., 1] * (c / I), -n[..., 0] * (c / I)
-    bending = np.hypot(sigma[1], sigma[2])
-    return Stress(_largest_around(sigma, tau), sigma[0] + bending, sigma[0] - bending)
+    n, m = force[..., None], moment[..., None]  # the last axis: rings
+    r = np.linspace(inner, outer, _RINGS + 1)
+    bore = (outer * inner / r) ** 2 if inner else 0.0
+    c = ((3 + 2 * nu) * (outer**2 + inner**2 + bore) - (1 - 2 * nu) * r**2) / (8 * (1 + nu))
+    e = (3 + 2 * nu) * (outer**2 + inner**2 - bore - r**2) / (8 * (1 + nu))
+    sigma = n[..., 2, :] / A, -m[..., 1, :] * (r / I), m[..., 0, :] * (r / I)
+    around = m[..., 2, :] * (r / (2 * I)), n[..., 1, :] * (c / I), -n[..., 0, :] * (c / I)
+    outwards = 0.0, n[..., 0, :] * (e / I), n[..., 1, :] * (e / I)
+    bending = np.hypot(moment[..., 0], moment[..., 1]) * (outer / I)
+    axial = force[..., 2] / A
+    return Stress(_largest_around(sigma, around, outwards).max(axis=-1), axial + bending, axial - bending)
 
 
-def _largest_around(sigma, tau):
-    """The maximum over theta of sqrt(sigma^2 + 3 tau^2), each given by its mean and factors of cos and sin.
+def _largest_around(sigma, *taus):
+    """The maximum over theta of sqrt(sigma^2 + 3 sum of tau^2), each given by its mean and factors of cos and sin.
 
     The square is c + a cos x + b cos(2 (x - y)) with a, b >= 0, x from the largest place of the first wave and y, in
     [-pi/2, pi/2], the nearest largest place of the second one. Its only maximum from 0 to y is the largest of all.
     """
     mean, first_cos, first_sin, second_cos, second_sin = sum(
-        factor * np.array([p * p + (q * q + r * r) / 2, 2 * p * q, 2 * p * r, (q * q - r * r) / 2, q * r])
-        for factor, (p, q, r) in ((1.0, sigma), (3.0, tau))
+        factor
+        * np.array(np.broadcast_arrays(p * p + (q * q + r * r) / 2, 2 * p * q, 2 * p * r, (q * q - r * r) / 2, q * r))
+        for factor, (p, q, r) in ((1.0, sigma), *((3.0, tau) for tau in taus))
     )
     a, b = np.hypot(first_cos, first_sin), np.hypot(second_cos, second_sin)
     y = np.arctan2(second_sin, second_cos) / 2 - np.arctan2(first_sin, first_cos)
@@ -90,48 +103,68 @@ def _largest_around(sigma, tau):
 
 @functools.lru_cache(maxsize=64)
 def rectangle_fibres(width, height, nu, torsion):
-    """The `Fibres` of a rectangle: its corners and places of all sides. Between them von Mises stresses may be larger
-    by 0.2 %.
+    """The `Fibres` of a rectangle: corners, places of all sides, denser near the corners, and places inside.
+
+    Between them von Mises stresses may be larger by 0.7 % (sides of 1:1 to 1:300, nu from 0 to 0.49), commonly 0.1 %.
 
     Args:
         width, height: along d_1 and d_2, m; nu: Poisson's ratio; torsion: Saint-Venant's constant, m^4.
     """
-    a, b, along = width / 2, height / 2, np.linspace(-1, 1, _INTERVALS + 1)
+    a, b = width / 2, height / 2
     A, I1, I2 = 4 * a * b, 4 * a * b**3 / 3, 4 * b * a**3 / 3
-    across, beside, twist = _side(a, b, nu, along)
-    right = np.column_stack([across / I2, beside / I1, twist / torsion])
-    across, beside, twist = _side(b, a, nu, along)
-    top = np.column_stack([-beside / I2, -across / I1, twist / torsion])
-    x = np.concatenate([np.full_like(along, a), a * along])
-    y = np.concatenate([b * along, np.full_like(along, b)])
-    normal = np.column_stack([np.full_like(x, 1 / A), y / I1, -x / I2])
-    shear = np.concatenate([right, top])
-    # stresses at opposite places, where x, y and the direction along the outline are reversed
-    return Fibres(np.concatenate([normal, normal * [1, -1, -1]]), np.concatenate([shear, shear * [-1, -1, 1]]))
+    (x, x_inside), (y, y_inside) = _places(a, min(a, b)), _places(b, min(a, b))
+    if a <= b:
+        shear = _shear(a, b, nu, x, y)
+    else:  # mirrored, which reverses torsion
+        shear = _shear(b, a, nu, y, x)[[1, 0, 2]][:, ::-1].swapaxes(2, 3) * np.array([1, 1, -1])[:, None, None, None]
+    kept = (np.abs(x) == a)[:, None] | (np.abs(y) == b) | (x_inside[:, None] & y_inside)
+    shear = np.moveaxis(shear[:, :, kept], 0, -1) / [I2, I1, torsion]
+    x, y = (values[kept] for values in np.meshgrid(x, y, indexing="ij"))
+    return Fibres(np.column_stack([np.full_like(x, 1 / A), y / I1, -x / I2]), shear)
 
 
-def _side(a, b, nu, along):
-    """Shear stresses along the side x = a, towards positive y, of a rectangle |x| <= a, |y| <= b.
+def _places(a, short):
+    """Places from -a to a, denser over the length 5 `short` at the ends, and whether each is one of those inside."""
+    corner = 1 - 5 * short / a * np.linspace(0, 1, _NEAR + 1)[1:] ** 1.5
+    half = np.unique(np.round(np.concatenate([np.linspace(0, 1, _INTERVALS // 2 + 1), corner[corner > 0]]), 9))
+    inside = np.arange(1 - len(half), len(half)) % _INSIDE == 0
+    return a * np.concatenate([-half[:0:-1], half]), inside
 
-    Args:
-        along: y/b.
+
+def _shear(a, b, nu, x, y):
+    """Shear stresses of a rectangle |x| <= a, |y| <= b with a <= b, at all pairs of x and y.
+
+    The series are those with hyperbolic functions of y, which converge fast save at the short sides.
 
     Returns:
-        Three arrays: per force along x, times the second moment of area for its bending (m^2); the same for a force
-        along y; per moment, times the torsion constant (m).
+        (3, 2, x, y): per force along x, times the second moment of area for its bending (m^2); the same for a force
+        along y; per moment, times the torsion constant (m); of each the components along x and y.
     """
-    y, n = b * along, np.arange(1, _TERMS + 1)[:, None]
-    poisson, odd = nu / (1 + nu), 2 * n - 1
-    waves = (-1.0) ** n / n**2 * np.sin(n * np.pi * along) * np.tanh(n * np.pi * a / b)
-    across = poisson * 2 * b**2 / np.pi**2 * waves.sum(axis=0)
-    cosh = _cosh_ratio(n * np.pi * y / a, n * np.pi * b / a) / n**2
-    beside = (b**2 - y**2) / 2 + poisson * a**2 * (1 / 3 - 2 / np.pi**2 * cosh.sum(axis=0))
-    cosh = _cosh_ratio(odd * np.pi * y / (2 * a), odd * np.pi * b / (2 * a)) / odd**2
-    twist = 2 * a - 16 * a / np.pi**2 * cosh.sum(axis=0)
-    corner = np.abs(along) == 1  # no shear stress; the series converge slowly there
-    return tuple(np.where(corner, 0.0, values) for values in (across, beside, twist))
+    n, poisson = np.arange(1, _TERMS + 1), nu / (1 + nu)
+    sign, odd = -((-1.0) ** n), 2 * n - 1
+    # odd waves: 1 at x = 0; whole waves: zero slope at x = a
+    p, q = odd * np.pi / (2 * a), n * np.pi / a
+    (sin, cos), (sin_whole, cos_whole) = ((np.sin(np.outer(x, k)), np.cos(np.outer(x, k))) for k in (p, q))
+    grow, even, sinh_b = _hyperbolic(p, y, b)
+    grow_whole, even_whole, _ = _hyperbolic(q, y, b)
+    across = 2 * b / a * sign / p**2, 2 * a * sign / (q * a) ** 2 * a, 4 / a * sign / p**2
+    x, y = x[:, None], y[None, :]
+    along_x = (
+        (1 - poisson) * (a**2 - x**2) / 2 + poisson * (cos * across[0]) @ (even / sinh_b),
+        poisson * ((sin * across[0]) @ (grow / sinh_b) - x * y),
+    )
+    along_y = (
+        -poisson * (sin_whole * across[1]) @ grow_whole,
+        (b**2 - y**2) / 2 + poisson * ((cos_whole * across[1]) @ even_whole - (a**2 - 3 * x**2) / 6),
+    )
+    twist = -(cos * across[2]) @ grow, 2 * x - (sin * across[2]) @ even
+    found = np.array([along_x, along_y, twist])
+    found[:, 1, :, np.abs(y[0]) == b] = 0.0  # where the series converge slowly
+    return found
 
 
-def _cosh_ratio(x, at_end):
-    """cosh(x)/cosh(at_end) for |x| <= at_end, however large."""
-    return np.exp(np.abs(x) - at_end) * (1 + np.exp(-2 * np.abs(x))) / (1 + np.exp(-2 * at_end))
+def _hyperbolic(k, y, b):
+    """sinh(k y)/cosh(k b), cosh(k y)/cosh(k b) (waves, places) for |y| <= b, however large; and tanh(k b)."""
+    k = k[:, None]
+    decay, far = np.exp(k * (np.abs(y) - b)) / (1 + np.exp(-2 * k * b)), np.exp(-2 * k * np.abs(y))
+    return np.sign(y) * decay * (1 - far), decay * (1 + far), np.tanh(k * b)

@@ -92,7 +92,9 @@ class StoredHistory(History):
         """A `History` in memory of the states at the indices `which`."""
         part = History.__new__(History)
         mine = {name: value for name, value in vars(self).items() if name not in ("folder", "_file", "_done")}
-        vars(part).update(mine, _expanded=[self._records[k] for k in which], _appended=[])
+        vars(part).update(
+            mine, _expanded=[self._records[self._index(k, f"at_points([{k!r}])")] for k in which], _appended=[]
+        )
         return part
 
     def __copy__(self):
