@@ -19,7 +19,7 @@ from cosserat_fenicsx.models.connections import Connections
 from cosserat_fenicsx.models.rodmesh import Layout
 from cosserat_fenicsx.models.scales import Scales
 from cosserat_fenicsx.dynamics.time_loop import TimeLoop
-from cosserat_fenicsx.results import saved
+from cosserat_fenicsx.results.export import saved
 from cosserat_fenicsx.results.history import History
 from cosserat_fenicsx.storage.runfolder import RunFolder
 from cosserat_fenicsx.scene.scene import Scene

@@ -18,7 +18,7 @@ from cosserat_fenicsx.pictures.drawing import add_body, at_rest, frame, load_pyv
 from cosserat_fenicsx.pictures.labels import plain
 from cosserat_fenicsx.progress import Progress
 from cosserat_fenicsx.ranks import on_first
-from cosserat_fenicsx.results.beside import replaced
+from cosserat_fenicsx.results.export.beside import replaced
 
 #: Default frames per second, and width and height in pixels.
 FPS, SIZE = 25, (960, 720)

@@ -3,7 +3,7 @@
 import io
 from pathlib import Path
 
-from cosserat_fenicsx.results.beside import replaced
+from cosserat_fenicsx.results.export.beside import replaced
 
 
 def save(figure, file):

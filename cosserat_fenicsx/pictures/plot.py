@@ -23,7 +23,7 @@ from cosserat_fenicsx.pictures.figures import save
 from cosserat_fenicsx.pictures.labels import Labels, plain
 from cosserat_fenicsx.pictures.signs import Deformed, Resting, signs_of, without_sign
 from cosserat_fenicsx.ranks import on_first
-from cosserat_fenicsx.results.beside import replaced
+from cosserat_fenicsx.results.export.beside import replaced
 
 # Smallest visible displacement as a share of the extent of the drawing.
 _VISIBLE = 0.01

@@ -14,7 +14,7 @@ from cosserat_fenicsx.pictures.animation import MOST_FRAMES, check_name, pixels,
 from cosserat_fenicsx.pictures.drawing import body_of, frame, load_pyvista, points_of, surface_of, thickening
 from cosserat_fenicsx.pictures.view import view_of
 from cosserat_fenicsx.ranks import on_first
-from cosserat_fenicsx.results.beside import replaced
+from cosserat_fenicsx.results.export.beside import replaced
 from cosserat_fenicsx.results.shapes import require_modes
 
 # Panels of a picture, and in a row of it.

@@ -8,7 +8,7 @@ import numpy as np
 from cosserat_fenicsx.annotations import File
 from cosserat_fenicsx.checks import instance
 from cosserat_fenicsx.quaternions import directors
-from cosserat_fenicsx.results.exports import Exports
+from cosserat_fenicsx.results.export.exports import Exports
 from cosserat_fenicsx.results.extremes import Extremes
 from cosserat_fenicsx.results.fields import fields_at
 from cosserat_fenicsx.results.reactions import Reactions
@@ -215,7 +215,7 @@ class Result(Exports, Extremes, Reactions, Stresses, States):
             OSError: the file cannot be written.
             SceneError: an unknown format, or an option that it does not have.
         """
-        from cosserat_fenicsx.results import files
+        from cosserat_fenicsx.results.export import files
 
         files.write(self, file, k, rod=rod, station=station)
 

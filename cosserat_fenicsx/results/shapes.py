@@ -168,7 +168,7 @@ class Shapes(OnNodes):
             OSError: the file cannot be written.
             SceneError: an unknown format, or no mode.
         """
-        from cosserat_fenicsx.results import shape_files
+        from cosserat_fenicsx.results.export import shape_files
 
         shape_files.write(self, file, k)
 

@@ -211,7 +211,8 @@ class Scene:
         """Warnings about Young's moduli that may be in wrong units."""
         soft = {rod.material.E for rod in self.rods if rod.material is not None and rod.material.E < _SOFTEST}
         return [
-            f"E = {E:g} Pa is softer than most rubbers: are the units SI (N, m, Pa; steel has 210e9)?" for E in sorted(soft)
+            f"E = {E:g} Pa is softer than most rubbers: are the units SI (N, m, Pa; steel has 210e9)?"
+            for E in sorted(soft)
         ]
 
     def _thickness(self):

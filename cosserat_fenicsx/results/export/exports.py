@@ -5,7 +5,7 @@ from typing import Any
 from cosserat_fenicsx.annotations import File
 from cosserat_fenicsx.errors import InstallationError, SceneError
 from cosserat_fenicsx.ranks import on_first
-from cosserat_fenicsx.results import columns, contents
+from cosserat_fenicsx.results.export import columns, contents
 from cosserat_fenicsx.results.on_nodes import OnNodes
 from cosserat_fenicsx.scene.rod import RodOrName, StationOrName
 
@@ -17,7 +17,7 @@ class Exports(OnNodes):
         """Write all of the result to one HDF5 file, from which `read_path` or `read_history` makes it again.
 
         Every query then gives the same digits. Other programs find, with units, what belongs to every state in the
-        root, and fields along each rod in rods/<name>, see `results.saved`. An old file is replaced once the new one is
+        root, and fields along each rod in rods/<name>, see `results.export.saved`. An old file is replaced once the new one is
         complete.
 
         Raises:
@@ -25,7 +25,7 @@ class Exports(OnNodes):
             SceneError: an empty result, or a scene with functions written in Python, or with actions of your own,
                 which are code: no file holds any.
         """
-        from cosserat_fenicsx.results import saved
+        from cosserat_fenicsx.results.export import saved
 
         _refuse_empty(self, "save")
         on_first(self.comm, lambda: saved.save(self, file))
@@ -98,7 +98,7 @@ class Exports(OnNodes):
         return xarray.DataTree.from_dict(tree)
 
     def _repr_html_(self):
-        from cosserat_fenicsx.results.notebook import as_html
+        from cosserat_fenicsx.results.export.notebook import as_html
 
         return as_html(self)
 

@@ -4,7 +4,7 @@ from pathlib import Path
 
 from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.ranks import on_first
-from cosserat_fenicsx.results import columns, xdmf
+from cosserat_fenicsx.results.export import columns, xdmf
 
 
 def _page(result, file, k=None):

@@ -10,9 +10,9 @@ from xml.etree import ElementTree as xml
 import numpy as np
 
 from cosserat_fenicsx.errors import SceneError
-from cosserat_fenicsx.results.arrays import arrays_in
-from cosserat_fenicsx.results.beside import replaced
-from cosserat_fenicsx.results.quantities import FIELDS as QUANTITIES
+from cosserat_fenicsx.results.export.arrays import arrays_in
+from cosserat_fenicsx.results.export.beside import replaced
+from cosserat_fenicsx.results.export.quantities import FIELDS as QUANTITIES
 from cosserat_fenicsx.scene.stresses import Stress
 
 #: Names in the files, as in eq. (1), and the fields of `Path.fields` behind them.

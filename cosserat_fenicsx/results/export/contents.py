@@ -5,7 +5,7 @@ from collections import namedtuple
 import numpy as np
 
 from cosserat_fenicsx.errors import SceneError
-from cosserat_fenicsx.results.quantities import FIELDS, OF_HISTORY, OF_PATH, Quantity
+from cosserat_fenicsx.results.export.quantities import FIELDS, OF_HISTORY, OF_PATH, Quantity
 from cosserat_fenicsx.scene.describe import describe
 
 #: dims: names of the dimensions of `values`, the components included; attributes: texts by names, such as units.

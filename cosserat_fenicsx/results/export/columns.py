@@ -5,8 +5,8 @@ import csv
 import numpy as np
 
 from cosserat_fenicsx.errors import SceneError
-from cosserat_fenicsx.results.beside import replaced
-from cosserat_fenicsx.results.quantities import FIELDS, headings
+from cosserat_fenicsx.results.export.beside import replaced
+from cosserat_fenicsx.results.export.quantities import FIELDS, headings
 from cosserat_fenicsx.results.tables import most_displaced
 
 _ENERGIES = ("kinetic", "strain", "work", "dissipated", "balance")

@@ -6,10 +6,10 @@ import numpy as np
 
 from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.ranks import on_first
-from cosserat_fenicsx.results.beside import replaced
-from cosserat_fenicsx.results.columns import write_columns
+from cosserat_fenicsx.results.export.beside import replaced
+from cosserat_fenicsx.results.export.columns import write_columns
+from cosserat_fenicsx.results.export.xdmf import write_blocks
 from cosserat_fenicsx.results.shapes import require_modes
-from cosserat_fenicsx.results.xdmf import write_blocks
 
 _UNITS = {
     "displacement": "m",

@@ -1,0 +1,1 @@
+"""Results leave the program: files, tables, dictionaries, other libraries, notebooks."""
