@@ -114,8 +114,12 @@ def _draw(path, points, magnify, colour):
     bodies = {(k, rod): swept(path, k, rod, magnify, colour) for k in shown for rod in path.scene.rods}
     everywhere = np.concatenate([*resting, *(body.line for body in bodies.values())])
     size = float(np.ptp(everywhere, axis=0).max())
-    peak = peak_of(path, colour, [body.values for body in bodies.values()])
     factors = {key: thickening(body, size) for key, body in bodies.items()}
+    if points is None and _coincide(bodies, shown, factors):  # they would hide each other's colours
+        shown = shown[-1:]
+        bodies = {key: body for key, body in bodies.items() if key[0] == shown[0]}
+    peak = peak_of(path, colour, [body.values for body in bodies.values()])
+    factors = {key: factors[key] for key in bodies}
     for key, body in bodies.items():
         add_body(plotter, pyvista, body, factors[key], peak, colour=colour)
     for line in resting:
@@ -256,6 +260,13 @@ def _spread(path, most=5):
     way = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(ends, axis=0), axis=1)))
     wanted = np.linspace(0, way[-1], most)
     return sorted({int(np.argmin(np.abs(way - w))) for w in wanted})
+
+
+def _coincide(bodies, shown, factors):
+    """Whether the shapes lie nowhere farther apart than the sections, as they are drawn, are thick."""
+    rods = {rod for _, rod in bodies}
+    apart = max(np.ptp([bodies[k, rod].line for k in shown], axis=0).max() for rod in rods)
+    return apart < 2 * max(factors[key] * body.radius for key, body in bodies.items())
 
 
 def _label(labels, path, shown, bodies):

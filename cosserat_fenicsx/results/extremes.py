@@ -18,6 +18,7 @@ _UNITS = {
     "shear force": "N",
     "tension": "N",
     "compression": "N",
+    "normal stress": "Pa",
     "von Mises stress": "Pa",
 }
 # States that are computed at once.
@@ -46,8 +47,8 @@ class Extremes(OnNodes):
 
         Returns:
             {quantity: `Largest`}, the quantities "bending moment", "twisting moment" (N m), "shear force", "tension",
-            "compression" (N) and, where sections know their shape, "von Mises stress" (Pa, see `stress`), without those
-            that are zero up to rounding.
+            "compression" (N) and, of the rods that know them, "normal stress" (its size) and "von Mises stress" (Pa,
+            see `stress`), without those that are zero up to rounding.
         """
         found = dict.fromkeys(_UNITS, Largest(0.0, None, 0))
         inside = np.linspace(0, 1, _PLACES * self.degree + 1)
@@ -94,23 +95,38 @@ class Extremes(OnNodes):
             "compression": -n[..., 2],
         }
         if rod.profile.shaped:
-            stresses = np.zeros(n.shape[:-1])
+            normal, mises = np.zeros((2, *n.shape[:-1]))
             for places, side in ((slice(0, 1), "right"), (slice(1, None), "left")):  # within the element at jumps
                 flat = (len(which), -1, 3)
                 told = rod.profile.stresses(
                     s[:, places].ravel(), side, n[:, :, places].reshape(flat), m[:, :, places].reshape(flat)
                 )
-                stresses[:, :, places] = np.nan_to_num(told.von_mises).reshape(stresses[:, :, places].shape)
-            sizes["von Mises stress"] = stresses
+                shape = normal[:, :, places].shape
+                normal[:, :, places] = np.nan_to_num(np.maximum(told.axial_max, -told.axial_min)).reshape(shape)
+                mises[:, :, places] = np.nan_to_num(told.von_mises).reshape(shape)
+            sizes |= {"normal stress": normal, "von Mises stress": mises}
         return {what: values.reshape(len(which), -1) for what, values in sizes.items()}
 
 
 def largest_in_words(path):
-    """`Extremes.largest` as a line of text."""
+    """`Extremes.largest` as a line of text, and which rods' stresses it cannot know."""
     where = "time" if path.axis == "time" else path.axis
     unit = " s" if path.axis == "time" else ""
     told = [
         f"{what} {x.size:.4g} {_UNITS[what]} ({x.station}, {where} {path.along_axis[x.point]:.4g}{unit})"
         for what, x in path.largest().items()
     ]
-    return f"Largest on this mesh (tol limits errors of positions only): {'; '.join(told) or 'no force or moment'}."
+    line = f"Largest on this mesh (tol limits errors of positions only): {'; '.join(told) or 'no force or moment'}."
+    return "\n".join([line, *_unknown_in_words(path)])
+
+
+def _unknown_in_words(path):
+    """Sentences on rods of which stresses are not known, where those of others are."""
+    if not path.knows_stresses:
+        return
+    for field, what in (("axial_max", "Stresses"), ("von_mises", "Von Mises stresses")):
+        names = [rod.name for rod in path.scene.rods if np.isnan(path.fields(0, rod)[field]).any()]
+        if names:
+            yield f"{what} of {', '.join(names)} are not computed, or not everywhere: see the sections there."
+        if field == "axial_max" and names:
+            return
