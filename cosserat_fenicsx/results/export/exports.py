@@ -17,8 +17,8 @@ class Exports(OnNodes):
         """Write all of the result to one HDF5 file, from which `read_path` or `read_history` makes it again.
 
         Every query then gives the same digits. Other programs find, with units, what belongs to every state in the
-        root, and fields along each rod in rods/<name>, see `results.export.saved`. An old file is replaced once the new one is
-        complete.
+        root, and fields along each rod in rods/<name>, see `results.export.saved`. An old file is replaced once the new
+        one is complete.
 
         Raises:
             OSError: the file cannot be written; an old one stays.
