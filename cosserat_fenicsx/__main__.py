@@ -1,5 +1,6 @@
 """`cosserat`, and `python -m cosserat_fenicsx`: the command line, which answers to signals from the first moment on."""
 
+import contextlib
 import os
 import sys
 
@@ -18,8 +19,9 @@ def main():
         sys.stderr.write("cosserat: interrupted\n")
         code = 130
     if code == 130:  # at once: Python would end by SIGINT itself where that came during an import in C
-        sys.stdout.flush()
-        sys.stderr.flush()
+        for stream in (sys.stdout, sys.stderr):
+            with contextlib.suppress(OSError):  # the terminal may be gone
+                stream.flush()
         os._exit(code)
     return code
 

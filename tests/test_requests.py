@@ -18,6 +18,7 @@ ROOT = Path(__file__).parent.parent
 DEMO = ROOT / "demos" / "eccentric_cantilever.toml"
 
 
+@pytest.mark.slow
 @pytest.mark.serial
 @pytest.mark.parametrize(("command", "number"), [("buckling", signal.SIGINT), ("modes", signal.SIGTERM)])
 def test_long_eigenproblems_end_soon_after_a_signal(command, number):

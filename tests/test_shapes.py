@@ -261,7 +261,7 @@ def test_a_film_swings_to_both_sides(tmp_path):
     tip = columns[rows == rows.min()].mean()
     other_rows, other_columns = np.nonzero(middle)
     opposite = other_columns[other_rows == other_rows.min()].mean()
-    assert abs(tip - centre) > 10 and tip + opposite == pytest.approx(2 * centre, abs=1.5)
+    assert abs(tip - centre) > 5 and tip + opposite == pytest.approx(2 * centre, abs=1.5)
     mirrored = np.zeros_like(first)
     mirrored[rows, np.clip(np.round(2 * centre - columns).astype(int), 0, 319)] = True
     assert (mirrored & middle).sum() > 0.7 * middle.sum()
