@@ -11,6 +11,7 @@ import platform
 
 import numpy as np
 
+from cosserat_fenicsx import interrupts
 from cosserat_fenicsx.errors import InstallationError
 
 _HOW_TO_INSTALL = (
@@ -28,6 +29,8 @@ try:
     from petsc4py import PETSc
 except ImportError as missing:
     raise InstallationError(f"dolfinx cannot be imported ({missing}). {_HOW_TO_INSTALL}") from missing
+
+interrupts.renew()
 
 _VERSION = tuple(int(part) for part in dolfinx.__version__.split(".")[:2])
 if _VERSION < (0, 5):

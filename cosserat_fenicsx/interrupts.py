@@ -8,6 +8,7 @@ computations, a signal ends what is done at once.
 import contextlib
 import os
 import signal
+import threading
 
 # Time (s) between checks for a requested stop while another thread computes.
 _CHECK_INTERVAL = 0.2
@@ -27,8 +28,16 @@ def listen():
         return
     os.environ["PETSC_OPTIONS"] = f"{os.environ.get('PETSC_OPTIONS', '')} -no_signal_handler"
     for number in _SIGNALS:
-        if signal.getsignal(number) is not signal.SIG_IGN:  # as SIGHUP under nohup
+        if number != signal.SIGHUP or signal.getsignal(number) is not signal.SIG_IGN:  # nohup ignores SIGHUP
             signal.signal(number, _ask)
+
+
+def renew():
+    """Take the signals of `listen` again: MPI or PETSc may have taken some of them when they started."""
+    if threading.current_thread() is threading.main_thread():
+        for number in _SIGNALS:
+            if signal.getsignal(number) is _ask:
+                signal.signal(number, _ask)
 
 
 def ignore():
