@@ -57,7 +57,7 @@ def rods(path, file=None, points=None, magnify=1.0, color="bending_moment"):
         raise SceneError("the path has no point to draw")
     positive("plot", "magnify", magnify, "-")
     colour = colour_of(color, known(path))
-    return _deliver(path.comm, file, lambda: _draw(path, points, magnify, colour))
+    return deliver(path.comm, file, lambda: _draw(path, points, magnify, colour))
 
 
 def scene(scene, file=None):
@@ -76,11 +76,16 @@ def scene(scene, file=None):
     """
     from mpi4py import MPI
 
-    return _deliver(MPI.COMM_WORLD, file, lambda: _draw_scene(scene))
+    return deliver(MPI.COMM_WORLD, file, lambda: _draw_scene(scene))
 
 
-def _deliver(comm, file, draw):
-    """The plotter that `draw` returns, or a .png of it."""
+def deliver(comm, file, draw):
+    """The plotter that `draw()` returns where `file` is None, else a .png of it, written by rank 0.
+
+    Raises:
+        SceneError: a file that is no .png.
+        OSError: the file cannot be written.
+    """
     if file is None:
         return draw()
     file = Path(file)
@@ -117,9 +122,8 @@ def _draw(path, points, magnify, colour):
     factors = {key: thickening(body, size) for key, body in bodies.items()}
     if points is None and _coincide(bodies, shown, factors):  # they would hide each other's colours
         shown = shown[-1:]
-        bodies = {key: body for key, body in bodies.items() if key[0] == shown[0]}
+        bodies, factors = ({key: of[key] for key in of if key[0] == shown[0]} for of in (bodies, factors))
     peak = peak_of(path, colour, [body.values for body in bodies.values()])
-    factors = {key: factors[key] for key in bodies}
     for key, body in bodies.items():
         add_body(plotter, pyvista, body, factors[key], peak, colour=colour)
     for line in resting:

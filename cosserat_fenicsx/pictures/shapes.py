@@ -4,17 +4,15 @@ import math
 import textwrap
 from collections.abc import Collection
 from functools import lru_cache
-from pathlib import Path
 
 import numpy as np
 
 from cosserat_fenicsx.checks import number, positive, refuse
-from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.pictures.animation import MOST_FRAMES, check_name, pixels, record
 from cosserat_fenicsx.pictures.drawing import body_of, frame, load_pyvista, points_of, surface_of, thickening
+from cosserat_fenicsx.pictures.plot import deliver
 from cosserat_fenicsx.pictures.view import view_of
 from cosserat_fenicsx.ranks import on_first
-from cosserat_fenicsx.results.export.beside import replaced
 from cosserat_fenicsx.results.shapes import require_modes
 
 # Panels of a picture, and in a row of it.
@@ -37,22 +35,7 @@ def draw(found, file, which, amplitude):
     if not isinstance(which, Collection) or not 1 <= len(which) <= _MOST_PANELS:
         refuse("plot", "which", which, f"a list of the numbers of one to {_MOST_PANELS} modes")
     shown = [found.number(k) for k in which]
-    if file is None:
-        return _panels(found, shown, amplitude)
-    file = Path(file)
-    if file.suffix != ".png":
-        raise SceneError(f"{file}: expected a name that ends in .png")
-
-    def save():
-        plotter = _panels(found, shown, amplitude)
-        try:
-            with replaced(file) as fresh:
-                plotter.screenshot(str(fresh))
-        finally:
-            plotter.close()
-
-    on_first(found.comm, save)
-    return None
+    return deliver(found.comm, file, lambda: _panels(found, shown, amplitude))
 
 
 def film(found, file, k, *, fps, seconds, cycles, amplitude, size, progress):
@@ -226,4 +209,5 @@ class _Stage:
         return self._plotter.screenshot(return_img=True)
 
     def close(self):
+        self.at.cache_clear()  # the frames and the stage refer to each other
         self._plotter.close()

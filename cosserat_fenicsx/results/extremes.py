@@ -124,9 +124,9 @@ def _unknown_in_words(path):
     """Sentences on rods of which stresses are not known, where those of others are."""
     if not path.knows_stresses:
         return
+    fields = {rod.name: path.fields(0, rod) for rod in path.scene.rods}
     for field, what in (("axial_max", "Stresses"), ("von_mises", "Von Mises stresses")):
-        names = [rod.name for rod in path.scene.rods if np.isnan(path.fields(0, rod)[field]).any()]
+        names = [name for name, values in fields.items() if np.isnan(values[field]).any()]
         if names:
             yield f"{what} of {', '.join(names)} are not computed, or not everywhere: see the sections there."
-        if field == "axial_max" and names:
             return

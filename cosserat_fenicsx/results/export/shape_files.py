@@ -4,11 +4,9 @@ from pathlib import Path
 
 import numpy as np
 
-from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.ranks import on_first
-from cosserat_fenicsx.results.export.beside import replaced
 from cosserat_fenicsx.results.export.columns import write_columns
-from cosserat_fenicsx.results.export.xdmf import write_blocks
+from cosserat_fenicsx.results.export.xdmf import lines_of, write_blocks, write_mesh
 from cosserat_fenicsx.results.shapes import require_modes
 
 _UNITS = {
@@ -41,30 +39,15 @@ def csv_columns(found):
 
 
 def _write(found, file, k):
-    import meshio
-
-    points, lines = _mesh(found)
+    positions = [found.equilibrium.position(rod) for rod in found.scene.rods]
+    points, lines = np.concatenate(positions), lines_of(map(len, positions))
     if file.suffix == ".xdmf":
         block = points, lines, _fields(found, points, slice(None))
         write_blocks(file, "modes", found.equilibrium, range(len(found)), [block], _UNITS)
         return
-    if file.suffix not in meshio.extension_to_filetypes:
-        known = ".xdmf, .csv, .vtu, .vtk or another ending that meshio knows"
-        raise SceneError(f"{file}: the ending '{file.suffix}' is not known: expected {known}")
     fields = {name: values[0] for name, values in _fields(found, points, slice(k, k + 1)).items()}
-    with replaced(file) as fresh:
-        meshio.write(fresh, meshio.Mesh(points, [("line", lines)], point_data=fields))
-
-
-def _mesh(found):
-    """Positions (N, 3), m, of all nodes in the equilibrium, and lines (cells, 2) between neighbours."""
-    points, lines, first = [], [], 0
-    for rod in found.scene.rods:
-        points.append(found.equilibrium.position(rod))
-        n = len(points[-1])
-        lines.append(first + np.column_stack([np.arange(n - 1), np.arange(1, n)]))
-        first += n
-    return np.concatenate(points), np.concatenate(lines)
+    known = ".xdmf, .csv, .vtu, .vtk or another ending that meshio knows"
+    write_mesh(file, lambda: (points, [("line", lines)], fields), known)
 
 
 def _fields(found, points, which):

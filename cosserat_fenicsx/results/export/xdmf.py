@@ -53,13 +53,27 @@ def write_state(path, file, k=None):
         SceneError: an ending that meshio does not support.
         OSError: the file cannot be written.
     """
+    known = (
+        ".xdmf, .csv, .html, .vtu, .vtk, .ply or another ending that meshio knows; `save` writes a whole result as .h5"
+    )
+    write_mesh(file, lambda: mesh_of(path, -1 if k is None else k), known)
+
+
+def write_mesh(file, mesh, known):
+    """Write nodes, lines and fields in a format of meshio.
+
+    Args:
+        file: a `pathlib.Path`; mesh: function that returns them as `mesh_of` does; known: the endings, in words.
+
+    Raises:
+        SceneError: an ending that meshio does not support.
+        OSError: the file cannot be written.
+    """
     import meshio
 
     if file.suffix not in meshio.extension_to_filetypes:
-        known = ".xdmf, .csv, .html, .vtu, .vtk, .ply or another ending that meshio knows"
-        known += "; `save` writes a whole result as .h5"
         raise SceneError(f"{file}: the ending '{file.suffix}' is not known: expected {known}")
-    points, cells, data = mesh_of(path, -1 if k is None else k)
+    points, cells, data = mesh()
     with replaced(file) as fresh:
         meshio.write(fresh, meshio.Mesh(points, cells, point_data=data))
 
@@ -178,14 +192,20 @@ def _names(path):
 def meshes_of(path, which):
     """`mesh_of` at several points: arrays (points, n, ...)."""
     names = _names(path)
-    points, lines, data, first = [], [], {name: [] for name in names}, 0
+    points, data = [], {name: [] for name in names}
     for rod in path.scene.rods:
         fields = path.fields_at(which, rod)
-        n = len(fields["s"])
         points.append(fields["position"])
-        lines.append(first + np.column_stack([np.arange(n - 1), np.arange(1, n)]))
         for name, field in names.items():
             data[name].append(fields[field])
-        first += n
     joined = {name: np.concatenate(values, axis=1) for name, values in data.items()}
-    return np.concatenate(points, axis=1), [("line", np.concatenate(lines))], joined
+    return np.concatenate(points, axis=1), [("line", lines_of(p.shape[1] for p in points))], joined
+
+
+def lines_of(counts):
+    """(elements, 2) lines between neighbours among the nodes of all rods, of which there are `counts`."""
+    lines, first = [], 0
+    for n in counts:
+        lines.append(first + np.column_stack([np.arange(n - 1), np.arange(1, n)]))
+        first += n
+    return np.concatenate(lines)
