@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import cosserat_fenicsx as cf
+from cosserat_fenicsx.results.extremes import largest_in_words
 from cosserat_fenicsx.scene import stresses
 from cosserat_fenicsx.scene.stresses import rectangle_fibres
 
@@ -151,3 +152,16 @@ def test_normal_stresses_of_a_rolled_profile():
     stress = cf.Profile("IPE 200").stresses(STEEL, np.array([1.0, 2.0, 0.0]), np.array([-3.0, 0.7, 5.0]))
     assert stress.axial_max == pytest.approx(3.0 / 194e-6 + 0.7 / 28.5e-6, rel=3e-3) == -stress.axial_min
     assert np.isnan(stress.von_mises)
+
+
+def test_what_the_largest_values_do_not_cover_is_told():
+    """Beside a tube: a rod without a shape, and a profile whose von Mises stresses are not computed."""
+    sections = cf.Tube(0.1, 0.08), cf.Stiffness((1e6, 1e6), 1e7, (1e4, 1e4), 1e4), cf.Profile("IPE 200")
+    rods = [
+        cf.Rod(cf.Line((0, i, 0), (1, i, 0)), section, STEEL, name=name)
+        for i, (section, name) in enumerate(zip(sections, ("tube", "bare", "beam"), strict=True))
+    ]
+    loads = [cf.Force(rod.end, (0, 0, -10.0)) for rod in rods]
+    path = cf.solve(cf.Scene(rods, [cf.Clamp(rod.start) for rod in rods], loads), [1.0], elements=2)
+    told = largest_in_words(path).splitlines()[1:]
+    assert [line.partition(" are ")[0] for line in told] == ["Stresses of bare", "Von Mises stresses of beam"]

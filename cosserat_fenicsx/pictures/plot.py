@@ -194,9 +194,7 @@ def _finish(plotter, pyvista, everywhere, symbols, lines, title, label):
 
 def _small(path, shown, size, magnify):
     """A note where displacements are too small to be seen, with a factor that shows them; else empty."""
-    largest = max(
-        np.linalg.norm(path.fields(k, rod)["displacement"], axis=1).max() for k in shown for rod in path.scene.rods
-    )
+    largest = path.largest_displacement()[shown].max()
     if magnify * largest > _VISIBLE * size or largest < 1e-12 * size:
         return ""
     decade = 10.0 ** math.floor(math.log10(0.1 * size / largest))

@@ -129,4 +129,4 @@ def _unknown_in_words(path):
         names = [name for name, values in fields.items() if np.isnan(values[field]).any()]
         if names:
             yield f"{what} of {', '.join(names)} are not computed, or not everywhere: see the sections there."
-            return
+            fields = {name: values for name, values in fields.items() if name not in names}  # each is told once
