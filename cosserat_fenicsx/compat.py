@@ -21,6 +21,7 @@ _HOW_TO_INSTALL = (
 )
 
 try:
+    import cffi
     import dolfinx
     import mpi4py.MPI  # noqa: F401  where it is missing or broken, the message below names it
     import ufl
@@ -181,6 +182,45 @@ def form_for_speed(form):
 def kernel(form):
     """dolfinx's C++ object of a compiled form."""
     return getattr(form, "_cpp_object", form)
+
+
+#: Number of arguments of a kernel of FFCx: (A, w, c, coordinates, entity, permutation), and later `custom_data`.
+KERNEL_ARGUMENTS = 6 if _VERSION < (0, 10) else 7
+#: Number of doubles that a kernel reads of the coordinates of one interval: its two ends, padded to three dimensions.
+KERNEL_COORDINATES = 6
+
+
+def kernel_address(form):
+    """Address of the compiled kernel of a form's only integral, over all cells; valid as long as the form is kept.
+
+    The kernel adds to A; w and c are the rows of dolfinx's `pack_coefficients` and `pack_constants`.
+    """
+    compiled = form.ufcx_form
+    if hasattr(compiled, "form_integrals"):
+        start, end = compiled.form_integral_offsets[0:2]
+        integrals, count = compiled.form_integrals + start, end - start
+    else:
+        integrals, count = compiled.integrals(0), compiled.num_integrals(0)
+    if count != 1:
+        raise ValueError(f"form: has {count} integrals over cells, expected 1")
+    return _address(integrals[0])
+
+
+def expression_address(expression):
+    """(address, Functions, Constants) of a compiled expression; valid as long as it is kept.
+
+    Its kernel adds (points * components) values to A. w holds the values of the Functions on the cell, all of the first
+    in the order of its dofs, then all of the next; c holds the values of the Constants likewise.
+    """
+    compiled, of_ufl = expression.ufcx_expression, expression.ufl_expression
+    functions = ufl.algorithms.extract_coefficients(of_ufl)
+    positions = (compiled.original_coefficient_positions[i] for i in range(compiled.num_coefficients))
+    constants = ufl.algorithms.analysis.extract_constants(of_ufl)
+    return _address(compiled), [functions[i] for i in positions], list(constants)
+
+
+def _address(compiled):
+    return int(cffi.FFI().cast("uintptr_t", compiled.tabulate_tensor_float64))
 
 
 def element_nodes(space):

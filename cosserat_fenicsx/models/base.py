@@ -8,11 +8,11 @@ from dolfinx import fem
 from mpi4py import MPI
 
 from cosserat_fenicsx import compat
+from cosserat_fenicsx.compiling import compiling
 from cosserat_fenicsx.element import ElementRule
 from cosserat_fenicsx.forms.law import stiffness_for
 from cosserat_fenicsx.models.action_terms import ActionTerms
 from cosserat_fenicsx.models.clamps import Clamps
-from cosserat_fenicsx.models.compiling import compiling
 from cosserat_fenicsx.models.connections import ties_of
 from cosserat_fenicsx.models.densities import Densities
 from cosserat_fenicsx.models.laws import stretch_values

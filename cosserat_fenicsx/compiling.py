@@ -1,4 +1,4 @@
-"""What can go wrong where dolfinx compiles forms, in words: its cache, or the C compiler."""
+"""What can go wrong where C is compiled, in words: the cache of compiled forms, or the C compiler."""
 
 import contextlib
 import os
@@ -10,7 +10,7 @@ from cosserat_fenicsx.errors import CosseratError, InstallationError
 
 @contextlib.contextmanager
 def compiling():
-    """Context manager in which dolfinx compiles forms or loads them from its cache.
+    """Context manager in which C is compiled or loaded from the cache of compiled forms.
 
     Raises:
         InstallationError: the cache cannot be written or read, or there is no C compiler that works.
@@ -24,17 +24,17 @@ def compiling():
         said = str(problem).strip().partition("\n")[0] or type(problem).__name__
         if type(problem).__name__ == "VerificationError" or "VerificationError" in said or "CompileError" in said:
             raise InstallationError(
-                f"the C compiler that dolfinx calls has failed ({said}): expected one that works, such as by 'apt "
+                f"the C compiler has failed ({said}): expected one that works, such as by 'apt "
                 f"install gcc python3-dev', room for its files in {cache()}, and no CC set to another"
             ) from problem
         if isinstance(problem, OSError | ImportError) or "just-in-time" in said:
             raise InstallationError(
-                f"dolfinx cannot use its cache of compiled forms, {cache()} ({said}): make room there, remove what is "
+                f"the cache of compiled forms in {cache()} cannot be used ({said}): make room there, remove what is "
                 "damaged, or set XDG_CACHE_HOME to a folder that can be written to"
             ) from problem
         raise
 
 
 def cache():
-    """The folder of dolfinx's compiled forms."""
+    """The folder of dolfinx's compiled forms, and of our own C."""
     return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "fenics"

@@ -1,0 +1,125 @@
+"""The C code of this folder: compiled once a machine, at first use, and kept beside dolfinx's compiled forms.
+
+Only a C compiler and Python's headers are needed, which dolfinx needs as well.
+"""
+
+import contextlib
+import fcntl
+import functools
+import hashlib
+import importlib.machinery
+import importlib.util
+import os
+import shlex
+import subprocess
+import sysconfig
+import tempfile
+from pathlib import Path
+
+import cffi
+
+from cosserat_fenicsx import compat
+from cosserat_fenicsx.compiling import cache, compiling
+
+CHAIN = Path(__file__).with_name("chain.c")
+# What -ffast-math would add hides numbers that are not finite, and changes sums. Python's own -fwrapv slows loops down.
+_FLAGS = ("-O3", "-fno-math-errno", "-ffp-contract=fast", "-fno-wrapv", "-fvisibility=hidden", "-g0")
+# The instructions of the level x86-64-v3, as Linux names them.
+_LEVEL_3 = {"avx", "avx2", "bmi1", "bmi2", "f16c", "fma", "abm", "movbe", "xsave"}
+_DIGEST = hashlib.sha256
+_DIGEST_SIZE = _DIGEST().digest_size
+
+
+@functools.cache
+def module(source=CHAIN):
+    """cffi's (ffi, lib) of a C file and the header beside it, which must only declare; lines with # are for C alone.
+
+    C finds the number of arguments of FFCx's kernels as KERNEL_ARGUMENTS. Processes that come at the same time wait for
+    the one that compiles, and a file that is damaged or belongs to another system is made anew.
+
+    Raises:
+        InstallationError: there is no C compiler that works, or the cache cannot be used.
+    """
+    with compiling():
+        flags = [*_FLAGS, *_instructions(), f"-DKERNEL_ARGUMENTS={compat.KERNEL_ARGUMENTS}"]
+        suffix = importlib.machinery.EXTENSION_SUFFIXES[0]
+        header = source.with_suffix(".h")
+        key = _DIGEST(repr((source.read_bytes(), header.read_bytes(), flags, suffix, cffi.__version__)).encode())
+        name = f"cosserat_{source.stem}_{key.hexdigest()[:20]}"
+        file = cache().absolute() / (name + suffix)
+        with contextlib.suppress(FileNotFoundError, ImportError):
+            return _load(name, file)
+        file.parent.mkdir(parents=True, exist_ok=True)
+        with _alone_in(file.parent):
+            with contextlib.suppress(FileNotFoundError, ImportError):
+                return _load(name, file)
+            _build(name, file, source, header, flags)
+            return _load(name, file)
+
+
+def _instructions():
+    """Compiler flags for this processor. They are part of the key: computers of different age may share a cache."""
+    with contextlib.suppress(OSError), open("/proc/cpuinfo", encoding="ascii", errors="replace") as lines:
+        for line in lines:
+            if line.startswith("flags"):
+                return ["-march=x86-64-v3"] if set(line.split()) >= _LEVEL_3 else []
+    return []
+
+
+@contextlib.contextmanager
+def _alone_in(folder):
+    """A lock on a folder, where the file system has locks; elsewhere the last process that compiles wins."""
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        with contextlib.suppress(OSError):
+            fcntl.flock(handle, fcntl.LOCK_EX)
+        yield
+    finally:
+        os.close(handle)
+
+
+def _build(name, file, source, header, flags):
+    from cffi import recompiler  # rarely needed, and slow to import
+
+    declarations = header.read_text(encoding="utf-8").splitlines()
+    builder = cffi.FFI()
+    builder.cdef("\n".join(line for line in declarations if not line.startswith("#")))
+    with tempfile.TemporaryDirectory(dir=file.parent, prefix=name) as folder:
+        glue, made = Path(folder) / "module.c", Path(folder) / "module.so"
+        recompiler.make_c_source(builder, name, f'#include "{source}"', str(glue))
+        headers = sysconfig.get_path("include"), sysconfig.get_path("platinclude")
+        command = [*_linker(), "-fPIC", *(f"-I{path}" for path in headers), *flags, str(glue), "-o", str(made), "-lm"]
+        try:
+            done = subprocess.run(
+                command, stdin=subprocess.DEVNULL, capture_output=True, encoding="utf-8", errors="replace"
+            )
+        except OSError as problem:
+            raise cffi.VerificationError(str(problem)) from problem
+        if done.returncode:
+            lines = done.stderr.strip().splitlines() or [f"{command[0]}: exit code {done.returncode}"]
+            raise cffi.VerificationError(next((line for line in lines if "error" in line), lines[0]))
+        with open(made, "r+b") as binary:
+            digest = _DIGEST(binary.read()).digest()
+            binary.write(digest)
+            binary.flush()
+            os.fsync(binary.fileno())
+        made.replace(file)
+
+
+def _linker():
+    """The command that makes a module of Python's; the environment's CC replaces its compiler, as everywhere."""
+    words, compiler = (sysconfig.get_config_var(name) for name in ("LDSHARED", "CC"))
+    if os.environ.get("CC") and words.startswith(compiler):
+        words = os.environ["CC"] + words[len(compiler) :]
+    return shlex.split(words)
+
+
+def _load(name, file):
+    # The system's loader maps what is there, and the process ends where a part is missing: hence a digest at the end.
+    content = file.read_bytes()
+    if _DIGEST(content[:-_DIGEST_SIZE]).digest() != content[-_DIGEST_SIZE:]:
+        raise ImportError(f"{file} is damaged")
+    spec = importlib.util.spec_from_file_location(name, file)
+    made = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(made)
+    return made.ffi, made.lib

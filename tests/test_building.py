@@ -1,0 +1,93 @@
+"""The C of the package is compiled and loaded on each release of dolfinx; what goes wrong is told in one sentence."""
+
+import threading
+
+import pytest
+
+import cosserat_fenicsx as cf
+from cosserat_fenicsx import compat
+from cosserat_fenicsx.algebra import building
+
+pytestmark = pytest.mark.serial
+
+HEADER = "#pragma once\ntypedef struct { double a, b; } pair;\ndouble product(const pair *given);\n"
+CODE = '#include "small.h"\ndouble product(const pair *given) { return given->a * given->b + KERNEL_ARGUMENTS; }\n'
+
+
+@pytest.fixture
+def source(tmp_path, monkeypatch):
+    """A small C file with its header, and an empty cache beside it."""
+    (tmp_path / "small.h").write_text(HEADER)
+    (tmp_path / "small.c").write_text(CODE)
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    monkeypatch.delenv("CC", raising=False)
+    building.module.cache_clear()
+    return tmp_path / "small.c"
+
+
+def works(module):
+    ffi, lib = module
+    return lib.product(ffi.new("pair *", [2.0, 3.0])) == 6.0 + compat.KERNEL_ARGUMENTS
+
+
+def test_c_is_compiled_once_and_in_silence(source, monkeypatch, capfd):
+    made = building.module(source)
+    (file,) = building.cache().iterdir()  # and nothing else
+    monkeypatch.setenv("CC", "/no/compiler")
+    assert building.module(source) is made and works(made)
+    building.module.cache_clear()
+    assert works(building.module(source))  # loaded, not compiled
+    assert capfd.readouterr() == ("", "")
+    source.write_text(CODE + "\n")
+    building.module.cache_clear()
+    with pytest.raises(cf.InstallationError, match="/no/compiler"):
+        building.module(source)
+    assert list(building.cache().iterdir()) == [file]
+
+
+@pytest.mark.parametrize("kept", [0.0, 0.5, 0.99])
+def test_a_damaged_file_is_made_anew(source, monkeypatch, kept):
+    building.module(source)
+    (file,) = building.cache().iterdir()
+    content = file.read_bytes()
+    monkeypatch.setenv("XDG_CACHE_HOME", str(source.parent / "other"))  # Python loads nothing twice from one place
+    building.cache().mkdir(parents=True)
+    damaged = building.cache() / file.name
+    damaged.write_bytes(content[: int(kept * len(content))])
+    building.module.cache_clear()
+    assert works(building.module(source)) and len(damaged.read_bytes()) == len(content)
+
+
+def test_one_of_many_compiles(source, monkeypatch):
+    compiler, log = source.parent / "cc", source.parent / "log"
+    compiler.write_text(f'#!/bin/sh\necho >> "{log}"\nsleep 0.2\nexec cc "$@"\n')
+    compiler.chmod(0o755)
+    monkeypatch.setenv("CC", f"{compiler} -DUNUSED")
+    made = []
+    threads = [threading.Thread(target=lambda: made.append(building.module.__wrapped__(source))) for _ in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert len(made) == 4 and all(map(works, made)) and log.read_text() == "\n"
+
+
+@pytest.mark.parametrize(
+    ("compiler", "words"),
+    [
+        ("/no/compiler", "No such file.*/no/compiler'.*apt install gcc python3-dev.*no CC set to another"),
+        ("false", r"\(false: exit code 1\).*apt install gcc"),
+        ("cc -include missing.h", r"\(.*fatal error: missing.h: No such file.*\).*apt install gcc"),
+    ],
+)
+def test_no_compiler(source, monkeypatch, compiler, words):
+    monkeypatch.setenv("CC", compiler)
+    with pytest.raises(cf.InstallationError, match=words) as told:
+        building.module(source)
+    assert "\n" not in str(told.value) and not list(building.cache().iterdir())
+
+
+def test_no_cache(source, monkeypatch):
+    monkeypatch.setenv("XDG_CACHE_HOME", "/dev/null")
+    with pytest.raises(cf.InstallationError, match="/dev/null/fenics .*Not a directory.* set XDG_CACHE_HOME"):
+        building.module(source)
