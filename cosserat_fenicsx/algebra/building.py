@@ -17,13 +17,15 @@ import tempfile
 from pathlib import Path
 
 import cffi
+import numpy as np
+from petsc4py import PETSc
 
 from cosserat_fenicsx import compat
 from cosserat_fenicsx.compiling import cache, compiling
 
-CHAIN = Path(__file__).with_name("chain.c")
+SOURCES = tuple(Path(__file__).with_name(name) for name in ("chain.c", "newton.c", "sweep.c"))
 # What -ffast-math would add hides numbers that are not finite, and changes sums. Python's own -fwrapv slows loops down.
-_FLAGS = ("-O3", "-fno-math-errno", "-ffp-contract=fast", "-fno-wrapv", "-fvisibility=hidden", "-g0")
+_FLAGS = ("-O3", "-fno-math-errno", "-ffp-contract=fast", "-fno-wrapv", "-fopenmp-simd", "-fvisibility=hidden", "-g0")
 # The instructions of the level x86-64-v3, as Linux names them.
 _LEVEL_3 = {"avx", "avx2", "bmi1", "bmi2", "f16c", "fma", "abm", "movbe", "xsave"}
 _DIGEST = hashlib.sha256
@@ -31,21 +33,26 @@ _DIGEST_SIZE = _DIGEST().digest_size
 
 
 @functools.cache
-def module(source=CHAIN):
-    """cffi's (ffi, lib) of a C file and the header beside it, which must only declare; lines with # are for C alone.
+def module(*sources):
+    """cffi's (ffi, lib) of C files, by default those of this folder, and the header of the first one, which must only
+    declare; lines with # are for C alone.
 
-    C finds the number of arguments of FFCx's kernels as KERNEL_ARGUMENTS. Processes that come at the same time wait for
-    the one that compiles, and a file that is damaged or belongs to another system is made anew.
+    C finds the number of arguments of FFCx's kernels as KERNEL_ARGUMENTS, and PETSc's integers as PetscInt. Processes
+    that come at the same time wait for the one that compiles, and a file that is damaged or belongs to another system is
+    made anew.
 
     Raises:
         InstallationError: there is no C compiler that works, or the cache cannot be used.
     """
     with compiling():
         flags = [*_FLAGS, *_instructions(), f"-DKERNEL_ARGUMENTS={compat.KERNEL_ARGUMENTS}"]
+        flags.append(f"-DPetscInt=int{8 * np.dtype(PETSc.IntType).itemsize}_t")
+        sources = sources or SOURCES
         suffix = importlib.machinery.EXTENSION_SUFFIXES[0]
-        header = source.with_suffix(".h")
-        key = _DIGEST(repr((source.read_bytes(), header.read_bytes(), flags, suffix, cffi.__version__)).encode())
-        name = f"cosserat_{source.stem}_{key.hexdigest()[:20]}"
+        header = sources[0].with_suffix(".h")
+        contents = [file.read_bytes() for file in (*sources, header)]
+        key = _DIGEST(repr((contents, flags, suffix, cffi.__version__)).encode())
+        name = f"cosserat_{sources[0].stem}_{key.hexdigest()[:20]}"
         file = cache().absolute() / (name + suffix)
         with contextlib.suppress(FileNotFoundError, ImportError):
             return _load(name, file)
@@ -53,7 +60,7 @@ def module(source=CHAIN):
         with _alone_in(file.parent):
             with contextlib.suppress(FileNotFoundError, ImportError):
                 return _load(name, file)
-            _build(name, file, source, header, flags)
+            _build(name, file, sources, header, flags)
             return _load(name, file)
 
 
@@ -78,7 +85,7 @@ def _alone_in(folder):
         os.close(handle)
 
 
-def _build(name, file, source, header, flags):
+def _build(name, file, sources, header, flags):
     from cffi import recompiler  # rarely needed, and slow to import
 
     declarations = header.read_text(encoding="utf-8").splitlines()
@@ -86,7 +93,7 @@ def _build(name, file, source, header, flags):
     builder.cdef("\n".join(line for line in declarations if not line.startswith("#")))
     with tempfile.TemporaryDirectory(dir=file.parent, prefix=name) as folder:
         glue, made = Path(folder) / "module.c", Path(folder) / "module.so"
-        recompiler.make_c_source(builder, name, f'#include "{source}"', str(glue))
+        recompiler.make_c_source(builder, name, "".join(f'#include "{source}"\n' for source in sources), str(glue))
         headers = sysconfig.get_path("include"), sysconfig.get_path("platinclude")
         command = [*_linker(), "-fPIC", *(f"-I{path}" for path in headers), *flags, str(glue), "-o", str(made), "-lm"]
         try:
