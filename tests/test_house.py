@@ -54,6 +54,7 @@ SHARED = {
     "quadrature",
     "quaternions",
     "ranks",
+    "remember",
     "units",
 }
 ROOMS = {
