@@ -84,7 +84,7 @@ class Problem(Equations):
 
         User-defined functions and loads may give other values at every call.
         """
-        if self._loaded is None or self._loaded[0] is not scene or not all(rod.uniform for rod in scene.rods):
+        if self._loaded is None or self._loaded[0] is not scene or not all(rod.profile.uniform for rod in scene.rods):
             return False
         if self._remembers or not all(type(load).__module__.startswith("cosserat_fenicsx.") for load in scene.loads):
             return False
