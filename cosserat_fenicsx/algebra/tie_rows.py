@@ -11,15 +11,16 @@ _WILD = {"invalid": "ignore", "over": "ignore"}
 
 
 class TieRows:
-    """Constraint equations of one problem; the last rank evaluates them.
+    """Constraint equations of one problem; all ranks evaluate them, and the last one adds them to vectors and matrices.
 
     Args:
-        model: its `rows_of_tied`, `ties`, `held_forces`, `tied_motion`, `tie_maps` and `tied_at_rest` are used.
+        model: its `rows_of_tied`, `ties`, `held_forces`, `tied_motion`, `tie_maps`, `rows_turn` and `tied_at_rest` are
+            used.
         numbering: the problem's `Numbering`.
 
     Attributes:
         rows: (tied nodes, block) solver's numbers, -1 where clamped.
-        seen: the tied nodes' unknowns and the multipliers, as of the last call of `see`; on the last rank.
+        seen: the tied nodes' unknowns and the multipliers of all equations, as of the last call of `see`.
     """
 
     def __init__(self, model, numbering):
@@ -30,90 +31,107 @@ class TieRows:
         self._free_rows = self.rows.ravel()[self._free]
         self._here = numbering.comm.rank == numbering.comm.size - 1
         links = model.signature.connections
-        self._added, self._all = tuple(links.equations), tuple(range(len(links.ties)))
-        self._which = np.array(self._added, dtype=np.intp)
+        self._added, self._count = np.array(links.equations, dtype=np.intp), len(links.ties)
         place = {vertex: i for i, vertex in enumerate(links.tied)}
         stations = np.array([(place[a], place.get(b, -1)) for _, a, b in links.ties]).reshape(-1, 2)
         # for every added equation: its row and its two stations in the gradients, and the sign of its reaction
-        rows, ends = np.arange(len(self._added))[:, None], stations[self._which]
-        self._exerted = rows, ends, np.where(ends >= 0, -1.0, 0.0)
+        ends = stations[self._added]
+        self._exerted = self._added[:, None], ends, np.where(ends >= 0, -1.0, 0.0)
         count = numbering.multipliers
         self._multipliers = (numbering.first_multiplier + np.arange(count)).astype(PETSc.IntType)
         self._idle = (numbering.first_multiplier + count + np.arange(numbering.idle)).astype(PETSc.IntType)
-        wanted = np.concatenate([self.rows[self.rows >= 0], self._multipliers]) if self._here else []
-        index = PETSc.IS().createGeneral(np.asarray(wanted, dtype=PETSc.IntType), comm=PETSc.COMM_SELF)
+        wanted = np.concatenate([self._free_rows, self._multipliers])
+        index = PETSc.IS().createGeneral(wanted, comm=PETSc.COMM_SELF)
         self._work = PETSc.Vec().createSeq(len(wanted))
         self._scatter = PETSc.Scatter().create(numbering.vector(), index, self._work, None)
-        self.seen = None
+        self.seen, self._constant_rows = None, (None, None)
 
     def see(self, x):
         """Copy the tied nodes' unknowns and the multipliers from a vector."""
         self._scatter.scatter(x, self._work, False, PETSc.ScatterMode.FORWARD)
-        if self._here:
-            values, nodal = self._work.array_r, self.model.tied_at_rest.copy()
-            free = np.count_nonzero(self.rows >= 0)
-            nodal[self.rows >= 0] = values[:free]
-            multipliers = np.zeros(len(self._all))
-            multipliers[list(self._added)] = values[free:]
-            self.seen, self._added_values, self._all_values = (nodal, multipliers), (None, None), (None, None)
+        values, free = self._work.array_r, len(self._free)
+        nodal, multipliers = self.model.tied_at_rest.copy(), np.zeros(self._count)
+        nodal.reshape(-1)[self._free] = values[:free]
+        multipliers[self._added] = values[free:]
+        self.seen = nodal, multipliers
+        self._forget()
+
+    def _forget(self):
+        """What was evaluated is of another state."""
+        self._values = self._change = (None, None)
 
     def _evaluate(self, eta):
-        """Values and derivatives of the equations that are added, evaluated once for residual and tangent."""
-        if self._added_values[0] != eta:
-            nodal, multipliers = self.seen
-            rq = self.model.tied_motion(nodal)
-            self._added_values = eta, self.model.ties.evaluate(rq, eta, multipliers[list(self._added)], self._added)
-        return self._added_values[1]
+        """Values and gradients of all equations, see `Ties.evaluate`; once for residual and tangent."""
+        if self._values[0] != eta:
+            self._values = eta, self.model.ties.evaluate(self.model.tied_motion(self.seen[0]), eta)
+        return self._values[1]
 
     def put(self, x, multipliers):
         """Set the multipliers in a vector."""
         if self._here:
-            x.setValues(self._multipliers, multipliers[list(self._added)])
+            x.setValues(self._multipliers, multipliers[self._added])
         x.assemble()
 
     def everywhere(self):
         """The multipliers as of the last call of `see`, on all ranks."""
-        comm = self.numbering.comm
-        if comm.size == 1:
-            return self.seen[1]
-        return comm.bcast(self.seen[1] if self._here else None, root=comm.size - 1)
+        return self.seen[1]
 
     def forces(self, eta):
         """See `Equations.tie_forces`; at the state of the last call of `see`."""
-        comm, found = self.numbering.comm, None
-        if self._here:
-            found, (rows, ends, signs) = np.zeros((len(self._all), 2, 6)), self._exerted
-            _, gradient, _ = self._evaluate(eta)
-            forces = gradient[rows, ends] * (signs * self.seen[1][self._which, None])[..., None]
-            found[self._which] = self.model.held_forces(forces)
-        return comm.bcast(found, root=comm.size - 1) if comm.size > 1 else found
+        found, (which, ends, signs) = np.zeros((self._count, 2, 6)), self._exerted
+        _, gradient = self._evaluate(eta)
+        forces = gradient[which, ends] * (signs * self.seen[1][which])[..., None]
+        found[self._added] = self.model.held_forces(forces)
+        return found
 
     def gradients(self):
         """(ties, tied nodes, 6) gradients of all equations by (displacement, rotation), on all ranks."""
-        comm, found = self.numbering.comm, None
-        if self._here:
-            nodal, multipliers = self.seen
-            _, found, _ = self.model.ties.evaluate(self.model.tied_motion(nodal), 0.0, multipliers)
-        return comm.bcast(found, root=comm.size - 1)
+        return self.model.ties.evaluate(self.model.tied_motion(self.seen[0]), 0.0)[1]
 
     @np.errstate(**_WILD)
+    def residual_blocks(self, eta):
+        """The reactions in the rows of the nodes (all of `rows`, one after the other), and the values of the equations
+        that are added."""
+        c, gradient = self._evaluate(eta)
+        reactions = by_multipliers(self.seen[1], gradient)
+        return (self._rows_of_forces() @ reactions[:, :, None]).ravel(), c[self._added]
+
+    def _rows_of_forces(self):
+        """The second of the model's `tie_maps`; the same for all states of a scene unless `rows_turn`."""
+        scene, rows = self._constant_rows
+        if self.model.rows_turn or scene is not self.model.scene:
+            rows = self.model.tie_maps(self.seen[0])[1]
+            self._constant_rows = self.model.scene, rows
+        return rows
+
+    @np.errstate(**_WILD)
+    def tangent_blocks(self, eta):
+        """Derivatives of `residual_blocks`: of the reactions by the nodes and by the multipliers, and of the equations
+        by the nodes."""
+        nodal, multipliers = self.seen
+        _, gradient = self._evaluate(eta)
+        change = self.model.ties.change(self.model.tied_motion(nodal), eta, multipliers)
+        trial, test = self.model.tie_maps(nodal)
+        of_nodes, added = reactions_by_nodes(test, change, trial), gradient[self._added]
+        if self.model.rows_turn:
+            places = np.arange(len(of_nodes)).reshape(len(nodal), -1)
+            turned = self.model.turned_reactions(nodal, by_multipliers(multipliers, gradient))
+            of_nodes[places[:, :, None], places[:, None, :]] += turned
+        return of_nodes, reactions_by_multipliers(test, added), by_nodes(added, trial)
+
     def add_residual(self, b, eta):
         """Add the reactions to the rows of the nodes, and the constraint equations in the rows of the multipliers."""
         if self._here:
-            nodal, multipliers = self.seen
-            c, gradient, _ = self._evaluate(eta)
-            _, test = self.model.tie_maps(nodal)
-            reactions = np.tensordot(multipliers[list(self._added)], gradient, 1)
-            b.setValues(self._free_rows, (test @ reactions[:, :, None]).ravel()[self._free], _ADD)
+            forces, c = self.residual_blocks(eta)
+            b.setValues(self._free_rows, forces[self._free], _ADD)
             b.setValues(self._multipliers, c, _ADD)
         b.assemble()
 
-    @np.errstate(**_WILD)
     def add_tangent(self, A, eta):
         """Add the derivative of `add_residual`."""
         if not self._here:
             return
-        of_nodes, reactions, equations = self._derivatives(eta)
+        of_nodes, reactions, equations = self.tangent_blocks(eta)
         nodes = self.rows.ravel()
         # in C order: petsc4py ignores strides
         A.setValues(nodes, nodes, np.ascontiguousarray(of_nodes), _ADD)
@@ -122,18 +140,6 @@ class TieRows:
         for rows, value in ((self._multipliers, 0.0), (self._idle, 1.0)):
             for i in rows:
                 A.setValue(i, i, value, _ADD)
-
-    def _derivatives(self, eta):
-        """Derivatives of the reactions by nodes and by multipliers, and of the equations by nodes, as matrices."""
-        _, gradient, change = self._evaluate(eta)
-        nodal, multipliers = self.seen
-        trial, test = self.model.tie_maps(nodal)
-        of_nodes = reactions_by_nodes(test, change, trial)
-        if self.model.rows_turn:
-            reactions = np.tensordot(multipliers[list(self._added)], gradient, 1)
-            places = np.arange(len(of_nodes)).reshape(len(nodal), -1)
-            of_nodes[places[:, :, None], places[:, None, :]] += self.model.turned_reactions(nodal, reactions)
-        return of_nodes, reactions_by_multipliers(test, gradient), by_nodes(gradient, trial)
 
     def add_second_variation(self, K, rows, axes, eta):
         """Add the geometric stiffness of the reactions, whose directions change with the nodes.
@@ -145,8 +151,7 @@ class TieRows:
             axes: (block, 6) the (displacement, rotation) of each of K's unknowns.
         """
         if self._here:
-            _, change = self._of_all(eta)
-            self._add(K, rows, axes @ (change @ axes.T).reshape(len(rows), 6, -1))
+            self._add(K, rows, axes @ (self._symmetric_change(eta) @ axes.T).reshape(len(rows), 6, -1))
 
     def add_springs(self, K, rows, axes, eta, resistance):
         """Add penalty springs that replace all constraint equations.
@@ -156,7 +161,7 @@ class TieRows:
             resistance: (tied nodes, block) stiffness of the elements against these motions of the nodes.
         """
         if self._here:
-            gradient = (self._of_all(eta)[0] @ axes.T).reshape(-1, rows.size)
+            gradient = (self._evaluate(eta)[1] @ axes.T).reshape(-1, rows.size)
             stiffness = _HELD * (gradient * gradient * resistance.ravel()).max(axis=1, keepdims=True)
             self._add(K, rows, gradient.T @ (stiffness * gradient))
 
@@ -165,14 +170,19 @@ class TieRows:
         nodes = rows.ravel().astype(PETSc.IntType)
         K.setValues(nodes, nodes, values, _ADD)
 
-    def _of_all(self, eta):
-        """Gradients (ties, tied nodes, 6) of all equations, and the symmetric part of the derivative of their
-        reactions, (tied nodes, 6, tied nodes, 6); evaluated once for all parts of the second variation."""
-        if self._all_values[0] != eta:
+    def _symmetric_change(self, eta):
+        """The symmetric part of the derivative of the reactions, (tied nodes, 6, tied nodes, 6); evaluated once for all
+        parts of the second variation."""
+        if self._change[0] != eta:
             nodal, multipliers = self.seen
-            _, gradient, change = self.model.ties.evaluate(self.model.tied_motion(nodal), eta, multipliers, self._all)
-            self._all_values = eta, (gradient, 0.5 * (change + change.transpose(2, 3, 0, 1)))
-        return self._all_values[1]
+            change = self.model.ties.change(self.model.tied_motion(nodal), eta, multipliers)
+            self._change = eta, 0.5 * (change + change.transpose(2, 3, 0, 1))
+        return self._change[1]
+
+
+def by_multipliers(multipliers, gradient):
+    """(tied nodes, 6) reactions from gradients (ties, tied nodes, 6)."""
+    return (multipliers @ gradient.reshape(len(gradient), -1)).reshape(-1, 6)
 
 
 def reactions_by_nodes(test, change, trial):

@@ -61,7 +61,4 @@ class CirculatoryModel(SpatialModel):
 
     def held(self, rq, load_factor):
         """Gradients of the constraint equations of supports and joints, (equations, tied nodes, 6)."""
-        count = len(self.signature.connections.ties)
-        if not count:
-            return np.zeros((0, 0, 6))
-        return self.ties.evaluate(rq[self.tied_slots], load_factor, np.zeros(count))[1]
+        return self.ties.evaluate(rq[self.tied_slots], load_factor)[1] if self.ties else np.zeros((0, 0, 6))

@@ -16,6 +16,7 @@ from cosserat_fenicsx.models.scales import Scales
 from cosserat_fenicsx.models.spatial import SpatialModel
 from cosserat_fenicsx.quaternions import cross
 from cosserat_fenicsx.scene.damping import Damping
+from cosserat_fenicsx.scene.signals import signals_of
 
 
 class Moving:
@@ -150,7 +151,8 @@ class Moving:
 
     def ties_at(self, t):
         """The `Ties` at the time t (s)."""
-        return self.ties.with_numbers_of(ties_of(self.scene, t))
+        driven = any(signals_of(support) for support in self.scene.supports)
+        return self.ties.with_numbers_of(ties_of(self.scene, t)) if driven else self.ties
 
     def largest_of(self, change, turns):
         """Largest displacement (lengths), or rotation (rad) times `turns`, in a change of the state, over all ranks."""
