@@ -38,8 +38,9 @@ def cross(u, v):
 
 
 def small_rotations(q):
-    """(k, 3, 4) matrices from changes dq of q (k, 4) to small inertial rotations 2 vec(dq conj(q))/|q|^2."""
-    return (q * (2 / (q * q).sum(axis=1, keepdims=True)) @ _SMALL_ROTATIONS).reshape(-1, 3, 4)
+    """(.., 3, 4) matrices from changes dq of q (.., 4) to small inertial rotations 2 vec(dq conj(q))/|q|^2."""
+    scaled = q * (2 / (q * q).sum(axis=-1, keepdims=True))
+    return (scaled @ _SMALL_ROTATIONS).reshape(*q.shape[:-1], 3, 4)
 
 
 #: (4, 12): q times this are the rows (-b, a, -d, c), (-c, d, a, -b), (-d, -c, b, a).

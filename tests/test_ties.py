@@ -39,11 +39,10 @@ def test_gradient_and_tangent():
         AngleTie(1, 2, vector(), vector()),
     ]  # fmt: skip
     known, multipliers = Ties(ties, NODES, rng.normal(size=(3, 3)), 2.0), rng.normal(size=len(ties))
-    _, gradient = known.evaluate(rq, ETA)
-    tangent = known.change(rq, ETA, multipliers)
+    gradient, tangent = known.on_nodes(known.evaluate(rq, ETA)[1]), known.change(rq, ETA, multipliers)
     for node in range(3):
         for direction in range(6):
             (c1, g1), (c0, g0) = (known.evaluate(moved(rq, node, direction, sign * STEP), ETA) for sign in (1, -1))
             np.testing.assert_allclose((c1 - c0) / (2 * STEP), gradient[:, node, direction], atol=1e-8)
-            reactions = np.tensordot(multipliers, g1 - g0, 1) / (2 * STEP)
+            reactions = known.reactions(g1 - g0, multipliers) / (2 * STEP)
             np.testing.assert_allclose(reactions, tangent[:, :, node, direction], atol=1e-8)

@@ -32,11 +32,8 @@ class TieRows:
         self._here = numbering.comm.rank == numbering.comm.size - 1
         links = model.signature.connections
         self._added, self._count = np.array(links.equations, dtype=np.intp), len(links.ties)
-        place = {vertex: i for i, vertex in enumerate(links.tied)}
-        stations = np.array([(place[a], place.get(b, -1)) for _, a, b in links.ties]).reshape(-1, 2)
-        # for every added equation: its row and its two stations in the gradients, and the sign of its reaction
-        ends = stations[self._added]
-        self._exerted = self._added[:, None], ends, np.where(ends >= 0, -1.0, 0.0)
+        # for every added equation: what multiplies its reaction at both stations, the ground has none
+        self._signs = np.array([(-1.0, 0.0 if links.ties[i][2] is None else -1.0) for i in self._added])
         count = numbering.multipliers
         self._multipliers = (numbering.first_multiplier + np.arange(count)).astype(PETSc.IntType)
         self._idle = (numbering.first_multiplier + count + np.arange(numbering.idle)).astype(PETSc.IntType)
@@ -78,22 +75,25 @@ class TieRows:
 
     def forces(self, eta):
         """See `Equations.tie_forces`; at the state of the last call of `see`."""
-        found, (which, ends, signs) = np.zeros((self._count, 2, 6)), self._exerted
-        _, gradient = self._evaluate(eta)
-        forces = gradient[which, ends] * (signs * self.seen[1][which])[..., None]
-        found[self._added] = self.model.held_forces(forces)
+        found, added = np.zeros((self._count, 2, 6)), self._added
+        signed = self._signs * self.seen[1][added, None]
+        found[added] = self.model.held_forces(self._evaluate(eta)[1][added] * signed[..., None])
         return found
 
     def gradients(self):
         """(ties, tied nodes, 6) gradients of all equations by (displacement, rotation), on all ranks."""
-        return self.model.ties.evaluate(self.model.tied_motion(self.seen[0]), 0.0)[1]
+        ties = self.model.ties
+        return ties.on_nodes(ties.evaluate(self.model.tied_motion(self.seen[0]), 0.0)[1])
 
     @np.errstate(**_WILD)
     def residual_blocks(self, eta):
         """The reactions in the rows of the nodes (all of `rows`, one after the other), and the values of the equations
         that are added."""
-        c, gradient = self._evaluate(eta)
-        reactions = by_multipliers(self.seen[1], gradient)
+        return self._blocks(eta)
+
+    def _blocks(self, eta):
+        c, gradients = self._evaluate(eta)
+        reactions = self.model.ties.reactions(gradients, self.seen[1])
         return (self._rows_of_forces() @ reactions[:, :, None]).ravel(), c[self._added]
 
     def _rows_of_forces(self):
@@ -108,14 +108,13 @@ class TieRows:
     def tangent_blocks(self, eta):
         """Derivatives of `residual_blocks`: of the reactions by the nodes and by the multipliers, and of the equations
         by the nodes."""
-        nodal, multipliers = self.seen
-        _, gradient = self._evaluate(eta)
-        change = self.model.ties.change(self.model.tied_motion(nodal), eta, multipliers)
+        (nodal, multipliers), (_, gradients), ties = self.seen, self._evaluate(eta), self.model.ties
+        change = ties.change(self.model.tied_motion(nodal), eta, multipliers)
         trial, test = self.model.tie_maps(nodal)
-        of_nodes, added = reactions_by_nodes(test, change, trial), gradient[self._added]
+        of_nodes, added = reactions_by_nodes(test, change, trial), ties.on_nodes(gradients)[self._added]
         if self.model.rows_turn:
             places = np.arange(len(of_nodes)).reshape(len(nodal), -1)
-            turned = self.model.turned_reactions(nodal, by_multipliers(multipliers, gradient))
+            turned = self.model.turned_reactions(nodal, ties.reactions(gradients, multipliers))
             of_nodes[places[:, :, None], places[:, None, :]] += turned
         return of_nodes, reactions_by_multipliers(test, added), by_nodes(added, trial)
 
@@ -161,7 +160,7 @@ class TieRows:
             resistance: (tied nodes, block) stiffness of the elements against these motions of the nodes.
         """
         if self._here:
-            gradient = (self._evaluate(eta)[1] @ axes.T).reshape(-1, rows.size)
+            gradient = (self.model.ties.on_nodes(self._evaluate(eta)[1]) @ axes.T).reshape(-1, rows.size)
             stiffness = _HELD * (gradient * gradient * resistance.ravel()).max(axis=1, keepdims=True)
             self._add(K, rows, gradient.T @ (stiffness * gradient))
 
@@ -178,11 +177,6 @@ class TieRows:
             change = self.model.ties.change(self.model.tied_motion(nodal), eta, multipliers)
             self._change = eta, 0.5 * (change + change.transpose(2, 3, 0, 1))
         return self._change[1]
-
-
-def by_multipliers(multipliers, gradient):
-    """(tied nodes, 6) reactions from gradients (ties, tied nodes, 6)."""
-    return (multipliers @ gradient.reshape(len(gradient), -1)).reshape(-1, 6)
 
 
 def reactions_by_nodes(test, change, trial):

@@ -160,9 +160,9 @@ def _off(model, rq, rates, t=0.0):
         alone.
     """
     eta, now, held = float(model.load_factor.value), rates[model.tied_slots], rq[model.tied_slots]
-    c, gradient = model.ties_at(t).evaluate(held, eta)
+    c, gradients = model.ties_at(t).evaluate(held, eta)
     later, _ = model.ties_at(t + _DIFFERENCE * model.time).evaluate(held, eta)
-    driven = (later - c) / _DIFFERENCE
+    driven, gradient = (later - c) / _DIFFERENCE, model.ties.on_nodes(gradients)
     return np.einsum("ikb,kb->i", gradient, now) + driven, gradient, driven
 
 

@@ -61,4 +61,6 @@ class CirculatoryModel(SpatialModel):
 
     def held(self, rq, load_factor):
         """Gradients of the constraint equations of supports and joints, (equations, tied nodes, 6)."""
-        return self.ties.evaluate(rq[self.tied_slots], load_factor)[1] if self.ties else np.zeros((0, 0, 6))
+        if not self.ties:
+            return np.zeros((0, 0, 6))
+        return self.ties.on_nodes(self.ties.evaluate(rq[self.tied_slots], load_factor)[1])

@@ -87,8 +87,8 @@ class EndTies(MovingTies):
         return ties.evaluate(self.model.tied_motion(self.seen[0]), eta)[0]
 
     def _evaluate(self, eta):
-        c, gradient = super()._evaluate(eta)
-        return c - self._shift, gradient
+        c, gradients = super()._evaluate(eta)
+        return c - self._shift, gradients
 
     def _reactions(self):
         return (self._reactions_before + self.seen[1]) / 2
