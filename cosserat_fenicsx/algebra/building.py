@@ -38,7 +38,7 @@ def module(*sources):
     declare; lines with # are for C alone.
 
     C finds the number of arguments of FFCx's kernels as KERNEL_ARGUMENTS, and PETSc's integers as PetscInt. Processes
-    that come at the same time wait for the one that compiles, and a file that is damaged or belongs to another system is
+    that come at the same time wait for the one that compiles; a file that is damaged or belongs to another system is
     made anew.
 
     Raises:

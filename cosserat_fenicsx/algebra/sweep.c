@@ -95,7 +95,7 @@ static int put(const sweep *s, const double *numbers, double eta)
     return take_state(s->newton->problem, numbers);
 }
 
-static int read(const sweep *s, double *numbers)
+static int take(const sweep *s, double *numbers)
 {
     const problem *p = s->newton->problem;
     const double *x;
@@ -131,7 +131,7 @@ static int attempt(sweep *s, double goal)
     s->iterations += n->iterations;
     if (reason <= 0) return 0;
     advance(n->problem);
-    if (read(s, found)) return 0;
+    if (take(s, found)) return 0;
     const double off = largest(s, found, guess), taken = fabs(goal - s->etas[s->known - 1]);
     if (off > s->slight && (off > s->far || !near(s, here, guess, found))) return 0;
     if (negative_modes(s->stability, &sideways) != s->negative) return 0;

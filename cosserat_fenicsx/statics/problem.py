@@ -44,6 +44,11 @@ class Problem(Equations):
         # Arrays of the constants, written in place: the setter of `value` takes as long as a residual of few elements.
         self._eta, self._share = model.load_factor.value, model.permanent_factor.value
         self.take_loads((self._dead.array, self._eta), (self._permanent.array, self._share))
+        #: the array of the load factor; the `PackedExpression` of `CompiledForms.fields`, or None
+        self.eta_array, self.fields = self._eta, None
+        if forms.fields and model.comm.size == 1:
+            size = len(forms.gauss) * forms.fields_size
+            self.fields = PackedExpression(forms.fields, model.mesh, len(model.cell_dofs), size)
         self._loaded, self.begins = None, False
 
     @property

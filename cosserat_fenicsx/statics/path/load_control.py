@@ -16,10 +16,10 @@ from cosserat_fenicsx.errors import NotConverged
 from cosserat_fenicsx.interrupts import obey
 from cosserat_fenicsx.statics.path.track import FAR, INTENDED, NOTHING, Track, growth_of, through
 
-# Distance from the predictor (rad, rod lengths) below which direction and length of a step are not checked.
-_SLIGHT = 1e-3
-# Distance from the predictor, over the predicted increment, above which a step may have jumped over a limit point.
-_LEAP = 2.0
+#: Distance from the predictor (rad, rod lengths) below which direction and length of a step are not checked.
+SLIGHT = 1e-3
+#: Distance from the predictor, over the predicted increment, above which a step may have jumped over a limit point.
+LEAP = 2.0
 # Number of rejected steps from the first point after which the step is limited by the stiffness there.
 _FIRST_REJECTIONS = 3
 # Largest distance from the predictor, over the step's length, at which the number of negative modes may change; the
@@ -88,6 +88,11 @@ class Continuation:
         self.track, self.control, self._watch = track, control, watch
         self.step, self._shrink, self.smallest = None, 0.5, 0.0
 
+    def begin(self, way):
+        """Choose the step where none is known; `way`: see `to`."""
+        self.step = self.step or self.control.first or way / 10
+        self.smallest = self.control.smallest * way
+
     def to(self, target, way, *, on_step=None, patience=None):
         """Advance to the load factor `target`, which is reached exactly.
 
@@ -105,8 +110,7 @@ class Continuation:
         control, track = self.control, self.track
         if not control.adaptive:
             return self._attempt(target, guard=False, on_step=on_step)
-        self.step = self.step or control.first or way / 10
-        self.smallest = control.smallest * way
+        self.begin(way)
         self._refused, rejections, last_accepted, first = False, 0, False, len(track.history) == 1
         while track.here.load_factor != target:
             left = target - track.here.load_factor
@@ -157,7 +161,7 @@ class Continuation:
             return track.restore()
         numbers = track.problem.numbers()
         off = track.distance(numbers, predicted)
-        if adaptive and off > _SLIGHT and not self._near(numbers, predicted, off, eta):
+        if adaptive and off > SLIGHT and not self._near(numbers, predicted, off, eta):
             return track.restore()
         point = track.point(solved)
         changed = point.negative_modes != here.negative_modes
@@ -203,7 +207,7 @@ class Continuation:
             if track.product(move, increment) <= 0 < size:
                 track.failure = "the equilibrium lies opposite to the direction of the path"
                 return False
-            if track.product(move - increment, move - increment) <= _LEAP**2 * size:
+            if track.product(move - increment, move - increment) <= LEAP**2 * size:
                 return True
         if self._jumped(move, eta - track.here.load_factor):
             track.failure = "the equilibrium jumped away from the path's direction"
