@@ -12,8 +12,8 @@ import numpy as np
 import ufl
 
 from cosserat_fenicsx import compat
-from cosserat_fenicsx.forms import ties as eq
 from cosserat_fenicsx.compiling import compiling
+from cosserat_fenicsx.forms import ties as eq
 from cosserat_fenicsx.scene.ties import AngleTie, PositionTie
 
 _GROUND = (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)

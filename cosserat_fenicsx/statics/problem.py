@@ -6,8 +6,8 @@ from cosserat_fenicsx.algebra.equations import STATE, Equations
 from cosserat_fenicsx.algebra.packed import Packed, PackedExpression
 from cosserat_fenicsx.algebra.tie_rows import TieRows
 
-# Change of the load factor for central differences, whose error is of second order in that of prescribed rotations.
-_CHANGE = 1e-4
+#: Change of the load factor for central differences, whose error is of second order in that of prescribed rotations.
+CHANGE = 1e-4
 
 
 class Problem(Equations):
@@ -149,7 +149,7 @@ class Problem(Equations):
         The next call overwrites the returned vector.
         """
         eta = self.load_factor
-        change = _CHANGE * max(1.0, abs(eta))
+        change = CHANGE * max(1.0, abs(eta))
         for vector, ahead in zip(self._difference, (change, -change), strict=True):
             self.set_load_factor(eta + ahead)
             self.function(x, vector)

@@ -111,12 +111,12 @@ class Follower:
     @property
     def sweeps(self):
         """Whether steps from here on may be taken in C (`Sweep`): load control of one process, where Python has no say
-        in a step that is accepted. The first step is checked by slopes."""
+        in a step that is accepted."""
         track, model = self.track, self.track.model
         unsure = track.here.negative_modes and track.without_potential
         return (
             self._steps.adaptive and self._control != "arc" and model.comm.size == 1 and track.neutral is None
-            and len(track.history) > 1 and not (unsure or model.actions.memory or model.signature.lives_along_rods)
+            and not (unsure or model.actions.memory or model.signature.lives_along_rods)
         )  # fmt: skip
 
     def sweep(self, targets, way, fields, *, every, counted):
@@ -124,7 +124,7 @@ class Follower:
         self._load.begin(way)
         if self._sweep is None:
             self._sweep = Sweep(self.track, fields)
-        return self._sweep.along(targets, self._load, every, counted)
+        return self._sweep.along(targets, self._load, _PATIENCE, every=every, counted=counted)
 
     def to_fork(self, target, way):
         """Advance towards a load factor up to the first bifurcation; whether one was found."""
