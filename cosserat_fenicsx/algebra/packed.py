@@ -109,7 +109,7 @@ class Packed(_Kernel):
 
     def add_to_vector(self, array):
         """Add a linear form to an array of local degrees of freedom, ghosts included."""
-        self._lib.add_vector(self.c, self._dofs, self._ffi.cast("double *", array.ctypes.data))
+        self._lib.add_vector(self.c, self._dofs, self._ffi.from_buffer("double[]", array))
 
     def matrices(self):
         """(elements, n, n) matrices of the elements, of a bilinear form."""

@@ -44,9 +44,14 @@ class ActionTerms:
                 term.put(t)
 
     @property
-    def moving(self):
-        """The Functions that depend on time."""
-        return [function for term in self.terms if term.moves for function in term.data]
+    def move(self):
+        """Whether any data depend on time."""
+        return any(term.moves for term in self.terms)
+
+    @property
+    def data(self):
+        """The Functions of the data of all terms."""
+        return [function for term in self.terms for function in term.data]
 
     @property
     def refreshed(self):
@@ -94,6 +99,8 @@ class Term:
         self.data = [self._function(size) for size in kind.sizes]
         self.memory = [self._function(size) for size in kind.memory]
         self._rest = self._frame = self._evolution = None
+        # dolfinx makes an array of a Function anew whenever it is asked for one
+        self._arrays = [f.x.array.reshape(-1, size) for f, size in zip(self.data, kind.sizes, strict=True)]
 
     def _function(self, size):
         mesh, place = self._rods.mesh, self.kind.place
@@ -200,8 +207,8 @@ class Term:
             self._take(nearest_polynomials(now, rod, s, *elements) if rough else now.data(rod, s), rod, rows)
 
     def _take(self, data, rod, rows):
-        for function, datum in zip(self.data, data, strict=True):
-            function.x.array.reshape(-1, datum.size)[rows] = self._scaled(datum, rod)
+        for array, datum in zip(self._arrays, data, strict=True):
+            array[rows] = self._scaled(datum, rod)
 
     def _scaled(self, datum, rod):
         """The value of a `Datum`, dimensionless, vectors along the model's axes."""

@@ -32,7 +32,8 @@ class MovingPlanar(Moving, PlanarModel):
 
     def passed(self):
         """See `Moving`."""
-        return self.state.x.array - self.start.x.array
+        now, before, _ = self._arrays
+        return now - before
 
     def set_velocity(self, linear, angular):
         """See `Moving`."""

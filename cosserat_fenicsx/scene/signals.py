@@ -5,7 +5,6 @@ with `jumps` at the times where it is not smooth: time steps end there. The attr
 are linear between their jumps, and resolved by steps of any length.
 """
 
-import copy
 import itertools
 import math
 from dataclasses import dataclass
@@ -14,7 +13,7 @@ from functools import cached_property
 import numpy as np
 
 from cosserat_fenicsx.annotations import Numbers, Rows
-from cosserat_fenicsx.checks import call, number, refuse, store, vector
+from cosserat_fenicsx.checks import LARGEST, call, number, refuse, vector
 from cosserat_fenicsx.errors import SceneError
 
 
@@ -252,6 +251,16 @@ class Signal:
             SceneError: the function raised, or returned another number of values or values that are not finite; the
                 message gives the time.
         """
+        return self.function(t) if self._known else self.checked(t)
+
+    @cached_property
+    def _known(self):
+        """Whether it is one of the classes here with numbers that are finite at all times once they are at one."""
+        value = getattr(self.function, "value", None)
+        return type(self.function) in SIGNALS and value is not None and max(map(abs, value)) <= LARGEST
+
+    def checked(self, t):
+        """The vector at t, s, checked whatever the function; see `__call__`."""
         when = f"at the time t = {t:g} s" + (f", of the {self.owner} at {self.place}" if self.place else "")
         given = call(self.function, t, f"{self.owner}.{self.field}: its function", f", {when}")
         try:
@@ -273,7 +282,7 @@ def vector_or_signal(owner, field, value, unit, jumps=()):
     place = getattr(owner, "station", None) or getattr(owner, "rod", None)
     place = str(getattr(place, "name", place) or "")
     signal = Signal(type(owner).__name__, field, unit, value, _times_of(owner, value, jumps), place=place)
-    signal(0.0)
+    signal.checked(0.0)
     return signal
 
 
@@ -296,9 +305,9 @@ def at(item, t):
     now = {name: signal(t) for name, signal in signals_of(item).items()}
     if not now:
         return item
-    item = copy.copy(item)  # not by its constructor, whose checks take longer than a signal's own
-    store(item, **now, jumps=())
-    return item
+    other = object.__new__(type(item))  # not by its constructor, whose checks take longer than a signal's own
+    vars(other).update(vars(item), **now, jumps=())
+    return other
 
 
 def sample_times(item, until):
