@@ -143,8 +143,8 @@ class Moving:
         rates[:] = 2 / h * (now - before) - rates
 
     def loads_at(self, t):
-        """Fill the forms' Functions with the loads at the time t (s)."""
-        self.actions.at(t)
+        """Fill the forms' Functions with the loads at the time t (s); whether they differ from those before."""
+        return self.actions.at(t)
 
     def ties_at(self, t):
         """The `Ties` at the time t (s)."""

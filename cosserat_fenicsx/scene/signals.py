@@ -302,11 +302,20 @@ def signals_of(item):
 
 def at(item, t):
     """A load or a support with its values at the time t (s); unchanged where it does not depend on time."""
-    now = {name: signal(t) for name, signal in signals_of(item).items()}
-    if not now:
+    return with_values(item, values_at(item, t))
+
+
+def values_at(item, t):
+    """{field: value} at the time t (s) of what depends on time in a load or a support."""
+    return {name: signal(t) for name, signal in signals_of(item).items()}
+
+
+def with_values(item, values):
+    """A load or a support with `values_at` a time, which it has from then on."""
+    if not values:
         return item
     other = object.__new__(type(item))  # not by its constructor, whose checks take longer than a signal's own
-    vars(other).update(vars(item), **now, jumps=())
+    vars(other).update(vars(item), **values, jumps=())
     return other
 
 

@@ -104,8 +104,8 @@ class StepProblem(Equations):
     def _take_loads(self, t):
         """Evaluate the loads at the time t (s)."""
         self._acting_at = t
-        if self.model.actions.move:
-            self.model.loads_at(t)
+        model = self.model
+        if model.actions.move and (model.loads_at(t) or model.comm.size > 1):  # all ranks, or none
             self._assemble_loads()
 
     def _assemble_loads(self):
