@@ -32,7 +32,7 @@ class TieRows:
         links = model.signature.connections
         self._added, self._count = np.array(links.equations, dtype=np.intp), len(links.ties)
         # for every added equation: what multiplies its reaction at both stations, the ground has none
-        self._signs = np.array([(-1.0, 0.0 if links.ties[i][2] is None else -1.0) for i in self._added])
+        self._signs = np.array([(-1.0, 0.0 if links.ties[i][2] is None else -1.0) for i in self._added]).reshape(-1, 2)
         count = numbering.multipliers
         self._multipliers = (numbering.first_multiplier + np.arange(count)).astype(PETSc.IntType)
         wanted = np.concatenate([self._free_rows, self._multipliers])

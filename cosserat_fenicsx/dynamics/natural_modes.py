@@ -187,7 +187,7 @@ def _stiffness(problem):
     K = variation.numbering.matrix(variation.cell_dofs, tied[tied >= 0])
     true = model.section.K
     model.stiffen(np.where(np.isfinite(true), true, model.bounded_K))  # stability counts bound finite ones as well
-    Packed(variation.form, ()).add_to_matrix(K)
+    Packed(variation.form, (), ()).add_to_matrix(K)
     model.stiffen(model.bounded_K)
     if problem.ties:
         rows, of_ties = tied.ravel().astype(PETSc.IntType), problem.ties.second_variation(variation.axes, problem.eta)

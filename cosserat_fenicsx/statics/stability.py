@@ -168,6 +168,11 @@ class Part:
         self._factor()
         return self._negative - int(not self._zero and self._nearest(1)[0][0] < 0)
 
+    def count_of_matrix(self):
+        """The number of negative eigenvalues of K, whose factors give eigenvalues and modes."""
+        self._factor()
+        return self._negative
+
     def _factor(self):
         """Assemble K at the problem's state and factorise it."""
         self.assemble()
