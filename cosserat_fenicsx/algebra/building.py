@@ -21,7 +21,6 @@ import cffi
 from cosserat_fenicsx import compat
 from cosserat_fenicsx.compiling import cache, compiling
 
-CHAIN = Path(__file__).with_name("chain.c")
 # What -ffast-math would add hides numbers that are not finite, and changes sums. Python's own -fwrapv slows loops down.
 _FLAGS = ("-O3", "-fno-math-errno", "-ffp-contract=fast", "-fno-wrapv", "-fvisibility=hidden", "-g0")
 # The instructions of the level x86-64-v3, as Linux names them.
@@ -31,21 +30,22 @@ _DIGEST_SIZE = _DIGEST().digest_size
 
 
 @functools.cache
-def module(source=CHAIN):
-    """cffi's (ffi, lib) of a C file and the header beside it, which must only declare; lines with # are for C alone.
+def module(folder=Path(__file__).parent):
+    """cffi's (ffi, lib) of the C files of a folder, which are one program, with the declarations of its header files.
 
-    C finds the number of arguments of FFCx's kernels as KERNEL_ARGUMENTS. Processes that come at the same time wait for
+    cffi reads all lines of the headers but those with #; so what only cffi understands goes between #if 0 and #endif. C
+    finds the number of arguments of FFCx's kernels as KERNEL_ARGUMENTS. Processes that come at the same time wait for
     the one that compiles, and a file that is damaged or belongs to another system is made anew.
 
     Raises:
         InstallationError: there is no C compiler that works, or the cache cannot be used.
     """
     with compiling():
+        texts = {file: file.read_text(encoding="utf-8") for file in sorted(folder.glob("*.[ch]"))}
         flags = [*_FLAGS, *_instructions(), f"-DKERNEL_ARGUMENTS={compat.KERNEL_ARGUMENTS}"]
         suffix = importlib.machinery.EXTENSION_SUFFIXES[0]
-        header = source.with_suffix(".h")
-        key = _DIGEST(repr((source.read_bytes(), header.read_bytes(), flags, suffix, cffi.__version__)).encode())
-        name = f"cosserat_{source.stem}_{key.hexdigest()[:20]}"
+        key = _DIGEST(repr((list(texts.values()), flags, suffix, cffi.__version__)).encode()).hexdigest()
+        name = f"cosserat_{folder.name}_{key[:20]}"
         file = cache().absolute() / (name + suffix)
         with contextlib.suppress(FileNotFoundError, ImportError):
             return _load(name, file)
@@ -53,7 +53,7 @@ def module(source=CHAIN):
         with _alone_in(file.parent):
             with contextlib.suppress(FileNotFoundError, ImportError):
                 return _load(name, file)
-            _build(name, file, source, header, flags)
+            _build(name, file, texts, flags)
             return _load(name, file)
 
 
@@ -78,17 +78,18 @@ def _alone_in(folder):
         os.close(handle)
 
 
-def _build(name, file, source, header, flags):
+def _build(name, file, texts, flags):
     from cffi import recompiler  # rarely needed, and slow to import
 
-    declarations = header.read_text(encoding="utf-8").splitlines()
+    headers = "\n".join(text for path, text in texts.items() if path.suffix == ".h")
     builder = cffi.FFI()
-    builder.cdef("\n".join(line for line in declarations if not line.startswith("#")))
+    builder.cdef("\n".join(line for line in headers.splitlines() if not line.startswith("#")))
+    included = [f'#include "{path}"' for path in texts if not any(f'"{path.name}"' in text for text in texts.values())]
     with tempfile.TemporaryDirectory(dir=file.parent, prefix=name) as folder:
         glue, made = Path(folder) / "module.c", Path(folder) / "module.so"
-        recompiler.make_c_source(builder, name, f'#include "{source}"', str(glue))
-        headers = sysconfig.get_path("include"), sysconfig.get_path("platinclude")
-        command = [*_linker(), "-fPIC", *(f"-I{path}" for path in headers), *flags, str(glue), "-o", str(made), "-lm"]
+        recompiler.make_c_source(builder, name, "\n".join(included), str(glue))
+        of_python = [f"-I{sysconfig.get_path(which)}" for which in ("include", "platinclude")]
+        command = [*_linker(), "-fPIC", *of_python, *flags, str(glue), "-o", str(made), "-lm"]
         try:
             done = subprocess.run(
                 command, stdin=subprocess.DEVNULL, capture_output=True, encoding="utf-8", errors="replace"
