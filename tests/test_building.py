@@ -10,31 +10,31 @@ from cosserat_fenicsx.algebra import building
 
 pytestmark = pytest.mark.serial
 
-HEADER = """#pragma once
+HEADER = """#ifndef SMALL_H
+#define SMALL_H
 typedef struct { double a, b; } pair;
 double product(const pair *given);
 #if 0
 extern "Python" double change(double x);
 #endif
+#endif
 """
 CODE = """#include "small.h"
 static double change(double x);
-double product(const pair *given) { return change(times(given->a, given->b)) + KERNEL_ARGUMENTS; }
+PetscInt zero = 0;
+double product(const pair *given) { return change(given->a * given->b) + KERNEL_ARGUMENTS + zero; }
 """
-OTHER = "static double times(double a, double b) { return a * b; }\n"
 
 
 @pytest.fixture
-def folder(tmp_path, monkeypatch):
-    """A small program, and an empty cache."""
-    folder = tmp_path / "small"
-    folder.mkdir()
-    for name, text in (("small.h", HEADER), ("small.c", CODE), ("one.c", OTHER)):
-        (folder / name).write_text(text)
+def source(tmp_path, monkeypatch):
+    """A small C file with its header, and an empty cache beside it."""
+    (tmp_path / "small.h").write_text(HEADER)
+    (tmp_path / "small.c").write_text(CODE)
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     monkeypatch.delenv("CC", raising=False)
     building.module.cache_clear()
-    return folder
+    return tmp_path / "small.c"
 
 
 def works(module):
@@ -43,41 +43,41 @@ def works(module):
     return lib.product(ffi.new("pair *", [2.0, 3.0])) == compat.KERNEL_ARGUMENTS - 6.0
 
 
-def test_c_is_compiled_once_and_in_silence(folder, monkeypatch, capfd):
-    made = building.module(folder)
+def test_c_is_compiled_once_and_in_silence(source, monkeypatch, capfd):
+    made = building.module(source)
     (file,) = building.cache().iterdir()  # and nothing else
     monkeypatch.setenv("CC", "/no/compiler")
-    assert building.module(folder) is made and works(made)
+    assert building.module(source) is made and works(made)
     building.module.cache_clear()
-    assert works(building.module(folder))  # loaded, not compiled
+    assert works(building.module(source))  # loaded, not compiled
     assert capfd.readouterr() == ("", "")
-    (folder / "one.c").write_text(OTHER + "\n")
+    source.write_text(CODE + "\n")
     building.module.cache_clear()
     with pytest.raises(cf.InstallationError, match="/no/compiler"):
-        building.module(folder)
+        building.module(source)
     assert list(building.cache().iterdir()) == [file]
 
 
 @pytest.mark.parametrize("kept", [0.0, 0.5, 0.99])
-def test_a_damaged_file_is_made_anew(folder, monkeypatch, kept):
-    building.module(folder)
+def test_a_damaged_file_is_made_anew(source, monkeypatch, kept):
+    building.module(source)
     (file,) = building.cache().iterdir()
     content = file.read_bytes()
-    monkeypatch.setenv("XDG_CACHE_HOME", str(folder.parent / "other"))  # Python loads nothing twice from one place
+    monkeypatch.setenv("XDG_CACHE_HOME", str(source.parent / "other"))  # Python loads nothing twice from one place
     building.cache().mkdir(parents=True)
     damaged = building.cache() / file.name
     damaged.write_bytes(content[: int(kept * len(content))])
     building.module.cache_clear()
-    assert works(building.module(folder)) and len(damaged.read_bytes()) == len(content)
+    assert works(building.module(source)) and len(damaged.read_bytes()) == len(content)
 
 
-def test_one_of_many_compiles(folder, monkeypatch):
-    compiler, log = folder.parent / "cc", folder.parent / "log"
+def test_one_of_many_compiles(source, monkeypatch):
+    compiler, log = source.parent / "cc", source.parent / "log"
     compiler.write_text(f'#!/bin/sh\necho >> "{log}"\nsleep 0.2\nexec cc "$@"\n')
     compiler.chmod(0o755)
     monkeypatch.setenv("CC", f"{compiler} -DUNUSED")
     made = []
-    threads = [threading.Thread(target=lambda: made.append(building.module.__wrapped__(folder))) for _ in range(4)]
+    threads = [threading.Thread(target=lambda: made.append(building.module.__wrapped__(source))) for _ in range(4)]
     for thread in threads:
         thread.start()
     for thread in threads:
@@ -93,14 +93,14 @@ def test_one_of_many_compiles(folder, monkeypatch):
         ("cc -include missing.h", r"\(.*fatal error: missing.h: No such file.*\).*apt install gcc"),
     ],
 )
-def test_no_compiler(folder, monkeypatch, compiler, words):
+def test_no_compiler(source, monkeypatch, compiler, words):
     monkeypatch.setenv("CC", compiler)
     with pytest.raises(cf.InstallationError, match=words) as told:
-        building.module(folder)
+        building.module(source)
     assert "\n" not in str(told.value) and not list(building.cache().iterdir())
 
 
-def test_no_cache(folder, monkeypatch):
+def test_no_cache(source, monkeypatch):
     monkeypatch.setenv("XDG_CACHE_HOME", "/dev/null")
     with pytest.raises(cf.InstallationError, match="/dev/null/fenics .*Not a directory.* set XDG_CACHE_HOME"):
-        building.module(folder)
+        building.module(source)

@@ -17,12 +17,15 @@ import tempfile
 from pathlib import Path
 
 import cffi
+import numpy as np
+from petsc4py import PETSc
 
 from cosserat_fenicsx import compat
 from cosserat_fenicsx.compiling import cache, compiling
 
+SOURCES = tuple(Path(__file__).with_name(name) for name in ("chain.c", "newton.c"))
 # What -ffast-math would add hides numbers that are not finite, and changes sums. Python's own -fwrapv slows loops down.
-_FLAGS = ("-O3", "-fno-math-errno", "-ffp-contract=fast", "-fno-wrapv", "-fvisibility=hidden", "-g0")
+_FLAGS = ("-O3", "-fno-math-errno", "-ffp-contract=fast", "-fno-wrapv", "-fopenmp-simd", "-fvisibility=hidden", "-g0")
 # The instructions of the level x86-64-v3, as Linux names them.
 _LEVEL_3 = {"avx", "avx2", "bmi1", "bmi2", "f16c", "fma", "abm", "movbe", "xsave"}
 _DIGEST = hashlib.sha256
@@ -30,22 +33,26 @@ _DIGEST_SIZE = _DIGEST().digest_size
 
 
 @functools.cache
-def module(folder=Path(__file__).parent):
-    """cffi's (ffi, lib) of the C files of a folder, which are one program, with the declarations of its header files.
+def module(*sources):
+    """cffi's (ffi, lib) of C files, by default those of this folder, and the header of the first one, which must only
+    declare. cffi reads all of its lines but those with #: what only cffi understands goes between #if 0 and #endif.
 
-    cffi reads all lines of the headers but those with #; so what only cffi understands goes between #if 0 and #endif. C
-    finds the number of arguments of FFCx's kernels as KERNEL_ARGUMENTS. Processes that come at the same time wait for
-    the one that compiles, and a file that is damaged or belongs to another system is made anew.
+    C finds the number of arguments of FFCx's kernels as KERNEL_ARGUMENTS and PETSc's integer type as PetscInt.
+    Processes that come at the same time wait for the one that compiles, and a file that is damaged or belongs to
+    another system is made anew.
 
     Raises:
         InstallationError: there is no C compiler that works, or the cache cannot be used.
     """
     with compiling():
-        texts = {file: file.read_text(encoding="utf-8") for file in sorted(folder.glob("*.[ch]"))}
         flags = [*_FLAGS, *_instructions(), f"-DKERNEL_ARGUMENTS={compat.KERNEL_ARGUMENTS}"]
+        flags.append(f"-DPetscInt=int{8 * np.dtype(PETSc.IntType).itemsize}_t")
+        sources = sources or SOURCES
         suffix = importlib.machinery.EXTENSION_SUFFIXES[0]
-        key = _DIGEST(repr((list(texts.values()), flags, suffix, cffi.__version__)).encode()).hexdigest()
-        name = f"cosserat_{folder.name}_{key[:20]}"
+        header = sources[0].with_suffix(".h")
+        contents = [file.read_bytes() for file in (*sources, header)]
+        key = _DIGEST(repr((contents, flags, suffix, cffi.__version__)).encode())
+        name = f"cosserat_{sources[0].stem}_{key.hexdigest()[:20]}"
         file = cache().absolute() / (name + suffix)
         with contextlib.suppress(FileNotFoundError, ImportError):
             return _load(name, file)
@@ -53,7 +60,7 @@ def module(folder=Path(__file__).parent):
         with _alone_in(file.parent):
             with contextlib.suppress(FileNotFoundError, ImportError):
                 return _load(name, file)
-            _build(name, file, texts, flags)
+            _build(name, file, sources, header, flags)
             return _load(name, file)
 
 
@@ -78,18 +85,17 @@ def _alone_in(folder):
         os.close(handle)
 
 
-def _build(name, file, texts, flags):
+def _build(name, file, sources, header, flags):
     from cffi import recompiler  # rarely needed, and slow to import
 
-    headers = "\n".join(text for path, text in texts.items() if path.suffix == ".h")
+    declarations = header.read_text(encoding="utf-8").splitlines()
     builder = cffi.FFI()
-    builder.cdef("\n".join(line for line in headers.splitlines() if not line.startswith("#")))
-    included = [f'#include "{path}"' for path in texts if not any(f'"{path.name}"' in text for text in texts.values())]
+    builder.cdef("\n".join(line for line in declarations if not line.startswith("#")))
     with tempfile.TemporaryDirectory(dir=file.parent, prefix=name) as folder:
         glue, made = Path(folder) / "module.c", Path(folder) / "module.so"
-        recompiler.make_c_source(builder, name, "\n".join(included), str(glue))
-        of_python = [f"-I{sysconfig.get_path(which)}" for which in ("include", "platinclude")]
-        command = [*_linker(), "-fPIC", *of_python, *flags, str(glue), "-o", str(made), "-lm"]
+        recompiler.make_c_source(builder, name, "".join(f'#include "{source}"\n' for source in sources), str(glue))
+        headers = sysconfig.get_path("include"), sysconfig.get_path("platinclude")
+        command = [*_linker(), "-fPIC", *(f"-I{path}" for path in headers), *flags, str(glue), "-o", str(made), "-lm"]
         try:
             done = subprocess.run(
                 command, stdin=subprocess.DEVNULL, capture_output=True, encoding="utf-8", errors="replace"
