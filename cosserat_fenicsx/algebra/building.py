@@ -93,7 +93,8 @@ def _build(name, file, sources, header, flags):
     builder.cdef("\n".join(line for line in declarations if not line.startswith("#")))
     with tempfile.TemporaryDirectory(dir=file.parent, prefix=name) as folder:
         glue, made = Path(folder) / "module.c", Path(folder) / "module.so"
-        recompiler.make_c_source(builder, name, "".join(f'#include "{source}"\n' for source in sources), str(glue))
+        code = "".join(f'#include "{source.absolute()}"\n' for source in sources)
+        recompiler.make_c_source(builder, name, code, str(glue))
         headers = sysconfig.get_path("include"), sysconfig.get_path("platinclude")
         command = [*_linker(), "-fPIC", *(f"-I{path}" for path in headers), *flags, str(glue), "-o", str(made), "-lm"]
         try:
@@ -104,7 +105,8 @@ def _build(name, file, sources, header, flags):
             raise cffi.VerificationError(str(problem)) from problem
         if done.returncode:
             lines = done.stderr.strip().splitlines() or [f"{command[0]}: exit code {done.returncode}"]
-            raise cffi.VerificationError(next((line for line in lines if "error" in line), lines[0]))
+            told = (line for line in lines if "error" in line or "failed" in line)  # ld's words come before gcc's
+            raise cffi.VerificationError(next(told, lines[0]))
         with open(made, "r+b") as binary:
             digest = _DIGEST(binary.read()).digest()
             binary.write(digest)
