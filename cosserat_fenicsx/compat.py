@@ -233,6 +233,7 @@ def cell_nodes(space):
     """Local node (block) indices of every local cell of a space, shape (cells, nodes per cell); a rank may have
     none."""
     cells = space.dofmap.list
+    cells = cells() if callable(cells) else cells  # of C++'s spaces
     if not hasattr(cells, "array"):
         return cells
     return cells.array.reshape(cells.num_nodes, space.dofmap.dof_layout.num_dofs)

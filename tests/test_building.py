@@ -43,6 +43,13 @@ def works(module):
     return lib.product(ffi.new("pair *", [2.0, 3.0])) == compat.KERNEL_ARGUMENTS - 6.0
 
 
+def test_the_c_of_the_package_is_built(monkeypatch, tmp_path):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    ffi, lib = building.module.__wrapped__()
+    (file,) = building.cache().iterdir()
+    assert file.name.startswith("cosserat_chain_") and callable(lib.eliminate) and ffi.sizeof("kernel") > 0
+
+
 def test_c_is_compiled_once_and_in_silence(source, monkeypatch, capfd):
     made = building.module(source)
     (file,) = building.cache().iterdir()  # and nothing else

@@ -55,6 +55,7 @@ SHARED = {
     "quadrature",
     "quaternions",
     "ranks",
+    "remember",
     "units",
 }
 ROOMS = {

@@ -23,7 +23,7 @@ from petsc4py import PETSc
 from cosserat_fenicsx import compat
 from cosserat_fenicsx.compiling import cache, compiling
 
-SOURCES = tuple(Path(__file__).with_name(name) for name in ("chain.c", "newton.c"))
+SOURCES = tuple(Path(__file__).with_name(name) for name in ("chain.c", "newton.c", "sweep.c"))
 # What -ffast-math would add hides numbers that are not finite, and changes sums. Python's own -fwrapv slows loops down.
 _FLAGS = ("-O3", "-fno-math-errno", "-ffp-contract=fast", "-fno-wrapv", "-fopenmp-simd", "-fvisibility=hidden", "-g0")
 # The instructions of the level x86-64-v3, as Linux names them.
@@ -35,11 +35,11 @@ _DIGEST_SIZE = _DIGEST().digest_size
 @functools.cache
 def module(*sources):
     """cffi's (ffi, lib) of C files, by default those of this folder, and the header of the first one, which must only
-    declare. cffi reads all of its lines but those with #: what only cffi understands goes between #if 0 and #endif.
+    declare; lines with # are for C alone.
 
-    C finds the number of arguments of FFCx's kernels as KERNEL_ARGUMENTS and PETSc's integer type as PetscInt.
-    Processes that come at the same time wait for the one that compiles, and a file that is damaged or belongs to
-    another system is made anew.
+    C finds the number of arguments of FFCx's kernels as KERNEL_ARGUMENTS, and PETSc's integers as PetscInt. Processes
+    that come at the same time wait for the one that compiles; a file that is damaged or belongs to another system is
+    made anew.
 
     Raises:
         InstallationError: there is no C compiler that works, or the cache cannot be used.

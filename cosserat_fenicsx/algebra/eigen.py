@@ -94,7 +94,7 @@ def real_of_pencil(A, B, count):
 
 def _unsymmetric(A, B, count):
     """(values (n,), complex; real or imaginary parts of eigenvectors) of the eigenvalues of largest magnitude."""
-    solver, pc = _of_pencil(A, B, linear.factor_tangent)
+    solver, pc = _of_pencil(A, B, linear.factor_general)
     which = SLEPc.EPS.Which.LARGEST_MAGNITUDE
     found = _solve(solver, SLEPc.EPS.ProblemType.GNHEP, which, count, A, tolerance=_UNSYMMETRIC)
     pc.destroy()

@@ -1,37 +1,244 @@
-"""Base class of equilibrium and time step problems: unknowns in PETSc vectors, constraint equations, assembly."""
+"""Base of equilibrium and time step problems: residual, tangent and its inverse in C, with what Python adds."""
+
+import weakref
+from functools import cache
 
 import numpy as np
+from mpi4py import MPI
+
+from cosserat_fenicsx.algebra.building import module
+from cosserat_fenicsx.algebra.elimination import Elimination
+from cosserat_fenicsx.algebra.interface import Interface
+
+#: What C asks Python for, see newton.c.
+STATE, RESIDUAL, TANGENT, INTERFACE, ADD_UP, SUM, MATRICES, COUNT = (1 << k for k in range(8))
 
 
-class Equations:
-    """Vectors and matrix of a model, in the solver's unknowns (`models.numbering`).
+@cache
+def _hook():
+    """Let C call `Called.called`."""
+    ffi, _ = module()
+
+    @ffi.def_extern(name="python_hook", error=1)
+    def hook(owner, what, a, b):
+        return ffi.from_handle(owner)().called(what, a, b)
+
+    return hook
+
+
+class Called:
+    """An object that C asks for what Python has to do."""
+
+    def __init__(self):
+        _hook()
+        self._ffi, self._lib = module()
+        self._handle, self._failure = self._ffi.new_handle(weakref.ref(self)), None
+
+    def called(self, what, a, b):
+        """See `hook` in newton.c: 0, or 1 after an exception, which is kept."""
+        try:
+            self._answer(what, a, b)
+        except BaseException as problem:  # C cannot pass it on
+            self._failure = problem
+            return 1
+        return 0
+
+    def raise_failure(self):
+        """Raise the exception that was kept, if any."""
+        failure, self._failure = self._failure, None
+        if failure is not None:
+            raise failure
+
+    def _answer(self, what, a, b):
+        raise NotImplementedError
+
+
+class Equations(Called):
+    """Residual and tangent of a model, in the solver's unknowns (`models.numbering`).
 
     Args:
         model: see `models.base.RodModel` for the protocol.
+        hooks: what of STATE, RESIDUAL and MATRICES Python changes, in addition to what this class needs.
 
     Attributes:
-        x, b, A: unknowns, residual, tangent; the model's state follows x.
+        x, b: unknowns, residual; the model's state follows x.
         ties: the `TieRows` of the constraint equations of supports and joints, or None.
-        tangent: the kind of factorisation of A, see `linear.factor_tangent`.
+        elimination: the `Elimination` of the tangent.
+        c: the C structure `problem`.
     """
 
     #: the class of `ties`, called with (model, numbering)
     ties_class = None
 
-    def __init__(self, model):
+    def __init__(self, model, hooks=0):
+        super().__init__()
         self.model, self.numbering = model, model.numbering
         numbering = self.numbering
         self.ties = self.ties_class(model, numbering) if model.signature.connections.ties else None
-        tied = self.ties.rows if self.ties else np.empty(0, dtype=np.int64)
-        self.tangent = self._kind()
-        self.A = numbering.matrix(model.cell_dofs, tied[tied >= 0], blocks=self.tangent == "blocks")
+        tied = self.ties.rows if self.ties else np.empty((0, numbering.block), dtype=np.int64)
+        order, delays = np.argsort(model.rods.cells[: len(model.cell_dofs)]), model.force_is_unknown
+        self.elimination = Elimination(numbering, model.cell_dofs, order, tied.ravel(), delays=delays)
         self.x, self.b = numbering.vector(), numbering.vector()
-        self._local = np.zeros(len(numbering.rows))
+        self._x, self._y = numbering.vector(), numbering.vector()  # for the hooks, which need PETSc's vectors
         self._state = model.state.x.array
+        self._local = np.zeros(len(numbering.rows))
+        self.interface = None
+        if self.elimination.unknowns or numbering.comm.size > 1:
+            self.interface = Interface(self.elimination, tied, numbering.multipliers)
+        self._fill(hooks)
 
-    def _kind(self):
-        """See `tangent`."""
-        raise NotImplementedError
+    def _fill(self, hooks):
+        model, numbering, ffi = self.model, self.numbering, self._ffi
+        serial = numbering.comm.size == 1
+        hooks |= (STATE | RESIDUAL) * bool(self.ties) | (STATE | ADD_UP | SUM) * (not serial)
+        hooks |= (TANGENT | INTERFACE) * bool(self.interface)
+        self.c = problem = ffi.new("problem *")
+        problem.self, problem.hooks, problem.serial, problem.chain = self._handle, hooks, serial, self.elimination.c
+        problem.size, problem.locals, problem.frees = numbering.size, len(self._local), len(numbering.free)
+        problem.free, problem.of_free = self._integers(numbering.free), self._integers(numbering.of_free)
+        problem.local = self.pointer(self._local)
+        if hooks & MATRICES:
+            #: (elements, n, n) where MATRICES is among the hooks
+            self.matrices = np.zeros((*model.cell_dofs.shape, model.cell_dofs.shape[1]))
+            problem.matrices = self.pointer(self.matrices)
+        for name in ("state", "before", "step"):
+            setattr(problem, name, self.pointer(getattr(model, name).x.array))
+        mine = self.elimination.interface - numbering.first
+        here = np.full(self.elimination.unknowns, -1)
+        here[: len(mine)] = np.where((mine >= 0) & (mine < numbering.size), mine, -1)
+        self._on_interface = np.zeros(len(here))
+        problem.interfaces, problem.of_interface = len(here), self._integers(here)
+        problem.interface = self.pointer(self._on_interface)
+
+    def take_forms(self, residual, tangent, advance=None):
+        """Set the `Packed` residual and tangent, and the `PackedExpression` of the carried contact force or None."""
+        problem = self.c
+        self._residual, self._tangent, self._advance = residual, tangent, advance
+        problem.residual, problem.tangent, problem.dofs = residual.c, tangent.c, self._integers(residual.dofs)
+        if advance:
+            problem.advance = advance.c
+            problem.carried = self.pointer(self.model.carried[0].x.array)
+            problem.advance_dofs = self._integers(self.model.carried_dofs)
+
+    def take_loads(self, *loads):
+        """Set up to three (vector, array of its factor) to subtract from the residual."""
+        for k, (vector, factor) in enumerate(loads):
+            self.c.load[k], self.c.factor[k] = self.pointer(vector), self.pointer(factor)
+
+    def pointer(self, array):
+        """C's pointer to an array of floats, which must live as long as the problem."""
+        self.__dict__.setdefault("_kept", []).append(array)
+        return self._ffi.cast("double *", array.ctypes.data)
+
+    def _integers(self, array):
+        array = np.ascontiguousarray(array, dtype=np.int32)
+        self.__dict__.setdefault("_kept", []).append(array)
+        return self._ffi.cast("int *", array.ctypes.data)
+
+    # -- for solvers -------------------------------------------------------------------------------------------------
+
+    def function(self, x, b):
+        """b = the residual at x; the state follows."""
+        self._done(self._lib.residual(self.c, self._read(x), self._written(b)))
+
+    def factor(self):
+        """Factors of the tangent at the state that `function` was last called with."""
+        self._done(self._lib.tangent(self.c))
+
+    def solve(self, b, x):
+        """x = tangent^-1 b; False where the last tangent is singular."""
+        self._done(self._lib.solve(self.c, self._read(b), self._written(x)))
+        return not self.c.singular
+
+    def set_state(self, x):
+        """Copy a vector of unknowns into the model's state, ghosts included."""
+        self._done(self._lib.take_state(self.c, self._read(x)))
+
+    def _read(self, vector):
+        return self._ffi.cast("double *", vector.array_r.ctypes.data)
+
+    def _written(self, vector):
+        return self._ffi.cast("double *", vector.array_w.ctypes.data)
+
+    def _done(self, failed):
+        self.raise_failure()
+        if failed:
+            raise MemoryError("C code of algebra/newton.c failed")
+
+    def memory(self):
+        """The factors of the tangent, as arrays."""
+        interface = {"interface": self.interface.memory()} if self.interface else {}
+        return self.elimination.memory() | interface
+
+    def recall(self, memory):
+        """Restore what `memory` returned."""
+        self.elimination.recall(memory)
+        if self.interface:
+            self.interface.recall(memory["interface"])
+        self.c.singular = 0
+
+    # -- what C asks for ---------------------------------------------------------------------------------------------
+
+    def _answer(self, what, a, b):
+        numbering, ties = self.numbering, self.ties
+        if what == STATE:
+            self._x.array_w[:] = self._array(a, numbering.size)
+            if numbering.comm.size > 1:
+                numbering.to_local(self._x, self._state)
+            if ties:
+                ties.see(self._x)
+            if b:
+                self._refresh()
+        elif what == RESIDUAL:
+            self._change_residual(self._array(a, numbering.size), self._array(b, numbering.size))
+        elif what == TANGENT:
+            self._factor_interface()
+        elif what == INTERFACE:
+            self._solve_interface()
+        elif what == ADD_UP:
+            numbering.add_up(self._local, self._y)
+            self._array(b, numbering.size)[:] = self._y.array_r
+        elif what == SUM:
+            self._array(a, 1)[0] = numbering.comm.allreduce(float(a[0]))
+        else:
+            self._change_matrices()
+
+    def _array(self, pointer, size):
+        return np.frombuffer(self._ffi.buffer(pointer, 8 * size))
+
+    def _refresh(self):
+        """Update what depends on the state, before it is evaluated."""
+
+    def _change_residual(self, x, b):
+        """Change the residual b at x, arrays of this rank's unknowns."""
+        if self.ties:
+            self._y.array_w[:] = b
+            self.ties.add_residual(self._y, self.eta)
+            b[:] = self._y.array_r
+
+    def _change_matrices(self):
+        """Change `matrices`, of the elements."""
+
+    def _factor_interface(self):
+        comm = self.numbering.comm
+        singular = comm.allreduce(self.c.singular, op=MPI.MAX) if comm.size > 1 else self.c.singular
+        self.c.singular = 1 if singular else not self.interface.factor(*self._derivatives_of_ties())
+
+    def _derivatives_of_ties(self):
+        """The tangent's part of supports and joints, see `Interface.matrix`; on all ranks."""
+        if not self.ties:
+            return (np.empty((0, 0)),)
+        found, comm = self.ties.tangent_blocks(self.eta), self.numbering.comm
+        return comm.bcast(found, root=comm.size - 1) if comm.size > 1 else found
+
+    def _solve_interface(self):
+        b, comm = self._on_interface, self.numbering.comm
+        if comm.size > 1:
+            comm.Allreduce(MPI.IN_PLACE, b)
+        if not self.c.singular:
+            b[:] = self.interface.solve(b)
+
+    # -- for results -------------------------------------------------------------------------------------------------
 
     def _assemble(self, form, vector):
         """Assemble a packed form into a solver's vector; None gives zero."""
@@ -39,12 +246,6 @@ class Equations:
         if form:
             form.add_to_vector(self._local)
         self.numbering.add_up(self._local, vector)
-
-    def set_state(self, x):
-        """Copy a vector of unknowns into the model's state, ghosts included."""
-        self.numbering.to_local(x, self._state)
-        if self.ties:
-            self.ties.see(x)
 
     def tie_forces(self):
         """(ties, 2, 6) force and moment, inertial, that every equation of supports and joints exerts on its two

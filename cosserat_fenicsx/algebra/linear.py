@@ -1,33 +1,13 @@
-"""The direct solver for each kind of matrix, and the settings that it needs."""
-
-from petsc4py import PETSc
+"""The direct solver for each kind of assembled matrix, and the settings that it needs."""
 
 
-def solve_with_tangent(ksp, kind="general"):
-    """Set how a KSP uses the factors of a tangent: a factorisation that pivots only within blocks loses digits on
-    slender rods, which two steps of iterative refinement recover."""
-    ksp.setType("richardson" if kind == "blocks" else "preonly")
-    if kind == "blocks":
-        ksp.setNormType(PETSc.KSP.NormType.NONE)
-        ksp.setTolerances(max_it=3)
-
-
-def factor_tangent(pc, A, kind="general"):
-    """Set the factorisation of a tangent, serial or parallel.
-
-    Args:
-        kind: in serial, "general": LU with pivoting over the whole matrix, because the diagonal of a constraint
-            equation, or of a contact force's, may be zero; "blocks": PETSc's LU of a matrix stored in node blocks,
-            which pivots within them (q_a may be zero), at a third of the cost; "plain": PETSc's LU without pivoting;
-            "symmetric": LDL^T. MUMPS in parallel.
-    """
-    pc.setType("cholesky" if kind == "symmetric" and A.comm.size == 1 else "lu")
+def factor_general(pc, A):
+    """Set an LU factorisation with pivoting over the whole matrix."""
+    pc.setType("lu")
     if A.comm.size > 1:
         _mumps(pc, A)
-    elif kind == "general":
-        pc.setFactorSolverType("klu")
     else:
-        pc.setFactorOrdering("nd")
+        pc.setFactorSolverType("klu")
 
 
 def factor_second_variation(pc, K):

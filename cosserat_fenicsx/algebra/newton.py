@@ -5,23 +5,22 @@ PETSc's default line search impairs convergence on eq. (1); so the line search i
 defined here.
 """
 
+import ctypes
 import math
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 
 import numpy as np
 from petsc4py import PETSc
 
-from cosserat_fenicsx.algebra import linear
+from cosserat_fenicsx.algebra.building import module
 from cosserat_fenicsx.compat import RESIDUAL_NOT_A_NUMBER
 from cosserat_fenicsx.errors import NotConverged
 
 #: Newton stops when the increment, or the remaining error estimated from the contraction, is below this (root mean
 #: square over the nodal unknowns, positions in units of L).
 INCREMENT = 1e-11
-_HUGE = 1e3
-#: PETSc's code for an error in an external package: KLU found a singular tangent.
-EXTERNAL = 76
+_MOST_ITERATIONS = 100  # the room in newton.c
 _Reason = PETSc.SNES.ConvergedReason
 #: Why SNES stopped.
 WORDS = {
@@ -31,6 +30,27 @@ WORDS = {
     RESIDUAL_NOT_A_NUMBER: "the residual is not a number",
     _Reason.DIVERGED_LINEAR_SOLVE: "the tangent is singular",
 }
+
+
+_FUNCTIONS = {
+    "get_read": "VecGetArrayRead", "restore_read": "VecRestoreArrayRead", "get": "VecGetArray",
+    "restore": "VecRestoreArray", "set_function": "SNESSetFunction", "set_jacobian": "SNESSetJacobian",
+    "set_test": "SNESSetConvergenceTest", "set_update": "SNESSetUpdate", "set_context": "SNESSetApplicationContext",
+    "get_context": "SNESGetApplicationContext", "set_apply": "PCShellSetApply", "set_shell": "PCShellSetContext",
+    "get_shell": "PCShellGetContext", "get_update": "SNESGetSolutionUpdate", "solve": "SNESSolve",
+    "get_reason": "SNESGetConvergedReason",
+}  # fmt: skip
+
+
+@cache
+def petsc():
+    """The functions of PETSc that newton.c calls: those of the library that petsc4py has loaded."""
+    ffi, _ = module()
+    library, table = ctypes.CDLL(PETSc.__file__), ffi.new("petsc *")
+    for field, name in _FUNCTIONS.items():
+        address = ctypes.cast(getattr(library, name), ctypes.c_void_p).value
+        setattr(table, field, ffi.cast(ffi.typeof(getattr(table, field)), address))
+    return table
 
 
 @dataclass(frozen=True)
@@ -52,43 +72,45 @@ def take_full_steps(snes):
 
 
 class Newton:
-    """Newton's method for one problem.
+    """Newton's method for one problem: PETSc's SNES with the callbacks of newton.c.
 
     Args:
         problem: a `Problem`.
     """
 
     def __init__(self, problem):
-        self.problem = problem
-        model = problem.model
-        motions = model.comm.allreduce(model.motion_in(problem.x.array_r).size)
-        self._others, self._root = motions < model.unknowns, math.sqrt(motions)
-        self._carries = bool(model.carried)
-        self._now, self._before, self._step = (f.x.array for f in (model.state, model.before, model.step))
-        self.snes = snes = PETSc.SNES().create(model.comm)
+        self.problem, (self._ffi, self._lib) = problem, module()
+        model, numbering, comm = problem.model, problem.numbering, problem.model.comm
+        self.c = newton = self._ffi.new("newton *")
+        newton.problem, newton.nodes, newton.block = problem.c, numbering.nodes, numbering.block
+        newton.motion = numbering.block - model.multipliers
+        newton.root = math.sqrt(comm.allreduce(numbering.nodes * newton.motion))
+        newton.increment, newton.period = INCREMENT, 1 if model.carries_force else 2
+        newton.contracts = not (model.signature.slender and model.carries_force)
+        newton.iterating, newton.converged = _Reason.CONVERGED_ITERATING, _Reason.CONVERGED_SNORM_RELATIVE
+        newton.ran_out, newton.grown = _Reason.DIVERGED_MAX_IT, _Reason.DIVERGED_DTOL
+        newton.not_a_number = RESIDUAL_NOT_A_NUMBER
+        self.snes = snes = PETSc.SNES().create(comm)
         snes.setType("newtonls")
-        snes.setFunction(problem.function, problem.b)
-        snes.setJacobian(problem.jacobian, problem.A)
-        if self._carries:
-            snes.setUpdate(self._carry)
-        snes.setConvergenceTest(self._test)
-        self._prepare(snes.getKSP())
+        self._matrix = PETSc.Mat().create(comm)  # SNES wants one; only its inverse is ever applied
+        self._matrix.setSizes(((numbering.size, numbering.total),) * 2)
+        self._matrix.setType("shell")
+        self._matrix.setUp()
+        ksp = snes.getKSP()
+        ksp.setType("preonly")
+        self._attach(snes, ksp.getPC())
         take_full_steps(snes)
 
-    def _start_over(self):
-        """Replace the PC after an error inside a solve: PETSc allows only two solves that did not end."""
-        pc = PETSc.PC().create(self.problem.A.comm)
-        pc.setOperators(self.problem.A)
-        self._factor(pc)
-        self.snes.getKSP().setPC(pc)
+    def _attach(self, snes, pc):
+        pc.setType("shell")
+        self._give(snes, pc.handle)
 
-    def _prepare(self, ksp):
-        linear.solve_with_tangent(ksp, self.problem.model.tangent)
-        self._factor(ksp.getPC())
-
-    def _factor(self, pc):
-        """Set the factorisation of the tangent."""
-        linear.factor_tangent(pc, self.problem.A, self.problem.model.tangent)
+    def _give(self, snes, pc):
+        handles = (
+            self._ffi.cast("void *", handle) for handle in (snes.handle, self.problem.b.handle, self._matrix.handle, pc)
+        )
+        if self._lib.attach(petsc(), self.c, *handles):
+            raise MemoryError("PETSc's SNES does not take its callbacks")
 
     @cached_property
     def bordered(self):
@@ -97,8 +119,8 @@ class Newton:
 
     def allow(self, iterations):
         """Set the largest number of iterations."""
-        self.max_iterations = iterations
-        self.snes.setTolerances(max_it=iterations + 1)  # `_test` stops before SNES's own limit
+        self.c.most = min(iterations, _MOST_ITERATIONS)
+        self.snes.setTolerances(max_it=iterations + 1)  # newton.c stops before SNES's own limit
 
     def solve(self):
         """Newton from the problem's x (and carried fields) at the model's load factor; x and the state follow.
@@ -106,77 +128,20 @@ class Newton:
         Returns:
             Solved. If it has not converged, x is not an equilibrium, and the state may differ from x.
         """
-        problem = self.problem
-        self._steps = []
-        if self._carries:
-            self._before[:] = self._now
+        problem, newton = self.problem, self.c
+        newton.loads, newton.rounding = abs(problem.load_factor) * problem.load_norm, problem.model.round_off
+        self._lib.begin(newton)
         try:
             self.snes.solve(None, problem.x)
-            reason = self.snes.getConvergedReason()
-        except PETSc.Error as problem_of_petsc:
-            if problem_of_petsc.ierr != EXTERNAL:
-                raise
-            self._start_over()
-            reason = _Reason.DIVERGED_LINEAR_SOLVE
+        except PETSc.Error:
+            problem.raise_failure()
+            raise
+        reason = self.snes.getConvergedReason()
         if reason > 0:  # the residual was last evaluated at x, so the state agrees with it
-            self._advance()
-        return Solved(reason > 0, len(self._steps), WORDS.get(reason, f"PETSc's reason {reason}"))
-
-    def _carry(self, snes, iteration):
-        if iteration > 0:
-            self._advance()
-
-    def _advance(self):
-        """Update the contact force carried at the Gauss points by the Newton step from `before` to the state."""
-        if self._carries:
-            np.subtract(self._now, self._before, out=self._step)
-            self.problem.model.advance()
-            self._before[:] = self._now
-
-    def _test(self, snes, iteration, norms):
-        _, step, residual = norms
-        if not math.isfinite(residual):
-            return RESIDUAL_NOT_A_NUMBER
-        if iteration == 0:
-            return _Reason.CONVERGED_ITERATING
-        problem = self.problem
-        step = self._motion(step) / self._root
-        self._steps.append(step)
-        if not step < _HUGE:
-            return _Reason.DIVERGED_DTOL
-        balanced = residual <= 1e-6 * (1 + abs(problem.load_factor) * problem.load_norm) + problem.model.round_off
-        if balanced and (step <= INCREMENT or self._remaining_error_is_small()):
-            return _Reason.CONVERGED_SNORM_RELATIVE
-        if iteration >= self.max_iterations:
-            return _Reason.DIVERGED_MAX_IT
-        return _Reason.CONVERGED_ITERATING
-
-    def _remaining_error_is_small(self):
-        """Whether the estimated error after the last step is below INCREMENT.
-
-        With the ratio c of the last two steps the error is step * c/(1 - c) for linear convergence. Where convergence
-        is quadratic the next ratio is c^2 or less; the estimate is then multiplied by min(1, 100 c), with a margin.
-        That factor is not used for slender rods whose contact force is carried or unknown: rounding makes their tangent
-        inexact for motions of low stiffness. Where n follows from the motion alone, Newton steps alternate between
-        bending and the correction of the stretch that this causes; c is then the ratio of successive pairs of steps,
-        because one small step does not imply convergence.
-        """
-        model = self.problem.model
-        period = 1 if model.carries_force else 2
-        if len(self._steps) < 2 * period:
-            return False
-        before, step = max(self._steps[-2 * period : -period]), max(self._steps[-period:])
-        c = step / before
-        newton = 1.0 if model.signature.slender and model.carries_force else min(1.0, 100 * c)
-        return c < 0.9 and step * c * newton <= INCREMENT * (1 - c)
-
-    def _motion(self, step):
-        """Norm of the part of a step that is motion: forces and multipliers differ in scale and in rounding error."""
-        if not self._others:
-            return step
-        model = self.problem.model
-        moved = model.motion_in(self.snes.getSolutionUpdate().array_r)
-        return math.sqrt(model.comm.allreduce(float(moved @ moved)))
+            self._lib.advance(problem.c)
+        elif problem.c.singular:
+            reason = _Reason.DIVERGED_LINEAR_SOLVE
+        return Solved(reason > 0, newton.iterations, WORDS.get(reason, f"PETSc's reason {reason}"))
 
 
 class BorderedNewton(Newton):
@@ -192,19 +157,11 @@ class BorderedNewton(Newton):
     path; the component of each step along this null vector is removed.
     """
 
-    def _prepare(self, ksp):
-        ksp.setType("preonly")
-        self._factor(ksp.getPC())
-
-    def _factor(self, pc):
-        A, kind = self.problem.A, self.problem.model.tangent
-        self._slope, self._free, self._force = (A.createVecRight() for _ in range(3))
-        self._ksp = ksp = PETSc.KSP().create(A.comm)
-        linear.solve_with_tangent(ksp, kind)
-        linear.factor_tangent(ksp.getPC(), A, kind)
-        ksp.setOperators(A)
+    def _attach(self, snes, pc):
+        self._slope, self._free, self._force = (self.problem.numbering.vector() for _ in range(3))
         pc.setType("python")
         pc.setPythonContext(self)
+        self._give(snes, 0)
 
     def stay_in_plane(self, normal, weight, neutral=None):
         """Solve from now on in the plane through the problem's x and load factor.
@@ -217,15 +174,11 @@ class BorderedNewton(Newton):
         self._normal, self._weight, self.neutral = normal, weight, neutral
         self._x0, self._eta0 = self.problem.x.array_r.copy(), self.problem.load_factor
 
-    def setUp(self, pc):
-        """PETSc calls this when the tangent is new."""
-        self._ksp.setOperators(*pc.getOperators())
-
     def apply(self, pc, residual, step):
         """PETSc calls this to compute the step, which it subtracts from x."""
         problem, inner = self.problem, self.problem.model.inner
-        self._ksp.solve(residual, step)
-        self._ksp.solve(problem.load_derivative(problem.x), self._slope)
+        problem.solve(residual, step)
+        problem.solve(problem.load_derivative(problem.x), self._slope)
         if self.neutral is not None:
             self._leave_out_neutral(step)
         if self._normal is None:
@@ -255,12 +208,6 @@ class BorderedNewton(Newton):
     def slope(self):
         """(owned unknowns,) dx/d eta at the last step of the last solve."""
         return -self._slope.array_r
-
-    def _factor_here(self):
-        problem = self.problem
-        problem.function(None, problem.x, problem.b)
-        problem.jacobian(None, problem.x, problem.A, problem.A)
-        self._ksp.setOperators(problem.A)
 
     def motion_of(self, change):
         """(nodes, 6) displacements and inertial rotations of this rank's nodes for a change of the unknowns (owned
@@ -303,16 +250,10 @@ class BorderedNewton(Newton):
 
     def _solved_here(self, force, motion):
         """motion = A^-1 force at the problem's x and load factor; False where A is singular."""
-        self._factor_here()
-        try:
-            self._ksp.solve(force, motion)
-        except PETSc.Error as found:  # KLU reports a singular matrix by this error, MUMPS by the reason
-            if found.ierr != EXTERNAL:
-                raise
-            self._start_over()
-            return False
-        # block factors report a singular matrix neither way, so the norm is tested too
-        return self._ksp.getConvergedReason() >= 0 and math.isfinite(motion.norm())
+        problem = self.problem
+        problem.function(problem.x, problem.b)
+        problem.factor()
+        return problem.solve(force, motion) and math.isfinite(motion.norm())
 
     def slope_here(self, neutral=None):
         """(owned unknowns,) dx/d eta at the problem's x and load factor, without the neutral motion.

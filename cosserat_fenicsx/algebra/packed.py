@@ -1,34 +1,86 @@
-"""Repeated assembly of a compiled form: its coefficients are packed once, and then only those that change.
-
-dolfinx packs all coefficients of a form in every assembly, which costs more than the element kernels of a coarse rod.
-"""
+"""Compiled forms and expressions for C: kernels whose coefficients are packed once, and then only those that change."""
 
 import numpy as np
 from dolfinx import cpp
 
 from cosserat_fenicsx import compat
+from cosserat_fenicsx.algebra.building import module
+
+_MARK = 0.8765432198765432
 
 
-class Packed:
-    """A form with its packed coefficients.
+class _Kernel:
+    """The C structure `kernel`, and what it points to."""
+
+    def __init__(self, compiled, address, mesh, elements, size):
+        self._compiled = compiled  # keeps the machine code
+        ffi, self._lib = module()
+        self.c = kernel = ffi.new("kernel *")
+        self._keep, self._ffi, self.size, self.elements = [], ffi, size, elements
+        kernel.tabulate, kernel.elements, kernel.size = ffi.cast("void *", address), elements, size
+        corners = np.ascontiguousarray(compat.geometry_dofs(mesh)[:elements], dtype=np.int32)
+        kernel.x, kernel.corners = self._numbers(mesh.geometry.x), self._integers(corners)
+        kernel.A = self._numbers(np.zeros(size))
+
+    def _numbers(self, array):
+        self._keep.append(array)
+        return self._ffi.cast("double *", array.ctypes.data)
+
+    def _integers(self, array):
+        self._keep.append(array)
+        return self._ffi.cast("int *", array.ctypes.data)
+
+    def _set(self, w, c, sources, constants):
+        """Give C the packed coefficients w (elements, width) and constants c; sources: (values, indices (elements,
+        count), first column) of those that change; constants: (array of one value, place in c)."""
+        kernel, ffi = self.c, self._ffi
+        kernel.w, kernel.width, kernel.c = self._numbers(w), w.shape[1], self._numbers(c)
+        self._sources = ffi.new("source[]", max(1, len(sources)))
+        for to, (values, which, column) in zip(self._sources, sources, strict=False):
+            which = np.ascontiguousarray(which, dtype=np.int32)
+            to.values, to.which = self._numbers(values), self._integers(which)
+            to.count, to.column = which.shape[1], column
+        self._constants = ffi.new("double *[]", [self._numbers(value) for value, _ in constants] or 1)
+        kernel.source, kernel.sources = self._sources, len(sources)
+        kernel.constant = ffi.cast("double **", self._constants)
+        kernel.slot = self._integers(np.array([slot for _, slot in constants], dtype=np.int32))
+        kernel.constants = len(constants)
+
+
+class Packed(_Kernel):
+    """A compiled form.
 
     Args:
-        form: a compiled form.
-        moving: the Functions whose values are packed anew in every assembly.
-        slow: those whose values change rarely, and are packed anew by `catch_up`; all others by `refresh`.
+        form: a linear or bilinear form, integrated over this rank's elements.
+        moving: the Functions whose values change; those of all others are taken by `refresh`.
+        constants: the Constants whose values change.
+
+    Attributes:
+        dofs: (elements, size) local degrees of freedom of the vector, of a linear form.
     """
 
-    def __init__(self, form, moving, slow=()):
-        self._kernel = compat.kernel(form)
-        self._constants = cpp.fem.pack_constants(self._kernel)
-        self._places = []  # (values, key, columns, indices of the entries in the values, whether slow)
-        for functions, is_slow in ((moving, False), (slow, True)):
-            for function in functions:
-                self._find(function.x.array, is_slow)
-        self.refresh()
+    def __init__(self, form, moving, constants=()):
+        self._form = compat.kernel(form)
+        spaces, elements = self._form.function_spaces, self._form.mesh.topology.index_map(1).size_local
+        of_spaces = [_dofs(space)[:elements] for space in spaces]
+        self._shape = [dofs.shape[1] for dofs in of_spaces]
+        size = int(np.prod(self._shape))
+        super().__init__(form, compat.kernel_address(form), self._form.mesh, elements, size)
+        self.dofs = np.ascontiguousarray(of_spaces[0], dtype=np.int32)
+        self._dofs = self._integers(self.dofs)
+        packed = self._pack()
+        self._key = next(iter(packed), None)
+        self._w = packed[self._key] if packed else np.zeros((elements, 0))
+        self._c = np.array(cpp.fem.pack_constants(self._form), dtype=float)
+        sources = [place for function in moving for place in self._places(function.x.array)]
+        self._set(self._w, self._c, sources, [slot for constant in constants for slot in self._slots(constant.value)])
 
-    def _find(self, numbers, is_slow):
-        """Find the columns where a Function's values are packed, by packing indices in place of values, twice."""
+    def _pack(self):
+        """{key of the integral: coefficients}; empty for a form without any."""
+        return {key: np.ascontiguousarray(w) for key, w in cpp.fem.pack_coefficients(self._form).items() if w.size}
+
+    def _places(self, numbers):
+        """Where a Function's values are packed, found by packing indices in place of values, twice."""
         kept, index = numbers.copy(), np.arange(len(numbers), dtype=float)
         numbers[:] = index
         first = self._pack()
@@ -39,36 +91,63 @@ class Packed:
             columns = np.flatnonzero((array != second[key]).any(axis=0))
             for run in np.split(columns, np.flatnonzero(np.diff(columns) > 1) + 1):
                 if len(run):
-                    which = array[:, run].astype(np.intp)
-                    self._places.append((numbers, key, slice(run[0], run[-1] + 1), which, is_slow))
+                    yield numbers, array[:, run], run[0]
 
-    def _pack(self):
-        return {key: array.copy() for key, array in cpp.fem.pack_coefficients(self._kernel).items()}
+    def _slots(self, value):
+        """The places of a Constant among the packed ones, found likewise."""
+        kept = value.copy()
+        value[...] = _MARK
+        found = np.flatnonzero(cpp.fem.pack_constants(self._form) == _MARK)
+        value[...] = kept
+        return [(value, int(slot)) for slot in found]
 
     def refresh(self):
-        """Pack all coefficients anew; to be called after the values of a scene are filled in."""
-        self._coefficients = self._pack()
-        views = [
-            (numbers, self._coefficients[key][:, run], which, slow) for numbers, key, run, which, slow in self._places
-        ]
-        self._views, self._slow = ([view[:3] for view in views if view[3] == slow] for slow in (False, True))
-
-    def catch_up(self):
-        """Pack the current values of the slow Functions."""
-        for numbers, view, which in self._slow:
-            view[...] = numbers[which]
-
-    def _renew(self):
-        for numbers, view, which in self._views:
-            view[...] = numbers[which]
-        if len(self._constants):
-            self._constants = cpp.fem.pack_constants(self._kernel)
-        return self._constants, self._coefficients
+        """Pack all coefficients and constants anew; to be called after the values of a scene are filled in."""
+        for packed in self._pack().values():
+            self._w[:] = packed
+        self._c[:] = cpp.fem.pack_constants(self._form)
 
     def add_to_vector(self, array):
         """Add a linear form to an array of local degrees of freedom, ghosts included."""
-        cpp.fem.assemble_vector(array, self._kernel, *self._renew())
+        self._lib.add_vector(self.c, self._dofs, self._ffi.cast("double *", array.ctypes.data))
+
+    def matrices(self):
+        """(elements, n, n) matrices of the elements, of a bilinear form."""
+        found = np.empty((self.elements, self.size))
+        self._lib.tabulate_all(self.c, self._ffi.cast("double *", found.ctypes.data))
+        return found.reshape(self.elements, *self._shape)
 
     def add_to_matrix(self, A):
         """Add a bilinear form to a PETSc matrix by the matrix's local-to-global map; -1 there means to skip."""
-        cpp.fem.petsc.assemble_matrix(A, self._kernel, *self._renew(), [])
+        self._lib.pack(self.c)
+        cpp.fem.petsc.assemble_matrix(A, self._form, self._c, {self._key: self._w} if self._key else {}, [])
+
+
+class PackedExpression(_Kernel):
+    """A compiled expression at points of all local elements, ghosts included, or of this rank's own; all of its
+    coefficients and constants are taken anew at every evaluation.
+
+    Args:
+        expression: a compiled expression.
+        mesh: its mesh.
+        elements: number of elements.
+        size: numbers of an element, (points, components).
+    """
+
+    def __init__(self, expression, mesh, elements, size):
+        address, functions, constants = compat.expression_address(expression)
+        super().__init__(expression, address, mesh, elements, size)
+        sources, column = [], 0
+        for function in functions:
+            which = _dofs(function.function_space)[:elements]
+            sources.append((function.x.array, which, column))
+            column += which.shape[1]
+        slots = [(constant.value, slot) for slot, constant in enumerate(constants)]
+        self._set(np.zeros((elements, column)), np.zeros(len(constants)), sources, slots)
+
+
+def _dofs(space):
+    """(local elements, n) local degrees of freedom of every element of a space."""
+    block = space.dofmap.index_map_bs
+    nodes = np.asarray(compat.cell_nodes(space))
+    return (nodes[:, :, None] * block + np.arange(block)).reshape(len(nodes), -1)

@@ -39,7 +39,6 @@ class TieRows:
         self._exerted = rows, ends, np.where(ends >= 0, -1.0, 0.0)
         count = numbering.multipliers
         self._multipliers = (numbering.first_multiplier + np.arange(count)).astype(PETSc.IntType)
-        self._idle = (numbering.first_multiplier + count + np.arange(numbering.idle)).astype(PETSc.IntType)
         wanted = np.concatenate([self.rows[self.rows >= 0], self._multipliers]) if self._here else []
         index = PETSc.IS().createGeneral(np.asarray(wanted, dtype=PETSc.IntType), comm=PETSc.COMM_SELF)
         self._work = PETSc.Vec().createSeq(len(wanted))
@@ -109,19 +108,9 @@ class TieRows:
         b.assemble()
 
     @np.errstate(**_WILD)
-    def add_tangent(self, A, eta):
-        """Add the derivative of `add_residual`."""
-        if not self._here:
-            return
-        of_nodes, reactions, equations = self._derivatives(eta)
-        nodes = self.rows.ravel()
-        # in C order: petsc4py ignores strides
-        A.setValues(nodes, nodes, np.ascontiguousarray(of_nodes), _ADD)
-        A.setValues(nodes, self._multipliers, np.ascontiguousarray(reactions), _ADD)
-        A.setValues(self._multipliers, nodes, np.ascontiguousarray(equations), _ADD)
-        for rows, value in ((self._multipliers, 0.0), (self._idle, 1.0)):
-            for i in rows:
-                A.setValue(i, i, value, _ADD)
+    def tangent_blocks(self, eta):
+        """The derivative of `add_residual` on the last rank, see `Interface.matrix`."""
+        return self._derivatives(eta) if self._here else None
 
     def _derivatives(self, eta):
         """Derivatives of the reactions by nodes and by multipliers, and of the equations by nodes, as matrices."""
@@ -135,35 +124,34 @@ class TieRows:
             of_nodes[places[:, :, None], places[:, None, :]] += self.model.turned_reactions(nodal, reactions)
         return of_nodes, reactions_by_multipliers(test, gradient), by_nodes(gradient, trial)
 
-    def add_second_variation(self, K, rows, axes, eta):
-        """Add the geometric stiffness of the reactions, whose directions change with the nodes.
+    def second_variation(self, axes, eta):
+        """The geometric stiffness of the reactions, whose directions change with the nodes, on the last rank.
 
         All equations contribute, in the plane and out of it, also those that a plane model does not need.
 
         Args:
-            rows: (tied nodes, block) numbers in K.
-            axes: (block, 6) the (displacement, rotation) of each of K's unknowns.
-        """
-        if self._here:
-            _, change = self._of_all(eta)
-            self._add(K, rows, axes @ (change @ axes.T).reshape(len(rows), 6, -1))
+            axes: (block, 6) the (displacement, rotation) of each of the unknowns of a node.
 
-    def add_springs(self, K, rows, axes, eta, resistance):
-        """Add penalty springs that replace all constraint equations.
+        Returns:
+            (tied nodes * block, the same).
+        """
+        if not self._here:
+            return None
+        _, change = self._of_all(eta)
+        size = len(change) * len(axes)
+        return (axes @ (change @ axes.T).reshape(len(change), 6, -1)).reshape(size, size)
+
+    def springs(self, axes, eta, resistance):
+        """Penalty springs that replace all constraint equations; arguments and result as of `second_variation`.
 
         Args:
-            rows, axes: as of `add_second_variation`, which comes first.
-            resistance: (tied nodes, block) stiffness of the elements against these motions of the nodes.
+            resistance: (tied nodes * block,) stiffness of the elements against these motions of the nodes.
         """
-        if self._here:
-            gradient = (self._of_all(eta)[0] @ axes.T).reshape(-1, rows.size)
-            stiffness = _HELD * (gradient * gradient * resistance.ravel()).max(axis=1, keepdims=True)
-            self._add(K, rows, gradient.T @ (stiffness * gradient))
-
-    @staticmethod
-    def _add(K, rows, values):
-        nodes = rows.ravel().astype(PETSc.IntType)
-        K.setValues(nodes, nodes, values, _ADD)
+        if not self._here:
+            return None
+        gradient = (self._of_all(eta)[0] @ axes.T).reshape(-1, len(resistance))
+        stiffness = _HELD * (gradient * gradient * resistance).max(axis=1, keepdims=True)
+        return gradient.T @ (stiffness * gradient)
 
     def _of_all(self, eta):
         """Gradients (ties, tied nodes, 6) of all equations, and the symmetric part of the derivative of their

@@ -6,6 +6,7 @@ import numbers
 
 import numpy as np
 from mpi4py import MPI
+from petsc4py import PETSc
 from scipy import sparse
 
 from cosserat_fenicsx.algebra.packed import Packed
@@ -189,7 +190,9 @@ def _stiffness(problem):
     Packed(variation.form, ()).add_to_matrix(K)
     model.stiffen(model.bounded_K)
     if problem.ties:
-        problem.ties.add_second_variation(K, tied, variation.axes, problem.eta)
+        rows, of_ties = tied.ravel().astype(PETSc.IntType), problem.ties.second_variation(variation.axes, problem.eta)
+        if of_ties is not None:
+            K.setValues(rows, rows, of_ties, PETSc.InsertMode.ADD_VALUES)
     K.assemble()
     size = K.getSize()[0]
     parts = model.comm.allgather(K.getValuesCSR())

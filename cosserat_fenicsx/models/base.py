@@ -35,7 +35,9 @@ class RodModel:
         state: Function of the unknowns (nodal ones, and those that the formulation adds), clamped nodes included.
         before, step: the state before a Newton step and the step, for `advance`.
         carried: Functions updated after each Newton step together with the unknowns: n at the Gauss points, or ().
-        carries_force: whether n is not a function of the motion alone.
+        carried_dofs: (local elements, n) places of an element's carried numbers.
+        carries_force: whether n is not a function of the motion alone; force_is_unknown: whether it is a field of
+            unknowns.
         force_nodes: reference coordinates of the nodes of n, where n is an unknown.
         load_factor: the Constant eta; permanent_factor: that of permanent loads, 1 except while they are applied.
         actions: the `ActionTerms` with the data of all actions; densities: their `Densities`.
@@ -51,7 +53,6 @@ class RodModel:
         axes: (3, 3) rows: the inertial basis of the components of vectors.
         load_norm: size of the loads that are not in `forms.dead` and `forms.permanent`, at factors 1.
         round_off: bound on the rounding error of the residual's norm.
-        tangent: the kind of its factorisation, see `linear.factor_tangent`.
         unknowns: number of unknowns, over all ranks.
     """
 
@@ -64,7 +65,6 @@ class RodModel:
     variations = ()
     #: whether the map from reactions to a node's residual rows depends on the node's unknowns
     rows_turn = False
-    tangent = "general"
     load_norm = 0.0
     #: unit of time for velocities, s; not used in statics
     time = 1.0
@@ -127,10 +127,6 @@ class RodModel:
         cells, points, 9), dimensionless, inertial. It stays valid for the current scene after another is loaded."""
         raise NotImplementedError
 
-    def _without_saddle(self):
-        """The kind of factorisation where the tangent is no saddle-point matrix, which would need pivoting."""
-        return "general" if self.signature.slender or self.comm.size > 1 else "blocks"
-
     # -- building ----------------------------------------------------------------------------------------------------
 
     def _build(self):
@@ -156,12 +152,12 @@ class RodModel:
         self.actions, self.evolving, self.densities = ActionTerms(self.rods, signature, self.nodes), [], Densities()
         self.carried = (gauss_function(self.mesh, signature.points, self.force_size),) if force.carried else ()
         for function in self.carried:
-            self._carried_values = function.x.array.reshape(-1, self.force_size)
-            self._carried_nodes = compat.cell_nodes(function.function_space).ravel()
-        self.carries_force = not force.of_motion
+            nodes = compat.cell_nodes(function.function_space)
+            self.carried_dofs = (nodes[:, :, None] * self.force_size + np.arange(self.force_size)).reshape(
+                len(nodes), -1
+            )
+        self.carries_force, self.force_is_unknown = not force.of_motion, force.unknown
         self.forms = self._compile(spaces)
-        if self.tangent == "general" and self.space is self.nodal_space and not self.numbering.multipliers:
-            self.tangent = self._without_saddle()
         for term, point in self.evolving:
             term.compile_evolution(point)
         self.rule = ElementRule(self.nodes, self.forms.gauss, self.forms.weights)
@@ -199,7 +195,7 @@ class RodModel:
         others = compat.cell_nodes(self.space)[:owned_cells, size * (p + 1) :] if self.space is not V else None
         of_nodes = nodal[cell_nodes[:owned_cells]].reshape(owned_cells, size * (p + 1))
         self.cell_dofs = of_nodes if others is None else np.concatenate([of_nodes, others], axis=1)
-        self.unknowns = self.numbering.total - self.numbering.idle
+        self.unknowns = self.numbering.total
 
     def _prepare_variations(self, spaces):
         self._variations = []
@@ -300,11 +296,10 @@ class RodModel:
 
     # -- for solvers and results -------------------------------------------------------------------------------------
 
-    def advance(self):
-        """Update the carried fields by `step` from `before`; both must have up-to-date ghosts."""
-        if self.carried:
-            values = compat.evaluate(self.forms.advance, self.mesh, self._local_cells)
-            self._carried_values[self._carried_nodes] = values.reshape(-1, self.force_size)
+    @property
+    def constants(self):
+        """All Constants of the forms."""
+        return [value for value in vars(self).values() if isinstance(value, fem.Constant)]
 
     def largest(self, change):
         """Largest displacement (rod lengths) or rotation (rad) over all ranks, in a change of the solver's vector."""

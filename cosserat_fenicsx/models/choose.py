@@ -4,6 +4,7 @@ from dataclasses import dataclass, field
 
 from cosserat_fenicsx.errors import SceneError, nearest
 from cosserat_fenicsx.models.traits import traits_of
+from cosserat_fenicsx.remember import per_scene
 
 #: The models from the cheapest to the most general.
 RUNGS = ("determinate", "planar", "spatial")
@@ -30,6 +31,7 @@ class Choice:
         return Choice("spatial", [f"promoted from the {self.model} model: {reason}"])
 
 
+@per_scene
 def choose(scene, *, model="auto", formulation=None, degree=4, points=None, follows=False):
     """The `Choice` for a scene.
 

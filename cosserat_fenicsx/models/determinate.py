@@ -68,7 +68,6 @@ class DeterminateInPlane(_KnownForce, PlaneModel):
 
     components, moves, turn = 1, 0, 1.0
     variations = ((1, False), (2, True))
-    tangent = "symmetric"
     _compile_with = compile_in_plane
 
     def _at_rest(self):

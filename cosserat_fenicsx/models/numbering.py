@@ -28,6 +28,7 @@ class Numbering:
         block: unknowns of a node.
         size: unknowns of this rank, total: of all ranks.
         rows: index in the solver's vector of every local degree of freedom of the space; -1 where clamped.
+        free, of_free: local degrees of freedom with an index there, and that index.
         first_multiplier: index of the first multiplier.
     """
 
@@ -40,16 +41,16 @@ class Numbering:
         own = np.zeros(len(slots), dtype=bool)
         own[:owned] = (free & (lead == slots))[:owned]
         self.nodes = int(own.sum())
-        # PETSc inserts node blocks only if all sizes are multiples of the block: unused multipliers fill the last one
-        self.idle = -multipliers % self.block if self._blocked else 0
+        # sizes of vectors and matrices in node blocks must be multiples of them
+        self._blocked = self._blocked and not multipliers
         dofs = dofmap.index_map.size_local * dofmap.index_map_bs
         others = np.setdiff1d(np.arange(dofs), node_dofs[:owned].ravel())
         last = comm.rank == comm.size - 1
         self.multipliers = multipliers
-        self.size = self.nodes * self.block + len(others) + (multipliers + self.idle) * last
+        self.size = self.nodes * self.block + len(others) + multipliers * last
         sizes = comm.allgather(self.size)
         first, self.total = sum(sizes[: comm.rank]), sum(sizes)
-        self.first, self.first_multiplier = first, self.total - multipliers - self.idle
+        self.first, self.first_multiplier = first, self.total - multipliers
         rows = fem.Function(space)  # communicates the indices to the ranks that have them as ghosts
         numbers = rows.x.array
         numbers[:] = -1
@@ -74,15 +75,15 @@ class Numbering:
 
     def _connect(self, shared):
         """Prepare the transfer between the solver's vector and dolfinx's local degrees of freedom."""
-        self._free = np.flatnonzero(self.rows >= 0)
-        self._of_free = self.rows[self._free]
-        mine = (self._of_free >= self.first) & (self._of_free < self.first + self.size)
-        self._mine, self._of_mine = self._free[mine], self._of_free[mine] - self.first
+        self.free = np.flatnonzero(self.rows >= 0)
+        self.of_free = self.rows[self.free]
+        mine = (self.of_free >= self.first) & (self.of_free < self.first + self.size)
+        self._mine, self._of_mine = self.free[mine], self.of_free[mine] - self.first
         self._serial = self.comm.size == 1
         self._shared = shared
         if not self._serial:
-            self._local = PETSc.Vec().createSeq(len(self._free))
-            index = PETSc.IS().createGeneral(self._of_free, comm=PETSc.COMM_SELF)
+            self._local = PETSc.Vec().createSeq(len(self.free))
+            index = PETSc.IS().createGeneral(self.of_free, comm=PETSc.COMM_SELF)
             self._scatter = PETSc.Scatter().create(self.vector(), index, self._local, None)
 
     def vector(self):
@@ -95,10 +96,10 @@ class Numbering:
     def to_local(self, x, numbers):
         """Copy a solver's vector to dolfinx's local degrees of freedom, ghosts included, clamped ones excluded."""
         if self._serial:
-            numbers[self._free] = x.array_r[self._of_free]
+            numbers[self.free] = x.array_r[self.of_free]
         else:
             self._scatter.scatter(x, self._local, False, PETSc.ScatterMode.FORWARD)
-            numbers[self._free] = self._local.array_r
+            numbers[self.free] = self._local.array_r
 
     def from_local(self, numbers, x):
         """Copy local degrees of freedom to a solver's vector; multipliers become zero."""
@@ -112,27 +113,25 @@ class Numbering:
             array = b.array_w
             array[self.first_multiplier :] = 0.0
             if self._shared:
-                array[:] = np.bincount(self._of_free, numbers[self._free], minlength=self.size)
+                array[:] = np.bincount(self.of_free, numbers[self.free], minlength=self.size)
             else:
-                array[self._of_free] = numbers[self._free]
+                array[self.of_free] = numbers[self.free]
         else:
             b.set(0.0)
-            self._local.array_w[:] = numbers[self._free]
+            self._local.array_w[:] = numbers[self.free]
             self._scatter.scatter(self._local, b, PETSc.InsertMode.ADD_VALUES, PETSc.ScatterMode.REVERSE)
 
-    def matrix(self, cell_dofs, tied, *, blocks=False):
+    def matrix(self, cell_dofs, tied):
         """A matrix preallocated for all elements of this rank and for the constraint equations.
 
         Args:
             cell_dofs: (cells, dofs) local degrees of freedom of every element of this rank.
             tied: indices (of any rank) of the unknowns in constraint equations; the same on all ranks.
-            blocks: whether to store it in node blocks.
         """
         A = PETSc.Mat().create(self.comm)
-        A.setType("baij" if blocks else "aij")
+        A.setType("aij")
         A.setSizes(((self.size, self.total), (self.size, self.total)), bsize=self.block if self._blocked else 1)
-        room = self._room(cell_dofs, tied)
-        A.setPreallocationNNZ(tuple(-(-r[:: self.block] // self.block) for r in room) if blocks else room)
+        A.setPreallocationNNZ(self._room(cell_dofs, tied))
         if self._blocked:
             whole = self.rows.reshape(-1, self.block)[:, 0]
             blocks = np.where(whole >= 0, whole // self.block, -1).astype(PETSc.IntType)
@@ -151,7 +150,7 @@ class Numbering:
         np.add.at(count, cell_dofs.ravel(), np.repeat(wide, cell_dofs.shape[1]))
         room = self.vector()
         if self._serial:
-            room.array_w[:] = np.bincount(self._of_free, count[self._free], minlength=self.size)
+            room.array_w[:] = np.bincount(self.of_free, count[self.free], minlength=self.size)
         else:
             self.add_up(count, room)
         first, array = self.first, room.array_r.astype(PETSc.IntType)

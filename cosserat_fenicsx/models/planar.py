@@ -71,9 +71,6 @@ class PlanarModel(PlaneModel):
     def _compile(self, spaces):
         return compile_forms(self, spaces[0])
 
-    def _without_saddle(self):
-        return "plain" if self.signature.slender or self.comm.size > 1 else "blocks"
-
     def _at_rest(self):
         return np.column_stack([self.reference @ self.axes[:2].T, np.zeros(len(self.reference))])
 

@@ -13,6 +13,7 @@ import numpy as np
 
 from cosserat_fenicsx import compat
 from cosserat_fenicsx.errors import SceneError
+from cosserat_fenicsx.remember import per_scene
 
 #: Largest number of elements of all rods together.
 MOST_ELEMENTS = 100_000
@@ -20,7 +21,7 @@ MOST_ELEMENTS = 100_000
 _GIGABYTES = 1e-4
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Layout:
     """How many elements each rod has and where their ends lie.
 
@@ -37,23 +38,11 @@ class Layout:
         Raises:
             SceneError: more than `MOST_ELEMENTS` in all.
         """
-        most = MOST_ELEMENTS // len(scene.rods)
-        if elements > most:
-            gigabytes = elements * len(scene.rods) * _GIGABYTES
-            raise SceneError(
-                f"elements = {elements} on {len(scene.rods)} rod(s) may take {gigabytes:.2g} GB of memory: "
-                f"expected at most {most} per rod. "
-                "A rod rarely needs more than 100; for the accuracy of a path leave `elements` out and ask for a `tol`."
-            )
-
-        def equal(rod, start, end):
-            return np.linspace(start, end, max(1, round(elements * (end - start))) + 1)
-
-        return cls._of_pieces(scene, equal)
+        return _equal(scene, elements)
 
     def finer(self, scene, factor):
         """The layout with `factor` times as many elements, rounded up in every piece; ratios of lengths stay."""
-        return self.resized(scene, [np.full(count, float(factor)) for count in self.counts])
+        return _finer(scene, self, factor)
 
     def resized(self, scene, wanted):
         """The layout with every element replaced by another number of elements.
@@ -141,6 +130,30 @@ class Layout:
     def node_s(self, nodes):
         """Arc length over rod length of every node of each rod, for reference nodes sorted in [0, 1]."""
         return [np.append((b[:-1, None] + np.diff(b)[:, None] * nodes[None, :-1]).ravel(), 1.0) for b in self.breaks]
+
+
+@per_scene
+def _equal(scene, elements):
+    """See `Layout.of`."""
+    most = MOST_ELEMENTS // len(scene.rods)
+    if elements > most:
+        gigabytes = elements * len(scene.rods) * _GIGABYTES
+        raise SceneError(
+            f"elements = {elements} on {len(scene.rods)} rod(s) may take {gigabytes:.2g} GB of memory: "
+            f"expected at most {most} per rod. "
+            "A rod rarely needs more than 100; for the accuracy of a path leave `elements` out and ask for a `tol`."
+        )
+
+    def equal(rod, start, end):
+        return np.linspace(start, end, max(1, round(elements * (end - start))) + 1)
+
+    return Layout._of_pieces(scene, equal)
+
+
+@per_scene
+def _finer(scene, layout, factor):
+    """See `Layout.finer`."""
+    return layout.resized(scene, [np.full(count, float(factor)) for count in layout.counts])
 
 
 def _fixed_ends(scene, rod):

@@ -11,6 +11,7 @@ from cosserat_fenicsx.models.connections import Connections
 from cosserat_fenicsx.models.formulations import formulation_of
 from cosserat_fenicsx.models.formulations.formulation import Formulation
 from cosserat_fenicsx.models.traits import traits_of, work_of
+from cosserat_fenicsx.remember import per_scene
 from cosserat_fenicsx.scene.signals import at
 
 #: (unknowns of a node, components of the contact force) by the model's name and whether it is planar.
@@ -60,6 +61,10 @@ class Signature:
             SceneError: an unknown formulation, a degree outside 1..4, or an infinite stiffness that the formulation
                 does not allow.
         """
+        return _signature(scene, layout, formulation, degree, points, model)
+
+    @classmethod
+    def _found(cls, scene, layout, formulation, degree, points, model):
         formulation = formulation_of(formulation)
         if isinstance(degree, bool) or not isinstance(degree, numbers.Integral) or not 1 <= degree <= 4:
             raise SceneError(f"degree = {degree!r}: expected 1, 2, 3 or 4")
@@ -98,6 +103,9 @@ class Signature:
             node += self.formulation.unit_length.unknowns
         others = force * self.degree * cells if self.formulation.force.unknown else 0
         return node * nodes + others + len(links.equations)
+
+
+_signature = per_scene(Signature._found)
 
 
 def _rounding(scene, layout, degree):

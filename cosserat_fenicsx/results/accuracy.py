@@ -202,7 +202,7 @@ def on_mesh(path, layout):
         dimensionless, inertial.
     """
     rule, scene = path.rule, path.scene
-    n = np.array([record.gauss_fields[:, :, :3] for record in path._records])
+    n = path._stacked("gauss_fields")[..., :3]
     motions, forces, first = [], [], 0
     for i, rod in enumerate(scene.rods):
         x, inside, breaks = layout.node_s(rule.nodes)[i], layout.inside(rule.gauss)[i], path.layout.breaks[i]

@@ -37,7 +37,7 @@ def layer_lengths(scene, scales, layout, rule, n):
 
 def of_path(path):
     """`layer_lengths` of the largest contact forces over all points of a path."""
-    n = np.array([record.gauss_fields for record in path._records])[..., :3]
+    n = path._stacked("gauss_fields")[..., :3]
     return layer_lengths(path.scene, path.scales, path.layout, path.rule, n)
 
 
@@ -66,7 +66,7 @@ def element_differences(fine, coarse):
         each point.
     """
     sizes = sizes_of(fine).largest
-    n = np.array([record.gauss_fields[:, :, :3] for record in coarse._records])
+    n = coarse._stacked("gauss_fields")[..., :3]
     forces = np.sqrt(np.square(n).sum(axis=3).max(axis=2))
     found, first, p, scales = [], 0, fine.degree, fine.scales
     for i, rod in enumerate(fine.scene.rods):

@@ -1,12 +1,14 @@
 """An equilibrium path as arrays with named fields. Imports no solver; other packages make files and pictures."""
 
+import dataclasses
+import itertools
 from collections.abc import Sequence
 from functools import cached_property
 from typing import Self
 
 import numpy as np
 
-from cosserat_fenicsx.results.records import Event
+from cosserat_fenicsx.results.records import Event, Record, Records
 from cosserat_fenicsx.results.recovery import element_contact
 from cosserat_fenicsx.results.result import Result
 from cosserat_fenicsx.scene.rod import RodOrName
@@ -35,7 +37,7 @@ class Path(Result):
     axis = "load factor"
     #: whether the formulation's virtual rotations are those of changes of q instead of independent small rotations
     galerkin = False
-    _computed = (*Result._computed, "_contact", "conservative")
+    _computed = (*Result._computed, "_records", "_contact", "conservative")
     # function of a path that computes its `conservative`
     _potential = None
 
@@ -44,6 +46,7 @@ class Path(Result):
         self.events: list[Event] = []
         self.control, self.left = "load", False
         self.rounding, self._error = 0.0, None
+        self._expanded: Records | None = None
 
     @classmethod
     def of(cls, model, why=(), potential=None):
@@ -53,6 +56,42 @@ class Path(Result):
         path.rounding, path.galerkin = formulation.force.rounding * model.round_off, formulation.unit_length.galerkin
         path._potential = potential
         return path
+
+    def extend(self, records):
+        """Add converged states at once: `Records`, whose `rq` and `gauss_fields` are of the form that a `Record` that
+        is appended has."""
+        self._appended.append(records)
+        self._forget()
+
+    @property
+    def _all(self):
+        """The `Records` of all points, expanded to three dimensions; None where there is none."""
+        if self._appended:
+            kinds = itertools.groupby(self._appended, key=lambda x: isinstance(x, Records))
+            parts = (part if whole else [Records.of(list(part))] for whole, part in kinds)
+            new, self._appended = Records.joined([*itertools.chain.from_iterable(parts)]), []
+            rq, fields = self._expand(np.array(new.load_factor, dtype=float), new.rq, new.gauss_fields)
+            new = dataclasses.replace(new, rq=rq, gauss_fields=fields)
+            self._expanded = new if self._expanded is None else Records.joined([self._expanded, new])
+        return self._expanded
+
+    @cached_property
+    def _records(self):
+        return [] if self._all is None else self._all.listed()
+
+    def _taken(self, which):
+        return None if self._all is None else self._all.at(which)
+
+    def _array(self, name):
+        parts = [*([] if self._expanded is None else [self._expanded]), *self._appended]
+        return np.concatenate([np.empty(0), *(np.atleast_1d(getattr(x, name)) for x in parts)])
+
+    def _stacked(self, name):
+        return getattr(self._all, name)
+
+    def __len__(self) -> int:
+        first = 0 if self._expanded is None else len(self._expanded)
+        return first + sum(1 if isinstance(x, Record) else len(x) for x in self._appended)
 
     def at_points(self, which: Sequence[int] | np.ndarray) -> Self:
         """A path of some of the points, without events.
@@ -69,11 +108,10 @@ class Path(Result):
 
         Args:
             others: the other `Path`.
-            which: for every point of the result, in order, whether it comes from `others`.
+            which: (n,) of bool: for every point of the result, in order, whether it comes from `others`.
         """
-        mine, theirs = iter(self._records), iter(others._records)
-        whole = self.at_points([])
-        whole._expanded = [next(theirs if other else mine) for other in which]
+        whole, order = self.at_points([]), np.where(which, len(self) + np.cumsum(which) - 1, np.cumsum(~which) - 1)
+        whole._expanded = Records.joined([self._all, others._all]).at(order)
         return whole
 
     def __repr__(self):

@@ -1,6 +1,7 @@
 """The contents of a path: equilibria, and the events between them."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
+from typing import Self
 
 import numpy as np
 
@@ -36,6 +37,68 @@ class Record:
     tie_forces: np.ndarray | None = None
     clamp_loads: np.ndarray | None = None
     steps: int = 0
+
+
+@dataclass
+class Records:
+    """Equilibria as arrays over them: the fields of `Record`, each (n, ...); None where those of a `Record` are None.
+
+    Attributes:
+        see `Record`; densities: a pair of arrays or None.
+    """
+
+    load_factor: np.ndarray
+    rq: np.ndarray
+    gauss_fields: np.ndarray | None
+    negative_modes: np.ndarray
+    iterations: np.ndarray
+    reactions: np.ndarray
+    neutral: np.ndarray
+    densities: tuple
+    tie_forces: np.ndarray | None
+    clamp_loads: np.ndarray | None
+    steps: np.ndarray
+
+    @classmethod
+    def of(cls, records):
+        """Those of a list of `Record`s."""
+        return cls(**{name: _along([getattr(x, name) for x in records], np.array) for name in _NAMES})
+
+    @classmethod
+    def joined(cls, parts):
+        """Several one after another."""
+        if len(parts) == 1:
+            return parts[0]
+        return cls(**{name: _along([getattr(x, name) for x in parts], np.concatenate) for name in _NAMES})
+
+    def __len__(self):
+        return len(self.load_factor)
+
+    def at(self, which) -> Self:
+        """Those with the indices `which`, copied."""
+        which = np.asarray(which, dtype=int)
+        return type(self)(**{name: _taken(getattr(self, name), which) for name in _NAMES})
+
+    def listed(self):
+        """A list of `Record`s, which share the arrays."""
+        return [Record(**{name: _taken(getattr(self, name), k) for name in _NAMES}) for k in range(len(self))]
+
+
+_NAMES = tuple(x.name for x in fields(Record))
+
+
+def _along(values, join):
+    """Values of many records, or of parts of them, as one."""
+    if isinstance(values[0], tuple):
+        return tuple(_along(part, join) for part in zip(*values, strict=True))
+    return None if values[0] is None else join(values)
+
+
+def _taken(values, which):
+    if isinstance(values, tuple):
+        return tuple(_taken(part, which) for part in values)
+    taken = None if values is None else values[which]
+    return taken.item() if isinstance(taken, np.generic) else taken
 
 
 @dataclass(frozen=True, eq=False)

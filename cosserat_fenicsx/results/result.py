@@ -114,7 +114,7 @@ class Result(Exports, Extremes, Reactions, Stresses, States):
     @cached_property
     def _all_rq(self):
         """(points, nodes, 7) r and q, dimensionless."""
-        return np.array([record.rq for record in self._records]).reshape(len(self), -1, 7)
+        return self._stacked("rq") if len(self) else np.empty((0, len(self._rest), 7))
 
     @cached_property
     def _rest(self):
@@ -179,7 +179,10 @@ class Result(Exports, Extremes, Reactions, Stresses, States):
         i, rows = self._rows(rod)
         cells, weights = self.rule.locate_all(self.layout.breaks[i], x)
         nodes = cells[:, None] * self.degree + np.arange(self.degree + 1)
-        nodal = np.array([record.rq[rows] for record in (self._records if records is None else records)])
+        if records is None:
+            nodal = self._all_rq[:, rows].copy()
+        else:
+            nodal = np.array([record.rq[rows] for record in records])
         nodal[:, :, :3] -= self._rest[rows]
         moved = np.einsum("kj,nkjc->nkc", weights, nodal[:, nodes])
         moved[:, :, 3:] /= np.linalg.norm(moved[:, :, 3:], axis=2, keepdims=True)

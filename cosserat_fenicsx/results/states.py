@@ -99,7 +99,7 @@ class States(OnNodes):
         Raises:
             IndexError, SceneError: as of `result[k]`.
         """
-        return self._with([self._records[self._index(k, f"at_points([{k!r}])")] for k in which])
+        return self._with(self._taken([self._index(k, f"at_points([{k!r}])") for k in which]))
 
     def _index(self, k, where):
         """The index k of a state, checked; `where` for messages."""
@@ -110,12 +110,16 @@ class States(OnNodes):
             raise IndexError(f"{where}: {expected}")
         return k
 
-    def _with(self, records):
-        """A copy with other states."""
+    def _taken(self, which):
+        """What `_expanded` of a result with the states `which` is."""
+        return [self._records[k] for k in which]
+
+    def _with(self, expanded):
+        """A copy with other states, already expanded."""
         part = object.__new__(type(self))
         vars(part).update(vars(self))
         part._forget()
-        part._expanded, part._appended = records, []
+        part._expanded, part._appended = expanded, []
         return part
 
     def _array(self, name):
@@ -142,7 +146,7 @@ class States(OnNodes):
     # -- copies ------------------------------------------------------------------------------------------------------
 
     def __copy__(self):
-        return self._with(list(self._records))
+        return self._with(self._taken(range(len(self))))
 
     def __deepcopy__(self, memo):
         memo |= {id(shared): shared for shared in (self.scene, self.comm)}

@@ -3,6 +3,7 @@
 import numpy as np
 
 from cosserat_fenicsx.models.rodmesh import Layout
+from cosserat_fenicsx.remember import per_scene
 from cosserat_fenicsx.scene.curves import Line
 
 #: Elements per rod of the first mesh, where the mesh is not given.
@@ -16,6 +17,7 @@ _LARGE = 0.1
 _STRAIGHT = 0.958
 
 
+@per_scene
 def first_layout(scene, degree):
     """The first mesh, fine enough to resolve the curvature of the axis and a section that is a function of s.
 

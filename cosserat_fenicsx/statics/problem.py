@@ -1,10 +1,9 @@
-"""A compiled model with its PETSc matrix and vectors, reused for all loads, steps and scenes of its signature."""
+"""A compiled model with its residual and tangent, reused for all loads, steps and scenes of its signature."""
 
 import numpy as np
-from petsc4py import PETSc
 
-from cosserat_fenicsx.algebra.equations import Equations
-from cosserat_fenicsx.algebra.packed import Packed
+from cosserat_fenicsx.algebra.equations import STATE, Equations
+from cosserat_fenicsx.algebra.packed import Packed, PackedExpression
 from cosserat_fenicsx.algebra.tie_rows import TieRows
 
 # Change of the load factor for central differences, whose error is of second order in that of prescribed rotations.
@@ -12,7 +11,7 @@ _CHANGE = 1e-4
 
 
 class Problem(Equations):
-    """Residual and tangent of a model as PETSc matrix and vectors, in the solver's unknowns (`models.numbering`).
+    """Residual and tangent of a model in statics.
 
     Args:
         model: see `models.base.RodModel` for the protocol.
@@ -27,23 +26,30 @@ class Problem(Equations):
     ties_class = TieRows
 
     def __init__(self, model):
-        super().__init__(model)
-        self.A.setOption(PETSc.Mat.Option.SYMMETRIC, self.tangent == "symmetric")
-        self._dead, self._permanent, *self._difference = (self.numbering.vector() for _ in range(4))
+        self._refreshes, self._remembers = bool(model.actions.refreshed), bool(model.actions.memory)
+        super().__init__(model, STATE * self._refreshes)
+        forms, constants = model.forms, model.constants
         moving = (model.state, *model.carried, *model.actions.refreshed, *model.actions.memory_functions)
-        self._residual, self._tangent = Packed(model.forms.residual, moving), Packed(model.forms.tangent, moving)
+        advance = None
+        if forms.advance:
+            elements, size = model.carried_dofs.shape
+            advance = PackedExpression(forms.advance, model.mesh, elements, size)
+        self.take_forms(Packed(forms.residual, moving, constants), Packed(forms.tangent, moving, constants), advance)
+        self._dead, self._permanent, *self._difference = (self.numbering.vector() for _ in range(4))
         self._loads, self._permanent_loads = (
-            None if form is None else Packed(form, ()) for form in (model.forms.dead, model.forms.permanent)
+            None if form is None else Packed(form, ()) for form in (forms.dead, forms.permanent)
         )
         self._live = [function.x.array for function in model.carried]
         self.load_factor = self.load_norm = 0.0
         # Arrays of the constants, written in place: the setter of `value` takes as long as a residual of few elements.
         self._eta, self._share = model.load_factor.value, model.permanent_factor.value
-        self._refreshes, self._remembers = bool(model.actions.refreshed), bool(model.actions.memory)
+        self.take_loads((self._dead.array, self._eta), (self._permanent.array, self._share))
         self._loaded, self.begins = None, False
 
-    def _kind(self):
-        return self.model.tangent
+    @property
+    def eta(self):
+        """The factor of loads and prescribed motions."""
+        return float(self._eta)
 
     def load(self, scene, layout):
         """Set the data of a scene; the state becomes its reference configuration.
@@ -67,7 +73,7 @@ class Problem(Equations):
         else:
             model.rest()
         self.begins = any(kind.scaled == "permanent" for kind in model.signature.terms)
-        self._eta[...] = self.eta = 0.0
+        self._eta[...] = 0.0
         self.set_load_factor(0.0)
         self.numbering.from_local(self._state, self.x)
         self.set_state(self.x)
@@ -78,7 +84,7 @@ class Problem(Equations):
 
         User-defined functions and loads may give other values at every call.
         """
-        if self._loaded is None or self._loaded[0] is not scene or not all(rod.uniform for rod in scene.rods):
+        if self._loaded is None or self._loaded[0] is not scene or not all(rod.profile.uniform for rod in scene.rods):
             return False
         if self._remembers or not all(type(load).__module__.startswith("cosserat_fenicsx.") for load in scene.loads):
             return False
@@ -92,7 +98,7 @@ class Problem(Equations):
         if self.begins:
             self._share[...] = eta
         else:
-            self._eta[...] = self.eta = eta
+            self._eta[...] = eta
 
     def end_beginning(self):
         """Set the factor of permanent loads to 1 and the load factor to 0."""
@@ -128,17 +134,9 @@ class Problem(Equations):
             self.ties.put(self.x, multipliers)
         self.set_state(self.x)
 
-    def function(self, snes, x, b):
-        """Residual at x for SNES."""
-        self.set_state(x)
+    def _refresh(self):
         if self._refreshes:
             self.model.actions.refresh()
-        self._assemble(self._residual, b)
-        b.axpy(-self.eta, self._dead)
-        if self._permanent_loads:
-            b.axpy(-float(self._share), self._permanent)
-        if self.ties:
-            self.ties.add_residual(b, self.eta)
 
     def load_derivative(self, x):
         """d residual/d load factor at x by a central difference, which is exact for loads, affine in the load factor.
@@ -149,17 +147,9 @@ class Problem(Equations):
         change = _CHANGE * max(1.0, abs(eta))
         for vector, ahead in zip(self._difference, (change, -change), strict=True):
             self.set_load_factor(eta + ahead)
-            self.function(None, x, vector)
+            self.function(x, vector)
         self.set_load_factor(eta)
         derivative, behind = self._difference
         derivative.axpy(-1.0, behind)
         derivative.scale(0.5 / change)
         return derivative
-
-    def jacobian(self, snes, x, A, P):
-        """Tangent at the state that `function` was last called with."""
-        P.zeroEntries()
-        self._tangent.add_to_matrix(P)
-        if self.ties:
-            self.ties.add_tangent(P, self.eta)
-        P.assemble()

@@ -5,17 +5,22 @@ dead moment in space is not conservative and makes the tangent unsymmetric; the 
 counted. In a plane model the second variation decouples into motions in the plane and motions out of it.
 """
 
+from functools import cached_property
+
 import numpy as np
 from petsc4py import PETSc
 
 from cosserat_fenicsx.algebra import eigen, linear
+from cosserat_fenicsx.algebra.elimination import Elimination
+from cosserat_fenicsx.algebra.equations import COUNT, Called
+from cosserat_fenicsx.algebra.interface import Interface, signs
 from cosserat_fenicsx.algebra.packed import Packed
 
 _ROUNDING = np.finfo(float).eps
 _LARGEST_ROW = PETSc.NormType.NORM_INFINITY
 
 
-class NegativeModes:
+class NegativeModes(Called):
     """Counts the negative eigenvalues of the second variation at a problem's state.
 
     Args:
@@ -23,12 +28,23 @@ class NegativeModes:
 
     Attributes:
         parts: the `Part`s of the second variation.
+        c: the C structure `second_variation`.
         sideways: of the last count, the number of negative eigenvalues of motions out of the plane; 0 in space.
     """
 
     def __init__(self, problem):
+        super().__init__()
         self.parts = [Part(problem, i) for i in range(len(problem.model.second_variations))]
-        self.sideways = 0
+        self.sideways, self._sideways = 0, self._ffi.new("int *")
+        self.c = variation = self._ffi.new("second_variation *")
+        variation.parts, variation.self = len(self.parts), self._handle
+        variation.hooked = any(part.interface for part in self.parts)
+        for k, part in enumerate(self.parts):
+            variation.form[k], variation.chain[k] = part.form.c, part.elimination.c
+            variation.sideways[k] = part.variation.sideways
+
+    def _answer(self, what, a, b):
+        self.parts[what - COUNT].complete()
 
     def load(self):
         """Take the numbers of the scene that the model was loaded with."""
@@ -51,9 +67,12 @@ class NegativeModes:
         Returns:
             int, or -1 where the second variation is singular to rounding.
         """
-        counts = [part.count(neutral=neutral) for part in self.parts]
-        self.sideways = sum(n for n, part in zip(counts, self.parts, strict=True) if part.variation.sideways and n > 0)
-        return -1 if -1 in counts else sum(counts)
+        if neutral:
+            return self.whole.count_without_neutral()
+        found = self._lib.negative_modes(self.c, self._sideways)
+        self.raise_failure()
+        self.sideways = self._sideways[0]
+        return found
 
 
 class Part:
@@ -64,30 +83,42 @@ class Part:
         index: of the part among its model's `second_variations`.
 
     Attributes:
-        variation: the model's `SecondVariation`.
-        K: its matrix; pc: a PETSc preconditioner with the factorisation of K.
+        variation: the model's `SecondVariation`; form: its `Packed` form.
+        elimination, interface: for counts; the latter None where nothing is to be added.
     """
 
     def __init__(self, problem, index):
         self.problem, self.model, self._index = problem, problem.model, index
         self.variation = variation = self.model.second_variations[index]
         tied = variation.tied
-        self.K = variation.numbering.matrix(variation.cell_dofs, tied[tied >= 0])
-        self.K.setOption(PETSc.Mat.Option.SYMMETRIC, True)
-        first, end = self.K.getOwnershipRange()
-        self._tied_here = np.flatnonzero((tied.ravel() >= first) & (tied.ravel() < end))
-        self._tied_rows = tied.ravel()[self._tied_here] - first
-        self._diagonal = self.K.createVecLeft()
-        actions = self.model.actions
-        moving = (self.model.state, *self.model.carried, *actions.refreshed, *actions.memory_functions)
-        self._form = Packed(variation.form, moving)
-        self.pc = PETSc.PC().create(self.model.comm)
-        linear.factor_second_variation(self.pc, self.K)
+        model, numbering = self.model, variation.numbering
+        actions = model.actions
+        moving = (model.state, *model.carried, *actions.refreshed, *actions.memory_functions)
+        self.form = Packed(variation.form, moving, model.constants)
+        order = np.argsort(model.rods.cells[: len(variation.cell_dofs)])
+        self.elimination = elimination = Elimination(numbering, variation.cell_dofs, order, tied.ravel())
+        needed = elimination.unknowns or model.comm.size > 1
+        self.interface = Interface(elimination, tied) if needed else None
 
     def load(self):
         """Take the numbers of the scene that the model was loaded with."""
         self.variation = self.model.second_variations[self._index]
-        self._form.refresh()
+        self.form.refresh()
+
+    @cached_property
+    def K(self):
+        """The matrix, made where it is first needed: for eigenvalues and modes."""
+        variation = self.variation
+        K = variation.numbering.matrix(variation.cell_dofs, variation.tied[variation.tied >= 0])
+        K.setOption(PETSc.Mat.Option.SYMMETRIC, True)
+        return K
+
+    @cached_property
+    def pc(self):
+        """A PETSc preconditioner with the factorisation of K."""
+        pc = PETSc.PC().create(self.model.comm)
+        linear.factor_second_variation(pc, self.K)
+        return pc
 
     def assemble(self, *, stress_alone=False):
         """The second variation at the problem's state and load factor, in K.
@@ -95,41 +126,58 @@ class Part:
         Args:
             stress_alone: geometric stiffness alone, without the stiffness of sections, supports and joints.
         """
-        problem, variation = self.problem, self.variation
         self.K.zeroEntries()
         if stress_alone:
             with self.model.stress_alone():
-                self._form.add_to_matrix(self.K)
+                self.form.add_to_matrix(self.K)
         else:
-            self._form.add_to_matrix(self.K)
-        ties, (tied, axes) = problem.ties, (variation.tied, variation.axes)
-        if ties:
-            ties.add_second_variation(self.K, tied, axes, problem.eta)
+            self.form.add_to_matrix(self.K)
+        if self.problem.ties:
+            self.elimination.count(self.form)
+            tied, of_ties = self.variation.tied.ravel().astype(PETSc.IntType), self._of_ties(stress_alone)
+            if self.model.comm.rank == 0:
+                self.K.setValues(tied, tied, of_ties, PETSc.InsertMode.ADD_VALUES)
         self.K.assemble()
-        if ties and not stress_alone:
-            ties.add_springs(self.K, tied, axes, problem.eta, self._resistance())
-            self.K.assemble()
 
-    def _resistance(self):
-        """(tied nodes, block) absolute diagonal entries of K at the nodes with constraints, summed over all ranks."""
-        self.K.getDiagonal(self._diagonal)
-        found = np.zeros(self.variation.tied.shape)
-        found.ravel()[self._tied_here] = np.abs(self._diagonal.array_r[self._tied_rows])
-        return self.model.comm.allreduce(found) if self.model.comm.size > 1 else found
+    def _of_ties(self, stress_alone=False):
+        """The part of supports and joints, (tied unknowns, the same), on all ranks, after a count of pivots."""
+        problem, comm, interface = self.problem, self.model.comm, self.interface
+        ties, axes, diagonal = problem.ties, self.variation.axes, self.elimination.diagonal
+        if comm.size > 1:
+            diagonal = comm.allreduce(diagonal)
+        found = ties.second_variation(axes, problem.eta)
+        if found is not None and not stress_alone:
+            resistance = np.where(interface.nodes < 0, 0.0, np.append(diagonal, 0.0)[interface.nodes])
+            found = found + ties.springs(axes, problem.eta, np.abs(resistance + np.diag(found)))
+        return comm.bcast(found, root=comm.size - 1) if comm.size > 1 else found
 
-    def count(self, *, neutral=False):
+    def complete(self):
+        """Complete the numbers of negative and zero pivots, which C has counted along this rank's rods."""
+        comm, chain = self.model.comm, self.elimination.c
+        negative, zero = chain.negative, chain.zero
+        if comm.size > 1:
+            negative, zero = comm.allreduce(np.array([negative, zero]))
+        if self.interface:
+            of_ties = self._of_ties() if self.problem.ties else np.empty((0, 0))
+            further = signs(self.interface.matrix(of_ties))
+            negative, zero = negative + further[0], zero + further[1]
+        chain.negative, chain.zero = int(negative), int(zero)
+
+    def count_without_neutral(self):
         """See `NegativeModes.count`."""
+        self._factor()
+        return self._negative - int(not self._zero and self._nearest(1)[0][0] < 0)
+
+    def _factor(self):
+        """Assemble K at the problem's state and factorise it."""
         self.assemble()
         self.pc.setOperators(self.K)
         self.pc.setUp()
-        negative, zero, _ = self.pc.getFactorMatrix().getInertia()
-        self._negative, self._zero, self._shift = negative, zero, 0.0
-        if neutral:
-            return negative - int(not zero and self._nearest(1)[0][0] < 0)
-        return -1 if zero else negative
+        self._negative, self._zero, _ = self.pc.getFactorMatrix().getInertia()
+        self._shift = 0.0
 
     def _nearest(self, count, side=0):
-        """(eigenvalues nearest zero, their eigenvectors) at the state of the last count; side: 1, -1 or 0 for both."""
+        """(eigenvalues nearest zero, their eigenvectors) of K as last factorised; side: 1, -1 or 0 for both."""
         if self._zero:  # MUMPS drops null pivots from solutions; shifting all eigenvalues leaves the eigenvectors
             self._zero, self._shift = 0, 10 * _ROUNDING * self.K.norm(_LARGEST_ROW)
             self.K.shift(self._shift)
@@ -139,7 +187,8 @@ class Part:
         return values - self._shift, vectors
 
     def is_neutral(self):
-        """Whether the eigenvalue nearest zero vanishes to rounding at the problem's state, that of the last count."""
+        """Whether the eigenvalue nearest zero vanishes to rounding at the problem's state."""
+        self._factor()
         values, _ = self._nearest(2)
         return abs(values[0]) < 1e-3 * abs(values[-1]) and abs(values[0]) < 30 * _ROUNDING * self.K.norm(_LARGEST_ROW)
 
@@ -148,7 +197,7 @@ class Part:
 
         Only eigenvalues near zero are cheap: all those between it and zero are computed.
         """
-        self.count()
+        self._factor()
         above = j - self._negative  # 0: the smallest positive one, -1: the negative one nearest zero
         needed, side = (1 + above, 1) if above >= 0 else (-above, -1)
         values = self._nearest(needed, side)[0]
@@ -167,7 +216,7 @@ class Part:
         Returns:
             Changes of the unknowns, arrays over the entries that this rank owns.
         """
-        self.count()
+        self._factor()
         return oriented(self.model, self._nearest(count, side)[1])
 
 

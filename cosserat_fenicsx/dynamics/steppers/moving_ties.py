@@ -40,15 +40,6 @@ class MovingTies(TieRows):
         equations = by_nodes(self._at_end, trial_at_end)
         return reactions_by_nodes(test, change, self.share * trial), reactions_by_multipliers(test, gradient), equations
 
-    def make_room(self, A):
-        """Reserve the matrix entries that `add_tangent` will add to."""
-        if self._here:
-            tied, added = self.rows[self.rows >= 0], self._multipliers
-            for rows, columns in ((tied, tied), (tied, added), (added, tied)):
-                A.setValues(rows, columns, np.zeros((len(rows), len(columns))), addv=True)
-            for i in (*added, *self._idle):
-                A.setValue(i, i, 0.0, addv=True)
-
     def work(self, eta):
         """Work of the reactions on the structure in the step, dimensionless; on the last rank, else 0."""
         if not self._here:

@@ -10,10 +10,7 @@ errors, and the residual of a stiff rod cannot fall below its rounding.
 
 import math
 
-from petsc4py import PETSc
-
-from cosserat_fenicsx.algebra import linear
-from cosserat_fenicsx.algebra.newton import EXTERNAL, Solved
+from cosserat_fenicsx.algebra.newton import Solved
 
 #: Newton's method stops when the remaining error, estimated from the contraction of the increments, is below the first
 #: number times the motion in the step (root mean square, units L, 1), since that is the relative error of velocities
@@ -42,9 +39,8 @@ class StepNewton:
         self._comm = problem.model.comm
         motions = self._comm.allreduce(self._motions)
         self._root = math.sqrt(motions)
-        self._price = motions / (50 + 0.055 * motions)  # cost of a new tangent, in iterations, as measured
+        self._price = motions / (80 + 0.2 * motions)  # cost of a new tangent, in iterations, as measured
         self._step = numbering.vector()
-        self._make_ksp()
         self.forget()
 
     def forget(self):
@@ -52,12 +48,6 @@ class StepNewton:
         self.problem.fresh = True
         # cost of the tangent and its iterations; steps it has served; steps left that start with a new tangent
         self._spent = self._served = self._anew = 0
-
-    def _make_ksp(self):
-        self._ksp = ksp = PETSc.KSP().create(self._comm)
-        ksp.setType("preonly")  # Newton's iterations correct the rounding errors of the factorisation
-        ksp.setOperators(self.problem.A)
-        linear.factor_tangent(ksp.getPC(), self.problem.A, self.problem.tangent)
 
     def solve(self, guesses):
         """Newton's method from the first guess with the current tangent; where that fails, from every guess with a new
@@ -86,7 +76,7 @@ class StepNewton:
         problem.guess(guess)
         self._enough = max(SMALLEST, INCREMENT * self._size(problem.x.array_r[: self._motions] - start))
         while found is None:
-            problem.function(None, problem.x, problem.b)
+            problem.function(problem.x, problem.b)
             if not self._solve():
                 found = "the tangent is singular"
                 break
@@ -111,19 +101,11 @@ class StepNewton:
 
     def _solve(self):
         """Solve for the increment; False where the tangent is singular."""
-        problem, ksp = self.problem, self._ksp
+        problem = self.problem
         if problem.fresh:
-            problem.jacobian(None, problem.x, problem.A, problem.A)
-            ksp.setOperators(problem.A)
+            problem.factor()
             self._spent, self._served = self._price, 0
-        try:
-            ksp.solve(problem.b, self._step)
-        except PETSc.Error as error:  # a failed solve leaves the KSP unusable: it is made again
-            if error.ierr != EXTERNAL:
-                raise
-            self._make_ksp()
-            return False
-        return ksp.getConvergedReason() >= 0
+        return problem.solve(problem.b, self._step)
 
     def _outcome(self, steps):
         """Why the iteration stops after the last increment, in words; None where it continues."""

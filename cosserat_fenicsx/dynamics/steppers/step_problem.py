@@ -3,7 +3,7 @@
 import numpy as np
 from dolfinx import fem
 
-from cosserat_fenicsx.algebra.equations import Equations
+from cosserat_fenicsx.algebra.equations import STATE, Equations
 from cosserat_fenicsx.algebra.packed import Packed
 from cosserat_fenicsx.dynamics.steppers.moving_ties import MovingTies
 
@@ -16,24 +16,24 @@ class StepProblem(Equations):
 
     Attributes:
         see `Equations`; x is the state at the end of the step.
-        fresh: whether `jacobian` assembles a new tangent when it is next called, or keeps the current one.
+        fresh: whether `factor` makes new factors of the tangent when it is next called, or keeps the current ones.
         h: the length of the step, dimensionless.
         load_factor: multiplies all loads and prescribed motions.
     """
 
     ties_class = MovingTies
+    #: see `Equations`
+    changes = 0
     #: where actions act, from the start (0) to the end (1) of a step
     acting_share = 0.5
 
     def __init__(self, model):
-        super().__init__(model)
+        self._refreshes = bool(model.actions.refreshed)
+        super().__init__(model, self.changes | STATE * self._refreshes)
         self._known, self._loads, self._momenta, self._vector = (self.numbering.vector() for _ in range(4))
+        self.take_loads((self._known.array, np.ones(1)))
         self._start = model.start.x.array
         self.load_factor, self.fresh = 1.0, True
-        self._refreshes = bool(model.actions.refreshed)
-
-    def _kind(self):
-        return "general" if self.ties or self.model.comm.size > 1 else "blocks"
 
     def _ends(self):
         """The Functions that change from step to step; only the first, the state, changes within a step."""
@@ -52,30 +52,29 @@ class StepProblem(Equations):
     def _pack(self):
         """Pack the constants and coefficients of a scene for all forms; those that change in time are updated later."""
         forms, moving = self.model.forms, tuple(self.model.moving_loads)
-        self._residual, self._tangent, self._live = map(
-            self._packed_within, (forms.residual, forms.tangent, forms.live)
+        self.take_forms(self._packed(forms.residual), self._packed(forms.tangent))
+        self._live, self._momentum = (
+            self._packed(forms.live),
+            Packed(forms.momentum, self._ends(), self.model.constants),
         )
-        self._momentum = Packed(forms.momentum, self._ends())
         self._dead, self._permanent = (
             None if form is None else Packed(form, moving) for form in (forms.dead, forms.permanent)
         )
 
-    def _packed_within(self, form):
-        """A form of the state, for assembly in every Newton iteration; None where there is none.
-
-        The start of the step, loads that depend on time and the memory of actions are constant within a step.
-        """
+    def _packed(self, form):
+        """A form of the state, for assembly in every Newton iteration; None where there is none."""
         if form is None:
             return None
-        (state, *beginning), actions = self._ends(), self.model.actions
-        constant = (*beginning, *self.model.moving_loads, *actions.memory_functions)
-        return Packed(form, (state, *actions.refreshed), constant)
+        model, actions = self.model, self.model.actions
+        moving = (*self._ends(), *model.moving_loads, *actions.refreshed, *actions.memory_functions)
+        return Packed(form, moving, model.constants)
 
-    def _refresh(self, share):
+    def _refresh(self, share=None):
         """Evaluate data that depend on the position at this share of the way from the start of the step to the
         state."""
         if not self._refreshes:
             return
+        share = self.acting_share if share is None else share
         end = self._state.copy()
         self._state[:] = (1 - share) * self._start + share * end
         self.model.actions.refresh()
@@ -105,14 +104,11 @@ class StepProblem(Equations):
             self.ties.begin(model.ties_at(t + h))
 
     def _take_loads(self, t):
-        """Evaluate the loads at the time t (s), and update all other data that are constant within a step."""
+        """Evaluate the loads at the time t (s)."""
         self._acting_at = t
         if self.model.moving_loads:
             self.model.loads_at(t)
             self._assemble_loads()
-        self._residual.catch_up()
-        if self._live:
-            self._live.catch_up()
 
     def _assemble_loads(self):
         """Assemble the loads that do not depend on the state, times the load factor, or unscaled where permanent."""
@@ -129,30 +125,12 @@ class StepProblem(Equations):
         if self.ties:
             self.ties.put(self.x, multipliers)
 
-    def function(self, snes, x, b):
-        """Residual at x for SNES."""
-        self.set_state(x)
-        self._refresh(self.acting_share)
-        self._put_stresses(x, b)
-        b.axpy(-1.0, self._known)
-        if self.ties:
-            self.ties.add_residual(b, self.load_factor)
-
-    def _put_stresses(self, x, b):
-        """Assemble into b the part of the residual that depends on the state, without the constraints."""
-        self._assemble(self._residual, b)
-
-    def jacobian(self, snes, x, A, P):
-        """Tangent at the state that `function` was last called with; the old one is kept unless `fresh`."""
-        if not self.fresh:
-            return
-        self.fresh = False
-        P.zeroEntries()
-        self._tangent.catch_up()
-        self._tangent.add_to_matrix(P)
-        if self.ties:
-            self.ties.add_tangent(P, self.load_factor)
-        P.assemble()
+    def factor(self):
+        """Factors of the tangent at the state that `function` was last called with; the old ones are kept unless
+        `fresh`."""
+        if self.fresh:
+            self.fresh = False
+            super().factor()
 
     def work(self):
         """Work of loads and supports in the step from `start` to the state, dimensionless, over all ranks."""
@@ -202,8 +180,7 @@ class StepProblem(Equations):
         """This rank's part of the data that later steps depend on, with the entries of a tangent that is kept."""
         kept = {"x": self.x.array_r.copy(), "state": self._state.copy(), "fresh": bool(self.fresh)}
         if not self.fresh:
-            rows, columns, values = self.A.getValuesCSR()
-            kept["tangent"] = {"rows": rows, "columns": columns, "values": values}
+            kept["tangent"] = super().memory()
         return kept
 
     def recall(self, memory):
@@ -213,6 +190,4 @@ class StepProblem(Equations):
         self.set_state(self.x)
         self.fresh = bool(memory["fresh"])
         if not self.fresh:
-            tangent = memory["tangent"]
-            self.A.setValuesCSR(tangent["rows"], tangent["columns"], tangent["values"])
-            self.A.assemble()
+            super().recall(memory["tangent"])

@@ -23,7 +23,7 @@ from cosserat_fenicsx.results.export.arrays import h5py_for, new_hdf5
 from cosserat_fenicsx.results.export.beside import replaced
 from cosserat_fenicsx.results.history import History, Instant, Ledger
 from cosserat_fenicsx.results.path import Path
-from cosserat_fenicsx.results.records import Event, Record
+from cosserat_fenicsx.results.records import Event, Record, Records
 from cosserat_fenicsx.scene.as_data import NotData, from_data, to_data
 
 _FORMAT, _VERSION = "result of cosserat_fenicsx", 1
@@ -175,7 +175,8 @@ def _restored(kind, scene, settings, numbers, assemble, comm):
     common = {name: settings[name] for name in ("model", "formulation", "degree", "unknowns", "why")}
     result = (History if moving else Path)(scene, layout, scales, rule, comm=comm, **common, connections=connections,
                                            expand=None)  # fmt: skip
-    result._expanded = [_record(numbers, k, moving) for k in range(states)]
+    listed = [_record(numbers, k, moving) for k in range(states)]
+    result._expanded = listed if moving else Records.of(listed) if listed else None
     if moving:
         result.scheme, result._time_unit = settings["scheme"], settings["time_unit"]
     else:

@@ -1,0 +1,307 @@
+/* Elements and elimination along the rods. Nothing here knows a formula of the rod: FFCx's kernels do. */
+#include "chain.h"
+
+#include <math.h>
+#include <stdint.h>
+#include <string.h>
+
+/* A pivot is taken if it is not smaller than this times the largest number in its column. The unknown of another one is
+   delayed to the next element: the axial force of a straight inextensible element between two points is not determined
+   before the points are. */
+static const double SMALLEST_PIVOT = 1e-6;
+/* Relative to the largest number in its row, smaller pivots of a symmetric matrix are zero. */
+static const double ZERO_PIVOT = 2e-14;
+
+#if KERNEL_ARGUMENTS == 6
+typedef void tabulator(double *, const double *, const double *, const double *, const int *, const uint8_t *);
+#define LAST
+#else
+typedef void tabulator(double *, const double *, const double *, const double *, const int *, const uint8_t *, void *);
+#define LAST , 0
+#endif
+
+/* ---- elements ---------------------------------------------------------------------------------------------------- */
+
+static void take_constants(kernel *k)
+{
+    for (int i = 0; i < k->constants; i++) k->c[k->slot[i]] = *k->constant[i];
+}
+
+static double *coefficients(kernel *k, int e)
+{
+    double *w = k->w + (size_t)e * k->width;
+    for (const source *s = k->source; s < k->source + k->sources; s++) {
+        const int *which = s->which + (size_t)e * s->count;
+        for (int i = 0; i < s->count; i++) w[s->column + i] = s->values[which[i]];
+    }
+    return w;
+}
+
+/* Take the current values of what changes, for assembly by others. */
+void pack(kernel *k)
+{
+    take_constants(k);
+    for (int e = 0; e < k->elements; e++) coefficients(k, e);
+}
+
+/* The numbers A of an element. */
+static const double *element(kernel *k, int e, double *A)
+{
+    const double *w = coefficients(k, e);
+    double x[6];
+    for (int i = 0; i < 2; i++) memcpy(x + 3 * i, k->x + 3 * (size_t)k->corners[2 * e + i], 3 * sizeof *x);
+    memset(A, 0, k->size * sizeof *A);
+    ((tabulator *)k->tabulate)(A, w, k->c, x, 0, 0 LAST);
+    return A;
+}
+
+/* Add a vector's elements to values (local degrees of freedom); dofs: (elements, size). */
+void add_vector(kernel *k, const int *dofs, double *values)
+{
+    take_constants(k);
+    for (int e = 0; e < k->elements; e++, dofs += k->size) {
+        const double *A = element(k, e, k->A);
+        for (int i = 0; i < k->size; i++) values[dofs[i]] += A[i];
+    }
+}
+
+/* Put an expression's values at their places. */
+void put_values(kernel *k, const int *dofs, double *values)
+{
+    take_constants(k);
+    for (int e = 0; e < k->elements; e++, dofs += k->size) {
+        const double *A = element(k, e, k->A);
+        for (int i = 0; i < k->size; i++) values[dofs[i]] = A[i];
+    }
+}
+
+/* All elements' numbers, (elements, size). */
+void tabulate_all(kernel *k, double *values)
+{
+    take_constants(k);
+    for (int e = 0; e < k->elements; e++) element(k, e, values + (size_t)e * k->size);
+}
+
+/* ---- one front --------------------------------------------------------------------------------------------------- */
+
+static void swap(double *a, double *b, int n, int step)
+{
+    for (int i = 0; i < n; i++, a += step, b += step) {
+        double c = *a;
+        *a = *b, *b = c;
+    }
+}
+
+static void swap_numbers(int *a, int *b)
+{
+    int c = *a;
+    *a = *b, *b = c;
+}
+
+static inline void subtract_pivot(double *F, int n, int k)
+{
+    const double *restrict pivot = F + (size_t)k * n;
+    const double inverse = 1 / pivot[k];
+    for (int i = k + 1; i < n; i++) {
+        double *restrict row = F + (size_t)i * n;
+        const double l = row[k] *= inverse;
+        if (l != 0)
+            for (int j = k + 1; j < n; j++) row[j] -= l * pivot[j];
+    }
+}
+
+/* LU factors of the first m rows and columns of F (n, n) with row exchanges among them, and the rest reduced; columns
+   without a pivot are moved behind the others, at most `most`. Returns how many were eliminated, -1 if singular. */
+static int reduce(double *F, int n, int m, int most, int *row, int *column)
+{
+    int k = 0, last = m;
+    while (k < last) {
+        int at = k;
+        double best = 0, largest = 0;
+        for (int i = k; i < m; i++) {
+            const double size = fabs(F[(size_t)i * n + k]);
+            if (size > best) best = size, at = i;
+        }
+        if (most)
+            for (int i = m; i < n; i++) largest = fmax(largest, fabs(F[(size_t)i * n + k]));
+        if (!(best > 0) || best < SMALLEST_PIVOT * largest) {
+            if (m - last < most) {
+                last--;
+                swap(F + k, F + last, n, n);
+                swap_numbers(column + k, column + last);
+                continue;
+            }
+            if (!(best > 0)) return -1;
+        }
+        if (at != k) {
+            swap(F + (size_t)k * n, F + (size_t)at * n, n, 1);
+            swap_numbers(row + k, row + at);
+        }
+        subtract_pivot(F, n, k++);
+    }
+    return last;
+}
+
+/* Signs of the pivots of the first m rows and columns of a symmetric F (n, n), the largest on the diagonal first. */
+static void signs(double *F, int n, int m, int *negative, int *zero)
+{
+    for (int k = 0; k < m; k++) {
+        int at = k;
+        double row = 0;
+        for (int i = k + 1; i < m; i++)
+            if (fabs(F[(size_t)i * n + i]) > fabs(F[(size_t)at * n + at])) at = i;
+        swap(F + (size_t)k * n, F + (size_t)at * n, n, 1);
+        swap(F + k, F + at, n, n);
+        const double pivot = F[(size_t)k * n + k];
+        for (int j = k; j < n; j++) row = fmax(row, fabs(F[(size_t)k * n + j]));
+        if (!(fabs(pivot) > ZERO_PIVOT * row)) {
+            ++*zero;
+            continue;
+        }
+        *negative += pivot < 0;
+        subtract_pivot(F, n, k);
+    }
+}
+
+static inline double dot(const double *restrict a, const double *restrict b, int n)
+{
+    double sum = 0;
+#pragma omp simd reduction(+ : sum)
+    for (int i = 0; i < n; i++) sum += a[i] * b[i];
+    return sum;
+}
+
+/* ---- along the rods ---------------------------------------------------------------------------------------------- */
+
+/* Where the i-th of the numbers carried from the element before is in the front; `ahead`: how many are in front of the
+   element's own. */
+static inline int carried_to(int i, int ahead, const int *shape)
+{
+    return i < ahead ? i : i + shape[1] + shape[2];
+}
+
+/* The front of the element in turn, with `d` delayed unknowns and what is carried from the front of the one before. */
+static double *assemble(chain *s, kernel *k, const double *matrices, int t, int d, const double *before, int n_before,
+                        int k_before)
+{
+    const int *shape = s->shape + 4 * t, *place = s->place + (size_t)t * s->width, w = s->width, e = s->order[t];
+    const int n = d + shape[0] + shape[1] + shape[2] + shape[3], ahead = d + shape[0];
+    double *F = s->front + (size_t)t * s->room * s->room;
+    memset(F, 0, (size_t)n * n * sizeof *F);
+    const double *A = matrices ? matrices + (size_t)e * w * w : element(k, e, k->A);
+    for (int i = 0; i < w; i++) {
+        if (place[i] < 0) continue;
+        double *row = F + (size_t)(place[i] + d) * n + d;
+        for (int j = 0; j < w; j++)
+            if (place[j] >= 0) row[place[j]] += A[i * w + j];
+        const int number = s->rows[(size_t)t * s->room + place[i]];
+        if (number >= s->size) s->diagonal[number - s->size] += A[i * w + i];
+    }
+    for (int i = k_before; before && i < n_before; i++) {
+        double *row = F + (size_t)carried_to(i - k_before, ahead, shape) * n;
+        for (int j = k_before; j < n_before; j++)
+            row[carried_to(j - k_before, ahead, shape)] += before[(size_t)i * n_before + j];
+    }
+    return F;
+}
+
+/* The matrix of a segment on the interface; `d`: delayed unknowns, in the first of its places. */
+static void condense(chain *s, int t, const double *F, int n, int k, int d)
+{
+    if (s->block[t] < 0) return;
+    const int slots = s->ends[t] < 0 ? 0 : s->delays, kept = n - k - d, all = slots + kept;
+    double *block = s->condensed + s->block[t];
+    memset(block, 0, (size_t)all * all * sizeof *block);
+    for (int i = 0; i < d + kept; i++)
+        for (int j = 0; j < d + kept; j++)
+            block[(size_t)(i < d ? i : i - d + slots) * all + (j < d ? j : j - d + slots)] =
+                F[(size_t)(k + i) * n + k + j];
+    for (int i = d; i < slots; i++) block[(size_t)i * all + i] = 1;
+}
+
+/* Factors of the sum of the elements: of the kernel, or matrices that are given. Returns 0, or 1 if it is singular. */
+int eliminate(chain *s, kernel *k, const double *matrices)
+{
+    const double *before = 0;
+    int n_before = 0, k_before = 0, d = 0;
+    if (k) take_constants(k);
+    for (int t = 0; t < s->elements; t++) {
+        const int *shape = s->shape + 4 * t, m = d + shape[0] + shape[1], n = m + shape[2] + shape[3];
+        int *row = s->row + (size_t)t * s->room, *column = s->column + (size_t)t * s->room;
+        const int last = s->ends[t] != -1;
+        double *F = assemble(s, k, matrices, t, d, before, n_before, k_before);
+        for (int i = 0; i < n; i++) row[i] = i;
+        for (int i = 0; i < d; i++) column[i] = s->column[(size_t)(t - 1) * s->room + k_before + i];
+        memcpy(column + d, s->rows + (size_t)t * s->room, (n - d) * sizeof *column);
+        k_before = reduce(F, n, m, last && s->ends[t] < 0 ? 0 : s->delays, row, column);
+        s->done[2 * t] = n, s->done[2 * t + 1] = k_before;
+        if (k_before < 0) return 1;
+        d = m - k_before, before = F, n_before = n;
+        if (last) condense(s, t, F, n, k_before, d), before = 0, d = 0;
+    }
+    return 0;
+}
+
+/* The negative and zero pivots of a symmetric sum of elements; the interface's matrices are condensed too. */
+int count(chain *s, kernel *k)
+{
+    const double *before = 0;
+    int n_before = 0, k_before = 0;
+    s->negative = s->zero = 0;
+    memset(s->diagonal, 0, s->kept * sizeof *s->diagonal);
+    take_constants(k);
+    for (int t = 0; t < s->elements; t++) {
+        const int *shape = s->shape + 4 * t, m = shape[0] + shape[1], n = m + shape[2] + shape[3];
+        double *F = assemble(s, k, 0, t, 0, before, n_before, k_before);
+        signs(F, n, m, &s->negative, &s->zero);
+        before = F, n_before = n, k_before = m;
+        if (s->ends[t] != -1) condense(s, t, F, n, m, 0), before = 0;
+    }
+    return s->negative;
+}
+
+/* Forward substitution of b (this rank's unknowns); what the interface gets is added to it. */
+void forward(chain *s, const double *b, double *interface)
+{
+    double *carry = s->carry, *y = s->work;
+    int d = 0, carried = 0;
+    for (int t = 0; t < s->elements; t++) {
+        const size_t at = (size_t)t * s->room;
+        const int *shape = s->shape + 4 * t, *rows = s->rows + at, *row = s->row + at, *column = s->column + at;
+        const int n = s->done[2 * t], k = s->done[2 * t + 1], m = d + shape[0] + shape[1];
+        const double *F = s->front + at * s->room;
+        double *z = s->forward + at;
+        for (int i = 0; i < n; i++) y[i] = i >= d && i < m ? b[rows[i - d]] : 0;
+        for (int i = 0; i < carried; i++) y[carried_to(i, d + shape[0], shape)] += carry[i];
+        for (int i = 0; i < n; i++) z[i] = y[row[i]];
+        for (int i = 1; i < n; i++) z[i] -= dot(F + (size_t)i * n, z, i < k ? i : k);
+        d = m - k, carried = n - k;
+        if (s->ends[t] == -1) {
+            memcpy(carry, z + k, carried * sizeof *carry);
+            continue;
+        }
+        for (int i = k; i < n; i++) interface[i < k + d ? s->ends[t] + i - k : column[i] - s->size] += z[i];
+        d = carried = 0;
+    }
+}
+
+/* Backward substitution: x from the solution on the interface, after `forward`. */
+void backward(chain *s, const double *interface, double *x)
+{
+    for (int t = s->elements - 1; t >= 0; t--) {
+        const size_t at = (size_t)t * s->room;
+        const int *shape = s->shape + 4 * t, *column = s->column + at;
+        const int n = s->done[2 * t], k = s->done[2 * t + 1], m = n - shape[2] - shape[3];
+        const double *F = s->front + at * s->room;
+        double *z = s->forward + at;
+        for (int i = k; i < n; i++) {
+            if (i < m && s->ends[t] >= 0) x[column[i]] = interface[s->ends[t] + i - k];
+            z[i] = column[i] < s->size ? x[column[i]] : interface[column[i] - s->size];
+        }
+        for (int i = k - 1; i >= 0; i--) {
+            const double *row = F + (size_t)i * n;
+            z[i] = (z[i] - dot(row + i + 1, z + i + 1, n - i - 1)) / row[i];
+            x[column[i]] = z[i];
+        }
+    }
+}

@@ -1,0 +1,157 @@
+/* What Python sees of chain.c and newton.c; read by cffi too, so declarations alone. Frames and units are those of the
+   forms: all numbers are dimensionless. Arrays belong to numpy. */
+
+#ifndef CHAIN_H
+#define CHAIN_H
+
+/* Values of a Function that change: the numbers of an element go into its packed coefficients from a column on. */
+typedef struct {
+    const double *values;
+    const int *which; /* (elements, count) */
+    int count, column;
+} source;
+
+/* A compiled form or expression with the coefficients of all elements. */
+typedef struct {
+    void *tabulate;                /* FFCx's function for one element */
+    int elements, size, width;     /* numbers that it returns, and that it takes, for an element */
+    double *w, *c;                 /* coefficients (elements, width), constants */
+    int sources, constants;
+    source *source;
+    const double **constant;       /* values of constants that change */
+    int *slot;                     /* their places in c */
+    const double *x;               /* (points, 3) the mesh's geometry */
+    const int *corners;            /* (elements, 2) */
+    double *A;                     /* (size,) work space */
+} kernel;
+
+/* Elimination of the unknowns of elements in turn, along the rods. A segment is a run of elements that share unknowns
+   with the next; its first and last element may have unknowns of the interface, which are kept. The matrix of an element
+   in turn, its front, has the unknowns [delayed | left | own | right | start]: those that earlier elements could not
+   eliminate, those shared with the element before, its own, those shared with the next (or, at the end, kept), and those
+   of the interface where the segment began. The first three are eliminated. */
+typedef struct {
+    int elements, width;           /* unknowns of an element, for the kernel */
+    int size, room, delays, kept;  /* unknowns of this rank; largest front; most delayed unknowns; of the interface */
+    const int *order;              /* (elements,) the kernel's number of the element in turn */
+    const int *place;              /* (elements, width) places in the front of the kernel's unknowns; -1: fixed */
+    const int *shape;              /* (elements, 4) numbers of left, own, right, start */
+    const int *rows;               /* (elements, room) unknowns in the front, delayed ones left out; the interface has
+                                      the numbers from size on */
+    const int *ends;               /* (elements,) -1; at the end of a segment the first of its `delays` numbers in the
+                                      interface for delayed unknowns, or -2 where it has none */
+    const int *block;              /* (elements,) at the end of a segment where its matrix is in condensed; else -1 */
+    double *front;                 /* (elements, room, room) factors */
+    int *row, *column, *done;      /* (elements, room) order of rows, unknowns of columns; (elements, 2) size of the front,
+                                      eliminated */
+    double *forward, *condensed;   /* (elements, room); matrices of the segments on the interface */
+    double *diagonal;              /* (interface,) sum of the elements' diagonals there */
+    double *carry, *work;          /* (room,) each */
+    int negative, zero;            /* pivots, after `count` */
+} chain;
+
+/* The equations of a problem. */
+typedef struct {
+    kernel *residual, *tangent, *advance; /* the last one, of the carried contact force, or 0 */
+    double *matrices;               /* (elements, width, width) where a hook changes the elements' matrices; or 0 */
+    chain *chain;
+    const int *dofs, *advance_dofs; /* (elements, size) local degrees of freedom; entries of carried */
+    int size, locals, frees, carries, serial, hooks;
+    const int *free, *of_free;      /* (frees,) local degrees of freedom that have unknowns, and these */
+    double *state, *before, *step;  /* (locals,) */
+    double *local, *carried;        /* (locals,) work space; (carries,) */
+    const double *load[3], *factor[3]; /* vectors that are subtracted from the residual, and their factors; or 0 */
+    double *interface;              /* (interfaces,) */
+    const int *of_interface;        /* (interfaces,) this rank's unknowns there, or -1 */
+    int interfaces, singular;
+    void *self;                     /* for the hooks */
+} problem;
+
+/* Newton's method by SNES. */
+typedef struct {
+    problem *problem;
+    int nodes, block, motion;       /* of this rank; unknowns of a node, and those of them that are motion */
+    double root;                    /* of the number of motions of all ranks */
+    double increment, rounding, loads; /* limits of the increment and of the residual: rounding + 1e-6 (1 + loads) */
+    int period, contracts;          /* steps that are compared; whether quadratic convergence is expected */
+    int most, iterations;
+    double steps[100];
+    int iterating, converged, ran_out, grown, not_a_number; /* SNES's reasons */
+    double *x;                      /* the solution, while SNES does not use it */
+} newton;
+
+/* Functions of PETSc. */
+typedef struct {
+    int (*get_read)(void *, const double **);
+    int (*restore_read)(void *, const double **);
+    int (*get)(void *, double **);
+    int (*restore)(void *, double **);
+    int (*set_function)(void *, void *, void *, void *);
+    int (*set_jacobian)(void *, void *, void *, void *, void *);
+    int (*set_test)(void *, void *, void *, void *);
+    int (*set_update)(void *, void *);
+    int (*set_context)(void *, void *);
+    int (*get_context)(void *, void *);
+    int (*set_apply)(void *, void *);
+    int (*set_shell)(void *, void *);
+    int (*get_shell)(void *, void *);
+    int (*get_update)(void *, void **);
+    int (*solve)(void *, void *, void *);
+    int (*get_reason)(void *, int *);
+} petsc;
+
+/* The second variation, in parts that are decoupled. */
+typedef struct {
+    int parts, hooked;              /* whether Python completes the counts of the parts */
+    kernel *form[2];
+    chain *chain[2];
+    int sideways[2];                /* whether a part leaves the plane */
+    void *self;                     /* for the hook */
+} second_variation;
+
+/* A continuation in the load factor, see statics/path/load_control.py for what its numbers mean. */
+typedef struct {
+    petsc *with;
+    newton *newton;
+    second_variation *stability;
+    void *snes, *x;
+    double *eta;
+    int numbers, moves, known, negative; /* of a point: unknowns, then carried ones; displacements of a node; points */
+    double turn, loads;
+    double *points, etas[3];        /* (3, numbers), the last one is the current */
+    double step, largest, slight, far, leap, intended, patience;
+    int easy, hard;
+    const double *targets;
+    int count, next, every;         /* whether every step is recorded, or the targets alone */
+    kernel *fields;                 /* of results, or 0 */
+    int records, room, iterations, steps;
+    double *recorded, *recorded_fields, *recorded_eta; /* (room, unknowns), (room, elements, size), (room,) */
+    int *recorded_iterations, *recorded_steps;
+    double *work;                   /* (2, numbers) */
+} sweep;
+
+void pack(kernel *k);
+void add_vector(kernel *k, const int *dofs, double *values);
+void put_values(kernel *k, const int *dofs, double *values);
+void tabulate_all(kernel *k, double *values);
+int eliminate(chain *s, kernel *k, const double *matrices);
+int count(chain *s, kernel *k);
+void forward(chain *s, const double *b, double *interface);
+void backward(chain *s, const double *interface, double *x);
+
+int take_state(problem *p, const double *x);
+int residual(problem *p, const double *x, double *b);
+int tangent(problem *p);
+int solve(problem *p, const double *b, double *x);
+void advance(problem *p);
+void begin(newton *n);
+int attach(petsc *functions, newton *n, void *snes, void *vector, void *matrix, void *pc);
+
+int negative_modes(second_variation *v, int *sideways);
+int run(sweep *s);
+
+#if 0
+extern "Python" int python_hook(void *self, int what, double *a, double *b);
+#endif
+
+#endif

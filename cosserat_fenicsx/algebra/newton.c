@@ -1,0 +1,190 @@
+/* Newton's method: the callbacks of PETSc's SNES. What only some problems have (constraint equations, other ranks, loads
+   that ask Python) is done by Python, in hooks. */
+#include "chain.h"
+
+#include <math.h>
+#include <string.h>
+
+enum { STATE = 1, RESIDUAL = 2, TANGENT = 4, INTERFACE = 8, ADD_UP = 16, SUM = 32, MATRICES = 64 };
+enum { FAILED = 1 };
+
+static int python_hook(void *self, int what, double *a, double *b);
+
+static int hook(problem *p, int what, double *a, double *b)
+{
+    return p->hooks & what ? python_hook(p->self, what, a, b) : 0;
+}
+
+/* ---- equations --------------------------------------------------------------------------------------------------- */
+
+static int put_state(problem *p, const double *x, int evaluated)
+{
+    if (p->serial)
+        for (int i = 0; i < p->frees; i++) p->state[p->free[i]] = x[p->of_free[i]];
+    return hook(p, STATE, (double *)x, evaluated ? p->state : 0);
+}
+
+/* The state from the unknowns. */
+int take_state(problem *p, const double *x)
+{
+    return put_state(p, x, 0);
+}
+
+/* The residual b at x; the state follows x. */
+int residual(problem *p, const double *x, double *b)
+{
+    if (put_state(p, x, 1)) return FAILED;
+    memset(p->local, 0, p->locals * sizeof *p->local);
+    add_vector(p->residual, p->dofs, p->local);
+    memset(b, 0, p->size * sizeof *b);
+    if (p->serial)
+        for (int i = 0; i < p->frees; i++) b[p->of_free[i]] += p->local[p->free[i]];
+    else if (hook(p, ADD_UP, p->local, b))
+        return FAILED;
+    if (hook(p, RESIDUAL, (double *)x, b)) return FAILED;
+    for (int k = 0; k < 3 && p->load[k]; k++)
+        for (int i = 0; i < p->size; i++) b[i] -= *p->factor[k] * p->load[k][i];
+    return 0;
+}
+
+/* Factors of the tangent at the state. */
+int tangent(problem *p)
+{
+    if (p->matrices) {
+        tabulate_all(p->tangent, p->matrices);
+        if (hook(p, MATRICES, p->matrices, 0)) return FAILED;
+    }
+    p->singular = eliminate(p->chain, p->tangent, p->matrices);
+    return hook(p, TANGENT, 0, 0);
+}
+
+/* x with tangent * x = b; not numbers where it is singular. */
+int solve(problem *p, const double *b, double *x)
+{
+    for (int i = 0; i < p->interfaces; i++) p->interface[i] = p->of_interface[i] < 0 ? 0 : b[p->of_interface[i]];
+    if (!p->singular) forward(p->chain, b, p->interface);
+    if (hook(p, INTERFACE, p->interface, 0)) return FAILED;
+    if (!p->singular) backward(p->chain, p->interface, x);
+    for (int i = 0; i < p->interfaces; i++)
+        if (p->of_interface[i] >= 0) x[p->of_interface[i]] = p->interface[i];
+    if (p->singular)
+        for (int i = 0; i < p->size; i++) x[i] = NAN;
+    return 0;
+}
+
+/* Update the carried contact force by the step from `before` to the state. */
+void advance(problem *p)
+{
+    if (!p->advance) return;
+    for (int i = 0; i < p->locals; i++) p->step[i] = p->state[i] - p->before[i];
+    put_values(p->advance, p->advance_dofs, p->carried);
+    memcpy(p->before, p->state, p->locals * sizeof *p->state);
+}
+
+/* ---- SNES -------------------------------------------------------------------------------------------------------- */
+
+static const petsc *with; /* PETSc is one library for the whole process */
+
+static int snes_function(void *snes, void *x, void *b, void *context)
+{
+    const newton *n = context;
+    const double *from;
+    double *to;
+    (void)snes;
+    if (with->get_read(x, &from) || with->get(b, &to)) return FAILED;
+    const int failed = residual(n->problem, from, to);
+    return with->restore_read(x, &from) || with->restore(b, &to) || failed;
+}
+
+static int snes_jacobian(void *snes, void *x, void *A, void *P, void *context)
+{
+    (void)snes, (void)x, (void)A, (void)P;
+    return tangent(((newton *)context)->problem);
+}
+
+static int apply(void *pc, void *b, void *x)
+{
+    newton *n;
+    const double *from;
+    double *to;
+    if (with->get_shell(pc, &n) || with->get_read(b, &from) || with->get(x, &to)) return FAILED;
+    const int failed = solve(n->problem, from, to);
+    return with->restore_read(b, &from) || with->restore(x, &to) || failed;
+}
+
+static int update(void *snes, PetscInt iteration)
+{
+    newton *n;
+    if (with->get_context(snes, &n)) return FAILED;
+    if (iteration > 0) advance(n->problem);
+    return 0;
+}
+
+/* Whether the estimated error after the last step is below the increment allowed.
+
+   With the ratio c of the last two steps the error is step * c/(1 - c) for linear convergence. Where convergence is
+   quadratic the next ratio is c^2 or less; the estimate is then multiplied by min(1, 100 c), with a margin. That factor
+   is not used (`contracts`) for slender rods whose contact force is carried or unknown: rounding makes their tangent
+   inexact for motions of low stiffness. Where n follows from the motion alone, Newton steps alternate between bending
+   and the correction of the stretch that this causes; c is then the ratio of successive pairs of steps (`period`),
+   because one small step does not imply convergence. */
+static int error_is_small(const newton *n)
+{
+    double before = 0, step = 0;
+    if (n->iterations < 2 * n->period) return 0;
+    for (int i = 1; i <= n->period; i++) {
+        step = fmax(step, n->steps[n->iterations - i]);
+        before = fmax(before, n->steps[n->iterations - n->period - i]);
+    }
+    const double c = step / before, quadratic = n->contracts ? fmin(1, 100 * c) : 1;
+    return c < 0.9 && step * c * quadratic <= n->increment * (1 - c);
+}
+
+/* Norm of the part of SNES's last step that is motion: forces and multipliers differ in scale and in rounding error. */
+static int motion(const newton *n, void *snes, double *size)
+{
+    void *change;
+    const double *x;
+    double sum = 0;
+    if (with->get_update(snes, &change) || with->get_read(change, &x)) return FAILED;
+    for (int i = 0; i < n->nodes; i++)
+        for (int j = 0; j < n->motion; j++) sum += x[i * n->block + j] * x[i * n->block + j];
+    if (with->restore_read(change, &x) || hook(n->problem, SUM, &sum, 0)) return FAILED;
+    *size = sqrt(sum) / n->root;
+    return 0;
+}
+
+static int test(void *snes, PetscInt iteration, double size, double change, double norm, int *reason, void *context)
+{
+    newton *n = context;
+    double step;
+    (void)size, (void)change;
+    *reason = n->iterating;
+    if (!isfinite(norm)) *reason = n->not_a_number;
+    if (*reason != n->iterating || iteration == 0) return 0;
+    if (motion(n, snes, &step)) return FAILED;
+    n->steps[n->iterations++] = step;
+    const int balanced = norm <= 1e-6 * (1 + n->loads) + n->rounding;
+    if (!(step < 1e3)) *reason = n->grown;
+    else if (balanced && (step <= n->increment || error_is_small(n))) *reason = n->converged;
+    else if (n->iterations >= n->most) *reason = n->ran_out;
+    return 0;
+}
+
+/* Before a solution by SNES from the state. */
+void begin(newton *n)
+{
+    problem *p = n->problem;
+    n->iterations = 0;
+    if (p->advance) memcpy(p->before, p->state, p->locals * sizeof *p->state);
+}
+
+/* Give SNES its callbacks, and a PC of the type shell, where there is one, the tangent's inverse. */
+int attach(petsc *functions, newton *n, void *snes, void *vector, void *matrix, void *pc)
+{
+    with = functions;
+    return with->set_function(snes, vector, snes_function, n)
+        || with->set_jacobian(snes, matrix, matrix, snes_jacobian, n) || with->set_test(snes, test, n, 0)
+        || with->set_context(snes, n) || with->set_update(snes, update)
+        || (pc && (with->set_shell(pc, n) || with->set_apply(pc, apply)));
+}

@@ -1,0 +1,175 @@
+/* The sweep over load factors while steps are accepted at once: predictor, Newton's method, and the checks of
+   statics/path/load_control.py, to which any other step is left. */
+#include "chain.h"
+
+#include <math.h>
+#include <string.h>
+#include <time.h>
+
+enum { DONE, LEFT, LATER, FULL };
+enum { COUNT = 128, FAILED_COUNT = -100 };
+
+static int python_hook(void *self, int what, double *a, double *b);
+
+static double now(void)
+{
+    struct timespec t;
+    clock_gettime(CLOCK_MONOTONIC, &t);
+    return t.tv_sec + 1e-9 * t.tv_nsec;
+}
+
+/* The number of negative eigenvalues of the second variation at the state; -1 where it is singular to rounding. */
+int negative_modes(second_variation *v, int *sideways)
+{
+    int negative = 0, zero = 0;
+    *sideways = 0;
+    for (int k = 0; k < v->parts; k++) {
+        chain *s = v->chain[k];
+        count(s, v->form[k]);
+        if (v->hooked && python_hook(v->self, COUNT + k, 0, 0)) return FAILED_COUNT;
+        negative += s->negative, zero += s->zero;
+        if (v->sideways[k]) *sideways += s->negative;
+    }
+    return zero ? -1 : negative;
+}
+
+/* Largest displacement or rotation in a change of the unknowns. */
+static double largest(const sweep *s, const double *a, const double *b)
+{
+    const newton *n = s->newton;
+    double moved = 0, turned = 0;
+    for (int i = 0; i < n->nodes; i++) {
+        double r = 0, q = 0;
+        for (int j = 0; j < n->motion; j++) {
+            const double c = a[i * n->block + j] - b[i * n->block + j];
+            if (j < s->moves) r += c * c;
+            else q += c * c;
+        }
+        moved = fmax(moved, r), turned = fmax(turned, q);
+    }
+    return sqrt(fmax(moved, s->turn * s->turn * turned));
+}
+
+/* Whether a step from `here` is along the path though its end differs from the predictor: see `Continuation._near`. */
+static int near(const sweep *s, const double *here, const double *guess, const double *found)
+{
+    const newton *n = s->newton;
+    double along = 0, size = 0, apart = 0;
+    for (int i = 0; i < n->nodes; i++)
+        for (int j = i * n->block; j < i * n->block + n->motion; j++) {
+            const double move = found[j] - here[j], increment = guess[j] - here[j];
+            along += move * increment, size += increment * increment;
+            apart += (move - increment) * (move - increment);
+        }
+    if (s->known < 2) return 0;
+    return !(along <= 0 && size > 0) && apart <= s->leap * s->leap * size;
+}
+
+/* The polynomial through the known points at a load factor; 0 where two of them have the same. */
+static int predict(const sweep *s, double eta, double *guess)
+{
+    memset(guess, 0, s->numbers * sizeof *guess);
+    for (int a = 0; a < s->known; a++) {
+        double weight = 1;
+        for (int b = 0; b < s->known; b++) {
+            if (b == a) continue;
+            if (s->etas[a] == s->etas[b]) return 0;
+            weight *= (eta - s->etas[b]) / (s->etas[a] - s->etas[b]);
+        }
+        const double *point = s->points + (size_t)a * s->numbers;
+        for (int i = 0; i < s->numbers; i++) guess[i] += weight * point[i];
+    }
+    return 1;
+}
+
+/* Set the state and the load factor. */
+static int put(const sweep *s, const double *numbers, double eta)
+{
+    const problem *p = s->newton->problem;
+    double *x;
+    *s->eta = eta;
+    if (s->with->get(s->x, &x)) return 1;
+    memcpy(x, numbers, p->size * sizeof *x);
+    if (s->with->restore(s->x, &x)) return 1;
+    memcpy(p->carried, numbers + p->size, p->carries * sizeof *x);
+    return take_state(s->newton->problem, numbers);
+}
+
+static int take(const sweep *s, double *numbers)
+{
+    const problem *p = s->newton->problem;
+    const double *x;
+    if (s->with->get_read(s->x, &x)) return 1;
+    memcpy(numbers, x, p->size * sizeof *x);
+    memcpy(numbers + p->size, p->carried, p->carries * sizeof *x);
+    return s->with->restore_read(s->x, &x);
+}
+
+static int record(sweep *s)
+{
+    const double *here = s->points + (size_t)(s->known - 1) * s->numbers;
+    const int k = s->records++;
+    s->recorded_eta[k] = s->etas[s->known - 1];
+    s->recorded_iterations[k] = s->iterations, s->recorded_steps[k] = s->steps;
+    s->iterations = 0;
+    memcpy(s->recorded + (size_t)k * s->newton->problem->size, here, s->newton->problem->size * sizeof *here);
+    if (s->fields) tabulate_all(s->fields, s->recorded_fields + (size_t)k * s->fields->elements * s->fields->size);
+    return s->records == s->room;
+}
+
+/* A step to a load factor: 1 if it was accepted, 0 if it is left to Python, from the last point. */
+static int attempt(sweep *s, double goal)
+{
+    newton *n = s->newton;
+    double *guess = s->work, *found = s->work + s->numbers;
+    const double *here = s->points + (size_t)(s->known - 1) * s->numbers;
+    int reason, sideways;
+    if (!predict(s, goal, guess) || put(s, guess, goal)) return 0;
+    n->loads = fabs(goal) * s->loads;
+    begin(n);
+    if (s->with->solve(s->snes, 0, s->x) || s->with->get_reason(s->snes, &reason)) return 0;
+    s->iterations += n->iterations;
+    if (reason <= 0) return 0;
+    advance(n->problem);
+    if (take(s, found)) return 0;
+    const double off = largest(s, found, guess), taken = fabs(goal - s->etas[s->known - 1]);
+    if (off > s->slight && (off > s->far || !near(s, here, guess, found))) return 0;
+    if (negative_modes(s->stability, &sideways) != s->negative) return 0;
+    const int order = s->known < 2 ? 1 : 2;
+    if (s->known == 3) memmove(s->points, s->points + s->numbers, 2 * (size_t)s->numbers * sizeof *found);
+    if (s->known == 3) s->etas[0] = s->etas[1], s->etas[1] = s->etas[2];
+    else s->known++;
+    memcpy(s->points + (size_t)(s->known - 1) * s->numbers, found, s->numbers * sizeof *found);
+    s->etas[s->known - 1] = goal;
+    s->steps++;
+    double growth = fmin(fmax(pow(s->intended / fmax(off, 1e-12), 1.0 / order), 0.5), 2);
+    if (n->iterations >= s->hard) growth = 0.5;
+    else if (n->iterations > s->easy) growth = fmin(growth, 1);
+    s->step = growth >= 1 ? fmax(s->step, taken * growth) : taken * growth;
+    return 1;
+}
+
+/* Advance to the targets. Returns why it stopped. */
+int run(sweep *s)
+{
+    const double began = now();
+    while (s->next < s->count) {
+        const double here = s->etas[s->known - 1], target = s->targets[s->next], left = target - here;
+        if (left == 0) {
+            s->next++;
+            if (!s->every && record(s)) return FULL;
+            continue;
+        }
+        const double step = fmin(s->step, s->largest);
+        double goal = here + copysign(step, left);
+        if (fabs(left) <= fmin(1.2 * step, s->largest)) goal = target;
+        else if (fabs(left) < 2 * step) goal = here + left / 2;
+        if (!attempt(s, goal)) {
+            put(s, s->points + (size_t)(s->known - 1) * s->numbers, here);
+            return LEFT;
+        }
+        if (s->every && record(s)) return FULL;
+        if (now() - began > s->patience) return LATER;
+    }
+    return DONE;
+}
