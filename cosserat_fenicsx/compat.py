@@ -21,7 +21,7 @@ _HOW_TO_INSTALL = (
 )
 
 try:
-    import cffi
+    import _cffi_backend
     import dolfinx
     import mpi4py.MPI  # noqa: F401  where it is missing or broken, the message below names it
     import ufl
@@ -220,7 +220,7 @@ def expression_address(expression):
 
 
 def _address(compiled):
-    return int(cffi.FFI().cast("uintptr_t", compiled.tabulate_tensor_float64))
+    return int(_cffi_backend.FFI().cast("uintptr_t", compiled.tabulate_tensor_float64))  # cffi.FFI loads a C parser
 
 
 def element_nodes(space):
