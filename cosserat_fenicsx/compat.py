@@ -24,10 +24,10 @@ _HOW_TO_INSTALL = (
 try:
     import _cffi_backend
     import dolfinx
-    import mpi4py.MPI  # noqa: F401  where it is missing or broken, the message below names it
     import ufl
-    from dolfinx import fem
+    from dolfinx import fem, jit
     from dolfinx import mesh as dolfinx_mesh
+    from mpi4py import MPI
     from petsc4py import PETSc
 except ImportError as missing:
     raise InstallationError(f"dolfinx cannot be imported ({missing}). {_HOW_TO_INSTALL}") from missing
@@ -178,6 +178,22 @@ def form_for_speed(form):
     to half of the running time less."""
     options = {"cffi_extra_compile_args": ["-O3", "-g0", *instructions()]}
     return fem.form(form, **{"jit_params" if _VERSION < (0, 6) else "jit_options": options})
+
+
+def on_rows(expression):
+    """A compiled function (numbers, results) that adds the values of a UFL expression of the components of one
+    ufl.Constant, for every row of `numbers` (m, components), to the rows of `results` (m, ..); both contiguous."""
+    compiled, module, _ = jit.ffcx_jit(MPI.COMM_SELF, (expression, np.array([[0.5]])))
+    call, buffer, null = compiled.tabulate_tensor_float64, module.ffi.from_buffer, module.ffi.NULL
+    others = (null,) * (3 if _VERSION < (0, 10) else 4)
+
+    def add(numbers, results):
+        given, found = buffer("double[]", numbers), buffer("double[]", results)
+        step, size = numbers.shape[1], math.prod(results.shape[1:])
+        for i in range(len(numbers)):
+            call(found + i * size, null, given + i * step, *others)
+
+    return add
 
 
 def kernel(form):

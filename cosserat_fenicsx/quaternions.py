@@ -37,16 +37,19 @@ def cross(u, v):
     return result
 
 
-def skew(u):
-    """The (3, 3) skew matrix of the cross product, skew(u) v = u x v."""
-    return np.array([[0.0, -u[2], u[1]], [u[2], 0.0, -u[0]], [-u[1], u[0], 0.0]])
-
-
 def small_rotations(q):
-    """(k, 3, 4) matrices from changes dq of q (k, 4) to small inertial rotations 2 vec(dq conj(q))/|q|^2."""
-    a, b, c, d = (q * (2 / (q * q).sum(axis=1, keepdims=True))).T
-    result = np.empty((len(q), 3, 4))
-    for i, row in enumerate(((-b, a, -d, c), (-c, d, a, -b), (-d, -c, b, a))):
-        for j, column in enumerate(row):
-            result[:, i, j] = column
-    return result
+    """(.., 3, 4) matrices from changes dq of q (.., 4) to small inertial rotations 2 vec(dq conj(q))/|q|^2."""
+    scaled = q * (2 / (q * q).sum(axis=-1, keepdims=True))
+    return (scaled @ _SMALL_ROTATIONS).reshape(*q.shape[:-1], 3, 4)
+
+
+#: (4, 12): q times this are the rows (-b, a, -d, c), (-c, d, a, -b), (-d, -c, b, a).
+_SMALL_ROTATIONS = np.array(
+    [
+        [[0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]],
+        [[-1, 0, 0, 0], [0, 0, 0, -1], [0, 0, 1, 0]],
+        [[0, 0, 0, 1], [-1, 0, 0, 0], [0, -1, 0, 0]],
+        [[0, 0, -1, 0], [0, 1, 0, 0], [-1, 0, 0, 0]],
+    ],
+    dtype=float,
+).reshape(4, 12)

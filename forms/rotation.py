@@ -53,17 +53,17 @@ def curvature(q, q_s):
 
 def small_rotation(dq, q):
     """The small inertial rotation 2 vec(dq conj(q))/|q|^2 of a change dq of q."""
-    return 2 * _product_conjugate(dq, q) / ufl.dot(q, q)
+    return 2 * product_conjugate(dq, q) / ufl.dot(q, q)
 
 
 def small_rotation_s(dq, dq_s, q, q_s):
     """The derivative of `small_rotation` along the rod."""
-    change = _product_conjugate(dq_s, q) + _product_conjugate(dq, q_s)
+    change = product_conjugate(dq_s, q) + product_conjugate(dq, q_s)
     squared = ufl.dot(q, q)
-    return 2 * (change - 2 * ufl.dot(q, q_s) / squared * _product_conjugate(dq, q)) / squared
+    return 2 * (change - 2 * ufl.dot(q, q_s) / squared * product_conjugate(dq, q)) / squared
 
 
-def _product_conjugate(p, q):
+def product_conjugate(p, q):
     """Vector part of p conj(q)."""
     v, w = vector_part(p), vector_part(q)
     return q[0] * v - p[0] * w - ufl.cross(v, w)

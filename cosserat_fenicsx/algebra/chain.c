@@ -8,9 +8,9 @@
 /* A pivot is taken if it is not smaller than this times the largest number in its column. The unknown of another one is
    delayed to the next element: the axial force of a straight inextensible element between two points is not determined
    before the points are. */
-static const double SMALLEST_PIVOT = 1e-6;
-/* Relative to the largest number in its row, smaller pivots of a symmetric matrix are zero. */
-static const double ZERO_PIVOT = 2e-14;
+static const double SMALLEST_PIVOT = 1e-2;
+/* Relative to the diagonal before elimination, smaller pivots of a symmetric matrix are zero to rounding. */
+static const double ZERO_PIVOT = 2e-15;
 
 #if KERNEL_ARGUMENTS == 6
 typedef void tabulator(double *, const double *, const double *, const double *, const int *, const uint8_t *);
@@ -142,19 +142,20 @@ static int reduce(double *F, int n, int m, int most, int *row, int *column)
     return last;
 }
 
-/* Signs of the pivots of the first m rows and columns of a symmetric F (n, n), the largest on the diagonal first. */
-static void signs(double *F, int n, int m, int *negative, int *zero)
+/* Signs of the pivots of the first m rows and columns of a symmetric F (n, n), the largest on the diagonal first; whole:
+   their diagonal before, against which zero is judged, whatever the scale of an unknown. */
+static void signs(double *F, int n, int m, double *whole, int *negative, int *zero)
 {
+    for (int i = 0; i < m; i++) whole[i] = fabs(F[(size_t)i * n + i]);
     for (int k = 0; k < m; k++) {
         int at = k;
-        double row = 0;
         for (int i = k + 1; i < m; i++)
             if (fabs(F[(size_t)i * n + i]) > fabs(F[(size_t)at * n + at])) at = i;
         swap(F + (size_t)k * n, F + (size_t)at * n, n, 1);
         swap(F + k, F + at, n, n);
+        swap(whole + k, whole + at, 1, 1);
         const double pivot = F[(size_t)k * n + k];
-        for (int j = k; j < n; j++) row = fmax(row, fabs(F[(size_t)k * n + j]));
-        if (!(fabs(pivot) > ZERO_PIVOT * row)) {
+        if (!(fabs(pivot) > ZERO_PIVOT * whole[k])) {
             ++*zero;
             continue;
         }
@@ -253,7 +254,7 @@ int count(chain *s, kernel *k)
     for (int t = 0; t < s->elements; t++) {
         const int *shape = s->shape + 4 * t, m = shape[0] + shape[1], n = m + shape[2] + shape[3];
         double *F = assemble(s, k, 0, t, 0, before, n_before, k_before);
-        signs(F, n, m, &s->negative, &s->zero);
+        signs(F, n, m, s->work, &s->negative, &s->zero);
         before = F, n_before = n, k_before = m;
         if (s->ends[t] != -1) condense(s, t, F, n, m, 0), before = 0;
     }

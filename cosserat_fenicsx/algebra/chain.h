@@ -119,15 +119,15 @@ typedef struct {
     int numbers, moves, known, negative; /* of a point: unknowns, then carried ones; displacements of a node; points */
     double turn, loads;
     double *points, etas[3];        /* (3, numbers), the last one is the current */
-    double step, largest, slight, far, leap, intended, patience;
-    int easy, hard;
+    double step, smallest, largest, shrink, slight, far, leap, intended, change, patience;
+    int easy, hard, rejections, allowed, accepted;
     const double *targets;
     int count, next, every;         /* whether every step is recorded, or the targets alone */
     kernel *fields;                 /* of results, or 0 */
     int records, room, iterations, steps;
     double *recorded, *recorded_fields, *recorded_eta; /* (room, unknowns), (room, elements, size), (room,) */
     int *recorded_iterations, *recorded_steps;
-    double *work;                   /* (2, numbers) */
+    double *work;                   /* (6, numbers) */
 } sweep;
 
 void pack(kernel *k);

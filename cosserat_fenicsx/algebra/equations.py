@@ -79,7 +79,7 @@ class Equations(Called):
         order, delays = np.argsort(model.rods.cells[: len(model.cell_dofs)]), model.force_is_unknown
         self.elimination = Elimination(numbering, model.cell_dofs, order, tied.ravel(), delays=delays)
         self.x, self.b = numbering.vector(), numbering.vector()
-        self._x, self._y = numbering.vector(), numbering.vector()  # for the hooks, which need PETSc's vectors
+        self._vector_of_x = numbering.vector()  # for transfers between ranks
         self._state = model.state.x.array
         self._local = np.zeros(len(numbering.rows))
         self.interface = None
@@ -117,7 +117,8 @@ class Equations(Called):
         problem.residual, problem.tangent, problem.dofs = residual.c, tangent.c, self._integers(residual.dofs)
         if advance:
             problem.advance = advance.c
-            problem.carried = self.pointer(self.model.carried[0].x.array)
+            (carried,) = self.model.carried
+            problem.carried, problem.carries = self.pointer(carried.x.array), len(carried.x.array)
             problem.advance_dofs = self._integers(self.model.carried_dofs)
 
     def take_loads(self, *loads):
@@ -182,11 +183,12 @@ class Equations(Called):
     def _answer(self, what, a, b):
         numbering, ties = self.numbering, self.ties
         if what == STATE:
-            self._x.array_w[:] = self._array(a, numbering.size)
+            x = self._array(a, numbering.size)
             if numbering.comm.size > 1:
-                numbering.to_local(self._x, self._state)
+                self._vector_of_x.array_w[:] = x
+                numbering.to_local(self._vector_of_x, self._state)
             if ties:
-                ties.see(self._x)
+                ties.see(x)
             if b:
                 self._refresh()
         elif what == RESIDUAL:
@@ -196,8 +198,8 @@ class Equations(Called):
         elif what == INTERFACE:
             self._solve_interface()
         elif what == ADD_UP:
-            numbering.add_up(self._local, self._y)
-            self._array(b, numbering.size)[:] = self._y.array_r
+            numbering.add_up(self._local, self._vector_of_x)
+            self._array(b, numbering.size)[:] = self._vector_of_x.array_r
         elif what == SUM:
             self._array(a, 1)[0] = numbering.comm.allreduce(float(a[0]))
         else:
@@ -212,9 +214,7 @@ class Equations(Called):
     def _change_residual(self, x, b):
         """Change the residual b at x, arrays of this rank's unknowns."""
         if self.ties:
-            self._y.array_w[:] = b
-            self.ties.add_residual(self._y, self.eta)
-            b[:] = self._y.array_r
+            self.ties.add_residual(b, self.eta)
 
     def _change_matrices(self):
         """Change `matrices`, of the elements."""
@@ -225,11 +225,10 @@ class Equations(Called):
         self.c.singular = 1 if singular else not self.interface.factor(*self._derivatives_of_ties())
 
     def _derivatives_of_ties(self):
-        """The tangent's part of supports and joints, see `Interface.matrix`; on all ranks."""
+        """The tangent's part of supports and joints, see `Interface.matrix`."""
         if not self.ties:
             return (np.empty((0, 0)),)
-        found, comm = self.ties.tangent_blocks(self.eta), self.numbering.comm
-        return comm.bcast(found, root=comm.size - 1) if comm.size > 1 else found
+        return self.ties.tangent_blocks(self.eta)
 
     def _solve_interface(self):
         b, comm = self._on_interface, self.numbering.comm
@@ -251,6 +250,13 @@ class Equations(Called):
         """(ties, 2, 6) force and moment, inertial, that every equation of supports and joints exerts on its two
         stations, on all ranks; zero for the ground."""
         return self.ties.forces(self.eta) if self.ties else np.empty((0, 2, 6))
+
+    def at_ties(self, x, eta):
+        """(multipliers, `tie_forces`) at unknowns x (this rank's part) and a load factor; the ties stay there."""
+        if not self.ties:
+            return np.empty(0), np.empty((0, 2, 6))
+        self.ties.see(x)
+        return self.ties.everywhere(), self.ties.forces(eta)
 
     def multipliers(self):
         """Multipliers (reactions) of the constraint equations, on all ranks."""

@@ -2,6 +2,9 @@
 
 import numpy as np
 
+# Pivots and eigenvalues of a matrix with a diagonal of ones that are zero to rounding.
+_ROUNDING = 1e-14
+
 
 class Interface:
     """The system of the unknowns that `Elimination` leaves, with the constraint equations.
@@ -76,17 +79,21 @@ class Interface:
 
 def signs(matrix):
     """(negative, zero) numbers of eigenvalues of a sparse symmetric matrix, from LDL^T factors."""
+    from scipy.sparse import diags
     from scipy.sparse.linalg import splu
 
     if not matrix.shape[0]:
         return 0, 0
+    size = np.sqrt(np.abs(matrix.diagonal()))
+    scale = diags(1 / np.where(size > 0, size, 1.0))  # which leaves the signs, whatever the units of the unknowns
+    matrix = (scale @ matrix @ scale).tocsc()
     try:
         factors = splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
         pivots = factors.U.diagonal()
-        if (factors.perm_r == factors.perm_c).all() and np.abs(pivots).min() > 1e-12 * np.abs(pivots).max():
+        if (factors.perm_r == factors.perm_c).all() and np.abs(pivots).min() > _ROUNDING:
             return int((pivots < 0).sum()), 0
     except RuntimeError:
         pass
     values = np.linalg.eigvalsh(matrix.toarray())
-    zero = np.abs(values) <= 1e-14 * np.abs(values).max(initial=0.0)
+    zero = np.abs(values) <= _ROUNDING
     return int((values[~zero] < 0).sum()), int(zero.sum())

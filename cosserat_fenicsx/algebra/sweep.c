@@ -7,6 +7,7 @@
 #include <time.h>
 
 enum { DONE, LEFT, LATER, FULL };
+enum { ACCEPTED, REJECTED, UNSURE };
 enum { COUNT = 128, FAILED_COUNT = -100 };
 
 static int python_hook(void *self, int what, double *a, double *b);
@@ -50,19 +51,25 @@ static double largest(const sweep *s, const double *a, const double *b)
     return sqrt(fmax(moved, s->turn * s->turn * turned));
 }
 
-/* Whether a step from `here` is along the path though its end differs from the predictor: see `Continuation._near`. */
-static int near(const sweep *s, const double *here, const double *guess, const double *found)
+/* What to do with a step whose end differs from the predictor, see `Continuation._near`. */
+static int judge(sweep *s, const double *here, const double *guess, const double *found, double off)
 {
     const newton *n = s->newton;
     double along = 0, size = 0, apart = 0;
+    s->shrink = 0.5;
+    if (off <= s->slight) return ACCEPTED;
+    if (off > s->far) {
+        s->shrink = fmin(fmax(pow(s->intended / off, 1.0 / s->known), 0.1), 0.5);
+        return REJECTED;
+    }
     for (int i = 0; i < n->nodes; i++)
         for (int j = i * n->block; j < i * n->block + n->motion; j++) {
             const double move = found[j] - here[j], increment = guess[j] - here[j];
             along += move * increment, size += increment * increment;
             apart += (move - increment) * (move - increment);
         }
-    if (s->known < 2) return 0;
-    return !(along <= 0 && size > 0) && apart <= s->leap * s->leap * size;
+    if (s->known > 1 && along <= 0 && size > 0) return REJECTED;
+    return s->known > 1 && apart <= s->leap * s->leap * size ? ACCEPTED : UNSURE;
 }
 
 /* The polynomial through the known points at a load factor; 0 where two of them have the same. */
@@ -105,6 +112,36 @@ static int take(const sweep *s, double *numbers)
     return s->with->restore_read(s->x, &x);
 }
 
+/* dx/d eta at numbers, where the state is; see `Problem.load_derivative`. */
+static int slope(const sweep *s, const double *x, double *out)
+{
+    problem *p = s->newton->problem;
+    double *ahead = s->work + 4 * s->numbers, *behind = ahead + s->numbers;
+    const double eta = *s->eta, change = s->change * fmax(1, fabs(eta));
+    *s->eta = eta + change;
+    int failed = residual(p, x, ahead);
+    *s->eta = eta - change;
+    failed |= residual(p, x, behind);
+    *s->eta = eta;
+    for (int i = 0; i < p->size; i++) ahead[i] = (behind[i] - ahead[i]) * 0.5 / change;
+    return failed || residual(p, x, behind) || tangent(p) || solve(p, ahead, out) || p->singular;
+}
+
+/* Whether a step is longer than twice the mean slope of its two ends allows, see `Continuation._jumped`. */
+static int jumped(const sweep *s, const double *here, const double *found, double goal)
+{
+    const newton *n = s->newton;
+    double *at_end = s->work + 2 * s->numbers, *at_start = at_end + s->numbers, slopes = 0, moves = 0;
+    const double eta = s->etas[s->known - 1];
+    if (slope(s, found, at_end) || put(s, here, eta) || slope(s, here, at_start) || put(s, found, goal)) return UNSURE;
+    for (int i = 0; i < n->nodes; i++)
+        for (int j = i * n->block; j < i * n->block + n->motion; j++) {
+            const double both = at_end[j] + at_start[j], move = found[j] - here[j];
+            slopes += both * both, moves += move * move;
+        }
+    return slopes * (goal - eta) * (goal - eta) < moves ? REJECTED : ACCEPTED;
+}
+
 static int record(sweep *s)
 {
     const double *here = s->points + (size_t)(s->known - 1) * s->numbers;
@@ -117,24 +154,27 @@ static int record(sweep *s)
     return s->records == s->room;
 }
 
-/* A step to a load factor: 1 if it was accepted, 0 if it is left to Python, from the last point. */
+/* A step to a load factor. */
 static int attempt(sweep *s, double goal)
 {
     newton *n = s->newton;
     double *guess = s->work, *found = s->work + s->numbers;
     const double *here = s->points + (size_t)(s->known - 1) * s->numbers;
     int reason, sideways;
-    if (!predict(s, goal, guess) || put(s, guess, goal)) return 0;
+    if (!predict(s, goal, guess) || put(s, guess, goal)) return UNSURE;
     n->loads = fabs(goal) * s->loads;
     begin(n);
-    if (s->with->solve(s->snes, 0, s->x) || s->with->get_reason(s->snes, &reason)) return 0;
+    if (s->with->solve(s->snes, 0, s->x) || s->with->get_reason(s->snes, &reason)) return UNSURE;
     s->iterations += n->iterations;
-    if (reason <= 0) return 0;
+    s->shrink = 0.5;
+    if (reason <= 0) return REJECTED;
     advance(n->problem);
-    if (take(s, found)) return 0;
+    if (take(s, found)) return UNSURE;
     const double off = largest(s, found, guess), taken = fabs(goal - s->etas[s->known - 1]);
-    if (off > s->slight && (off > s->far || !near(s, here, guess, found))) return 0;
-    if (negative_modes(s->stability, &sideways) != s->negative) return 0;
+    int judged = judge(s, here, guess, found, off);
+    if (judged == UNSURE) judged = jumped(s, here, found, goal);
+    if (judged != ACCEPTED) return judged;
+    if (negative_modes(s->stability, &sideways) != s->negative) return UNSURE;
     const int order = s->known < 2 ? 1 : 2;
     if (s->known == 3) memmove(s->points, s->points + s->numbers, 2 * (size_t)s->numbers * sizeof *found);
     if (s->known == 3) s->etas[0] = s->etas[1], s->etas[1] = s->etas[2];
@@ -146,7 +186,7 @@ static int attempt(sweep *s, double goal)
     if (n->iterations >= s->hard) growth = 0.5;
     else if (n->iterations > s->easy) growth = fmin(growth, 1);
     s->step = growth >= 1 ? fmax(s->step, taken * growth) : taken * growth;
-    return 1;
+    return ACCEPTED;
 }
 
 /* Advance to the targets. Returns why it stopped. */
@@ -164,10 +204,16 @@ int run(sweep *s)
         double goal = here + copysign(step, left);
         if (fabs(left) <= fmin(1.2 * step, s->largest)) goal = target;
         else if (fabs(left) < 2 * step) goal = here + left / 2;
-        if (!attempt(s, goal)) {
+        const int judged = attempt(s, goal);
+        if (judged != ACCEPTED) {
             put(s, s->points + (size_t)(s->known - 1) * s->numbers, here);
-            return LEFT;
+            if (judged == UNSURE) return LEFT;
+            s->rejections++, s->accepted = 0;
+            s->step = fabs(goal - here) * s->shrink;
+            if (s->step < s->smallest || s->rejections >= s->allowed) return LEFT;
+            continue;
         }
+        s->rejections = s->accepted ? 0 : s->rejections, s->accepted = 1;
         if (s->every && record(s)) return FULL;
         if (now() - began > s->patience) return LATER;
     }

@@ -191,7 +191,7 @@ def _stiffness(problem):
     model.stiffen(model.bounded_K)
     if problem.ties:
         rows, of_ties = tied.ravel().astype(PETSc.IntType), problem.ties.second_variation(variation.axes, problem.eta)
-        if of_ties is not None:
+        if model.comm.rank == 0:
             K.setValues(rows, rows, of_ties, PETSc.InsertMode.ADD_VALUES)
     K.assemble()
     size = K.getSize()[0]

@@ -4,7 +4,6 @@ import numpy as np
 
 from cosserat_fenicsx.checks import instance, refuse
 from cosserat_fenicsx.errors import SceneError
-from cosserat_fenicsx.models.connections import ties_of
 from cosserat_fenicsx.results.path import Path
 
 # Largest violation of supports and joints by the initial state: positions over the unit of length, rotations in rad,
@@ -36,7 +35,7 @@ def put_start(model, start):
     model.set_motion(model.unknowns_of(rq), np.zeros((sum(layout.counts), model.signature.points, 3)))
     held = rq[model.tied_slots]
     if model.ties:
-        c, _, _ = model.ties_at(0.0).evaluate(held, float(model.load_factor.value), np.zeros(len(ties_of(scene))))
+        c, _ = model.ties_at(0.0).evaluate(held, float(model.load_factor.value))
         k = int(np.argmax(np.abs(c)))
         if abs(c[k]) > _LARGEST_VIOLATION:
             raise SceneError(
@@ -160,10 +159,10 @@ def _off(model, rq, rates, t=0.0):
         the rates with velocities `rates` (N, 6); the gradient of the constraints; the rates by prescribed motions
         alone.
     """
-    eta, now, count = float(model.load_factor.value), rates[model.tied_slots], len(ties_of(model.scene))
-    c, gradient, _ = model.ties_at(t).evaluate(rq[model.tied_slots], eta, np.zeros(count))
-    later, _, _ = model.ties_at(t + _DIFFERENCE * model.time).evaluate(rq[model.tied_slots], eta, np.zeros(count))
-    driven = (later - c) / _DIFFERENCE
+    eta, now, held = float(model.load_factor.value), rates[model.tied_slots], rq[model.tied_slots]
+    c, gradients = model.ties_at(t).evaluate(held, eta)
+    later, _ = model.ties_at(t + _DIFFERENCE * model.time).evaluate(held, eta)
+    driven, gradient = (later - c) / _DIFFERENCE, model.ties.on_nodes(gradients)
     return np.einsum("ikb,kb->i", gradient, now) + driven, gradient, driven
 
 

@@ -258,6 +258,7 @@ class RodModel:
         self.round_off = self._round_off(sizes)
         self._rest = self._at_rest()
         self.rest()
+        self._rest_state = self.state.x.array.copy()
         self.actions.fill(self, self.time)
         self.densities.load(self)
         self.clamps.load()
@@ -333,6 +334,22 @@ class RodModel:
         if self.forms.fields is None:
             return nodal, None
         return nodal, self.gathered(self.forms.fields, len(self.forms.gauss), self.forms.fields_size)
+
+    def snapshots(self, x, fields):
+        """`snapshot` at several states of one process: from its unknowns (k, unknowns), and the values of the fields
+        (k, elements, n) or None."""
+        numbering = self.numbering
+        state = np.tile(self._rest_state, (len(x), 1))
+        state[:, numbering.free] = x[:, numbering.of_free]
+        nodal = np.empty((len(x), *self._nodal.shape))
+        nodal[:, self._slots] = state[:, self._nodal]
+        if fields is None:
+            return nodal, None
+        values = fields.reshape(*fields.shape[:2], len(self.forms.gauss), -1).copy()
+        values[:, self.rods.reversed] = values[:, self.rods.reversed][:, :, ::-1]
+        found = np.empty_like(values)
+        found[:, self.rods.cells] = values
+        return nodal, found
 
     def gathered(self, expression, points, size):
         """(elements, points, size) values of a compiled expression, in the scene's order, on all ranks."""

@@ -61,7 +61,6 @@ class CirculatoryModel(SpatialModel):
 
     def held(self, rq, load_factor):
         """Gradients of the constraint equations of supports and joints, (equations, tied nodes, 6)."""
-        count = len(self.signature.connections.ties)
-        if not count:
+        if not self.ties:
             return np.zeros((0, 0, 6))
-        return self.ties.evaluate(rq[self.tied_slots], load_factor, np.zeros(count))[1]
+        return self.ties.on_nodes(self.ties.evaluate(rq[self.tied_slots], load_factor)[1])

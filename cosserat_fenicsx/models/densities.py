@@ -1,5 +1,7 @@
 """Force and moment per length of the distributed actions, from which results compute contact forces at element ends."""
 
+import numpy as np
+
 
 class Densities:
     """The densities of the actions of a model's current scene."""
@@ -18,6 +20,14 @@ class Densities:
             self._dead.append(self._at(model.forms.density, len(model.forms.gauss)))
         for factor, value in zip(factors, before, strict=True):
             factor.value = value
+
+    def at(self, load_factors):
+        """`here` at several load factors (k,), for dead densities: (k, elements, points, 6) or None, and None."""
+        if self._dead is None:
+            return None, None
+        of_load, of_permanent = self._dead
+        permanent = float(self._model.permanent_factor.value) * of_permanent
+        return np.multiply.outer(load_factors, of_load) + permanent, None
 
     def here(self):
         """The densities at the model's state, inertial, dimensionless, (elements, points, 6) each or None: at the Gauss

@@ -14,8 +14,9 @@ from cosserat_fenicsx.models.moving_forms import SpatialStep, compile_momentum
 from cosserat_fenicsx.models.rod_data import check_inertia, gauss_function, joined, nodal_inertia, rod_data
 from cosserat_fenicsx.models.scales import Scales
 from cosserat_fenicsx.models.spatial import SpatialModel
-from cosserat_fenicsx.quaternions import cross
+from cosserat_fenicsx.quaternions import cross, small_rotations
 from cosserat_fenicsx.scene.damping import Damping
+from cosserat_fenicsx.scene.signals import signals_of
 
 
 class Moving:
@@ -150,7 +151,8 @@ class Moving:
 
     def ties_at(self, t):
         """The `Ties` at the time t (s)."""
-        return self.ties.with_numbers_of(ties_of(self.scene, t))
+        driven = any(signals_of(support) for support in self.scene.supports)
+        return self.ties.with_numbers_of(ties_of(self.scene, t)) if driven else self.ties
 
     def largest_of(self, change, turns):
         """Largest displacement (lengths), or rotation (rad) times `turns`, in a change of the state, over all ranks."""
@@ -204,8 +206,8 @@ class MovingSpatial(Moving, SpatialModel):
 
     def turned_over(self):
         """See `Moving`; a q of the other sign also satisfies |q| = 1."""
-        q, before = (f.x.array[self._nodal[:, 3:]] for f in (self.state, self.start))
-        here = bool((np.einsum("ni,ni->n", before, q) <= 0).any())
+        q, before = (function.x.array.reshape(-1, 7)[:, 3:] for function in (self.state, self.start))  # node by node
+        here = bool(((q * before).sum(axis=1) <= 0).any())
         return self.comm.allreduce(here, op=MPI.LOR) if self.comm.size > 1 else here
 
     def set_velocity(self, linear, angular):
@@ -231,7 +233,4 @@ def spun(q, omega):
 
 def turned_by(dq, q):
     """(.., 3) the inertial rotations 2 vec(dq conj(q))/|q|^2 of changes dq of q, (.., 4) each."""
-    a, b, c, d = np.moveaxis(q, -1, 0)
-    da, db, dc, dd = np.moveaxis(dq, -1, 0)
-    turned = a * db - da * b - dc * d + dd * c, a * dc - da * c - dd * b + db * d, a * dd - da * d - db * c + dc * b
-    return np.stack([2 / (a * a + b * b + c * c + d * d) * x for x in turned], axis=-1)
+    return (small_rotations(q) @ dq[..., None])[..., 0]

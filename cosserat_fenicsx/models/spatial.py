@@ -9,6 +9,8 @@ from cosserat_fenicsx.models.base import RodModel
 from cosserat_fenicsx.models.spatial_forms import compile_forms
 from cosserat_fenicsx.quaternions import small_rotations
 
+_SAME = np.eye(3)
+
 
 class SpatialModel(RodModel):
     """The model for any scene."""
@@ -44,9 +46,10 @@ class SpatialModel(RodModel):
     def tie_maps(self, values):
         """See `RodModel`."""
         size, q = self.components, values[:, 3:7]
-        trial, test = np.zeros((len(values), 6, size)), np.zeros((len(values), size, 6))
-        trial[:, :3, :3] = test[:, :3, :3] = np.eye(3)
-        test[:, 3:, 3:] = self.signature.formulation.unit_length.rows_of_moments(q)
+        of_moments = self.signature.formulation.unit_length.rows_of_moments(q)
+        trial, test = np.zeros((len(values), 6, size)), np.zeros((len(of_moments), size, 6))
+        trial[:, :3, :3] = test[:, :3, :3] = _SAME
+        test[:, 3:, 3:] = of_moments
         trial[:, 3:, 3:7] = small_rotations(q)
         return trial, test
 

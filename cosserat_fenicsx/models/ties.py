@@ -1,16 +1,29 @@
 """The constraint equations of supports and joints: their values, their reactions and the tangent of both.
 
-Every equation c = 0 is a function of the position and the rotation of one or two nodes; its multiplier lambda is the
-reaction. Derivatives are by small displacements and small inertial rotations, which every model maps to its own
-unknowns.
+Every equation c = 0 is a function of the position and the rotation of one or two nodes (forms/ties.py); its multiplier
+lambda is the reaction. Derivatives are by small displacements and small inertial rotations, which every model maps to
+its own unknowns.
 """
 
-from functools import lru_cache
+from copy import copy
+from functools import cache
 
 import numpy as np
+import ufl
 
-from cosserat_fenicsx.quaternions import cross, directors, skew
+from cosserat_fenicsx import compat
+from cosserat_fenicsx.compiling import compiling
+from cosserat_fenicsx.forms import ties as eq
 from cosserat_fenicsx.scene.ties import AngleTie, PositionTie
+
+_GROUND = (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
+
+
+@cache
+def _kernels():
+    """The compiled `forms.ties.derivatives`; the same for all scenes and models."""
+    with compiling():
+        return [compat.on_rows(x) for x in eq.derivatives(ufl.Constant(compat.interval_domain(), shape=(eq.COUNT,)))]
 
 
 class Ties:
@@ -24,84 +37,77 @@ class Ties:
     """
 
     def __init__(self, ties, nodes, reference, length):
-        self._ties, self._nodes, self._reference, self._length = ties, np.array(nodes), reference, length
-        self._kinds = lru_cache(maxsize=None)(self._sorted)
+        self._length, self._count = length, len(reference)
+        self._nodes = np.array(nodes) % (self._count + 1)  # the ground last
+        rest = np.append(reference, [_GROUND[:3]], axis=0)
+        # what the kernels take, see forms/ties.py; motions, load factor and multipliers are of the last evaluation
+        self._rows, self._motion = np.zeros((len(ties), eq.COUNT)), np.tile(_GROUND, (len(rest), 1))
+        self._rows[:, eq.PLACES["place"]] = np.subtract(*rest[self._nodes.T])
+        self._take(ties)
+        self._ends = (np.arange(self._count)[:, None] == self._nodes.ravel()).astype(float)
+        # ties of the same two nodes stand together: where they begin, and the places of both nodes in rows of the
+        # displacements and rotations of all nodes and the ground
+        self._first = np.flatnonzero(np.append(True, (self._nodes[1:] != self._nodes[:-1]).any(axis=1)))
+        places = (6 * self._nodes[self._first, :, None] + np.arange(6)).reshape(-1, 12)
+        self._places = [np.ix_(x, x) for x in places]
 
-    def _sorted(self, which):
-        """{kind of tie: (indices in `which`, nodes a and b, fields as arrays)}; and the constant gradients."""
-        ties, kinds = [self._ties[i] for i in which], {}
-        nodes = self._nodes[list(which)]
-        for kind in {type(tie) for tie in ties}:
-            at = np.array([i for i, tie in enumerate(ties) if type(tie) is kind])
-            fields = [np.array([getattr(ties[i], name) for i in at], dtype=float) for name in kind._fields[2:]]
-            kinds[kind] = (at, nodes[at, 0], nodes[at, 1], *fields)
-        constant = np.zeros((len(ties), len(self._reference), 6))
-        if PositionTie in kinds:
-            at, a, b, n, _ = kinds[PositionTie]
-            constant[at, a, :3] = n
-            far = b >= 0
-            constant[at[far], b[far], :3] -= n[far]
-        return kinds, constant
+    def _take(self, ties):
+        for row, tie in zip(self._rows, ties, strict=True):
+            for name, value in _numbers(tie, self._length).items():
+                row[eq.PLACES[name]] = value
 
     def with_numbers_of(self, ties):
         """The same equations with other data, those of prescribed motions at another time."""
-        return Ties(ties, self._nodes, self._reference, self._length)
+        other = copy(self)
+        other._rows = self._rows.copy()
+        other._take(ties)
+        return other
 
-    def evaluate(self, rq, eta, multipliers, which=None):
-        """Values and derivatives at (r, q) (tied nodes, 7) and a load factor.
+    def _run(self, kernel, rq, eta, size):
+        """(ties, size) results of a kernel."""
+        found, rows, motion = np.zeros((len(self._rows), size)), self._rows, self._motion
+        motion[:-1] = rq
+        rows[:, : eq.MOTION] = motion.take(self._nodes, axis=0).reshape(-1, eq.MOTION)
+        rows[:, -2] = eta
+        kernel(rows, found)
+        return found
 
-        Args:
-            which: tuple of the indices of the equations to evaluate, None for all; multipliers: theirs.
+    def evaluate(self, rq, eta):
+        """Values at (r, q) (tied nodes, 7) and a load factor.
 
         Returns:
-            c (ties,); gradients (ties, tied nodes, 6) over (displacement, rotation), which are also the reactions per
-            unit of multiplier; tangent of the reactions (tied nodes, 6, tied nodes, 6).
+            c (ties,); gradients (ties, 2, 6) over (displacement, rotation) of the nodes a and b, or the ground, which
+            are also the reactions per unit of multiplier.
         """
-        which = tuple(range(len(self._ties))) if which is None else which
-        kinds, constant = self._kinds(which)
-        count, gradient = len(rq), constant.copy()
-        c, tangent = np.zeros(len(which)), np.zeros((count, 6, count, 6))
-        for kind, parts in kinds.items():
-            if kind is PositionTie:
-                at, _, _, _, rate = parts
-                c[at] = gradient[at, :, :3].reshape(len(at), -1) @ (rq[:, :3] - self._reference).ravel()
-                c[at] -= eta / self._length * rate
-            else:
-                add = self._angles if kind is AngleTie else self._turns
-                add(parts, rq[:, 3:], eta, multipliers, c, gradient, tangent)
-        return c, gradient, tangent
+        found = self._run(_kernels()[0], rq, eta, 13)
+        return found[:, 0], found[:, 1:].reshape(-1, 2, 6)
 
-    @staticmethod
-    def _angles(parts, q, eta, multipliers, c, gradient, tangent):
-        at, a, b, t, w = parts
-        turn = np.empty((len(q) + 1, 3, 3))
-        turn[:-1], turn[-1] = directors(q / np.sqrt((q * q).sum(axis=1, keepdims=True))), np.eye(3)  # the ground last
-        u, v = (turn[a] @ t[:, :, None])[..., 0], (turn[b] @ w[:, :, None])[..., 0]
-        c[at], moment = (u * v).sum(axis=1), cross(u, v)
-        gradient[at, a, 3:] = moment
-        # d(u x v) by the rotations of a and of b; u x (v x theta) = (v u^T - (u.v) I)^T theta
-        by_a = multipliers[at, None, None] * (u[:, :, None] * v[:, None, :] - c[at, None, None] * np.eye(3))
-        for i, k in enumerate(a):
-            tangent[k, 3:, k, 3:] += by_a[i]
-        for i in np.flatnonzero(b >= 0):
-            k, far = a[i], b[i]
-            gradient[at[i], far, 3:] -= moment[i]
-            tangent[k, 3:, far, 3:] -= by_a[i].T
-            tangent[far, 3:, k, 3:] -= by_a[i]
-            tangent[far, 3:, far, 3:] += by_a[i].T
+    def on_nodes(self, gradients):
+        """(ties, tied nodes, 6) from gradients (ties, 2, 6)."""
+        found, ties = np.zeros((len(self._rows), self._count + 1, 6)), np.arange(len(self._rows))
+        for i in range(2):  # a and b may be one node
+            found[ties, self._nodes[:, i]] += gradients[:, i]
+        return found[:, :-1]
 
-    @staticmethod
-    def _turns(parts, q, eta, multipliers, c, gradient, tangent):
-        at, a, _, axis, rotation = parts
-        angle = np.sqrt((rotation * rotation).sum(axis=1))
-        half = 0.5 * eta * angle
-        p0, p = np.cos(half), (np.sin(half) / np.where(angle, angle, 1.0))[:, None] * rotation
-        q0, qv = q[a, 0], q[a, 1:]
-        s0 = q0 * p0 + (qv * p).sum(axis=1)  # s = q conj(p)
-        s = qv * p0[:, None] - q0[:, None] * p - cross(qv, p)
-        along = (axis * s).sum(axis=1)
-        c[at] = 2 * along
-        gradient[at, a, 3:] = s0[:, None] * axis + cross(s, axis)
-        change = s[:, :, None] * axis[:, None, :] - axis[:, :, None] * s[:, None, :] - along[:, None, None] * np.eye(3)
-        for i, k in enumerate(a):
-            tangent[k, 3:, k, 3:] += 0.5 * multipliers[at[i]] * (change[i] - s0[i] * skew(axis[i]))
+    def reactions(self, gradients, multipliers):
+        """(tied nodes, 6) forces and moments, sums over the ties, from gradients (ties, 2, 6)."""
+        return self._ends @ (multipliers[:, None, None] * gradients).reshape(-1, 6)
+
+    def change(self, rq, eta, multipliers):
+        """The tangent of the reactions, (tied nodes, 6, tied nodes, 6), at (r, q) (tied nodes, 7), a load factor and
+        multipliers (ties,)."""
+        self._rows[:, -1] = multipliers
+        found, total = self._run(_kernels()[1], rq, eta, 144), np.zeros((6 * self._count + 6, 6 * self._count + 6))
+        for place, block in zip(self._places, np.add.reduceat(found, self._first), strict=True):
+            total[place] += block.reshape(12, 12)
+        return total[:-6, :-6].reshape(self._count, 6, self._count, 6)
+
+
+def _numbers(tie, length):
+    """The data of a tie of `cosserat_fenicsx.scene.ties` by their names in forms/ties.py."""
+    if isinstance(tie, PositionTie):
+        return {"n": tie.direction, "rate": tie.rate / length}
+    if isinstance(tie, AngleTie):
+        return {"t": tie.t, "w": tie.w}
+    angle = float(np.linalg.norm(tie.rotation))
+    return {"axis": tie.axis, "angle": angle, "about": np.divide(tie.rotation, angle or 1.0)}

@@ -6,8 +6,8 @@ from cosserat_fenicsx.algebra.equations import STATE, Equations
 from cosserat_fenicsx.algebra.packed import Packed, PackedExpression
 from cosserat_fenicsx.algebra.tie_rows import TieRows
 
-# Change of the load factor for central differences, whose error is of second order in that of prescribed rotations.
-_CHANGE = 1e-4
+#: Change of the load factor for central differences, whose error is of second order in that of prescribed rotations.
+CHANGE = 1e-4
 
 
 class Problem(Equations):
@@ -44,6 +44,11 @@ class Problem(Equations):
         # Arrays of the constants, written in place: the setter of `value` takes as long as a residual of few elements.
         self._eta, self._share = model.load_factor.value, model.permanent_factor.value
         self.take_loads((self._dead.array, self._eta), (self._permanent.array, self._share))
+        #: the array of the load factor; the `PackedExpression` of `CompiledForms.fields`, or None
+        self.eta_array, self.fields = self._eta, None
+        if forms.fields and model.comm.size == 1:
+            size = len(forms.gauss) * forms.fields_size
+            self.fields = PackedExpression(forms.fields, model.mesh, len(model.cell_dofs), size)
         self._loaded, self.begins = None, False
 
     @property
@@ -144,7 +149,7 @@ class Problem(Equations):
         The next call overwrites the returned vector.
         """
         eta = self.load_factor
-        change = _CHANGE * max(1.0, abs(eta))
+        change = CHANGE * max(1.0, abs(eta))
         for vector, ahead in zip(self._difference, (change, -change), strict=True):
             self.set_load_factor(eta + ahead)
             self.function(x, vector)

@@ -140,16 +140,16 @@ class Part:
         self.K.assemble()
 
     def _of_ties(self, stress_alone=False):
-        """The part of supports and joints, (tied unknowns, the same), on all ranks, after a count of pivots."""
+        """The part of supports and joints, (tied unknowns, the same), after a count of pivots."""
         problem, comm, interface = self.problem, self.model.comm, self.interface
         ties, axes, diagonal = problem.ties, self.variation.axes, self.elimination.diagonal
         if comm.size > 1:
             diagonal = comm.allreduce(diagonal)
         found = ties.second_variation(axes, problem.eta)
-        if found is not None and not stress_alone:
+        if not stress_alone:
             resistance = np.where(interface.nodes < 0, 0.0, np.append(diagonal, 0.0)[interface.nodes])
             found = found + ties.springs(axes, problem.eta, np.abs(resistance + np.diag(found)))
-        return comm.bcast(found, root=comm.size - 1) if comm.size > 1 else found
+        return found
 
     def complete(self):
         """Complete the numbers of negative and zero pivots, which C has counted along this rank's rods."""

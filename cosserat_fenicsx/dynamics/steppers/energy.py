@@ -50,8 +50,8 @@ class TurnedStepProblem(StepProblem):
 
     def _change_residual(self, x, b):
         q, rows = self._of_nodes(x), self._of_nodes(b)
-        self._y.array_w[:] = b
-        self.numbering.to_local(self._y, self._of_q)
+        self._vector_of_x.array_w[:] = b
+        self.numbering.to_local(self._vector_of_x, self._of_q)
         of_q = rows.copy()
         rows[:, 1:] = np.einsum("nij,nj->ni", _turning((self._q_start + q) / 2), of_q)
         rows[:, 0] = np.einsum("ni,ni->n", q, q) - 1

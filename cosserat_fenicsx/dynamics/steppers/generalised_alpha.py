@@ -72,28 +72,23 @@ class EndTies(MovingTies):
         """See `MovingTies`."""
         super().begin(ties)
         self._shift = 0.0
-        if self._here:
-            self._reactions_before = self.seen[1]
+        self._reactions_before = self.seen[1]
 
     def forget(self):
         """The current step has failed: restore the reactions before it."""
-        if self._here:
-            self.seen = self.seen[0], self._reactions_before
+        self.seen = self.seen[0], self._reactions_before
 
     def shift(self, values):
         """Require these values of the constraints instead of zero in this step; see `values`."""
         self._shift = values
 
     def values(self, ties, eta):
-        """Values of the constraints at the current state, for `ties` of another time; 0 on all but the last rank."""
-        if not self._here:
-            return 0.0
-        nodal, multipliers = self.seen
-        return ties.evaluate(self.model.tied_motion(nodal), eta, multipliers[list(self._added)], self._added)[0]
+        """Values of the constraints at the current state, for `ties` of another time."""
+        return ties.evaluate(self.model.tied_motion(self.seen[0]), eta)[0]
 
     def _evaluate(self, eta):
-        c, gradient, change = super()._evaluate(eta)
-        return c - self._shift, gradient, change
+        c, gradients = super()._evaluate(eta)
+        return c - self._shift, gradients
 
     def _reactions(self):
         return (self._reactions_before + self.seen[1]) / 2

@@ -80,7 +80,8 @@ class OneStep:
         guesses = _extrapolated([*known, now])
         if len(known) < 3:
             return guesses[::-1]
-        errors = np.array([np.square(guess - self._start).sum() for guess in _extrapolated(known)])
+        off = [guess - self._start for guess in _extrapolated(known)]
+        errors = np.array([change @ change for change in off])
         order = np.argsort(self._comm.allreduce(errors) if self._comm.size > 1 else errors)
         return [guesses[k] for k in order]
 

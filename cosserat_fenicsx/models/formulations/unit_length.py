@@ -4,6 +4,8 @@ import numpy as np
 
 from cosserat_fenicsx.forms import spatial
 
+_LAST_ROWS = np.eye(4)[None, :, 1:]
+
 
 class UnitLength:
     """One equation |q|^2 = 1 per node, in the row of the scalar component of q.
@@ -30,10 +32,9 @@ class UnitLength:
         return spatial.unit_quaternion(state, test)
 
     def rows_of_moments(self, q):
-        """(nodes, components after r, 3): matrices from moments at nodes with q (nodes, 4) to residual rows."""
-        rows = np.zeros((len(q), 4, 3))
-        rows[:, 1:] = np.eye(3)
-        return rows
+        """(nodes, components after r, 3): matrices from moments at nodes with q (nodes, 4) to residual rows; only one
+        where all nodes have the same."""
+        return _LAST_ROWS
 
     def turned_rows(self, q, moments):
         """(nodes, c, c), c the components after r: derivative by q of the residual rows of moments (nodes, 3), where

@@ -7,6 +7,7 @@ from cosserat_fenicsx.statics.path.arclength import ArcLength
 from cosserat_fenicsx.statics.path.chord import Chord
 from cosserat_fenicsx.statics.path.events import Locator
 from cosserat_fenicsx.statics.path.load_control import Continuation
+from cosserat_fenicsx.statics.path.sweep import Sweep
 from cosserat_fenicsx.statics.path.track import INTENDED, Track
 
 #: Control parameters of the continuation, see `solve`.
@@ -46,7 +47,7 @@ class Follower:
         self._arc = ArcLength(self.track, steps, self.locator)
         self._auto = control == "auto" and steps.adaptive
         self.fork, self.left, self.used = None, False, "load"
-        self._begun = False
+        self._begun, self._sweep = False, None
 
     @property
     def smallest(self):
@@ -106,6 +107,24 @@ class Follower:
             before, here = track.history[-2:]
             self._load.step = abs(here.load_factor - before.load_factor) or None
         return done
+
+    @property
+    def sweeps(self):
+        """Whether steps from here on may be taken in C (`Sweep`): load control of one process, where Python has no say
+        in a step that is accepted."""
+        track, model = self.track, self.track.model
+        unsure = track.here.negative_modes and track.without_potential
+        return (
+            self._steps.adaptive and self._control != "arc" and model.comm.size == 1 and track.neutral is None
+            and not (unsure or model.actions.memory or model.signature.lives_along_rods)
+        )  # fmt: skip
+
+    def sweep(self, targets, way, fields, *, every, counted):
+        """Advance as far as steps are accepted at once, see `Sweep.along`; the path has begun."""
+        self._load.begin(way)
+        if self._sweep is None:
+            self._sweep = Sweep(self.track, fields)
+        return self._sweep.along(targets, self._load, _PATIENCE, every=every, counted=counted)
 
     def to_fork(self, target, way):
         """Advance towards a load factor up to the first bifurcation; whether one was found."""

@@ -16,12 +16,12 @@ from cosserat_fenicsx.errors import NotConverged
 from cosserat_fenicsx.interrupts import obey
 from cosserat_fenicsx.statics.path.track import FAR, INTENDED, NOTHING, Track, growth_of, through
 
-# Distance from the predictor (rad, rod lengths) below which direction and length of a step are not checked.
-_SLIGHT = 1e-3
-# Distance from the predictor, over the predicted increment, above which a step may have jumped over a limit point.
-_LEAP = 2.0
-# Number of rejected steps from the first point after which the step is limited by the stiffness there.
-_FIRST_REJECTIONS = 3
+#: Distance from the predictor (rad, rod lengths) below which direction and length of a step are not checked.
+SLIGHT = 1e-3
+#: Distance from the predictor, over the predicted increment, above which a step may have jumped over a limit point.
+LEAP = 2.0
+#: Number of rejected steps from the first point after which the step is limited by the stiffness there.
+FIRST_REJECTIONS = 3
 # Largest distance from the predictor, over the step's length, at which the number of negative modes may change; the
 # second once steps are below a thousandth of the way: the path is smooth there, so that it crosses a bifurcation
 # without a change of branch.
@@ -82,11 +82,17 @@ class Continuation:
     Attributes:
         step: the next step of the load factor; None where it is still to be chosen.
         smallest: the smallest step of the load factor that is tried.
+        rejections: number of steps that were rejected just before the next call of `to`.
     """
 
     def __init__(self, track: Track, control: StepControl, watch=None):
         self.track, self.control, self._watch = track, control, watch
-        self.step, self._shrink, self.smallest = None, 0.5, 0.0
+        self.step, self._shrink, self.smallest, self.rejections = None, 0.5, 0.0, 0
+
+    def begin(self, way):
+        """Choose the step where none is known; `way`: see `to`."""
+        self.step = self.step or self.control.first or way / 10
+        self.smallest = self.control.smallest * way
 
     def to(self, target, way, *, on_step=None, patience=None):
         """Advance to the load factor `target`, which is reached exactly.
@@ -105,9 +111,9 @@ class Continuation:
         control, track = self.control, self.track
         if not control.adaptive:
             return self._attempt(target, guard=False, on_step=on_step)
-        self.step = self.step or control.first or way / 10
-        self.smallest = control.smallest * way
-        self._refused, rejections, last_accepted, first = False, 0, False, len(track.history) == 1
+        self.begin(way)
+        self._refused, rejections, last_accepted, first = False, self.rejections, False, len(track.history) == 1
+        self.rejections = 0
         while track.here.load_factor != target:
             left = target - track.here.load_factor
             step = min(self.step, control.largest or np.inf)
@@ -124,10 +130,10 @@ class Continuation:
             else:
                 rejections, last_accepted = rejections + 1, False
                 self.step = taken * self._shrink
-                if first and rejections == _FIRST_REJECTIONS:
+                if first and rejections >= FIRST_REJECTIONS:
                     rejections, first, linear = 0, False, self._linear_step()
                     self.step, self.smallest = min(self.step, linear), min(self.smallest, control.smallest * linear)
-                if self._refused or self.step < self.smallest or rejections == patience:
+                if self._refused or self.step < self.smallest or rejections >= (patience or math.inf):
                     self.step = None
                     return False
         return True
@@ -157,7 +163,7 @@ class Continuation:
             return track.restore()
         numbers = track.problem.numbers()
         off = track.distance(numbers, predicted)
-        if adaptive and off > _SLIGHT and not self._near(numbers, predicted, off, eta):
+        if adaptive and off > SLIGHT and not self._near(numbers, predicted, off, eta):
             return track.restore()
         point = track.point(solved)
         changed = point.negative_modes != here.negative_modes
@@ -203,7 +209,7 @@ class Continuation:
             if track.product(move, increment) <= 0 < size:
                 track.failure = "the equilibrium lies opposite to the direction of the path"
                 return False
-            if track.product(move - increment, move - increment) <= _LEAP**2 * size:
+            if track.product(move - increment, move - increment) <= LEAP**2 * size:
                 return True
         if self._jumped(move, eta - track.here.load_factor):
             track.failure = "the equilibrium jumped away from the path's direction"

@@ -9,7 +9,7 @@ from cosserat_fenicsx.errors import Interrupted, NotConverged
 from cosserat_fenicsx.interrupts import obey
 from cosserat_fenicsx.results.accuracy import on_mesh
 from cosserat_fenicsx.results.path import Path
-from cosserat_fenicsx.results.records import Event, Record
+from cosserat_fenicsx.results.records import Event, Record, Records
 from cosserat_fenicsx.statics.circulatory import conservative_along
 from cosserat_fenicsx.statics.path.chord import Chord
 from cosserat_fenicsx.statics.path.follower import Follower
@@ -144,8 +144,9 @@ class Tracing:
         way = max(abs(eta) for eta in targets) or 1.0
         try:
             self._follower.begin()
-            for k, target in enumerate(targets):
-                between = free and k == 1
+            k = 0
+            while (k := self._swept_from(k, targets, free, way, until)) < len(targets):
+                target, between = targets[k], free and k == 1
                 self._until = until if between else None
                 on_step = (lambda point: (self._watch(point), self._record(point))) if between else self._watch
                 at_start = k == 0 and track.here.load_factor == target
@@ -160,6 +161,7 @@ class Tracing:
                     )
                 if not between:
                     self._record(track.here)
+                k += 1
         except _Enough:
             pass
         except NotConverged as failure:
@@ -170,6 +172,35 @@ class Tracing:
         finally:
             self.path.control, self.path.left = self._follower.used, self._follower.left
         return self.path
+
+    def _swept_from(self, k, targets, free, way, until):
+        """Advance from the k-th target on in C as far as every step is accepted; the number of the next target."""
+        between, here = free and k == 1, self.track.here
+        watched = self._choice.promoted and here.negative_modes
+        if k == len(targets) or watched or (between and until) or not self._follower.sweeps:
+            return k
+        wanted = targets[k:] if not free or between else targets[:1]
+        sweep = self._follower.sweep(wanted, way, self.problem.fields, every=between,
+                                     counted=self.track.iterations - self._counted)  # fmt: skip
+        try:
+            while True:
+                self._record_all(next(sweep))
+        except StopIteration as end:
+            done, left = end.value
+        self._counted, self._stable_at = self.track.iterations - left, self.track.here.load_factor
+        return k + done
+
+    def _record_all(self, swept):
+        self._bar.at(self.track.here)
+        count, model, problem = len(swept.load_factors), self.model, self.problem
+        nodal, fields = model.snapshots(swept.x, swept.fields)
+        ties = [problem.at_ties(x, eta) for x, eta in zip(swept.x, swept.load_factors, strict=True)]
+        self.path.extend(Records(
+            swept.load_factors.copy(), nodal, fields, np.full(count, self.track.here.negative_modes),
+            swept.iterations.astype(int), np.array([multipliers for multipliers, _ in ties]),
+            np.zeros(count, dtype=bool), model.densities.at(swept.load_factors), np.array([f for _, f in ties]),
+            np.array([model.clamps.loads(eta) for eta in swept.load_factors.tolist()]), swept.steps.astype(int),
+        ))  # fmt: skip
 
     def _advice(self, here, load):
         if not self._options["steps"].adaptive:

@@ -9,13 +9,14 @@ from cosserat_fenicsx.algebra.newton import petsc
 from cosserat_fenicsx.interrupts import obey
 from cosserat_fenicsx.statics.path import load_control
 from cosserat_fenicsx.statics.path.track import EASY, FAR, HARD, INTENDED, PathPoint
+from cosserat_fenicsx.statics.problem import CHANGE
 
 # Seconds after which C returns, so that Ctrl-C is obeyed; load factors recorded between two returns.
 _PATIENCE, _ROOM = 0.05, 64
 _DONE, _LEFT, _LATER, _FULL = range(4)
 
-#: Recorded points: load factors, unknowns (k, unknowns), values of the fields (k, elements, n) or None, iterations since
-#: the point before, and steps so far.
+#: Recorded points: load factors, unknowns (k, unknowns), values of the fields (k, elements, n) or None, iterations
+#: since the point before, and steps so far.
 Swept = namedtuple("Swept", "load_factors x fields iterations steps")
 
 
@@ -40,9 +41,10 @@ class Sweep:
         sweep.numbers, sweep.moves, sweep.turn = numbers, model.moves, model.turn
         sweep.slight, sweep.far, sweep.intended = load_control.SLIGHT, FAR, INTENDED
         sweep.leap, sweep.easy, sweep.hard, sweep.patience = load_control.LEAP, EASY, HARD, _PATIENCE
+        sweep.change = CHANGE
         sweep.fields, sweep.room = fields.c if fields else ffi.NULL, _ROOM
         shape = (fields.elements, fields.size) if fields else (0,)
-        self._points, work = np.zeros((3, numbers)), np.zeros((2, numbers))
+        self._points, work = np.zeros((3, numbers)), np.zeros((6, numbers))
         self._recorded = Swept(
             np.zeros(_ROOM), np.zeros((_ROOM, unknowns)), np.zeros((_ROOM, *shape)), *np.zeros((2, _ROOM), np.int32)
         )
@@ -55,12 +57,13 @@ class Sweep:
         for name in ("iterations", "steps"):
             setattr(sweep, f"recorded_{name}", ffi.cast("int *", getattr(self._recorded, name).ctypes.data))
 
-    def along(self, targets, control, every, counted):
-        """Advance to load factors in turn until a step needs another decision than to be accepted.
+    def along(self, targets, control, patience, *, every, counted):
+        """Advance to load factors in turn until a step needs another decision than to be accepted or halved.
 
         Args:
             targets: load factors.
             control: the `Continuation`, whose step is taken and set.
+            patience: number of rejected steps, without two successive accepted ones between, after which to stop.
             every: whether every step is recorded, or the targets alone.
             counted: Newton iterations since the last record.
 
@@ -78,6 +81,8 @@ class Sweep:
         for k, point in enumerate(known):
             sweep.etas[k] = point.load_factor
         sweep.known, sweep.negative, sweep.step = len(known), track.here.negative_modes, control.step
+        sweep.smallest, sweep.rejections, sweep.accepted = control.smallest, 0, False
+        sweep.allowed = min(patience, load_control.FIRST_REJECTIONS if len(known) == 1 else patience) - 1
         sweep.largest, sweep.loads = control.control.largest or np.inf, track.problem.load_norm
         sweep.targets, sweep.count, sweep.next = self._ffi.cast("double *", targets.ctypes.data), len(targets), 0
         sweep.every, sweep.iterations, sweep.steps, sweep.records = every, counted, track.steps, 0
@@ -89,7 +94,7 @@ class Sweep:
             track.iterations += int(self._recorded.iterations[:k].sum()) + sweep.iterations - before
             sweep.records = 0
             self._follow()
-            control.step = sweep.step
+            control.step, control.rejections = sweep.step, sweep.rejections
             track.problem.raise_failure()
             track.stability.raise_failure()
             if k:

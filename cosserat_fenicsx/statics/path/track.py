@@ -13,8 +13,8 @@ from cosserat_fenicsx.statics.stability import NegativeModes
 FAR, INTENDED = 0.5, 0.1
 #: Motions below this are rounding (rad, rod lengths): an inextensible column does not move until it buckles.
 NOTHING = 1e-8
-# Newton iterations of a step beyond which the next step does not grow, and from which on it is halved.
-_EASY, _HARD = 5, 9
+#: Newton iterations of a step beyond which the next step does not grow, and from which on it is halved.
+EASY, HARD = 5, 9
 
 
 @dataclass(eq=False)
@@ -226,6 +226,6 @@ def growth_of(off, order, iterations):
         iterations: Newton iterations of the step.
     """
     growth = min(max((INTENDED / max(off, 1e-12)) ** (1 / order), 0.5), 2.0)
-    if iterations >= _HARD:
+    if iterations >= HARD:
         return 0.5
-    return min(growth, 1.0) if iterations > _EASY else growth
+    return min(growth, 1.0) if iterations > EASY else growth
