@@ -51,6 +51,7 @@ SHARED = {
     "element",
     "errors",
     "interrupts",
+    "processor",
     "progress",
     "quadrature",
     "quaternions",
