@@ -197,7 +197,7 @@ class BorderedNewton(Newton):
         inner, motion = self.problem.model.inner, self.neutral
         force = self.problem.load_derivative(self.problem.x)
         force.array_w[:] = motion
-        self._ksp.solve(force, self._free)
+        self.problem.solve(force, self._free)
         free = self._free.array_r
         size = inner(motion, free)
         for vector in (step, self._slope):
