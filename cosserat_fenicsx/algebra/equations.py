@@ -19,33 +19,33 @@ def _hook():
     """Let C call `Called.called`."""
     ffi, _ = module()
 
-    @ffi.def_extern(name="python_hook", error=1)
+    def keep(kind, failure, trace):  # C cannot pass it on; Ctrl-C is raised here as soon as Python is entered
+        ffi.from_handle(trace.tb_frame.f_locals["owner"])().failure = failure
+
+    @ffi.def_extern(name="python_hook", error=1, onerror=keep)
     def hook(owner, what, a, b):
-        return ffi.from_handle(owner)().called(what, a, b)
+        """See `hook` in newton.c: 0, or 1 after an exception, which is kept."""
+        ffi.from_handle(owner)()._answer(what, a, b)
+        return 0
 
     return hook
 
 
 class Called:
-    """An object that C asks for what Python has to do."""
+    """An object that C asks for what Python has to do.
+
+    Attributes:
+        failure: the exception that has ended the last answer, if any.
+    """
 
     def __init__(self):
         _hook()
         self._ffi, self._lib = module()
-        self._handle, self._failure = self._ffi.new_handle(weakref.ref(self)), None
-
-    def called(self, what, a, b):
-        """See `hook` in newton.c: 0, or 1 after an exception, which is kept."""
-        try:
-            self._answer(what, a, b)
-        except BaseException as problem:  # C cannot pass it on
-            self._failure = problem
-            return 1
-        return 0
+        self._handle, self.failure = self._ffi.new_handle(weakref.ref(self)), None
 
     def raise_failure(self):
         """Raise the exception that was kept, if any."""
-        failure, self._failure = self._failure, None
+        failure, self.failure = self.failure, None
         if failure is not None:
             raise failure
 
