@@ -125,16 +125,16 @@ class TieRows:
         by the nodes."""
         (nodal, multipliers), acting, ties, model = self.seen, self._acting(), self.ties, self.model
         change, gradients = ties.change(model.tied_motion(acting), eta, multipliers), self._gradients(eta)
-        trial, test = model.tie_maps(acting)
+        (trial, test), added = model.tie_maps(acting), ties.on_nodes(gradients)[self._added]
         of_nodes = reactions_by_nodes(test, change, self.share * trial)
-        reactions = reactions_by_multipliers(test, ties.on_nodes(gradients)[self._added])
+        reactions = reactions_by_multipliers(test, added)
         if model.rows_turn:
             places = np.arange(len(of_nodes)).reshape(len(nodal), -1)
             turned = self.share * model.turned_reactions(acting, ties.reactions(gradients, multipliers))
             of_nodes[places[:, :, None], places[:, None, :]] += turned
         if acting is not nodal:
-            trial, _ = model.tie_maps(nodal)
-        return of_nodes, reactions, by_nodes(ties.on_nodes(self._evaluate(eta)[1])[self._added], trial)
+            (trial, _), added = model.tie_maps(nodal), ties.on_nodes(self._evaluate(eta)[1])[self._added]
+        return of_nodes, reactions, by_nodes(added, trial)
 
     def add_residual(self, b, eta):
         """Add the reactions to the rows of the nodes, and the constraint equations in the rows of the multipliers."""
