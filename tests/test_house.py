@@ -73,6 +73,7 @@ ROOMS = {
 #: results.
 FITTERS = {
     "statics": {
+        "agreement",
         "circulatory",
         "first_mesh",
         "grading",
