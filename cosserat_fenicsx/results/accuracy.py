@@ -19,6 +19,11 @@ _SAFETY, _SAFETY_BELOW, _ASYMPTOTIC = 4, 2, 1e-3
 _CAUTION = 1.5
 # Exponents of an error as a function of what indicates it, below and above what is known.
 _BELOW, _ABOVE = 0.7, 1.4
+# Factor of an error that is interpolated over leading coefficients, as a power of their ratio to those of the nearest
+# sample point; the largest one.
+_WIDENED, _WIDEST = 0.5, 2.0
+# Largest ratio of the leading coefficients of sample points without another one between them.
+_APART = 10.0
 # Ratio of leading coefficients below which a second, smoother point is sampled, since its error may converge otherwise.
 _SMOOTHER = 0.1
 # Points with displacements below this times the largest one of the path are not sampled for their smoothness.
@@ -116,20 +121,24 @@ def hardest(path):
     """Sample points that determine the mesh that a path needs.
 
     They are the point with the largest error (the largest relative leading coefficients where errors are unknown), the
-    most displaced one, the last, and the smoothest (smallest leading coefficients) where it is much smoother. All
-    points where these are few or the path has events.
+    most displaced one, the last, the smoothest (smallest leading coefficients) where it is much smoother, and then one
+    between. All points where these are few or the path has events.
 
     Returns:
         (Path of these points, their indices).
     """
     if len(path) <= FEW or path.events:  # events have to be located on every mesh
         return path, np.arange(len(path))
-    sizes, rough, _ = sizes_of(path)
+    sizes, rough = sizes_of(path).largest, _leading(path)
     known = np.isfinite(path.error).all()
     which = {int(np.argmax(path.error if known else rough / sizes)), int(np.argmax(sizes)), len(path) - 1}
     seen = np.flatnonzero(sizes >= _SEEN * sizes.max())
     if rough[seen].min() < _SMOOTHER * rough.max():
         which.add(int(seen[np.argmin(rough[seen])]))
+    told = np.log(np.maximum(rough, 1e-300))
+    ends = np.array([min(told[list(which)]), max(told[list(which)])])
+    if np.ptp(ends) > np.log(_APART):
+        which.add(int(np.argmin(np.abs(told - ends.mean()))))
     which = np.array(sorted(which))
     return path.at_points(which), which
 
@@ -138,14 +147,15 @@ def spread_error(path, few, which, coarse=None):
     """Set `path.error` from the errors of its sample points on the same mesh.
 
     The errors of the other points are interpolated over what indicates them, logarithmically: the differences from the
-    same points on a coarser mesh, or the leading coefficients.
+    same points on a coarser mesh, or the leading coefficients. In the second case they
+    are increased the more, the farther these are from those of the sample points.
 
     Args:
         few: the sample points, with their errors; which: their indices.
         coarse: the whole path on a coarser mesh, or None.
     """
-    sizes, leading, turning = sizes_of(path)
-    told = leading if coarse is None else np.maximum(_apart(path, coarse, turning)[0] - _ROUNDING, 0.0)
+    sizes, turning = sizes_of(path)
+    told = _leading(path) if coarse is None else np.maximum(_apart(path, coarse, turning)[0] - _ROUNDING, 0.0)
     known, errors = told[which], few.error * sizes[which]
     usable = (known > 100 * _ROUNDING) & (errors > 0)
     error = np.zeros(len(path)) if coarse is None else told.copy()
@@ -154,6 +164,8 @@ def spread_error(path, few, which, coarse=None):
         known, errors = np.log(known[usable][order]), np.log(np.maximum.accumulate(errors[usable][order]))
         told = np.log(np.maximum(told, 1e-300))
         beyond = _BELOW * np.minimum(told - known[0], 0) + _ABOVE * np.maximum(told - known[-1], 0)
+        if coarse is None:
+            beyond += np.minimum(_WIDENED * np.abs(told[:, None] - known).min(axis=1), np.log(_WIDEST))
         error = np.exp(np.interp(told, known, errors) + beyond)
     error /= sizes
     error[which] = few.error
@@ -167,9 +179,9 @@ def _apart(fine, coarse, turning):
     radius of gyration.
     """
     there, here, ends = compared(coarse.layout, fine.layout, coarse.rule)
-    off = np.linalg.norm(there.of(coarse._moved()) - here.of(fine._moved()), axis=2)
+    off = np.linalg.norm(there.of(coarse._moved) - here.of(fine._moved), axis=2)
     if turning.any():
-        turned = np.linalg.norm(_unit(there.of(coarse._turned())) - _unit(here.of(fine._turned())), axis=2)
+        turned = np.linalg.norm(_unit(there.of(coarse._turned)) - _unit(here.of(fine._turned)), axis=2)
         for rod, part in zip(fine.scene.rods, there.rods, strict=True):
             turned[:, part] *= 2 * _gyration(rod) / fine.scales.length
         off = np.maximum(off, turning[:, None] * turned)
@@ -180,30 +192,33 @@ def _unit(q):
     return q / np.linalg.norm(q, axis=2, keepdims=True)
 
 
-_Sizes = namedtuple("_Sizes", "largest leading turning")
+_Sizes = namedtuple("_Sizes", "largest turning")
 
 
 def sizes_of(path):
     """Reference sizes of the points of a path, a `_Sizes` of arrays (points,).
 
-    largest: the displacement that errors are relative to; leading: the largest leading coefficient of an element's
-    displacement, both dimensionless; turning: whether `largest` comes from rotations times the radius of gyration.
+    largest: the displacement that errors are relative to, dimensionless; turning: whether it comes from rotations times
+    the radius of gyration.
     """
-    off, vectors = np.linalg.norm(path._moved(), axis=2), _unit(path._turned())[:, :, 1:]
+    moved, vectors = np.linalg.norm(path._moved, axis=2).max(axis=1), _unit(path._turned)[:, :, 1:]
     # |R - 1| = sqrt(8) |sin(angle/2)|
     angle, turned = np.sqrt(8) * np.linalg.norm(vectors, axis=2), np.zeros(len(path))
     for rod, (_, rows) in zip(path.scene.rods, cell_nodes(path.layout, path.degree), strict=True):
         turned = np.maximum(turned, angle[:, rows].max(axis=1) * _gyration(rod) / path.scales.length)
-    moved = np.maximum(off.max(axis=1), 1e-9)
-    leading = np.max([found.max(axis=1) for found in leading_coefficients(path)], axis=0)
-    return _Sizes(np.maximum(moved, turned), leading, turned > moved)
+    moved = np.maximum(moved, 1e-9)
+    return _Sizes(np.maximum(moved, turned), turned > moved)
+
+
+def _leading(path):
+    """(points,) the largest leading coefficient of an element's displacement, dimensionless."""
+    return np.max([found.max(axis=1) for found in leading_coefficients(path)], axis=0)
 
 
 def leading_coefficients(path):
     """For every rod (points, elements): sizes of the leading coefficients of the displacement, dimensionless."""
-    moved = path._moved()
     return [
-        np.linalg.norm(np.einsum("j,kcji->kci", path.rule.leading, moved[:, nodes]), axis=2)
+        np.linalg.norm(np.einsum("j,kcji->kci", path.rule.leading, path._moved[:, nodes]), axis=2)
         for nodes, _ in cell_nodes(path.layout, path.degree)
     ]
 
@@ -218,7 +233,7 @@ def on_mesh(path, layout):
     rule, n = path.rule, path._stacked("gauss_fields")[..., :3]
     places, at_gauss = transferred(path.layout, layout, rule)
     rest = resting(path.scene, layout, rule) / path.scales.length
-    rq = np.concatenate([places.of(path._moved()) + rest, _unit(places.of(path._turned()))], axis=2)
+    rq = np.concatenate([places.of(path._moved) + rest, _unit(places.of(path._turned))], axis=2)
     forces, first = [], 0
     for breaks, (cells, weights) in zip(path.layout.breaks, at_gauss, strict=True):
         found = np.einsum("kj,pkjc->pkc", weights, n[:, first + cells])

@@ -118,7 +118,7 @@ class Result(Exports, Extremes, Reactions, Stresses, States):
 
     def largest_displacement(self) -> np.ndarray:
         """(n,) the largest displacement of any node, m."""
-        return np.linalg.norm(self._moved(), axis=2).max(axis=1) * self.scales.length
+        return np.linalg.norm(self._moved, axis=2).max(axis=1) * self.scales.length
 
     @cached_property
     def _all_rq(self):
@@ -130,10 +130,12 @@ class Result(Exports, Extremes, Reactions, Stresses, States):
         """(nodes, 3) positions at rest, dimensionless, relative to the origin of each structure."""
         return resting(self.scene, self.layout, self.rule) / self.scales.length
 
+    @cached_property
     def _moved(self):
         """(points, nodes, 3) displacements of the nodes, dimensionless."""
         return self._all_rq[:, :, :3] - self._rest
 
+    @property
     def _turned(self):
         """(points, nodes, 4) q at the nodes."""
         return self._all_rq[:, :, 3:]

@@ -89,6 +89,7 @@ class _Search:
         self.whole = self._few = self._which = None  # `_few`: sample points on the last mesh; `_which`: their indices
         self._apart, self._apart_of_whole = None, None  # their differences to the mesh before, and those of all points
         self._level, self._level_of_whole = -1, -2
+        self._plain = False  # see `_plain`, of the complete path
         # Assumed order of the error in h; refinement factor over the mesh before, None where the meshes are not nested.
         self._order, self._factor = 1.0, 2.0
         self._failed, self._promoted, self._best = False, None, math.inf
@@ -119,11 +120,16 @@ class _Search:
             self._promoted, self._few, self._apart, self._halved = found, None, None, None
             return None
         self._failed = False
-        if self._usual is not None and (found is None or not _plain(found)):
+        if found is None:
             return self._begin_again()
         if found is self.whole and self._level_of_whole < self._level:
             return self.confirmed(found)
-        self._layered = with_layers(self._scene, layout, of_path(found))
+        layers = of_path(found)
+        if found is self.whole:
+            self._plain = _plain(found, layers)
+            if self._usual is not None and not self._plain:
+                return self._begin_again()
+        self._layered = with_layers(self._scene, layout, layers)
         if found.rounding > self._tol:  # refinement would increase it
             raise NotConverged(_rounding_hides(self._tol, found.rounding, elements, found.formulation), found)
         if np.isfinite(found.error).all():
@@ -190,7 +196,11 @@ class _Search:
         return layout
 
     def _found_on(self, layout):
-        """The sample points, or all points, on a mesh, with their errors where these are known."""
+        """The sample points, or all points, on a mesh, with their errors where these are known.
+
+        All points on the mesh before where the sample points show that they are accurate; None where a mesh that is
+        coarser than usual does not resolve them.
+        """
         few = None if self._few is None else self._correct(layout, self._few)
         apart = None if few is None else self._judge(few, self._few, self._apart)
         if few is None or apart.max() > _RESOLVED:
@@ -204,7 +214,7 @@ class _Search:
         if len(few) == len(self.whole):
             return self._keep(few, apart)
         coarse, self._few, self._apart = self._few, few, apart
-        if self._error_before is not None and self._level == self._level_of_whole + 1 and _plain(self.whole):
+        if self._error_before is not None and self._level == self._level_of_whole + 1 and self._plain:
             coarse.set_error(self._error_before)
             if coarse.error.max() <= self._tol:
                 spread_error(self.whole, coarse, self._which)
@@ -256,11 +266,11 @@ class _Search:
         return self._keep(whole, None)
 
 
-def _plain(path):
+def _plain(path, layers):
     """Whether a path has nothing that a coarse mesh may miss or invent: it is followed by load control, is stable, and
     its elements are shorter than its boundary layers, and so than the half-waves of buckling."""
     followed = path.control == "load" and not path.events
-    return followed and not path.negative_modes.any() and resolves(path.layout, of_path(path))
+    return followed and not path.negative_modes.any() and resolves(path.layout, layers)
 
 
 def _rounding_hides(tol, rounding, elements, formulation):

@@ -151,10 +151,8 @@ def solve(
 
         if elements is not None:
             return trace(Layout.of(scene, elements))
-        if simple:
-            layout, usual = meshes_for(scene, degree, tol, many=free or len(targets) > FEW)
-        else:
-            layout, usual = first_layout(scene, degree), None
+        many = free or len(targets) > FEW
+        layout, usual = meshes_for(scene, degree, tol, many) if simple else (first_layout(scene, degree), None)
         return refine(trace, correct, scene, layout, tol, degree, usual)
 
     with Progress(targets, progress, comm) as bar:
