@@ -8,10 +8,14 @@ def share(number):
     return f"1/{1 / number:.3g}" if number < 1 else f"{number:.3g}"
 
 
-def judged(found, most):
-    """The last three cells of a row: what was found, what is asked at most, and whether it is met."""
+def judged(found, most, form=None):
+    """The last three cells of a row: what was found, what is asked at most, and whether it is met.
+
+    Args:
+        found: a ratio; or a number of another unit, with the format specification `form`; or None.
+    """
     verdict = "-" if found is None else "met" if found <= most else "missed"
-    return f"{share(found)} | {share(most)} | {verdict}"
+    return " | ".join((format(found, form), f"{most:g}", verdict) if form else (share(found), share(most), verdict))
 
 
 #: The heads of these cells, after that of the first.
