@@ -42,8 +42,10 @@ def under_mpirun(ranks, elements):
     """What `measure` found on so many ranks."""
     program = "/usr/bin/mpirun" if Path("/usr/bin/mpirun").exists() else shutil.which("mpirun")
     words = [program, "--oversubscribe", "-n", str(ranks), sys.executable, __file__, "--one", str(elements)]
-    # a copy: what MPI has put into this process's environment would make its ranks of the new ones
-    done = subprocess.run(words, env=dict(os.environ), capture_output=True, text=True, check=True, timeout=600)
+    # a copy, without what MPI has put into this process's environment since it was started
+    done = subprocess.run(words, env=dict(os.environ), capture_output=True, text=True, timeout=600)
+    if done.returncode:
+        raise SystemExit(done.stderr)
     return json.loads(done.stdout.splitlines()[-1])
 
 
@@ -70,7 +72,7 @@ def main(sizes=SIZES, rounds=ROUNDS, out="out", ranks=RANKS):
         medians = {n: float(np.median(times)) for n, times in seconds.items()}
         one = np.array(tips[1])
         apart = max(float(np.abs(np.array(tip) - one).max() / np.abs(one).max()) for tip in tips.values())
-        told = " | ".join(f"{1e3 * s:.3g}" for s in medians.values())
+        told = " | ".join(f"{1e3 * s:.1f}" for s in medians.values())
         lines.append(f"| {unknowns} | {told} | {apart:.0e} | {judged(medians[2] / medians[1], ASKED)} |")
         found.append((unknowns, medians, apart))
     text = "\n".join(lines)

@@ -129,10 +129,11 @@ def sizes_table(rows):
     yield ""
     yield f"| asked | found | {HEADS}"
     yield "|---|---|---|---|"
-    yield f"| exponent of the Newton step, least squares over all rows | {judged(exponent(unknowns, step), EXPONENT)} |"
+    all_rows = judged(exponent(unknowns, step), EXPONENT, ".3f")
+    yield f"| exponent of the Newton step, least squares over all rows | {all_rows} |"
     if unknowns[-1] >= 1e6:
-        yield f"| Newton step of {unknowns[-1]:.0f} unknowns (s) | {judged(step[-1], MILLION)} |"
-    yield f"| exponent of the count of negative modes | {exponent(unknowns, count):.3g} | - | - |"
+        yield f"| Newton step of {unknowns[-1]:.0f} unknowns (s) | {judged(step[-1], MILLION, '.2f')} |"
+    yield f"| exponent of the count of negative modes | {exponent(unknowns, count):.3f} | - | - |"
 
 
 def floor_table(runs):

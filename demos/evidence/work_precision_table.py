@@ -2,12 +2,13 @@
 
 import statistics
 
-from asked import HEADS, judged
+from asked import HEADS, judged, share
 from machine import in_words
 from peers.environments import OWN
 from peers.problems import TITLES
 
 ACCURACIES = (1e-3, 1e-5, 1e-7)
+WAITS = {("cosserat run", "warm"): 1.0, ("cosserat run", "cold"): 8.0}  # s of wall clock, asked at most
 CLOSE = 1.25  # times the smallest time: a row may turn out to be the fastest
 
 
@@ -112,7 +113,7 @@ def deciding(rows):
 def text(found, rows):
     """The whole table, in Markdown."""
     return "\n".join(
-        [*_head(found), "", *_ratios(rows), "", *_times(rows), "", *_stopped(rows), *_waits(found)]
+        [*_head(found), "", *_ratios(rows), "", *_by_tol(rows), *_times(rows), "", *_stopped(rows), *_waits(found)]
     ).rstrip()
 
 
@@ -145,6 +146,29 @@ def _ratios(rows):
         cells = [f"{milliseconds(median(r))} ({called(r)})" if r else "none is so accurate" for r in (mine, peer)]
         lines.append(f"| {words} | {accuracy:.0e} | {' | '.join(cells)} | {judged(ratio, largest)} |")
     return lines
+
+
+def _by_tol(rows):
+    """What a tolerance gives and takes on the sweep, beside Exudyn's planar elements that are as accurate."""
+    sweep = answered(rows, "sweep")
+    mine = sorted((row for row in sweep if automatic(row)), key=lambda row: -row["configuration"]["tol"])
+    theirs = [row for row in sweep if planar_exudyn(row)]
+    if not mine:
+        return []
+    lines = [
+        '| `model="auto"`, tol | true error | here | Exudyn, planar, as accurate | ratio |',
+        "|---|---|---|---|---|",
+    ]
+    for row in mine:
+        peer = cheapest(theirs, row["error"])
+        cells = (
+            (milliseconds(median(peer)), share(median(row) / median(peer))) if peer else ("none is so accurate", "-")
+        )
+        lines.append(
+            f"| {row['configuration']['tol']:.0e} | {row['error']:.0e} | {milliseconds(median(row))} | "
+            f"{' | '.join(cells)} |"
+        )
+    return [*lines, ""]
 
 
 def _times(rows):
@@ -180,14 +204,16 @@ def _waits(found):
     if not found.waits:
         return []
     lines = [
-        "| what a person waits for | caches | processor time | wall clock | what is computed |",
-        "|---|---|---|---|---|",
+        f"| what a person waits for | caches | what is computed | processor time (s) | wall clock (s) | {HEADS}",
+        "|---|---|---|---|---|---|---|",
     ]
     for row in found.waits:
-        told = (
-            [f"{statistics.median(row[key]):.2f} s" for key in ("processor", "wall")]
-            if row["wall"]
-            else [row["failed"], "-"]
-        )
-        lines.append(f"| {row['who']} | {row['caches']} | {' | '.join(told)} | {row['what']} |")
+        start = f"| {row['who']} | {row['caches']} | {row['what']} |"
+        if not row["wall"]:
+            lines.append(f"{start} {row['failed']} | - | - | - |")
+            continue
+        worked, waited = (statistics.median(row[key]) for key in ("processor", "wall"))
+        most = WAITS.get((row["who"], row["caches"]))
+        told = judged(waited, most, ".2f") if most else f"{waited:.2f} | - | -"
+        lines.append(f"{start} {worked:.2f} | {told} |")
     return lines

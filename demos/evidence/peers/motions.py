@@ -78,8 +78,8 @@ def configurations(peer, problem, quick=False):
 
 def _own(problem):
     found, spatial = [], problem == "spaghetti"
-    meshes = ((4, 3), (8, 2), (8, 3)) if spatial else ((4, 3), (2, 3), (4, 2))
-    steps = (0.1, 0.05, 0.03125, 0.0125) if spatial else (0.1, 0.05, 0.025)
+    meshes = ((4, 3), (4, 2), (8, 2), (8, 3)) if spatial else ((4, 3), (2, 3), (4, 2))
+    steps = (0.1, 0.05, 0.03125, 0.025, 0.0125) if spatial else (0.1, 0.05, 0.025)
     for scheme, stepper in SCHEMES.items():
         grid = [{"scheme": scheme, "elements": elements, "degree": degree} for elements, degree in meshes]
         found += [{**mesh, "dt": dt} for mesh in grid for dt in steps]
