@@ -72,7 +72,8 @@ def configurations(peer, problem, quick=False):
     if not quick:
         return found
     if peer == OWN:
-        return [c for c in found if c.get("dt") == 0.05 and c["degree"] == 2]
+        elements = 8 if problem == "spaghetti" else 4
+        return [c for c in found if c.get("dt") == 0.05 and c["degree"] == 2 and c["elements"] == elements]
     return [c for c in found if c["dt"] == 0.05 and c["elements"] == 16 and c["tol"] == 1e-4]
 
 
