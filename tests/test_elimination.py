@@ -1,11 +1,9 @@
 """Elimination along the rods against dense linear algebra: solutions, singular tangents, and counts of negative modes."""
 
 from contextlib import contextmanager
-from dataclasses import replace
 
 import numpy as np
 import pytest
-from conftest import COMM
 from mpi4py import MPI
 
 import cosserat_fenicsx as cf
@@ -38,7 +36,9 @@ def straight_between_points(section):
 def hinged_in_the_middle(section=SOFT):
     rods = [line((0, 0, 0), (0, 0, 0.5), section), line((0, 0, 0.5), (0, 0.2, 1.0), section)]
     joint = cf.Joint(rods[0].end, rods[1].start, (0, 1, 0))
-    return cf.Scene(rods, [cf.Clamp(rods[0].start), cf.Pin(rods[1].end)], [cf.Force(rods[1].start, (0.4, 0, -1))], [joint])
+    return cf.Scene(
+        rods, [cf.Clamp(rods[0].start), cf.Pin(rods[1].end)], [cf.Force(rods[1].start, (0.4, 0, -1))], [joint]
+    )
 
 
 def branches(section=SOFT):

@@ -312,3 +312,22 @@ void backward(chain *s, const double *interface, double *x)
         }
     }
 }
+
+/* ---- a small system as a whole ----------------------------------------------------------------------------------- */
+
+/* LU factors of F (n, n). Returns 0, or 1 if it is singular. */
+int factor_dense(double *F, int n, int *row, int *column)
+{
+    for (int i = 0; i < n; i++) row[i] = column[i] = i;
+    return reduce(F, n, n, 0, row, column) < n;
+}
+
+/* Replace b by the solution, by the factors. */
+void solve_dense(const double *F, int n, const int *row, const int *column, double *b, double *work)
+{
+    for (int i = 0; i < n; i++) work[i] = b[row[i]];
+    for (int i = 1; i < n; i++) work[i] -= dot(F + (size_t)i * n, work, i);
+    for (int i = n - 1; i >= 0; i--)
+        work[i] = (work[i] - dot(F + (size_t)i * n + i + 1, work + i + 1, n - i - 1)) / F[(size_t)i * n + i];
+    for (int i = 0; i < n; i++) b[column[i]] = work[i];
+}

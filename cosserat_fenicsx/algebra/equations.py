@@ -230,7 +230,7 @@ class Equations(Called):
         self.c.singular = 1 if singular else not self.interface.factor(*self._derivatives_of_ties())
 
     def _derivatives_of_ties(self):
-        """The tangent's part of supports and joints, see `Interface.matrix`."""
+        """The tangent's part of supports and joints, see `Interface.factor`."""
         if not self.ties:
             return (np.empty((0, 0)),)
         return self.ties.tangent_blocks(self.eta)
@@ -240,7 +240,7 @@ class Equations(Called):
         if comm.size > 1:
             comm.Allreduce(MPI.IN_PLACE, b)
         if not self.c.singular:
-            b[:] = self.interface.solve(b)
+            self.interface.solve(b)
 
     # -- for results -------------------------------------------------------------------------------------------------
 
