@@ -75,6 +75,7 @@ ROOMS = {
 #: results.
 FITTERS = {
     "statics": {
+        "agreement",
         "circulatory",
         "first_mesh",
         "grading",

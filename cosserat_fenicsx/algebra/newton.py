@@ -138,7 +138,7 @@ class Newton:
             raise
         reason = self.snes.getConvergedReason()
         if reason > 0:  # the residual was last evaluated at x, so the state agrees with it
-            self._lib.advance(problem.c)
+            problem.advance()
         elif problem.c.singular:
             reason = _Reason.DIVERGED_LINEAR_SOLVE
         return Solved(reason > 0, newton.iterations, WORDS.get(reason, f"PETSc's reason {reason}"))
@@ -197,7 +197,7 @@ class BorderedNewton(Newton):
         inner, motion = self.problem.model.inner, self.neutral
         force = self.problem.load_derivative(self.problem.x)
         force.array_w[:] = motion
-        self._ksp.solve(force, self._free)
+        self.problem.solve(force, self._free)
         free = self._free.array_r
         size = inner(motion, free)
         for vector in (step, self._slope):

@@ -196,7 +196,7 @@ int run(sweep *s)
     while (s->next < s->count) {
         const double here = s->etas[s->known - 1], target = s->targets[s->next], left = target - here;
         if (left == 0) {
-            s->next++;
+            s->next++, s->rejections = s->accepted = 0;
             if (!s->every && record(s)) return FULL;
             continue;
         }

@@ -95,10 +95,10 @@ class Sweep:
             sweep.records = 0
             self._follow()
             control.step, control.rejections = sweep.step, sweep.rejections
-            track.problem.raise_failure()
-            track.stability.raise_failure()
             if k:
                 yield Swept(*(array[:k] if array.size else None for array in self._recorded))
+            track.problem.raise_failure()
+            track.stability.raise_failure()
             obey()
             if why in (_DONE, _LEFT):
                 return sweep.next, sweep.iterations

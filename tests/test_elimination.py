@@ -1,0 +1,166 @@
+"""Elimination along the rods against dense linear algebra: solutions, singular tangents, and counts of negative modes."""
+
+from contextlib import contextmanager
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+import cosserat_fenicsx as cf
+from cosserat_fenicsx.models.rodmesh import Layout
+from cosserat_fenicsx.statics.solvers import solvers_of
+
+SOFT = cf.Stiffness(shear=(3e3, 5e3), axial=8e3, bending=(1.0, 2.5), torsion=0.7)
+RIGID = cf.Stiffness(shear=(np.inf, np.inf), axial=np.inf, bending=(1.0, 2.5), torsion=0.7)
+INEXTENSIBLE = cf.Stiffness(shear=(3e3, 5e3), axial=np.inf, bending=(1.0, 2.5), torsion=0.7)
+
+
+def line(a, b, section=SOFT, **more):
+    return cf.Rod(cf.Line(a, b, **more), section)
+
+
+def held_at(*which, section=SOFT):
+    """A rod clamped at its ends."""
+    rod = line((0, 0, 0), (0.3, 0.4, 1.0), section)
+    free = rod.at(0.5 * rod.length) if len(which) > 1 else rod.start if which == ("end",) else rod.end
+    return cf.Scene([rod], [cf.Clamp(getattr(rod, end)) for end in which], [cf.Force(free, (0.4, 0.5, -0.6))])
+
+
+def straight_between_points(section):
+    """Along z, whose axial force is not determined before the last element."""
+    rod = line((0, 0, 0), (0, 0, 1.0), section)
+    supports = [cf.Clamp(rod.start), cf.Roller(rod.end, (1, 0, 0)), cf.Roller(rod.end, (0, 1, 0))]
+    return cf.Scene([rod], supports, [cf.Force(rod.at(0.5), (0.4, 0.5, 0))])
+
+
+def hinged_in_the_middle(section=SOFT):
+    rods = [line((0, 0, 0), (0, 0, 0.5), section), line((0, 0, 0.5), (0, 0.2, 1.0), section)]
+    joint = cf.Joint(rods[0].end, rods[1].start, (0, 1, 0))
+    return cf.Scene(
+        rods, [cf.Clamp(rods[0].start), cf.Pin(rods[1].end)], [cf.Force(rods[1].start, (0.4, 0, -1))], [joint]
+    )
+
+
+def branches(section=SOFT):
+    """A rod on the interior of another one, with a twig of its own, and a rod joined start to start."""
+    trunk, bough = line((0, 0, 0), (0, 0, 1), section), line((0, 0, 0.5), (1, 0.1, 0.6), section)
+    twig, other = line((1, 0.1, 0.6), (1.5, 0.8, 1), section), line((0, 0, 0.5), (0, -1, 1), section)
+    joints = [cf.Joint(trunk.at(0.5), bough.start), cf.Joint(bough.end, twig.start), cf.Joint(bough.start, other.start)]
+    loads = [cf.Force(rod.end, (0.1, 0.3, -0.4)) for rod in (trunk, twig, other)]
+    return cf.Scene([trunk, bough, twig, other], [cf.Clamp(trunk.start)], loads, joints)
+
+
+def ring(count, section=SOFT):
+    """A closed ring of rods."""
+    turn, ends = 2 * np.pi / count, np.exp(2j * np.pi * np.arange(count) / count)
+    rods = [cf.Rod(cf.Arc((0, 0, 0), (z.real, z.imag, 0), turn), section) for z in ends]
+    joints = [cf.Joint(rod.end, rods[(i + 1) % count].start) for i, rod in enumerate(rods)]
+    far = rods[-1].at(0.5 * rods[-1].length)
+    return cf.Scene(rods, [cf.Clamp(rods[0].start)], [cf.Force(far, (-1, 0.2, 0.5))], joints)
+
+
+def end_to_end(section=SOFT):
+    """Joined end to end, and start to start with a third one."""
+    a, b = line((0, 0, 0), (0, 0, 1), section), line((0, 1, 1), (0, 0, 1), section)
+    c = line((0, 1, 1), (1, 1, 1), section)
+    joints = [cf.Joint(a.end, b.end), cf.Joint(b.start, c.start)]
+    return cf.Scene([a, b, c], [cf.Clamp(a.start)], [cf.Force(c.end, (0.2, 0.3, -0.4))], joints)
+
+
+def lattice(section=SOFT):
+    """Rods between the points of a grid, most of them of one element, two of them hinged."""
+    points = {(i, j): (float(i), float(j), 0.1 * i * j) for i in range(3) for j in range(3)}
+    rods, first, joints = [], {}, []
+    for i, j in points:
+        for to in ((i + 1, j), (i, j + 1)):
+            if to in points:
+                rods.append(line(points[i, j], points[to], section))
+                for at, station in (((i, j), rods[-1].start), (to, rods[-1].end)):
+                    if at in first:
+                        release = (0, 0, 1) if len(rods) in (4, 9) and station.s == 0 else None
+                        joints.append(cf.Joint(first[at], station, release))
+                    else:
+                        first[at] = station
+    supports = [cf.Clamp(first[0, 0]), cf.Pin(first[2, 0])]
+    return cf.Scene(rods, supports, [cf.Force(first[2, 2], (0.1, 0.2, -0.5))], joints)
+
+
+def in_a_plane(section=SOFT):
+    a, b = line((0, 0, 0), (0, 0, 1), section, d1=(1, 0, 0)), line((0, 0, 1), (1, 0, 1), section, d1=(0, 0, 1))
+    return cf.Scene([a, b], [cf.Clamp(a.start)], [cf.Force(b.end, (0.2, 0, -0.5))], [cf.Joint(a.end, b.start)])
+
+
+def column(section=SOFT):
+    """Statically determinate in a plane."""
+    rod = line((0, 0, 0), (0, 0, 1), section, d1=(1, 0, 0))
+    return cf.Scene([rod], [cf.Clamp(rod.start)], [cf.Force(rod.end, (0.5, 0, -2))])
+
+
+SCENES = {
+    "clamped at its start": held_at("start"), "clamped at its end": held_at("end"), "at both": held_at("start", "end"),
+    "rigid, start": held_at("start", section=RIGID), "rigid, end": held_at("end", section=RIGID),
+    "inextensible between points": straight_between_points(INEXTENSIBLE),
+    "rigid between points": straight_between_points(RIGID),
+    "hinge": hinged_in_the_middle(), "rigid with hinge": hinged_in_the_middle(RIGID),
+    "tree": branches(), "rigid tree": branches(RIGID), "ring of one": ring(1), "ring of three": ring(3),
+    "rigid ring of two": ring(2, RIGID), "end to end": end_to_end(), "lattice": lattice(),
+    "rigid lattice": lattice(INEXTENSIBLE),
+}  # fmt: skip
+
+
+@contextmanager
+def bent(scene, elements=2, *, comm=MPI.COMM_SELF, amount=0.1, **options):
+    """Loaded solvers whose state is near the reference one, without symmetry."""
+    with solvers_of(scene, Layout.of(scene, elements), comm=comm, **options) as solvers:
+        problem = solvers[0]
+        bend(problem, amount)
+        yield solvers
+
+
+def bend(problem, amount):
+    """The same motion on all ranks."""
+    numbering = problem.numbering
+    problem.set_load_factor(0.8)
+    change = amount * np.random.default_rng(5).normal(size=numbering.total)
+    problem.x.array_w[:] += change[numbering.first : numbering.first + numbering.size]
+    problem.function(problem.x, problem.b)
+    for live in problem._live:
+        live[:] = 0.3
+
+
+def dense(problem):
+    """The tangent, from its elements and the blocks of the constraint equations."""
+    numbering, model = problem.numbering, problem.model
+    rows = numbering.rows[model.cell_dofs]
+    A = np.zeros((numbering.total + 1,) * 2)  # the last row and column are those of clamped nodes, numbered -1
+    for here, element in zip(rows, problem._tangent.matrices(), strict=True):
+        A[np.ix_(here, here)] += 0  # an element may contain a node twice
+        np.add.at(A, (here[:, None], here[None, :]), element)
+    if problem.ties:
+        nodes = problem.ties.rows.ravel()
+        multipliers = numbering.first_multiplier + np.arange(numbering.multipliers)
+        blocks = problem.ties.tangent_blocks(problem.eta)
+        for (r, c), block in zip(((nodes, nodes), (nodes, multipliers), (multipliers, nodes)), blocks, strict=True):
+            np.add.at(A, (r[:, None], c[None, :]), block)
+    return A[:-1, :-1]
+
+
+def check_solution(problem):
+    problem.factor()
+    A, b = dense(problem), np.random.default_rng(6).normal(size=problem.numbering.total)
+    problem.b.array_w[:] = b
+    x = problem.numbering.vector()
+    assert problem.solve(problem.b, x)
+    scale = np.abs(A) @ np.abs(x.array_r) + np.abs(b)
+    assert (np.abs(A @ x.array_r - b) / scale.max()).max() < 1e-12
+    exact = np.linalg.solve(A, b)
+    room = 1e-15 * np.linalg.cond(A) + 1e-12
+    np.testing.assert_allclose(x.array_r, exact, rtol=0, atol=room * np.abs(exact).max())
+
+
+@pytest.mark.serial
+@pytest.mark.parametrize("name", SCENES)
+def test_solution_is_that_of_dense_factors(name):
+    """At a bent state and, where the tangent is not singular there, at a straight one."""
+    with bent(SCENES[name]) as (problem, _, _):
+        check_solution(problem)
