@@ -1,7 +1,6 @@
-"""Elimination along the rods against dense linear algebra: solutions, singular tangents, and counts of negative modes."""
+"""Elimination along the rods against dense linear algebra: solutions, singular tangents, numbers of negative modes."""
 
 from contextlib import contextmanager
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -225,14 +224,14 @@ def eigenvalues(stability):
 
 def soft_on_stiff():
     """A rod whose stiffness is a millionth of that of its neighbour, and one between both."""
-    a, b = line((0, 0, 0), (0, 0, 1), SOFT), line((0, 0, 1), (0, 0.3, 2), replace_all(SOFT, 1e6))
-    c = line((0, 0, 1), (1, 0, 1.5), replace_all(SOFT, 1e3))
+    a, b = line((0, 0, 0), (0, 0, 1), SOFT), line((0, 0, 1), (0, 0.3, 2), times(SOFT, 1e6))
+    c = line((0, 0, 1), (1, 0, 1.5), times(SOFT, 1e3))
     joints = [cf.Joint(a.end, b.start), cf.Joint(b.start, c.start, (0, 1, 0))]
     loads = [cf.Force(a.end, (0, 0, -1e2)), cf.Force(b.end, (0, 0.3, -1e6)), cf.Force(c.end, (1, 0, -20))]
     return cf.Scene([a, b, c], [cf.Clamp(a.start), cf.Pin(c.end)], loads, joints)
 
 
-def replace_all(section, factor):
+def times(section, factor):
     return cf.Stiffness(
         shear=[factor * k for k in (3e3, 5e3)], axial=factor * 8e3, bending=[factor, 2.5 * factor],
         torsion=0.7 * factor,
@@ -275,7 +274,7 @@ def test_negative_pivots_are_negative_eigenvalues(name):
 @pytest.mark.parametrize("name", ["hinge", "rigid tree", "lattice", "ring of three"])
 def test_ranks_share_the_elimination(name):
     """The same solution and count on all ranks together as on each alone."""
-    scene, b, found = SCENES[name], None, []
+    scene, found = SCENES[name], []
     for comm in (MPI.COMM_SELF, COMM):
         with bent(scene, 2, comm=comm, amount=0.0) as (problem, newton, stability):
             problem.set_load_factor(0.4)
