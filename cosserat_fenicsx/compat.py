@@ -13,6 +13,7 @@ import numpy as np
 
 from cosserat_fenicsx import interrupts
 from cosserat_fenicsx.errors import InstallationError
+from cosserat_fenicsx.processor import instructions
 
 _HOW_TO_INSTALL = (
     "Install it with the system's packages (Debian and Ubuntu: 'apt install python3-dolfinx', then run the "
@@ -21,7 +22,7 @@ _HOW_TO_INSTALL = (
 )
 
 try:
-    import cffi
+    import _cffi_backend
     import dolfinx
     import ufl
     from dolfinx import fem, jit
@@ -173,9 +174,9 @@ def alias(function):
 
 
 def form_for_speed(form):
-    """A form compiled with more optimisation, for kernels that run very often: half the running time, a tenth more to
-    compile."""
-    options = {"cffi_extra_compile_args": ["-O3"]}
+    """A form compiled with more optimisation, for kernels that run very often: a tenth more to compile, and from a sixth
+    to half of the running time less."""
+    options = {"cffi_extra_compile_args": ["-O3", "-g0", *instructions()]}
     return fem.form(form, **{"jit_params" if _VERSION < (0, 6) else "jit_options": options})
 
 
@@ -236,7 +237,7 @@ def expression_address(expression):
 
 
 def _address(compiled):
-    return int(cffi.FFI().cast("uintptr_t", compiled.tabulate_tensor_float64))
+    return int(_cffi_backend.FFI().cast("uintptr_t", compiled.tabulate_tensor_float64))  # cffi.FFI loads a C parser
 
 
 def element_nodes(space):

@@ -4,7 +4,6 @@ from contextlib import contextmanager
 
 import numpy as np
 import pytest
-from conftest import COMM
 from mpi4py import MPI
 
 import cosserat_fenicsx as cf
@@ -134,7 +133,7 @@ def dense(problem):
     numbering, model = problem.numbering, problem.model
     rows = numbering.rows[model.cell_dofs]
     A = np.zeros((numbering.total + 1,) * 2)  # the last row and column are those of clamped nodes, numbered -1
-    for here, element in zip(rows, problem._tangent.matrices(), strict=True):
+    for here, element in zip(rows, problem.tangent_form.matrices(), strict=True):
         A[np.ix_(here, here)] += 0  # an element may contain a node twice
         np.add.at(A, (here[:, None], here[None, :]), element)
     if problem.ties:

@@ -63,7 +63,8 @@ class Equations(Called):
     Attributes:
         x, b: unknowns, residual; the model's state follows x.
         ties: the `TieRows` of the constraint equations of supports and joints, or None.
-        elimination: the `Elimination` of the tangent.
+        elimination: the `Elimination` of the tangent; interface: its `Interface`, or None.
+        tangent_form: the `Packed` tangent.
         c: the C structure `problem`.
     """
 
@@ -113,7 +114,7 @@ class Equations(Called):
     def take_forms(self, residual, tangent, advance=None):
         """Set the `Packed` residual and tangent, and the `PackedExpression` of the carried contact force or None."""
         problem = self.c
-        self._residual, self._tangent, self._advance = residual, tangent, advance
+        self._residual, self.tangent_form, self._advance = residual, tangent, advance
         problem.residual, problem.tangent, problem.dofs = residual.c, tangent.c, self._integers(residual.dofs)
         if advance:
             problem.advance = advance.c
@@ -150,6 +151,10 @@ class Equations(Called):
         """x = tangent^-1 b; False where the last tangent is singular."""
         self._done(self._lib.solve(self.c, self._read(b), self._written(x)))
         return not self.c.singular
+
+    def advance(self):
+        """Update the contact force that is carried at the Gauss points by the step from `model.before` to the state."""
+        self._lib.advance(self.c)
 
     def set_state(self, x):
         """Copy a vector of unknowns into the model's state, ghosts included."""
@@ -225,7 +230,7 @@ class Equations(Called):
         self.c.singular = 1 if singular else not self.interface.factor(*self._derivatives_of_ties())
 
     def _derivatives_of_ties(self):
-        """The tangent's part of supports and joints, see `Interface.matrix`."""
+        """The tangent's part of supports and joints, see `Interface.factor`."""
         if not self.ties:
             return (np.empty((0, 0)),)
         return self.ties.tangent_blocks(self.eta)
@@ -235,7 +240,7 @@ class Equations(Called):
         if comm.size > 1:
             comm.Allreduce(MPI.IN_PLACE, b)
         if not self.c.singular:
-            b[:] = self.interface.solve(b)
+            self.interface.solve(b)
 
     # -- for results -------------------------------------------------------------------------------------------------
 

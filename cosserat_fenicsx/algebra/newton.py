@@ -138,7 +138,7 @@ class Newton:
             raise
         reason = self.snes.getConvergedReason()
         if reason > 0:  # the residual was last evaluated at x, so the state agrees with it
-            self._lib.advance(problem.c)
+            problem.advance()
         elif problem.c.singular:
             reason = _Reason.DIVERGED_LINEAR_SOLVE
         return Solved(reason > 0, newton.iterations, WORDS.get(reason, f"PETSc's reason {reason}"))

@@ -53,13 +53,13 @@ class Packed(_Kernel):
     Args:
         form: a linear or bilinear form, integrated over this rank's elements.
         moving: the Functions whose values change; those of all others are taken by `refresh`.
-        constants: the Constants whose values change.
+        constants: the Constants whose values change; those of all others are taken by `refresh`, too.
 
     Attributes:
         dofs: (elements, size) local degrees of freedom of the vector, of a linear form.
     """
 
-    def __init__(self, form, moving, constants=()):
+    def __init__(self, form, moving, constants):
         self._form = compat.kernel(form)
         spaces, elements = self._form.function_spaces, self._form.mesh.topology.index_map(1).size_local
         of_spaces = [_dofs(space)[:elements] for space in spaces]

@@ -51,14 +51,15 @@ class StepProblem(Equations):
 
     def _pack(self):
         """Pack the constants and coefficients of a scene for all forms; those that change in time are updated later."""
-        forms, moving = self.model.forms, tuple(self.model.moving_loads)
+        forms, moving, constants = self.model.forms, tuple(self.model.moving_loads), self.model.constants
         self.take_forms(self._packed(forms.residual), self._packed(forms.tangent))
         self._live, self._momentum = (
             self._packed(forms.live),
-            Packed(forms.momentum, self._ends(), self.model.constants),
+            Packed(forms.momentum, self._ends(), constants),
         )
         self._dead, self._permanent = (
-            None if form is None else Packed(form, moving) for form in (forms.dead, forms.permanent)
+            None if form is None else Packed(form, moving, self.model.constants)
+            for form in (forms.dead, forms.permanent)
         )
 
     def _packed(self, form):
