@@ -1,4 +1,4 @@
-"""Elimination along the rods against dense linear algebra: solutions, singular tangents, and counts of negative modes."""
+"""Elimination along the rods against dense linear algebra: solutions, singular tangents, numbers of negative modes."""
 
 from contextlib import contextmanager
 
@@ -164,3 +164,127 @@ def test_solution_is_that_of_dense_factors(name):
     """At a bent state and, where the tangent is not singular there, at a straight one."""
     with bent(SCENES[name]) as (problem, _, _):
         check_solution(problem)
+
+
+@pytest.mark.serial
+@pytest.mark.parametrize("degree", [1, 2, 3, 4])
+@pytest.mark.parametrize("formulation", ["mixed", "displacement", "multiplier"])
+def test_every_formulation_and_degree(formulation, degree):
+    with bent(hinged_in_the_middle(), 3, formulation=formulation, degree=degree) as (problem, _, _):
+        check_solution(problem)
+
+
+@pytest.mark.serial
+@pytest.mark.parametrize("degree", [1, 4])
+@pytest.mark.parametrize(
+    ("scene", "model"), [(in_a_plane(), "planar"), (in_a_plane(RIGID), "planar"), (column(), "determinate")]
+)
+def test_plane_models(scene, model, degree):
+    with bent(scene, 3, model=model, degree=degree) as (problem, _, _):
+        check_solution(problem)
+
+
+@pytest.mark.serial
+@pytest.mark.parametrize("section", [INEXTENSIBLE, RIGID])
+@pytest.mark.parametrize("elements", [1, 5])
+def test_forces_of_straight_rods_without_extension_wait_for_their_ends(section, elements):
+    """Pivots of the axial force are zero in every element of a straight rod between two points."""
+    with bent(straight_between_points(section), elements, amount=0.0) as (problem, _, _):
+        check_solution(problem)
+
+
+@pytest.mark.serial
+@pytest.mark.parametrize("elements", [1, 2, 6])
+def test_an_axial_force_that_is_not_determined_makes_the_tangent_singular(elements):
+    """Between two clamps, and in the middle of a rod that is held at both ends along its axis."""
+    rod = line((0, 0, 0), (0, 0, 1.0), INEXTENSIBLE)
+    for supports in ([cf.Clamp(rod.start), cf.Clamp(rod.end)], [cf.Clamp(rod.start), cf.Pin(rod.end)]):
+        scene = cf.Scene([rod], supports, [cf.Force(rod.at(0.5), (0.3, 0.2, 0))])
+        with bent(scene, elements, amount=0.0) as (problem, newton, _):
+            problem.factor()
+            assert not problem.solve(problem.b, problem.x)
+            assert not np.isfinite(problem.x.array_r).any()
+        with bent(scene, elements, amount=0.0) as (problem, newton, _):
+            newton.allow(5)
+            assert newton.solve().reason == "the tangent is singular"
+
+
+def eigenvalues(stability):
+    """Of the assembled second variation, scaled to a diagonal of ones; with the signs that they have in any scaling."""
+    found = []
+    for part in stability.parts:
+        part.assemble()
+        rows = np.arange(part.variation.numbering.total, dtype=np.int32)
+        K = part.K.getValues(rows, rows)
+        size = np.sqrt(np.abs(np.diag(K)))
+        found.append(np.linalg.eigvalsh((K + K.T) / (2 * size * size[:, None])))
+    return np.concatenate(found)
+
+
+def soft_on_stiff():
+    """A rod whose stiffness is a millionth of that of its neighbour, and one between both."""
+    a, b = line((0, 0, 0), (0, 0, 1), SOFT), line((0, 0, 1), (0, 0.3, 2), times(SOFT, 1e6))
+    c = line((0, 0, 1), (1, 0, 1.5), times(SOFT, 1e3))
+    joints = [cf.Joint(a.end, b.start), cf.Joint(b.start, c.start, (0, 1, 0))]
+    loads = [cf.Force(a.end, (0, 0, -1e2)), cf.Force(b.end, (0, 0.3, -1e6)), cf.Force(c.end, (1, 0, -20))]
+    return cf.Scene([a, b, c], [cf.Clamp(a.start), cf.Pin(c.end)], loads, joints)
+
+
+def times(section, factor):
+    return cf.Stiffness(
+        shear=[factor * k for k in (3e3, 5e3)], axial=factor * 8e3, bending=[factor, 2.5 * factor],
+        torsion=0.7 * factor,
+    )  # fmt: skip
+
+
+def slender():
+    """L/d = 1e5: axial and bending stiffness of the elements differ by eleven orders of magnitude."""
+    rod = line((0, 0, 0), (0, 0, 1), cf.Stiffness(shear=(6e10, 6e10), axial=1.6e11, bending=(1.0, 1.0), torsion=0.8))
+    return cf.Scene([rod], [cf.Clamp(rod.start)], [cf.Force(rod.end, (0.1, 0.2, -1.0))])
+
+
+COUNTED = {
+    "clamped at its end": (held_at("end"), {}), "at both": (held_at("start", "end"), {"formulation": "displacement"}),
+    "hinge": (hinged_in_the_middle(), {"degree": 2}), "rigid tree": (branches(RIGID), {}),
+    "ring of one": (ring(1), {"formulation": "multiplier"}), "lattice": (lattice(), {"degree": 3}),
+    "in a plane": (in_a_plane(), {"model": "planar"}), "determinate": (column(), {"model": "determinate"}),
+    "soft on stiff": (soft_on_stiff(), {}), "slender": (slender(), {}),
+}  # fmt: skip
+
+
+@pytest.mark.serial
+@pytest.mark.parametrize("name", COUNTED)
+def test_negative_pivots_are_negative_eigenvalues(name):
+    """Under contact forces of all signs, so that up to a third of the eigenvalues are negative."""
+    scene, options = COUNTED[name]
+    found = []
+    with bent(scene, 3, amount=1e-3, **options) as (problem, _, stability):
+        for size in (0.0, 30.0, 1e3):
+            for live in problem._live:
+                live[:] = size * np.random.default_rng(3).normal(size=len(live))
+            values = eigenvalues(stability)
+            assert stability.count() == np.count_nonzero(values < 0)
+            found.append(np.count_nonzero(values < 0))
+    if problem._live:
+        assert found[0] < found[-1]
+
+
+@pytest.mark.few_ranks
+@pytest.mark.parametrize("name", ["hinge", "rigid tree", "lattice", "ring of three"])
+def test_ranks_share_the_elimination(name):
+    """The same solution and count on all ranks together as on each alone."""
+    scene, found = SCENES[name], []
+    for comm in (MPI.COMM_SELF, COMM):
+        with bent(scene, 2, comm=comm, amount=0.0) as (problem, newton, stability):
+            problem.set_load_factor(0.4)
+            newton.allow(30)
+            assert newton.solve().converged
+            problem.factor()
+            model, numbering = problem.model, problem.numbering
+            problem._force = problem.load_derivative(problem.x)
+            x = numbering.vector()
+            assert problem.solve(problem._force, x)
+            nodal, _ = model.snapshot()
+            found.append((nodal, model.inner(x.array_r, x.array_r), stability.count()))
+    for alone, together in zip(*found, strict=True):
+        np.testing.assert_allclose(together, alone, rtol=1e-9, atol=1e-11)
