@@ -87,6 +87,7 @@ class Sweep:
         sweep.targets, sweep.count, sweep.next = self._ffi.cast("double *", targets.ctypes.data), len(targets), 0
         sweep.every, sweep.iterations, sweep.steps, sweep.records = every, counted, track.steps, 0
         track.newton.allow(track.max_iterations)
+        track.newton.c.rounding = track.model.round_off
         while True:
             before = sweep.iterations
             why = self._run(sweep)
