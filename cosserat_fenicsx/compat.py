@@ -249,8 +249,9 @@ def element_nodes(space):
 def cell_nodes(space):
     """Local node (block) indices of every local cell of a space, shape (cells, nodes per cell); a rank may have
     none."""
-    cells = space.dofmap.list
-    cells = cells() if callable(cells) else cells  # of C++'s spaces
+    dofmap = space.dofmap
+    cells = dofmap.list if hasattr(dofmap, "list") else dofmap.map()  # a space of Python's, or one of C++'s
+    cells = cells() if callable(cells) else cells
     if not hasattr(cells, "array"):
         return cells
     return cells.array.reshape(cells.num_nodes, space.dofmap.dof_layout.num_dofs)

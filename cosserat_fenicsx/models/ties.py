@@ -21,7 +21,7 @@ _GROUND = (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
 
 @cache
 def _kernels():
-    """The compiled `forms.ties.derivatives`; the same for all scenes and models."""
+    """The compiled `forms.ties.derivatives`, which are the same for all scenes and models."""
     with compiling():
         return [compat.on_rows(x) for x in eq.derivatives(ufl.Constant(compat.interval_domain(), shape=(eq.COUNT,)))]
 
@@ -37,6 +37,7 @@ class Ties:
     """
 
     def __init__(self, ties, nodes, reference, length):
+        self._add_values, self._add_changes = _kernels()
         self._length, self._count = length, len(reference)
         self._nodes = np.array(nodes) % (self._count + 1)  # the ground last
         rest = np.append(reference, [_GROUND[:3]], axis=0)
@@ -75,7 +76,7 @@ class Ties:
         """
         found = np.zeros((len(self._rows), 13))
         self._see(rq, eta)
-        _kernels()[0](self._rows, found)
+        self._add_values(self._rows, found)
         return found[:, 0], found[:, 1:].reshape(-1, 2, 6)
 
     def on_nodes(self, gradients):
@@ -92,7 +93,7 @@ class Ties:
         found, total = np.zeros((len(self._turning), 144)), np.zeros((self._count, 6, self._count, 6))
         self._see(rq, eta)
         self._rows[:, -1] = multipliers
-        _kernels()[1](self._rows[self._turning], found)
+        self._add_changes(self._rows[self._turning], found)
         for tie, block in zip(self._turning, found.reshape(-1, 2, 6, 2, 6), strict=True):
             ends = [(i, node) for i, node in enumerate(self._nodes[tie]) if node < self._count]
             for i, k in ends:

@@ -1,6 +1,6 @@
 """Wall clock of a Newton step on one, two and four ranks, with the spatial model at 1e5 and 1e6 unknowns.
 
-    python demos/evidence/ranks.py            runs itself under mpirun; writes out/ranks.md (a minute)
+    python demos/evidence/ranks.py            runs itself under mpirun, on an idle machine; writes out/ranks.md
     python demos/evidence/ranks.py --quick    7000 unknowns, one round
 
 The cantilever and the step of scaling.py. Numbers of ranks take turns; results are medians over all rounds. More ranks
@@ -56,7 +56,8 @@ def main(sizes=SIZES, rounds=ROUNDS, out="out", ranks=RANKS):
         [(unknowns, {ranks: median time (s)}, largest difference of the tip's displacement, relative)].
     """
     lines = [
-        f"{in_words(record())}. Wall clock, medians of {rounds} run(s) in turn.",
+        f"{in_words(record())}. Wall clock, medians of {rounds} run(s) in turn; at the start {os.getloadavg()[0]:.1f}"
+        " other processes were running.",
         "",
         "| unknowns | " + " | ".join(f"{n} rank{'s' * (n > 1)} (ms)" for n in ranks)
         + f" | digits: largest difference of the tip | two over one | {HEADS}",
