@@ -156,3 +156,27 @@ def test_ctrl_c_keeps_the_points_so_far(scene):
     assert took < 0.2 and 10 < len(path) < len(etas)
     np.testing.assert_array_equal(path.load_factors, etas[: len(path)])
     assert np.isfinite(path.position(scene.rods[0].end)).all()
+
+
+def test_threads_take_turns_in_petsc():
+    """PETSc keeps reductions that have begun in one place for all threads."""
+
+    def tip():
+        scene = column()
+        return cf.solve(scene, ETAS, elements=3, model="spatial").position(scene.rods[0].end)
+
+    expected, failures = tip(), []
+
+    def work():
+        try:
+            for _ in range(15):
+                np.testing.assert_allclose(tip(), expected, atol=1e-11)
+        except BaseException as problem:
+            failures.append(problem)
+
+    threads = [threading.Thread(target=work) for _ in range(3)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert not failures
