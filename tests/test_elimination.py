@@ -4,6 +4,8 @@ from contextlib import contextmanager
 
 import numpy as np
 import pytest
+from conftest import COMM
+from dense import tangent
 from mpi4py import MPI
 
 import cosserat_fenicsx as cf
@@ -128,26 +130,9 @@ def bend(problem, amount):
         live[:] = 0.3
 
 
-def dense(problem):
-    """The tangent, from its elements and the blocks of the constraint equations."""
-    numbering, model = problem.numbering, problem.model
-    rows = numbering.rows[model.cell_dofs]
-    A = np.zeros((numbering.total + 1,) * 2)  # the last row and column are those of clamped nodes, numbered -1
-    for here, element in zip(rows, problem.tangent_form.matrices(), strict=True):
-        A[np.ix_(here, here)] += 0  # an element may contain a node twice
-        np.add.at(A, (here[:, None], here[None, :]), element)
-    if problem.ties:
-        nodes = problem.ties.rows.ravel()
-        multipliers = numbering.first_multiplier + np.arange(numbering.multipliers)
-        blocks = problem.ties.tangent_blocks(problem.eta)
-        for (r, c), block in zip(((nodes, nodes), (nodes, multipliers), (multipliers, nodes)), blocks, strict=True):
-            np.add.at(A, (r[:, None], c[None, :]), block)
-    return A[:-1, :-1]
-
-
 def check_solution(problem):
     problem.factor()
-    A, b = dense(problem), np.random.default_rng(6).normal(size=problem.numbering.total)
+    A, b = tangent(problem), np.random.default_rng(6).normal(size=problem.numbering.total)
     problem.b.array_w[:] = b
     x = problem.numbering.vector()
     assert problem.solve(problem.b, x)

@@ -4,6 +4,7 @@ Only a C compiler and Python's headers are needed, which dolfinx needs as well.
 """
 
 import contextlib
+import ctypes
 import fcntl
 import functools
 import hashlib
@@ -61,6 +62,15 @@ def module(*sources):
                 return _load(name, file)
             _build(name, file, sources, header, flags)
             return _load(name, file)
+
+
+def undisturbed(name, *pointers):
+    """Call a C function of this folder that calls PETSc, which is not made for threads: unlike cffi, without letting
+    other threads of Python run meanwhile."""
+    ffi, lib = module()
+    address = int(ffi.cast("intptr_t", ffi.addressof(lib, name)))
+    function = ctypes.PYFUNCTYPE(ctypes.c_int, *[ctypes.c_void_p] * len(pointers))(address)
+    return function(*(int(ffi.cast("intptr_t", pointer)) for pointer in pointers))
 
 
 @contextlib.contextmanager

@@ -20,7 +20,7 @@ def _hook():
     ffi, _ = module()
 
     def keep(kind, failure, trace):  # C cannot pass it on; Ctrl-C is raised here as soon as Python is entered
-        ffi.from_handle(trace.tb_frame.f_locals["owner"])().failure = failure
+        ffi.from_handle(trace.tb_frame.f_locals["owner"])().failure = failure.with_traceback(trace)
 
     @ffi.def_extern(name="python_hook", error=1, onerror=keep)
     def hook(owner, what, a, b):

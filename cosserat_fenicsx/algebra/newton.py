@@ -13,7 +13,7 @@ from functools import cache, cached_property
 import numpy as np
 from petsc4py import PETSc
 
-from cosserat_fenicsx.algebra.building import module
+from cosserat_fenicsx.algebra.building import module, undisturbed
 from cosserat_fenicsx.compat import RESIDUAL_NOT_A_NUMBER
 from cosserat_fenicsx.errors import NotConverged
 
@@ -109,7 +109,7 @@ class Newton:
         handles = (
             self._ffi.cast("void *", handle) for handle in (snes.handle, self.problem.b.handle, self._matrix.handle, pc)
         )
-        if self._lib.attach(petsc(), self.c, *handles):
+        if undisturbed("attach", petsc(), self.c, *handles):
             raise MemoryError("PETSc's SNES does not take its callbacks")
 
     @cached_property

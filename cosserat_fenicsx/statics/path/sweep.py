@@ -4,7 +4,7 @@ from collections import namedtuple
 
 import numpy as np
 
-from cosserat_fenicsx.algebra.building import module
+from cosserat_fenicsx.algebra.building import module, undisturbed
 from cosserat_fenicsx.algebra.newton import petsc
 from cosserat_fenicsx.interrupts import obey
 from cosserat_fenicsx.statics.path import load_control
@@ -29,8 +29,8 @@ class Sweep:
     """
 
     def __init__(self, track, fields):
-        self._ffi, lib = module()
-        self._run, self._track, self._fields = lib.run, track, fields
+        self._ffi, _ = module()
+        self._track, self._fields = track, fields
         problem, model, ffi = track.problem, track.model, self._ffi
         self.c = sweep = ffi.new("sweep *")
         sweep.newton, sweep.stability = track.newton.c, track.stability.c
@@ -90,7 +90,7 @@ class Sweep:
         track.newton.c.rounding = track.model.round_off
         while True:
             before = sweep.iterations
-            why = self._run(sweep)
+            why = undisturbed("run", sweep)
             k = sweep.records
             track.iterations += int(self._recorded.iterations[:k].sum()) + sweep.iterations - before
             sweep.records = 0
