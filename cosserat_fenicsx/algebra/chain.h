@@ -75,7 +75,7 @@ typedef struct {
     double increment, rounding, loads; /* limits of the increment and of the residual: rounding + 1e-6 (1 + loads) */
     int period, contracts;          /* steps that are compared; whether quadratic convergence is expected */
     int most, iterations;
-    double steps[100];
+    double steps[4];                /* sizes of the last ones, the latest first */
     int iterating, converged, ran_out, grown, not_a_number; /* SNES's reasons */
     double *x;                      /* the solution, while SNES does not use it */
 } newton;

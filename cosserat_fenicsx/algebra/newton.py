@@ -20,7 +20,6 @@ from cosserat_fenicsx.errors import NotConverged
 #: Newton stops when the increment, or the remaining error estimated from the contraction, is below this (root mean
 #: square over the nodal unknowns, positions in units of L).
 INCREMENT = 1e-11
-_MOST_ITERATIONS = 100  # the room in newton.c
 _Reason = PETSc.SNES.ConvergedReason
 #: Why SNES stopped.
 WORDS = {
@@ -119,8 +118,13 @@ class Newton:
 
     def allow(self, iterations):
         """Set the largest number of iterations."""
-        self.c.most = min(iterations, _MOST_ITERATIONS)
+        self.c.most = iterations
         self.snes.setTolerances(max_it=iterations + 1)  # newton.c stops before SNES's own limit
+
+    def _take_loads(self):
+        """What the residual is compared with."""
+        problem = self.problem
+        self.c.loads, self.c.rounding = abs(problem.load_factor) * problem.load_norm, problem.model.round_off
 
     def solve(self):
         """Newton from the problem's x (and carried fields) at the model's load factor; x and the state follow.
@@ -129,7 +133,7 @@ class Newton:
             Solved. If it has not converged, x is not an equilibrium, and the state may differ from x.
         """
         problem, newton = self.problem, self.c
-        newton.loads, newton.rounding = abs(problem.load_factor) * problem.load_norm, problem.model.round_off
+        self._take_loads()
         self._lib.begin(newton)
         try:
             self.snes.solve(None, problem.x)
@@ -191,6 +195,7 @@ class BorderedNewton(Newton):
         step.axpy(change, self._slope)
         if math.isfinite(change):
             problem.set_load_factor(eta + change)
+            self._take_loads()
 
     def _leave_out_neutral(self, step):
         """Remove the neutral motion from the step and from dx/d eta, and update it by inverse iteration."""

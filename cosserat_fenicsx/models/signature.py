@@ -21,7 +21,7 @@ _SIZES = {
     ("determinate", True): (1, 0),
     ("determinate", False): (4, 0),
 }
-# Largest value of `_rounding` for a factorisation that pivots only within nodes.
+# Value of `_rounding` above which rods are slender, see `Signature.slender`.
 _SLENDER = 1e-4
 
 
