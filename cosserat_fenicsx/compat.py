@@ -180,9 +180,14 @@ def form_for_speed(form):
     return fem.form(form, **{"jit_params" if _VERSION < (0, 6) else "jit_options": options})
 
 
+#: Gives a function that compiles a communicator as its first argument: rank 0 calls it before the others.
+rank_0_first = jit.mpi_jit_decorator
+
+
 def on_rows(expression):
-    """A compiled function (numbers, results) that adds the values of a UFL expression of the components of one
-    ufl.Constant, for every row of `numbers` (m, components), to the rows of `results` (m, ..); both contiguous."""
+    """For `rank_0_first`: a compiled function (numbers, results) that adds the values of a UFL expression of the
+    components of one ufl.Constant, for every row of `numbers` (m, components), to the rows of `results` (m, ..); both
+    contiguous."""
     compiled, module, _ = jit.ffcx_jit(MPI.COMM_SELF, (expression, np.array([[0.5]])))
     call, buffer, null = compiled.tabulate_tensor_float64, module.ffi.from_buffer, module.ffi.NULL
     others = (null,) * (3 if _VERSION < (0, 10) else 4)

@@ -288,7 +288,7 @@ class RodModel(Snapshots):
         place = {vertex: i for i, vertex in enumerate(links.tied)}
         nodes = [(place[a], -1 if b is None else place[b]) for _, a, b in links.ties]
         reference = self.reference[self.tied_slots]
-        self.ties = Ties(ties_of(self.scene), nodes, reference, self.scales.length) if nodes else None
+        self.ties = Ties(ties_of(self.scene), nodes, reference, self.scales.length, self.comm) if nodes else None
 
     def set_motion(self, values, n):
         """Set the initial guess, in the scene's order: the nodes' unknowns (N, components), and n at the Gauss points

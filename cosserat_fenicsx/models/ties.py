@@ -10,6 +10,7 @@ from functools import cache
 
 import numpy as np
 import ufl
+from mpi4py import MPI
 
 from cosserat_fenicsx import compat
 from cosserat_fenicsx.compiling import compiling
@@ -19,11 +20,11 @@ from cosserat_fenicsx.scene.ties import AngleTie, PositionTie
 _GROUND = (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
 
 
+@compat.rank_0_first
 @cache
 def _kernels():
     """The compiled `forms.ties.derivatives`, which are the same for all scenes and models."""
-    with compiling():
-        return [compat.on_rows(x) for x in eq.derivatives(ufl.Constant(compat.interval_domain(), shape=(eq.COUNT,)))]
+    return [compat.on_rows(x) for x in eq.derivatives(ufl.Constant(compat.interval_domain(), shape=(eq.COUNT,)))]
 
 
 class Ties:
@@ -34,10 +35,12 @@ class Ties:
         nodes: (a, b) of every tie as indices into the tied nodes; b = -1 for the ground.
         reference: (tied nodes, 3) positions at rest.
         length: unit of length, m.
+        comm: of the ranks that make them together.
     """
 
-    def __init__(self, ties, nodes, reference, length):
-        self._add_values, self._add_changes = _kernels()
+    def __init__(self, ties, nodes, reference, length, comm=MPI.COMM_SELF):
+        with compiling():
+            self._add_values, self._add_changes = _kernels(comm)
         self._length, self._count = length, len(reference)
         self._nodes = np.array(nodes) % (self._count + 1)  # the ground last
         rest = np.append(reference, [_GROUND[:3]], axis=0)
