@@ -31,6 +31,11 @@ class ElementRule:
         return np.vander(2 * np.asarray(x) - 1, len(self.nodes), increasing=True) @ self._to_coefficients
 
     @cached_property
+    def at_gauss(self):
+        """(gauss, p + 1) nodal basis functions at the Gauss points."""
+        return self.basis(self.gauss)
+
+    @cached_property
     def lobatto(self):
         """(p + 1,) weights of the quadrature rule whose points are the nodes."""
         return lobatto_weights(self.nodes)

@@ -1,5 +1,6 @@
 """The C of the package is compiled and loaded on each release of dolfinx; what goes wrong is told in one sentence."""
 
+import os
 import threading
 
 import pytest
@@ -10,8 +11,20 @@ from cosserat_fenicsx.algebra import building
 
 pytestmark = pytest.mark.serial
 
-HEADER = "#pragma once\ntypedef struct { double a, b; } pair;\ndouble product(const pair *given);\n"
-CODE = '#include "small.h"\ndouble product(const pair *given) { return given->a * given->b + KERNEL_ARGUMENTS; }\n'
+HEADER = """#ifndef SMALL_H
+#define SMALL_H
+typedef struct { double a, b; } pair;
+double product(const pair *given);
+#if 0
+extern "Python" double change(double x);
+#endif
+#endif
+"""
+CODE = """#include "small.h"
+static double change(double x);
+PetscInt zero = 0;
+double product(const pair *given) { return change(given->a * given->b) + KERNEL_ARGUMENTS + zero; }
+"""
 
 
 @pytest.fixture
@@ -20,14 +33,21 @@ def source(tmp_path, monkeypatch):
     (tmp_path / "small.h").write_text(HEADER)
     (tmp_path / "small.c").write_text(CODE)
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
-    monkeypatch.delenv("CC", raising=False)
     building.module.cache_clear()
     return tmp_path / "small.c"
 
 
 def works(module):
     ffi, lib = module
-    return lib.product(ffi.new("pair *", [2.0, 3.0])) == 6.0 + compat.KERNEL_ARGUMENTS
+    ffi.def_extern(name="change")(lambda x: -x)
+    return lib.product(ffi.new("pair *", [2.0, 3.0])) == compat.KERNEL_ARGUMENTS - 6.0
+
+
+def test_the_c_of_the_package_is_built(monkeypatch, tmp_path):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    ffi, lib = building.module.__wrapped__()
+    (file,) = building.cache().iterdir()
+    assert file.name.startswith("cosserat_chain_") and callable(lib.eliminate) and ffi.sizeof("kernel") > 0
 
 
 def test_c_is_compiled_once_and_in_silence(source, monkeypatch, capfd):
@@ -60,7 +80,7 @@ def test_a_damaged_file_is_made_anew(source, monkeypatch, kept):
 
 def test_one_of_many_compiles(source, monkeypatch):
     compiler, log = source.parent / "cc", source.parent / "log"
-    compiler.write_text(f'#!/bin/sh\necho >> "{log}"\nsleep 0.2\nexec cc "$@"\n')
+    compiler.write_text(f'#!/bin/sh\necho >> "{log}"\nsleep 0.2\nexec {os.environ.get("CC", "cc")} "$@"\n')
     compiler.chmod(0o755)
     monkeypatch.setenv("CC", f"{compiler} -DUNUSED")
     made = []

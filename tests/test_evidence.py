@@ -1,5 +1,6 @@
 """What measures accuracy and cost (demos/evidence/) runs, and measures right results."""
 
+import shutil
 import sys
 from pathlib import Path
 
@@ -36,9 +37,10 @@ def test_rungs_quick(tmp_path):
     import rungs
 
     scenes = [(rungs.eccentric_cantilever, ((3, 4), None)), (rungs.lee_frame, ((4, 8),)), (rungs.spring, ((4, 24),))]
-    for (name, _), rows in rungs.main(runs=1, out=tmp_path, scenes=scenes).items():
-        sizes = [row[1] for row in rows]
-        assert rows[-1][0] == "spatial" and sizes == sorted(set(sizes)), name
+    for (name, mesh), rows in rungs.main(runs=1, out=tmp_path, scenes=scenes).items():
+        sizes = {row[0]: row[1] for row in rows}
+        assert mesh or sizes.pop("auto") == min(sizes.values()), name
+        assert list(sizes)[-1] == "spatial" and list(sizes.values()) == sorted(set(sizes.values())), name
         assert all(error < 2e-6 for _, _, _, _, error, _ in rows), rows
 
 
@@ -58,19 +60,37 @@ def test_choice_quick(tmp_path):
 
 @pytest.mark.slow
 def test_scaling_quick(tmp_path):
-    """The numbers of unknowns; times are not tested."""
+    """The numbers of unknowns, and the rod in plain C: its tip moves as far as that of such a rod. Times are not
+    tested."""
     import scaling
 
-    rows = scaling.main(sizes=(4, 16, 64), out=tmp_path)
-    assert rows[:, 0].tolist() == [112, 448, 1792] and (rows[:, 1:] > 0).all()
+    rows = scaling.main(sizes=(4, 16), out=tmp_path, runs=1)
+    assert rows[:, 0].tolist() == [112, 448] and (rows[:, 1:] > 0).all()
+    seconds, moved = scaling.floor(steps=1)
+    assert seconds > 0 and moved == pytest.approx(1e-6 * ((1 - 1 / (4 * scaling.FEW**2)) / 3 + 1 / 4e3), rel=1e-9)
+    text = (tmp_path / "scaling.md").read_text(encoding="utf-8")
+    assert "| planar P1 |" in text and "asked at most" in text and "nan" not in text
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(shutil.which("mpirun") is None, reason="needs mpirun")
+def test_ranks_quick(tmp_path):
+    """One rank and two find the same; times are not tested."""
+    import ranks
+
+    ((unknowns, seconds, apart),) = ranks.main(sizes=(16,), rounds=1, out=tmp_path, ranks=(1, 2))
+    assert unknowns == 448 and list(seconds) == [1, 2] and apart < 1e-9
 
 
 @pytest.mark.slow
 def test_steps_quick(tmp_path):
-    """Models and schemes give the same motion; most steps reuse a tangent. Times are not tested."""
+    """Models and schemes give the same motion; most steps reuse a tangent; a hinge lets the rod move farther. Times
+    are not tested."""
     import steps
 
-    found = steps.main(runs=1, duration=0.2, out=tmp_path)
+    found, few = steps.main(runs=1, duration=0.2, out=tmp_path)
+    clamped, hinged, jointed = (place[1] for _, _, place in few)
+    assert 0 < clamped < hinged and clamped < jointed
     tips = [history.position(history.scene.rods[0].start)[-1] for _, _, history in found]
     assert np.ptp(tips, axis=0).max() < 1e-6 and abs(tips[0][0]) > 1e-3
     assert all(iterations < 6 for _, iterations, _ in found)

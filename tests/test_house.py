@@ -51,6 +51,7 @@ SHARED = {
     "element",
     "errors",
     "interrupts",
+    "processor",
     "progress",
     "quadrature",
     "quaternions",
@@ -74,6 +75,7 @@ ROOMS = {
 #: results.
 FITTERS = {
     "statics": {
+        "agreement",
         "circulatory",
         "first_mesh",
         "grading",

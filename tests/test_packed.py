@@ -18,11 +18,13 @@ def test_packed_forms_are_the_forms(formulation, degree):
     for length in (20.0, 30.0):
         _, scene = column(arm=True, length=length)
         layout = Layout.of(scene, 3)
-        with solvers.solvers_of(scene, layout, formulation=formulation, degree=degree) as (problem, _, stability):
+        with solvers.solvers_of(scene, layout, formulation=formulation, degree=degree) as (problem, _, _):
             model, forms = problem.model, problem.model.forms
             moving = [model.state, *model.carried]
+            compiled = forms.residual, forms.tangent, forms.second_variations[0]
             if packed is None:
-                packed = [Packed(form, moving) for form in (forms.residual, forms.tangent, forms.second_variations[0])]
+                factors = model.load_factor, model.permanent_factor
+                packed = [Packed(form, moving, factors) for form in compiled]
             for form in packed:
                 form.refresh()
             for eta in (0.3, 0.8):
@@ -34,10 +36,8 @@ def test_packed_forms_are_the_forms(formulation, degree):
                     found = np.zeros(len(local.array_r))
                     packed[0].add_to_vector(found)
                     np.testing.assert_array_equal(found, local.array_r)
-                for form, mine, A in (
-                    (forms.tangent, packed[1], problem.A),
-                    (forms.second_variations[0], packed[2], stability.parts[0].K),
-                ):
+                for form, mine in zip(compiled[1:], packed[1:], strict=True):
+                    A = fem_petsc.create_matrix(form)
                     matrices = []
                     for add in (lambda A, form=form: fem_petsc.assemble_matrix(A, form), mine.add_to_matrix):
                         A.zeroEntries()

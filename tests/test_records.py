@@ -6,6 +6,7 @@ from conftest import column
 
 import cosserat_fenicsx as cf
 from cosserat_fenicsx.results.records import Records
+from cosserat_fenicsx.statics.path.follower import Follower
 
 pytestmark = pytest.mark.serial
 
@@ -14,6 +15,7 @@ pytestmark = pytest.mark.serial
 def test_one_by_one_and_many_at_once(model, monkeypatch):
     rod, scene = column()
     etas, given, append = [0.2, 0.4, 0.6, 0.8, 1.0], [], cf.Path.append
+    monkeypatch.setattr(Follower, "sweeps", False)
     monkeypatch.setattr(cf.Path, "append", lambda path, record: (given.append(record), append(path, record)))
     single = cf.solve(scene, etas, model=model, elements=3)
     mixed = single.at_points([])

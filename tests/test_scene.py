@@ -140,6 +140,7 @@ def test_accuracy_that_cannot_be_met_is_refused(monkeypatch):
 
 
 def test_interruption_keeps_what_is_done():
+    from cosserat_fenicsx.statics.path.follower import Follower
     from cosserat_fenicsx.statics.path.load_control import Continuation
 
     _, scene = column()
@@ -151,6 +152,7 @@ def test_interruption_keeps_what_is_done():
         return whole(self, eta, **arguments)
 
     with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Follower, "sweeps", False)
         patch.setattr(Continuation, "_attempt", attempt)
         with pytest.raises(cf.Interrupted) as stop:
             cf.solve(scene, [0.25, 0.5, 0.75, 1.0], elements=4)

@@ -151,3 +151,31 @@ def test_time_at_an_accuracy():
     ]
     assert cheapest(rows, 1e-3) is rows[2] and cheapest(rows, 1e-8) is rows[3] and cheapest(rows, 1e-10) is None
     assert frontier(rows) == [rows[3], rows[2], rows[0]]
+
+
+def test_ratios_that_are_asked_for():
+    """Of each side the fastest that is accurate enough; by tol it is the true error that counts."""
+    from asked import judged
+    from work_precision_table import ASKED, called, deciding, ratios
+
+    def row(peer, kind, seconds, error, **configuration):
+        return {
+            "problem": "sweep", "peer": peer, "kind": kind, "spatial": "spatial" in kind, "seconds": [seconds],
+            "error": error, "configuration": configuration,
+        }  # fmt: skip
+
+    rows = [
+        row("cosserat_fenicsx", "auto, by tol", 1.0, 1e-6, model="auto", tol=1e-2),
+        row("cosserat_fenicsx", "auto, by tol", 3.0, 1e-9, model="auto", tol=1e-6),
+        row("cosserat_fenicsx", "spatial, mixed", 2.0, 1e-9, model="spatial", degree=4, elements=2),
+        row("Exudyn", "planar 3-node", 4.0, 1e-8, elements=8),
+        row("Exudyn", "planar 3-node", 4.5, 1e-8, elements=9),
+        row("OpenSeesPy", "spatial CBDI", 20.0, 1e-8, elements=8),
+    ]
+    found = {(words, accuracy): ratio for words, accuracy, _, _, ratio, _ in ratios(rows)}
+    plane, space, both, automatic = (words for words, *_ in ASKED)
+    assert found[plane, 1e-5] == 1 / 4 and found[plane, 1e-7] == 2 / 4 and found[space, 1e-7] == 2 / 20
+    assert found[both, 1e-3] == 2 / 4 and found[automatic, 1e-5] == 1 / 4 and found[automatic, 1e-7] == 3 / 4
+    assert deciding(rows) == [rows[i] for i in (0, 3, 4, 2, 5, 1)]
+    assert called(rows[0]) == "auto, tol 1e-02" and judged(None, 0.5) == "- | 1/2 | -"
+    assert judged(1 / 4, 1 / 5) == "1/4 | 1/5 | missed" and judged(0.4, 0.5, ".2f") == "0.40 | 0.5 | met"

@@ -4,6 +4,7 @@ Only a C compiler and Python's headers are needed, which dolfinx needs as well.
 """
 
 import contextlib
+import ctypes
 import fcntl
 import functools
 import hashlib
@@ -22,12 +23,11 @@ from petsc4py import PETSc
 
 from cosserat_fenicsx import compat
 from cosserat_fenicsx.compiling import cache, compiling
+from cosserat_fenicsx.processor import instructions
 
 SOURCES = tuple(Path(__file__).with_name(name) for name in ("chain.c", "newton.c", "sweep.c"))
 # What -ffast-math would add hides numbers that are not finite, and changes sums. Python's own -fwrapv slows loops down.
 _FLAGS = ("-O3", "-fno-math-errno", "-ffp-contract=fast", "-fno-wrapv", "-fopenmp-simd", "-fvisibility=hidden", "-g0")
-# The instructions of the level x86-64-v3, as Linux names them.
-_LEVEL_3 = {"avx", "avx2", "bmi1", "bmi2", "f16c", "fma", "abm", "movbe", "xsave"}
 _DIGEST = hashlib.sha256
 _DIGEST_SIZE = _DIGEST().digest_size
 
@@ -45,7 +45,7 @@ def module(*sources):
         InstallationError: there is no C compiler that works, or the cache cannot be used.
     """
     with compiling():
-        flags = [*_FLAGS, *_instructions(), f"-DKERNEL_ARGUMENTS={compat.KERNEL_ARGUMENTS}"]
+        flags = [*_FLAGS, *instructions(), f"-DKERNEL_ARGUMENTS={compat.KERNEL_ARGUMENTS}"]
         flags.append(f"-DPetscInt=int{8 * np.dtype(PETSc.IntType).itemsize}_t")
         sources = sources or SOURCES
         suffix = importlib.machinery.EXTENSION_SUFFIXES[0]
@@ -64,13 +64,13 @@ def module(*sources):
             return _load(name, file)
 
 
-def _instructions():
-    """Compiler flags for this processor. They are part of the key: computers of different age may share a cache."""
-    with contextlib.suppress(OSError), open("/proc/cpuinfo", encoding="ascii", errors="replace") as lines:
-        for line in lines:
-            if line.startswith("flags"):
-                return ["-march=x86-64-v3"] if set(line.split()) >= _LEVEL_3 else []
-    return []
+def undisturbed(name, *pointers):
+    """Call a C function of this folder that calls PETSc, which is not made for threads: unlike cffi, without letting
+    other threads of Python run meanwhile."""
+    ffi, lib = module()
+    address = int(ffi.cast("intptr_t", ffi.addressof(lib, name)))
+    function = ctypes.PYFUNCTYPE(ctypes.c_int, *[ctypes.c_void_p] * len(pointers))(address)
+    return function(*(int(ffi.cast("intptr_t", pointer)) for pointer in pointers))
 
 
 @contextlib.contextmanager
@@ -93,7 +93,8 @@ def _build(name, file, sources, header, flags):
     builder.cdef("\n".join(line for line in declarations if not line.startswith("#")))
     with tempfile.TemporaryDirectory(dir=file.parent, prefix=name) as folder:
         glue, made = Path(folder) / "module.c", Path(folder) / "module.so"
-        recompiler.make_c_source(builder, name, "".join(f'#include "{source}"\n' for source in sources), str(glue))
+        code = "".join(f'#include "{source.absolute()}"\n' for source in sources)
+        recompiler.make_c_source(builder, name, code, str(glue))
         headers = sysconfig.get_path("include"), sysconfig.get_path("platinclude")
         command = [*_linker(), "-fPIC", *(f"-I{path}" for path in headers), *flags, str(glue), "-o", str(made), "-lm"]
         try:
@@ -104,7 +105,8 @@ def _build(name, file, sources, header, flags):
             raise cffi.VerificationError(str(problem)) from problem
         if done.returncode:
             lines = done.stderr.strip().splitlines() or [f"{command[0]}: exit code {done.returncode}"]
-            raise cffi.VerificationError(next((line for line in lines if "error" in line), lines[0]))
+            told = (line for line in lines if "error" in line or "failed" in line)  # ld's words come before gcc's
+            raise cffi.VerificationError(next(told, lines[0]))
         with open(made, "r+b") as binary:
             digest = _DIGEST(binary.read()).digest()
             binary.write(digest)

@@ -110,28 +110,34 @@ static inline void subtract_pivot(double *F, int n, int k)
     }
 }
 
-/* LU factors of the first m rows and columns of F (n, n) with row exchanges among them, and the rest reduced; columns
-   without a pivot are moved behind the others, at most `most`. Returns how many were eliminated, -1 if singular. */
+/* LU factors of the first m rows and columns of F (n, n) with row exchanges among them, and the rest reduced. Columns
+   without an acceptable pivot are tried again after the others; at most `most` may be left over. Returns how many were
+   eliminated, -1 if F is singular. */
 static int reduce(double *F, int n, int m, int most, int *row, int *column)
 {
-    int k = 0, last = m;
-    while (k < last) {
+    int k = 0, last = m, before = 0; /* the columns from `last` on were refused since `before` were eliminated */
+    double share = most ? SMALLEST_PIVOT : 0;
+    while (k < m) {
+        if (k == last) {
+            if (k == before) {
+                if (m - k <= most) break;
+                if (share == 0) return -1;
+                share = 0;
+            }
+            last = m, before = k;
+        }
         int at = k;
         double best = 0, largest = 0;
         for (int i = k; i < m; i++) {
             const double size = fabs(F[(size_t)i * n + k]);
             if (size > best) best = size, at = i;
         }
-        if (most)
-            for (int i = m; i < n; i++) largest = fmax(largest, fabs(F[(size_t)i * n + k]));
-        if (!(best > 0) || best < SMALLEST_PIVOT * largest) {
-            if (m - last < most) {
-                last--;
-                swap(F + k, F + last, n, n);
-                swap_numbers(column + k, column + last);
-                continue;
-            }
-            if (!(best > 0)) return -1;
+        for (int i = m; share > 0 && i < n; i++) largest = fmax(largest, fabs(F[(size_t)i * n + k]));
+        if (!(best > 0) || best < share * largest) {
+            last--;
+            swap(F + k, F + last, n, n);
+            swap_numbers(column + k, column + last);
+            continue;
         }
         if (at != k) {
             swap(F + (size_t)k * n, F + (size_t)at * n, n, 1);
@@ -139,7 +145,7 @@ static int reduce(double *F, int n, int m, int most, int *row, int *column)
         }
         subtract_pivot(F, n, k++);
     }
-    return last;
+    return k;
 }
 
 /* Signs of the pivots of the first m rows and columns of a symmetric F (n, n), the largest on the diagonal first; whole:
@@ -305,4 +311,23 @@ void backward(chain *s, const double *interface, double *x)
             x[column[i]] = z[i];
         }
     }
+}
+
+/* ---- a small system as a whole ----------------------------------------------------------------------------------- */
+
+/* LU factors of F (n, n). Returns 0, or 1 if it is singular. */
+int factor_dense(double *F, int n, int *row, int *column)
+{
+    for (int i = 0; i < n; i++) row[i] = column[i] = i;
+    return reduce(F, n, n, 0, row, column) < n;
+}
+
+/* Replace b by the solution, by the factors. */
+void solve_dense(const double *F, int n, const int *row, const int *column, double *b, double *work)
+{
+    for (int i = 0; i < n; i++) work[i] = b[row[i]];
+    for (int i = 1; i < n; i++) work[i] -= dot(F + (size_t)i * n, work, i);
+    for (int i = n - 1; i >= 0; i--)
+        work[i] = (work[i] - dot(F + (size_t)i * n + i + 1, work + i + 1, n - i - 1)) / F[(size_t)i * n + i];
+    for (int i = 0; i < n; i++) b[column[i]] = work[i];
 }

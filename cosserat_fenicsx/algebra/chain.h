@@ -75,7 +75,7 @@ typedef struct {
     double increment, rounding, loads; /* limits of the increment and of the residual: rounding + 1e-6 (1 + loads) */
     int period, contracts;          /* steps that are compared; whether quadratic convergence is expected */
     int most, iterations;
-    double steps[100];
+    double steps[4];                /* sizes of the last ones, the latest first */
     int iterating, converged, ran_out, grown, not_a_number; /* SNES's reasons */
     double *x;                      /* the solution, while SNES does not use it */
 } newton;
@@ -150,6 +150,8 @@ int eliminate(chain *s, kernel *k, const double *matrices);
 int count(chain *s, kernel *k);
 void forward(chain *s, const double *b, double *interface);
 void backward(chain *s, const double *interface, double *x);
+int factor_dense(double *F, int n, int *row, int *column);
+void solve_dense(const double *F, int n, const int *row, const int *column, double *b, double *work);
 
 int take_state(problem *p, const double *x);
 int residual(problem *p, const double *x, double *b);

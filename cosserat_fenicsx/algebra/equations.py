@@ -19,33 +19,33 @@ def _hook():
     """Let C call `Called.called`."""
     ffi, _ = module()
 
-    @ffi.def_extern(name="python_hook", error=1)
+    def keep(kind, failure, trace):  # C cannot pass it on; Ctrl-C is raised here as soon as Python is entered
+        ffi.from_handle(trace.tb_frame.f_locals["owner"])().failure = failure.with_traceback(trace)
+
+    @ffi.def_extern(name="python_hook", error=1, onerror=keep)
     def hook(owner, what, a, b):
-        return ffi.from_handle(owner)().called(what, a, b)
+        """See `hook` in newton.c: 0, or 1 after an exception, which is kept."""
+        ffi.from_handle(owner)()._answer(what, a, b)
+        return 0
 
     return hook
 
 
 class Called:
-    """An object that C asks for what Python has to do."""
+    """An object that C asks for what Python has to do.
+
+    Attributes:
+        failure: the exception that has ended the last answer, if any.
+    """
 
     def __init__(self):
         _hook()
         self._ffi, self._lib = module()
-        self._handle, self._failure = self._ffi.new_handle(weakref.ref(self)), None
-
-    def called(self, what, a, b):
-        """See `hook` in newton.c: 0, or 1 after an exception, which is kept."""
-        try:
-            self._answer(what, a, b)
-        except BaseException as problem:  # C cannot pass it on
-            self._failure = problem
-            return 1
-        return 0
+        self._handle, self.failure = self._ffi.new_handle(weakref.ref(self)), None
 
     def raise_failure(self):
         """Raise the exception that was kept, if any."""
-        failure, self._failure = self._failure, None
+        failure, self.failure = self.failure, None
         if failure is not None:
             raise failure
 
@@ -63,7 +63,8 @@ class Equations(Called):
     Attributes:
         x, b: unknowns, residual; the model's state follows x.
         ties: the `TieRows` of the constraint equations of supports and joints, or None.
-        elimination: the `Elimination` of the tangent.
+        elimination: the `Elimination` of the tangent; interface: its `Interface`, or None.
+        tangent_form: the `Packed` tangent.
         c: the C structure `problem`.
     """
 
@@ -113,8 +114,8 @@ class Equations(Called):
     def take_forms(self, residual, tangent, advance=None):
         """Set the `Packed` residual and tangent, and the `PackedExpression` of the carried contact force or None."""
         problem = self.c
-        self._residual, self._tangent, self._advance = residual, tangent, advance
-        problem.residual, problem.tangent, problem.dofs = residual.c, tangent.c, self._integers(residual.dofs)
+        self._residual, self.tangent_form, self._advance = residual, tangent, advance
+        problem.residual, problem.tangent, problem.dofs = residual.c, tangent.c, residual.dofs_c
         if advance:
             problem.advance = advance.c
             (carried,) = self.model.carried
@@ -150,6 +151,10 @@ class Equations(Called):
         """x = tangent^-1 b; False where the last tangent is singular."""
         self._done(self._lib.solve(self.c, self._read(b), self._written(x)))
         return not self.c.singular
+
+    def advance(self):
+        """Update the contact force that is carried at the Gauss points by the step from `model.before` to the state."""
+        self._lib.advance(self.c)
 
     def set_state(self, x):
         """Copy a vector of unknowns into the model's state, ghosts included."""
@@ -225,7 +230,7 @@ class Equations(Called):
         self.c.singular = 1 if singular else not self.interface.factor(*self._derivatives_of_ties())
 
     def _derivatives_of_ties(self):
-        """The tangent's part of supports and joints, see `Interface.matrix`."""
+        """The tangent's part of supports and joints, see `Interface.factor`."""
         if not self.ties:
             return (np.empty((0, 0)),)
         return self.ties.tangent_blocks(self.eta)
@@ -235,7 +240,7 @@ class Equations(Called):
         if comm.size > 1:
             comm.Allreduce(MPI.IN_PLACE, b)
         if not self.c.singular:
-            b[:] = self.interface.solve(b)
+            self.interface.solve(b)
 
     # -- for results -------------------------------------------------------------------------------------------------
 

@@ -1,9 +1,13 @@
-"""The unknowns where rods meet, in one small sparse system that every rank solves as a whole."""
+"""The unknowns where rods meet, in one small system that every rank solves as a whole."""
 
 import numpy as np
 
+from cosserat_fenicsx.algebra.building import module
+
 # Pivots and eigenvalues of a matrix with a diagonal of ones that are zero to rounding.
 _ROUNDING = 1e-14
+# Largest number of unknowns of a system that is solved as a dense one.
+_DENSE = 150
 
 
 class Interface:
@@ -13,87 +17,141 @@ class Interface:
         elimination: the `Elimination`.
         tied: (tied nodes, block) numbers of the unknowns in constraint equations, -1 where clamped.
         multipliers: number of constraint equations.
+
+    Attributes:
+        nodes: places in the system of the tied nodes' unknowns, -1 where clamped.
     """
 
     def __init__(self, elimination, tied, multipliers=0):
         self._elimination, self._size = elimination, elimination.unknowns
         known = elimination.interface
-        nodes = np.where(tied.ravel() >= 0, np.searchsorted(known, tied.ravel()), -1)
-        #: places of the tied nodes' unknowns, -1 where clamped, and those of the multipliers
-        self.nodes, self.multipliers = nodes, len(known) - multipliers + np.arange(multipliers)
-        grids = [elimination.places, np.tile(np.arange(self._size), (2, 1))]
-        for rows, columns in ((nodes, nodes), (nodes, self.multipliers), (self.multipliers, nodes)):
+        self.nodes = nodes = np.where(tied.ravel() >= 0, np.searchsorted(known, tied.ravel()), -1)
+        added = len(known) - multipliers + np.arange(multipliers)
+        grids = [elimination.places]
+        for rows, columns in ((nodes, nodes), (nodes, added), (added, nodes)):
             grids.append(np.stack([np.repeat(rows, len(columns)), np.tile(columns, len(rows))]))
-        self._diagonal = np.zeros(self._size)
         rows, columns = np.concatenate(grids, axis=1)
         self._here = (rows >= 0) & (columns >= 0)
-        keys, self._entry = np.unique(columns[self._here] * self._size + rows[self._here], return_inverse=True)
-        self._indices = (keys % self._size).astype(np.int32)
-        self._starts = np.searchsorted(keys // max(1, self._size), np.arange(self._size + 1)).astype(np.int32)
-        self._solve = self._values = None
+        self._dense = self._size <= _DENSE
+        self._solver = _Dense(self._size) if self._dense else _Sparse(self._size)
+        self._entry = self._solver.entries(rows[self._here], columns[self._here])
 
-    def matrix(self, of_nodes, reactions=None, equations=None):
-        """The sum of all ranks' condensed matrices and of the derivatives of the reactions by nodes and by multipliers,
-        and of the equations by nodes: arrays over the tied nodes' unknowns, clamped ones included, and multipliers."""
-        parts = [self._elimination.all_condensed(), self._diagonal]
-        parts += [part.ravel() for part in (of_nodes, reactions, equations) if part is not None]
-        values = np.concatenate(parts)
+    def _values(self, of_nodes, *others):
+        """The entries of the sum of all ranks' condensed matrices and of the constraint equations' derivatives.
+
+        Args:
+            of_nodes, others: derivatives of the reactions by nodes and by multipliers, and of the equations by nodes:
+                arrays over the tied nodes' unknowns, clamped ones included, and multipliers; the last two only where
+                multipliers belong to the system.
+        """
+        values = np.concatenate([self._elimination.all_condensed(), *(part.ravel() for part in (of_nodes, *others))])
         here = self._here[: len(values)]
         entries = self._entry[: np.count_nonzero(here)]
-        return self._with(np.bincount(entries, values[here], minlength=len(self._indices)))
+        return np.bincount(entries, values[here], minlength=self._solver.room)
 
-    def _with(self, values):
-        from scipy.sparse import csc_matrix  # slow to import, and a single rod has no interface
+    def factor(self, *derivatives):
+        """Factors of the system, see `_values`; False where it is singular."""
+        self._kept = self._values(*derivatives)
+        return self._solver.factor(self._kept)
+
+    def memory(self):
+        """The entries of the last matrix."""
+        return self._kept
+
+    def recall(self, memory):
+        """Factorise the matrix whose entries `memory` returned."""
+        self._kept = np.array(memory)
+        self._solver.factor(self._kept)
+
+    def solve(self, b):
+        """Replace a right-hand side (unknowns,) by the solution, from the last factors."""
+        self._solver.solve(b)
+
+    def signs(self, of_nodes):
+        """(negative, zero) numbers of eigenvalues of the system, which is symmetric."""
+        return self._solver.signs(self._values(of_nodes))
+
+
+class _Dense:
+    """A system as a dense matrix, row by row."""
+
+    def __init__(self, size):
+        self._ffi, self._lib = module()
+        self._size, self.room = size, size * size
+        self._factors, self._work = np.zeros(size * size), np.zeros(size)
+        self._order = np.zeros((2, size), dtype=np.int32)
+        self._double = [self._ffi.cast("double *", array.ctypes.data) for array in (self._factors, self._work)]
+        self._int = [self._ffi.cast("int *", array.ctypes.data) for array in self._order]
+
+    def entries(self, rows, columns):
+        return rows * self._size + columns
+
+    def factor(self, values):
+        self._factors[:] = values
+        return not self._lib.factor_dense(self._double[0], self._size, *self._int)
+
+    def solve(self, b):
+        self._lib.solve_dense(self._double[0], self._size, *self._int, self._ffi.from_buffer("double[]", b),
+                              self._double[1])  # fmt: skip
+
+    def signs(self, values):
+        matrix = values.reshape(self._size, self._size)
+        scale = _scale(np.diag(matrix))
+        values = np.linalg.eigvalsh(scale[:, None] * matrix * scale)
+        zero = np.abs(values) <= _ROUNDING
+        return int((values[~zero] < 0).sum()), int(zero.sum())
+
+
+class _Sparse:
+    """A system by its columns."""
+
+    def __init__(self, size):
+        self._size = size
+
+    def entries(self, rows, columns):
+        """Where the entries at rows and columns are added."""
+        each = np.arange(self._size)  # a diagonal of zeros is part of the pattern
+        keys, entry = np.unique(np.append(columns, each) * self._size + np.append(rows, each), return_inverse=True)
+        self._indices, self.room = (keys % self._size).astype(np.int32), len(keys)
+        self._starts = np.searchsorted(keys // self._size, np.arange(self._size + 1)).astype(np.int32)
+        return entry[: len(rows)]
+
+    def _matrix(self, values):
+        from scipy.sparse import csc_matrix  # slow to import, and few scenes need it
 
         return csc_matrix((values, self._indices, self._starts), shape=(self._size, self._size))
 
-    def factor(self, *derivatives):
-        """Factors of `matrix`; False where it is singular."""
-        return self._factor(self.matrix(*derivatives))
-
-    def _factor(self, matrix):
+    def factor(self, values):
         from scipy.sparse.linalg import splu
 
-        self._values = matrix.data
-        if not self._size:
-            self._solve = np.copy
-            return True
         try:
-            self._solve = splu(matrix).solve if np.isfinite(matrix.data).all() else None
+            self._solve = splu(self._matrix(values)).solve if np.isfinite(values).all() else None
         except RuntimeError:  # SuperLU: exactly singular
             self._solve = None
         return self._solve is not None
 
-    def memory(self):
-        """The entries of the last matrix."""
-        return self._values
-
-    def recall(self, memory):
-        """Factorise the matrix whose entries `memory` returned."""
-        self._factor(self._with(memory))
-
     def solve(self, b):
-        """(unknowns,) the solution for a right-hand side, from the last factors."""
-        return self._solve(b)
+        b[:] = self._solve(b)
+
+    def signs(self, values):
+        from scipy.sparse import diags
+        from scipy.sparse.linalg import splu
+
+        matrix = self._matrix(values)
+        scale = diags(_scale(matrix.diagonal()))
+        matrix = (scale @ matrix @ scale).tocsc()
+        try:
+            factors = splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
+            pivots = factors.U.diagonal()
+            if (factors.perm_r == factors.perm_c).all() and np.abs(pivots).min() > _ROUNDING:
+                return int((pivots < 0).sum()), 0
+        except RuntimeError:
+            pass
+        dense = _Dense(self._size)
+        return dense.signs(matrix.toarray().ravel())
 
 
-def signs(matrix):
-    """(negative, zero) numbers of eigenvalues of a sparse symmetric matrix, from LDL^T factors."""
-    from scipy.sparse import diags
-    from scipy.sparse.linalg import splu
-
-    if not matrix.shape[0]:
-        return 0, 0
-    size = np.sqrt(np.abs(matrix.diagonal()))
-    scale = diags(1 / np.where(size > 0, size, 1.0))  # which leaves the signs, whatever the units of the unknowns
-    matrix = (scale @ matrix @ scale).tocsc()
-    try:
-        factors = splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
-        pivots = factors.U.diagonal()
-        if (factors.perm_r == factors.perm_c).all() and np.abs(pivots).min() > _ROUNDING:
-            return int((pivots < 0).sum()), 0
-    except RuntimeError:
-        pass
-    values = np.linalg.eigvalsh(matrix.toarray())
-    zero = np.abs(values) <= _ROUNDING
-    return int((values[~zero] < 0).sum()), int(zero.sum())
+def _scale(diagonal):
+    """Factors that make the diagonal ones, which leaves the signs, whatever the units of the unknowns."""
+    size = np.sqrt(np.abs(diagonal))
+    return 1 / np.where(size > 0, size, 1.0)

@@ -194,8 +194,8 @@ static int error_is_small(const newton *n)
     double before = 0, step = 0;
     if (n->iterations < 2 * n->period) return 0;
     for (int i = 1; i <= n->period; i++) {
-        step = fmax(step, n->steps[n->iterations - i]);
-        before = fmax(before, n->steps[n->iterations - n->period - i]);
+        step = fmax(step, n->steps[i - 1]);
+        before = fmax(before, n->steps[n->period + i - 1]);
     }
     const double c = step / before, quadratic = n->contracts ? fmin(1, 100 * c) : 1;
     return c < 0.9 && step * c * quadratic <= n->increment * (1 - c);
@@ -224,7 +224,8 @@ static int test(void *snes, PetscInt iteration, double size, double change, doub
     if (!isfinite(norm)) *reason = n->not_a_number;
     if (*reason != n->iterating || iteration == 0) return 0;
     if (motion(n, snes, &step)) return FAILED;
-    n->steps[n->iterations++] = step;
+    memmove(n->steps + 1, n->steps, 3 * sizeof step);
+    n->steps[0] = step, n->iterations++;
     const int balanced = norm <= 1e-6 * (1 + n->loads) + n->rounding;
     if (!(step < 1e3)) *reason = n->grown;
     else if (balanced && (step <= n->increment || error_is_small(n))) *reason = n->converged;

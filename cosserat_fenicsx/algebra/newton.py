@@ -13,14 +13,13 @@ from functools import cache, cached_property
 import numpy as np
 from petsc4py import PETSc
 
-from cosserat_fenicsx.algebra.building import module
+from cosserat_fenicsx.algebra.building import module, undisturbed
 from cosserat_fenicsx.compat import RESIDUAL_NOT_A_NUMBER
 from cosserat_fenicsx.errors import NotConverged
 
 #: Newton stops when the increment, or the remaining error estimated from the contraction, is below this (root mean
 #: square over the nodal unknowns, positions in units of L).
 INCREMENT = 1e-11
-_MOST_ITERATIONS = 100  # the room in newton.c
 _Reason = PETSc.SNES.ConvergedReason
 #: Why SNES stopped.
 WORDS = {
@@ -109,7 +108,7 @@ class Newton:
         handles = (
             self._ffi.cast("void *", handle) for handle in (snes.handle, self.problem.b.handle, self._matrix.handle, pc)
         )
-        if self._lib.attach(petsc(), self.c, *handles):
+        if undisturbed("attach", petsc(), self.c, *handles):
             raise MemoryError("PETSc's SNES does not take its callbacks")
 
     @cached_property
@@ -119,8 +118,13 @@ class Newton:
 
     def allow(self, iterations):
         """Set the largest number of iterations."""
-        self.c.most = min(iterations, _MOST_ITERATIONS)
+        self.c.most = iterations
         self.snes.setTolerances(max_it=iterations + 1)  # newton.c stops before SNES's own limit
+
+    def _take_loads(self):
+        """What the residual is compared with."""
+        problem = self.problem
+        self.c.loads, self.c.rounding = abs(problem.load_factor) * problem.load_norm, problem.model.round_off
 
     def solve(self):
         """Newton from the problem's x (and carried fields) at the model's load factor; x and the state follow.
@@ -129,7 +133,7 @@ class Newton:
             Solved. If it has not converged, x is not an equilibrium, and the state may differ from x.
         """
         problem, newton = self.problem, self.c
-        newton.loads, newton.rounding = abs(problem.load_factor) * problem.load_norm, problem.model.round_off
+        self._take_loads()
         self._lib.begin(newton)
         try:
             self.snes.solve(None, problem.x)
@@ -138,7 +142,7 @@ class Newton:
             raise
         reason = self.snes.getConvergedReason()
         if reason > 0:  # the residual was last evaluated at x, so the state agrees with it
-            self._lib.advance(problem.c)
+            problem.advance()
         elif problem.c.singular:
             reason = _Reason.DIVERGED_LINEAR_SOLVE
         return Solved(reason > 0, newton.iterations, WORDS.get(reason, f"PETSc's reason {reason}"))
@@ -191,13 +195,14 @@ class BorderedNewton(Newton):
         step.axpy(change, self._slope)
         if math.isfinite(change):
             problem.set_load_factor(eta + change)
+            self._take_loads()
 
     def _leave_out_neutral(self, step):
         """Remove the neutral motion from the step and from dx/d eta, and update it by inverse iteration."""
         inner, motion = self.problem.model.inner, self.neutral
         force = self.problem.load_derivative(self.problem.x)
         force.array_w[:] = motion
-        self._ksp.solve(force, self._free)
+        self.problem.solve(force, self._free)
         free = self._free.array_r
         size = inner(motion, free)
         for vector in (step, self._slope):

@@ -196,7 +196,7 @@ int run(sweep *s)
     while (s->next < s->count) {
         const double here = s->etas[s->known - 1], target = s->targets[s->next], left = target - here;
         if (left == 0) {
-            s->next++;
+            s->next++, s->rejections = s->accepted = 0;
             if (!s->every && record(s)) return FULL;
             continue;
         }
@@ -204,10 +204,13 @@ int run(sweep *s)
         double goal = here + copysign(step, left);
         if (fabs(left) <= fmin(1.2 * step, s->largest)) goal = target;
         else if (fabs(left) < 2 * step) goal = here + left / 2;
-        const int judged = attempt(s, goal);
+        const int before = s->iterations, judged = attempt(s, goal);
         if (judged != ACCEPTED) {
             put(s, s->points + (size_t)(s->known - 1) * s->numbers, here);
-            if (judged == UNSURE) return LEFT;
+            if (judged == UNSURE) {
+                s->iterations = before; /* Python counts them when it repeats the step */
+                return LEFT;
+            }
             s->rejections++, s->accepted = 0;
             s->step = fabs(goal - here) * s->shrink;
             if (s->step < s->smallest || s->rejections >= s->allowed) return LEFT;

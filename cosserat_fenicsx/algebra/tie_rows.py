@@ -20,7 +20,10 @@ class TieRows:
     Attributes:
         rows: (tied nodes, block) solver's numbers, -1 where clamped.
         seen: the tied nodes' unknowns and the multipliers of all equations, as of the last call of `see`.
+        share: in motion, where in the step reactions act: 0 at its start, 1 at its end, where the equations hold.
     """
+
+    share = 1.0
 
     def __init__(self, model, numbering):
         self.model, self.numbering = model, numbering
@@ -32,7 +35,8 @@ class TieRows:
         links = model.signature.connections
         self._added, self._count = np.array(links.equations, dtype=np.intp), len(links.ties)
         # for every added equation: what multiplies its reaction at both stations, the ground has none
-        self._signs = np.array([(-1.0, 0.0 if links.ties[i][2] is None else -1.0) for i in self._added])
+        signs = [(-1.0, 0.0 if links.ties[i][2] is None else -1.0) for i in self._added]
+        self._signs = np.array(signs).reshape(-1, 2)  # in a plane no equation may be added
         count = numbering.multipliers
         self._multipliers = (numbering.first_multiplier + np.arange(count)).astype(PETSc.IntType)
         wanted = np.concatenate([self._free_rows, self._multipliers])
@@ -65,11 +69,24 @@ class TieRows:
         """What was evaluated is of another state."""
         self._values = self._change = (None, None)
 
+    @property
+    def ties(self):
+        """The `Ties` that are evaluated."""
+        return self.model.ties
+
     def _evaluate(self, eta):
         """Values and gradients of all equations, see `Ties.evaluate`; once for residual and tangent."""
         if self._values[0] != eta:
-            self._values = eta, self.model.ties.evaluate(self.model.tied_motion(self.seen[0]), eta)
+            self._values = eta, self.ties.evaluate(self.model.tied_motion(self.seen[0]), eta)
         return self._values[1]
+
+    def _acting(self):
+        """The tied nodes' unknowns where reactions act."""
+        return self.seen[0]
+
+    def _gradients(self, eta):
+        """Gradients of all equations where reactions act."""
+        return self._evaluate(eta)[1]
 
     def put(self, x, multipliers):
         """Set the multipliers in a vector."""
@@ -85,13 +102,12 @@ class TieRows:
         """See `Equations.tie_forces`; at the state of the last call of `see`."""
         found, added = np.zeros((self._count, 2, 6)), self._added
         signed = self._signs * self.seen[1][added, None]
-        found[added] = self.model.held_forces(self._evaluate(eta)[1][added] * signed[..., None])
+        found[added] = self.model.held_forces(self._gradients(eta)[added] * signed[..., None])
         return found
 
     def gradients(self):
         """(ties, tied nodes, 6) gradients of all equations by (displacement, rotation), on all ranks."""
-        ties = self.model.ties
-        return ties.on_nodes(ties.evaluate(self.model.tied_motion(self.seen[0]), 0.0)[1])
+        return self.ties.on_nodes(self._evaluate(0.0)[1])
 
     @np.errstate(**_WILD)
     def residual_blocks(self, eta):
@@ -100,9 +116,8 @@ class TieRows:
         return self._blocks(eta)
 
     def _blocks(self, eta):
-        c, gradients = self._evaluate(eta)
-        reactions = self.model.ties.reactions(gradients, self.seen[1])
-        return (self._rows_of_forces() @ reactions[:, :, None]).ravel(), c[self._added]
+        reactions = self.ties.reactions(self._gradients(eta), self.seen[1])
+        return (self._rows_of_forces() @ reactions[:, :, None]).ravel(), self._evaluate(eta)[0][self._added]
 
     def _rows_of_forces(self):
         """The second of the model's `tie_maps`; the same for all states of a scene unless `rows_turn`."""
@@ -116,15 +131,18 @@ class TieRows:
     def tangent_blocks(self, eta):
         """Derivatives of `residual_blocks`: of the reactions by the nodes and by the multipliers, and of the equations
         by the nodes."""
-        (nodal, multipliers), (_, gradients), ties = self.seen, self._evaluate(eta), self.model.ties
-        change = ties.change(self.model.tied_motion(nodal), eta, multipliers)
-        trial, test = self.model.tie_maps(nodal)
-        of_nodes, added = reactions_by_nodes(test, change, trial), ties.on_nodes(gradients)[self._added]
-        if self.model.rows_turn:
+        (nodal, multipliers), acting, ties, model = self.seen, self._acting(), self.ties, self.model
+        change, gradients = ties.change(model.tied_motion(acting), eta, multipliers), self._gradients(eta)
+        (trial, test), added = model.tie_maps(acting), ties.on_nodes(gradients)[self._added]
+        of_nodes = reactions_by_nodes(test, change, self.share * trial)
+        reactions = reactions_by_multipliers(test, added)
+        if model.rows_turn:
             places = np.arange(len(of_nodes)).reshape(len(nodal), -1)
-            turned = self.model.turned_reactions(nodal, ties.reactions(gradients, multipliers))
+            turned = self.share * model.turned_reactions(acting, ties.reactions(gradients, multipliers))
             of_nodes[places[:, :, None], places[:, None, :]] += turned
-        return of_nodes, reactions_by_multipliers(test, added), by_nodes(added, trial)
+        if acting is not nodal:
+            (trial, _), added = model.tie_maps(nodal), ties.on_nodes(self._evaluate(eta)[1])[self._added]
+        return of_nodes, reactions, by_nodes(added, trial)
 
     def add_residual(self, b, eta):
         """Add the reactions to the rows of the nodes, and the constraint equations in the rows of the multipliers, in
@@ -153,7 +171,7 @@ class TieRows:
         Args:
             resistance: (tied nodes * block,) stiffness of the elements against these motions of the nodes.
         """
-        gradient = (self.model.ties.on_nodes(self._evaluate(eta)[1]) @ axes.T).reshape(-1, len(resistance))
+        gradient = (self.ties.on_nodes(self._evaluate(eta)[1]) @ axes.T).reshape(-1, len(resistance))
         stiffness = _HELD * (gradient * gradient * resistance).max(axis=1, keepdims=True)
         return gradient.T @ (stiffness * gradient)
 
@@ -162,7 +180,7 @@ class TieRows:
         parts of the second variation."""
         if self._change[0] != eta:
             nodal, multipliers = self.seen
-            change = self.model.ties.change(self.model.tied_motion(nodal), eta, multipliers)
+            change = self.ties.change(self.model.tied_motion(nodal), eta, multipliers)
             self._change = eta, 0.5 * (change + change.transpose(2, 3, 0, 1))
         return self._change[1]
 

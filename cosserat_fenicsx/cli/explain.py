@@ -8,12 +8,13 @@ from cosserat_fenicsx.models.choose import choose, fitting
 from cosserat_fenicsx.models.formulations import formulation_of
 from cosserat_fenicsx.models.rodmesh import Layout
 from cosserat_fenicsx.models.signature import Signature
+from cosserat_fenicsx.results.accuracy import FEW
 from cosserat_fenicsx.scene.curves import Line, Spline
 from cosserat_fenicsx.scene.describe import actions_in_words, describe
 from cosserat_fenicsx.scene.magnitudes import check_magnitudes
 from cosserat_fenicsx.scene.rolled import Profile
 from cosserat_fenicsx.scene.sections import Rectangle, Stiffness
-from cosserat_fenicsx.statics.first_mesh import FIRST_ELEMENTS
+from cosserat_fenicsx.statics.first_mesh import first_layout, meshes_for
 from cosserat_fenicsx.statics.solve import check_arguments
 
 #: What the unknowns of a model are, in a plane (True) or in space.
@@ -42,8 +43,12 @@ def explain(scene, load_factors, settings):
     check_magnitudes(scene, np.abs(load_factors).max())
     follows = settings.get("branch") is not None or settings.get("control") == "arc"
     choice = choose(scene, model=settings.get("model", "auto"), formulation=formulation, degree=degree, follows=follows)
-    first = elements or FIRST_ELEMENTS
-    layout = Layout.of(scene, first)
+    many = isinstance(load_factors, tuple) or np.size(load_factors) > FEW
+    if elements or follows:
+        layout = Layout.of(scene, elements) if elements else first_layout(scene, degree)
+    else:
+        layout, _ = meshes_for(scene, degree, tol, many)
+    first = elements or max(layout.counts)
 
     def signature_of(model):
         return Signature.of(scene, layout, formulation=formulation, degree=degree, model=model)

@@ -23,12 +23,12 @@ from cosserat_fenicsx.scene.action import has_permanent
 from cosserat_fenicsx.scene.magnitudes import check_magnitudes
 from cosserat_fenicsx.scene.scene import Scene
 from cosserat_fenicsx.scene.statical import without_mechanism
+from cosserat_fenicsx.statics.agreement import until_two_meshes_agree
 from cosserat_fenicsx.statics.circulatory import circulatory_part
 from cosserat_fenicsx.statics.first_mesh import FIRST_ELEMENTS
 from cosserat_fenicsx.statics.grading import layers_of
 from cosserat_fenicsx.statics.path.follower import Follower
 from cosserat_fenicsx.statics.path.load_control import StepControl
-from cosserat_fenicsx.statics.refinement import until_two_meshes_agree
 from cosserat_fenicsx.statics.shapes import shapes_of
 from cosserat_fenicsx.statics.solve import check_arguments
 from cosserat_fenicsx.statics.solvers import solvers_of
@@ -187,7 +187,7 @@ def _stiffness(problem):
     K = variation.numbering.matrix(variation.cell_dofs, tied[tied >= 0])
     true = model.section.K
     model.stiffen(np.where(np.isfinite(true), true, model.bounded_K))  # stability counts bound finite ones as well
-    Packed(variation.form, ()).add_to_matrix(K)
+    Packed(variation.form, (), ()).add_to_matrix(K)
     model.stiffen(model.bounded_K)
     if problem.ties:
         rows, of_ties = tied.ravel().astype(PETSc.IntType), problem.ties.second_variation(variation.axes, problem.eta)

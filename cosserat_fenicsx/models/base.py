@@ -20,6 +20,7 @@ from cosserat_fenicsx.models.numbering import Numbering
 from cosserat_fenicsx.models.rod_data import bending_lengths, bounded, fill_fields, gauss_function, rod_data, rod_fields
 from cosserat_fenicsx.models.rodmesh import Gather, RodMesh
 from cosserat_fenicsx.models.scales import Scales
+from cosserat_fenicsx.models.snapshots import Snapshots
 from cosserat_fenicsx.models.ties import Ties
 
 #: One part of the second variation, decoupled from the others: its compiled form, its `Numbering`, the local degrees of
@@ -28,7 +29,7 @@ from cosserat_fenicsx.models.ties import Ties
 SecondVariation = namedtuple("SecondVariation", "form numbering cell_dofs tied axes sideways")
 
 
-class RodModel:
+class RodModel(Snapshots):
     """Spaces, data and forms of one `Signature`; `load` fills in the data of a scene. Subclasses are the models.
 
     Attributes:
@@ -287,7 +288,7 @@ class RodModel:
         place = {vertex: i for i, vertex in enumerate(links.tied)}
         nodes = [(place[a], -1 if b is None else place[b]) for _, a, b in links.ties]
         reference = self.reference[self.tied_slots]
-        self.ties = Ties(ties_of(self.scene), nodes, reference, self.scales.length) if nodes else None
+        self.ties = Ties(ties_of(self.scene), nodes, reference, self.scales.length, self.comm) if nodes else None
 
     def set_motion(self, values, n):
         """Set the initial guess, in the scene's order: the nodes' unknowns (N, components), and n at the Gauss points
@@ -326,35 +327,3 @@ class RodModel:
         """K in the second variation at the state, (elements, points, 3), in the scene's order, on all ranks."""
         n = self.snapshot()[1][..., : self.force_size]
         return np.maximum(self.bounded_K, stiffness_for(np.linalg.norm(n, axis=2, keepdims=True), 1 / self.section.K))
-
-    def snapshot(self):
-        """The input of `expansion`: the nodes' unknowns (N, components), and the fields at the Gauss points (cells,
-        points, k) or None; in the scene's order, on all ranks, dimensionless."""
-        nodal = self._gather_nodes(self.state.x.array[self._nodal[: self._owned_nodes]])
-        if self.forms.fields is None:
-            return nodal, None
-        return nodal, self.gathered(self.forms.fields, len(self.forms.gauss), self.forms.fields_size)
-
-    def snapshots(self, x, fields):
-        """`snapshot` at several states of one process: from its unknowns (k, unknowns), and the values of the fields
-        (k, elements, n) or None."""
-        numbering = self.numbering
-        state = np.tile(self._rest_state, (len(x), 1))
-        state[:, numbering.free] = x[:, numbering.of_free]
-        nodal = np.empty((len(x), *self._nodal.shape))
-        nodal[:, self._slots] = state[:, self._nodal]
-        if fields is None:
-            return nodal, None
-        values = fields.reshape(*fields.shape[:2], len(self.forms.gauss), -1).copy()
-        values[:, self.rods.reversed] = values[:, self.rods.reversed][:, :, ::-1]
-        found = np.empty_like(values)
-        found[:, self.rods.cells] = values
-        return nodal, found
-
-    def gathered(self, expression, points, size):
-        """(elements, points, size) values of a compiled expression, in the scene's order, on all ranks."""
-        owned = len(self._owned_cells)
-        values = compat.evaluate(expression, self.mesh, self._owned_cells).reshape(owned, points, size)
-        reverse = self.rods.reversed[:owned]
-        values[reverse] = values[reverse][:, ::-1]
-        return self._gather_cells(values.reshape(owned, points * size)).reshape(-1, points, size)

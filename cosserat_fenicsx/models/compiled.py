@@ -13,6 +13,7 @@ import numpy as np
 import ufl
 from dolfinx import fem
 
+from cosserat_fenicsx import compat
 from cosserat_fenicsx.element import lobatto_weights
 from cosserat_fenicsx.forms.point import resultants, variation
 
@@ -62,7 +63,6 @@ class CompiledForms:
 
 def compile_all(
     model, residual, tangent, acting, seconds, *, fields=None, advance=None, forces=None, densities=(None, None),
-    compiled=fem.form,
 ):  # fmt: skip
     """The `CompiledForms` of UFL forms and expressions.
 
@@ -70,7 +70,6 @@ def compile_all(
         acting: the `ActionWork`; forces: that of forces on displacements alone, or None.
         seconds: second variations, whose symmetric parts count.
         densities: see `action_densities`.
-        compiled: makes residual and tangent.
     """
     seconds = [0.5 * (second + ufl.adjoint(second)) for second in seconds]
     forces = forces or ActionWork(None, None, [])
@@ -80,11 +79,11 @@ def compile_all(
     points, weights = basix.make_quadrature(basix.CellType.interval, 2 * model.signature.points - 1)
     at_gauss, at_nodes = densities
     return CompiledForms(
-        compiled(residual),
-        compiled(tangent),
+        compat.form_for_speed(residual),
+        compat.form_for_speed(tangent),
         _unless_none(fem.form, acting.dead),
         _unless_none(fem.form, acting.permanent),
-        tuple(fem.form(second) for second in seconds),
+        tuple(compat.form_for_speed(second) for second in seconds),
         _unless_none(lambda a: fem.Expression(a, points), fields),
         0 if fields is None else len(fields),
         _unless_none(lambda a: fem.Expression(a, points), advance),

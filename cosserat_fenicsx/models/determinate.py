@@ -86,7 +86,7 @@ class DeterminateInPlane(_KnownForce, PlaneModel):
         """See `RodModel`."""
         axes, offset, section = self.axes, self._out_of_plane(), self.section
         known, lasting, rule, tree, sizes = self._known, self._lasting, self.rule, self._tree, self._sizes()
-        rest, basis = self.reference @ axes[:2].T, rule.basis(rule.gauss)
+        rest, basis = self.reference @ axes[:2].T, rule.at_gauss
 
         def expand(load_factors, nodal, gauss):
             theta = nodal[..., 0]
@@ -130,7 +130,7 @@ class DeterminateInSpace(_KnownForce):
         """See `RodModel`."""
         section, known, lasting = self.section, self._known, self._lasting
         rule, tree, sizes = self.rule, self._tree, self._sizes()
-        rest, basis = self.reference, rule.basis(rule.gauss)
+        rest, basis = self.reference, rule.at_gauss
         R_R = section.R_R.reshape(*section.K.shape, 3)
 
         def expand(load_factors, nodal, gauss):

@@ -261,9 +261,8 @@ def compile_motion(model, residual, tangent, acting, fields, others, of_step):
     for form in others.values():
         if form is not None:
             form.signature()
-    made = compat.form_for_speed
-    steady = compile_all(model, residual, tangent, acting, [], fields=fields, compiled=made)
-    others = {name: form and made(form) for name, form in others.items()}
+    steady = compile_all(model, residual, tangent, acting, [], fields=fields)
+    others = {name: form and compat.form_for_speed(form) for name, form in others.items()}
     places = steady.gauss, model.nodes
     return MotionForms(**vars(steady), **others, **{
         name: None if a is None else fem.Expression(a, x[:, None])

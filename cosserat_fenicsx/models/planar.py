@@ -81,6 +81,10 @@ class PlanarModel(PlaneModel):
         across[0, :3], across[1, 3:], across[2, 3:] = e3, e1, e2
         return inside, across
 
+    def _tie(self):
+        super()._tie()
+        self._inside, self._tied_off = self._variation_axes()[0], self._out_of_plane()[self.tied_slots]
+
     def positions(self):
         """See `RodModel`."""
         return self.state.x.array[self._nodal[:, :2]] @ self.axes[:2] + self._out_of_plane()[self._slots]
@@ -90,19 +94,17 @@ class PlanarModel(PlaneModel):
         e3, half = self.axes[2], values[:, 2:] / 2
         rq = np.empty((len(values), 7))
         rq[:, :3] = values[:, :2] @ self.axes[:2]
-        rq[:, :3] += (self.reference[self.tied_slots] @ e3)[:, None] * e3
+        rq[:, :3] += self._tied_off
         rq[:, 3:4], rq[:, 4:] = np.cos(half), np.sin(half) * e3
         return rq
 
     def tie_maps(self, values):
         """See `RodModel`."""
-        inside = self._variation_axes()[0]
-        return inside.T[None], inside[None]
+        return self._inside.T[None], self._inside[None]
 
     def held_forces(self, forces):
         """See `RodModel`: those in the plane and about its normal."""
-        inside = self._variation_axes()[0]
-        return forces @ inside.T @ inside
+        return forces @ self._inside.T @ self._inside
 
     def unknowns_of(self, rq):
         """See `RodModel`."""

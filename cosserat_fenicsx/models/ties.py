@@ -10,6 +10,7 @@ from functools import cache
 
 import numpy as np
 import ufl
+from mpi4py import MPI
 
 from cosserat_fenicsx import compat
 from cosserat_fenicsx.compiling import compiling
@@ -19,11 +20,11 @@ from cosserat_fenicsx.scene.ties import AngleTie, PositionTie
 _GROUND = (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
 
 
+@compat.rank_0_first
 @cache
 def _kernels():
-    """The compiled `forms.ties.derivatives`; the same for all scenes and models."""
-    with compiling():
-        return [compat.on_rows(x) for x in eq.derivatives(ufl.Constant(compat.interval_domain(), shape=(eq.COUNT,)))]
+    """The compiled `forms.ties.derivatives`, which are the same for all scenes and models."""
+    return [compat.on_rows(x) for x in eq.derivatives(ufl.Constant(compat.interval_domain(), shape=(eq.COUNT,)))]
 
 
 class Ties:
@@ -34,9 +35,12 @@ class Ties:
         nodes: (a, b) of every tie as indices into the tied nodes; b = -1 for the ground.
         reference: (tied nodes, 3) positions at rest.
         length: unit of length, m.
+        comm: of the ranks that make them together.
     """
 
-    def __init__(self, ties, nodes, reference, length):
+    def __init__(self, ties, nodes, reference, length, comm=MPI.COMM_SELF):
+        with compiling():
+            self._add_values, self._add_changes = _kernels(comm)
         self._length, self._count = length, len(reference)
         self._nodes = np.array(nodes) % (self._count + 1)  # the ground last
         rest = np.append(reference, [_GROUND[:3]], axis=0)
@@ -44,12 +48,10 @@ class Ties:
         self._rows, self._motion = np.zeros((len(ties), eq.COUNT)), np.tile(_GROUND, (len(rest), 1))
         self._rows[:, eq.PLACES["place"]] = np.subtract(*rest[self._nodes.T])
         self._take(ties)
-        self._ends = (np.arange(self._count)[:, None] == self._nodes.ravel()).astype(float)
-        # ties of the same two nodes stand together: where they begin, and the places of both nodes in rows of the
-        # displacements and rotations of all nodes and the ground
-        self._first = np.flatnonzero(np.append(True, (self._nodes[1:] != self._nodes[:-1]).any(axis=1)))
-        places = (6 * self._nodes[self._first, :, None] + np.arange(6)).reshape(-1, 12)
-        self._places = [np.ix_(x, x) for x in places]
+        # 1 where a tied node is a or b of a tie, else 0: (ties, tied nodes, 2), and (tied nodes, ties and 2)
+        self._ends = (self._nodes[:, None, :] == np.arange(self._count)[:, None]).astype(float)
+        self._sums = self._ends.swapaxes(0, 1).reshape(self._count, -1)
+        self._turning = np.array([i for i, tie in enumerate(ties) if not isinstance(tie, PositionTie)], dtype=np.intp)
 
     def _take(self, ties):
         for row, tie in zip(self._rows, ties, strict=True):
@@ -63,14 +65,10 @@ class Ties:
         other._take(ties)
         return other
 
-    def _run(self, kernel, rq, eta, size):
-        """(ties, size) results of a kernel."""
-        found, rows, motion = np.zeros((len(self._rows), size)), self._rows, self._motion
-        motion[:-1] = rq
-        rows[:, : eq.MOTION] = motion.take(self._nodes, axis=0).reshape(-1, eq.MOTION)
-        rows[:, -2] = eta
-        kernel(rows, found)
-        return found
+    def _see(self, rq, eta):
+        self._motion[:-1] = rq
+        self._rows[:, : eq.MOTION] = self._motion.take(self._nodes, axis=0).reshape(-1, eq.MOTION)
+        self._rows[:, -2] = eta
 
     def evaluate(self, rq, eta):
         """Values at (r, q) (tied nodes, 7) and a load factor.
@@ -79,28 +77,32 @@ class Ties:
             c (ties,); gradients (ties, 2, 6) over (displacement, rotation) of the nodes a and b, or the ground, which
             are also the reactions per unit of multiplier.
         """
-        found = self._run(_kernels()[0], rq, eta, 13)
+        found = np.zeros((len(self._rows), 13))
+        self._see(rq, eta)
+        self._add_values(self._rows, found)
         return found[:, 0], found[:, 1:].reshape(-1, 2, 6)
 
     def on_nodes(self, gradients):
         """(ties, tied nodes, 6) from gradients (ties, 2, 6)."""
-        found, ties = np.zeros((len(self._rows), self._count + 1, 6)), np.arange(len(self._rows))
-        for i in range(2):  # a and b may be one node
-            found[ties, self._nodes[:, i]] += gradients[:, i]
-        return found[:, :-1]
+        return self._ends @ gradients
 
     def reactions(self, gradients, multipliers):
         """(tied nodes, 6) forces and moments, sums over the ties, from gradients (ties, 2, 6)."""
-        return self._ends @ (multipliers[:, None, None] * gradients).reshape(-1, 6)
+        return self._sums @ (multipliers[:, None, None] * gradients).reshape(-1, 6)
 
     def change(self, rq, eta, multipliers):
         """The tangent of the reactions, (tied nodes, 6, tied nodes, 6), at (r, q) (tied nodes, 7), a load factor and
         multipliers (ties,)."""
+        found, total = np.zeros((len(self._turning), 144)), np.zeros((self._count, 6, self._count, 6))
+        self._see(rq, eta)
         self._rows[:, -1] = multipliers
-        found, total = self._run(_kernels()[1], rq, eta, 144), np.zeros((6 * self._count + 6, 6 * self._count + 6))
-        for place, block in zip(self._places, np.add.reduceat(found, self._first), strict=True):
-            total[place] += block.reshape(12, 12)
-        return total[:-6, :-6].reshape(self._count, 6, self._count, 6)
+        self._add_changes(self._rows[self._turning], found)
+        for tie, block in zip(self._turning, found.reshape(-1, 2, 6, 2, 6), strict=True):
+            ends = [(i, node) for i, node in enumerate(self._nodes[tie]) if node < self._count]
+            for i, k in ends:
+                for j, m in ends:
+                    total[k, :, m] += block[i, :, j]
+        return total
 
 
 def _numbers(tie, length):

@@ -4,10 +4,26 @@ from collections import namedtuple
 
 import numpy as np
 
+from cosserat_fenicsx.results.places import cell_nodes, compared, transferred
+from cosserat_fenicsx.results.result import resting
+
+#: Largest number of points of a path that are all sample points.
+FEW = 3
 # Differences of positions due to rounding alone, in units of the scales' length; not zero in an undisplaced state.
 _ROUNDING = 1e-14
 # Ratios of the largest difference to that at the element ends, above which the superconvergence of the ends is evident.
 _AHEAD, _FAR_AHEAD = 4, 30
+# Safety of the assumed gain in accuracy, and that of differences below which convergence is asymptotic.
+_SAFETY, _SAFETY_BELOW, _ASYMPTOTIC = 4, 2, 1e-3
+# Smallest error of a mesh over its difference from the mesh of elements half as long.
+_CAUTION = 1.5
+# Exponents of an error as a function of what indicates it, below and above what is known.
+_BELOW, _ABOVE = 0.7, 1.4
+# Factor of an error that is interpolated over leading coefficients, as a power of their ratio to those of the nearest
+# sample point; the largest one.
+_WIDENED, _WIDEST = 0.5, 2.0
+# Largest ratio of the leading coefficients of sample points without another one between them.
+_APART = 10.0
 # Ratio of leading coefficients below which a second, smoother point is sampled, since its error may converge otherwise.
 _SMOOTHER = 0.1
 # Points with displacements below this times the largest one of the path are not sampled for their smoothness.
@@ -18,31 +34,43 @@ def estimate_error(fine, coarse, before=None):
     """Estimate the error of a path from the same points on the mesh of elements twice as long; sets `fine.error`.
 
     The error is the difference of the positions, at the coarse nodes and half way between them, over an assumed gain in
-    accuracy. The gain of a halving is asymptotically 2^(p + 1) between the nodes. Only a part of it is assumed, and
-    only where the differences confirm it:
-    - with the differences `before` of the previous halving: (their ratio to the present ones - 1)/4, between 1 and
-      2^(p - 1);
-    - without: 2^(p - 1) or 2^(p - 3) if the element ends, whose order is 2 p, are much or moderately more accurate than
-      the rest, else 1. Splines and sections that are functions of s may reduce the order: for these at most 2^(p - 3).
+    accuracy. The gain of a halving is asymptotically 2^(p + 1) between the nodes. Only a part of it is assumed, a
+    quarter, or a half where the differences are small, and only where the differences confirm it:
+    - with the differences `before` of the previous halving: that part of (their ratio to the present ones - 1), at
+      least 1;
+    - without: that part if the element ends, whose order is 2 p, are much more accurate than the rest, 2^(p - 3) if
+      they are moderately more accurate, else 1. Splines and sections that are functions of s may reduce the order: for
+      these at most 2^(p - 3).
 
     Differences are relative to the largest displacement; where sections mainly rotate (a shaft in torsion), to their
     rotation times the radius of gyration; at least to 1e-9 of the length.
 
     Returns:
-        (n,) the relative differences, which are `before` in the next halving; and the assumed order of the error in h,
-        1 to p.
+        (n,) the relative differences, which are `before` in the next halving; and (n,) the assumed gains.
     """
     p = fine.degree
     relative, difference, at_ends = _differences(fine, coarse)
-    seen = np.inf if before is None else before / np.maximum(relative, 1e-300)
+    part = np.where(relative < _ASYMPTOTIC, 1 / _SAFETY_BELOW, 1 / _SAFETY)
     if before is None:
         ahead, far = difference > _AHEAD * at_ends, difference > _FAR_AHEAD * at_ends
         uniform = all(rod.uniform for rod in fine.scene.rods)
-        gain = np.where(far & uniform, 2.0 ** (p - 1), np.where(ahead, max(1.0, 2.0 ** (p - 3)), 1.0))
+        gain = np.where(far & uniform, part * 2.0 ** (p + 1), np.where(ahead, max(1.0, 2.0 ** (p - 3)), 1.0))
     else:
-        gain = np.clip((seen - 1) / 4, 1, 2 ** max(p - 1, 0))
+        seen = before / np.maximum(relative, 1e-300)
+        gain = np.clip(part * (seen - 1), 1, part * 2.0 ** (p + 1))
     fine.set_error(relative / gain)
-    return relative, float(np.clip(1 + np.log2(np.min(gain)), 1, p))
+    return relative, gain
+
+
+def error_before(apart, gain):
+    """(n,) the estimated errors of the coarse mesh of `estimate_error`, from what it returned; infinite where nothing
+    confirms that the meshes converge."""
+    return np.where(gain > 1, _CAUTION * apart, np.inf)
+
+
+def order_of(gain, p):
+    """The order of the error in h that the gains (n,) of a halving are those of."""
+    return float(np.clip(np.log2(_CAUTION * np.min(gain)), 1, p + 0.5))
 
 
 def carry_error(fine, coarse, factor, order, before=None):
@@ -54,7 +82,7 @@ def carry_error(fine, coarse, factor, order, before=None):
 
     Args:
         factor: number of elements over that of the coarser mesh.
-        order: of the error in h, as assumed by `estimate_error` on the coarser mesh.
+        order: of the error in h, see `order_of`.
         before: relative differences of the coarser mesh from the one before, where its elements were halved; or None.
 
     Returns:
@@ -64,7 +92,9 @@ def carry_error(fine, coarse, factor, order, before=None):
     seen = (
         order
         if before is None
-        else np.clip(np.log2(np.maximum(before, 1e-300) / np.maximum(relative, 1e-300)) - 1, order, fine.degree)
+        else np.clip(
+            np.log2(np.maximum(before, 1e-300) / np.maximum(relative, 1e-300)) - 1, order, max(order, fine.degree)
+        )
     )
     reduction = factor**-seen
     estimate = relative * reduction / (1 - reduction)
@@ -87,48 +117,56 @@ def _differences(fine, coarse):
     return np.maximum(difference - _ROUNDING, 0.0) / sizes.largest, difference, at_ends
 
 
-def hardest(path, most=3):
+def hardest(path):
     """Sample points that determine the mesh that a path needs.
 
     They are the point with the largest error (the largest relative leading coefficients where errors are unknown), the
-    most displaced one, the last, and the smoothest (smallest leading coefficients) where it is much smoother. All
-    points where these are few or the path has events.
+    most displaced one, the last, the smoothest (smallest leading coefficients) where it is much smoother, and then one
+    between. All points where these are few or the path has events.
 
     Returns:
         (Path of these points, their indices).
     """
-    if len(path) <= most or path.events:  # events have to be located on every mesh
+    if len(path) <= FEW or path.events:  # events have to be located on every mesh
         return path, np.arange(len(path))
-    sizes, rough, _ = sizes_of(path)
+    sizes, rough = sizes_of(path).largest, _leading(path)
     known = np.isfinite(path.error).all()
     which = {int(np.argmax(path.error if known else rough / sizes)), int(np.argmax(sizes)), len(path) - 1}
     seen = np.flatnonzero(sizes >= _SEEN * sizes.max())
     if rough[seen].min() < _SMOOTHER * rough.max():
         which.add(int(seen[np.argmin(rough[seen])]))
+    told = np.log(np.maximum(rough, 1e-300))
+    ends = np.array([min(told[list(which)]), max(told[list(which)])])
+    if np.ptp(ends) > np.log(_APART):
+        which.add(int(np.argmin(np.abs(told - ends.mean()))))
     which = np.array(sorted(which))
     return path.at_points(which), which
 
 
-def spread_error(path, few, which, coarse):
+def spread_error(path, few, which, coarse=None):
     """Set `path.error` from the errors of its sample points on the same mesh.
 
-    The errors of the other points are interpolated over their differences from the same points on a coarser mesh:
-    logarithmically between neighbouring sample points, in proportion outside the range of these.
+    The errors of the other points are interpolated over what indicates them, logarithmically: the differences from the
+    same points on a coarser mesh, or the leading coefficients. In the second case they
+    are increased the more, the farther these are from those of the sample points.
 
     Args:
         few: the sample points, with their errors; which: their indices.
-        coarse: the whole path on a coarser mesh.
+        coarse: the whole path on a coarser mesh, or None.
     """
-    sizes, _, turning = sizes_of(path)
-    apart = np.maximum(_apart(path, coarse, turning)[0] - _ROUNDING, 0.0)
-    known, errors = apart[which], few.error * sizes[which]
+    sizes, turning = sizes_of(path)
+    told = _leading(path) if coarse is None else np.maximum(_apart(path, coarse, turning)[0] - _ROUNDING, 0.0)
+    known, errors = told[which], few.error * sizes[which]
     usable = (known > 100 * _ROUNDING) & (errors > 0)
-    error = apart.copy()
+    error = np.zeros(len(path)) if coarse is None else told.copy()
     if usable.any():
         order = np.argsort(known[usable])
-        known, errors = known[usable][order], np.maximum.accumulate(errors[usable][order])
-        within = np.clip(apart, known[0], known[-1])
-        error *= np.exp(np.interp(np.log(within), np.log(known), np.log(errors))) / within
+        known, errors = np.log(known[usable][order]), np.log(np.maximum.accumulate(errors[usable][order]))
+        told = np.log(np.maximum(told, 1e-300))
+        beyond = _BELOW * np.minimum(told - known[0], 0) + _ABOVE * np.maximum(told - known[-1], 0)
+        if coarse is None:
+            beyond += np.minimum(_WIDENED * np.abs(told[:, None] - known).min(axis=1), np.log(_WIDEST))
+        error = np.exp(np.interp(told, known, errors) + beyond)
     error /= sizes
     error[which] = few.error
     path.set_error(error)
@@ -140,58 +178,49 @@ def _apart(fine, coarse, turning):
     Both (points,). Where sections mainly rotate (`_Sizes.turning`), differences of rotations count too, times the
     radius of gyration.
     """
-    difference, at_ends = np.zeros(len(fine)), np.zeros(len(fine))
-    for i, rod in enumerate(fine.scene.rods):
-        nodes = coarse.layout.node_s(coarse.rule.nodes)[i]
-        x = halfway(nodes)
-        ends = np.isin(x, coarse.layout.breaks[i])
-        off = coarse.motion(rod, x) - fine.motion(rod, x)
-        radius = 2 * _gyration(rod) / fine.scales.length
-        turned = turning[:, None] * radius * np.linalg.norm(off[:, :, 3:], axis=2)
-        off = np.maximum(np.linalg.norm(off[:, :, :3], axis=2), turned)
-        difference = np.maximum(difference, off.max(axis=1))
-        at_ends = np.maximum(at_ends, off[:, ends].max(axis=1))
-    return difference, at_ends
+    there, here, ends = compared(coarse.layout, fine.layout, coarse.rule)
+    off = np.linalg.norm(there.of(coarse._moved) - here.of(fine._moved), axis=2)
+    if turning.any():
+        turned = np.linalg.norm(_unit(there.of(coarse._turned)) - _unit(here.of(fine._turned)), axis=2)
+        for rod, part in zip(fine.scene.rods, there.rods, strict=True):
+            turned[:, part] *= 2 * _gyration(rod) / fine.scales.length
+        off = np.maximum(off, turning[:, None] * turned)
+    return off.max(axis=1), off[:, ends].max(axis=1)
 
 
-def halfway(places):
-    """Coordinates in ascending order with the midpoints of their intervals."""
-    return np.sort(np.concatenate([places, (places[:-1] + places[1:]) / 2]))
+def _unit(q):
+    return q / np.linalg.norm(q, axis=2, keepdims=True)
 
 
-_Sizes = namedtuple("_Sizes", "largest leading turning")
+_Sizes = namedtuple("_Sizes", "largest turning")
 
 
 def sizes_of(path):
     """Reference sizes of the points of a path, a `_Sizes` of arrays (points,).
 
-    largest: the displacement that errors are relative to; leading: the largest leading coefficient of an element's
-    displacement, both dimensionless; turning: whether `largest` comes from rotations times the radius of gyration.
+    largest: the displacement that errors are relative to, dimensionless; turning: whether it comes from rotations times
+    the radius of gyration.
     """
-    moved, turned = np.full(len(path), 1e-9), np.zeros(len(path))
-    leading = np.zeros(len(path))
-    for i, rod in enumerate(path.scene.rods):
-        motion = path.motion(rod, path.layout.node_s(path.rule.nodes)[i])
-        # |R - 1| = sqrt(8) |sin(angle/2)|
-        angle = np.sqrt(8) * np.linalg.norm(motion[:, :, 4:], axis=2).max(axis=1)
-        turned = np.maximum(turned, angle * _gyration(rod) / path.scales.length)
-        moved = np.maximum(moved, np.linalg.norm(motion[:, :, :3], axis=2).max(axis=1))
-        leading = np.maximum(leading, _of_degree_p(path, motion).max(axis=1))
-    return _Sizes(np.maximum(moved, turned), leading, turned > moved)
+    moved, vectors = np.linalg.norm(path._moved, axis=2).max(axis=1), _unit(path._turned)[:, :, 1:]
+    # |R - 1| = sqrt(8) |sin(angle/2)|
+    angle, turned = np.sqrt(8) * np.linalg.norm(vectors, axis=2), np.zeros(len(path))
+    for rod, (_, rows) in zip(path.scene.rods, cell_nodes(path.layout, path.degree), strict=True):
+        turned = np.maximum(turned, angle[:, rows].max(axis=1) * _gyration(rod) / path.scales.length)
+    moved = np.maximum(moved, 1e-9)
+    return _Sizes(np.maximum(moved, turned), turned > moved)
+
+
+def _leading(path):
+    """(points,) the largest leading coefficient of an element's displacement, dimensionless."""
+    return np.max([found.max(axis=1) for found in leading_coefficients(path)], axis=0)
 
 
 def leading_coefficients(path):
     """For every rod (points, elements): sizes of the leading coefficients of the displacement, dimensionless."""
-    nodes = path.layout.node_s(path.rule.nodes)
-    return [_of_degree_p(path, path.motion(rod, x)) for rod, x in zip(path.scene.rods, nodes, strict=True)]
-
-
-def _of_degree_p(path, motion):
-    """(points, elements) sizes of the displacement's coefficients of degree p, from the motion of a rod's nodes."""
-    p = path.degree
-    elements = p * np.arange((motion.shape[1] - 1) // p)[:, None] + np.arange(p + 1)
-    of_degree_p = np.einsum("j,kcji->kci", path.rule.leading, motion[:, elements, :3])
-    return np.linalg.norm(of_degree_p, axis=2)
+    return [
+        np.linalg.norm(np.einsum("j,kcji->kci", path.rule.leading, path._moved[:, nodes]), axis=2)
+        for nodes, _ in cell_nodes(path.layout, path.degree)
+    ]
 
 
 def on_mesh(path, layout):
@@ -201,18 +230,16 @@ def on_mesh(path, layout):
         (r, q) at the nodes (points, N, 7) and n at the Gauss points (points, elements, Gauss points per element, 3),
         dimensionless, inertial.
     """
-    rule, scene = path.rule, path.scene
-    n = path._stacked("gauss_fields")[..., :3]
-    motions, forces, first = [], [], 0
-    for i, rod in enumerate(scene.rods):
-        x, inside, breaks = layout.node_s(rule.nodes)[i], layout.inside(rule.gauss)[i], path.layout.breaks[i]
-        motion = path.motion(rod, x)
-        motion[:, :, :3] += (rod.curve.position(x * rod.length) - scene.origin(rod)) / path.scales.length
-        motions.append(motion)
-        cells, weights = rule.locate_all(breaks, inside.ravel(), rule.between_gauss)
-        forces.append(np.einsum("kj,pkjc->pkc", weights, n[:, first + cells]).reshape(-1, *inside.shape, 3))
+    rule, n = path.rule, path._stacked("gauss_fields")[..., :3]
+    places, at_gauss = transferred(path.layout, layout, rule)
+    rest = resting(path.scene, layout, rule) / path.scales.length
+    rq = np.concatenate([places.of(path._moved) + rest, _unit(places.of(path._turned))], axis=2)
+    forces, first = [], 0
+    for breaks, (cells, weights) in zip(path.layout.breaks, at_gauss, strict=True):
+        found = np.einsum("kj,pkjc->pkc", weights, n[:, first + cells])
+        forces.append(found.reshape(len(n), -1, len(rule.gauss), 3))
         first += len(breaks) - 1
-    return np.concatenate(motions, axis=1), np.concatenate(forces, axis=1)
+    return rq, np.concatenate(forces, axis=1)
 
 
 def _gyration(rod):

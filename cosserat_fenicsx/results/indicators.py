@@ -3,7 +3,8 @@
 import numpy as np
 
 from cosserat_fenicsx.quaternions import conjugate_product, directors
-from cosserat_fenicsx.results.accuracy import halfway, sizes_of
+from cosserat_fenicsx.results.accuracy import sizes_of
+from cosserat_fenicsx.results.places import halfway
 
 # Largest length of an element next to a support, load or kink, over the length of the boundary layer there.
 _COARSE = 4.0
@@ -49,6 +50,13 @@ def unresolved(scene, layout, lengths):
         if (sizes[at_ends] > _COARSE * layers[at_ends]).any():
             return True
     return False
+
+
+def resolves(layout, lengths):
+    """Whether all elements are short enough for the boundary layers in them; `lengths` as `layer_lengths` returns."""
+    return lengths is None or all(
+        (np.diff(breaks) <= _COARSE * layers).all() for breaks, layers in zip(layout.breaks, lengths, strict=True)
+    )
 
 
 def element_differences(fine, coarse):

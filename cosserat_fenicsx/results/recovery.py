@@ -13,7 +13,7 @@ def element_contact(path, record):
     through both ends and the Gauss points. Virtual rotations are those of the formulation, see `Path.galerkin`.
     """
     rule, scales, p = path.rule, path.scales, path.degree
-    basis, lobatto = rule.basis(rule.gauss), rule.lobatto
+    basis, lobatto = rule.at_gauss, rule.lobatto
     result, cell0, node0 = [], 0, 0
     for rod, breaks in zip(path.scene.rods, path.layout.breaks, strict=True):
         cells = len(breaks) - 1
@@ -52,7 +52,7 @@ def _tested_by_turning(q, end, rule, h, m, density):
         h: (elements,) lengths; m: (elements, points, 3) moments at the Gauss points.
         density: (elements, points, 3) r' x n and moments per length.
     """
-    basis = rule.basis(rule.gauss)
+    basis = rule.at_gauss
     inside, slope = basis @ q, rule.slopes @ q / h[:, None, None]
     squared = np.einsum("cgi,cgi->cg", inside, inside)[..., None]
     at_end = np.broadcast_to(q[:, end, None], inside.shape)

@@ -8,6 +8,7 @@ import numpy as np
 from cosserat_fenicsx.annotations import File
 from cosserat_fenicsx.checks import instance
 from cosserat_fenicsx.quaternions import directors
+from cosserat_fenicsx.remember import per_scene
 from cosserat_fenicsx.results.export.exports import Exports
 from cosserat_fenicsx.results.extremes import Extremes
 from cosserat_fenicsx.results.fields import fields_at
@@ -18,6 +19,15 @@ from cosserat_fenicsx.scene.rod import RodOrName, Station, StationOrName
 
 # How far beyond a jump its right side is taken, over the rod's length.
 _BEYOND = 1e-9
+
+
+@per_scene
+def resting(scene, layout, rule):
+    """(nodes, 3) positions at rest, m, of all nodes of all rods, relative to the origin of each structure."""
+    return np.concatenate([
+        rod.curve.position(x * rod.length) - scene.origin(rod)
+        for rod, x in zip(scene.rods, layout.node_s(rule.nodes), strict=True)
+    ])  # fmt: skip
 
 
 class Result(Exports, Extremes, Reactions, Stresses, States):
@@ -108,8 +118,7 @@ class Result(Exports, Extremes, Reactions, Stresses, States):
 
     def largest_displacement(self) -> np.ndarray:
         """(n,) the largest displacement of any node, m."""
-        moved = self._all_rq[:, :, :3] - self._rest
-        return np.linalg.norm(moved, axis=2).max(axis=1) * self.scales.length
+        return np.linalg.norm(self._moved, axis=2).max(axis=1) * self.scales.length
 
     @cached_property
     def _all_rq(self):
@@ -119,10 +128,17 @@ class Result(Exports, Extremes, Reactions, Stresses, States):
     @cached_property
     def _rest(self):
         """(nodes, 3) positions at rest, dimensionless, relative to the origin of each structure."""
-        return np.concatenate([
-            (rod.curve.position(x * rod.length) - self.scene.origin(rod)) / self.scales.length
-            for rod, x in zip(self.scene.rods, self.layout.node_s(self.rule.nodes), strict=True)
-        ])  # fmt: skip
+        return resting(self.scene, self.layout, self.rule) / self.scales.length
+
+    @cached_property
+    def _moved(self):
+        """(points, nodes, 3) displacements of the nodes, dimensionless."""
+        return self._all_rq[:, :, :3] - self._rest
+
+    @property
+    def _turned(self):
+        """(points, nodes, 4) q at the nodes."""
+        return self._all_rq[:, :, 3:]
 
     def _contact_at(self, station, side="left"):
         """(points, 6) n and m at a station, dimensionless; at a jump those of the "left" or the "right" side."""

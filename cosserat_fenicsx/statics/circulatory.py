@@ -45,7 +45,7 @@ class CirculatoryPart:
     def __init__(self, model):
         self._model = model
         (self._variation,) = model.second_variations
-        self._form = self._variation.form and Packed(self._variation.form, ())
+        self._form = self._variation.form and Packed(self._variation.form, (), ())
 
     def skew(self, rq, load_factor):
         """The skew-symmetric part of the second variation, a PETSc matrix, dimensionless.

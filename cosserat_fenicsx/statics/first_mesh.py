@@ -1,8 +1,11 @@
 """The first mesh of the automatic refinement."""
 
+import math
+
 import numpy as np
 
 from cosserat_fenicsx.models.rodmesh import Layout
+from cosserat_fenicsx.models.traits import traits_of
 from cosserat_fenicsx.remember import per_scene
 from cosserat_fenicsx.scene.curves import Line
 
@@ -13,36 +16,76 @@ FIRST_ELEMENTS = 4
 _FINEST_FIRST, _FLEXIBILITY_TOLERANCE = 256, 1e-3
 # Elements are halved where their quadrature error exceeds this share of the largest one.
 _LARGE = 0.1
-# Smallest mean ratio of chord to arc over a quarter of an element: that of a circular arc of one radian.
+# Smallest mean ratio of chord to arc over a quarter of an element, or over an element where the mesh is coarser than
+# usual: that of a circular arc of one radian.
 _STRAIGHT = 0.958
+# The error of rods that bend by about a radian is _TYPICAL n^-(p + 0.9) on n elements of degree p = 1 .. 4; the first
+# mesh has no more elements than _MOST by this.
+_TYPICAL, _MOST = (0.3, 0.1, 0.01, 0.004), 12
+# Error of a mesh that is estimated by its difference from another one over the true error, about; and the part of the
+# gain in accuracy of a halving that is assumed for the error of the finer mesh.
+_ESTIMATED, _GAINED = 1.5, 0.25
+
+
+def meshes_for(scene, degree, tol, many):
+    """The first mesh for a tolerance; and, where it is coarser than usual, the usual one, else None.
+
+    Args:
+        many: whether the path has so many points that those on the first mesh should suffice; else these are all
+            computed on one of elements half as long too.
+    """
+    usual = first_layout(scene, degree)
+    if not 1 <= degree <= 4 or not all(rod.uniform for rod in scene.rods) or not _acts_evenly(scene):
+        return usual, None
+    wanted = tol if many else _GAINED * 2 ** (degree + 1) * tol
+    elements = (_ESTIMATED * _TYPICAL[degree - 1] / wanted) ** (1 / (degree + 0.9))
+    layout = first_layout(scene, degree, min(max(math.ceil(elements), 1), _MOST))
+    coarser = any(a < b for a, b in zip(layout.counts, usual.counts, strict=True))
+    return layout, usual if coarser else None
 
 
 @per_scene
-def first_layout(scene, degree):
-    """The first mesh, fine enough to resolve the curvature of the axis and a section that is a function of s.
+def _acts_evenly(scene):
+    """Whether loads along rods are constant: no functions, and nothing that depends on the motion."""
+    return all(
+        action.station is not None
+        or (
+            type(action).__module__.startswith("cosserat_fenicsx.")
+            and not any(map(callable, vars(action).values()))
+            and traits_of(action, scene.rods).dead
+        )
+        for action in scene.actions
+    )
 
-    A local change of the section then cannot be missed by the quadrature points. Where a section changes in a part of
-    a rod, elements are short only there.
+
+@per_scene
+def first_layout(scene, degree, elements=FIRST_ELEMENTS):
+    """The first mesh of so many elements per rod or more.
+
+    It resolves the curvature of the axis and a section that is a function of s, a local change of which then cannot be
+    missed by the quadrature points. Where a section changes in a part of a rod, elements are short only there.
     """
-    layout = Layout.of(scene, FIRST_ELEMENTS)
+    layout, parts = Layout.of(scene, elements), 4 if elements >= FIRST_ELEMENTS else 1
     while True:
-        too_long = [_too_long(rod, breaks, degree) for rod, breaks in zip(scene.rods, layout.breaks, strict=True)]
+        too_long = [
+            _too_long(rod, breaks, degree, parts) for rod, breaks in zip(scene.rods, layout.breaks, strict=True)
+        ]
         if not any(marked.any() for marked in too_long):
             return layout
         layout = layout.resized(scene, [np.where(marked, 2.0, 1.0) for marked in too_long])
 
 
-def _too_long(rod, breaks, degree):
+def _too_long(rod, breaks, degree, parts):
     """(elements,) of bool: the elements to be halved.
 
-    All of them until their quarters are almost straight. Then, where the section changes along the rod or twists about
-    a curved axis, those in which the Gauss points do not integrate the flexibilities 1/EI, compared with a fine
-    quadrature.
+    All of them until so many equal parts of them are almost straight. Then, where the section changes along the rod or
+    twists about a curved axis, those in which the Gauss points do not integrate the flexibilities 1/EI, compared with a
+    fine quadrature.
     """
     none = np.zeros(len(breaks) - 1, dtype=bool)
     long_enough = np.diff(breaks) > 1.01 / _FINEST_FIRST
-    quarters = (breaks[:-1, None] + np.diff(breaks)[:, None] * np.arange(4) / 4).ravel()
-    chords = np.diff(rod.curve.position(np.append(quarters, 1.0) * rod.length), axis=0)
+    ends = (breaks[:-1, None] + np.diff(breaks)[:, None] * np.arange(parts) / parts).ravel()
+    chords = np.diff(rod.curve.position(np.append(ends, 1.0) * rod.length), axis=0)
     if np.linalg.norm(chords, axis=1).sum() < _STRAIGHT * rod.length:
         return long_enough
     low, high = rod.profile.range

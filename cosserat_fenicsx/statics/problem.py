@@ -37,7 +37,7 @@ class Problem(Equations):
         self.take_forms(Packed(forms.residual, moving, constants), Packed(forms.tangent, moving, constants), advance)
         self._dead, self._permanent, *self._difference = (self.numbering.vector() for _ in range(4))
         self._loads, self._permanent_loads = (
-            None if form is None else Packed(form, ()) for form in (forms.dead, forms.permanent)
+            None if form is None else Packed(form, (), ()) for form in (forms.dead, forms.permanent)
         )
         self._live = [function.x.array for function in model.carried]
         self.load_factor = self.load_norm = 0.0
@@ -68,7 +68,7 @@ class Problem(Equations):
             self._loaded = None
             model.load(scene, layout)
             self._residual.refresh()
-            self._tangent.refresh()
+            self.tangent_form.refresh()
             for packed, vector in ((self._loads, self._dead), (self._permanent_loads, self._permanent)):
                 if packed:
                     packed.refresh()

@@ -1,7 +1,8 @@
 """Mesh refinement of a path until the difference of two successive meshes estimates an error below the tolerance.
 
 A path is traced anew on coarse meshes; once it is resolved, its points on a finer mesh follow by Newton's method from
-those of the coarser one. A few sample points determine the mesh, on which all points are then computed at once.
+those of the coarser one. A few sample points determine the mesh, on which all points are then computed at once; where
+that is the mesh on which the path was traced, it is not computed again.
 """
 
 import math
@@ -9,10 +10,16 @@ import math
 import numpy as np
 
 from cosserat_fenicsx.errors import Interrupted, NotConverged
-from cosserat_fenicsx.interrupts import obey
-from cosserat_fenicsx.models.rodmesh import Layout
-from cosserat_fenicsx.results.accuracy import carry_error, compare, estimate_error, hardest, spread_error
-from cosserat_fenicsx.results.indicators import of_path
+from cosserat_fenicsx.results.accuracy import (
+    carry_error,
+    compare,
+    error_before,
+    estimate_error,
+    hardest,
+    order_of,
+    spread_error,
+)
+from cosserat_fenicsx.results.indicators import of_path, resolves
 from cosserat_fenicsx.results.same_events import find_again, keep_confirmed
 from cosserat_fenicsx.statics.grading import balanced, with_layers
 from cosserat_fenicsx.statics.path.recorder import Promoted
@@ -28,11 +35,11 @@ _QUARTERS, _AIM = 4, 0.8
 _LOCATED, _FOR_EVENTS = 1e-6, 2
 # Largest number of times that the error is equidistributed over the elements.
 _MOST_BALANCINGS = 4
-# Paths with fewer unknowns than this at all points together are cheaper to solve than to sample.
+# Largest number of unknowns, of all points together, that is cheaper to solve than another mesh is to make.
 _CHEAP = 800
 
 
-def refine(trace, correct, scene, layout, tol, degree):
+def refine(trace, correct, scene, layout, tol, degree, usual=None):
     """A path whose estimated error is at most `tol`.
 
     Args:
@@ -40,6 +47,8 @@ def refine(trace, correct, scene, layout, tol, degree):
         correct: (layout, path) -> the points of the path on this mesh by Newton's method from those of the given path;
             None where that fails.
         scene: the scene; layout: the first mesh.
+        usual: where that one is coarser than usual, the mesh to begin with again unless the path on it is plain: load
+            control, no events, no negative modes, elements shorter than boundary layers.
         tol: largest error of positions relative to the largest displacement.
         degree: of the elements, for error messages.
 
@@ -47,7 +56,7 @@ def refine(trace, correct, scene, layout, tol, degree):
         NotConverged: two meshes in a row cannot be solved, or the accuracy is not reached.
         Promoted: the path leaves the plane; the spatial model is needed.
     """
-    search = _Search(trace, correct, scene, tol, degree)
+    search = _Search(trace, correct, scene, tol, degree, usual)
     try:
         while True:
             try:
@@ -71,16 +80,22 @@ class _Search:
         accurate: the last path with accurate positions whose events differ from those of the mesh before; or None.
     """
 
-    def __init__(self, trace, correct, scene, tol, degree):
+    def __init__(self, trace, correct, scene, tol, degree, usual):
         self._trace, self._correct, self._scene, self._tol, self._degree = trace, correct, scene, tol, degree
+        self._usual, self._next = usual, None  # `_next`: the next mesh and its refinement factor, where it is known
+        self._begin()
+
+    def _begin(self):
         self.whole = self._few = self._which = None  # `_few`: sample points on the last mesh; `_which`: their indices
         self._apart, self._apart_of_whole = None, None  # their differences to the mesh before, and those of all points
         self._level, self._level_of_whole = -1, -2
+        self._plain = False  # see `_plain`, of the complete path
         # Assumed order of the error in h; refinement factor over the mesh before, None where the meshes are not nested.
         self._order, self._factor = 1.0, 2.0
         self._failed, self._promoted, self._best = False, None, math.inf
         self.accurate, self._meshes_for_events, self._lost_events = None, _FOR_EVENTS, []
         self._halved = None  # sample points on this mesh and on the one before, if this one halves its elements
+        self._error_before = None  # errors of the latter
         self._layered = None  # the next mesh where the last one does not resolve the boundary layers
         self._balancings = 0
 
@@ -91,17 +106,30 @@ class _Search:
         try:
             found = self._found_on(layout)
         except NotConverged:
+            if self._usual is not None:
+                return self._begin_again()
             if self._failed or elements >= _MOST_ELEMENTS:
                 raise
             self._failed, self._few, self._apart, self._halved = True, None, None, None
             return None
         except Promoted as found:
+            if self._usual is not None:
+                return self._begin_again()
             if found.agrees(self._promoted) or elements >= _MOST_ELEMENTS:
                 raise
             self._promoted, self._few, self._apart, self._halved = found, None, None, None
             return None
         self._failed = False
-        self._layered = with_layers(self._scene, layout, of_path(found))
+        if found is None:
+            return self._begin_again()
+        if found is self.whole and self._level_of_whole < self._level:
+            return self.confirmed(found)
+        layers = of_path(found)
+        if found is self.whole:
+            self._plain = _plain(found, layers)
+            if self._usual is not None and not self._plain:
+                return self._begin_again()
+        self._layered = with_layers(self._scene, layout, layers)
         if found.rounding > self._tol:  # refinement would increase it
             raise NotConverged(_rounding_hides(self._tol, found.rounding, elements, found.formulation), found)
         if np.isfinite(found.error).all():
@@ -118,12 +146,14 @@ class _Search:
                 )
             self._best = min(self._best, reached)
         if found is self.whole:
-            if len(found) * found.unknowns <= _CHEAP:
-                self._few, self._which = found, np.arange(len(found))
-            else:
-                self._few, self._which = hardest(found)
+            self._few, self._which = hardest(found)
             self._apart = None if self._apart_of_whole is None else self._apart_of_whole[self._which]
         return None
+
+    def _begin_again(self):
+        """Begin again on a mesh that is not coarser than usual."""
+        self._begin()
+        self._next, self._usual = (self._usual, None), None
 
     def _events_agree(self, path):
         return all(event.error <= max(self._tol, _LOCATED) for event in path.events)
@@ -139,6 +169,9 @@ class _Search:
         It resolves the boundary layers or equidistributes the error where the last mesh does not. Else it has twice as
         many elements, or fewer where these suffice by the assumed order of the error.
         """
+        if self._next is not None:
+            (following, self._factor), self._next = self._next, None
+            return following
         if self._factor != 2:
             self._apart = self._apart_of_whole = None  # only halvings give differences that show an order
         layered, self._layered = self._layered, None
@@ -153,7 +186,7 @@ class _Search:
                 if even is not None:
                     self._balancings += 1
                     return self._restarted(even)
-            self._factor = min(2.0, math.ceil(_QUARTERS * above ** (1 / self._order)) / _QUARTERS)
+            self._factor = self._factor_for(self._few)
         return layout.finer(self._scene, self._factor)
 
     def _restarted(self, layout):
@@ -163,28 +196,58 @@ class _Search:
         return layout
 
     def _found_on(self, layout):
-        """The sample points, or all points, on a mesh, with their errors where these are known."""
+        """The sample points, or all points, on a mesh, with their errors where these are known.
+
+        All points on the mesh before where the sample points show that they are accurate; None where a mesh that is
+        coarser than usual does not resolve them.
+        """
         few = None if self._few is None else self._correct(layout, self._few)
         apart = None if few is None else self._judge(few, self._few, self._apart)
         if few is None or apart.max() > _RESOLVED:
+            if self._usual is not None and self.whole is not None:
+                return None
             whole, apart = self._trace(layout, self.whole), None
             if self._level == self._level_of_whole + 1:
                 apart = self._judge(whole, self.whole, self._apart_of_whole)
             return self._keep(whole, apart)
+        self._usual = None
         if len(few) == len(self.whole):
             return self._keep(few, apart)
-        self._few, self._apart = few, apart
+        coarse, self._few, self._apart = self._few, few, apart
+        if self._error_before is not None and self._level == self._level_of_whole + 1 and self._plain:
+            coarse.set_error(self._error_before)
+            if coarse.error.max() <= self._tol:
+                spread_error(self.whole, coarse, self._which)
+                if self.whole.error.max() <= self._tol:
+                    return self.whole
+            elif few.error.max() <= self._tol and self._saves(few, coarse):
+                self._few, self._apart = coarse, None
+                return few
         return self._all_points(layout, few) if few.error.max() <= self._tol else few
+
+    def _factor_for(self, path):
+        """The refinement factor, at most 2, that is to make the errors of a path small enough."""
+        wanted = min(2.0, (float(path.error.max()) / (_AIM * self._tol)) ** (1 / self._order))
+        return math.ceil(_QUARTERS * wanted) / _QUARTERS
+
+    def _saves(self, few, coarse):
+        """Whether a mesh between two is accurate enough, and all points on it are cheaper; sets it as the next one."""
+        factor = self._factor_for(coarse)
+        if (2 - factor) / 2 * few.unknowns * (len(self.whole) - len(few)) <= _CHEAP:
+            return False
+        self._next = self.whole.layout.finer(self._scene, factor), factor
+        return True
 
     def _judge(self, fine, coarse, before):
         """Set the errors of points from their differences (points,) to the mesh before, and return these."""
-        self._halved = None
+        self._halved = self._error_before = None
         if self._factor is None:
             return compare(fine, coarse)
         if self._factor < 2:
             return carry_error(fine, coarse, self._factor, self._order, before)
-        apart, self._order = estimate_error(fine, coarse, before)
-        self._halved = fine, coarse
+        apart, gain = estimate_error(fine, coarse, before)
+        self._halved, self._order = (fine, coarse), order_of(gain, fine.degree)
+        self._error_before = error_before(apart, gain)
         return apart
 
     def _keep(self, whole, apart):
@@ -203,81 +266,11 @@ class _Search:
         return self._keep(whole, None)
 
 
-def until_two_meshes_agree(scene, on_mesh, apart, tol, *, first, most, elements, degree, advice, progress, gains=False):
-    """Solve on successively halved meshes until the results of two of them agree.
-
-    Args:
-        scene: the scene.
-        on_mesh: a function of a layout that returns a tuple: the numbers to compare (n,), the lengths of boundary
-            layers (see `grading.layers_of`) or None, and further results.
-        apart: (the numbers, those of the mesh before) -> relative differences (n,).
-        tol: largest relative difference.
-        first, most: elements per rod of the first mesh and of the last; elements: those of a given mesh, or None.
-        degree, advice: for error messages.
-        progress: a `MeshProgress`.
-        gains: whether the error is estimated by the gain of a halving, of order 2 p, instead of by the difference of
-            two meshes, which is larger. Without rounding errors among the numbers alone.
-
-    Returns:
-        (what `on_mesh` returned, estimated relative errors (n,) or NaN, layout).
-
-    Raises:
-        NotConverged: the accuracy is not reached.
-    """
-    layout, coarse, best, worse = Layout.of(scene, elements or first), None, math.inf, 0
-    before = coarse_layout = None  # relative differences of the halving before; the mesh of `coarse`
-    while True:
-        obey()
-        progress.on(max(layout.counts), best)
-        found = on_mesh(layout)
-        numbers, lengths = found[:2]
-        error = np.full(len(numbers), np.nan)
-        layered = None if elements else with_layers(scene, layout, lengths)
-        if layered is not None:
-            coarse, before, layout = None, None, layered
-            continue
-        if coarse is not None and len(coarse) != len(numbers) and max(layout.counts) >= most:
-            raise NotConverged(
-                f"two meshes differ in how many were found: {len(coarse)} on the coarser one, {len(numbers)} with "
-                f"{max(layout.counts)} elements of degree {degree} per rod. Ask for fewer."
-            )
-        if coarse is not None and len(coarse) == len(numbers):
-            error = apart(numbers, coarse)
-            reached = error.max(initial=0.0)
-            # Differences may grow once before they converge; growth twice in a row is rounding.
-            worse = worse + 1 if reached > max(tol, best) else 0
-            if worse == 2 or (reached > tol and max(layout.counts) >= most):
-                raise NotConverged(
-                    f"the accuracy tol = {tol:g} was not reached with {max(layout.counts)} elements of degree {degree} "
-                    f"per rod: the estimated error stays at {min(reached, best):.2g}. Ask for {advice}."
-                )
-            best = min(best, reached)
-        if elements or (best <= tol and not gains):
-            return found, error, layout
-        if best <= tol:
-            if before is None:
-                before = _difference_before(scene, on_mesh, apart, coarse, coarse_layout)
-            return found, error if before is None else error / _gain(before, error, degree), layout
-        before = None if np.isnan(error).any() or not len(error) else error
-        coarse, coarse_layout, layout = numbers, layout, layout.finer(scene, 2)
-
-
-def _difference_before(scene, on_mesh, apart, numbers, layout):
-    """Relative differences (n,) of the numbers on a mesh to those on one with half as many elements; None where that
-    one is too coarse to be solved or to have as many."""
-    try:
-        coarse = on_mesh(layout.finer(scene, 0.5))[0]
-    except NotConverged:
-        return None
-    return apart(numbers, coarse) if len(coarse) == len(numbers) else None
-
-
-def _gain(before, error, degree):
-    """(n,) the assumed gain in accuracy of a halving, from the differences of two halvings.
-
-    Eigenvalues converge with the order 2 p, a gain of 2^(2 p); a part of the gain that is observed is assumed.
-    """
-    return np.clip((before / np.maximum(error, 1e-300) - 1) / 4, 1, 2.0 ** (2 * degree - 2))
+def _plain(path, layers):
+    """Whether a path has nothing that a coarse mesh may miss or invent: it is followed by load control, is stable, and
+    its elements are shorter than its boundary layers, and so than the half-waves of buckling."""
+    followed = path.control == "load" and not path.events
+    return followed and not path.negative_modes.any() and resolves(path.layout, layers)
 
 
 def _rounding_hides(tol, rounding, elements, formulation):

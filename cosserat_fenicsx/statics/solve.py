@@ -14,6 +14,7 @@ from mpi4py import MPI
 
 from cosserat_fenicsx.checks import instance
 from cosserat_fenicsx.models.choose import choose
+from cosserat_fenicsx.results.accuracy import FEW
 from cosserat_fenicsx.statics.path.load_control import StepControl
 from cosserat_fenicsx.errors import NotConverged, SceneError, nearest
 from cosserat_fenicsx.statics.path.follower import CONTROLS
@@ -21,7 +22,7 @@ from cosserat_fenicsx.models.formulations import formulation_of
 from cosserat_fenicsx.models.rodmesh import Layout
 from cosserat_fenicsx.results.path import Path
 from cosserat_fenicsx.progress import Progress
-from cosserat_fenicsx.statics.first_mesh import first_layout
+from cosserat_fenicsx.statics.first_mesh import first_layout, meshes_for
 from cosserat_fenicsx.statics.solvers import solvers_of
 from cosserat_fenicsx.statics.refinement import refine
 from cosserat_fenicsx.scene.action import path_dependent
@@ -111,6 +112,7 @@ def solve(
         follow["steps"] = replace(steps, largest=min(steps.largest or math.inf, _LARGEST_TURN / _turn(scene)))
 
     in_order = path_dependent(scene)
+    simple = not (branch or control == "arc" or until or in_order) and steps.adaptive
 
     def take(choice, bar):
         strayed = []
@@ -142,14 +144,16 @@ def solve(
                     raise
 
         def correct(layout, coarse):
-            if coarse.events or coarse.control == "arc" or until or not steps.adaptive or in_order:
+            if coarse.events or coarse.control == "arc" or not simple:
                 return None
             with tracing(layout, from_rest=False) as tracer:
                 return tracer.corrected(coarse)
 
         if elements is not None:
             return trace(Layout.of(scene, elements))
-        return refine(trace, correct, scene, first_layout(scene, degree), tol, degree)
+        many = free or len(targets) > FEW
+        layout, usual = meshes_for(scene, degree, tol, many) if simple else (first_layout(scene, degree), None)
+        return refine(trace, correct, scene, layout, tol, degree, usual)
 
     with Progress(targets, progress, comm) as bar:
         try:

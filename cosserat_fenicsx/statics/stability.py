@@ -13,7 +13,7 @@ from petsc4py import PETSc
 from cosserat_fenicsx.algebra import eigen, linear
 from cosserat_fenicsx.algebra.elimination import Elimination
 from cosserat_fenicsx.algebra.equations import COUNT, Called
-from cosserat_fenicsx.algebra.interface import Interface, signs
+from cosserat_fenicsx.algebra.interface import Interface
 from cosserat_fenicsx.algebra.packed import Packed
 
 _ROUNDING = np.finfo(float).eps
@@ -159,7 +159,7 @@ class Part:
             negative, zero = comm.allreduce(np.array([negative, zero]))
         if self.interface:
             of_ties = self._of_ties() if self.problem.ties else np.empty((0, 0))
-            further = signs(self.interface.matrix(of_ties))
+            further = self.interface.signs(of_ties)
             negative, zero = negative + further[0], zero + further[1]
         chain.negative, chain.zero = int(negative), int(zero)
 
@@ -167,6 +167,11 @@ class Part:
         """See `NegativeModes.count`."""
         self._factor()
         return self._negative - int(not self._zero and self._nearest(1)[0][0] < 0)
+
+    def count_of_matrix(self):
+        """The number of negative eigenvalues of K, whose factors give eigenvalues and modes."""
+        self._factor()
+        return self._negative
 
     def _factor(self):
         """Assemble K at the problem's state and factorise it."""

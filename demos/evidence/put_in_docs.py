@@ -24,6 +24,8 @@ PAGES = {
     "rungs": ("speed.md",),
     "choice": ("speed.md",),
     "scaling": ("speed.md",),
+    "ranks": ("speed.md",),
+    "steps": ("speed.md",),
     "overhead": ("speed.md",),
     "work_precision": ("speed.md", "work_precision_sweep.png"),
     "work_precision_motion": ("speed.md", "work_precision_motion.png"),

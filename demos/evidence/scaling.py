@@ -5,68 +5,173 @@
 
 Each size runs in a separate process: a thick cantilever under a small transverse force, degree 4, one Newton step
 (residual, tangent, factorisation, solution, update of n) repeated from rest, and one count of negative modes; medians.
-Small matrices are factored by node blocks, which is cheaper, large ones with full pivoting (`Signature.slender`):
-exponents are given for each kind.
+
+A second table has a step at 8 elements beside that of the cheapest rod there is, in plain C (floor.c), and its parts.
 """
 
 import argparse
 import json
+import os
 import resource
 import subprocess
 import sys
+import tempfile
 import time
 from pathlib import Path
 
 import numpy as np
+from asked import HEADS, judged
 from cantilever import column
 
 from cosserat_fenicsx import compat
 from cosserat_fenicsx.models.rodmesh import Layout
 from cosserat_fenicsx.statics import solvers
 
-SIZES = (4, 16, 64, 256, 1024, 4096, 16384, 35700)  # elements of degree 4: 28 unknowns each
+SIZES = (4, 16, 64, 256, 1024, 4096, 16384, 35715)  # elements of degree 4: 28 unknowns each
 QUICK = SIZES[:5]
-_DEGREE = 4
+DEGREE = 4
+LOAD = 1e-6  # load factor
+EXPONENT, MILLION, FLOOR = 1.05, 0.5, 5.0  # asked at most: exponent; s; times the time of floor.c
+FEW = 8  # elements of the second table
+KINDS = (("determinate", 1), ("planar", 1), ("spatial", 1), ("determinate", 4), ("planar", 4), ("spatial", 4))
+
+
+def loaded(elements, degree=DEGREE, model="spatial"):
+    """Context manager: the problem of the cantilever, its Newton solver for single steps, and its stability count."""
+    _, scene = column()
+    return solvers.solvers_of(scene, Layout.of(scene, elements), degree=degree, model=model)
+
+
+def from_rest(problem, newton, clock=time.process_time, meet=lambda: None):
+    """A function that puts the problem at rest, takes one Newton step and returns its seconds.
+
+    Args:
+        clock: which time; meet: called before it is taken, where several ranks take part.
+    """
+    newton.allow(1)
+    start = problem.numbers()
+
+    def step():
+        problem.put(start)
+        problem.set_load_factor(LOAD)
+        meet()
+        return timed(newton.solve, clock)
+
+    return step
+
+
+def timed(task, clock=time.process_time):
+    """Seconds of a call."""
+    began = clock()
+    task()
+    return clock() - began
 
 
 def measure(elements):
     """Number of unknowns, time of a Newton step (s), time of a count of negative modes (s), largest memory of this
-    process (MB), and whether the tangent is factored by blocks."""
-    _, scene = column()
-    layout = Layout.of(scene, elements)
-    with solvers.solvers_of(scene, layout, degree=_DEGREE) as (problem, newton, stability):
-        newton.allow(1)
-        start, steps, counts = problem.numbers(), [], []
-        for _ in range(max(3, min(100, 20000 // elements))):
-            problem.put(start)
-            problem.set_load_factor(1e-6)
-            began = time.process_time()
-            newton.solve()
-            steps.append(time.process_time() - began)
-            began = time.process_time()
-            stability.count()
-            counts.append(time.process_time() - began)
+    process (MB)."""
+    with loaded(elements) as (problem, newton, stability):
+        step = from_rest(problem, newton)
+        times = [(step(), timed(stability.count)) for _ in range(max(5, min(100, 20000 // elements)))]
         memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
-        return (
-            problem.model.unknowns,
-            float(np.median(steps)),
-            float(np.median(counts)),
-            memory,
-            problem.tangent == "blocks",
-        )
+        return problem.model.unknowns, *np.median(times, axis=0).tolist(), memory
+
+
+def parts(model, degree, runs):
+    """Times (s) at FEW elements: a whole step; its two residuals; tangent and factors; solution; without the rest of
+    it, which is SNES, the convergence test, the update of n, and Python."""
+    with loaded(FEW, degree, model) as (problem, newton, _):
+        step, snes = from_rest(problem, newton), newton.snes
+        step()
+        tangent, ksp, change = snes.getJacobian()[0], snes.getKSP(), problem.b.duplicate()
+        state = problem.x.copy()
+
+        def factors():
+            snes.computeJacobian(state, tangent)
+            ksp.setOperators(tangent)
+            ksp.setUp()
+
+        def residual():
+            snes.computeFunction(state, problem.b)
+
+        def solution():
+            ksp.solve(problem.b, change)
+
+        tasks = step, *(lambda task=task: timed(task) for task in (residual, factors, solution, lambda: None))
+        found = np.median([[task() for task in tasks] for _ in range(runs)], axis=0)
+        return (found[:-1] - found[-1]) * (1, 2, 1, 1)  # without the time of taking the time
+
+
+def kernels(model, degree, runs):
+    """Time (s) of FFCx's kernels alone for the tangents of FEW elements; of 16 times as many, since calls take time."""
+    with loaded(16 * FEW, degree, model) as (problem, _, _):
+        return float(np.median([timed(problem._tangent.matrices) for _ in range(runs)])) / 16
+
+
+def floor(steps, elements=FEW):
+    """Time (s) of a step of floor.c, and the displacement of its end after one."""
+    with tempfile.TemporaryDirectory() as folder:
+        program, source = Path(folder, "floor"), Path(__file__).with_name("floor.c")
+        words = [os.environ.get("CC", "cc"), "-O3", str(source), "-o", str(program), "-lm"]
+        subprocess.run(words, check=True)
+        words = [str(program), str(elements), str(steps)]
+        told = [subprocess.run(words, capture_output=True, text=True, check=True).stdout.split() for _ in range(5)]
+    microseconds, moved = np.median(np.array(told, dtype=float), axis=0)
+    return 1e-6 * float(microseconds), float(moved)
 
 
 def exponent(x, y):
-    """The exponent in y = c x^exponent by least squares; nan with fewer than two points with y > 0."""
-    some = y > 0
-    return float(np.polyfit(np.log(x[some]), np.log(y[some]), 1)[0]) if some.sum() > 1 else float("nan")
+    """The exponent in y = c x^exponent by least squares."""
+    return float(np.polyfit(np.log(x), np.log(y), 1)[0])
 
 
-def main(sizes=SIZES, out="out"):
-    """Print the table, write it to out/scaling.md.
+def sizes_table(rows):
+    """Lines of the table of sizes, and of what is asked of it."""
+    unknowns, step, count, _ = rows.T
+    yield "| unknowns | Newton step (ms) | us an unknown | count of negative modes (ms) | memory (MB) |"
+    yield "|---|---|---|---|---|"
+    for n, a, c, m in rows:
+        yield f"| {n:.0f} | {1e3 * a:.3f} | {1e6 * a / n:.2f} | {1e3 * c:.3f} | {m:.0f} |"
+    yield ""
+    yield f"| asked | found | {HEADS}"
+    yield "|---|---|---|---|"
+    all_rows = judged(exponent(unknowns, step), EXPONENT, ".3f")
+    yield f"| exponent of the Newton step, least squares over all rows | {all_rows} |"
+    if unknowns[-1] >= 1e6:
+        yield f"| Newton step of {unknowns[-1]:.0f} unknowns (s) | {judged(step[-1], MILLION, '.2f')} |"
+    yield f"| exponent of the count of negative modes | {exponent(unknowns, count):.3f} | - | - |"
+
+
+def floor_table(runs):
+    """Lines of the table of a step at few elements."""
+    least, _ = floor(1000 * runs)
+    yield (
+        f"A Newton step at {FEW} elements beside that of the cheapest rod there is, planar, P1, in plain C"
+        f" (demos/evidence/floor.c): {1e6 * least:.2f} us. The rest is SNES, the convergence test, the update of n and"
+        " Python."
+    )
+    yield ""
+    heads = (
+        "step (us) | two residuals | kernels of the tangent | its elimination | solution | the rest | over the floor"
+    )
+    yield f"| model | {heads} | {HEADS}"
+    yield "|---|---|---|---|---|---|---|---|---|---|"
+    for model, degree in KINDS:
+        found, alone = parts(model, degree, runs), kernels(model, degree, runs)
+        step, residuals, tangent, solution = found
+        parted = step, residuals, alone, tangent - alone, solution, step - found[1:].sum()
+        cells = [f"{1e6 * x:.1f}" for x in parted]
+        over = found[0] / least
+        in_plane = degree == 1 and model != "spatial"
+        told = judged(over, FLOOR) if in_plane else f"{over:.3g} | - | -"
+        yield f"| {model} P{degree} | {' | '.join(cells)} | {told} |"
+
+
+def main(sizes=SIZES, out="out", runs=300):
+    """Print the tables, write them to out/scaling.md.
 
     Returns:
-        The rows (unknowns, step, count, memory, whether by blocks) as an array.
+        The rows (unknowns, step, count, memory) as an array.
     """
     rows = []
     for elements in sizes:
@@ -76,30 +181,8 @@ def main(sizes=SIZES, out="out"):
         rows.append(json.loads(done.stdout.splitlines()[-1]))
         print(f"{rows[-1][0]:8d} unknowns: step {1e3 * rows[-1][1]:9.3f} ms", flush=True)
     rows = np.array(rows)
-    unknowns, step, count, memory, blocks = rows.T
-    of_blocks = blocks.astype(bool)
-    lines = [
-        (
-            f"{compat.version()}; medians, processor time, one process. Memory is the process's largest, everything"
-            " loaded."
-        ),
-        "",
-        "| unknowns | factored | Newton step (ms) | us an unknown | count of negative modes (ms) | memory (MB) |",
-        "|---|---|---|---|---|---|",
-        *(
-            f"| {n:.0f} | {'by blocks' if b else 'pivoting'} | {1e3 * a:.3f} | {1e6 * a / n:.2f} | {1e3 * c:.3f} |"
-            f" {m:.0f} |"
-            for n, a, c, m, b in rows
-        ),
-        "",
-        (
-            f"Exponents, least squares: step by blocks {exponent(unknowns[of_blocks], step[of_blocks]):.3f}, pivoting "
-            f"{exponent(unknowns[~of_blocks], step[~of_blocks]):.3f}, all rows {exponent(unknowns, step):.3f}; count "
-            f"{exponent(unknowns, count):.3f}; memory above the smallest, pivoting "
-            f"{exponent(unknowns[~of_blocks], memory[~of_blocks] - memory[0]):.3f}."
-        ),
-    ]
-    text = "\n".join(lines)
+    about = f"{compat.version()}; medians, processor time, one process. Memory is the process's largest, all loaded."
+    text = "\n".join([about, "", *sizes_table(rows), "", *floor_table(runs)])
     Path(out).mkdir(parents=True, exist_ok=True)
     (Path(out) / "scaling.md").write_text(text + "\n", encoding="utf-8")
     print(text)

@@ -1,8 +1,10 @@
-"""Computing time of a simulated second: a hanging drill-pipe of 1 km, moved up and down, 200 P2 elements, steps of 5
-ms.
+"""Computing time of a step of a motion, on many elements and on few, and what a hinge adds to it.
 
-    python demos/evidence/steps.py            medians of 7 runs of 5 s, processor time; writes out/steps.md
-    python demos/evidence/steps.py --quick    one run of 0.2 s
+    python demos/evidence/steps.py            medians of 7 runs, processor time; writes out/steps.md
+    python demos/evidence/steps.py --quick    one short run of each
+
+Many: a hanging drill-pipe of 1 km, moved up and down, 200 P2 elements, steps of 5 ms. Few: a rod under a short push, 8
+P2 elements, steps of 10 ms; clamped, hinged at its start, or with a rotating joint in its middle.
 
 Forms are compiled and the initial equilibrium is computed before; the time is that of the whole call of `simulate`,
 with the energy balance and the state saved every second.
@@ -13,6 +15,7 @@ import statistics
 import time
 from pathlib import Path
 
+from asked import HEADS, judged
 from machine import in_words, record
 
 import cosserat_fenicsx as cf
@@ -20,6 +23,9 @@ import cosserat_fenicsx as cf
 ELEMENTS, DEGREE, DT = 200, 2, 0.005
 #: (model, scheme)
 KINDS = (("spatial", "momentum"), ("planar", "momentum"), ("spatial", "energy"))
+HELD = ("clamp", "hinge", "rotating joint")
+FEW, STEP = 8, 0.01  # elements; s
+ASKED = 0.5  # ms, at most, of a step on few elements
 
 
 def pipe():
@@ -48,11 +54,42 @@ def measure(model, scheme, runs, duration):
     return statistics.median(seconds), history.iterations.sum() / history.steps[-1], history
 
 
+def pushed(held):
+    """The scene of a rod of 10 m (as in the flying spaghetti) with a push on its end, and the station of the end."""
+    section = cf.Stiffness((1e4, 1e4), 1e4, (500, 500), 500, mass=1.0, inertia=(10, 10, 20))
+    half = cf.Rod(cf.Line((0, 0, 0), (5, 0, 0)), section, name="first half")
+    rest = cf.Rod(cf.Line((5, 0, 0), (10, 0, 0)), section, name="second half")
+    whole = cf.Rod(cf.Line((0, 0, 0), (10, 0, 0)), section, name="rod")
+    rods = [half, rest] if held == "rotating joint" else [whole]
+    joints = [cf.Joint(half.end, rest.start, release=(0, 0, 1))] if held == "rotating joint" else []
+    support = cf.Hinge(whole.start, (0, 0, 1)) if held == "hinge" else cf.Clamp(rods[0].start)
+    push = cf.Force(rods[-1].end, cf.Triangle((0, 20, 5), 0, 1, 2))
+    return cf.Scene(rods, [support], [push], joints), rods[-1].end
+
+
+def compare(runs, duration):
+    """[(milliseconds of a step, iterations a step, place of the end at last)], one of each of HELD, by turns."""
+    scenes = {held: pushed(held) for held in HELD}
+    seconds, found = {held: [] for held in HELD}, {}
+    for run in range(runs + 1):  # the first compiles
+        for held, (scene, _) in scenes.items():
+            elements = FEW // len(scene.rods)
+            began = time.process_time()
+            found[held] = cf.simulate(scene, duration, dt=STEP, elements=elements, degree=DEGREE, model="spatial")
+            if run:
+                seconds[held].append(time.process_time() - began)
+    return [
+        (1e3 * statistics.median(seconds[held]) / history.steps[-1], history.iterations.sum() / history.steps[-1],
+         history.position(scenes[held][1])[-1])
+        for held, history in found.items()
+    ]  # fmt: skip
+
+
 def main(runs=7, duration=5.0, out="out"):
-    """Print the table and write it to out/steps.md.
+    """Print the tables and write them to out/steps.md.
 
     Returns:
-        [(seconds, iterations, History)], one of each kind.
+        [(seconds, iterations, History)], one of each kind; and what `compare` found.
     """
     lines = [
         (
@@ -68,11 +105,16 @@ def main(runs=7, duration=5.0, out="out"):
         seconds, iterations, history = measure(model, scheme, runs, duration)
         lines.append(f"| {model} | {scheme} | {history.unknowns} | {iterations:.1f} | {seconds:.3f} |")
         found.append((seconds, iterations, history))
+    lines += ["", f"{FEW} P{DEGREE} elements in space, steps of {1e3 * STEP:g} ms:", ""]
+    lines += [f"| held by | iterations a step | ms a step | {HEADS}", "|---|---|---|---|---|"]
+    few = compare(runs, min(duration, 2.0))
+    for held, (milliseconds, iterations, _) in zip(HELD, few, strict=True):
+        lines.append(f"| {held} | {iterations:.1f} | {judged(milliseconds, ASKED, '.2f')} |")
     text = "\n".join(lines)
     Path(out).mkdir(parents=True, exist_ok=True)
     (Path(out) / "steps.md").write_text(text + "\n", encoding="utf-8")
     print(text)
-    return found
+    return found, few
 
 
 if __name__ == "__main__":

@@ -9,7 +9,8 @@ Writes to out/: work_precision.json (every sample), work_precision.md (the table
 
 Every peer runs in a separate process and environment, on one thread. A sample is the processor time of one warm
 solution from the unloaded state. The first round takes three samples of every configuration (one of slow ones), later
-rounds the others, in a changing order, so that peers alternate, until a configuration has five. Results are medians.
+rounds the others, in a changing order, so that peers alternate, until a configuration has five; configurations that
+decide a ratio that is asked for get 25. Results are medians.
 """
 
 import argparse
@@ -30,6 +31,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from waiting import waits
 
 SAMPLES, SEED = 5, 2026  # smallest number of samples of a row; of the random order
+DECIDING = 25  # samples of a row on which a ratio that is asked for depends
 #: Time limits of a request, s: here it may compile a form; the last two compile, relax or are whole programs.
 LIMITS = {OWN: 40.0, "Exudyn": 4.0, "OpenSeesPy": 4.0, "PyElastica": 20.0, "CalculiX": 20.0}
 SLOW_PEERS = ("PyElastica", "CalculiX")
@@ -57,7 +59,8 @@ class Record:
     def __init__(self, file, fresh=False, panel=None):
         self.panel = panel or STATICS
         self.file, self.rows, self.spent, self._saved = file, {}, 0.0, 0.0
-        self.about = {"machine": record(), "seed": SEED, "samples": SAMPLES, "limits_s": LIMITS}
+        self.about = {"machine": record(), "seed": SEED, "samples": SAMPLES}
+        self.about |= {"deciding": DECIDING, "limits_s": LIMITS}
         self.missing, self.waits, self.versions = {}, [], {}
         if file.exists() and not fresh:
             self._continue(json.loads(file.read_text(encoding="utf-8")))
@@ -179,6 +182,19 @@ def measure(started, names, found, *, quick, wanted, limits, budget):
     return rows
 
 
+def decide(started, rows, found, limits):
+    """More samples, in alternation, of the rows on which the ratios that are asked for depend."""
+    for number in range(DECIDING):
+        todo = [row for row in table.deciding(rows) if len(row["seconds"]) < DECIDING and not row["failed"]]
+        if not todo:
+            return
+        print(f"what decides a ratio, round {number + 1}: {len(todo)} rows", flush=True)
+        random.Random(SEED - number).shuffle(todo)
+        for row in todo:
+            sample(started[row["peer"]], row, found, min(DECIDING, len(row["seconds"]) + SAMPLES), limits)
+            found.write()
+
+
 def _round(todo, like, started, found, wanted, limits, bar, name):
     """Samples of every row for which more are useful."""
     task, told = bar.add_task(name, total=len(todo)), time.monotonic()
@@ -215,6 +231,7 @@ def main(out="out", quick=False, fresh=False, peers=PEERS, names=None, wanted=No
     try:
         rows = measure(started, names, found, quick=quick, wanted=wanted, limits=limits, budget=BUDGET)
         if not quick:
+            decide(started, rows, found, limits)
             found.waits = waits(started, rows)
     except KeyboardInterrupt:
         raise SystemExit(f"\nbroken off; {found.file} keeps the samples, the same command goes on from them") from None

@@ -194,7 +194,8 @@ class Locator:
         unstable = max(chord.neighbours(place), key=lambda known: known.negative_modes)
         if together == 1 and unstable.negative_modes > point.negative_modes:
             track.put(unstable.numbers, unstable.load_factor)
-            negative = stability.modes(1, side=-1)
+            # next to a singular point, rounding may hide from this factorisation what the count has found
+            negative = stability.modes(1, side=-1) if stability.count_of_matrix() > point.negative_modes else []
             if not modes or not negative:
                 return modes or negative
             if track.product(negative[0], modes[0]) ** 2 < 0.25 * track.square(negative[0]) * track.square(modes[0]):

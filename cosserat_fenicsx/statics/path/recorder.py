@@ -188,7 +188,7 @@ class Tracing:
         except StopIteration as end:
             done, left = end.value
         self._counted, self._stable_at = self.track.iterations - left, self.track.here.load_factor
-        return k + done
+        return self._swept_from(1, targets, free, way, until) if free and k < done else k + done
 
     def _record_all(self, swept):
         self._bar.at(self.track.here)

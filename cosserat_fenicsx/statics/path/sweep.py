@@ -4,7 +4,7 @@ from collections import namedtuple
 
 import numpy as np
 
-from cosserat_fenicsx.algebra.building import module
+from cosserat_fenicsx.algebra.building import module, undisturbed
 from cosserat_fenicsx.algebra.newton import petsc
 from cosserat_fenicsx.interrupts import obey
 from cosserat_fenicsx.statics.path import load_control
@@ -29,14 +29,14 @@ class Sweep:
     """
 
     def __init__(self, track, fields):
-        self._ffi, lib = module()
-        self._run, self._track, self._fields = lib.run, track, fields
+        self._ffi, _ = module()
+        self._track, self._fields = track, fields
         problem, model, ffi = track.problem, track.model, self._ffi
         self.c = sweep = ffi.new("sweep *")
         sweep.newton, sweep.stability = track.newton.c, track.stability.c
         setattr(sweep, "with", petsc())
         sweep.snes, sweep.x = (ffi.cast("void *", each.handle) for each in (track.newton.snes, problem.x))
-        sweep.eta = problem.pointer(problem.eta_array)
+        sweep.eta = ffi.cast("double *", problem.eta_array.ctypes.data)
         unknowns, numbers = problem.numbering.size, problem.numbering.size + problem.c.carries
         sweep.numbers, sweep.moves, sweep.turn = numbers, model.moves, model.turn
         sweep.slight, sweep.far, sweep.intended = load_control.SLIGHT, FAR, INTENDED
@@ -87,18 +87,19 @@ class Sweep:
         sweep.targets, sweep.count, sweep.next = self._ffi.cast("double *", targets.ctypes.data), len(targets), 0
         sweep.every, sweep.iterations, sweep.steps, sweep.records = every, counted, track.steps, 0
         track.newton.allow(track.max_iterations)
+        track.newton.c.rounding = track.model.round_off
         while True:
             before = sweep.iterations
-            why = self._run(sweep)
+            why = undisturbed("run", sweep)
             k = sweep.records
             track.iterations += int(self._recorded.iterations[:k].sum()) + sweep.iterations - before
             sweep.records = 0
             self._follow()
             control.step, control.rejections = sweep.step, sweep.rejections
-            track.problem.raise_failure()
-            track.stability.raise_failure()
             if k:
                 yield Swept(*(array[:k] if array.size else None for array in self._recorded))
+            track.problem.raise_failure()
+            track.stability.raise_failure()
             obey()
             if why in (_DONE, _LEFT):
                 return sweep.next, sweep.iterations

@@ -3,6 +3,7 @@
 from peers.environments import OWN
 
 _MESHES = (1, 2, 3, 4, 8, 16, 32, 64)
+_TOLERANCES = (1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8)
 #: The mechanical model that an element converges to; Reissner where it is not named.
 _MODELS = {"planar ANCF cable": "shear-rigid", "planar elastic": "shear-rigid", "spatial elastic": "shear-rigid",
            "planar CBDI": "shear-rigid", "spatial CBDI": "shear-rigid"}  # fmt: skip
@@ -49,7 +50,7 @@ def _own(problem):
         for degree in (1, 2, 3, 4)
         for elements in _MESHES
     ]
-    return fixed + [{"model": rung, "tol": tol} for rung in ("auto", "spatial") for tol in (1e-3, 1e-5, 1e-7)]
+    return fixed + [{"model": rung, "tol": tol} for rung in ("auto", "spatial") for tol in _TOLERANCES]
 
 
 def _substeps(problem):

@@ -80,7 +80,8 @@ def fingerprint(peer):
     files = [HERE / name for name in (SCRIPTS[peer], "speak.py", "problems.py", "motions.py")]
     files += [file for file in [HERE / SCRIPTS[peer].replace("_rod", "_motion")] if file.exists()]
     if peer == OWN:
-        files += sorted([*(ROOT / "cosserat_fenicsx").rglob("*.py"), *(ROOT / "forms").rglob("*.py")])
+        folders = ROOT / "cosserat_fenicsx", ROOT / "forms"
+        files += sorted(file for folder in folders for end in ("*.py", "*.c", "*.h") for file in folder.rglob(end))
     return _short(file.read_text(encoding="utf-8") for file in files)
 
 

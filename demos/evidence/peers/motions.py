@@ -72,14 +72,15 @@ def configurations(peer, problem, quick=False):
     if not quick:
         return found
     if peer == OWN:
-        return [c for c in found if c.get("dt") == 0.05 and c["degree"] == 2]
+        elements = 8 if problem == "spaghetti" else 4
+        return [c for c in found if c.get("dt") == 0.05 and c["degree"] == 2 and c["elements"] == elements]
     return [c for c in found if c["dt"] == 0.05 and c["elements"] == 16 and c["tol"] == 1e-4]
 
 
 def _own(problem):
     found, spatial = [], problem == "spaghetti"
-    meshes = ((4, 3), (8, 2), (8, 3)) if spatial else ((4, 3), (2, 3), (4, 2))
-    steps = (0.1, 0.05, 0.03125, 0.0125) if spatial else (0.1, 0.05, 0.025)
+    meshes = ((4, 3), (4, 2), (8, 2), (8, 3)) if spatial else ((4, 3), (2, 3), (4, 2), (3, 2))
+    steps = (0.1, 0.05, 0.03125, 0.025, 0.0125) if spatial else (0.1, 0.0625, 0.05, 0.025)
     for scheme, stepper in SCHEMES.items():
         grid = [{"scheme": scheme, "elements": elements, "degree": degree} for elements, degree in meshes]
         found += [{**mesh, "dt": dt} for mesh in grid for dt in steps]
@@ -97,14 +98,13 @@ def _exudyn(problem):
     times slower at the largest stable step, 2 ms.
     """
     spatial = problem == "spaghetti"
-    meshes = (16, 28, 32, 40, 64) if spatial else (16, 24, 32, 40)
-    steps = (0.05, 0.025, 0.02, 0.0125) if spatial else (0.1, 0.05, 0.025)
-    tolerances = (1e-3, 1e-4) if spatial else (1e-4,)
+    meshes = (16, 28, 32, 40, 64) if spatial else (16, 24, 28, 32, 40)
+    steps = (0.05, 0.025, 0.02, 0.0125) if spatial else (0.1, 0.0625, 0.05, 0.025)
     return [
         {"node": node, "solver": "generalised alpha", "elements": n, "dt": dt, "tol": tol}
         for node in ("LG", "EP")
         for n in meshes
         for dt in steps
-        for tol in tolerances
+        for tol in (1e-3, 1e-4)
         if n < 40 or tol < 1e-3
     ]

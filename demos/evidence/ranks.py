@@ -1,0 +1,96 @@
+"""Wall clock of a Newton step on one, two and four ranks, with the spatial model at 1e5 and 1e6 unknowns.
+
+    python demos/evidence/ranks.py            runs itself under mpirun, on an idle machine; writes out/ranks.md
+    python demos/evidence/ranks.py --quick    7000 unknowns, one round
+
+The cantilever and the step of scaling.py. Numbers of ranks take turns; results are medians over all rounds. More ranks
+than the machine has cores show only whether the digits are the same.
+"""
+
+import argparse
+import json
+import os
+import shutil
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+from asked import HEADS, judged
+from machine import in_words, record
+from mpi4py import MPI
+from scaling import from_rest, loaded
+
+SIZES, QUICK = (3600, 35715), (256,)  # elements of degree 4: 28 unknowns each
+RANKS = (1, 2, 4)
+ROUNDS = 3
+ASKED = 1 / 1.6  # at most, the time of two ranks over that of one
+
+
+def measure(elements):
+    """Unknowns, times (s) of Newton steps, and the displacement of the tip after a step, over the length."""
+    with loaded(elements) as (problem, newton, _):
+        model, comm = problem.model, problem.model.comm
+        step = from_rest(problem, newton, time.perf_counter, comm.Barrier)
+        seconds = [comm.allreduce(step(), MPI.MAX) for _ in range(max(3, min(50, 40000 // elements)))]
+        moved, _ = model.snapshot()
+        return model.unknowns, seconds, moved[-1][:3].tolist()
+
+
+def under_mpirun(ranks, elements):
+    """What `measure` found on so many ranks."""
+    program = "/usr/bin/mpirun" if Path("/usr/bin/mpirun").exists() else shutil.which("mpirun")
+    words = [program, "--oversubscribe", "-n", str(ranks), sys.executable, __file__, "--one", str(elements)]
+    # a copy, without what MPI has put into this process's environment since it was started
+    done = subprocess.run(words, env=dict(os.environ), capture_output=True, text=True, timeout=600)
+    if done.returncode:
+        raise SystemExit(done.stderr)
+    return json.loads(done.stdout.splitlines()[-1])
+
+
+def main(sizes=SIZES, rounds=ROUNDS, out="out", ranks=RANKS):
+    """Print the table, write it to out/ranks.md.
+
+    Returns:
+        [(unknowns, {ranks: median time (s)}, largest difference of the tip's displacement, relative)].
+    """
+    lines = [
+        f"{in_words(record())}. Wall clock, medians of {rounds} run(s) in turn; at the start {os.getloadavg()[0]:.1f}"
+        " other processes were running.",
+        "",
+        "| unknowns | " + " | ".join(f"{n} rank{'s' * (n > 1)} (ms)" for n in ranks)
+        + f" | digits: largest difference of the tip | two over one | {HEADS}",
+        "|---|" + "---|" * (len(ranks) + 4),
+    ]  # fmt: skip
+    found = []
+    for elements in sizes:
+        seconds, tips = {n: [] for n in ranks}, {}
+        for _ in range(rounds):
+            for n in ranks:
+                unknowns, times, tips[n] = under_mpirun(n, elements)
+                seconds[n] += times
+        medians = {n: float(np.median(times)) for n, times in seconds.items()}
+        one = np.array(tips[1])
+        apart = max(float(np.abs(np.array(tip) - one).max() / np.abs(one).max()) for tip in tips.values())
+        told = " | ".join(f"{1e3 * s:.1f}" for s in medians.values())
+        lines.append(f"| {unknowns} | {told} | {apart:.0e} | {judged(medians[2] / medians[1], ASKED)} |")
+        found.append((unknowns, medians, apart))
+    text = "\n".join(lines)
+    Path(out).mkdir(parents=True, exist_ok=True)
+    (Path(out) / "ranks.md").write_text(text + "\n", encoding="utf-8")
+    print(text)
+    return found
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--quick", action="store_true")
+    parser.add_argument("--one", type=int, help=argparse.SUPPRESS)
+    options = parser.parse_args()
+    if options.one:
+        numbers = measure(options.one)
+        if MPI.COMM_WORLD.rank == 0:
+            print(json.dumps(numbers))
+    else:
+        main(*((QUICK, 1) if options.quick else ()))
