@@ -150,4 +150,4 @@ def _dofs(space):
     """(local elements, n) local degrees of freedom of every element of a space."""
     block = space.dofmap.index_map_bs
     nodes = np.asarray(compat.cell_nodes(space))
-    return (nodes[:, :, None] * block + np.arange(block)).reshape(len(nodes), -1)
+    return (nodes[:, :, None] * block + np.arange(block)).reshape(len(nodes), nodes.shape[1] * block)

@@ -204,7 +204,7 @@ class MovingSpatial(Moving, SpatialModel):
     def turned_over(self):
         """See `Moving`; a q of the other sign also satisfies |q| = 1."""
         q, before = (array.reshape(-1, 7)[:, 3:] for array in self._arrays[:2])  # node by node
-        here = bool((np.einsum("ni,ni->n", q, before) <= 0).any())
+        here = bool(((q * before) @ np.ones(4) <= 0).any())
         return self.comm.allreduce(here, op=MPI.LOR) if self.comm.size > 1 else here
 
     def set_velocity(self, linear, angular):

@@ -1,5 +1,7 @@
 """Base of the implicit one-step schemes of order 2: velocities by the trapezoidal rule, whatever the forms conserve."""
 
+from functools import lru_cache
+
 import numpy as np
 
 from cosserat_fenicsx.dynamics.start import drive
@@ -87,7 +89,7 @@ class OneStep:
             (h2, _, rates2, _), (h1, _, rates1, _), (h0, state, rates, _) = known
             last = _extrapolated(h0, state, rates[0], [h2, h1], [rates2[0], rates1[0]])
         off = last - self._start
-        errors = np.einsum("ij,ij->i", off, off)
+        errors = np.array([change @ change for change in off])
         order = np.argsort(self._comm.allreduce(errors) if self._comm.size > 1 else errors)
         return guesses[order]
 
@@ -164,6 +166,12 @@ def _extrapolated(h, state, velocity, steps, velocities):
     Args:
         steps, velocities: lengths and initial velocities of up to two steps before, the last one last.
     """
+    return _weights(h, *steps) @ np.array([state, velocity, *velocities[::-1]])
+
+
+@lru_cache(maxsize=8)
+def _weights(h, *steps):
+    """Weights of the state and of the velocities, the current one first, in `_extrapolated`."""
     orders = 1 + len(steps)
     weights, square = np.zeros((orders, 1 + orders)), 0.5 * h * h
     weights[:, 0], weights[:, 1] = 1.0, h
@@ -175,4 +183,4 @@ def _extrapolated(h, state, velocity, steps, velocities):
         h2 = steps[0]
         cubic = square * (h + h1) / (h1 + h2)  # times half the rate of the acceleration
         weights[2, 1:] += cubic / h1, -cubic / h1 - cubic / h2, cubic / h2
-    return weights @ np.array([state, velocity, *velocities[::-1]])
+    return weights
