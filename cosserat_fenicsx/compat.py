@@ -174,8 +174,8 @@ def alias(function):
 
 
 def form_for_speed(form):
-    """A form compiled with more optimisation, for kernels that run very often: a tenth more to compile, and from a sixth
-    to half of the running time less."""
+    """A form compiled with more optimisation, for kernels that run very often: a tenth more to compile, and from a
+    sixth to half of the running time less."""
     options = {"cffi_extra_compile_args": ["-O3", "-g0", *instructions()]}
     return fem.form(form, **{"jit_params" if _VERSION < (0, 6) else "jit_options": options})
 

@@ -115,7 +115,7 @@ class Equations(Called):
         """Set the `Packed` residual and tangent, and the `PackedExpression` of the carried contact force or None."""
         problem = self.c
         self._residual, self.tangent_form, self._advance = residual, tangent, advance
-        problem.residual, problem.tangent, problem.dofs = residual.c, tangent.c, self._integers(residual.dofs)
+        problem.residual, problem.tangent, problem.dofs = residual.c, tangent.c, residual.dofs_c
         if advance:
             problem.advance = advance.c
             (carried,) = self.model.carried

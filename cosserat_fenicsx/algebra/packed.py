@@ -56,7 +56,7 @@ class Packed(_Kernel):
         constants: the Constants whose values change; those of all others are taken by `refresh`, too.
 
     Attributes:
-        dofs: (elements, size) local degrees of freedom of the vector, of a linear form.
+        dofs: (elements, size) local degrees of freedom of the vector, of a linear form; dofs_c: C's pointer to them.
     """
 
     def __init__(self, form, moving, constants):
@@ -67,7 +67,7 @@ class Packed(_Kernel):
         size = int(np.prod(self._shape))
         super().__init__(form, compat.kernel_address(form), self._form.mesh, elements, size)
         self.dofs = np.ascontiguousarray(of_spaces[0], dtype=np.int32)
-        self._dofs = self._integers(self.dofs)
+        self.dofs_c = self._integers(self.dofs)
         packed = self._pack()
         self._key = next(iter(packed), None)
         self._w = packed[self._key] if packed else np.zeros((elements, 0))
@@ -109,7 +109,7 @@ class Packed(_Kernel):
 
     def add_to_vector(self, array):
         """Add a linear form to an array of local degrees of freedom, ghosts included."""
-        self._lib.add_vector(self.c, self._dofs, self._ffi.cast("double *", array.ctypes.data))
+        self._lib.add_vector(self.c, self.dofs_c, self._ffi.cast("double *", array.ctypes.data))
 
     def matrices(self):
         """(elements, n, n) matrices of the elements, of a bilinear form."""

@@ -22,7 +22,7 @@ _SIZES = {
     ("determinate", False): (4, 0),
 }
 # Largest value of `_rounding` for a factorisation that pivots only within nodes.
-_ROOM_FOR_BLOCKS = 1e-4
+_SLENDER = 1e-4
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,8 @@ class Signature:
         points: Gauss points per element.
         terms: the `TermKind`s of the actions; a kind is repeated for actions that act at the same place.
         connections: where supports and joints act.
-        slender: whether rounding rules out a factorisation that pivots only within nodes.
+        slender: whether rounding makes Newton's tangent inexact for motions of low stiffness, see `error_is_small` in
+            algebra/newton.c.
         coupled: whether a section couples strains, so that the law is one of full matrices.
     """
 
@@ -81,7 +82,7 @@ class Signature:
         terms = tuple(kind for kind, _ in place_actions(scene, layout))
         plane = None if model == "spatial" else scene.plane
         connections = Connections.of(scene, layout, plane)
-        counts, slender = layout.counts, rounding > _ROOM_FOR_BLOCKS
+        counts, slender = layout.counts, rounding > _SLENDER
         coupled = any(rod.profile.coupled for rod in scene.rods)
         return cls(
             model, plane is not None, counts, degree, formulation, points or degree, terms, connections, slender,

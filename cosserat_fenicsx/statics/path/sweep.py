@@ -36,7 +36,7 @@ class Sweep:
         sweep.newton, sweep.stability = track.newton.c, track.stability.c
         setattr(sweep, "with", petsc())
         sweep.snes, sweep.x = (ffi.cast("void *", each.handle) for each in (track.newton.snes, problem.x))
-        sweep.eta = problem.pointer(problem.eta_array)
+        sweep.eta = ffi.cast("double *", problem.eta_array.ctypes.data)
         unknowns, numbers = problem.numbering.size, problem.numbering.size + problem.c.carries
         sweep.numbers, sweep.moves, sweep.turn = numbers, model.moves, model.turn
         sweep.slight, sweep.far, sweep.intended = load_control.SLIGHT, FAR, INTENDED
