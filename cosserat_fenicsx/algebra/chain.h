@@ -138,7 +138,7 @@ int eliminate(chain *s, kernel *k, const double *matrices);
 int count(chain *s, kernel *k);
 void forward(chain *s, const double *b, double *interface);
 void backward(chain *s, const double *interface, double *x);
-int factor_dense(double *F, int n, int *row, int *column);
+int factor_dense(double *F, int n, int *row, int *column, double *work);
 void solve_dense(const double *F, int n, const int *row, const int *column, double *b, double *work);
 
 int take_state(problem *p, const double *x);

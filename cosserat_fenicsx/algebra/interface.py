@@ -88,7 +88,7 @@ class _Dense:
 
     def factor(self, values):
         self._factors[:] = values
-        return not self._lib.factor_dense(self._double[0], self._size, *self._int)
+        return not self._lib.factor_dense(self._double[0], self._size, *self._int, self._double[1])
 
     def solve(self, b):
         self._lib.solve_dense(self._double[0], self._size, *self._int, self._ffi.from_buffer("double[]", b),
