@@ -9,8 +9,7 @@
    delayed to the next element: the axial force of a straight inextensible element between two points is not determined
    before the points are. */
 static const double SMALLEST_PIVOT = 1e-2;
-/* Relative to the largest number in the column before elimination, or in a symmetric matrix to the diagonal, smaller
-   pivots are zero to rounding. */
+/* Relative to the diagonal before elimination, smaller pivots of a symmetric matrix are zero to rounding. */
 static const double ZERO_PIVOT = 2e-15;
 
 #if KERNEL_ARGUMENTS == 6
@@ -113,8 +112,10 @@ static inline void subtract_pivot(double *F, int n, int k)
 
 /* LU factors of the first m rows and columns of F (n, n) with row exchanges among them, and the rest reduced. Columns
    without an acceptable pivot are tried again after the others; at most `most` may be left over. Returns how many were
-   eliminated, -1 if F is singular. whole: (m,) work space, the largest numbers in the columns at first. */
-static int reduce(double *restrict F, int n, int m, int most, int *row, int *column, double *restrict whole)
+   eliminated, -1 if F is singular: pivots are zero that are smaller than `zero` times the largest number in the column
+   before elimination. whole: (m,) work space for these. */
+static int reduce(double *restrict F, int n, int m, int most, int *row, int *column, double zero,
+                  double *restrict whole)
 {
     int k = 0, last = m, before = 0; /* the columns from `last` on were refused since `before` were eliminated */
     double share = most ? SMALLEST_PIVOT : 0;
@@ -140,7 +141,7 @@ static int reduce(double *restrict F, int n, int m, int most, int *row, int *col
             if (size > best) best = size, at = i;
         }
         for (int i = m; share > 0 && i < n; i++) largest = fmax(largest, fabs(F[(size_t)i * n + k]));
-        if (!(best > ZERO_PIVOT * whole[k]) || best < share * largest) {
+        if (!(best > zero * whole[k]) || best < share * largest) {
             last--;
             swap(F + k, F + last, n, n);
             swap(whole + k, whole + last, 1, 1);
@@ -248,7 +249,8 @@ int eliminate(chain *s, kernel *k, const double *matrices)
         for (int i = 0; i < n; i++) row[i] = i;
         for (int i = 0; i < d; i++) column[i] = s->column[(size_t)(t - 1) * s->room + k_before + i];
         memcpy(column + d, s->rows + (size_t)t * s->room, (n - d) * sizeof *column);
-        k_before = reduce(F, n, m, last && s->ends[t] < 0 ? 0 : s->delays, row, column, s->work);
+        k_before = reduce(F, n, m, last && s->ends[t] < 0 ? 0 : s->delays, row, column, s->zero_pivot,
+                          s->work);
         s->done[2 * t] = n, s->done[2 * t + 1] = k_before;
         if (k_before < 0) return 1;
         d = m - k_before, before = F, n_before = n;
@@ -324,10 +326,10 @@ void backward(chain *s, const double *interface, double *x)
 /* ---- a small system as a whole ----------------------------------------------------------------------------------- */
 
 /* LU factors of F (n, n). Returns 0, or 1 if it is singular. */
-int factor_dense(double *F, int n, int *row, int *column, double *work)
+int factor_dense(double *F, int n, int *row, int *column, double zero, double *work)
 {
     for (int i = 0; i < n; i++) row[i] = column[i] = i;
-    return reduce(F, n, n, 0, row, column, work) < n;
+    return reduce(F, n, n, 0, row, column, zero, work) < n;
 }
 
 /* Replace b by the solution, by the factors. */
