@@ -22,6 +22,18 @@ def test_momenta_and_energy_of_free_flight():
     np.testing.assert_allclose(history.linear_momentum[-1], [50, 0, 0], atol=1e-10)
 
 
+def test_impulses_of_scenes_that_share_a_compiled_problem():
+    """Loads that vary, stay, begin late and end: nothing is kept of a step, or of a scene, that another one changes."""
+    loads = {
+        (50.0, 0, 0): cf.Triangle((20, 0, 0), 0, 2.5, 5), (0, 18.0, 0): (0, 3, 0), (0, 0, 8.0): cf.Step((0, 0, 4), 1, 3),
+        (12.0, 0, -6.0): lambda t: (2.0, 0, -1), (0, 0, 0): (0, 0, 0), (25.0, 0, 0): cf.Triangle((10, 0, 0), 0, 2.5, 5),
+    }  # fmt: skip
+    for impulse, force in loads.items():
+        _, scene = spaghetti(lambda rod, force=force: cf.Force(rod.start, force))
+        history = cf.simulate(scene, 6, dt=0.1, elements=4, degree=2, model="spatial", save_every=6)
+        np.testing.assert_allclose(history.linear_momentum[-1], impulse, atol=1e-10)
+
+
 def test_flight_in_space_ends_where_it_should():
     """Within 1e-2 m of 32 P2 elements with dt 0.0025."""
     rod, scene = flying_in_space()

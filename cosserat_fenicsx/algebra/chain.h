@@ -81,6 +81,18 @@ typedef struct {
     double *x;                      /* the solution, while SNES does not use it */
 } newton;
 
+/* Newton's method of a time step, see dynamics/steppers/newton.py for what its numbers mean. */
+typedef struct {
+    problem *problem;
+    int motions;                    /* nodal unknowns of this rank */
+    double root;                    /* of their number on all ranks */
+    double increment, smallest, rounding, rate, price, diverged;
+    int most;
+    double *x, *start, *b, *change; /* (unknowns,) each; x from the guess to the solution, start: before the step */
+    int fresh, served, iterations, outcome;
+    double spent, enough;
+} stepping;
+
 /* Functions of PETSc. */
 typedef struct {
     int (*get_read)(void *, const double **);
@@ -148,6 +160,7 @@ int tangent(problem *p);
 int solve(problem *p, const double *b, double *x);
 void advance(problem *p);
 void begin(newton *n);
+int iterate(stepping *s);
 int attach(petsc *functions, newton *n, void *snes, void *vector, void *matrix, void *pc);
 
 int negative_modes(second_variation *v, int *sideways);

@@ -81,6 +81,67 @@ void advance(problem *p)
     memcpy(p->before, p->state, p->locals * sizeof *p->state);
 }
 
+/* ---- time steps -------------------------------------------------------------------------------------------------- */
+
+enum { ITERATING, CONVERGED, SINGULAR, NOT_A_NUMBER, GROWN, RAN_OUT };
+
+/* The root mean square of the nodal unknowns in a - b, or in a where b is 0. */
+static int motion_in(const stepping *s, const double *a, const double *b, double *size)
+{
+    double sum = 0;
+#pragma omp simd reduction(+ : sum)
+    for (int i = 0; i < s->motions; i++) {
+        const double c = b ? a[i] - b[i] : a[i];
+        sum += c * c;
+    }
+    if (hook(s->problem, SUM, &sum, 0)) return FAILED;
+    *size = sqrt(sum) / s->root;
+    return 0;
+}
+
+/* Whether the iteration stops after an increment, and whether it goes on with a new tangent. */
+static void judge_increment(stepping *s, double step, double before)
+{
+    const double rate = s->iterations > 1 ? step / before : 1;
+    if (!isfinite(step)) s->outcome = NOT_A_NUMBER;
+    else if (step > s->diverged) s->outcome = GROWN;
+    else if (step <= s->enough || (rate < 0.9 && step * rate / (1 - rate) <= s->enough)
+             || (step <= s->rounding && rate > 0.5 && s->iterations > 1))
+        s->outcome = CONVERGED;
+    else if (s->iterations >= s->most) s->outcome = RAN_OUT;
+    else if (s->iterations > 1) {
+        const double left = log(s->enough / step);
+        s->fresh = rate > 0.9 || left / log(rate) > s->price + left / log(s->rate);
+    }
+}
+
+/* Newton's method from the guess x; the state follows. */
+int iterate(stepping *s)
+{
+    problem *p = s->problem;
+    double step = 0, before;
+    if (motion_in(s, s->x, s->start, &s->enough)) return FAILED;
+    s->enough = fmax(s->smallest, s->increment * s->enough);
+    s->iterations = 0, s->outcome = ITERATING;
+    while (s->outcome == ITERATING) {
+        if (residual(p, s->x, s->b)) return FAILED;
+        if (s->fresh) {
+            if (tangent(p)) return FAILED;
+            s->fresh = 0, s->spent = s->price, s->served = 0;
+        }
+        if (solve(p, s->b, s->change)) return FAILED;
+        if (p->singular) {
+            s->outcome = SINGULAR;
+            break;
+        }
+        for (int i = 0; i < p->size; i++) s->x[i] -= s->change[i];
+        before = step, s->iterations++;
+        if (motion_in(s, s->change, 0, &step)) return FAILED;
+        judge_increment(s, step, before);
+    }
+    return take_state(p, s->x);
+}
+
 /* ---- SNES -------------------------------------------------------------------------------------------------------- */
 
 static const petsc *with; /* PETSc is one library for the whole process */

@@ -109,7 +109,7 @@ class Packed(_Kernel):
 
     def add_to_vector(self, array):
         """Add a linear form to an array of local degrees of freedom, ghosts included."""
-        self._lib.add_vector(self.c, self.dofs_c, self._ffi.cast("double *", array.ctypes.data))
+        self._lib.add_vector(self.c, self.dofs_c, self._ffi.from_buffer("double[]", array))
 
     def matrices(self):
         """(elements, n, n) matrices of the elements, of a bilinear form."""
@@ -150,4 +150,4 @@ def _dofs(space):
     """(local elements, n) local degrees of freedom of every element of a space."""
     block = space.dofmap.index_map_bs
     nodes = np.asarray(compat.cell_nodes(space))
-    return (nodes[:, :, None] * block + np.arange(block)).reshape(len(nodes), -1)
+    return (nodes[:, :, None] * block + np.arange(block)).reshape(len(nodes), nodes.shape[1] * block)

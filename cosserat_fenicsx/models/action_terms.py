@@ -8,7 +8,7 @@ from cosserat_fenicsx import compat
 from cosserat_fenicsx.models.projection import nearest_polynomials
 from cosserat_fenicsx.models.rod_data import gauss_function
 from cosserat_fenicsx.models.signature import place_actions
-from cosserat_fenicsx.scene.signals import at, signals_of
+from cosserat_fenicsx.scene.signals import at, signals_of, values_at, with_values
 
 # Points of an element, in [0, 1], that are closer than this are the same.
 _SAME = 1e-9
@@ -38,15 +38,18 @@ class ActionTerms:
             term.fill(model, members, time)
 
     def at(self, t):
-        """Fill the Functions with the data at the time t (s)."""
-        for term in self.terms:
-            if term.moves:
-                term.put(t)
+        """Fill the Functions with the data at the time t (s); whether they differ from those before."""
+        return any([term.put(t) for term in self.terms if term.moves])
 
     @property
-    def moving(self):
-        """The Functions that depend on time."""
-        return [function for term in self.terms if term.moves for function in term.data]
+    def move(self):
+        """Whether any data depend on time."""
+        return any(term.moves for term in self.terms)
+
+    @property
+    def data(self):
+        """The Functions of the data of all terms."""
+        return [function for term in self.terms for function in term.data]
 
     @property
     def refreshed(self):
@@ -94,6 +97,8 @@ class Term:
         self.data = [self._function(size) for size in kind.sizes]
         self.memory = [self._function(size) for size in kind.memory]
         self._rest = self._frame = self._evolution = None
+        # dolfinx makes an array of a Function anew whenever it is asked for one
+        self._arrays = [f.x.array.reshape(-1, size) for f, size in zip(self.data, kind.sizes, strict=True)]
 
     def _function(self, size):
         mesh, place = self._rods.mesh, self.kind.place
@@ -175,7 +180,9 @@ class Term:
             action, rod = self._where[0][:2]
             datum = (*at(action, 0.0).data(rod, np.zeros(1)), *action.memory)[k]
             function.x.array.reshape(-1, datum.size)[:] = self._scaled(datum, rod)
+        self._values = None
         self.put(0.0)
+        self._values = None  # so that the first step takes them for new, and checks them
         for k, function in enumerate(self.memory):
             for action, rod, rows, *_ in self._where:
                 function.x.array.reshape(-1, action.memory[k].size)[rows] = self._scaled(action.memory[k], rod)
@@ -188,20 +195,25 @@ class Term:
                 self._frame.x.array.reshape(-1, 9)[numbers[here].ravel()] = frames.reshape(-1, 9)
 
     def put(self, t):
-        """Fill in the data at the time t, s."""
-        self.acting = []
-        for action, rod, rows, s, _, elements in self._where:
-            now = at(action, t)  # on all ranks, since a user's function of time may communicate
+        """Fill in the data at the time t, s; whether they differ from those before."""
+        # on all ranks, since a user's function of time may communicate
+        values = [values_at(action, t) for action, *_ in self._where]
+        if values == self._values:
+            return False
+        self._values, self.acting = values, []
+        for now, (action, rod, rows, s, _, elements) in zip(values, self._where, strict=True):
+            now = with_values(action, now)
             if now is not action:
                 self.acting.append((now, rod))
             if not len(rows):
                 continue
             rough = self.kind.place == "line" and len(now.kinks(rod))
             self._take(nearest_polynomials(now, rod, s, *elements) if rough else now.data(rod, s), rod, rows)
+        return True
 
     def _take(self, data, rod, rows):
-        for function, datum in zip(self.data, data, strict=True):
-            function.x.array.reshape(-1, datum.size)[rows] = self._scaled(datum, rod)
+        for array, datum in zip(self._arrays, data, strict=True):
+            array[rows] = self._scaled(datum, rod)
 
     def _scaled(self, datum, rod):
         """The value of a `Datum`, dimensionless, vectors along the model's axes."""

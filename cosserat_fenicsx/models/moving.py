@@ -41,6 +41,8 @@ class Moving:
         """Make the Functions that the forms need in addition to those of a `RodModel`."""
         mesh, points = self.mesh, self.signature.points
         self.start, self.velocity = fem.Function(self.space), fem.Function(self.space)
+        # dolfinx makes an array of a Function anew whenever it is asked for one
+        self._arrays = self.state.x.array, self.start.x.array, self.velocity.x.array
         self.h = fem.Constant(mesh, np.float64(1))
         self.mass, self.drag = self._at_element_nodes(1), self._at_element_nodes(1)
         self.inertia = self._at_element_nodes(self.inertia_size)
@@ -133,21 +135,16 @@ class Moving:
     @property
     def rate_arrays(self):
         """The arrays of the rates of the state."""
-        return (self.velocity.x.array,)
+        return (self._arrays[2],)
 
     def accept(self, h):
         """Update the rates to those of `state` after a step of length h, by the trapezoidal rule."""
-        rates = self.velocity.x.array
-        rates[:] = 2 / h * (self.state.x.array - self.start.x.array) - rates
+        now, before, rates = self._arrays
+        rates[:] = 2 / h * (now - before) - rates
 
     def loads_at(self, t):
-        """Fill the forms' Functions with the loads at the time t (s)."""
-        self.actions.at(t)
-
-    @property
-    def moving_loads(self):
-        """The Functions of loads that depend on time."""
-        return self.actions.moving
+        """Fill the forms' Functions with the loads at the time t (s); whether they differ from those before."""
+        return self.actions.at(t)
 
     def ties_at(self, t):
         """The `Ties` at the time t (s)."""
@@ -167,7 +164,7 @@ class Moving:
 
     def snapshot_of_rates(self):
         """(N, components) `velocity` at the nodes, in the scene's order, on all ranks, dimensionless."""
-        return self._gather_nodes(self.velocity.x.array[self._nodal[: self._owned_nodes]])
+        return self._gather_nodes(self._arrays[2][self._nodal[: self._owned_nodes]])
 
     def momenta(self, tested):
         """Linear (3,) and angular momentum (3,) about the inertial origin, over all ranks, dimensionless.
@@ -198,7 +195,7 @@ class MovingSpatial(Moving, SpatialModel):
 
     def passed(self):
         """See `Moving`."""
-        now, before = (function.x.array.reshape(-1, 7) for function in (self.state, self.start))  # node by node
+        now, before = (array.reshape(-1, 7) for array in self._arrays[:2])  # node by node
         work = now - before
         work[:, 4:] = turned_by(work[:, 3:], (now[:, 3:] + before[:, 3:]) / 2)
         work[:, 3] = 0.0
@@ -206,8 +203,8 @@ class MovingSpatial(Moving, SpatialModel):
 
     def turned_over(self):
         """See `Moving`; a q of the other sign also satisfies |q| = 1."""
-        q, before = (function.x.array.reshape(-1, 7)[:, 3:] for function in (self.state, self.start))  # node by node
-        here = bool(((q * before).sum(axis=1) <= 0).any())
+        q, before = (array.reshape(-1, 7)[:, 3:] for array in self._arrays[:2])  # node by node
+        here = bool(((q * before) @ np.ones(4) <= 0).any())
         return self.comm.allreduce(here, op=MPI.LOR) if self.comm.size > 1 else here
 
     def set_velocity(self, linear, angular):

@@ -32,7 +32,8 @@ class MovingPlanar(Moving, PlanarModel):
 
     def passed(self):
         """See `Moving`."""
-        return self.state.x.array - self.start.x.array
+        now, before, _ = self._arrays
+        return now - before
 
     def set_velocity(self, linear, angular):
         """See `Moving`."""
@@ -59,7 +60,8 @@ class MovingPlanar(Moving, PlanarModel):
         Raises:
             SceneError: a load that leaves the plane at this time.
         """
-        super().loads_at(t)
+        if not super().loads_at(t):
+            return False
         for load, rod in (pair for term in self.actions.terms for pair in term.acting):
             for datum in load.data(rod, np.array([0.0, rod.length])):
                 if datum.size != 3:
@@ -68,6 +70,7 @@ class MovingPlanar(Moving, PlanarModel):
                 off = given[:, :2] if is_axial(datum.unit) else given[:, 2]
                 if np.abs(off).max() > _OFF * np.abs(given).max():
                     self._refuse(describe(load), t)
+        return True
 
     def ties_at(self, t):
         """See `Moving`.

@@ -5,7 +5,6 @@ with `jumps` at the times where it is not smooth: time steps end there. The attr
 are linear between their jumps, and resolved by steps of any length.
 """
 
-import copy
 import itertools
 import math
 from dataclasses import dataclass
@@ -14,7 +13,7 @@ from functools import cached_property
 import numpy as np
 
 from cosserat_fenicsx.annotations import Numbers, Rows
-from cosserat_fenicsx.checks import call, number, refuse, store, vector
+from cosserat_fenicsx.checks import LARGEST, call, number, refuse, vector
 from cosserat_fenicsx.errors import SceneError
 
 
@@ -254,6 +253,9 @@ class Signal:
         """
         when = f"at the time t = {t:g} s" + (f", of the {self.owner} at {self.place}" if self.place else "")
         given = call(self.function, t, f"{self.owner}.{self.field}: its function", f", {when}")
+        floats = type(given) is tuple and all(type(x) is float and abs(x) <= LARGEST for x in given)
+        if floats and len(given) == self.size:
+            return given  # as most are; the whole check takes ten times as long
         try:
             return vector(self.owner, self.field, given, self.unit, self.size)
         except SceneError as problem:
@@ -293,12 +295,21 @@ def signals_of(item):
 
 def at(item, t):
     """A load or a support with its values at the time t (s); unchanged where it does not depend on time."""
-    now = {name: signal(t) for name, signal in signals_of(item).items()}
-    if not now:
+    return with_values(item, values_at(item, t))
+
+
+def values_at(item, t):
+    """{field: value} at the time t (s) of what depends on time in a load or a support."""
+    return {name: signal(t) for name, signal in signals_of(item).items()}
+
+
+def with_values(item, values):
+    """A load or a support with `values_at` a time, which it has from then on."""
+    if not values:
         return item
-    item = copy.copy(item)  # not by its constructor, whose checks take longer than a signal's own
-    store(item, **now, jumps=())
-    return item
+    other = object.__new__(type(item))  # not by its constructor, whose checks take longer than a signal's own
+    vars(other).update(vars(item), **values, jumps=())
+    return other
 
 
 def sample_times(item, until):

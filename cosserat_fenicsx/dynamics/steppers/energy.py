@@ -34,7 +34,7 @@ class TurnedStepProblem(StepProblem):
 
     def _pack(self):
         super()._pack()
-        self._live_tangent = self._packed(self.model.forms.live_tangent)
+        self._live_tangent = self._pack_form(self.model.forms.live_tangent)
 
     def _of_nodes(self, x):
         """(nodes, 4) q of the free nodes of this rank."""

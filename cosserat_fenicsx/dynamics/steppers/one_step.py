@@ -1,5 +1,7 @@
 """Base of the implicit one-step schemes of order 2: velocities by the trapezoidal rule, whatever the forms conserve."""
 
+from functools import lru_cache
+
 import numpy as np
 
 from cosserat_fenicsx.dynamics.start import drive
@@ -35,11 +37,13 @@ class OneStep:
 
     def jump(self):
         """See `Stepper`."""
+        self._guesses = None  # those of the last step, where they are known
         self._past = []  # of the last steps: (h, state, rates, (work, dissipated)) at their starts
 
     def drive(self, t):
         """See `Stepper`."""
         kinetic, _ = self.problem.energies()
+        self._guesses = None
         drive(self.problem.model, t)
         self.work += self.problem.energies()[0] - kinetic
 
@@ -56,6 +60,7 @@ class OneStep:
         guesses = self._predicted(unit)
         solved = self._newton.solve(guesses)
         if not solved.converged:
+            self._guesses = None
             self._state[:] = self._start
             problem.begin()
             return solved
@@ -75,15 +80,18 @@ class OneStep:
 
         First comes the order whose extrapolation of the last step was closest to its result.
         """
-        now = (h, self._start, self._velocity)
-        known = [(step, state, rates[0]) for step, state, rates, _ in self._past[-3:]]
-        guesses = _extrapolated([*known, now])
+        known, last = self._past[-3:], self._guesses
+        steps = [step for step, *_ in known[-2:]]
+        self._guesses = guesses = _extrapolated(h, self._start, self._velocity, steps, [x[2][0] for x in known[-2:]])
         if len(known) < 3:
             return guesses[::-1]
-        off = [guess - self._start for guess in _extrapolated(known)]
+        if last is None:
+            (h2, _, rates2, _), (h1, _, rates1, _), (h0, state, rates, _) = known
+            last = _extrapolated(h0, state, rates[0], [h2, h1], [rates2[0], rates1[0]])
+        off = last - self._start
         errors = np.array([change @ change for change in off])
         order = np.argsort(self._comm.allreduce(errors) if self._comm.size > 1 else errors)
-        return [guesses[k] for k in order]
+        return guesses[order]
 
     def error(self, early=False):
         """See `Stepper`: h^3/12 times the third derivative of the cubic through four states, the last one the current.
@@ -108,6 +116,7 @@ class OneStep:
     def undo(self):
         """See `Stepper`."""
         _, state, rates, (self.work, self.dissipated) = self._past.pop()
+        self._guesses = None
         self._state[:] = state
         for now, before in zip(self._rates, rates, strict=True):
             now[:] = before
@@ -136,7 +145,7 @@ class OneStep:
         self.work, self.dissipated = memory["books"].tolist()
         for i, rate in enumerate(self._rates):
             rate[:] = memory["rates"][str(i)]
-        past = memory["past"]
+        past, self._guesses = memory["past"], None
         rates = zip(*past.get("rates", {}).values(), strict=True)
         books = map(tuple, past["books"].tolist())
         self._past = [
@@ -151,20 +160,27 @@ def _numbered(arrays):
     return {str(i): array for i, array in enumerate(arrays)}
 
 
-def _extrapolated(steps):
-    """Extrapolations of the state to the end of the last of one to three steps, of orders 1 to the number of steps.
+def _extrapolated(h, state, velocity, steps, velocities):
+    """(orders, n) extrapolations of the state by a step h, of order 1 and one more for each earlier step.
 
     Args:
-        steps: (h, state, velocity) of each step, at its start.
+        steps, velocities: lengths and initial velocities of up to two steps before, the last one last.
     """
-    (h, state, velocity), *earlier = steps[::-1]
-    guesses = [state + h * velocity]
-    if earlier:
-        (h1, _, velocity1), *earlier = earlier
-        acceleration = (velocity - velocity1) / h1
-        guesses.append(guesses[-1] + 0.5 * h**2 * acceleration)
-        if earlier:
-            h2, _, velocity2 = earlier[0]
-            change = (acceleration - (velocity1 - velocity2) / h2) / (h1 + h2)  # half the rate of the acceleration
-            guesses.append(guesses[-1] + 0.5 * h**2 * (h + h1) * change)
-    return guesses
+    return _weights(h, *steps) @ np.array([state, velocity, *velocities[::-1]])
+
+
+@lru_cache(maxsize=8)
+def _weights(h, *steps):
+    """Weights of the state and of the velocities, the current one first, in `_extrapolated`."""
+    orders = 1 + len(steps)
+    weights, square = np.zeros((orders, 1 + orders)), 0.5 * h * h
+    weights[:, 0], weights[:, 1] = 1.0, h
+    if steps:
+        h1 = steps[-1]
+        weights[1:, 1] += square / h1
+        weights[1:, 2] = -square / h1
+    if len(steps) == 2:
+        h2 = steps[0]
+        cubic = square * (h + h1) / (h1 + h2)  # times half the rate of the acceleration
+        weights[2, 1:] += cubic / h1, -cubic / h1 - cubic / h2, cubic / h2
+    return weights

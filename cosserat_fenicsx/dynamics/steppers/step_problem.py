@@ -16,7 +16,7 @@ class StepProblem(Equations):
 
     Attributes:
         see `Equations`; x is the state at the end of the step.
-        fresh: whether `factor` makes new factors of the tangent when it is next called, or keeps the current ones.
+        fresh: whether the next iteration takes a new tangent.
         h: the length of the step, dimensionless.
         load_factor: multiplies all loads and prescribed motions.
     """
@@ -30,10 +30,11 @@ class StepProblem(Equations):
     def __init__(self, model):
         self._refreshes = bool(model.actions.refreshed)
         super().__init__(model, self.changes | STATE * self._refreshes)
-        self._known, self._loads, self._momenta, self._vector = (self.numbering.vector() for _ in range(4))
+        self._known, self._loads, self._vector = (self.numbering.vector() for _ in range(3))
         self.take_loads((self._known.array, np.ones(1)))
         self._start = model.start.x.array
         self.load_factor, self.fresh = 1.0, True
+        self._pack()
 
     def _ends(self):
         """The Functions that change from step to step; only the first, the state, changes within a step."""
@@ -44,31 +45,28 @@ class StepProblem(Equations):
         model = self.model
         model.load(scene, layout)
         self.load_factor = model.load_factor.value = load_factor
-        self._pack()
+        for packed in self._packed:
+            packed.refresh()
         self._assemble_loads()
         self._begun = False  # the reactions of another scene are no initial guess
         self.begin()
 
     def _pack(self):
-        """Pack the constants and coefficients of a scene for all forms; those that change in time are updated later."""
-        forms, moving, constants = self.model.forms, tuple(self.model.moving_loads), self.model.constants
-        self.take_forms(self._packed(forms.residual), self._packed(forms.tangent))
-        self._live, self._momentum = (
-            self._packed(forms.live),
-            Packed(forms.momentum, self._ends(), constants),
-        )
-        self._dead, self._permanent = (
-            None if form is None else Packed(form, moving, self.model.constants)
-            for form in (forms.dead, forms.permanent)
+        """Pack all forms, whose data are those of any scene of the signature."""
+        forms, self._packed = self.model.forms, []
+        self.take_forms(self._pack_form(forms.residual), self._pack_form(forms.tangent))
+        self._live, self._momentum, self._dead, self._permanent = (
+            self._pack_form(form) for form in (forms.live, forms.momentum, forms.dead, forms.permanent)
         )
 
-    def _packed(self, form):
-        """A form of the state, for assembly in every Newton iteration; None where there is none."""
+    def _pack_form(self, form):
+        """A form for assembly, all of whose data may change in time; None where there is none."""
         if form is None:
             return None
         model, actions = self.model, self.model.actions
-        moving = (*self._ends(), *model.moving_loads, *actions.refreshed, *actions.memory_functions)
-        return Packed(form, moving, model.constants)
+        moving = (*self._ends(), *actions.data, *actions.memory_functions)
+        self._packed.append(Packed(form, moving, model.constants))
+        return self._packed[-1]
 
     def _refresh(self, share=None):
         """Evaluate data that depend on the position at this share of the way from the start of the step to the
@@ -97,9 +95,8 @@ class StepProblem(Equations):
         self.h = model.h.value = h / model.time
         self._start[:] = self._state
         self._take_loads(t + h / 2)
-        self._assemble(self._momentum, self._momenta)
-        self._known.set(0.0)
-        self._known.axpy(model.time / h, self._momenta)
+        self._assemble(self._momentum, self._known)
+        self._known.scale(1 / self.h)
         self._known.axpy(1.0, self._loads)
         if self.ties:
             self.ties.begin(model.ties_at(t + h))
@@ -107,8 +104,8 @@ class StepProblem(Equations):
     def _take_loads(self, t):
         """Evaluate the loads at the time t (s)."""
         self._acting_at = t
-        if self.model.moving_loads:
-            self.model.loads_at(t)
+        model = self.model
+        if model.actions.move and (model.loads_at(t) or model.comm.size > 1):  # all ranks, or none
             self._assemble_loads()
 
     def _assemble_loads(self):
@@ -126,12 +123,18 @@ class StepProblem(Equations):
         if self.ties:
             self.ties.put(self.x, multipliers)
 
-    def factor(self):
-        """Factors of the tangent at the state that `function` was last called with; the old ones are kept unless
-        `fresh`."""
-        if self.fresh:
-            self.fresh = False
-            super().factor()
+    def stepping(self, start, **numbers):
+        """The C structure `stepping` for `iterate`: Newton's method from `x`; start: the unknowns before the step."""
+        found, self._increment = self._ffi.new("stepping *", numbers), self.numbering.vector()
+        found.problem, found.start = self.c, self.pointer(start)
+        vectors = {"x": self.x, "b": self.b, "change": self._increment}
+        for name, vector in vectors.items():
+            setattr(found, name, self.pointer(vector.array))
+        return found
+
+    def iterate(self, stepping):
+        """Newton's method from the guess that is set; the state follows `x`."""
+        self._done(self._lib.iterate(stepping))
 
     def work(self):
         """Work of loads and supports in the step from `start` to the state, dimensionless, over all ranks."""
