@@ -112,11 +112,19 @@ static inline void subtract_pivot(double *F, int n, int k)
 
 /* LU factors of the first m rows and columns of F (n, n) with row exchanges among them, and the rest reduced. Columns
    without an acceptable pivot are tried again after the others; at most `most` may be left over. Returns how many were
-   eliminated, -1 if F is singular. */
-static int reduce(double *F, int n, int m, int most, int *row, int *column)
+   eliminated, -1 if F is singular: pivots are zero that are smaller than `zero` times the largest number in the column
+   before elimination. whole: (m,) work space for these. */
+static int reduce(double *restrict F, int n, int m, int most, int *row, int *column, double zero,
+                  double *restrict whole)
 {
     int k = 0, last = m, before = 0; /* the columns from `last` on were refused since `before` were eliminated */
     double share = most ? SMALLEST_PIVOT : 0;
+    for (int j = 0; j < m; j++) whole[j] = 0;
+    for (int i = 0; i < n; i++)
+        for (int j = 0; j < m; j++) {
+            const double size = fabs(F[(size_t)i * n + j]);
+            whole[j] = size > whole[j] ? size : whole[j]; /* fmax is four times slower */
+        }
     while (k < m) {
         if (k == last) {
             if (k == before) {
@@ -133,9 +141,10 @@ static int reduce(double *F, int n, int m, int most, int *row, int *column)
             if (size > best) best = size, at = i;
         }
         for (int i = m; share > 0 && i < n; i++) largest = fmax(largest, fabs(F[(size_t)i * n + k]));
-        if (!(best > 0) || best < share * largest) {
+        if (!(best > zero * whole[k]) || best < share * largest) {
             last--;
             swap(F + k, F + last, n, n);
+            swap(whole + k, whole + last, 1, 1);
             swap_numbers(column + k, column + last);
             continue;
         }
@@ -240,7 +249,8 @@ int eliminate(chain *s, kernel *k, const double *matrices)
         for (int i = 0; i < n; i++) row[i] = i;
         for (int i = 0; i < d; i++) column[i] = s->column[(size_t)(t - 1) * s->room + k_before + i];
         memcpy(column + d, s->rows + (size_t)t * s->room, (n - d) * sizeof *column);
-        k_before = reduce(F, n, m, last && s->ends[t] < 0 ? 0 : s->delays, row, column);
+        k_before = reduce(F, n, m, last && s->ends[t] < 0 ? 0 : s->delays, row, column, s->zero_pivot,
+                          s->work);
         s->done[2 * t] = n, s->done[2 * t + 1] = k_before;
         if (k_before < 0) return 1;
         d = m - k_before, before = F, n_before = n;
@@ -316,10 +326,10 @@ void backward(chain *s, const double *interface, double *x)
 /* ---- a small system as a whole ----------------------------------------------------------------------------------- */
 
 /* LU factors of F (n, n). Returns 0, or 1 if it is singular. */
-int factor_dense(double *F, int n, int *row, int *column)
+int factor_dense(double *F, int n, int *row, int *column, double zero, double *work)
 {
     for (int i = 0; i < n; i++) row[i] = column[i] = i;
-    return reduce(F, n, n, 0, row, column) < n;
+    return reduce(F, n, n, 0, row, column, zero, work) < n;
 }
 
 /* Replace b by the solution, by the factors. */

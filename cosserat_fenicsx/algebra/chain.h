@@ -48,6 +48,7 @@ typedef struct {
     double *diagonal;              /* (interface,) sum of the elements' diagonals there */
     double *carry, *work;          /* (room,) each */
     int negative, zero;            /* pivots, after `count` */
+    double zero_pivot;             /* of `eliminate`, relative to the largest number in the column; smaller ones are zero */
 } chain;
 
 /* The equations of a problem. */
@@ -150,7 +151,7 @@ int eliminate(chain *s, kernel *k, const double *matrices);
 int count(chain *s, kernel *k);
 void forward(chain *s, const double *b, double *interface);
 void backward(chain *s, const double *interface, double *x);
-int factor_dense(double *F, int n, int *row, int *column);
+int factor_dense(double *F, int n, int *row, int *column, double zero, double *work);
 void solve_dense(const double *F, int n, const int *row, const int *column, double *b, double *work);
 
 int take_state(problem *p, const double *x);

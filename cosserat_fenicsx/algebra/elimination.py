@@ -9,6 +9,8 @@ import numpy as np
 
 from cosserat_fenicsx.algebra.building import module
 
+#: Relative to the largest number in its column, smaller pivots are zero to rounding.
+ZERO_PIVOT = 2e-15
 #: Unknowns that an element may leave to the next one, where contact forces are unknowns: see `chain.c`.
 _DELAYS = 3
 
@@ -106,6 +108,7 @@ class Elimination:
         self._find_places(np.flatnonzero(size), ends, rows, slots)
         self.c = chain = ffi.new("chain *")
         chain.elements, chain.width, chain.size = elements, width, numbering.size
+        chain.zero_pivot = ZERO_PIVOT
         chain.room, chain.delays, chain.kept = room, delays, self.unknowns
         room_for = {"row": (elements, room), "column": (elements, room), "done": (elements, 2)}
         self._factors = {name: np.zeros(shape, dtype=np.int32) for name, shape in room_for.items()}

@@ -52,7 +52,7 @@ class Interface:
     def factor(self, *derivatives):
         """Factors of the system, see `_values`; False where it is singular."""
         self._kept = self._values(*derivatives)
-        return self._solver.factor(self._kept)
+        return self._solver.factor(self._kept, self._elimination.c.zero_pivot)
 
     def memory(self):
         """The entries of the last matrix."""
@@ -61,7 +61,7 @@ class Interface:
     def recall(self, memory):
         """Factorise the matrix whose entries `memory` returned."""
         self._kept = np.array(memory)
-        self._solver.factor(self._kept)
+        self._solver.factor(self._kept, self._elimination.c.zero_pivot)
 
     def solve(self, b):
         """Replace a right-hand side (unknowns,) by the solution, from the last factors."""
@@ -86,9 +86,9 @@ class _Dense:
     def entries(self, rows, columns):
         return rows * self._size + columns
 
-    def factor(self, values):
+    def factor(self, values, zero):
         self._factors[:] = values
-        return not self._lib.factor_dense(self._double[0], self._size, *self._int)
+        return not self._lib.factor_dense(self._double[0], self._size, *self._int, zero, self._double[1])
 
     def solve(self, b):
         self._lib.solve_dense(self._double[0], self._size, *self._int, self._ffi.from_buffer("double[]", b),
@@ -121,7 +121,7 @@ class _Sparse:
 
         return csc_matrix((values, self._indices, self._starts), shape=(self._size, self._size))
 
-    def factor(self, values):
+    def factor(self, values, zero):
         from scipy.sparse.linalg import splu
 
         try:

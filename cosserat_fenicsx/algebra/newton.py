@@ -14,6 +14,7 @@ import numpy as np
 from petsc4py import PETSc
 
 from cosserat_fenicsx.algebra.building import module, undisturbed
+from cosserat_fenicsx.algebra.elimination import ZERO_PIVOT
 from cosserat_fenicsx.compat import RESIDUAL_NOT_A_NUMBER
 from cosserat_fenicsx.errors import NotConverged
 
@@ -162,10 +163,22 @@ class BorderedNewton(Newton):
     """
 
     def _attach(self, snes, pc):
+        self.neutral = None
         self._slope, self._free, self._force = (self.problem.numbering.vector() for _ in range(3))
         pc.setType("python")
         pc.setPythonContext(self)
         self._give(snes, 0)
+
+    @property
+    def neutral(self):
+        """(owned unknowns,) the neutral motion, or None. The tangent is then singular to rounding, and solved all the
+        same."""
+        return self._neutral
+
+    @neutral.setter
+    def neutral(self, motion):
+        self._neutral = motion
+        self.problem.elimination.c.zero_pivot = ZERO_PIVOT if motion is None else 0.0
 
     def stay_in_plane(self, normal, weight, neutral=None):
         """Solve from now on in the plane through the problem's x and load factor.
@@ -266,13 +279,12 @@ class BorderedNewton(Newton):
         Raises:
             NotConverged: the tangent is singular.
         """
-        problem = self.problem
+        problem, self.neutral = self.problem, neutral
         if not self._solved_here(problem.load_derivative(problem.x), self._slope):
             raise NotConverged(
                 f"the tangent is singular at the load factor {problem.load_factor:.6g}: the path branches there, "
                 "or something is not determined, such as the axial force of an inextensible rod between two supports"
             )
-        self.neutral = neutral
         if neutral is not None:
             self._leave_out_neutral(self._slope)
         return self.slope

@@ -40,6 +40,8 @@ def meshes_for(scene, degree, tol, many):
     wanted = tol if many else _GAINED * 2 ** (degree + 1) * tol
     elements = (_ESTIMATED * _TYPICAL[degree - 1] / wanted) ** (1 / (degree + 0.9))
     layout = first_layout(scene, degree, min(max(math.ceil(elements), 1), _MOST))
+    if elements <= FIRST_ELEMENTS and any(a > b for a, b in zip(layout.counts, usual.counts, strict=True)):
+        return usual, None  # which asks less of curves
     coarser = any(a < b for a, b in zip(layout.counts, usual.counts, strict=True))
     return layout, usual if coarser else None
 

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from cosserat_fenicsx.algebra.elimination import ZERO_PIVOT
 from cosserat_fenicsx.algebra.equations import STATE, Equations
 from cosserat_fenicsx.algebra.packed import Packed, PackedExpression
 from cosserat_fenicsx.algebra.tie_rows import TieRows
@@ -77,6 +78,7 @@ class Problem(Equations):
             self._loaded = scene, layout
         else:
             model.rest()
+        self.elimination.c.zero_pivot = ZERO_PIVOT
         self.begins = any(kind.scaled == "permanent" for kind in model.signature.terms)
         self._eta[...] = 0.0
         self.set_load_factor(0.0)

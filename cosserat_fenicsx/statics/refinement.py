@@ -220,7 +220,7 @@ class _Search:
                 spread_error(self.whole, coarse, self._which)
                 if self.whole.error.max() <= self._tol:
                     return self.whole
-            elif few.error.max() <= self._tol and self._saves(few, coarse):
+            elif few.error.max() <= self._tol and max(layout.counts) < _MOST_ELEMENTS and self._saves(few, coarse):
                 self._few, self._apart = coarse, None
                 return few
         return self._all_points(layout, few) if few.error.max() <= self._tol else few

@@ -105,7 +105,7 @@ def parts(model, degree, runs):
 def kernels(model, degree, runs):
     """Time (s) of FFCx's kernels alone for the tangents of FEW elements; of 16 times as many, since calls take time."""
     with loaded(16 * FEW, degree, model) as (problem, _, _):
-        return float(np.median([timed(problem._tangent.matrices) for _ in range(runs)])) / 16
+        return float(np.median([timed(problem.tangent_form.matrices) for _ in range(runs)])) / 16
 
 
 def floor(steps, elements=FEW):
