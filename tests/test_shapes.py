@@ -69,14 +69,14 @@ def test_buckling_of_a_pinned_column_leaves_the_program(command, tmp_path, capsy
     import pyvista
 
     out = tmp_path / "new" / "out"
-    assert command("buckling", "--count", 2, "--tol", "1e-7", "-o", out) == 0
+    assert command("buckling", "--count", 2, "--tol", "1e-6", "-o", out) == 0
     said = capsys.readouterr().out
     assert "A [/red] column" in said and "rod[bold]@0.5" in said and "no static bifurcation below 9.869" in said
     assert {file.name for file in out.iterdir()} == {f"buckling.{kind}" for kind in ("csv", "xdmf", "h5", "png")}
     rows = list(csv.DictReader((out / "buckling.csv").open(encoding="utf-8")))
     critical = [float(row["critical load factor"]) for row in rows]
     assert critical == pytest.approx([np.pi**2, 4 * np.pi**2], rel=1e-5)
-    assert all(0 < float(row["estimated relative error"]) <= 1e-7 for row in rows)
+    assert all(0 < float(row["estimated relative error"]) <= 1e-6 for row in rows)
     with meshio.xdmf.TimeSeriesReader(out / "buckling.xdmf") as reader:
         points, _ = reader.read_points_cells()
         z = points[:, 2]
