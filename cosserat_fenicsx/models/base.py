@@ -154,9 +154,8 @@ class RodModel(Snapshots):
         self.carried = (gauss_function(self.mesh, signature.points, self.force_size),) if force.carried else ()
         for function in self.carried:
             nodes = compat.cell_nodes(function.function_space)
-            self.carried_dofs = (nodes[:, :, None] * self.force_size + np.arange(self.force_size)).reshape(
-                len(nodes), -1
-            )
+            numbers = nodes[:, :, None] * self.force_size + np.arange(self.force_size)
+            self.carried_dofs = numbers.reshape(len(nodes), nodes.shape[1] * self.force_size)
         self.carries_force, self.force_is_unknown = not force.of_motion, force.unknown
         self.forms = self._compile(spaces)
         for term, point in self.evolving:

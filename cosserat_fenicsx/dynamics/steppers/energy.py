@@ -20,7 +20,7 @@ class TurnedStepProblem(StepProblem):
 
     def __init__(self, model):
         super().__init__(model)
-        self._q_of_elements = model.cell_dofs.reshape(len(model.cell_dofs), -1, 7)[:, :, 3:]
+        self._q_of_elements = model.cell_dofs.reshape(len(model.cell_dofs), model.cell_dofs.shape[1] // 7, 7)[:, :, 3:]
         self._of_q = np.zeros(len(self._state))
         # a node's own terms are shared among all elements that meet there
         meeting = np.zeros(len(self._state))
