@@ -76,8 +76,8 @@ class Packed(_Kernel):
         self._set(self._w, self._c, sources, [slot for constant in constants for slot in self._slots(constant.value)])
 
     def _pack(self):
-        """{key of the integral: coefficients}; empty for a form without any."""
-        return {key: np.ascontiguousarray(w) for key, w in cpp.fem.pack_coefficients(self._form).items() if w.size}
+        """{key of the integral: coefficients (elements, n)}."""
+        return {key: np.ascontiguousarray(w) for key, w in cpp.fem.pack_coefficients(self._form).items()}
 
     def _places(self, numbers):
         """Where a Function's values are packed, found by packing indices in place of values, twice."""
