@@ -243,13 +243,14 @@ class BorderedNewton(Newton):
         Returns:
             (1/(v S^-1 v), S^-1 v of unit norm) with S the tangent in displacements and rotations, with the true
             stiffnesses. The first is an eigenvalue where v is an eigenvector, and changes sign through zero where the
-            tangent becomes singular with a null vector not orthogonal to v. (0.0, v) where the tangent is singular to
-            rounding.
+            tangent becomes singular with a null vector not orthogonal to v. (0.0, v) where the tangent is exactly
+            singular.
         """
         displacements, rows = self._tie_maps()
         self._force.set(0.0)
         self._by_nodes(self._force.array_w)[:] = (rows @ motion[..., None])[..., 0]
-        if not self._solved_here(self._force, self._free):
+        # where the tangent is singular to rounding, the response is the null vector
+        if not self._solved_here(self._force, self._free, zero_pivot=0.0):
             return 0.0, motion
         moved = (displacements @ self._by_nodes(self._free.array_r)[..., None])[..., 0]
         work, size = self.work(motion, moved), math.sqrt(self.work(moved, moved))
@@ -266,11 +267,14 @@ class BorderedNewton(Newton):
         """Inner product of two motions of the nodes, over all ranks."""
         return self.problem.model.comm.allreduce(float(np.vdot(a, b)))
 
-    def _solved_here(self, force, motion):
+    def _solved_here(self, force, motion, zero_pivot=None):
         """motion = A^-1 force at the problem's x and load factor; False where A is singular."""
-        problem = self.problem
+        problem, chain = self.problem, self.problem.elimination.c
+        before = chain.zero_pivot
+        chain.zero_pivot = before if zero_pivot is None else zero_pivot
         problem.function(problem.x, problem.b)
         problem.factor()
+        chain.zero_pivot = before
         return problem.solve(force, motion) and math.isfinite(motion.norm())
 
     def slope_here(self, neutral=None):
