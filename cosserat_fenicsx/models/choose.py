@@ -119,7 +119,8 @@ def _live(scene):
         traits = traits_of(load, scene.rods)
         if not traits.turns:
             return _names_components(i, load)
-        if not (traits.dead or (traits.known_force and load.station is not None)):
+        known = traits.dead or (traits.known_force and load.station is not None)
+        if not known or load.refreshed is not None:
             how = "turns with the rod" if load.follows else "depends on the motion"
             load_and_why = f"load {i + 1}, a {type(load).__name__}, {how}"
             return f"{load_and_why}, so that statics alone does not give the contact force"

@@ -80,13 +80,14 @@ class Follower:
                 raise NotConverged(f"no equilibrium was found at the load factor 0: {track.failure}")
             track.begin_here()
 
-    def to(self, target, way, *, on_step=None):
+    def to(self, target, way, *, on_step=None, once=False):
         """Advance to the load factor `target`, which is reached exactly.
 
         Args:
             target: load factor.
             way: range of the load factor over the whole path, to which steps of the load factor are relative.
             on_step: called with every accepted `PathPoint`.
+            once: whether to return after the first accepted step of load control.
 
         Returns:
             bool: False where the path could not be continued; `track.failure` gives the reason, and the state is that
@@ -94,7 +95,7 @@ class Follower:
         """
         self.begin()
         track, here = self.track, self.track.here
-        done = self._advance(target, way, on_step)
+        done = self._advance(target, way, on_step, once)
         if self.fork and not self.left:
             self.left, self._branch, self.used = True, 0, "arc"
             first = self._onto(self.fork)
@@ -132,10 +133,11 @@ class Follower:
         self._advance(target, way, None)
         return self.fork is not None
 
-    def _advance(self, target, way, on_step):
+    def _advance(self, target, way, on_step, once=False):
         """Advance to the load factor; False where the path fails or is to be left for a branch before."""
         if self._control != "arc":
-            done = self._load.to(target, way, on_step=on_step, patience=_PATIENCE if self._auto else None)
+            patience = _PATIENCE if self._auto else None
+            done = self._load.to(target, way, on_step=on_step, patience=patience, once=once)
             if done or not self._auto or (self.fork and not self.left):
                 return done
         self.used = "arc"

@@ -94,7 +94,7 @@ class Continuation:
         self.step = self.step or self.control.first or way / 10
         self.smallest = self.control.smallest * way
 
-    def to(self, target, way, *, on_step=None, patience=None):
+    def to(self, target, way, *, on_step=None, patience=None, once=False):
         """Advance to the load factor `target`, which is reached exactly.
 
         Args:
@@ -103,6 +103,7 @@ class Continuation:
             on_step: called with every accepted `PathPoint`.
             patience: number of rejected steps, without two successive accepted ones between, after which to stop;
                 None to go on to the `StepControl`'s smallest step.
+            once: whether to return after the first accepted step.
 
         Returns:
             bool: False where too many steps were rejected, the steps became too small or `watch` returned False; the
@@ -127,6 +128,8 @@ class Continuation:
             # A new negative mode counts as one of the path itself once the step is this small.
             if self._attempt(goal, guard=taken > 1e-3 * way, on_step=on_step):
                 rejections, last_accepted, first = 0 if last_accepted else rejections, True, False
+                if once:
+                    return True
             else:
                 rejections, last_accepted = rejections + 1, False
                 self.step = taken * self._shrink

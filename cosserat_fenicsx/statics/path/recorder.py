@@ -150,7 +150,8 @@ class Tracing:
                 self._until = until if between else None
                 on_step = (lambda point: (self._watch(point), self._record(point))) if between else self._watch
                 at_start = k == 0 and track.here.load_factor == target
-                if not (at_start or self._follower.to(target, way, on_step=on_step)):
+                # within a range C takes over again after a step
+                if not (at_start or self._follower.to(target, way, on_step=on_step, once=between)):
                     here = track.here.load_factor
                     if self._choice.promoted and self._options["control"] == "auto":
                         raise Promoted(f"load control ends at the load factor {here:.4g}, because {track.failure}")
@@ -161,7 +162,8 @@ class Tracing:
                     )
                 if not between:
                     self._record(track.here)
-                k += 1
+                once = between and self._follower.used == "load"
+                k += not once or track.here.load_factor == target
         except _Enough:
             pass
         except NotConverged as failure:
