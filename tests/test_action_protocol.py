@@ -339,19 +339,3 @@ force = [0, 0, 0.01]
     with pytest.raises(cf.SceneError, match="did you mean 'Spring'"):
         (tmp_path / "wrong.toml").write_text((tmp_path / "scene.toml").read_text().replace('"Spring"', '"Sprig"'))
         cf.read_scene(tmp_path / "wrong.toml")
-
-
-class Towards(cf.Force):
-    """A force of 1 N per metre of distance to a point."""
-
-    def refreshed(self, rod, s, r):
-        return (action.vector(np.array([[0.3, 0.0, 0.8]]) - r, "N"),)
-
-
-@pytest.mark.serial
-def test_data_that_depend_on_the_position_are_no_matter_of_statics_alone():
-    rod = cf.Rod(cf.Line((0, 0, 0), (0, 0, 1)), cf.Stiffness((1e3, 1e3), 1e3, (1, 1), 1))
-    path = cf.solve(cf.Scene([rod], [cf.Clamp(rod.start)], [Towards(rod.end, (1.0, 0, 0))]), [1.0])
-    assert path.model != "determinate"
-    force = path.force(rod.end)[-1]
-    np.testing.assert_allclose(force, [0.3, 0, 0.8] - path.position(rod.end)[-1], atol=1e-8)

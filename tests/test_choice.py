@@ -6,6 +6,7 @@ from conftest import column
 from plane_scenes import STEEL, Drawn, hinged_arch, lee_frame, thin_cantilever
 
 import cosserat_fenicsx as cf
+from cosserat_fenicsx.scene import action
 
 pytestmark = pytest.mark.serial  # the choice does not depend on ranks
 
@@ -97,3 +98,18 @@ def test_a_helix_is_in_no_plane(turns):
     twisted = cf.Rod(cf.UniformCurvature(1.0, (0, 0, turns * np.pi)), cf.Stiffness((1e3, 1e3), 1e3, (1.0, 5.0), 0.7))
     scene = cf.Scene([twisted], [cf.Clamp(twisted.start)], [cf.Force(twisted.end, (1.0, 0, 0))])
     assert "oblique to the plane" in scene.flatness[1]
+
+
+class Towards(cf.Force):
+    """A force of 1 N per metre of distance to a point."""
+
+    def refreshed(self, rod, s, r):
+        return (action.vector(np.array([[0.3, 0.0, 0.8]]) - r, "N"),)
+
+
+def test_data_that_depend_on_the_position_are_no_matter_of_statics_alone():
+    rod = cf.Rod(cf.Line((0, 0, 0), (0, 0, 1)), cf.Stiffness((1e3, 1e3), 1e3, (1, 1), 1))
+    path = cf.solve(cf.Scene([rod], [cf.Clamp(rod.start)], [Towards(rod.end, (1.0, 0, 0))]), [1.0])
+    assert path.model != "determinate"
+    force = path.force(rod.end)[-1]
+    np.testing.assert_allclose(force, [0.3, 0, 0.8] - path.position(rod.end)[-1], atol=1e-8)
