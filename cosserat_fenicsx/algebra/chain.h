@@ -78,6 +78,7 @@ typedef struct {
     int most, iterations;
     double steps[4];                /* sizes of the last ones, the latest first */
     int iterating, converged, ran_out, grown, not_a_number; /* SNES's reasons */
+    int verdict;                    /* the last of them; PETSc 3.25 may end a solution with the reason of the one before */
     double *x;                      /* the solution, while SNES does not use it */
 } newton;
 

@@ -220,8 +220,7 @@ static int test(void *snes, PetscInt iteration, double size, double change, doub
     newton *n = context;
     double step;
     (void)size, (void)change;
-    *reason = n->iterating;
-    if (!isfinite(norm)) *reason = n->not_a_number;
+    *reason = n->verdict = isfinite(norm) ? n->iterating : n->not_a_number;
     if (*reason != n->iterating || iteration == 0) return 0;
     if (motion(n, snes, &step)) return FAILED;
     memmove(n->steps + 1, n->steps, 3 * sizeof step);
@@ -230,6 +229,7 @@ static int test(void *snes, PetscInt iteration, double size, double change, doub
     if (!(step < 1e3)) *reason = n->grown;
     else if (balanced && (step <= n->increment || error_is_small(n))) *reason = n->converged;
     else if (n->iterations >= n->most) *reason = n->ran_out;
+    n->verdict = *reason;
     return 0;
 }
 
@@ -237,7 +237,7 @@ static int test(void *snes, PetscInt iteration, double size, double change, doub
 void begin(newton *n)
 {
     problem *p = n->problem;
-    n->iterations = 0;
+    n->iterations = 0, n->verdict = n->iterating;
     if (p->advance) memcpy(p->before, p->state, p->locals * sizeof *p->state);
 }
 

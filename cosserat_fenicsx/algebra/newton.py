@@ -142,6 +142,8 @@ class Newton:
             problem.raise_failure()
             raise
         reason = self.snes.getConvergedReason()
+        if reason > 0 and newton.verdict != newton.converged:
+            reason = RESIDUAL_NOT_A_NUMBER
         if reason > 0:  # the residual was last evaluated at x, so the state agrees with it
             problem.advance()
         elif problem.c.singular:

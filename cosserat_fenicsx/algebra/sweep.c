@@ -46,6 +46,7 @@ static double largest(const sweep *s, const double *a, const double *b)
             if (j < s->moves) r += c * c;
             else q += c * c;
         }
+        if (!isfinite(r + q)) return NAN; /* fmax would leave it out */
         moved = fmax(moved, r), turned = fmax(turned, q);
     }
     return sqrt(fmax(moved, s->turn * s->turn * turned));
@@ -167,10 +168,11 @@ static int attempt(sweep *s, double goal)
     if (s->with->solve(s->snes, 0, s->x) || s->with->get_reason(s->snes, &reason)) return UNSURE;
     s->iterations += n->iterations;
     s->shrink = 0.5;
-    if (reason <= 0) return REJECTED;
+    if (reason <= 0 || n->verdict != n->converged) return REJECTED;
     advance(n->problem);
     if (take(s, found)) return UNSURE;
     const double off = largest(s, found, guess), taken = fabs(goal - s->etas[s->known - 1]);
+    if (!isfinite(off)) return REJECTED;
     int judged = judge(s, here, guess, found, off);
     if (judged == UNSURE) judged = jumped(s, here, found, goal);
     if (judged != ACCEPTED) return judged;

@@ -183,13 +183,23 @@ class Part:
 
     def _nearest(self, count, side=0):
         """(eigenvalues nearest zero, their eigenvectors) of K as last factorised; side: 1, -1 or 0 for both."""
-        if self._zero:  # MUMPS drops null pivots from solutions; shifting all eigenvalues leaves the eigenvectors
-            self._zero, self._shift = 0, 10 * _ROUNDING * self.K.norm(_LARGEST_ROW)
-            self.K.shift(self._shift)
-            self.pc.setOperators(self.K)
-            self.pc.setUp()
-        values, vectors = eigen.nearest_zero(self.K, self.pc, count, side)
+        if self._zero:  # MUMPS drops null pivots from solutions
+            self._shift_from_zero()
+        try:
+            values, vectors = eigen.nearest_zero(self.K, self.pc, count, side)
+        except (PETSc.Error, SystemError):  # recent releases refuse factors with a pivot that is almost zero
+            if self._shift:
+                raise
+            self._shift_from_zero()
+            values, vectors = eigen.nearest_zero(self.K, self.pc, count, side)
         return values - self._shift, vectors
+
+    def _shift_from_zero(self):
+        """Shift all eigenvalues by their rounding, which leaves the eigenvectors."""
+        self._zero, self._shift = 0, 10 * _ROUNDING * self.K.norm(_LARGEST_ROW)
+        self.K.shift(self._shift)
+        self.pc.setOperators(self.K)
+        self.pc.setUp()
 
     def is_neutral(self):
         """Whether the eigenvalue nearest zero vanishes to rounding at the problem's state."""
