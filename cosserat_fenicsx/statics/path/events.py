@@ -186,20 +186,26 @@ class Locator:
         """The modes whose eigenvalues change sign at a coordinate.
 
         In a structure with a very soft member other eigenvalues may be as close to zero. Then the mode is taken from
-        the neighbouring point where its eigenvalue is negative.
+        the nearest point where its eigenvalue is negative, also by the factors that give modes: next to a singular
+        point, rounding may hide from them what the count has found.
         """
         track, stability = self.track, self.track.stability.whole
         track.put(point.numbers, point.load_factor)
         modes = stability.modes(together)
-        unstable = max(chord.neighbours(place), key=lambda known: known.negative_modes)
-        if together == 1 and unstable.negative_modes > point.negative_modes:
+        if together > 1:
+            return modes
+        stable = min(known.negative_modes for known in chord.neighbours(place))
+        for _, unstable in sorted(chord.known, key=lambda known: abs(known[0] - place)):
+            if unstable.negative_modes <= stable:
+                continue
             track.put(unstable.numbers, unstable.load_factor)
-            # next to a singular point, rounding may hide from this factorisation what the count has found
-            negative = stability.modes(1, side=-1) if stability.count_of_matrix() > point.negative_modes else []
+            if stability.count_of_matrix() <= stable:
+                continue
+            negative = stability.modes(1, side=-1)
             if not modes or not negative:
                 return modes or negative
-            if track.product(negative[0], modes[0]) ** 2 < 0.25 * track.square(negative[0]) * track.square(modes[0]):
-                return negative
+            alike = 0.25 * track.square(negative[0]) * track.square(modes[0])
+            return negative if track.product(negative[0], modes[0]) ** 2 < alike else modes
         return modes
 
     def _vanishing(self, chord, j, last):
