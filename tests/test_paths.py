@@ -85,7 +85,7 @@ def test_shallow_arch(control, far):
     np.testing.assert_allclose(loads(path, "bifurcation"), ARCH_BIFURCATIONS, rtol=2e-7)
     skew = path.mode(next(event for event in path.events if event.kind == "bifurcation"), rod)
     snap = path.mode(path.events[0], rod)
-    # 1e-9 as a rule; where an event is met to rounding, rounding of the bounded stiffnesses (1e8 EI/L^2) over the gap to
+    # 1e-9 as a rule; where an event is met to rounding, that of the bounded stiffnesses (1e8 EI/L^2) over the gap to
     # the next eigenvalue: 1.1e-4 was seen with dolfinx 0.9
     np.testing.assert_allclose(snap[:, :2], snap[::-1, :2] * [-1, 1], atol=1e-3)
     np.testing.assert_allclose(skew[:, :2], skew[::-1, :2] * [1, -1], atol=1e-3)
