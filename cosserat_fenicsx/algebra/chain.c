@@ -196,13 +196,13 @@ static inline int carried_to(int i, int ahead, const int *shape)
     return i < ahead ? i : i + shape[1] + shape[2];
 }
 
-/* The front of the element in turn, with `d` delayed unknowns and what is carried from the front of the one before. */
-static double *assemble(chain *s, kernel *k, const double *matrices, int t, int d, const double *before, int n_before,
-                        int k_before)
+/* The front F of the element in turn, with `d` delayed unknowns and what is carried from the front of the one before. */
+static void assemble(chain *s, kernel *k, const double *matrices, double *F, int t, int d, const double *before,
+                     int n_before, int k_before)
 {
     const int *shape = s->shape + 4 * t, *place = s->place + (size_t)t * s->width, w = s->width, e = s->order[t];
     const int n = d + shape[0] + shape[1] + shape[2] + shape[3], ahead = d + shape[0];
-    double *F = s->front + (size_t)t * s->room * s->room;
+    if (t == 0) memset(s->diagonal, 0, s->kept * sizeof *s->diagonal);
     memset(F, 0, (size_t)n * n * sizeof *F);
     const double *A = matrices ? matrices + (size_t)e * w * w : element(k, e, k->A);
     for (int i = 0; i < w; i++) {
@@ -218,7 +218,6 @@ static double *assemble(chain *s, kernel *k, const double *matrices, int t, int 
         for (int j = k_before; j < n_before; j++)
             row[carried_to(j - k_before, ahead, shape)] += before[(size_t)i * n_before + j];
     }
-    return F;
 }
 
 /* The matrix of a segment on the interface; `d`: delayed unknowns, in the first of its places. */
@@ -245,7 +244,8 @@ int eliminate(chain *s, kernel *k, const double *matrices)
         const int *shape = s->shape + 4 * t, m = d + shape[0] + shape[1], n = m + shape[2] + shape[3];
         int *row = s->row + (size_t)t * s->room, *column = s->column + (size_t)t * s->room;
         const int last = s->ends[t] != -1;
-        double *F = assemble(s, k, matrices, t, d, before, n_before, k_before);
+        double *F = s->front + (size_t)t * s->room * s->room;
+        assemble(s, k, matrices, F, t, d, before, n_before, k_before);
         for (int i = 0; i < n; i++) row[i] = i;
         for (int i = 0; i < d; i++) column[i] = s->column[(size_t)(t - 1) * s->room + k_before + i];
         memcpy(column + d, s->rows + (size_t)t * s->room, (n - d) * sizeof *column);
@@ -260,21 +260,20 @@ int eliminate(chain *s, kernel *k, const double *matrices)
 }
 
 /* The negative and zero pivots of a symmetric sum of elements; the interface's matrices are condensed too. */
-int count(chain *s, kernel *k)
+void count(chain *s, kernel *k)
 {
     const double *before = 0;
     int n_before = 0, k_before = 0;
     s->negative = s->zero = 0;
-    memset(s->diagonal, 0, s->kept * sizeof *s->diagonal);
     take_constants(k);
     for (int t = 0; t < s->elements; t++) {
         const int *shape = s->shape + 4 * t, m = shape[0] + shape[1], n = m + shape[2] + shape[3];
-        double *F = assemble(s, k, 0, t, 0, before, n_before, k_before);
+        double *F = s->front + (size_t)(t % 2) * s->room * s->room; /* of the others nothing is needed any more */
+        assemble(s, k, 0, F, t, 0, before, n_before, k_before);
         signs(F, n, m, s->work, &s->negative, &s->zero);
         before = F, n_before = n, k_before = m;
         if (s->ends[t] != -1) condense(s, t, F, n, m, 0), before = 0;
     }
-    return s->negative;
 }
 
 /* Forward substitution of b (this rank's unknowns); what the interface gets is added to it. */

@@ -41,7 +41,7 @@ typedef struct {
     const int *ends;               /* (elements,) -1; at the end of a segment the first of its `delays` numbers in the
                                       interface for delayed unknowns, or -2 where it has none */
     const int *block;              /* (elements,) at the end of a segment where its matrix is in condensed; else -1 */
-    double *front;                 /* (elements, room, room) factors */
+    double *front;                 /* (elements, room, room) factors; (2, room, room) where pivots are only counted */
     int *row, *column, *done;      /* (elements, room) order of rows, unknowns of columns; (elements, 2) size of the front,
                                       eliminated */
     double *forward, *condensed;   /* (elements, room); matrices of the segments on the interface */
@@ -79,7 +79,6 @@ typedef struct {
     double steps[4];                /* sizes of the last ones, the latest first */
     int iterating, converged, ran_out, grown, not_a_number; /* SNES's reasons */
     int verdict;                    /* the last of them; PETSc 3.25 may end a solution with the reason of the one before */
-    double *x;                      /* the solution, while SNES does not use it */
 } newton;
 
 /* Newton's method of a time step, see dynamics/steppers/newton.py for what its numbers mean. */
@@ -149,7 +148,7 @@ void add_vector(kernel *k, const int *dofs, double *values);
 void put_values(kernel *k, const int *dofs, double *values);
 void tabulate_all(kernel *k, double *values);
 int eliminate(chain *s, kernel *k, const double *matrices);
-int count(chain *s, kernel *k);
+void count(chain *s, kernel *k);
 void forward(chain *s, const double *b, double *interface);
 void backward(chain *s, const double *interface, double *x);
 int factor_dense(double *F, int n, int *row, int *column, double zero, double *work);

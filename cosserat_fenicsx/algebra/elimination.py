@@ -7,7 +7,7 @@ segments of rods, and all ranks solve the whole interface, with the same numbers
 
 import numpy as np
 
-from cosserat_fenicsx.algebra.building import module
+from cosserat_fenicsx.algebra.pointers import Pointers
 
 #: Relative to the largest number in its column, smaller pivots are zero to rounding.
 ZERO_PIVOT = 2e-15
@@ -15,7 +15,7 @@ ZERO_PIVOT = 2e-15
 _DELAYS = 3
 
 
-class Elimination:
+class Elimination(Pointers):
     """The C structure `chain` for the elements of this rank.
 
     Args:
@@ -24,15 +24,16 @@ class Elimination:
         order: (elements,) this rank's elements in turn along the rods.
         tied: numbers of the unknowns in constraint equations; the same on all ranks.
         delays: whether some pivots may be zero.
+        factors: whether factors are kept, for solutions; without them only pivots can be counted.
 
     Attributes:
         interface: (interfaces,) numbers of its unknowns; the same on all ranks.
         places: (entries,) rows and columns, in the interface, of the entries of all ranks' condensed matrices.
     """
 
-    def __init__(self, numbering, cell_dofs, order, tied, *, delays=False):
-        self._ffi, self._lib = module()
-        self.numbering, self._keep = numbering, []
+    def __init__(self, numbering, cell_dofs, order, tied, *, delays=False, factors=True):
+        super().__init__()
+        self.numbering = numbering
         rows = numbering.rows[cell_dofs][order].astype(np.int64)
         turn = np.repeat(np.arange(len(rows)), rows.shape[1])
         number, inverse = np.unique(rows.ravel(), return_inverse=True)
@@ -43,7 +44,7 @@ class Elimination:
         multipliers = numbering.first_multiplier + np.arange(numbering.multipliers)
         self.interface = np.concatenate([kept, multipliers])
         self._arrange(rows, number, inverse.reshape(rows.shape), first, last, np.isin(number, kept))
-        self._allocate(order, rows.shape[1], _DELAYS if delays else 0)
+        self._allocate(order, rows.shape[1], _DELAYS if delays else 0, len(order) if factors else 2)
 
     def _kept(self, number, apart, tied):
         """The numbers of the nodes' unknowns on the interface, those of all ranks."""
@@ -85,7 +86,7 @@ class Elimination:
             s = started[t]
             self._rows[t, before[t] : before[t] + starts[t]] = self._rows[s, before[s] : before[s] + starts[t]]
 
-    def _allocate(self, order, width, delays):
+    def _allocate(self, order, width, delays, fronts):
         ffi, numbering = self._ffi, self.numbering
         elements, room = len(order), self._rows.shape[1] + delays
         kept = self._shape[:, 2:].sum(axis=1) * self._ends
@@ -110,23 +111,19 @@ class Elimination:
         chain.elements, chain.width, chain.size = elements, width, numbering.size
         chain.zero_pivot = ZERO_PIVOT
         chain.room, chain.delays, chain.kept = room, delays, self.unknowns
-        room_for = {"row": (elements, room), "column": (elements, room), "done": (elements, 2)}
+        room_for = {"row": (fronts, room), "column": (fronts, room), "done": (fronts, 2)}
         self._factors = {name: np.zeros(shape, dtype=np.int32) for name, shape in room_for.items()}
         for name, array in (
             ("order", order), ("place", self._place), ("shape", self._shape), ("rows", rows), ("ends", ends),
             ("block", block), *self._factors.items(),
         ):  # fmt: skip
-            setattr(chain, name, self._pointer("int *", np.ascontiguousarray(array, dtype=np.int32)))
-        self._factors["front"] = np.zeros((elements, room, room))
+            setattr(chain, name, self.integers(array))
+        self._factors["front"] = np.zeros((fronts, room, room))
         for name, array in (
-            ("front", self._factors["front"]), ("forward", np.zeros((elements, room))), ("condensed", self.condensed),
+            ("front", self._factors["front"]), ("forward", np.zeros((fronts, room))), ("condensed", self.condensed),
             ("diagonal", self.diagonal), ("carry", np.zeros(room)), ("work", np.zeros(room)),
         ):  # fmt: skip
-            setattr(chain, name, self._pointer("double *", array))
-
-    def _pointer(self, kind, array):
-        self._keep.append(array)
-        return self._ffi.cast(kind, array.ctypes.data)
+            setattr(chain, name, self.doubles(array))
 
     def _find_places(self, at, ends, rows, slots):
         numbering, places = self.numbering, []
@@ -159,6 +156,6 @@ class Elimination:
             array[:] = memory[name]
 
     def count(self, kernel):
-        """(negative, zero) pivots of the symmetric sum of a kernel's elements, apart from the interface's."""
+        """Count the pivots of the symmetric sum of a kernel's elements, apart from the interface's: `c.negative`,
+        `c.zero`; and sum the elements' diagonals there: `diagonal`."""
         self._lib.count(self.c, kernel.c)
-        return self.c.negative, self.c.zero

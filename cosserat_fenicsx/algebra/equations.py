@@ -7,8 +7,8 @@ import numpy as np
 from mpi4py import MPI
 
 from cosserat_fenicsx.algebra.building import module
-from cosserat_fenicsx.algebra.elimination import Elimination
-from cosserat_fenicsx.algebra.interface import Interface
+from cosserat_fenicsx.algebra.interface import condensed
+from cosserat_fenicsx.algebra.pointers import Pointers
 
 #: What C asks Python for, see newton.c.
 STATE, RESIDUAL, TANGENT, INTERFACE, ADD_UP, SUM, MATRICES, COUNT = (1 << k for k in range(8))
@@ -31,7 +31,7 @@ def _hook():
     return hook
 
 
-class Called:
+class Called(Pointers):
     """An object that C asks for what Python has to do.
 
     Attributes:
@@ -39,8 +39,8 @@ class Called:
     """
 
     def __init__(self):
+        super().__init__()
         _hook()
-        self._ffi, self._lib = module()
         self._handle, self.failure = self._ffi.new_handle(weakref.ref(self)), None
 
     def raise_failure(self):
@@ -77,15 +77,13 @@ class Equations(Called):
         numbering = self.numbering
         self.ties = self.ties_class(model, numbering) if model.signature.connections.ties else None
         tied = self.ties.rows if self.ties else np.empty((0, numbering.block), dtype=np.int64)
-        order, delays = np.argsort(model.rods.cells[: len(model.cell_dofs)]), model.force_is_unknown
-        self.elimination = Elimination(numbering, model.cell_dofs, order, tied.ravel(), delays=delays)
+        self.elimination, self.interface = condensed(
+            model, numbering, model.cell_dofs, tied, delays=model.force_is_unknown
+        )
         self.x, self.b = numbering.vector(), numbering.vector()
         self._vector_of_x = numbering.vector()  # for transfers between ranks
         self._state = model.state.x.array
         self._local = np.zeros(len(numbering.rows))
-        self.interface = None
-        if self.elimination.unknowns or numbering.comm.size > 1:
-            self.interface = Interface(self.elimination, tied, numbering.multipliers)
         self._fill(hooks)
 
     def _fill(self, hooks):
@@ -96,20 +94,20 @@ class Equations(Called):
         self.c = problem = ffi.new("problem *")
         problem.self, problem.hooks, problem.serial, problem.chain = self._handle, hooks, serial, self.elimination.c
         problem.size, problem.locals, problem.frees = numbering.size, len(self._local), len(numbering.free)
-        problem.free, problem.of_free = self._integers(numbering.free), self._integers(numbering.of_free)
-        problem.local = self.pointer(self._local)
+        problem.free, problem.of_free = self.integers(numbering.free), self.integers(numbering.of_free)
+        problem.local = self.doubles(self._local)
         if hooks & MATRICES:
             #: (elements, n, n) where MATRICES is among the hooks
             self.matrices = np.zeros((*model.cell_dofs.shape, model.cell_dofs.shape[1]))
-            problem.matrices = self.pointer(self.matrices)
+            problem.matrices = self.doubles(self.matrices)
         for name in ("state", "before", "step"):
-            setattr(problem, name, self.pointer(getattr(model, name).x.array))
+            setattr(problem, name, self.doubles(getattr(model, name).x.array))
         mine = self.elimination.interface - numbering.first
         here = np.full(self.elimination.unknowns, -1)
         here[: len(mine)] = np.where((mine >= 0) & (mine < numbering.size), mine, -1)
         self._on_interface = np.zeros(len(here))
-        problem.interfaces, problem.of_interface = len(here), self._integers(here)
-        problem.interface = self.pointer(self._on_interface)
+        problem.interfaces, problem.of_interface = len(here), self.integers(here)
+        problem.interface = self.doubles(self._on_interface)
 
     def take_forms(self, residual, tangent, advance=None):
         """Set the `Packed` residual and tangent, and the `PackedExpression` of the carried contact force or None."""
@@ -119,23 +117,13 @@ class Equations(Called):
         if advance:
             problem.advance = advance.c
             (carried,) = self.model.carried
-            problem.carried, problem.carries = self.pointer(carried.x.array), len(carried.x.array)
-            problem.advance_dofs = self._integers(self.model.carried_dofs)
+            problem.carried, problem.carries = self.doubles(carried.x.array), len(carried.x.array)
+            problem.advance_dofs = self.integers(self.model.carried_dofs)
 
     def take_loads(self, *loads):
         """Set up to three (vector, array of its factor) to subtract from the residual."""
         for k, (vector, factor) in enumerate(loads):
-            self.c.load[k], self.c.factor[k] = self.pointer(vector), self.pointer(factor)
-
-    def pointer(self, array):
-        """C's pointer to an array of floats, which must live as long as the problem."""
-        self.__dict__.setdefault("_kept", []).append(array)
-        return self._ffi.cast("double *", array.ctypes.data)
-
-    def _integers(self, array):
-        array = np.ascontiguousarray(array, dtype=np.int32)
-        self.__dict__.setdefault("_kept", []).append(array)
-        return self._ffi.cast("int *", array.ctypes.data)
+            self.c.load[k], self.c.factor[k] = self.doubles(vector), self.doubles(factor)
 
     # -- for solvers -------------------------------------------------------------------------------------------------
 

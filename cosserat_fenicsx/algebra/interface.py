@@ -2,12 +2,26 @@
 
 import numpy as np
 
-from cosserat_fenicsx.algebra.building import module
+from cosserat_fenicsx.algebra.elimination import Elimination
+from cosserat_fenicsx.algebra.pointers import Pointers
 
 # Pivots and eigenvalues of a matrix with a diagonal of ones that are zero to rounding.
 _ROUNDING = 1e-14
 # Largest number of unknowns of a system that is solved as a dense one.
 _DENSE = 150
+
+
+def condensed(model, numbering, cell_dofs, tied, **options):
+    """The `Elimination` along a model's rods, and the `Interface` that it leaves, or None where it leaves nothing.
+
+    Args:
+        numbering: the `Numbering` of the unknowns; cell_dofs: see `Elimination`, as for the options.
+        tied: (tied nodes, block) numbers of the unknowns in constraint equations, -1 where clamped.
+    """
+    order = np.argsort(model.rods.cells[: len(cell_dofs)])
+    elimination = Elimination(numbering, cell_dofs, order, tied.ravel(), **options)
+    needed = elimination.unknowns or numbering.comm.size > 1
+    return elimination, Interface(elimination, tied, numbering.multipliers) if needed else None
 
 
 class Interface:
@@ -72,16 +86,16 @@ class Interface:
         return self._solver.signs(self._values(of_nodes))
 
 
-class _Dense:
+class _Dense(Pointers):
     """A system as a dense matrix, row by row."""
 
     def __init__(self, size):
-        self._ffi, self._lib = module()
+        super().__init__()
         self._size, self.room = size, size * size
         self._factors, self._work = np.zeros(size * size), np.zeros(size)
         self._order = np.zeros((2, size), dtype=np.int32)
-        self._double = [self._ffi.cast("double *", array.ctypes.data) for array in (self._factors, self._work)]
-        self._int = [self._ffi.cast("int *", array.ctypes.data) for array in self._order]
+        self._double = [self.doubles(array) for array in (self._factors, self._work)]
+        self._int = [self.integers(array) for array in self._order]
 
     def entries(self, rows, columns):
         return rows * self._size + columns

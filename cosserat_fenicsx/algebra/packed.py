@@ -4,46 +4,37 @@ import numpy as np
 from dolfinx import cpp
 
 from cosserat_fenicsx import compat
-from cosserat_fenicsx.algebra.building import module
+from cosserat_fenicsx.algebra.pointers import Pointers
 
 _MARK = 0.8765432198765432
 
 
-class _Kernel:
+class _Kernel(Pointers):
     """The C structure `kernel`, and what it points to."""
 
     def __init__(self, compiled, address, mesh, elements, size):
+        super().__init__()
         self._compiled = compiled  # keeps the machine code
-        ffi, self._lib = module()
+        self.size, self.elements, ffi = size, elements, self._ffi
         self.c = kernel = ffi.new("kernel *")
-        self._keep, self._ffi, self.size, self.elements = [], ffi, size, elements
         kernel.tabulate, kernel.elements, kernel.size = ffi.cast("void *", address), elements, size
-        corners = np.ascontiguousarray(compat.geometry_dofs(mesh)[:elements], dtype=np.int32)
-        kernel.x, kernel.corners = self._numbers(mesh.geometry.x), self._integers(corners)
-        kernel.A = self._numbers(np.zeros(size))
-
-    def _numbers(self, array):
-        self._keep.append(array)
-        return self._ffi.cast("double *", array.ctypes.data)
-
-    def _integers(self, array):
-        self._keep.append(array)
-        return self._ffi.cast("int *", array.ctypes.data)
+        corners = compat.geometry_dofs(mesh)[:elements]
+        kernel.x, kernel.corners = self.doubles(mesh.geometry.x), self.integers(corners)
+        kernel.A = self.doubles(np.zeros(size))
 
     def _set(self, w, c, sources, constants):
         """Give C the packed coefficients w (elements, width) and constants c; sources: (values, indices (elements,
         count), first column) of those that change; constants: (array of one value, place in c)."""
         kernel, ffi = self.c, self._ffi
-        kernel.w, kernel.width, kernel.c = self._numbers(w), w.shape[1], self._numbers(c)
+        kernel.w, kernel.width, kernel.c = self.doubles(w), w.shape[1], self.doubles(c)
         self._sources = ffi.new("source[]", max(1, len(sources)))
         for to, (values, which, column) in zip(self._sources, sources, strict=False):
-            which = np.ascontiguousarray(which, dtype=np.int32)
-            to.values, to.which = self._numbers(values), self._integers(which)
+            to.values, to.which = self.doubles(values), self.integers(which)
             to.count, to.column = which.shape[1], column
-        self._constants = ffi.new("double *[]", [self._numbers(value) for value, _ in constants] or 1)
+        self._constants = ffi.new("double *[]", [self.doubles(value) for value, _ in constants] or 1)
         kernel.source, kernel.sources = self._sources, len(sources)
         kernel.constant = ffi.cast("double **", self._constants)
-        kernel.slot = self._integers(np.array([slot for _, slot in constants], dtype=np.int32))
+        kernel.slot = self.integers([slot for _, slot in constants])
         kernel.constants = len(constants)
 
 
@@ -56,7 +47,7 @@ class Packed(_Kernel):
         constants: the Constants whose values change; those of all others are taken by `refresh`, too.
 
     Attributes:
-        dofs: (elements, size) local degrees of freedom of the vector, of a linear form; dofs_c: C's pointer to them.
+        dofs_c: C's pointer to the local degrees of freedom (elements, size) of the vector, of a linear form.
     """
 
     def __init__(self, form, moving, constants):
@@ -66,8 +57,7 @@ class Packed(_Kernel):
         self._shape = [dofs.shape[1] for dofs in of_spaces]
         size = int(np.prod(self._shape))
         super().__init__(form, compat.kernel_address(form), self._form.mesh, elements, size)
-        self.dofs = np.ascontiguousarray(of_spaces[0], dtype=np.int32)
-        self.dofs_c = self._integers(self.dofs)
+        self.dofs_c = self.integers(of_spaces[0])
         packed = self._pack()
         self._key = next(iter(packed), None)
         self._w = packed[self._key] if packed else np.zeros((elements, 0))

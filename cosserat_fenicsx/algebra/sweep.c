@@ -140,7 +140,7 @@ static int jumped(const sweep *s, const double *here, const double *found, doubl
             const double both = at_end[j] + at_start[j], move = found[j] - here[j];
             slopes += both * both, moves += move * move;
         }
-    return slopes * (goal - eta) * (goal - eta) < moves ? REJECTED : ACCEPTED;
+    return slopes * (goal - eta) * (goal - eta) >= moves ? ACCEPTED : REJECTED; /* also what is not a number */
 }
 
 static int record(sweep *s)

@@ -298,6 +298,12 @@ class RodModel(Snapshots):
     # -- for solvers and results -------------------------------------------------------------------------------------
 
     @property
+    def changing(self):
+        """The Functions whose values change along a path."""
+        actions = self.actions
+        return (self.state, *self.carried, *actions.refreshed, *actions.memory_functions)
+
+    @property
     def constants(self):
         """All Constants of the forms."""
         return [value for value in vars(self).values() if isinstance(value, fem.Constant)]

@@ -21,6 +21,8 @@ class Problem(Equations):
         see `Equations`.
         load_factor: factor of loads and prescribed motions; while `begins`, the factor of permanent loads.
         begins: whether permanent loads are still being applied, with a factor from 0 to 1, before all other loads.
+        eta_array: array of one value, the factor of loads and prescribed motions.
+        fields: the `PackedExpression` of `CompiledForms.fields`; None where there is none, or with several ranks.
         load_norm: Euclidean norm of the dead loads at load factor 1, dimensionless.
     """
 
@@ -30,7 +32,7 @@ class Problem(Equations):
         self._refreshes, self._remembers = bool(model.actions.refreshed), bool(model.actions.memory)
         super().__init__(model, STATE * self._refreshes)
         forms, constants = model.forms, model.constants
-        moving = (model.state, *model.carried, *model.actions.refreshed, *model.actions.memory_functions)
+        moving = model.changing
         advance = None
         if forms.advance:
             elements, size = model.carried_dofs.shape
@@ -43,10 +45,9 @@ class Problem(Equations):
         self._live = [function.x.array for function in model.carried]
         self.load_factor = self.load_norm = 0.0
         # Arrays of the constants, written in place: the setter of `value` takes as long as a residual of few elements.
-        self._eta, self._share = model.load_factor.value, model.permanent_factor.value
-        self.take_loads((self._dead.array, self._eta), (self._permanent.array, self._share))
-        #: the array of the load factor; the `PackedExpression` of `CompiledForms.fields`, or None
-        self.eta_array, self.fields = self._eta, None
+        self.eta_array, self._share = model.load_factor.value, model.permanent_factor.value
+        self.take_loads((self._dead.array, self.eta_array), (self._permanent.array, self._share))
+        self.fields = None
         if forms.fields and model.comm.size == 1:
             size = len(forms.gauss) * forms.fields_size
             self.fields = PackedExpression(forms.fields, model.mesh, len(model.cell_dofs), size)
@@ -55,7 +56,7 @@ class Problem(Equations):
     @property
     def eta(self):
         """The factor of loads and prescribed motions."""
-        return float(self._eta)
+        return float(self.eta_array)
 
     def load(self, scene, layout):
         """Set the data of a scene; the state becomes its reference configuration.
@@ -80,7 +81,7 @@ class Problem(Equations):
             model.rest()
         self.elimination.c.zero_pivot = ZERO_PIVOT
         self.begins = any(kind.scaled == "permanent" for kind in model.signature.terms)
-        self._eta[...] = 0.0
+        self.eta_array[...] = 0.0
         self.set_load_factor(0.0)
         self.numbering.from_local(self._state, self.x)
         self.set_state(self.x)
@@ -105,7 +106,7 @@ class Problem(Equations):
         if self.begins:
             self._share[...] = eta
         else:
-            self._eta[...] = eta
+            self.eta_array[...] = eta
 
     def end_beginning(self):
         """Set the factor of permanent loads to 1 and the load factor to 0."""

@@ -11,9 +11,8 @@ import numpy as np
 from petsc4py import PETSc
 
 from cosserat_fenicsx.algebra import eigen, linear
-from cosserat_fenicsx.algebra.elimination import Elimination
 from cosserat_fenicsx.algebra.equations import COUNT, Called
-from cosserat_fenicsx.algebra.interface import Interface
+from cosserat_fenicsx.algebra.interface import condensed
 from cosserat_fenicsx.algebra.packed import Packed
 
 _ROUNDING = np.finfo(float).eps
@@ -90,15 +89,10 @@ class Part:
     def __init__(self, problem, index):
         self.problem, self.model, self._index = problem, problem.model, index
         self.variation = variation = self.model.second_variations[index]
-        tied = variation.tied
-        model, numbering = self.model, variation.numbering
-        actions = model.actions
-        moving = (model.state, *model.carried, *actions.refreshed, *actions.memory_functions)
-        self.form = Packed(variation.form, moving, model.constants)
-        order = np.argsort(model.rods.cells[: len(variation.cell_dofs)])
-        self.elimination = elimination = Elimination(numbering, variation.cell_dofs, order, tied.ravel())
-        needed = elimination.unknowns or model.comm.size > 1
-        self.interface = Interface(elimination, tied) if needed else None
+        self.form = Packed(variation.form, self.model.changing, self.model.constants)
+        self.elimination, self.interface = condensed(
+            self.model, variation.numbering, variation.cell_dofs, variation.tied, factors=False
+        )
 
     def load(self):
         """Take the numbers of the scene that the model was loaded with."""
@@ -133,7 +127,8 @@ class Part:
         else:
             self.form.add_to_matrix(self.K)
         if self.problem.ties:
-            self.elimination.count(self.form)
+            if not stress_alone:
+                self.elimination.count(self.form)  # for the diagonal that springs are scaled by
             tied, of_ties = self.variation.tied.ravel().astype(PETSc.IntType), self._of_ties(stress_alone)
             if self.model.comm.rank == 0:
                 self.K.setValues(tied, tied, of_ties, PETSc.InsertMode.ADD_VALUES)

@@ -7,10 +7,10 @@ python demos/evidence/accuracy.py --quick    two meshes and two slendernesses
 import argparse
 import math
 import platform
-from pathlib import Path
 
 import numpy as np
 from cantilever import ECCENTRICITY, L, column, exact
+from written import write
 
 import cosserat_fenicsx as cf
 from cosserat_fenicsx import analytic, compat
@@ -100,9 +100,7 @@ def main(quick=False, out="out"):
         "",
         *newton_work(),
     ]
-    text = "\n".join(lines)
-    Path(out).mkdir(parents=True, exist_ok=True)
-    (Path(out) / "accuracy.md").write_text(text + "\n", encoding="utf-8")
+    text = write("accuracy", lines, out)
     print(text)
     return text
 

@@ -16,6 +16,7 @@ from pathlib import Path
 
 import numpy as np
 from asked import HEADS, judged
+from written import write
 
 import cosserat_fenicsx as cf
 from cosserat_fenicsx import compat
@@ -125,8 +126,7 @@ def main(runs=9, out="out", scenes=SCENES, counts=COUNTS):
                 f"{off:.0e} | {told} | {1e3 * seconds:.2f} | {judged(ratio, ASKED) if who == 'auto' else ' | | '} |"
             )
             print(lines[-1], flush=True)
-    Path(out).mkdir(parents=True, exist_ok=True)
-    (Path(out) / "choice.md").write_text("\n".join(lines) + "\n", encoding="utf-8")
+    write("choice", lines, out)
     return found
 
 

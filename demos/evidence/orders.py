@@ -12,9 +12,9 @@ smooth up to its ends. Changes and errors that may be affected by rounding are m
 
 import argparse
 import math
-from pathlib import Path
 
 import numpy as np
+from written import write
 
 import cosserat_fenicsx as cf
 from cosserat_fenicsx import compat
@@ -158,8 +158,7 @@ def main(quick=False, out="out"):
     in_dt, temporal = time_table(QUICK_STEPS if quick else STEPS)
     in_h, spatial = space_table(QUICK_MESHES if quick else MESHES, (12, 16) if quick else (24, 32))
     lines = [f"{compat.version()}.", "", *in_dt, "", *in_h]
-    Path(out).mkdir(parents=True, exist_ok=True)
-    (Path(out) / "orders.md").write_text("\n".join(lines) + "\n", encoding="utf-8")
+    write("orders", lines, out)
     return temporal, spatial
 
 

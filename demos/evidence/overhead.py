@@ -10,13 +10,13 @@ package; the loop is timed without it and with it.
 
 import argparse
 import time
-from pathlib import Path
 
 import numpy as np
 from cantilever import column
 from dolfinx import fem
 from dolfinx.fem import petsc as fem_petsc
 from petsc4py import PETSc
+from written import write
 
 import cosserat_fenicsx as cf
 from cosserat_fenicsx import compat
@@ -145,10 +145,7 @@ def main(runs=15, out="out"):
             f"| {1e3 * stable:.1f} | {ratios[1]:.2f} |"
         )
         results.append((*ratios, difference))
-    text = "\n".join(lines)
-    Path(out).mkdir(parents=True, exist_ok=True)
-    (Path(out) / "overhead.md").write_text(text + "\n", encoding="utf-8")
-    print(text)
+    print(write("overhead", lines, out))
     return np.array(results).T
 
 

@@ -7,7 +7,6 @@ The cantilever and the step of scaling.py. Numbers of ranks take turns; results 
 than the machine has cores show only whether the digits are the same.
 """
 
-import argparse
 import json
 import os
 import shutil
@@ -21,6 +20,7 @@ from asked import HEADS, judged
 from machine import in_words, record
 from mpi4py import MPI
 from scaling import from_rest, loaded
+from written import options, write
 
 SIZES, QUICK = (3600, 35715), (256,)  # elements of degree 4: 28 unknowns each
 RANKS = (1, 2, 4)
@@ -76,21 +76,15 @@ def main(sizes=SIZES, rounds=ROUNDS, out="out", ranks=RANKS):
         told = " | ".join(f"{1e3 * s:.1f}" for s in medians.values())
         lines.append(f"| {unknowns} | {told} | {apart:.0e} | {judged(medians[2] / medians[1], ASKED)} |")
         found.append((unknowns, medians, apart))
-    text = "\n".join(lines)
-    Path(out).mkdir(parents=True, exist_ok=True)
-    (Path(out) / "ranks.md").write_text(text + "\n", encoding="utf-8")
-    print(text)
+    print(write("ranks", lines, out))
     return found
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--quick", action="store_true")
-    parser.add_argument("--one", type=int, help=argparse.SUPPRESS)
-    options = parser.parse_args()
-    if options.one:
-        numbers = measure(options.one)
+    asked = options(__doc__)
+    if asked.one:
+        numbers = measure(asked.one)
         if MPI.COMM_WORLD.rank == 0:
             print(json.dumps(numbers))
     else:
-        main(*((QUICK, 1) if options.quick else ()))
+        main(*((QUICK, 1) if asked.quick else ()))

@@ -11,11 +11,11 @@ error is that of the tip, the largest over the path, relative to its displacemen
 import argparse
 import platform
 import time
-from pathlib import Path
 
 import numpy as np
 from asked import HEADS, judged, share
 from cantilever import column, exact
+from written import write
 
 import cosserat_fenicsx as cf
 from cosserat_fenicsx import compat
@@ -157,10 +157,7 @@ def main(runs=9, out="out", scenes=SCENES):
                     f"| {draw.__name__.replace('_', ' ')} | {name} | {model} | {unknowns} | {error:.0e} | {told} | "
                     f"{1e3 * seconds:.2f} | {judged(ratio, most) if most else f'{share(ratio)} | - | -'} |"
                 )
-    text = "\n".join(lines)
-    Path(out).mkdir(parents=True, exist_ok=True)
-    (Path(out) / "rungs.md").write_text(text + "\n", encoding="utf-8")
-    print(text)
+    print(write("rungs", lines, out))
     return found
 
 

@@ -9,7 +9,6 @@ Each size runs in a separate process: a thick cantilever under a small transvers
 A second table has a step at 8 elements beside that of the cheapest rod there is, in plain C (floor.c), and its parts.
 """
 
-import argparse
 import json
 import os
 import resource
@@ -22,6 +21,7 @@ from pathlib import Path
 import numpy as np
 from asked import HEADS, judged
 from cantilever import column
+from written import options, write
 
 from cosserat_fenicsx import compat
 from cosserat_fenicsx.models.rodmesh import Layout
@@ -182,19 +182,13 @@ def main(sizes=SIZES, out="out", runs=300):
         print(f"{rows[-1][0]:8d} unknowns: step {1e3 * rows[-1][1]:9.3f} ms", flush=True)
     rows = np.array(rows)
     about = f"{compat.version()}; medians, processor time, one process. Memory is the process's largest, all loaded."
-    text = "\n".join([about, "", *sizes_table(rows), "", *floor_table(runs)])
-    Path(out).mkdir(parents=True, exist_ok=True)
-    (Path(out) / "scaling.md").write_text(text + "\n", encoding="utf-8")
-    print(text)
+    print(write("scaling", [about, "", *sizes_table(rows), "", *floor_table(runs)], out))
     return rows
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--quick", action="store_true")
-    parser.add_argument("--one", type=int, help=argparse.SUPPRESS)
-    options = parser.parse_args()
-    if options.one:
-        print(json.dumps(measure(options.one)))
+    asked = options(__doc__)
+    if asked.one:
+        print(json.dumps(measure(asked.one)))
     else:
-        main(QUICK if options.quick else SIZES)
+        main(QUICK if asked.quick else SIZES)

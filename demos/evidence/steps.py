@@ -13,10 +13,10 @@ with the energy balance and the state saved every second.
 import argparse
 import statistics
 import time
-from pathlib import Path
 
 from asked import HEADS, judged
 from machine import in_words, record
+from written import write
 
 import cosserat_fenicsx as cf
 
@@ -110,10 +110,7 @@ def main(runs=7, duration=5.0, out="out"):
     few = compare(runs, min(duration, 2.0))
     for held, (milliseconds, iterations, _) in zip(HELD, few, strict=True):
         lines.append(f"| {held} | {iterations:.1f} | {judged(milliseconds, ASKED, '.2f')} |")
-    text = "\n".join(lines)
-    Path(out).mkdir(parents=True, exist_ok=True)
-    (Path(out) / "steps.md").write_text(text + "\n", encoding="utf-8")
-    print(text)
+    print(write("steps", lines, out))
     return found, few
 
 

@@ -126,10 +126,10 @@ class StepProblem(Equations):
     def stepping(self, start, **numbers):
         """The C structure `stepping` for `iterate`: Newton's method from `x`; start: the unknowns before the step."""
         found, self._increment = self._ffi.new("stepping *", numbers), self.numbering.vector()
-        found.problem, found.start = self.c, self.pointer(start)
+        found.problem, found.start = self.c, self.doubles(start)
         vectors = {"x": self.x, "b": self.b, "change": self._increment}
         for name, vector in vectors.items():
-            setattr(found, name, self.pointer(vector.array))
+            setattr(found, name, self.doubles(vector.array))
         return found
 
     def iterate(self, stepping):

@@ -4,8 +4,9 @@ from collections import namedtuple
 
 import numpy as np
 
-from cosserat_fenicsx.algebra.building import module, undisturbed
+from cosserat_fenicsx.algebra.building import undisturbed
 from cosserat_fenicsx.algebra.newton import petsc
+from cosserat_fenicsx.algebra.pointers import Pointers
 from cosserat_fenicsx.interrupts import obey
 from cosserat_fenicsx.statics.path import load_control
 from cosserat_fenicsx.statics.path.track import EASY, FAR, HARD, INTENDED, PathPoint
@@ -20,7 +21,7 @@ _DONE, _LEFT, _LATER, _FULL = range(4)
 Swept = namedtuple("Swept", "load_factors x fields iterations steps")
 
 
-class Sweep:
+class Sweep(Pointers):
     """The continuation in C of one problem.
 
     Args:
@@ -29,14 +30,14 @@ class Sweep:
     """
 
     def __init__(self, track, fields):
-        self._ffi, _ = module()
+        super().__init__()
         self._track, self._fields = track, fields
         problem, model, ffi = track.problem, track.model, self._ffi
         self.c = sweep = ffi.new("sweep *")
         sweep.newton, sweep.stability = track.newton.c, track.stability.c
         setattr(sweep, "with", petsc())
         sweep.snes, sweep.x = (ffi.cast("void *", each.handle) for each in (track.newton.snes, problem.x))
-        sweep.eta = ffi.cast("double *", problem.eta_array.ctypes.data)
+        sweep.eta = self.doubles(problem.eta_array)
         unknowns, numbers = problem.numbering.size, problem.numbering.size + problem.c.carries
         sweep.numbers, sweep.moves, sweep.turn = numbers, model.moves, model.turn
         sweep.slight, sweep.far, sweep.intended = load_control.SLIGHT, FAR, INTENDED
@@ -48,14 +49,13 @@ class Sweep:
         self._recorded = Swept(
             np.zeros(_ROOM), np.zeros((_ROOM, unknowns)), np.zeros((_ROOM, *shape)), *np.zeros((2, _ROOM), np.int32)
         )
-        self._keep = [work]
         for name, array in (
             ("points", self._points), ("work", work), ("recorded_eta", self._recorded.load_factors),
             ("recorded", self._recorded.x), ("recorded_fields", self._recorded.fields),
         ):  # fmt: skip
-            setattr(sweep, name, ffi.cast("double *", array.ctypes.data))
+            setattr(sweep, name, self.doubles(array))
         for name in ("iterations", "steps"):
-            setattr(sweep, f"recorded_{name}", ffi.cast("int *", getattr(self._recorded, name).ctypes.data))
+            setattr(sweep, f"recorded_{name}", self.integers(getattr(self._recorded, name)))
 
     def along(self, targets, control, patience, *, every, counted):
         """Advance to load factors in turn until a step needs another decision than to be accepted or halved.
@@ -84,7 +84,7 @@ class Sweep:
         sweep.smallest, sweep.rejections, sweep.accepted = control.smallest, 0, False
         sweep.allowed = min(patience, load_control.FIRST_REJECTIONS if len(known) == 1 else patience) - 1
         sweep.largest, sweep.loads = control.control.largest or np.inf, track.problem.load_norm
-        sweep.targets, sweep.count, sweep.next = self._ffi.cast("double *", targets.ctypes.data), len(targets), 0
+        sweep.targets, sweep.count, sweep.next = self.doubles(targets), len(targets), 0
         sweep.every, sweep.iterations, sweep.steps, sweep.records = every, counted, track.steps, 0
         track.newton.allow(track.max_iterations)
         track.newton.c.rounding = track.model.round_off
