@@ -9,14 +9,16 @@ from cosserat_fenicsx.results.result import resting
 
 #: Largest number of points of a path that are all sample points.
 FEW = 3
-# Differences of positions due to rounding alone, in units of the scales' length; not zero in an undisplaced state.
+# Differences of positions up to this are rounding alone, in units of the scales' length; not zero in an undisplaced
+# state.
 _ROUNDING = 1e-14
 # Ratios of the largest difference to that at the element ends, above which the superconvergence of the ends is evident.
 _AHEAD, _FAR_AHEAD = 4, 30
 # Safety of the assumed gain in accuracy, and that of differences below which convergence is asymptotic.
 _SAFETY, _SAFETY_BELOW, _ASYMPTOTIC = 4, 2, 1e-3
-# Smallest error of a mesh over its difference from the mesh of elements half as long.
-_CAUTION = 1.5
+# Error of the finer of two meshes over its estimate that is assumed for the estimate of the coarser one; factor from an
+# assumed gain in accuracy to the likely one.
+_CAUTION, _LIKELY = 2, 1.5
 # Exponents of an error as a function of what indicates it, below and above what is known.
 _BELOW, _ABOVE = 0.7, 1.4
 # Factor of an error that is interpolated over leading coefficients, as a power of their ratio to those of the nearest
@@ -63,14 +65,14 @@ def estimate_error(fine, coarse, before=None):
 
 
 def error_before(apart, gain):
-    """(n,) the estimated errors of the coarse mesh of `estimate_error`, from what it returned; infinite where nothing
-    confirms that the meshes converge."""
-    return np.where(gain > 1, _CAUTION * apart, np.inf)
+    """(n,) the estimated errors of the coarse mesh of `estimate_error`, from what it returned: the differences and a
+    multiple of the errors of the fine mesh; infinite where nothing confirms that the meshes converge."""
+    return np.where(gain > 1, (1 + _CAUTION / gain) * apart, np.inf)
 
 
 def order_of(gain, p):
     """The order of the error in h that the gains (n,) of a halving are those of."""
-    return float(np.clip(np.log2(_CAUTION * np.min(gain)), 1, p + 0.5))
+    return float(np.clip(np.log2(_LIKELY * np.min(gain)), 1, p + 0.5))
 
 
 def carry_error(fine, coarse, factor, order, before=None):
@@ -114,24 +116,29 @@ def _differences(fine, coarse):
     """(n,) relative differences, then the two results of `_apart`."""
     sizes = sizes_of(fine)
     difference, at_ends = _apart(fine, coarse, sizes.turning)
-    return np.maximum(difference - _ROUNDING, 0.0) / sizes.largest, difference, at_ends
+    return _above_rounding(difference) / sizes.largest, difference, at_ends
+
+
+def _above_rounding(difference):
+    return np.where(difference > _ROUNDING, difference, 0.0)
 
 
 def hardest(path):
     """Sample points that determine the mesh that a path needs.
 
-    They are the point with the largest error (the largest relative leading coefficients where errors are unknown), the
-    most displaced one, the last, the smoothest (smallest leading coefficients) where it is much smoother, and then one
-    between. All points where these are few or the path has events.
+    They are the point with the largest error (of every rod the one with the largest relative leading coefficients where
+    errors are unknown), the most displaced one, the last, the smoothest (smallest leading coefficients) where it is
+    much smoother, and then one between. All points where these are few or the path has events.
 
     Returns:
         (Path of these points, their indices).
     """
     if len(path) <= FEW or path.events:  # events have to be located on every mesh
         return path, np.arange(len(path))
-    sizes, rough = sizes_of(path).largest, _leading(path)
-    known = np.isfinite(path.error).all()
-    which = {int(np.argmax(path.error if known else rough / sizes)), int(np.argmax(sizes)), len(path) - 1}
+    sizes, of_rods = sizes_of(path).largest, _leading(path)
+    known, rough = np.isfinite(path.error).all(), of_rods.max(axis=0)
+    worst = np.argmax(path.error[None] if known else of_rods / sizes, axis=1)
+    which = {*worst.tolist(), int(np.argmax(sizes)), len(path) - 1}
     seen = np.flatnonzero(sizes >= _SEEN * sizes.max())
     if rough[seen].min() < _SMOOTHER * rough.max():
         which.add(int(seen[np.argmin(rough[seen])]))
@@ -147,16 +154,17 @@ def spread_error(path, few, which, coarse=None):
     """Set `path.error` from the errors of its sample points on the same mesh.
 
     The errors of the other points are interpolated over what indicates them, logarithmically: the differences from the
-    same points on a coarser mesh, or the leading coefficients. In the second case they
-    are increased the more, the farther these are from those of the sample points.
+    same points on a coarser mesh, or the leading coefficients. In the second case they are increased the more, the
+    farther these are from those of the sample points, by themselves or relative to the displacements.
 
     Args:
         few: the sample points, with their errors; which: their indices.
         coarse: the whole path on a coarser mesh, or None.
     """
     sizes, turning = sizes_of(path)
-    told = _leading(path) if coarse is None else np.maximum(_apart(path, coarse, turning)[0] - _ROUNDING, 0.0)
+    told = _leading(path).max(axis=0) if coarse is None else _above_rounding(_apart(path, coarse, turning)[0])
     known, errors = told[which], few.error * sizes[which]
+    relative = np.log(np.maximum(told / sizes, 1e-300))
     usable = (known > 100 * _ROUNDING) & (errors > 0)
     error = np.zeros(len(path)) if coarse is None else told.copy()
     if usable.any():
@@ -165,7 +173,11 @@ def spread_error(path, few, which, coarse=None):
         told = np.log(np.maximum(told, 1e-300))
         beyond = _BELOW * np.minimum(told - known[0], 0) + _ABOVE * np.maximum(told - known[-1], 0)
         if coarse is None:
-            beyond += np.minimum(_WIDENED * np.abs(told[:, None] - known).min(axis=1), np.log(_WIDEST))
+            unlike = np.minimum(
+                np.abs(told[:, None] - known).min(axis=1),
+                np.abs(relative[:, None] - relative[which][usable]).min(axis=1),
+            )
+            beyond += np.minimum(_WIDENED * unlike, np.log(_WIDEST))
         error = np.exp(np.interp(told, known, errors) + beyond)
     error /= sizes
     error[which] = few.error
@@ -211,8 +223,8 @@ def sizes_of(path):
 
 
 def _leading(path):
-    """(points,) the largest leading coefficient of an element's displacement, dimensionless."""
-    return np.max([found.max(axis=1) for found in leading_coefficients(path)], axis=0)
+    """(rods, points) the largest leading coefficient of an element's displacement, dimensionless."""
+    return np.array([found.max(axis=1) for found in leading_coefficients(path)])
 
 
 def leading_coefficients(path):

@@ -19,9 +19,11 @@ _LARGE = 0.1
 # Smallest mean ratio of chord to arc over a quarter of an element, or over an element where the mesh is coarser than
 # usual: that of a circular arc of one radian.
 _STRAIGHT = 0.958
-# The error of rods that bend by about a radian is _TYPICAL n^-(p + 0.9) on n elements of degree p = 1 .. 4; the first
-# mesh has no more elements than _MOST by this.
-_TYPICAL, _MOST = (0.3, 0.1, 0.01, 0.004), 12
+# Wave number of the displacement of a straight rod that bends by about a radian, over its length; most elements of the
+# first mesh per unit of it.
+_BENDING, _MOST = 4.0, 3
+# Places at which the direction of a rod's axis is compared.
+_SAMPLES = 257
 # Error of a mesh that is estimated by its difference from another one over the true error, about; and the part of the
 # gain in accuracy of a halving that is assumed for the error of the finer mesh.
 _ESTIMATED, _GAINED = 1.5, 0.25
@@ -37,9 +39,11 @@ def meshes_for(scene, degree, tol, many):
     usual = first_layout(scene, degree)
     if not 1 <= degree <= 4 or not all(rod.uniform for rod in scene.rods) or not _acts_evenly(scene):
         return usual, None
-    wanted = tol if many else _GAINED * 2 ** (degree + 1) * tol
-    elements = (_ESTIMATED * _TYPICAL[degree - 1] / wanted) ** (1 / (degree + 0.9))
-    layout = first_layout(scene, degree, min(max(math.ceil(elements), 1), _MOST))
+    wanted = (tol if many else _GAINED * 2 ** (degree + 1) * tol) / _ESTIMATED
+    waves = _BENDING + _turning(scene)
+    # the best polynomial for a wave is off by (waves/2n)^(p + 1)/((p + 1)! 2^p) of its amplitude, that by 1/waves
+    elements = waves / 2 * (wanted * waves * math.factorial(degree + 1) * 2**degree) ** (-1 / (degree + 1))
+    layout = first_layout(scene, degree, math.ceil(min(max(elements, 1), _MOST * waves)))
     if elements <= FIRST_ELEMENTS and any(a > b for a, b in zip(layout.counts, usual.counts, strict=True)):
         return usual, None  # which asks less of curves
     coarser = any(a < b for a, b in zip(layout.counts, usual.counts, strict=True))
@@ -58,6 +62,13 @@ def _acts_evenly(scene):
         )
         for action in scene.actions
     )
+
+
+@per_scene
+def _turning(scene):
+    """The largest angle by which the direction of a rod's axis turns in all along it, rad."""
+    tangents = (rod.curve.frame(np.linspace(0, rod.length, _SAMPLES))[:, :, 2] for rod in scene.rods)
+    return float(max(2 * np.arcsin(np.linalg.norm(np.diff(t, axis=0), axis=1) / 2).sum() for t in tangents))
 
 
 @per_scene

@@ -129,7 +129,7 @@ class _Search:
             self._plain = _plain(found, layers)
             if self._usual is not None and not self._plain:
                 return self._begin_again()
-        self._layered = with_layers(self._scene, layout, layers)
+        self._layered = with_layers(self._scene, found.layout, layers)
         if found.rounding > self._tol:  # refinement would increase it
             raise NotConverged(_rounding_hides(self._tol, found.rounding, elements, found.formulation), found)
         if np.isfinite(found.error).all():
@@ -198,8 +198,8 @@ class _Search:
     def _found_on(self, layout):
         """The sample points, or all points, on a mesh, with their errors where these are known.
 
-        All points on the mesh before where the sample points show that they are accurate; None where a mesh that is
-        coarser than usual does not resolve them.
+        All points on the mesh before where the sample points show that it suffices; None where a mesh that is coarser
+        than usual does not resolve them.
         """
         few = None if self._few is None else self._correct(layout, self._few)
         apart = None if few is None else self._judge(few, self._few, self._apart)
@@ -214,16 +214,23 @@ class _Search:
         if len(few) == len(self.whole):
             return self._keep(few, apart)
         coarse, self._few, self._apart = self._few, few, apart
-        if self._error_before is not None and self._level == self._level_of_whole + 1 and self._plain:
+        traced = self._level == self._level_of_whole + 1  # all points are known on the mesh before
+        if self._error_before is not None and (self._plain or not traced):
             coarse.set_error(self._error_before)
+            judged = coarse
             if coarse.error.max() <= self._tol:
-                spread_error(self.whole, coarse, self._which)
-                if self.whole.error.max() <= self._tol:
-                    return self.whole
-            elif few.error.max() <= self._tol and max(layout.counts) < _MOST_ELEMENTS and self._saves(few, coarse):
+                judged = self._all_judged(coarse) if traced else self._all_points(coarse.layout, coarse)
+                if judged.error.max() <= self._tol:
+                    return judged
+            if few.error.max() <= self._tol and max(layout.counts) < _MOST_ELEMENTS and self._saves(few, judged):
                 self._few, self._apart = coarse, None
                 return few
         return self._all_points(layout, few) if few.error.max() <= self._tol else few
+
+    def _all_judged(self, few):
+        """All points of the last mesh with the errors that those of the sample points tell."""
+        spread_error(self.whole, few, self._which)
+        return self.whole
 
     def _factor_for(self, path):
         """The refinement factor, at most 2, that is to make the errors of a path small enough."""
@@ -231,11 +238,13 @@ class _Search:
         return math.ceil(_QUARTERS * wanted) / _QUARTERS
 
     def _saves(self, few, coarse):
-        """Whether a mesh between two is accurate enough, and all points on it are cheaper; sets it as the next one."""
+        """Whether a mesh between those of two paths is accurate enough, and all points on it are cheaper; it is the
+        next one then."""
         factor = self._factor_for(coarse)
-        if (2 - factor) / 2 * few.unknowns * (len(self.whole) - len(few)) <= _CHEAP:
+        others = len(self.whole) - len(few)
+        if few.unknowns * ((2 - factor) / 2 * others - factor / 2 * len(few)) <= _CHEAP:
             return False
-        self._next = self.whole.layout.finer(self._scene, factor), factor
+        self._next = coarse.layout.finer(self._scene, factor), factor
         return True
 
     def _judge(self, fine, coarse, before):
