@@ -254,6 +254,22 @@ def test_negative_pivots_are_negative_eigenvalues(name):
         assert found[0] < found[-1]
 
 
+@pytest.mark.serial
+@pytest.mark.parametrize("length", [0.1, 0.03])
+@pytest.mark.parametrize("elements", [2, 8])
+def test_slender_rods_with_hinges_are_stable(length, elements):
+    """A rod of L/d = 1e5 on a short one: the smallest eigenvalue of the interface is 1e-15 of the largest."""
+    section = cf.Stiffness(shear=(6e10, 6e10), axial=1.6e11, bending=(1.0, 1.0), torsion=0.8)
+    top = (0, 0.6 * length, 1 + 0.8 * length)
+    rod, strut = line((0, 0, 0), (0, 0, 1), section), line((0, 0, 1), top, section)
+    joint = cf.Joint(rod.end, strut.start, (0.3, 0.3, -0.9))
+    scene = cf.Scene(
+        [rod, strut], [cf.Clamp(rod.start), cf.Pin(strut.end)], [cf.Force(rod.at(0.5), (0.1, 0, 0))], [joint]
+    )
+    with bent(scene, elements, amount=0.0) as (_, _, stability):
+        assert stability.count() == 0
+
+
 @pytest.mark.few_ranks
 @pytest.mark.parametrize("name", ["hinge", "rigid tree", "lattice", "ring of three"])
 def test_ranks_share_the_elimination(name):

@@ -1,12 +1,15 @@
 """The unknowns where rods meet, in one small system that every rank solves as a whole."""
 
+import contextlib
+
 import numpy as np
 
 from cosserat_fenicsx.algebra.elimination import Elimination
 from cosserat_fenicsx.algebra.pointers import Pointers
 
-# Pivots and eigenvalues of a matrix with a diagonal of ones that are zero to rounding.
-_ROUNDING = 1e-14
+# Pivots and eigenvalues of a matrix with a diagonal of ones that are zero to rounding. Those of slender rods with
+# hinges may be almost as small.
+_ROUNDING = 1e-15
 # Largest number of unknowns of a system that is solved as a dense one.
 _DENSE = 150
 
@@ -111,7 +114,11 @@ class _Dense(Pointers):
     def signs(self, values):
         matrix = values.reshape(self._size, self._size)
         scale = _scale(np.diag(matrix))
-        values = np.linalg.eigvalsh(scale[:, None] * matrix * scale)
+        matrix = scale[:, None] * matrix * scale
+        with contextlib.suppress(np.linalg.LinAlgError):
+            np.linalg.cholesky(matrix)  # of small eigenvalues it tells the sign more accurately than their values do
+            return 0, 0
+        values = np.linalg.eigvalsh(matrix)
         zero = np.abs(values) <= _ROUNDING
         return int((values[~zero] < 0).sum()), int(zero.sum())
 
