@@ -84,3 +84,24 @@ def test_columns_buckle_on_coarse_meshes_too(held, load, tol=1e-2):
     found, exact = ([event.load_factor for event in p.events] for p in (path, fine))
     assert found == pytest.approx(exact, rel=max(tol, 1e-6))
     assert path.model == "spatial" and max(path.elements) >= 8
+
+
+def twisted_rod():
+    """Between clamps, one of which is free to approach; buckles under a torque of 8.98682 EI/L (tan x/2 = x/2)."""
+    rod = cf.Rod(cf.Line((0, 0, 0), (0, 0, 1)), cf.Stiffness((6e4, 6e4), 1.6e5, (1.0, 1.0), 2.5), name="rod")
+    supports = [cf.Roller(rod.end, (1, 0, 0)), cf.Roller(rod.end, (0, 1, 0))]
+    turned = cf.Prescribed(rod.end, rotation=(0, 0, 8.98682 / 2.5))
+    return cf.Scene([rod], [cf.Clamp(rod.start), *supports, turned])
+
+
+def deep_beam():
+    """Thin, bent about its stiff axis, its end held against rotation: tilts at 0.7805 of its load (64 elements)."""
+    rod = cf.Rod(cf.Line((0, 0, 0), (0, 0, 1), d1=(1, 0, 0)), cf.Stiffness((6e5, 6e5), 1.6e6, (1e3, 1.0), 0.05))
+    supports = [cf.Clamp(rod.start), cf.Roller(rod.end, (1, 0, 0)), cf.Prescribed(rod.end, rotation=(0, 0, 0))]
+    return cf.Scene([rod], supports, [cf.Force(rod.end, (0, 8.0 * 0.7805, 0))])
+
+
+@pytest.mark.parametrize("scene", [twisted_rod(), deep_beam()], ids=["twisted", "deep"])
+def test_rods_buckle_under_moments_on_coarse_meshes_too(scene, tol=1e-3):
+    for load, unstable in ((0.998, False), (1.002, True)):
+        assert (cf.solve(scene, [0.5 * load, load], tol=tol).negative_modes[-1] > 0) == unstable

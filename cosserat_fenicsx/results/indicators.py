@@ -42,6 +42,31 @@ def of_path(path):
     return layer_lengths(path.scene, path.scales, path.layout, path.rule, n)
 
 
+def winding_lengths(path):
+    """Lengths 1/k for the wave numbers k with which rods under moments buckle, as in cos(k s).
+
+    Under a torque T that is k = T/EI (Greenhill 1883), under a moment M about the stiff axis
+    k^2 = (M^2/EI GJ) (1 - EI/EI_max) (1 - GJ/EI_max), with the smaller EI (Michell 1899, Prandtl 1899).
+
+    Returns:
+        For every rod (elements,), over the length of the rod, of the largest moments over all points of a path.
+    """
+    fields, scale = path._stacked("gauss_fields"), path.scales.moment
+    m, d3 = fields[..., 3:6], fields[..., 6:] / np.linalg.norm(fields[..., 6:], axis=-1, keepdims=True)
+    torque = np.einsum("...i,...i", m, d3)
+    bending = np.linalg.norm(m - torque[..., None] * d3, axis=-1)
+    torque, bending = (scale * np.abs(x).max(axis=(0, 2)) for x in (torque, bending))
+    lengths, first = [], 0
+    for rod, breaks in zip(path.scene.rods, path.layout.breaks, strict=True):
+        *flexural, torsional = rod.profile.range[0].J
+        soft, stiff = sorted(flexural)
+        tilting = max(0.0, (1 - soft / stiff) * (1 - torsional / stiff)) / (soft * torsional)
+        here = slice(first, first := first + len(breaks) - 1)
+        k = np.maximum(torque[here] / soft, np.sqrt(tilting) * bending[here])
+        lengths.append(1 / np.maximum(k * rod.length, 1e-300))
+    return lengths
+
+
 def unresolved(scene, layout, lengths):
     """Whether elements at the ends of pieces (see `rodmesh`) are too long for boundary layers there."""
     for breaks, pieces, layers in zip(layout.breaks, layout.pieces(scene), lengths, strict=True):

@@ -19,7 +19,7 @@ from cosserat_fenicsx.results.accuracy import (
     order_of,
     spread_error,
 )
-from cosserat_fenicsx.results.indicators import of_path, resolves
+from cosserat_fenicsx.results.indicators import of_path, resolves, winding_lengths
 from cosserat_fenicsx.results.same_events import find_again, keep_confirmed
 from cosserat_fenicsx.statics.grading import balanced, with_layers
 from cosserat_fenicsx.statics.path.recorder import Promoted
@@ -277,9 +277,10 @@ class _Search:
 
 def _plain(path, layers):
     """Whether a path has nothing that a coarse mesh may miss or invent: it is followed by load control, is stable, and
-    its elements are shorter than its boundary layers, and so than the half-waves of buckling."""
-    followed = path.control == "load" and not path.events
-    return followed and not path.negative_modes.any() and resolves(path.layout, layers)
+    its elements are shorter than its boundary layers, and so than the half-waves of buckling under forces and moments.
+    """
+    followed = path.control == "load" and not path.events and not path.negative_modes.any()
+    return followed and resolves(path.layout, layers) and resolves(path.layout, winding_lengths(path))
 
 
 def _rounding_hides(tol, rounding, elements, formulation):
