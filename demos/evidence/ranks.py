@@ -41,7 +41,9 @@ def measure(elements):
 def under_mpirun(ranks, elements):
     """What `measure` found on so many ranks."""
     program = "/usr/bin/mpirun" if Path("/usr/bin/mpirun").exists() else shutil.which("mpirun")
-    words = [program, "--oversubscribe", "-n", str(ranks), sys.executable, __file__, "--one", str(elements)]
+    # not bound to cores: one of them may be busy with something else, and the other ranks would wait
+    words = [program, "--oversubscribe", "--bind-to", "none", "-n", str(ranks)]
+    words += [sys.executable, __file__, "--one", str(elements)]
     # a copy, without what MPI has put into this process's environment since it was started
     done = subprocess.run(words, env=dict(os.environ), capture_output=True, text=True, timeout=600)
     if done.returncode:
