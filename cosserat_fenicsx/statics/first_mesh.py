@@ -1,4 +1,4 @@
-"""The first mesh of the automatic refinement."""
+"""The first mesh of the automatic refinement, and what every mesh has to resolve."""
 
 import math
 
@@ -7,13 +7,15 @@ import numpy as np
 from cosserat_fenicsx.models.rodmesh import Layout
 from cosserat_fenicsx.models.traits import traits_of
 from cosserat_fenicsx.remember import per_scene
+from cosserat_fenicsx.scene.along import FUNCTIONS_ALONG
 from cosserat_fenicsx.scene.curves import Line
 
 #: Elements per rod of the first mesh, where the mesh is not given.
 FIRST_ELEMENTS = 4
-# Where a section is a function of s: the rod's length over the shortest element of the first mesh, and the relative
-# accuracy with which that mesh must integrate the flexibilities 1/EI.
-_FINEST_FIRST, _FLEXIBILITY_TOLERANCE = 256, 1e-3
+# Where sections or loads are functions of s: the relative accuracy with which the first mesh must integrate the
+# flexibilities 1/EI and the loads, and the rod's length over the longest step of the quadrature that it is compared
+# with, and over the shortest element.
+_INTEGRATED, _SAMPLED, _SHORTEST = 1e-3, 256, 1024
 # Elements are halved where their quadrature error exceeds this share of the largest one.
 _LARGE = 0.1
 # Smallest mean ratio of chord to arc over a quarter of an element, or over an element where the mesh is coarser than
@@ -73,57 +75,86 @@ def _turning(scene):
 
 @per_scene
 def first_layout(scene, degree, elements=FIRST_ELEMENTS):
-    """The first mesh of so many elements per rod or more.
+    """The first mesh of so many elements per rod or more."""
+    return resolving(scene, Layout.of(scene, elements), degree, 4 if elements >= FIRST_ELEMENTS else 1)
 
-    It resolves the curvature of the axis and a section that is a function of s, a local change of which then cannot be
-    missed by the quadrature points. Where a section changes in a part of a rod, elements are short only there.
+
+def resolving(scene, layout, degree, parts=4):
+    """A mesh, finer where it has to be, that resolves what is given along the rods.
+
+    That is the curvature of the axis, by so many equal parts of an element, and sections and loads that are functions
+    of s, a local change of which then cannot be missed by the quadrature points. Where these change in a part of a rod,
+    elements are short only there.
     """
-    layout, parts = Layout.of(scene, elements), 4 if elements >= FIRST_ELEMENTS else 1
+    varying = [_varying(scene, rod) for rod in scene.rods]
     while True:
         too_long = [
-            _too_long(rod, breaks, degree, parts) for rod, breaks in zip(scene.rods, layout.breaks, strict=True)
+            _too_long(rod, functions, breaks, degree, parts)
+            for rod, functions, breaks in zip(scene.rods, varying, layout.breaks, strict=True)
         ]
         if not any(marked.any() for marked in too_long):
             return layout
         layout = layout.resized(scene, [np.where(marked, 2.0, 1.0) for marked in too_long])
 
 
-def _too_long(rod, breaks, degree, parts):
+def _varying(scene, rod):
+    """Functions, of (n,) arc lengths over the rod's length, that vary along a rod, with values (n, m)."""
+    loads = [value for action in scene.actions if getattr(action, "rod", None) is rod
+             for value in vars(action).values() if isinstance(value, FUNCTIONS_ALONG)]  # fmt: skip
+    functions = [lambda s, value=value: value(s * rod.length) for value in loads]
+    low, high = rod.profile.range
+    twisted = not isinstance(rod.curve, Line) and (low.J[0] != high.J[1] or rod.profile.coupled)
+    if rod.profile.uniform and not twisted:
+        return functions
+
+    def flexibilities(s):
+        flexible = rod.stiffness_at(s * rod.length).flexibility
+        if twisted:  # as tensors of inertial components
+            across = rod.curve.frame(s * rod.length)[:, :, :2]
+            flexible = np.einsum("kai,kij,kbj->kab", across, flexible, across)
+        return flexible.reshape(len(s), -1)
+
+    return [*functions, flexibilities]
+
+
+def _too_long(rod, functions, breaks, degree, parts):
     """(elements,) of bool: the elements to be halved.
 
-    All of them until so many equal parts of them are almost straight. Then, where the section changes along the rod or
-    twists about a curved axis, those in which the Gauss points do not integrate the flexibilities 1/EI, compared with a
-    fine quadrature.
+    All of them until so many equal parts of them are almost straight. Then those in which the Gauss points do not
+    integrate the functions, compared with a fine quadrature.
     """
-    none = np.zeros(len(breaks) - 1, dtype=bool)
-    long_enough = np.diff(breaks) > 1.01 / _FINEST_FIRST
+    long_enough = np.diff(breaks) > 1.01 / _SHORTEST
     ends = (breaks[:-1, None] + np.diff(breaks)[:, None] * np.arange(parts) / parts).ravel()
     chords = np.diff(rod.curve.position(np.append(ends, 1.0) * rod.length), axis=0)
     if np.linalg.norm(chords, axis=1).sum() < _STRAIGHT * rod.length:
         return long_enough
-    low, high = rod.profile.range
-    twisted = not isinstance(rod.curve, Line) and (low.J[0] != high.J[1] or rod.profile.coupled)
-    if rod.profile.uniform and not twisted:
-        return none
+    marked = np.zeros(len(breaks) - 1, dtype=bool)
+    for values in functions:
+        marked |= _unresolved(values, breaks, degree)
+    return long_enough & marked
+
+
+def _unresolved(values, breaks, degree):
+    """(elements,) of bool: where most of the error of the integral of (n,) arc lengths -> (n, m) arises, if that is too
+    large."""
     x, weights = np.polynomial.legendre.leggauss(degree)
 
-    def integrals(starts, sizes):
-        s = starts[:, None] + sizes[:, None] * (x + 1) / 2
-        flexible = rod.stiffness_at(s.ravel() * rod.length).flexibility
-        if twisted:  # as tensors of inertial components
-            across = rod.curve.frame(s.ravel() * rod.length)[:, :, :2]
-            flexible = np.einsum("kai,kij,kbj->kab", across, flexible, across)
-        return np.einsum("g,cgi,c->ci", weights / 2, flexible.reshape(*s.shape, -1), sizes)
+    def integrals(counts):
+        """(elements, m) by so many equal parts of each element."""
+        owner = np.repeat(np.arange(len(counts)), counts)
+        sizes = (np.diff(breaks) / counts)[owner]
+        inner = np.arange(len(owner)) - np.concatenate([[0], np.cumsum(counts)])[owner]
+        s = (breaks[owner] + inner * sizes)[:, None] + sizes[:, None] * (x + 1) / 2
+        parts = np.einsum("g,cgi,c->ci", weights / 2, values(s.ravel()).reshape(*s.shape, -1), sizes)
+        found = np.zeros((len(counts), parts.shape[1]))
+        np.add.at(found, owner, parts)
+        return found
 
-    counts = np.maximum(8, np.ceil(_FINEST_FIRST * np.diff(breaks) - 1e-9).astype(int))
-    owner = np.repeat(np.arange(len(counts)), counts)
-    sizes = (np.diff(breaks) / counts)[owner]
-    inner = np.arange(len(owner)) - np.concatenate([[0], np.cumsum(counts)])[owner]
-    parts = integrals(breaks[owner] + inner * sizes, sizes)
-    fine = np.zeros((len(counts), parts.shape[1]))
-    np.add.at(fine, owner, parts)
-    error = np.abs(integrals(breaks[:-1], np.diff(breaks)) - fine)
-    if (error.sum(axis=0) <= _FLEXIBILITY_TOLERANCE * np.abs(fine).sum(axis=0).max()).all():
-        return none
+    whole = np.ones(len(breaks) - 1, dtype=int)
+    fine = integrals(np.maximum(8, np.ceil(_SAMPLED * np.diff(breaks) - 1e-9).astype(int)))
+    # of whole elements and of parts: one of these may agree by chance
+    error = np.max([np.abs(integrals(parts * whole) - fine) for parts in (1, 2, 3)], axis=0)
+    if (error.sum(axis=0) <= _INTEGRATED * np.abs(fine).sum(axis=0).max()).all():
+        return np.zeros(len(whole), dtype=bool)
     error = error.max(axis=1)
-    return long_enough & (error > _LARGE * error.max())
+    return error > _LARGE * error.max()

@@ -21,6 +21,7 @@ from cosserat_fenicsx.results.accuracy import (
 )
 from cosserat_fenicsx.results.indicators import of_path, resolves, winding_lengths
 from cosserat_fenicsx.results.same_events import find_again, keep_confirmed
+from cosserat_fenicsx.statics.first_mesh import resolving
 from cosserat_fenicsx.statics.grading import balanced, with_layers
 from cosserat_fenicsx.statics.path.recorder import Promoted
 
@@ -50,7 +51,7 @@ def refine(trace, correct, scene, layout, tol, degree, usual=None):
         usual: where that one is coarser than usual, the mesh to begin with again unless the path on it is plain: load
             control, no events, no negative modes, elements shorter than boundary layers.
         tol: largest error of positions relative to the largest displacement.
-        degree: of the elements, for error messages.
+        degree: of the elements.
 
     Raises:
         NotConverged: two meshes in a row cannot be solved, or the accuracy is not reached.
@@ -185,7 +186,7 @@ class _Search:
                 even = balanced(*self._halved, above)
                 if even is not None:
                     self._balancings += 1
-                    return self._restarted(even)
+                    return self._restarted(resolving(self._scene, even, self._degree))
             self._factor = self._factor_for(self._few)
         return layout.finer(self._scene, self._factor)
 
