@@ -3,7 +3,6 @@
 import numpy as np
 
 from cosserat_fenicsx.quaternions import conjugate_product, directors
-from cosserat_fenicsx.results.accuracy import sizes_of
 from cosserat_fenicsx.results.places import halfway
 
 # Largest length of an element next to a support, load or kink, over the length of the boundary layer there.
@@ -98,7 +97,7 @@ def element_differences(fine, coarse):
         For every rod (elements of the coarse mesh,): maximum over all points, relative to the largest displacement of
         each point.
     """
-    sizes = sizes_of(fine).largest
+    sizes = fine._sizes.largest
     n = coarse._stacked("gauss_fields")[..., :3]
     forces = np.sqrt(np.square(n).sum(axis=3).max(axis=2))
     found, first, p, scales = [], 0, fine.degree, fine.scales

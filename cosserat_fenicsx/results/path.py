@@ -8,6 +8,7 @@ from typing import Self
 
 import numpy as np
 
+from cosserat_fenicsx.results.accuracy import leading_of, sizes_of
 from cosserat_fenicsx.results.records import Event, Record, Records
 from cosserat_fenicsx.results.recovery import element_contact
 from cosserat_fenicsx.results.result import Result
@@ -37,7 +38,7 @@ class Path(Result):
     axis = "load factor"
     #: whether the formulation's virtual rotations are those of changes of q instead of independent small rotations
     galerkin = False
-    _computed = (*Result._computed, "_records", "_contact", "conservative")
+    _computed = (*Result._computed, "_records", "_contact", "conservative", "_sizes", "_leading")
     # function of a path that computes its `conservative`
     _potential = None
 
@@ -78,6 +79,14 @@ class Path(Result):
     @cached_property
     def _records(self):
         return [] if self._all is None else self._all.listed()
+
+    @cached_property
+    def _sizes(self):
+        return sizes_of(self)
+
+    @cached_property
+    def _leading(self):
+        return leading_of(self)
 
     def _taken(self, which):
         return None if self._all is None else self._all.at(which)
