@@ -114,7 +114,7 @@ def compare(fine, coarse):
 
 def _differences(fine, coarse):
     """(n,) relative differences, then the two results of `_apart`."""
-    sizes = fine._sizes
+    sizes = fine._reference
     difference, at_ends = _apart(fine, coarse, sizes.turning)
     return _above_rounding(difference) / sizes.largest, difference, at_ends
 
@@ -135,7 +135,7 @@ def hardest(path):
     """
     if len(path) <= FEW or path.events:  # events have to be located on every mesh
         return path, np.arange(len(path))
-    sizes, of_rods = path._sizes.largest, path._leading
+    sizes, of_rods = path._reference.largest, path._roughness
     known, rough = np.isfinite(path.error).all(), of_rods.max(axis=0)
     worst = np.argmax(path.error[None] if known else of_rods / sizes, axis=1)
     which = {*worst.tolist(), int(np.argmax(sizes)), len(path) - 1}
@@ -161,8 +161,8 @@ def spread_error(path, few, which, coarse=None):
         few: the sample points, with their errors; which: their indices.
         coarse: the whole path on a coarser mesh, or None.
     """
-    sizes, turning = path._sizes
-    told = path._leading.max(axis=0) if coarse is None else _above_rounding(_apart(path, coarse, turning)[0])
+    sizes, turning = path._reference
+    told = path._roughness.max(axis=0) if coarse is None else _above_rounding(_apart(path, coarse, turning)[0])
     known, errors = told[which], few.error * sizes[which]
     relative = np.log(np.maximum(told / sizes, 1e-300))
     usable = (known > 100 * _ROUNDING) & (errors > 0)

@@ -97,7 +97,7 @@ def element_differences(fine, coarse):
         For every rod (elements of the coarse mesh,): maximum over all points, relative to the largest displacement of
         each point.
     """
-    sizes = fine._sizes.largest
+    sizes = fine._reference.largest
     n = coarse._stacked("gauss_fields")[..., :3]
     forces = np.sqrt(np.square(n).sum(axis=3).max(axis=2))
     found, first, p, scales = [], 0, fine.degree, fine.scales

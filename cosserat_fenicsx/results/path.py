@@ -38,7 +38,7 @@ class Path(Result):
     axis = "load factor"
     #: whether the formulation's virtual rotations are those of changes of q instead of independent small rotations
     galerkin = False
-    _computed = (*Result._computed, "_records", "_contact", "conservative", "_sizes", "_leading")
+    _computed = (*Result._computed, "_records", "_contact", "conservative", "_reference", "_roughness")
     # function of a path that computes its `conservative`
     _potential = None
 
@@ -81,11 +81,11 @@ class Path(Result):
         return [] if self._all is None else self._all.listed()
 
     @cached_property
-    def _sizes(self):
+    def _reference(self):
         return sizes_of(self)
 
     @cached_property
-    def _leading(self):
+    def _roughness(self):
         return leading_of(self)
 
     def _taken(self, which):
