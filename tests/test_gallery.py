@@ -52,15 +52,15 @@ def strong_form(path, line_force=(0, 0, 0)):
     return lambda s: start + rod.length * done.sol(np.asarray(s) / rod.length)[:3].T
 
 
-@pytest.mark.parametrize(
-    ("name", "line_force", "accuracy"),
-    [("helical_spring", 0.0, 1e-9), ("riser", -700.0, 3e-8), ("soft_arm", None, 1e-9)],
-)
-def test_the_strong_form_reaches_the_same_end(gallery, name, line_force, accuracy):
+@pytest.mark.parametrize(("name", "line_force"), [("helical_spring", 0.0), ("riser", -700.0), ("soft_arm", None)])
+def test_the_strong_form_reaches_the_same_end(gallery, name, line_force):
+    """Within the path's own error bar; collocation is accurate to 1e-9 of the length."""
     path, _ = gallery[name]
     (rod,) = path.scene.rods
     weight = -9.81 * rod.stiffness.mass if line_force is None else line_force
     places = (rod.length, 110.0 if name == "riser" else rod.length / 2)
     reached = strong_form(path, (0, 0, weight))(places)
     expected = [path.position(rod.at(s))[-1] for s in places]
-    np.testing.assert_allclose(reached, expected, rtol=0, atol=accuracy * rod.length)
+    allowed = path.error[-1] * path.largest_displacement()[-1] + 1e-9 * rod.length
+    assert np.linalg.norm(reached - expected, axis=1).max() <= allowed
+    assert path.error.max() <= 1e-5
