@@ -73,6 +73,7 @@ _HOME = {
     "units": None,
     "Wall": "actions.wall",
     "Weight": "scene.loads",
+    "WellPath": "well.path",
     "euler_load": "scene.rod",
     "read_motion": "scene.scenefile",
     "read_path": "statics.reading",
@@ -164,6 +165,7 @@ if TYPE_CHECKING:  # the same names, for editors and type checkers
     from cosserat_fenicsx.statics.path.load_control import StepControl as StepControl
     from cosserat_fenicsx.statics.reading import read_path as read_path
     from cosserat_fenicsx.statics.solve import solve as solve
+    from cosserat_fenicsx.well.path import WellPath as WellPath
 
 __all__ = sorted(_HOME)
 

@@ -69,7 +69,8 @@ ROOMS = {
     "pictures": {"scene", "results"},
     "statics": {"scene", "models", "algebra", "results"},
     "dynamics": {"scene", "models", "algebra", "results", "storage", "statics"},
-    "cli": {"scene", "models", "statics", "dynamics", "results", "storage", "pictures"},
+    "well": {"scene", "results", "pictures"},
+    "cli": {"well", "scene", "models", "statics", "dynamics", "results", "storage", "pictures"},
 }
 #: Files that combine scenes, models, solvers and results; all other solver files import none of scene, models and
 #: results.
