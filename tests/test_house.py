@@ -61,7 +61,7 @@ SHARED = {
 }
 ROOMS = {
     "scene": {"pictures"},
-    "actions": {"scene"},
+    "actions": {"scene", "forms"},
     "algebra": set(),
     "models": {"scene", "forms"},
     "results": {"scene", "pictures"},
@@ -69,7 +69,7 @@ ROOMS = {
     "pictures": {"scene", "results"},
     "statics": {"scene", "models", "algebra", "results"},
     "dynamics": {"scene", "models", "algebra", "results", "storage", "statics"},
-    "well": {"scene", "results", "pictures"},
+    "well": {"actions", "scene", "models", "statics", "results", "pictures"},
     "cli": {"well", "scene", "models", "statics", "dynamics", "results", "storage", "pictures"},
 }
 #: Files that combine scenes, models, solvers and results; all other solver files import none of scene, models and

@@ -18,6 +18,7 @@ Datum = namedtuple("Datum", "value unit size")
 _UNITS = {
     "1": (0, 0, 0, False),
     "m": (0, 1, 0, False),
+    "1/m": (0, -1, 0, False),
     "m from origin": (0, 1, 0, False),
     "m/s": (0, 1, -1, False),
     "rad/s": (0, 0, -1, True),

@@ -21,6 +21,9 @@ from cosserat_fenicsx.well.survey import checked_survey, read_columns
 #: vector (1/m, 3), and length (m).
 Sections = namedtuple("Sections", "start position tangent curvature length")
 
+#: Measured depth (n,), position (n, 3), tangent (n, 3) and curvature vector (n, 3, 1/m) of points of the axis.
+Nearest = namedtuple("Nearest", "md position tangent curvature")
+
 # Pairs of a point and an arc that are compared at a time, in a search along the whole axis.
 _PAIRS = 1 << 20
 
@@ -156,6 +159,33 @@ class WellPath:
         else:
             found = self._walked(rows, np.broadcast_to(np.asarray(near, dtype=float), points.shape[:-1]).ravel())
         return found.reshape(points.shape[:-1])
+
+    def nearest(self, points: Numbers | None, near: Numbers) -> "Nearest":
+        """The points of the axis that are closest to points, with what a projection on the axis needs there.
+
+        Args:
+            points: (n, 3) m; None for the points of the axis at `near`.
+            near: (n,) measured depths (m) to start from, see `closest`; of any value.
+
+        Returns:
+            `Nearest`. Beyond its ends the axis goes on straight: a point there has the measured depth and the position
+            of the end, and no curvature.
+        """
+        s, at = self.sections, np.clip(near, 0.0, self.length)
+        if points is None:
+            beyond, md = near - at, at
+        else:
+            md, beyond = self._walked(points, at), None
+        i, x = self._place(md)
+        cos, along, aside = _arc(s, i, x)
+        k, t0 = s.curvature[i], s.tangent[i]
+        position = s.position[i] + along[:, None] * t0 + aside[:, None] * k
+        tangent = cos[:, None] * t0 + along[:, None] * k
+        curvature = cos[:, None] * k - (along * (k * k).sum(axis=-1))[:, None] * t0
+        if beyond is not None:
+            position += beyond[:, None] * tangent
+        curvature[(md <= 0.0) | (md >= self.length)] = 0.0
+        return Nearest(md, position, tangent, curvature)
 
     def _on_the_whole(self, points):
         every = np.arange(len(self.sections.length))

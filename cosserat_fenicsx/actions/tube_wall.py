@@ -1,0 +1,207 @@
+"""The wall of a curved tube around rods, such as that of a borehole, with friction in a known direction of slip."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from cosserat_fenicsx.annotations import Numbers
+from cosserat_fenicsx.checks import number, positive, refuse, store, vector
+from cosserat_fenicsx.forms.contact import wall_work
+from cosserat_fenicsx.scene import action
+from cosserat_fenicsx.scene.action import LineAction, PointAction
+from cosserat_fenicsx.scene.rod import Rod, RodOrName, Station, StationOrName, is_known
+
+
+@dataclass
+class Stage:
+    """What a start in stages changes of a wall: its stiffness, and that of a spring to the axis, both over the wall's
+    own stiffness."""
+
+    wall: float = 1.0
+    spring: float = 0.0
+
+
+class _Confined:
+    """What walls along rods and at stations share."""
+
+    scaled, work = False, staticmethod(wall_work)
+
+    def _check(self, unit):
+        if not callable(getattr(self.path, "nearest", None)):
+            refuse(self, "path", self.path, "the axis of the tube, such as a WellPath")
+        store(self, stiffness=positive(self, "stiffness", self.stiffness, unit))
+        store(self, slip=vector(self, "slip", self.slip, "1", 2))
+        if self.slip != (0.0, 0.0) and abs(np.hypot(*self.slip) - 1) > 1e-9:
+            refuse(self, "slip", self.slip, "a unit vector (along, across), or (0, 0)")
+        store(self, begins=number(self, "begins", self.begins, "a number (m)", np.isfinite))
+
+    def data(self, rod, s):
+        """See `Action`: as where the rod lies on the axis."""
+        return self.refreshed(rod, s, self.path.nearest(None, s + self.begins).position)
+
+    def refreshed(self, rod, s, r):
+        """See `Action`."""
+        near = self.path.nearest(r, s + self.begins)
+        clearance, arm, friction = self._sizes(s, near.md)
+        stage, kp = self.stage, np.full(len(s), self.stiffness)
+        along, across = self.slip
+        return (
+            action.vector(near.position, "m from origin"),
+            action.vector(near.tangent, "1"),
+            action.vector(near.curvature, "1/m"),
+            action.scalar(clearance, "m"),
+            action.scalar(stage.wall * kp, self.unit),
+            action.scalar(stage.spring * kp, self.unit),
+            action.scalar(along * friction, "1"),
+            action.scalar(across * friction, "1"),
+            action.scalar(arm, "m"),
+        )
+
+
+@dataclass(frozen=True)
+class TubeWall(_Confined, LineAction):
+    """The wall of a tube with a curved axis around a rod: a pressure stiffness <a - clearance>, force per reference
+    length, towards the axis, a the distance from it, and Coulomb friction of the pressure where the rod slips in a
+    known direction.
+
+    It is integrated with the nodes as quadrature points and is not multiplied by the load factor. The nearest point of
+    the axis is found again in every Newton iteration. Beyond its ends the tube goes on straight.
+
+    Args:
+        rod: the rod.
+        path: the axis of the tube, a `WellPath`, m, inertial.
+        radius: of the tube, m; or pieces [(md_end, radius)] along the axis.
+        contact_radius: of the rod's surface, m; or pieces [(s_end, radius)] along the rod. Where it jumps the larger
+            one counts.
+        stiffness: of the wall, N/m^2: the penetration is the force per length over it.
+        friction: friction coefficient; or pieces [(md_end, coefficient)] along the axis.
+        slip: (c_a, c_r), the unit direction in which the rod's surface slips: c_a towards the start of the axis, c_r
+            round the axis, by a right-handed rotation about its tangent; (0, 0) for none.
+        begins: measured depth near which the rod's start lies, m.
+        has_arm: whether friction has a moment about the centreline; False where it acts on the centreline itself.
+
+    Raises:
+        SceneError: numbers outside their range, a rod as wide as the tube, or a direction of slip without unit length.
+    """
+
+    rod: RodOrName
+    path: object
+    radius: float | Numbers
+    contact_radius: float | Numbers
+    stiffness: float = 1e9
+    friction: float | Numbers = 0.0
+    slip: Numbers = (0.0, 0.0)
+    begins: float = 0.0
+    has_arm: bool = True
+    stage: Stage = field(default_factory=Stage, init=False, repr=False, compare=False)
+
+    at_nodes, unit = True, "N/m^2"
+
+    def __post_init__(self):
+        self._check("N/m^2")
+        store(self, radius=pieces(self, "radius", self.radius, "m", least=0.0))
+        store(self, contact_radius=pieces(self, "contact_radius", self.contact_radius, "m", least=0.0))
+        store(self, friction=pieces(self, "friction", self.friction, "1"))
+        narrow, wide = min(r for _, r in self.radius), max(r for _, r in self.contact_radius)
+        if not wide < narrow:
+            refuse(self, "contact_radius", wide, f"less than the radius of the tube, {narrow:g} m")
+        is_known(self, "rod", Rod)
+
+    def _sizes(self, s, md):
+        arm = larger_at(self.contact_radius, s)
+        friction = value_at(self.friction, md)
+        return value_at(self.radius, md) - arm, arm if self.has_arm else np.zeros_like(arm), friction
+
+    def breaks(self, rod):
+        """See `Action`: element ends where the rod's radius jumps."""
+        return tuple(end for end, _ in self.contact_radius[:-1] if end < rod.length)
+
+    def holds(self, scene):
+        """See `Action`: it confines the rod across the axis."""
+        held = []
+        for station in (self.rod.start, self.rod.end):
+            near = self.path.nearest(None, np.array([station.s + self.begins]))
+            across = np.linalg.svd(near.tangent)[2][1:]
+            held += [(station, np.r_[row, 0, 0, 0]) for row in across]
+        return held
+
+
+@dataclass(frozen=True)
+class TubeRing(_Confined, PointAction):
+    """The wall of a tube at one station of a rod, such as a stabiliser or a bit; see `TubeWall`.
+
+    Args:
+        station: where.
+        path: the axis of the tube, a `WellPath`.
+        clearance: radius of the tube minus that of the ring, m; zero holds the station on the axis elastically.
+        contact_radius: radius of the ring, m, the arm of its friction.
+        stiffness: N/m.
+        friction: friction coefficient.
+        slip, begins: see `TubeWall`.
+
+    Raises:
+        SceneError: numbers outside their range.
+    """
+
+    station: StationOrName
+    path: object
+    clearance: float
+    contact_radius: float
+    stiffness: float = 1e9
+    friction: float = 0.0
+    slip: Numbers = (0.0, 0.0)
+    begins: float = 0.0
+    stage: Stage = field(default_factory=Stage, init=False, repr=False, compare=False)
+
+    unit = "N/m"
+
+    def __post_init__(self):
+        self._check("N/m")
+        store(self, contact_radius=positive(self, "contact_radius", self.contact_radius, "m"))
+        for name, unit in (("clearance", "m"), ("friction", "1")):
+            value = number(
+                self, name, getattr(self, name), f"a number of zero or more ({unit})", lambda x: 0 <= x < np.inf
+            )
+            store(self, **{name: value})
+        is_known(self, "station", Station)
+
+    def _sizes(self, s, md):
+        return tuple(np.full(len(s), x) for x in (self.clearance, self.contact_radius, self.friction))
+
+
+def pieces(owner, name, value, unit, least=None):
+    """((end, value), ..) with ascending ends, the last infinite, of a number or of pairs.
+
+    Args:
+        least: values must exceed it; None where they may be zero, not less.
+    """
+
+    def checked(x):
+        expected = f"a number {'of zero or more' if least is None else f'above {least:g}'} ({unit})"
+        return number(owner, name, x, expected, lambda x: (x >= 0 if least is None else x > least) and np.isfinite(x))
+
+    if not isinstance(value, list | tuple):
+        return ((np.inf, checked(value)),)
+    found, last = [], 0.0
+    for piece in value:
+        if not isinstance(piece, list | tuple) or len(piece) != 2:
+            refuse(owner, name, value, "a number, or pairs (end, value)")
+        end = number(owner, name, piece[0], "ends (m) that ascend from above zero", lambda x, last=last: x > last)
+        found.append((end, checked(piece[1])))
+        last = end
+    if not found:
+        refuse(owner, name, value, "a number, or pairs (end, value)")
+    return (*found[:-1], (np.inf, found[-1][1]))
+
+
+def value_at(given, x):
+    """(n,) values of `pieces` at x (n,); at an end that of the piece before it."""
+    ends, values = np.array(given).T
+    return values[np.searchsorted(ends, x)]
+
+
+def larger_at(given, x):
+    """(n,) values of `pieces` at x (n,); at an end the larger of the two pieces that meet there."""
+    ends, values = np.array(given).T
+    slack = 1e-9 * max(1.0, float(np.max(x, initial=0.0)))
+    return np.maximum(values[np.searchsorted(ends, x - slack)], values[np.searchsorted(ends, x + slack)])
