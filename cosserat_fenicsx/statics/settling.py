@@ -15,6 +15,8 @@ from cosserat_fenicsx.interrupts import obey
 LAST = ((1.0, 0.0),)
 # The wall that takes over from the spring is so much stiffer; smallest spring over the wall's stiffness.
 _TAKES_OVER, _SOFTEST = 10.0, 1e-12
+# Powers of ten by which the spring fades before it is left out; factor of a small step.
+_FADED, _SMALL_STEP = 2, 2.0
 # Longest displacement of a node in a Newton step, over the clearance, or over the longest rod, the unit of length; and
 # largest rotation, rad.
 _LONGEST, _OF_LENGTH, _WIDEST = 10.0, 1e-4, 0.5
@@ -23,26 +25,26 @@ _LONGEST, _OF_LENGTH, _WIDEST = 10.0, 1e-4, 0.5
 _ROUGH, _CAREFUL, _ENOUGH, _ROUNDING = 1e-2, 1e-4, 1e-8, 1e-13
 # Newton steps of a stage.
 _MOST = 60
-# Newton's method alternates between two contacts where steps do not shrink by this factor, so many times: then a share of
-# a step is taken, which ends between the two.
+# Newton's method alternates between two contacts where steps do not shrink by this factor, so many times: then a share
+# of a step is taken, which ends between the two.
 _SLOW, _STALLED, _SHARES = 0.6, 2, (0.5, 0.35, 0.7)
 # Residual force of a node at equilibrium, over the norm of the loads.
 _BALANCED = 1e-6
 
 
-def stages_from(spring):
-    """The stages of a start on the axis: (stiffness of the wall, of a spring to its axis), over the wall's own, in turn.
+def stages_from(spring, gentle=False):
+    """The stages of a start on the axis: (stiffness of the wall, of a spring to its axis), over the wall's own.
 
     Args:
         spring: the first spring, with which the loads move the rod by about the clearance.
+        gentle: whether to go on by small steps, for a rod that is compressed beyond its buckling load.
     """
     spring = min(max(spring, _SOFTEST), 0.1 / _TAKES_OVER)
-    wall = _TAKES_OVER * spring
-    tens = max(0, math.ceil(math.log10(0.1 / wall) - 1e-9))
-    stiffer = [0.1 * (wall / 0.1) ** (1 - k / tens) for k in range(1, tens + 1)]
-    return (
-        (0.0, spring), (wall, 0.1 * spring), (wall, 0.01 * spring), (wall, 0.0), *((k, 0.0) for k in stiffer), *LAST,
-    )  # fmt: skip
+    wall, step = _TAKES_OVER * spring, _SMALL_STEP if gentle else 10.0
+    softer = [(wall, spring / step**k) for k in range(1, 1 + math.ceil(_FADED / math.log10(step)))]
+    count = max(0, math.ceil(math.log(0.1 / wall, step) - 1e-9))
+    stiffer = [(0.1 * (wall / 0.1) ** (1 - k / count), 0.0) for k in range(1, count + 1)]
+    return ((0.0, spring), *softer, (wall, 0.0), *stiffer, *LAST)
 
 
 def settle(problem, walls, clearance, rounding, stages, careful=(), on_stage=None):

@@ -7,7 +7,7 @@ import numpy as np
 from cosserat_fenicsx.quaternions import directors
 from cosserat_fenicsx.results.recovery import at_nodes
 from cosserat_fenicsx.well.contacts import contacts_along
-from cosserat_fenicsx.well.string_scene import is_round
+from cosserat_fenicsx.well.string_scene import bending_of, is_round
 
 # Change from one mesh to the next, whose signs alternate, that is counted as the error of the finer one.
 _OF_CHANGE = 3.0
@@ -36,7 +36,7 @@ class InHole:
         stretch: m, twist: rad, of the string by tension and torque, from the true stiffness (NaN where a section has
             none); an `extensible` string has them in its state.
         errors: {"hook_load": N, "surface_torque": N m, "wall_force": N}, estimated; error: the largest relative one of
-            the first two.
+            the first two, that of the torque only where the string turns.
         balance: N, between the reaction and the sum of all other forces.
         steps: Newton steps, on this mesh and on those before.
     """
@@ -197,7 +197,7 @@ class InHole:
     def contacts(self):
         """[`Contact`]."""
         string = self._string
-        EI = max(max(section.bending) for section in string.sections if section.matrix is None)
+        EI = max(bending_of(section) for section in string.sections)
         layer = (4 * EI / string.wall.stiffness) ** 0.25
         rings = [
             (ring.station.s, np.linalg.norm(force)) for ring, force in zip(string.rings, self.ring_forces, strict=True)
@@ -265,20 +265,27 @@ class InHole:
             coarse: the `InHole` on the mesh before, or None. softer: that of a wall softer by ten on the same mesh, or
                 None where that of the mesh before counts.
         """
-        names = ("hook_load", "surface_torque", "wall_force")
+        turns = self._string.turns
+        weight = np.diff(self._string.ends, prepend=0.0) @ self._string.weight
+        arm = max(radius for _, radius in self._string.wall.contact_radius)
+        scales = {
+            "hook_load": max(abs(self.hook_load), _LEAST_LOAD * weight),
+            "surface_torque": max(abs(self.surface_torque), _LEAST_TORQUE * arm * self.wall_force),
+            "wall_force": max(self.wall_force, _LEAST_LOAD * weight),
+        }
         if softer is not None:
-            self._by_stiffness = {name: abs(getattr(self, name) - getattr(softer, name)) for name in names}
+            self._by_stiffness = {name: abs(getattr(self, name) - getattr(softer, name)) for name in scales}
         elif coarse is not None:
             self._by_stiffness = coarse._by_stiffness
-        arm = max(radius for _, radius in self._string.wall.contact_radius)
-        rounding = {"hook_load": self.balance, "surface_torque": self.balance * arm, "wall_force": self.balance}
-        for name in names:
-            change = np.inf if coarse is None else _OF_CHANGE * abs(getattr(self, name) - getattr(coarse, name))
-            self.errors[name] = change + self._by_stiffness.get(name, np.inf) + rounding[name]
-        weight = np.diff(self._string.ends, prepend=0.0) @ self._string.weight
-        load = max(abs(self.hook_load), _LEAST_LOAD * weight)
-        torque = max(abs(self.surface_torque), _LEAST_TORQUE * arm * self.wall_force)
-        self.error = max(self.errors["hook_load"] / load, self.errors["surface_torque"] / torque)
+        change = np.inf
+        if coarse is not None:  # a single quantity may change little by chance
+            changes = {name: abs(getattr(self, name) - getattr(coarse, name)) / scales[name] for name in scales}
+            change = _OF_CHANGE * max(changes[name] for name in scales if turns or name != "surface_torque")
+        for name, scale in scales.items():
+            rounding = self.balance * (arm if name == "surface_torque" else 1.0)
+            self.errors[name] = change * scale + self._by_stiffness.get(name, np.inf) + rounding
+        of_load, of_torque = (self.errors[name] / scales[name] for name in ("hook_load", "surface_torque"))
+        self.error = max(of_load, of_torque) if turns else of_load
         if coarse is not None:
             self.steps = int(self.path.iterations[0]) + coarse.steps
 

@@ -1,5 +1,7 @@
 """The exact rod in its hole: a string of several sections, at rest against the hole's wall or slipping along it."""
 
+import contextlib
+
 import numpy as np
 from mpi4py import MPI
 
@@ -23,6 +25,8 @@ _DEGREE = 3
 _FIRST, _MOST, _FINER, _BEFORE = 256, 8192, 2, 4
 # A finer mesh has shorter elements where the pressure changes: bounds of their number, over that of equal ones.
 _FEWEST, _DENSEST = 0.3, 2.4
+# Starts in turn: how much stiffer the first spring is, and whether stages follow by small steps.
+_STARTS = ((1.0, False), (1.0, True), (10.0, True))
 # Rounding of the residual of a node, over that of its position times the stiffness of its piece of wall.
 _ROUNDED = 20.0
 # Largest difference between the reaction and the balance of all forces, over the sum of the wall's forces.
@@ -125,13 +129,18 @@ def _finer(string, count, degree, before, bar, comm):
     """The `InHole` on a mesh of so many elements, from that on the mesh before, or from the start in stages."""
     if before is not None:
         layout = before.path.layout.resized(string.scene, [_wanted(before, count)])
+        with contextlib.suppress(NotConverged):  # the contact on the coarse mesh may be too far off
+            return _on_mesh(string, layout, degree, LAST, before, bar, comm)
+    for stiffer, gentle in _STARTS:
         try:
-            return _on_mesh(string, layout, degree, before, bar, comm)
-        except NotConverged:  # the contact of the coarse mesh is too far off
-            pass
-    answer = _on_mesh(string, Layout.of(string.scene, count), degree, None, bar, comm)
-    answer.compare(before)
-    return answer
+            stages = stages_from(stiffer * string.spring, gentle)
+            return _on_mesh(string, Layout.of(string.scene, count), degree, stages, before, bar, comm)
+        except NotConverged as failed:
+            reason = failed
+    raise NotConverged(
+        f"solve_in_hole: no equilibrium was found on {count} elements: {reason}. A string that is compressed beyond "
+        "its buckling load may have many: expected more elements, a softer wall, or less compression"
+    )
 
 
 def _wanted(answer, count):
@@ -144,13 +153,13 @@ def _wanted(answer, count):
     return wanted * count / wanted.sum()
 
 
-def _on_mesh(string, layout, degree, before, bar, comm):
-    """The `InHole` on one mesh."""
-    scene, stages = string.scene, LAST if before else stages_from(string.spring)
+def _on_mesh(string, layout, degree, stages, before, bar, comm):
+    """The `InHole` on one mesh, with errors by that on the mesh before, its start where `stages` is `LAST`."""
+    scene = string.scene
     with solvers_of(scene, layout, degree=degree, comm=comm) as (problem, _, _):
         model, scales = problem.model, problem.model.scales
         problem.set_load_factor(1.0)
-        _begin(problem, string, layout, before)
+        _begin(problem, string, layout, before if stages is LAST else None)
         bar.start(f"rod in its hole, {model.unknowns} unknowns")
         softer = []
 

@@ -24,6 +24,8 @@ _OF_RINGS = 100.0
 # Points at which the load across the hole is sampled, the part of them that it is not larger at, and its smallest value
 # over the weight.
 _SAMPLES, _TYPICAL, _LEAST = 257, 0.9, 0.1
+# The first spring over the one in which the string would buckle.
+_SAFE = 3.0
 
 
 @dataclass(frozen=True)
@@ -34,7 +36,7 @@ class StringScene:
         path: the `WellPath`; scene: with one `rod`, its `support`, the `wall` and the `rings`.
         sections: the true `Stiffness` of each section; ends: (n,) their lower ends, m.
         weight: (n,) N/m; bottom: force at the lower end (3,), N.
-        clearance: the smallest one of the wall, m.
+        clearance: the smallest one of the wall, m. turns: whether torque is applied, or friction exerts one.
         words: what was simplified, as text.
     """
 
@@ -49,20 +51,23 @@ class StringScene:
     weight: np.ndarray
     bottom: np.ndarray
     clearance: float
+    turns: bool
     words: str
 
     @cached_property
     def spring(self):
-        """Stiffness of a spring to the axis with which the loads move the string by about twice the clearance, over
-        that of the wall."""
+        """Stiffness of a spring to the axis with which the loads move the string by about twice the clearance, and in
+        which its compression does not buckle it; over that of the wall."""
         s = np.linspace(0.0, self.ends[-1], _SAMPLES)
-        near, at = self.path.nearest(None, s), np.searchsorted(self.ends[:-1], s)
-        fall = np.diff(near.position[:, 2]) * self.weight[at[1:]]
-        tension = np.linalg.norm(self.bottom) + np.abs(np.cumsum(fall[::-1])[::-1])
+        near, at = self.path.nearest(None, s), np.searchsorted(self.ends[:-1], s)[1:]
+        fall = np.diff(near.position[:, 2]) * self.weight[at]
+        tension = self.bottom @ near.tangent[-1] + np.cumsum(fall[::-1])[::-1]
         down = np.array([0.0, 0.0, 1.0]) - near.tangent[:, 2:] * near.tangent
-        load = tension[:, None] * near.curvature[1:] + self.weight[at[1:], None] * down[1:]
+        load = tension[:, None] * near.curvature[1:] + self.weight[at, None] * down[1:]
         typical = max(np.quantile(np.linalg.norm(load, axis=1), _TYPICAL), _LEAST * self.weight.max())
-        return float(typical / (2 * self.clearance * self.wall.stiffness))
+        EI = np.array([bending_of(section) for section in self.sections])[at]
+        buckles = (np.minimum(tension, 0.0) ** 2 / (4 * EI)).max()
+        return float(max(typical / (2 * self.clearance), _SAFE * buckles) / self.wall.stiffness)
 
     @property
     def stages(self):
@@ -112,7 +117,7 @@ def string_in(path, lengths, stiffness, weight, contact_radius, radius, friction
     clearance = min(r for _, r in wall.radius) - float(arms.max())
     words = "the string's lengths are those under load" if not extensible else "the string stretches"
     return StringScene(path, Scene([rod], [support], [*loads, wall, *around]), rod, support, wall, around, sections,
-                       ends, weight, pull * t, clearance, words)  # fmt: skip
+                       ends, weight, pull * t, clearance, bool(torque or wall.slip[1]), words)  # fmt: skip
 
 
 def _numbers(name, value, count, expected, accept):
@@ -136,6 +141,11 @@ def _in_place(section, extensible):
 def is_round(section):
     """Whether a section's bending does not depend on its twist."""
     return section.matrix is None and math.isclose(*section.bending, rel_tol=1e-12)
+
+
+def bending_of(section):
+    """The smaller bending stiffness of a section, N m^2."""
+    return float(min(section.bending) if section.matrix is None else np.diag(section.matrix)[3:5].min())
 
 
 def _friction_at(wall, s):
