@@ -73,6 +73,26 @@ _HOME = {
     "units": None,
     "Wall": "actions.wall",
     "Weight": "scene.loads",
+    "BackReam": "well.operations",
+    "Bit": "well.components",
+    "Borehole": "well.hole",
+    "Collar": "well.components",
+    "Component": "well.components",
+    "DrillPipe": "well.components",
+    "DrillString": "well.string",
+    "HeavyWeight": "well.components",
+    "HoleSection": "well.hole",
+    "Mud": "well.mud",
+    "Ream": "well.operations",
+    "RotaryDrilling": "well.operations",
+    "RotateOffBottom": "well.operations",
+    "Sliding": "well.operations",
+    "Stabiliser": "well.components",
+    "Static": "well.operations",
+    "TorqueAndDrag": "well.answer",
+    "TripIn": "well.operations",
+    "TripOut": "well.operations",
+    "torque_and_drag": "well.torque_and_drag",
     "WellPath": "well.path",
     "euler_load": "scene.rod",
     "read_motion": "scene.scenefile",
@@ -165,7 +185,27 @@ if TYPE_CHECKING:  # the same names, for editors and type checkers
     from cosserat_fenicsx.statics.path.load_control import StepControl as StepControl
     from cosserat_fenicsx.statics.reading import read_path as read_path
     from cosserat_fenicsx.statics.solve import solve as solve
+    from cosserat_fenicsx.well.answer import TorqueAndDrag as TorqueAndDrag
+    from cosserat_fenicsx.well.components import Bit as Bit
+    from cosserat_fenicsx.well.components import Collar as Collar
+    from cosserat_fenicsx.well.components import Component as Component
+    from cosserat_fenicsx.well.components import DrillPipe as DrillPipe
+    from cosserat_fenicsx.well.components import HeavyWeight as HeavyWeight
+    from cosserat_fenicsx.well.components import Stabiliser as Stabiliser
+    from cosserat_fenicsx.well.hole import Borehole as Borehole
+    from cosserat_fenicsx.well.hole import HoleSection as HoleSection
+    from cosserat_fenicsx.well.mud import Mud as Mud
+    from cosserat_fenicsx.well.operations import BackReam as BackReam
+    from cosserat_fenicsx.well.operations import Ream as Ream
+    from cosserat_fenicsx.well.operations import RotaryDrilling as RotaryDrilling
+    from cosserat_fenicsx.well.operations import RotateOffBottom as RotateOffBottom
+    from cosserat_fenicsx.well.operations import Sliding as Sliding
+    from cosserat_fenicsx.well.operations import Static as Static
+    from cosserat_fenicsx.well.operations import TripIn as TripIn
+    from cosserat_fenicsx.well.operations import TripOut as TripOut
     from cosserat_fenicsx.well.path import WellPath as WellPath
+    from cosserat_fenicsx.well.string import DrillString as DrillString
+    from cosserat_fenicsx.well.torque_and_drag import torque_and_drag as torque_and_drag
 
 __all__ = sorted(_HOME)
 

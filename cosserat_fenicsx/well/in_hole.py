@@ -6,7 +6,7 @@ import numpy as np
 
 from cosserat_fenicsx.quaternions import directors
 from cosserat_fenicsx.results.recovery import at_nodes
-from cosserat_fenicsx.well.contacts import contacts_along
+from cosserat_fenicsx.well.resultants import contacts_along
 from cosserat_fenicsx.well.string_scene import bending_of, is_round
 
 # Change from one mesh to the next, whose signs alternate, that is counted as the error of the finer one.

@@ -1,0 +1,71 @@
+"""An answer as a table for the screen."""
+
+import math
+
+import numpy as np
+from rich.table import Table
+
+from cosserat_fenicsx.results.tables import as_text
+from cosserat_fenicsx.well import criteria
+
+_STATES = ("straight", "sinusoidal", "helical")
+
+
+def answer_table(answer):
+    """Text: the state along the string, surface loads, and what decided for the model."""
+    path, operation = answer.hole.path, answer.operation
+    table = Table(
+        title=f"{operation.name}, bit at {answer.depth:g} m, {answer.model} string",
+        caption="md, inclination: of the hole. tension: effective. side force: of the wall, per length.\n"
+        "moment: EI times the hole's curvature. state: buckling.",
+    )
+    for heading in ("md (m)", "component", "inclination (deg)", "tension (kN)", "torque (kN m)", "side force (N/m)",
+                    "moment (N m)", "von Mises (MPa)", "state"):  # fmt: skip
+        table.add_column(heading, justify="left" if heading in ("component", "state") else "right")
+    states = answer.buckling
+    for i in _shown(answer):
+        part = answer.string.components[answer.component[i]]
+        table.add_row(
+            f"{answer.md[i]:.6g}", part.name, f"{math.degrees(path.inclination_at(answer.md[i])):.2f}",
+            f"{answer.tension[i] / 1e3:.3f}", f"{answer.torque[i] / 1e3:.3f}", f"{answer.side_force[i]:.1f}",
+            _known(answer.bending_moment[i], 1, ".0f"), _known(answer.von_mises[i], 1e-6, ".1f"), _STATES[states[i]],
+        )  # fmt: skip
+    return "\n".join([as_text(table), *summary(answer)])
+
+
+def _shown(answer):
+    """Indices of rows: the ends of components, and about every tenth of the depth between."""
+    md, ends = answer.md, [answer.depth, *(place.top for place in answer.laid)]
+    rows = {0, len(md) - 1, *(i + side for i in np.flatnonzero(np.diff(answer.component)) for side in (0, 1))}
+    for depth in np.linspace(0.0, answer.depth, 11)[1:-1]:
+        if min(abs(depth - end) for end in ends) > answer.depth / 25:
+            rows.add(int(np.argmin(np.abs(md - depth))))
+    return sorted(rows)
+
+
+def summary(answer):
+    """Lines: surface loads and their errors, what follows from them, and why this model."""
+    lines = [
+        f"hook load {answer.hook_load / 1e3:.3f} kN (friction {answer.drag / 1e3:+.3f} kN), surface torque "
+        f"{answer.surface_torque / 1e3:.3f} kN m (convention: {answer.torque_convention})",
+        f"estimated relative errors: of the solution {answer.error:.0e}, of the model {answer.model_error:.0e}; asked "
+        f"for {answer.tol:g}: {'enough' if answer.enough else 'NOT ENOUGH'}",
+    ]
+    more = [f"{name} {value:.4g} {unit}" for name, value, unit in (
+        ("stretch", answer.stretch, "m"), ("twist", answer.twist / (2 * math.pi), "turns"),
+        ("neutral point at", answer.neutral_point, "m")) if math.isfinite(value)]  # fmt: skip
+    if more:
+        lines.append(", ".join(more))
+    if answer.hook_load < 0:
+        lines.append("the string does not go down by its own weight: a negative hook load is a push at the surface")
+    states = answer.buckling
+    for state in (criteria.SNAKE, criteria.HELIX):
+        where = answer.md[states == state]
+        if len(where):
+            lines.append(f"{_STATES[state]} buckling between {where.min():.5g} and {where.max():.5g} m")
+    lines.append(f"{answer.model}: {'; '.join(answer.why)}.")
+    return lines
+
+
+def _known(value, factor, form):
+    return "-" if math.isnan(value) else format(value * factor, form)
