@@ -6,9 +6,9 @@ nearest point of the tube's axis, its tangent and its curvature vector are data.
 
 import ufl
 
-# The distance from the axis is not differentiated below this fraction of the clearance: the radial direction is
-# undefined on the axis, where nothing touches.
-_ON_AXIS = 1e-6
+# Below this fraction of the tube's radius the distance from the axis counts as that: on the axis the radial direction
+# is undefined. Only a ring without clearance, which is held there elastically, touches something so close to it.
+_ON_AXIS = 1e-8
 
 
 def wall_work(point, test, c0, t0, k0, clearance, stiffness, spring, along, across, arm):
@@ -34,6 +34,6 @@ def wall_work(point, test, c0, t0, k0, clearance, stiffness, spring, along, acro
     a = ufl.sqrt(ufl.max_value(ufl.dot(rho, rho), (_ON_AXIS * (clearance + arm)) ** 2))
     e = rho / a
     pressure = stiffness * ufl.max_value(a - clearance, 0)
-    friction = pressure * (along * t - across * ufl.cross(t, e))
+    friction = pressure * ufl.dot(e, e) * (along * t - across * ufl.cross(t, e))
     force = friction - pressure * e - spring * rho
     return ufl.dot(force, test.phi_r) + ufl.dot(arm * ufl.cross(e, friction), test.phi)

@@ -11,6 +11,9 @@ from cosserat_fenicsx.scene import action
 from cosserat_fenicsx.scene.action import LineAction, PointAction
 from cosserat_fenicsx.scene.rod import Rod, RodOrName, Station, StationOrName, is_known
 
+# Half the length over which sizes and coefficients of the tube change at a jump, over the length of its axis.
+_RAMP = 1e-4
+
 
 @dataclass
 class Stage:
@@ -30,9 +33,6 @@ class _Confined:
         if not callable(getattr(self.path, "nearest", None)):
             refuse(self, "path", self.path, "the axis of the tube, such as a WellPath")
         store(self, stiffness=positive(self, "stiffness", self.stiffness, unit))
-        store(self, slip=vector(self, "slip", self.slip, "1", 2))
-        if self.slip != (0.0, 0.0) and abs(np.hypot(*self.slip) - 1) > 1e-9:
-            refuse(self, "slip", self.slip, "a unit vector (along, across), or (0, 0)")
         store(self, begins=number(self, "begins", self.begins, "a number (m)", np.isfinite))
 
     def data(self, rod, s):
@@ -42,9 +42,9 @@ class _Confined:
     def refreshed(self, rod, s, r):
         """See `Action`."""
         near = self.path.nearest(r, s + self.begins)
-        clearance, arm, friction = self._sizes(s, near.md)
+        clearance, arm, friction = self.sizes(s, near.md)
         stage, kp = self.stage, np.full(len(s), self.stiffness)
-        along, across = self.slip
+        slip = value_at(self.slip, s)
         return (
             action.vector(near.position, "m from origin"),
             action.vector(near.tangent, "1"),
@@ -52,8 +52,8 @@ class _Confined:
             action.scalar(clearance, "m"),
             action.scalar(stage.wall * kp, self.unit),
             action.scalar(stage.spring * kp, self.unit),
-            action.scalar(along * friction, "1"),
-            action.scalar(across * friction, "1"),
+            action.scalar(slip[:, 0] * friction, "1"),
+            action.scalar(slip[:, 1] * friction, "1"),
             action.scalar(arm, "m"),
         )
 
@@ -71,12 +71,12 @@ class TubeWall(_Confined, LineAction):
         rod: the rod.
         path: the axis of the tube, a `WellPath`, m, inertial.
         radius: of the tube, m; or pieces [(md_end, radius)] along the axis.
-        contact_radius: of the rod's surface, m; or pieces [(s_end, radius)] along the rod. Where it jumps the larger
-            one counts.
+        contact_radius: of the rod's surface, m; or pieces [(s_end, radius)] along the rod.
         stiffness: of the wall, N/m^2: the penetration is the force per length over it.
         friction: friction coefficient; or pieces [(md_end, coefficient)] along the axis.
         slip: (c_a, c_r), the unit direction in which the rod's surface slips: c_a towards the start of the axis, c_r
-            round the axis, by a right-handed rotation about its tangent; (0, 0) for none.
+            round the axis, by a right-handed rotation about its tangent; (0, 0) for none; or pieces [(s_end, slip)]
+            along the rod.
         begins: measured depth near which the rod's start lies, m.
         has_arm: whether friction has a moment about the centreline; False where it acts on the centreline itself.
 
@@ -101,20 +101,32 @@ class TubeWall(_Confined, LineAction):
         self._check("N/m^2")
         store(self, radius=pieces(self, "radius", self.radius, "m", least=0.0))
         store(self, contact_radius=pieces(self, "contact_radius", self.contact_radius, "m", least=0.0))
-        store(self, friction=pieces(self, "friction", self.friction, "1"))
+        store(self, friction=pieces(self, "friction", self.friction, "1"), slip=slip_pieces(self, self.slip))
         narrow, wide = min(r for _, r in self.radius), max(r for _, r in self.contact_radius)
         if not wide < narrow:
             refuse(self, "contact_radius", wide, f"less than the radius of the tube, {narrow:g} m")
         is_known(self, "rod", Rod)
 
-    def _sizes(self, s, md):
-        arm = larger_at(self.contact_radius, s)
-        friction = value_at(self.friction, md)
-        return value_at(self.radius, md) - arm, arm if self.has_arm else np.zeros_like(arm), friction
+    def sizes(self, s, md):
+        """(n,) clearance (m), radius of the surface where friction acts (m) and friction coefficient, at arc lengths s
+        of the rod and measured depths md."""
+        arm = value_at(self.contact_radius, s)
+        clearance = self._smooth(self.radius, md) - arm
+        return clearance, arm if self.has_arm else np.zeros_like(arm), self._smooth(self.friction, md)
+
+    def _smooth(self, given, md):
+        """(n,) values of `pieces` along the axis, linear over a short length at a jump: the contact there would
+        alternate."""
+        ends, values = np.array([end for end, _ in given[:-1]]), np.array([value for _, value in given])
+        half = _RAMP * self.path.length
+        knots = np.ravel(np.column_stack([ends - half, ends + half]))
+        return np.interp(md, knots, np.repeat(values, 2)[1:-1]) if len(ends) else np.full(len(md), values[0])
 
     def breaks(self, rod):
-        """See `Action`: element ends where the rod's radius jumps."""
-        return tuple(end for end, _ in self.contact_radius[:-1] if end < rod.length)
+        """See `Action`: element ends where sizes and coefficients jump."""
+        along = [end - self.begins for given in (self.radius, self.friction) for end, _ in given[:-1]]
+        along += [end for given in (self.contact_radius, self.slip) for end, _ in given[:-1]]
+        return tuple(sorted({end for end in along if 0 < end < rod.length}))
 
     def holds(self, scene):
         """See `Action`: it confines the rod across the axis."""
@@ -163,9 +175,11 @@ class TubeRing(_Confined, PointAction):
                 self, name, getattr(self, name), f"a number of zero or more ({unit})", lambda x: 0 <= x < np.inf
             )
             store(self, **{name: value})
+        store(self, slip=slip_pieces(self, self.slip))
         is_known(self, "station", Station)
 
-    def _sizes(self, s, md):
+    def sizes(self, s, md):
+        """See `TubeWall`."""
         return tuple(np.full(len(s), x) for x in (self.clearance, self.contact_radius, self.friction))
 
 
@@ -175,33 +189,44 @@ def pieces(owner, name, value, unit, least=None):
     Args:
         least: values must exceed it; None where they may be zero, not less.
     """
+    expected = f"a number {'of zero or more' if least is None else f'above {least:g}'} ({unit}), or pairs (end, number)"
 
     def checked(x):
-        expected = f"a number {'of zero or more' if least is None else f'above {least:g}'} ({unit})"
         return number(owner, name, x, expected, lambda x: (x >= 0 if least is None else x > least) and np.isfinite(x))
 
     if not isinstance(value, list | tuple):
         return ((np.inf, checked(value)),)
+    return _of_pairs(owner, name, value, expected, checked)
+
+
+def slip_pieces(owner, value):
+    """((end, (c_a, c_r)), ..) of one direction or of pairs."""
+    expected = "a unit vector (c_a, c_r), or (0, 0), or pairs (end, vector)"
+
+    def checked(x):
+        slip = vector(owner, "slip", x, "1", 2)
+        if slip != (0.0, 0.0) and abs(np.hypot(*slip) - 1) > 1e-9:
+            refuse(owner, "slip", x, expected)
+        return slip
+
+    if not isinstance(value, list | tuple) or not all(isinstance(x, list | tuple) for x in value):
+        return ((np.inf, checked(value)),)
+    return _of_pairs(owner, "slip", value, expected, checked)
+
+
+def _of_pairs(owner, name, value, expected, checked):
     found, last = [], 0.0
     for piece in value:
-        if not isinstance(piece, list | tuple) or len(piece) != 2:
-            refuse(owner, name, value, "a number, or pairs (end, value)")
+        if not isinstance(piece, list | tuple) or len(piece) != 2 or np.ndim(piece[0]):
+            refuse(owner, name, value, expected)
         end = number(owner, name, piece[0], "ends (m) that ascend from above zero", lambda x, last=last: x > last)
         found.append((end, checked(piece[1])))
         last = end
     if not found:
-        refuse(owner, name, value, "a number, or pairs (end, value)")
+        refuse(owner, name, value, expected)
     return (*found[:-1], (np.inf, found[-1][1]))
 
 
 def value_at(given, x):
-    """(n,) values of `pieces` at x (n,); at an end that of the piece before it."""
-    ends, values = np.array(given).T
-    return values[np.searchsorted(ends, x)]
-
-
-def larger_at(given, x):
-    """(n,) values of `pieces` at x (n,); at an end the larger of the two pieces that meet there."""
-    ends, values = np.array(given).T
-    slack = 1e-9 * max(1.0, float(np.max(x, initial=0.0)))
-    return np.maximum(values[np.searchsorted(ends, x - slack)], values[np.searchsorted(ends, x + slack)])
+    """(n, ..) values of `pieces` at x (n,); at an end that of the piece before it."""
+    return np.array([value for _, value in given])[np.searchsorted([end for end, _ in given], x)]

@@ -11,8 +11,9 @@ from cosserat_fenicsx.algebra.limited_newton import LimitedNewton
 from cosserat_fenicsx.errors import NotConverged
 from cosserat_fenicsx.interrupts import obey
 
-#: From a state close to the solution, such as that of a coarser mesh: the wall as it is.
+#: From a state close to the solution, such as that of a coarser mesh: the wall as it is, or softer by ten before.
 LAST = ((1.0, 0.0),)
+LAST_TWO = ((0.1, 0.0), *LAST)
 # The wall that takes over from the spring is so much stiffer; smallest spring over the wall's stiffness.
 _TAKES_OVER, _SOFTEST = 10.0, 1e-12
 # Powers of ten by which the spring fades before it is left out; factor of a small step.
@@ -22,7 +23,7 @@ _FADED, _SMALL_STEP = 2, 2.0
 _LONGEST, _OF_LENGTH, _WIDEST = 10.0, 1e-4, 0.5
 # A stage ends at a step below this share of the clearance: the first ones, those with full results (`careful`), the
 # last one, which is not asked for less than rounding allows, in the unit of length.
-_ROUGH, _CAREFUL, _ENOUGH, _ROUNDING = 1e-2, 1e-4, 1e-8, 1e-13
+_ROUGH, _CAREFUL, _ENOUGH, _ROUNDING = 0.1, 1e-7, 1e-8, 1e-13
 # Newton steps of a stage.
 _MOST = 60
 # Newton's method alternates between two contacts where steps do not shrink by this factor, so many times: then a share

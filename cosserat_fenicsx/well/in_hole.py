@@ -37,6 +37,7 @@ class InHole:
             none); an `extensible` string has them in its state.
         errors: {"hook_load": N, "surface_torque": N m, "wall_force": N}, estimated; error: the largest relative one of
             the first two, that of the torque only where the string turns.
+        of_stiffness: largest relative change of these quantities from a wall softer by ten, a part of the errors.
         balance: N, between the reaction and the sum of all other forces.
         steps: Newton steps, on this mesh and on those before.
     """
@@ -44,7 +45,7 @@ class InHole:
     def __init__(self, string, path):
         self._string, self.path, self.scene = string, path, path.scene
         self.steps = int(path.iterations[0])
-        self.errors, self.error, self._by_stiffness = {}, np.inf, {}
+        self.errors, self.error, self._by_stiffness, self.of_stiffness = {}, np.inf, {}, np.inf
 
     # -- along the string --------------------------------------------------------------------------------------------
 
@@ -90,7 +91,7 @@ class InHole:
     @cached_property
     def standoff(self):
         """(n,) the part of the clearance that is left."""
-        return 1 - self.distance / self._string.wall._sizes(self.s, self.md)[0]
+        return 1 - self.distance / self._string.wall.sizes(self.s, self.md)[0]
 
     @cached_property
     def side(self):
@@ -186,9 +187,8 @@ class InHole:
     @cached_property
     def wall_force(self):
         """N."""
-        slip = np.hypot(*(mu * c for mu, c in zip([1.0, 1.0], self._string.wall.slip, strict=True)))
         across = [
-            np.linalg.norm(force) / np.hypot(1.0, ring.friction * slip)
+            np.linalg.norm(force) / np.hypot(1.0, ring.friction * np.hypot(*ring.slip[0][1]))
             for ring, force in zip(self._string.rings, self.ring_forces, strict=True)
         ]
         return float(self.node_force.sum() + sum(across))
@@ -277,6 +277,9 @@ class InHole:
             self._by_stiffness = {name: abs(getattr(self, name) - getattr(softer, name)) for name in scales}
         elif coarse is not None:
             self._by_stiffness = coarse._by_stiffness
+        self.of_stiffness = max(
+            (self._by_stiffness[name] / scales[name] for name in self._by_stiffness), default=np.inf
+        )
         change = np.inf
         if coarse is not None:  # a single quantity may change little by chance
             changes = {name: abs(getattr(self, name) - getattr(coarse, name)) / scales[name] for name in scales}

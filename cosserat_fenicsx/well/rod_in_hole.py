@@ -13,7 +13,7 @@ from cosserat_fenicsx.quaternions import product_conjugate
 from cosserat_fenicsx.results.accuracy import on_mesh
 from cosserat_fenicsx.results.path import Path
 from cosserat_fenicsx.results.records import Record
-from cosserat_fenicsx.statics.settling import LAST, settle, stages_from
+from cosserat_fenicsx.statics.settling import LAST, LAST_TWO, settle, stages_from
 from cosserat_fenicsx.statics.solvers import solvers_of
 from cosserat_fenicsx.well.in_hole import InHole
 from cosserat_fenicsx.well.string_scene import string_in
@@ -25,6 +25,8 @@ _DEGREE = 3
 _FIRST, _MOST, _FINER, _BEFORE = 256, 8192, 2, 4
 # A finer mesh has shorter elements where the pressure changes: bounds of their number, over that of equal ones.
 _FEWEST, _DENSEST = 0.3, 2.4
+# Part of the accuracy asked for below which the effect of the wall's stiffness is not found again on a finer mesh.
+_KNOWN = 0.1
 # Starts in turn: how much stiffer the first spring is, and whether stages follow by small steps.
 _STARTS = ((1.0, False), (1.0, True), (10.0, True))
 # Rounding of the residual of a node, over that of its position times the stiffness of its piece of wall.
@@ -71,11 +73,11 @@ def solve_in_hole(
         lengths: (n,) of the string's sections from the top down, m.
         stiffness: n `Stiffness`, or one for all.
         weight: (n,) or one, N/m, in the fluid (> 0).
-        contact_radius: (n,) or one, radius of the surface that touches, m; where it jumps the larger one counts.
+        contact_radius: (n,) or one, radius of the surface that touches, m.
         radius: of the hole, m; or pieces [(md_end, radius)].
         friction: coefficient; or pieces [(md_end, coefficient)].
         slip: (c_a, c_r), unit direction of slip of the string's surface: (1, 0) up the hole, (-1, 0) down, (0, 1)
-            turning (clockwise seen from above); (0, 0) for no friction.
+            turning (clockwise seen from above); (0, 0) for no friction; or one for each section, (n, 2).
         bottom_tension: N, along the hole at the string's end; negative: weight on bit.
         bottom_torque: torque on bit, N m, against the rotation.
         rings: [(s, clearance, radius)] of stabilisers and bits: stations (m from the top) that stay within a clearance
@@ -104,7 +106,7 @@ def solve_in_hole(
     with Progress([float(len(stages_from(string.spring)))], progress, comm, "stage") as bar:
         answer = None
         for count in counts:
-            answer = _finer(string, count, degree, answer, bar, comm)
+            answer = _finer(string, count, degree, answer, tol, bar, comm)
             if elements is None and answer.error <= tol:
                 break
         else:
@@ -125,16 +127,17 @@ def _counts(elements):
     return [max(1, elements // _BEFORE), elements]
 
 
-def _finer(string, count, degree, before, bar, comm):
+def _finer(string, count, degree, before, tol, bar, comm):
     """The `InHole` on a mesh of so many elements, from that on the mesh before, or from the start in stages."""
     if before is not None:
         layout = before.path.layout.resized(string.scene, [_wanted(before, count)])
         with contextlib.suppress(NotConverged):  # the contact on the coarse mesh may be too far off
-            return _on_mesh(string, layout, degree, LAST, before, bar, comm)
+            stages = LAST if before.of_stiffness <= _KNOWN * tol else LAST_TWO
+            return _on_mesh(string, layout, degree, stages, before, before, bar, comm)
     for stiffer, gentle in _STARTS:
         try:
             stages = stages_from(stiffer * string.spring, gentle)
-            return _on_mesh(string, Layout.of(string.scene, count), degree, stages, before, bar, comm)
+            return _on_mesh(string, Layout.of(string.scene, count), degree, stages, None, before, bar, comm)
         except NotConverged as failed:
             reason = failed
     raise NotConverged(
@@ -153,13 +156,13 @@ def _wanted(answer, count):
     return wanted * count / wanted.sum()
 
 
-def _on_mesh(string, layout, degree, stages, before, bar, comm):
-    """The `InHole` on one mesh, with errors by that on the mesh before, its start where `stages` is `LAST`."""
+def _on_mesh(string, layout, degree, stages, start, before, bar, comm):
+    """The `InHole` on one mesh, from that on another mesh or from the axis, with errors by that on the mesh before."""
     scene = string.scene
     with solvers_of(scene, layout, degree=degree, comm=comm) as (problem, _, _):
         model, scales = problem.model, problem.model.scales
         problem.set_load_factor(1.0)
-        _begin(problem, string, layout, before if stages is LAST else None)
+        _begin(problem, string, layout, start)
         bar.start(f"rod in its hole, {model.unknowns} unknowns")
         softer = []
 

@@ -98,6 +98,8 @@ def string_in(path, lengths, stiffness, weight, contact_radius, radius, friction
         held[0] if len(held) == 1 else [*zip(ends[:-1].tolist(), held[:-1], strict=True), (None, held[-1])],
         name="string",
     )
+    if np.shape(slip) == (len(lengths), 2):
+        slip = [*zip(ends.tolist(), map(tuple, np.asarray(slip).tolist()), strict=True)]
     wall = TubeWall(
         rod, path, radius, [*zip(ends.tolist(), arms.tolist(), strict=True)], wall_stiffness, friction, slip,
         has_arm=has_arm,
@@ -110,14 +112,15 @@ def string_in(path, lengths, stiffness, weight, contact_radius, radius, friction
     loads += [Force(rod.end, tuple(pull * t))] if pull else []
     loads += [Moment(rod.end, tuple(-torque * t))] if torque else []
     around = tuple(
-        TubeRing(rod.at(s), path, clearance, ring_radius, _OF_RINGS * wall_stiffness, _friction_at(wall, s), slip)
+        TubeRing(rod.at(s), path, clearance, ring_radius, _OF_RINGS * wall_stiffness, *_friction_at(wall, s))
         for s, clearance, ring_radius in rings
     )
     support = Clamp(rod.start) if hinge is None else Hinge(rod.start, hinge)
     clearance = min(r for _, r in wall.radius) - float(arms.max())
     words = "the string's lengths are those under load" if not extensible else "the string stretches"
+    turns = bool(torque or any(across for _, (_, across) in wall.slip))
     return StringScene(path, Scene([rod], [support], [*loads, wall, *around]), rod, support, wall, around, sections,
-                       ends, weight, pull * t, clearance, bool(torque or wall.slip[1]), words)  # fmt: skip
+                       ends, weight, pull * t, clearance, turns, words)  # fmt: skip
 
 
 def _numbers(name, value, count, expected, accept):
@@ -149,4 +152,5 @@ def bending_of(section):
 
 
 def _friction_at(wall, s):
-    return next(value for end, value in wall.friction if s <= end)
+    """Friction coefficient and slip at a station."""
+    return tuple(next(value for end, value in given if s <= end) for given in (wall.friction, wall.slip))
