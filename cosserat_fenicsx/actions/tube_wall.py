@@ -17,11 +17,12 @@ _RAMP = 1e-4
 
 @dataclass
 class Stage:
-    """What a start in stages changes of a wall: its stiffness, and that of a spring to the axis, both over the wall's
-    own stiffness."""
+    """What solvers change of a wall for a while: its stiffness, and that of a spring to the axis, both over the wall's
+    own stiffness; and the part of the friction that acts."""
 
     wall: float = 1.0
     spring: float = 0.0
+    friction: float = 1.0
 
 
 class _Confined:
@@ -44,7 +45,7 @@ class _Confined:
         near = self.path.nearest(r, s + self.begins)
         clearance, arm, friction = self.sizes(s, near.md)
         stage, kp = self.stage, np.full(len(s), self.stiffness)
-        slip = value_at(self.slip, s)
+        slip = stage.friction * value_at(self.slip, s)
         return (
             action.vector(near.position, "m from origin"),
             action.vector(near.tangent, "1"),

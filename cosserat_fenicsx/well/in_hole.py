@@ -39,12 +39,14 @@ class InHole:
             the first two, that of the torque only where the string turns.
         of_stiffness: largest relative change of these quantities from a wall softer by ten, a part of the errors.
         balance: N, between the reaction and the sum of all other forces.
+        negative_modes: number of negative eigenvalues of the second variation without friction, -1 where it is
+            singular. Where it is not 0, the string would buckle, or buckle otherwise, but for friction.
         steps: Newton steps, on this mesh and on those before.
     """
 
     def __init__(self, string, path):
         self._string, self.path, self.scene = string, path, path.scene
-        self.steps = int(path.iterations[0])
+        self.steps, self.negative_modes = int(path.iterations[0]), int(path.negative_modes[0])
         self.errors, self.error, self._by_stiffness, self.of_stiffness = {}, np.inf, {}, np.inf
 
     # -- along the string --------------------------------------------------------------------------------------------

@@ -175,7 +175,7 @@ class WellPath:
         if points is None:
             beyond, md = near - at, at
         else:
-            md, beyond = self._walked(points, at), None
+            md, beyond = np.nan_to_num(self._walked(points, at)), None  # a solver that diverges sees it by its points
         i, x = self._place(md)
         cos, along, aside = _arc(s, i, x)
         k, t0 = s.curvature[i], s.tangent[i]

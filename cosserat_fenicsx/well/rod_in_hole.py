@@ -159,7 +159,7 @@ def _wanted(answer, count):
 def _on_mesh(string, layout, degree, stages, start, before, bar, comm):
     """The `InHole` on one mesh, from that on another mesh or from the axis, with errors by that on the mesh before."""
     scene = string.scene
-    with solvers_of(scene, layout, degree=degree, comm=comm) as (problem, _, _):
+    with solvers_of(scene, layout, degree=degree, comm=comm) as (problem, _, stability):
         model, scales = problem.model, problem.model.scales
         problem.set_load_factor(1.0)
         _begin(problem, string, layout, start)
@@ -169,14 +169,14 @@ def _on_mesh(string, layout, degree, stages, start, before, bar, comm):
         def on_stage(k):
             bar.reached(float(k + 1))
             if k == len(stages) - 2:
-                softer.append(_record(problem, 0))
+                softer.append(_record(problem, 0, 0))
 
         stiffest = string.wall.stiffness * float(layout.sizes(scene).max())
         rounding = _ROUNDED * np.finfo(float).eps * stiffest * scales.length / scales.force
         steps = settle(problem, string.stages, string.clearance / scales.length, rounding, stages,
                        careful=[len(stages) - 2], on_stage=on_stage)  # fmt: skip
         answers = []
-        for record in (*softer, _record(problem, steps)):
+        for record in (*softer, _record(problem, steps, _negative_modes(string, problem, stability))):
             path = Path.of(model, [f"{string.words}; {model.signature.formulation.words}"])
             path.append(record)
             answers.append(InHole(string, path))
@@ -189,10 +189,21 @@ def _on_mesh(string, layout, degree, stages, start, before, bar, comm):
     return answer
 
 
-def _record(problem, steps):
+def _record(problem, steps, negative_modes):
     model = problem.model
-    return Record(1.0, *model.snapshot(), 0, steps, problem.multipliers(), False, model.densities.here(),
+    return Record(1.0, *model.snapshot(), negative_modes, steps, problem.multipliers(), False, model.densities.here(),
                   problem.tie_forces(), model.clamps.loads(1.0), steps)  # fmt: skip
+
+
+def _negative_modes(string, problem, stability):
+    """The number of negative eigenvalues of the second variation without friction, which has no potential."""
+    for friction in (0.0, 1.0):
+        for stage in string.stages:
+            stage.friction = friction
+        problem.model.actions.refresh()
+        if not friction:
+            found = stability.count()
+    return found
 
 
 def _begin(problem, string, layout, before):
