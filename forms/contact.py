@@ -11,7 +11,7 @@ import ufl
 _ON_AXIS = 1e-8
 
 
-def wall_work(point, test, c0, t0, k0, clearance, stiffness, spring, along, across, arm):
+def wall_work(point, test, c0, t0, k0, clearance, stiffness, spring, anchor, along, across, arm):
     """Virtual work of the wall, per length of the rod.
 
     With d0 = r - c0 the nearest point moves by sigma = t0 . d0/(1 - k0 . d0) along the axis, which is zero in value and
@@ -22,7 +22,7 @@ def wall_work(point, test, c0, t0, k0, clearance, stiffness, spring, along, acro
         point: a `Point`; test: a `VirtualMotion`.
         c0, t0, k0: the point of the axis that is nearest to r, the unit tangent and the curvature vector there.
         clearance: radius of the tube minus that of the rod. stiffness: of the wall, force per area.
-        spring: force per area of an elastic bed around the axis, without friction.
+        spring: force per area of an elastic bed without friction, across the axis, from the point `anchor`.
         along, across: friction coefficient times the components of the unit direction of slip, against t and along
             t x e: the friction is p (along t - across t x e).
         arm: radius of the rod's surface.
@@ -35,5 +35,6 @@ def wall_work(point, test, c0, t0, k0, clearance, stiffness, spring, along, acro
     e = rho / a
     pressure = stiffness * ufl.max_value(a - clearance, 0)
     friction = pressure * ufl.dot(e, e) * (along * t - across * ufl.cross(t, e))
-    force = friction - pressure * e - spring * rho
+    held = point.r - anchor
+    force = friction - pressure * e - spring * (held - ufl.dot(t, held) * t)
     return ufl.dot(force, test.phi_r) + ufl.dot(arm * ufl.cross(e, friction), test.phi)

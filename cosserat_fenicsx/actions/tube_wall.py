@@ -17,12 +17,19 @@ _RAMP = 1e-4
 
 @dataclass
 class Stage:
-    """What solvers change of a wall for a while: its stiffness, and that of a spring to the axis, both over the wall's
-    own stiffness; and the part of the friction that acts."""
+    """What solvers change of a wall for a while: its stiffness, and that of a spring, both over the wall's own
+    stiffness; and the part of the friction that acts. The spring leads to the axis, or to where the rod was when it was
+    anchored."""
 
     wall: float = 1.0
     spring: float = 0.0
     friction: float = 1.0
+    anchor: np.ndarray | None = None
+    last: np.ndarray | None = None
+
+    def fasten(self):
+        """Anchor the spring where the rod is."""
+        self.anchor = self.last.copy()
 
 
 class _Confined:
@@ -38,6 +45,7 @@ class _Confined:
 
     def data(self, rod, s):
         """See `Action`: as where the rod lies on the axis."""
+        self.stage.anchor = None
         return self.refreshed(rod, s, self.path.nearest(None, s + self.begins).position)
 
     def refreshed(self, rod, s, r):
@@ -45,6 +53,7 @@ class _Confined:
         near = self.path.nearest(r, s + self.begins)
         clearance, arm, friction = self.sizes(s, near.md)
         stage, kp = self.stage, np.full(len(s), self.stiffness)
+        stage.last = r
         slip = stage.friction * value_at(self.slip, s)
         return (
             action.vector(near.position, "m from origin"),
@@ -53,6 +62,7 @@ class _Confined:
             action.scalar(clearance, "m"),
             action.scalar(stage.wall * kp, self.unit),
             action.scalar(stage.spring * kp, self.unit),
+            action.vector(near.position if stage.anchor is None else stage.anchor, "m from origin"),
             action.scalar(slip[:, 0] * friction, "1"),
             action.scalar(slip[:, 1] * friction, "1"),
             action.scalar(arm, "m"),

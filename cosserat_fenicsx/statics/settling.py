@@ -12,12 +12,17 @@ from cosserat_fenicsx.errors import NotConverged
 from cosserat_fenicsx.interrupts import obey
 
 #: From a state close to the solution, such as that of a coarser mesh: the wall as it is, or softer by ten before.
-LAST = ((1.0, 0.0),)
-LAST_TWO = ((0.1, 0.0), *LAST)
+LAST = ((1.0, 0.0, False),)
+LAST_TWO = ((0.1, 0.0, False), *LAST)
+#: From such a state where these fail.
+BACK = ((1e-3, 0.0, False), (1e-2, 0.0, False), *LAST_TWO)
 # The wall that takes over from the spring is so much stiffer; smallest spring over the wall's stiffness.
 _TAKES_OVER, _SOFTEST = 10.0, 1e-12
 # Powers of ten by which the spring fades before it is left out; factor of a small step.
 _FADED, _SMALL_STEP = 2, 2.0
+# Steps of a viscous motion at most; movement of a step that is wanted, over the clearance; bounds of the change of the
+# viscosity after a step, and of the viscosity, over the first one.
+_VISCOUS, _WANTED, _CHANGE, _BOUNDS = 300, 0.3, (0.5, 4.0), (1e-4, 30.0)
 # Longest displacement of a node in a Newton step, over the clearance, or over the longest rod, the unit of length; and
 # largest rotation, rad.
 _LONGEST, _OF_LENGTH, _WIDEST = 10.0, 1e-4, 0.5
@@ -33,19 +38,23 @@ _SLOW, _STALLED, _SHARES = 0.6, 2, (0.5, 0.35, 0.7)
 _BALANCED = 1e-6
 
 
-def stages_from(spring, gentle=False):
-    """The stages of a start on the axis: (stiffness of the wall, of a spring to its axis), over the wall's own.
+def stages_from(spring, way="fast"):
+    """The stages of a start on the axis: (stiffness of the wall, of a spring to its axis, over the wall's own; whether
+    the rod moves as in a viscous fluid instead, see `_relax`), in turn.
 
     Args:
         spring: the first spring, with which the loads move the rod by about the clearance.
-        gentle: whether to go on by small steps, for a rod that is compressed beyond its buckling load.
+        way: "fast"; "gentle", by small steps; or "relaxed", for a rod that is compressed beyond its buckling load.
     """
     spring = min(max(spring, _SOFTEST), 0.1 / _TAKES_OVER)
-    wall, step = _TAKES_OVER * spring, _SMALL_STEP if gentle else 10.0
-    softer = [(wall, spring / step**k) for k in range(1, 1 + math.ceil(_FADED / math.log10(step)))]
+    wall, step = _TAKES_OVER * spring, 10.0 if way == "fast" else _SMALL_STEP
     count = max(0, math.ceil(math.log(0.1 / wall, step) - 1e-9))
-    stiffer = [(0.1 * (wall / 0.1) ** (1 - k / count), 0.0) for k in range(1, count + 1)]
-    return ((0.0, spring), *softer, (wall, 0.0), *stiffer, *LAST)
+    stiffer = [(0.1 * (wall / 0.1) ** (1 - k / count), 0.0, False) for k in range(1, count + 1)]
+    if way == "relaxed":
+        fading = [(wall, spring, True)]
+    else:
+        fading = [(wall, spring / step**k, False) for k in range(1, 1 + math.ceil(_FADED / math.log10(step)))]
+    return ((0.0, spring, False), *fading, (wall, 0.0, False), *stiffer, *LAST)
 
 
 def settle(problem, walls, clearance, rounding, stages, careful=(), on_stage=None):
@@ -66,12 +75,16 @@ def settle(problem, walls, clearance, rounding, stages, careful=(), on_stage=Non
         NotConverged: a stage was not solved, or what was found is no equilibrium.
     """
     newton = LimitedNewton(problem, max(_LONGEST * clearance, _OF_LENGTH), _WIDEST)
-    for k, (stiffness, spring) in enumerate(stages):
+    for k, (stiffness, spring, viscous) in enumerate(stages):
         for wall in walls:
             wall.wall, wall.spring = stiffness, spring
         last = k == len(stages) - 1
         share = _ENOUGH if last else _CAREFUL if k in careful else _ROUGH
-        _solve_stage(newton, max(share * clearance, _ROUNDING), f"stage {k + 1} of {len(stages)}")
+        name = f"stage {k + 1} of {len(stages)} of the start"
+        if viscous:
+            _relax(newton, walls, spring, clearance, name)
+        else:
+            _solve_stage(newton, max(share * clearance, _ROUNDING), name)
         if on_stage:
             on_stage(k)
     off = newton.imbalance()
@@ -89,9 +102,32 @@ def _solve_stage(newton, enough, name):
         share = _SHARES[stalled // _STALLED % len(_SHARES)] if stalled and stalled % _STALLED == 0 else 1.0
         step = newton.step(share)
         if step is None:
-            raise NotConverged(f"the tangent is singular in {name} of the start")
+            raise NotConverged(f"the tangent is singular in {name}")
         if step.share == 1.0 and step.moved <= enough:
             return
         stalled = stalled + 1 if step.moved > _SLOW * moved else 0
         moved = step.moved
-    raise NotConverged(f"Newton's method has not converged after {_MOST} steps in {name} of the start")
+    raise NotConverged(f"Newton's method has not converged after {_MOST} steps in {name}")
+
+
+def _relax(newton, walls, spring, clearance, name):
+    """Let the rod move as in a viscous fluid until it rests: at every step the spring leads to where the rod is, and so
+    resists the step alone. The steps are of an implicit scheme in time, of one Newton step each."""
+    viscosity = spring
+    for _ in range(_VISCOUS):
+        obey()
+        newton.imbalance()  # with the rod's position
+        for wall in walls:
+            wall.fasten()
+            wall.spring = viscosity
+        step = newton.step()
+        if step is None:
+            raise NotConverged(f"the tangent is singular in {name}")
+        if step.moved <= _ROUGH * clearance and viscosity <= _BOUNDS[0] * spring:
+            break
+        change = min(max(step.moved / (_WANTED * clearance), _CHANGE[0]), _CHANGE[1])
+        viscosity = min(max(change * viscosity, _BOUNDS[0] * spring), _BOUNDS[1] * spring)
+    else:
+        raise NotConverged(f"the rod has not come to rest in {name}")
+    for wall in walls:
+        wall.anchor = None

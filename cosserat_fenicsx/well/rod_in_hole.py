@@ -13,7 +13,7 @@ from cosserat_fenicsx.quaternions import product_conjugate
 from cosserat_fenicsx.results.accuracy import on_mesh
 from cosserat_fenicsx.results.path import Path
 from cosserat_fenicsx.results.records import Record
-from cosserat_fenicsx.statics.settling import LAST, LAST_TWO, settle, stages_from
+from cosserat_fenicsx.statics.settling import BACK, LAST, LAST_TWO, settle, stages_from
 from cosserat_fenicsx.statics.solvers import solvers_of
 from cosserat_fenicsx.well.in_hole import InHole
 from cosserat_fenicsx.well.string_scene import string_in
@@ -27,8 +27,8 @@ _FIRST, _MOST, _FINER, _BEFORE = 256, 8192, 2, 4
 _FEWEST, _DENSEST = 0.3, 2.4
 # Part of the accuracy asked for below which the effect of the wall's stiffness is not found again on a finer mesh.
 _KNOWN = 0.1
-# Starts in turn: how much stiffer the first spring is, and whether stages follow by small steps.
-_STARTS = ((1.0, False), (1.0, True), (10.0, True))
+# Starts in turn, see `stages_from`.
+_STARTS = ("fast", "gentle", "relaxed")
 # Rounding of the residual of a node, over that of its position times the stiffness of its piece of wall.
 _ROUNDED = 20.0
 # Largest difference between the reaction and the balance of all forces, over the sum of the wall's forces.
@@ -131,12 +131,12 @@ def _finer(string, count, degree, before, tol, bar, comm):
     """The `InHole` on a mesh of so many elements, from that on the mesh before, or from the start in stages."""
     if before is not None:
         layout = before.path.layout.resized(string.scene, [_wanted(before, count)])
-        with contextlib.suppress(NotConverged):  # the contact on the coarse mesh may be too far off
-            stages = LAST if before.of_stiffness <= _KNOWN * tol else LAST_TWO
-            return _on_mesh(string, layout, degree, stages, before, before, bar, comm)
-    for stiffer, gentle in _STARTS:
+        for stages in (LAST if before.of_stiffness <= _KNOWN * tol else LAST_TWO, BACK):
+            with contextlib.suppress(NotConverged):  # the contact on the coarse mesh may be too far off
+                return _on_mesh(string, layout, degree, stages, before, before, bar, comm)
+    for way in _STARTS:
         try:
-            stages = stages_from(stiffer * string.spring, gentle)
+            stages = stages_from(string.spring, way)
             return _on_mesh(string, Layout.of(string.scene, count), degree, stages, None, before, bar, comm)
         except NotConverged as failed:
             reason = failed
