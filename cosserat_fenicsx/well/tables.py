@@ -45,8 +45,9 @@ def _shown(answer):
 
 def summary(answer):
     """Lines: surface loads and their errors, what follows from them, and why this model."""
+    friction = f"friction {answer.drag / 1e3:+.3f} kN" if abs(answer.drag) > 1e-9 * abs(answer.hook_load) else "no drag"
     lines = [
-        f"hook load {answer.hook_load / 1e3:.3f} kN (friction {answer.drag / 1e3:+.3f} kN), surface torque "
+        f"hook load {answer.hook_load / 1e3:.3f} kN ({friction}), surface torque "
         f"{answer.surface_torque / 1e3:.3f} kN m (convention: {answer.torque_convention})",
         f"estimated relative errors: of the solution {answer.error:.0e}, of the model {answer.model_error:.0e}; asked "
         f"for {answer.tol:g}: {'enough' if answer.enough else 'NOT ENOUGH'}",
@@ -69,3 +70,45 @@ def summary(answer):
 
 def _known(value, factor, form):
     return "-" if math.isnan(value) else format(value * factor, form)
+
+
+def sweep_table(sweep):
+    """Text: hook loads and torques over the depth of the bit."""
+    table = Table(title="hook load (kN), and surface torque (kN m) where the string rotates, over the depth of the bit")
+    table.add_column("depth (m)", justify="right")
+    columns = []
+    for i, operation in enumerate(sweep.operations):
+        for j in range(len(sweep.friction)):
+            columns.append(sweep.hook_load[i, j] / 1e3)
+            table.add_column(sweep.label(i, j), justify="right")
+            if operation.direction(1.0)[1]:
+                columns.append(sweep.surface_torque[i, j] / 1e3)
+                table.add_column("torque", justify="right")
+    for k, depth in enumerate(sweep.depths):
+        table.add_row(f"{depth:.6g}", *(_known(values[k], 1, ".3f") for values in columns))
+    lines = [as_text(table)]
+    locked = np.argwhere(~np.isnan(sweep.values["locked"]))
+    for i, j, k in locked:
+        at = sweep.values["locked"][i, j, k]
+        lines.append(f"{sweep.label(i, j)}: locks up at md = {at:.5g} m with the bit at {sweep.depths[k]:.5g} m")
+    if len(sweep):
+        worst = np.nanmax(sweep.values["model_error"], initial=0.0)
+        lines.append(f"largest estimated relative error of the model {worst:.0e}")
+    return "\n".join(lines)
+
+
+def fit_table(fit):
+    """Text: coefficients of friction with their intervals."""
+    table = Table(title="coefficients of friction by least squares",
+                  caption=f"misfit {fit.misfit:.3g}: 1 where the standard deviations are right")  # fmt: skip
+    for heading in ("section", "to (m)", "friction", f"{100 * fit.confidence:g} % interval"):
+        table.add_column(heading, justify="left" if heading == "section" else "right")
+    for i, section in enumerate(fit.hole.sections):
+        low, high = fit.interval[i]
+        table.add_row(
+            section.name or str(i + 1), f"{section.to:.6g}", f"{fit.friction[i]:.4f}", f"{low:.4f} to {high:.4f}"
+        )
+    if np.isfinite(fit.block_interval).all():
+        low, high = fit.block_interval / 1e3
+        table.add_row("block weight", "", f"{fit.block_weight / 1e3:.2f} kN", f"{low:.2f} to {high:.2f} kN")
+    return as_text(table)
