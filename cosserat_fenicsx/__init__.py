@@ -98,6 +98,8 @@ _HOME = {
     "RigMeasurement": "well.calibrate",
     "FrictionFit": "well.calibrate",
     "calibrate_friction": "well.calibrate",
+    "read_well": "well.scenefile",
+    "WellScene": "well.scenefile",
     "WellPath": "well.path",
     "euler_load": "scene.rod",
     "read_motion": "scene.scenefile",
@@ -214,6 +216,8 @@ if TYPE_CHECKING:  # the same names, for editors and type checkers
     from cosserat_fenicsx.well.operations import TripIn as TripIn
     from cosserat_fenicsx.well.operations import TripOut as TripOut
     from cosserat_fenicsx.well.path import WellPath as WellPath
+    from cosserat_fenicsx.well.scenefile import WellScene as WellScene
+    from cosserat_fenicsx.well.scenefile import read_well as read_well
     from cosserat_fenicsx.well.string import DrillString as DrillString
     from cosserat_fenicsx.well.torque_and_drag import torque_and_drag as torque_and_drag
 

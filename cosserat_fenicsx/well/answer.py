@@ -262,6 +262,16 @@ class TorqueAndDrag:
         found[known] = criteria.he_kyllingstad(*(x[known] for x in (EI, loose, b, across, k)))
         return found
 
+    def write(self, file: File) -> None:
+        """Write the arrays along the string as a .csv file, one row a place. Rank 0 writes.
+
+        Raises:
+            OSError: it cannot be written.
+        """
+        from cosserat_fenicsx.well.tables import write_answer
+
+        write_answer(self, file)
+
     def plot(self, file: File | None = None):
         """Draw tension with the loads of buckling, torque, and side force along the string, depth downwards.
 

@@ -1,10 +1,12 @@
-"""An answer as a table for the screen."""
+"""Answers, sweeps and fits as tables: for the screen, and as .csv."""
 
 import math
+from pathlib import Path
 
 import numpy as np
 from rich.table import Table
 
+from cosserat_fenicsx.ranks import on_first, world
 from cosserat_fenicsx.results.tables import as_text
 from cosserat_fenicsx.well import criteria
 
@@ -72,6 +74,26 @@ def _known(value, factor, form):
     return "-" if math.isnan(value) else format(value * factor, form)
 
 
+def write_answer(answer, file):
+    """The .csv file of an answer; angles in degrees."""
+    position = answer.hole.path.position(answer.md)
+    columns = {
+        "md (m)": answer.md, "north (m)": position[:, 0], "east (m)": position[:, 1], "down (m)": position[:, 2],
+        "inclination (deg)": np.degrees(answer.inclination), "effective tension (N)": answer.tension,
+        "true tension (N)": answer.true_tension, "torque (N m)": answer.torque, "side force (N/m)": answer.side_force,
+        "contact side (deg from high side)": np.degrees(answer.contact_side), "stand-off": answer.standoff,
+        "bending moment (N m)": answer.bending_moment, "von Mises (Pa)": answer.von_mises,
+    }  # fmt: skip
+    rows = np.stack(list(columns.values()), axis=1)
+    names = [part.name for part in answer.string.components]
+    lines = [",".join([*columns, "state", "component"])]
+    for row, state, part in zip(rows, answer.buckling, answer.component, strict=True):
+        numbers = ("" if math.isnan(x) else f"{x:.9g}" for x in row)
+        lines.append(",".join([*numbers, _STATES[state], names[part]]))
+    text = "\n".join(lines) + "\n"
+    on_first(world(), lambda: Path(file).write_text(text, encoding="utf-8"))
+
+
 def sweep_table(sweep):
     """Text: hook loads and torques over the depth of the bit."""
     table = Table(title="hook load (kN), and surface torque (kN m) where the string rotates, over the depth of the bit")
@@ -80,7 +102,7 @@ def sweep_table(sweep):
     for i, operation in enumerate(sweep.operations):
         for j in range(len(sweep.friction)):
             columns.append(sweep.hook_load[i, j] / 1e3)
-            table.add_column(sweep.label(i, j), justify="right")
+            table.add_column(sweep.label(i, j), justify="right", overflow="fold")
             if operation.direction(1.0)[1]:
                 columns.append(sweep.surface_torque[i, j] / 1e3)
                 table.add_column("torque", justify="right")
