@@ -177,23 +177,28 @@ class _Store:
         self._values, self._stream = values, None
         if file is None:
             return
-        self._file, comm = Path(file), world()
-        for index, numbers in comm.bcast(self._read(mark) if comm.rank == 0 else None):
+        comm, rows = world(), []
+        on_first(comm, lambda: rows.extend(self._open(Path(file), mark)))
+        for index, numbers in comm.bcast(rows):
             self._set(index, numbers)
-        if comm.rank == 0:
-            new = not self._file.exists()
-            self._stream = self._file.open("a", encoding="utf-8")
-            if new:
-                self._write({"sweep": mark})
 
-    def _read(self, mark):
-        """The rows that are there."""
-        if not self._file.exists():
-            return []
-        text = self._file.read_text(encoding="utf-8")
-        if not text.endswith("\n"):  # the run was ended while it wrote
+    def _open(self, file, mark):
+        """Open the file for more rows, and return those that are there."""
+        rows = self._read(file, mark)
+        new = not file.exists() or file.stat().st_size == 0
+        self._stream = file.open("a", encoding="utf-8")
+        if new:
+            self._write({"sweep": mark})
+        return rows
+
+    @staticmethod
+    def _read(file, mark):
+        text = file.read_text(encoding="utf-8") if file.exists() else ""
+        if text and not text.endswith("\n"):  # the run was ended while it wrote
             text = text[: text.rfind("\n") + 1]
-            os.truncate(self._file, len(text.encode()))
+            os.truncate(file, len(text.encode()))
+        if not text:
+            return []
         try:
             head, *rows = [json.loads(line) for line in text.splitlines()]
             other = head["sweep"] != mark
@@ -201,7 +206,7 @@ class _Store:
             other = True
         if other:
             raise SceneError(
-                f"depth_sweep.file = {str(self._file)!r}: it holds another sweep (hole, string, depths or settings "
+                f"depth_sweep.file = {str(file)!r}: it holds another sweep (hole, string, depths or settings "
                 "differ): expected the same call, or another file"
             )
         return [(row[:3], row[3:]) for row in rows]

@@ -122,7 +122,7 @@ def sweep_table(sweep):
 def fit_table(fit):
     """Text: coefficients of friction with their intervals."""
     table = Table(title="coefficients of friction by least squares",
-                  caption=f"misfit {fit.misfit:.3g}: 1 where the standard deviations are right")  # fmt: skip
+                  caption=f"misfit {fit.misfit:.3g} (1: as the standard deviations say)")  # fmt: skip
     for heading in ("section", "to (m)", "friction", f"{100 * fit.confidence:g} % interval"):
         table.add_column(heading, justify="left" if heading == "section" else "right")
     for i, section in enumerate(fit.hole.sections):
