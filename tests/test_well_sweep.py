@@ -56,6 +56,13 @@ def test_a_sweep_goes_on_where_it_was_broken_off(tmp_path, monkeypatch):
         sweep(file=file, tol=1e-3)
 
 
+def test_depths_that_do_not_fit_are_refused_first():
+    with pytest.raises(cf.SceneError, match="hole, which ends at 2500 m"):
+        cf.depth_sweep(HOLE, STRING, OPERATIONS, [1000, 2600], mud=MUD)
+    with pytest.raises(cf.SceneError, match="above the surface at the depth 50 m"):
+        cf.depth_sweep(HOLE, STRING, OPERATIONS, [1000, 50], mud=MUD)
+
+
 def test_lock_up_in_a_sweep_is_told():
     stiff = cf.Stiffness((1e9, 1e9), 7e8, (348950.0,) * 2, 9.4e5)
     string = cf.DrillString([cf.Component(None, stiff, 16.6, 0.05)])

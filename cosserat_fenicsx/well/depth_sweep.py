@@ -19,6 +19,7 @@ from cosserat_fenicsx.well.buckled import LockUp
 from cosserat_fenicsx.well.hole import Borehole
 from cosserat_fenicsx.well.mud import Mud
 from cosserat_fenicsx.well.operations import Operation
+from cosserat_fenicsx.well.pieces import pieces_of
 from cosserat_fenicsx.well.string import DrillString
 from cosserat_fenicsx.well.torque_and_drag import torque_and_drag
 
@@ -136,6 +137,8 @@ def depth_sweep(
         Interrupted: by Ctrl-C; its `path` is the sweep so far.
     """
     operations = (operations,) if isinstance(operations, Operation) else tuple(operations)
+    if not operations:
+        refuse("depth_sweep", "operations", operations, "at least one operation")
     for operation in operations:
         if not isinstance(operation, Operation):
             refuse("depth_sweep", "operations", operation, "operations, such as TripOut()")
@@ -143,6 +146,8 @@ def depth_sweep(
     friction = tuple(friction) if isinstance(friction, Sequence | np.ndarray) else (friction,)
     holes = [hole if value is None else hole.with_friction(value) for value in friction]
     settings = {"mud": mud, "model": model, "tol": tol, "torque_convention": torque_convention}
+    for depth in (depths.min(), depths.max()):  # what does not fit is refused before the computation
+        pieces_of(hole, string, operations[0], mud, float(depth))
     shape = (len(operations), len(friction), len(depths))
     values = {name: np.full(shape, np.nan) for name in KEPT}
     sweep = DepthSweep(operations, depths, friction, values)
