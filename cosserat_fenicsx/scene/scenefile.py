@@ -119,6 +119,10 @@ def _read(file):
     """Scene, [solve] and [simulate] of a file."""
     file = Path(file)
     tables = tables_of(file)
+    if "well" in tables:
+        raise SceneError(
+            f"{file}: a string in a well: expected `read_well` in Python, `cosserat run` or `cosserat explain`"
+        )
     try:
         return _scene(tables, file.parent)
     except SceneError as problem:
