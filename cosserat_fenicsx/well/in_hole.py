@@ -270,10 +270,12 @@ class InHole:
         turns = self._string.turns
         weight = np.diff(self._string.ends, prepend=0.0) @ self._string.weight
         arm = max(radius for _, radius in self._string.wall.contact_radius)
+        least = _LEAST_LOAD * weight
+        wall = max(self.wall_force, least)
         scales = {
-            "hook_load": max(abs(self.hook_load), _LEAST_LOAD * weight),
-            "surface_torque": max(abs(self.surface_torque), _LEAST_TORQUE * arm * self.wall_force),
-            "wall_force": max(self.wall_force, _LEAST_LOAD * weight),
+            "hook_load": max(abs(self.hook_load), least),
+            "surface_torque": max(abs(self.surface_torque), _LEAST_TORQUE * arm * wall),
+            "wall_force": wall,
         }
         if softer is not None:
             self._by_stiffness = {name: abs(getattr(self, name) - getattr(softer, name)) for name in scales}

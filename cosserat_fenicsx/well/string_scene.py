@@ -116,11 +116,10 @@ def string_in(path, lengths, stiffness, weight, contact_radius, radius, friction
         for s, clearance, ring_radius in rings
     )
     support = Clamp(rod.start) if hinge is None else Hinge(rod.start, hinge)
-    clearance = min(r for _, r in wall.radius) - float(arms.max())
     words = "the string's lengths are those under load" if not extensible else "the string stretches"
     turns = bool(torque or any(across for _, (_, across) in wall.slip))
     return StringScene(path, Scene([rod], [support], [*loads, wall, *around]), rod, support, wall, around, sections,
-                       ends, weight, pull * t, clearance, turns, words)  # fmt: skip
+                       ends, weight, pull * t, wall.clearance, turns, words)  # fmt: skip
 
 
 def _numbers(name, value, count, expected, accept):
