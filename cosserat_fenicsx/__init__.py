@@ -69,6 +69,8 @@ _HOME = {
     "StepControl": "statics.path.load_control",
     "Stiffness": "scene.sections",
     "Tube": "scene.sections",
+    "TubeRing": "actions.tube_wall",
+    "TubeWall": "actions.tube_wall",
     "UniformCurvature": "scene.curves",
     "units": None,
     "Wall": "actions.wall",
@@ -127,6 +129,8 @@ if TYPE_CHECKING:  # the same names, for editors and type checkers
     from cosserat_fenicsx.actions.foundation import Foundation as Foundation
     from cosserat_fenicsx.actions.point_mass import PointMass as PointMass
     from cosserat_fenicsx.actions.spring import Spring as Spring
+    from cosserat_fenicsx.actions.tube_wall import TubeRing as TubeRing
+    from cosserat_fenicsx.actions.tube_wall import TubeWall as TubeWall
     from cosserat_fenicsx.actions.wall import Wall as Wall
     from cosserat_fenicsx.dynamics.natural_modes import modes as modes
     from cosserat_fenicsx.dynamics.resuming import read_history as read_history

@@ -176,13 +176,17 @@ def test_a_string_on_the_axis_has_no_twist_and_no_jump_of_its_quaternion():
     ({"slip": (1.0, 1.0)}, "slip"),
     ({"slip": ((1.0, 0.0), (0.0, 1.0))}, "slip"),
     ({"elements": 0}, "elements"),
+    ({"lengths": [400.0, 200.0]}, "no more than the length of the hole, 500 m"),
+    ({"weight": 0.0}, "weight"),
+    ({"stiffness": [PIPE, PIPE]}, "one Stiffness"),
     ({"rings": [(500.0, 0.0, 0.1)]}, "arc length"),
     ({"bottom_tension": math.nan}, "bottom_tension"),
 ])  # fmt: skip
 def test_refusals(arguments, word):
     path = cf.WellPath.from_survey([0, 500], [60, 60], [30, 30])
+    given = {"lengths": [400], "stiffness": PIPE, "weight": 241.13, "contact_radius": 0.0635, "radius": 0.108}
     with pytest.raises(cf.SceneError, match=word.replace("(", r"\(")):
-        solve_in_hole(path, [400], PIPE, 241.13, 0.0635, **{"radius": 0.108, **arguments})
+        solve_in_hole(path, **{**given, **arguments})
 
 
 def test_walls_refuse_what_has_no_axis():

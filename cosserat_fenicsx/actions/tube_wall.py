@@ -44,7 +44,7 @@ class _Confined:
         store(self, begins=number(self, "begins", self.begins, "a number (m)", np.isfinite))
 
     def data(self, rod, s):
-        """See `Action`: as where the rod lies on the axis."""
+        """See `Action`: as where the rod lies on the axis, to which the spring leads again."""
         self.stage.anchor = None
         return self.refreshed(rod, s, self.path.nearest(None, s + self.begins).position)
 
@@ -113,10 +113,27 @@ class TubeWall(_Confined, LineAction):
         store(self, radius=pieces(self, "radius", self.radius, "m", least=0.0))
         store(self, contact_radius=pieces(self, "contact_radius", self.contact_radius, "m", least=0.0))
         store(self, friction=pieces(self, "friction", self.friction, "1"), slip=slip_pieces(self, self.slip))
-        narrow, wide = min(r for _, r in self.radius), max(r for _, r in self.contact_radius)
-        if not wide < narrow:
-            refuse(self, "contact_radius", wide, f"less than the radius of the tube, {narrow:g} m")
-        is_known(self, "rod", Rod)
+        if is_known(self, "rod", Rod):
+            self._check_inside()
+
+    def _check_inside(self):
+        s, clearance = self._clearances()
+        k = int(np.argmin(clearance))
+        if not clearance[k] > 0:
+            wide, narrow = value_at(self.contact_radius, s)[k], value_at(self.radius, s + self.begins)[k]
+            expected = f"less than the radius of the tube, {narrow:g} m at s = {s[k]:.6g} m"
+            refuse(self, "contact_radius", float(wide), expected)
+
+    def _clearances(self):
+        """In the middle of each part of equal sizes: arc length and clearance, m, of a rod on the axis."""
+        ends = np.array([0.0, *self.breaks(self.rod), self.rod.length])
+        s = (ends[1:] + ends[:-1]) / 2
+        return s, value_at(self.radius, s + self.begins) - value_at(self.contact_radius, s)
+
+    @property
+    def clearance(self):
+        """The smallest clearance, m."""
+        return float(self._clearances()[1].min())
 
     def sizes(self, s, md):
         """(n,) clearance (m), radius of the surface where friction acts (m) and friction coefficient, at arc lengths s

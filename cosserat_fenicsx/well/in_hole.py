@@ -24,7 +24,8 @@ class InHole:
     Attributes:
         path: a `Path` with the rod's state as its only point, for all that a `Path` offers; scene: its `Scene`.
         s: arc length from the top, m. md: measured depth of the closest point of the hole's axis, m.
-        position: (n, 3), m. distance: from the hole's axis, m. standoff: 1 on the axis, 0 where it touches.
+        position: (n, 3), m. offset: (n, 3) from the hole's axis, m; distance: its size. standoff: 1 on the axis, 0
+            where it touches. node_length: the weights of integrals along the string, m.
         side: direction of the rod from the axis, rad, from the high side of the hole, clockwise looking down the hole
             (from the first axis, north, where it is vertical).
         tension: effective, N. torque: N m, that the upper part exerts in the sense of clockwise rotation on the lower.
@@ -75,20 +76,21 @@ class InHole:
         return self._near.md
 
     @cached_property
-    def _away(self):
+    def offset(self):
+        """(n, 3) from the axis to the rod, across the hole, m."""
         away = self.position - self._near.position
         return away - (away * self._near.tangent).sum(axis=1)[:, None] * self._near.tangent
 
     @cached_property
     def distance(self):
         """(n,) m."""
-        return np.linalg.norm(self._away, axis=1)
+        return np.linalg.norm(self.offset, axis=1)
 
     @cached_property
     def _outward(self):
         """(n, 3) unit vectors from the axis to the rod; zero where it is centred."""
         clear = self.distance > _CENTRED * self._string.clearance
-        return np.where(clear[:, None], self._away / np.where(clear, self.distance, 1.0)[:, None], 0.0)
+        return np.where(clear[:, None], self.offset / np.where(clear, self.distance, 1.0)[:, None], 0.0)
 
     @cached_property
     def standoff(self):
@@ -172,6 +174,11 @@ class InHole:
         return found
 
     @cached_property
+    def node_length(self):
+        """(n,) lengths that the nodes stand for, m: the weights of integrals along the string."""
+        return self._summed(self._of_nodes)
+
+    @cached_property
     def node_force(self):
         """(n,) N."""
         return self._summed(self.element_pressures * self._of_nodes)
@@ -246,7 +253,7 @@ class InHole:
         """Integral over the string of values at the nodes over a stiffness of the sections."""
         at = np.minimum(np.searchsorted(self._string.ends, self.s, side="left"), len(self._string.ends) - 1)
         found = np.array([np.nan if x.matrix is not None else of_section(x) for x in self._string.sections])
-        return float((self._summed(self._of_nodes) * values / found[at]).sum())
+        return float((self.node_length * values / found[at]).sum())
 
     @property
     def stretch(self):
@@ -270,10 +277,12 @@ class InHole:
         turns = self._string.turns
         weight = np.diff(self._string.ends, prepend=0.0) @ self._string.weight
         arm = max(radius for _, radius in self._string.wall.contact_radius)
+        least = _LEAST_LOAD * weight
+        wall = max(self.wall_force, least)
         scales = {
-            "hook_load": max(abs(self.hook_load), _LEAST_LOAD * weight),
-            "surface_torque": max(abs(self.surface_torque), _LEAST_TORQUE * arm * self.wall_force),
-            "wall_force": max(self.wall_force, _LEAST_LOAD * weight),
+            "hook_load": max(abs(self.hook_load), least),
+            "surface_torque": max(abs(self.surface_torque), _LEAST_TORQUE * arm * wall),
+            "wall_force": wall,
         }
         if softer is not None:
             self._by_stiffness = {name: abs(getattr(self, name) - getattr(softer, name)) for name in scales}

@@ -56,8 +56,9 @@ class StringScene:
 
     @cached_property
     def spring(self):
-        """Stiffness of a spring to the axis with which the loads move the string by about twice the clearance, and in
-        which its compression does not buckle it; over that of the wall."""
+        """Stiffness of a spring to the axis in which the loads, and the string's resistance to the axis's curvature k,
+        move it by about twice the clearance c, and in which its compression F does not buckle it; over that of the
+        wall. The moment EI k acts within the length sqrt(8 c/k), which gives EI k^2/(16 c^2); F^2/(4 EI) buckles."""
         s = np.linspace(0.0, self.ends[-1], _SAMPLES)
         near, at = self.path.nearest(None, s), np.searchsorted(self.ends[:-1], s)[1:]
         fall = np.diff(near.position[:, 2]) * self.weight[at]
@@ -67,7 +68,8 @@ class StringScene:
         typical = max(np.quantile(np.linalg.norm(load, axis=1), _TYPICAL), _LEAST * self.weight.max())
         EI = np.array([bending_of(section) for section in self.sections])[at]
         buckles = (np.minimum(tension, 0.0) ** 2 / (4 * EI)).max()
-        return float(max(typical / (2 * self.clearance), _SAFE * buckles) / self.wall.stiffness)
+        bends = (EI * (near.curvature[1:] ** 2).sum(axis=1)).max() / (16 * self.clearance**2)
+        return float(max(typical / (2 * self.clearance), bends, _SAFE * buckles) / self.wall.stiffness)
 
     @property
     def stages(self):
@@ -90,6 +92,8 @@ def string_in(path, lengths, stiffness, weight, contact_radius, radius, friction
         refuse("solve_in_hole", "stiffness", stiffness, f"one Stiffness, or {len(lengths)} of them")
     ends = np.cumsum(lengths)
     length = float(ends[-1])
+    if length > path.length * (1 + 1e-9):
+        refuse("solve_in_hole", "lengths", length, f"together no more than the length of the hole, {path.length:g} m")
     top, bottom = (path.nearest(None, np.array([x])) for x in (0.0, length))
     start = tuple(top.position[0])
     held = [_in_place(x, extensible) for x in sections]
@@ -116,11 +120,10 @@ def string_in(path, lengths, stiffness, weight, contact_radius, radius, friction
         for s, clearance, ring_radius in rings
     )
     support = Clamp(rod.start) if hinge is None else Hinge(rod.start, hinge)
-    clearance = min(r for _, r in wall.radius) - float(arms.max())
     words = "the string's lengths are those under load" if not extensible else "the string stretches"
     turns = bool(torque or any(across for _, (_, across) in wall.slip))
     return StringScene(path, Scene([rod], [support], [*loads, wall, *around]), rod, support, wall, around, sections,
-                       ends, weight, pull * t, clearance, turns, words)  # fmt: skip
+                       ends, weight, pull * t, wall.clearance, turns, words)  # fmt: skip
 
 
 def _numbers(name, value, count, expected, accept):
