@@ -166,6 +166,6 @@ def test_a_well_of_200_stations_takes_5_ms():
     best = np.inf
     for _ in range(30):
         before = time.process_time()
-        answer = cf.torque_and_drag(hole, string, cf.TripOut(), mud=cf.Mud(1200.0), tol=1e-8)
+        answer = cf.torque_and_drag(hole, string, cf.TripOut(), mud=cf.Mud(1200.0), model="soft", tol=1e-8)
         best = min(best, time.process_time() - before)
     assert answer.error <= 1e-8 and best < 5e-3

@@ -29,7 +29,7 @@ def test_a_sweep_is_its_answers():
         assert found.hook_load[i, 1, 3] == answer.hook_load and found.surface_torque[i, 1, 3] == answer.surface_torque
     assert (found.hook_load[0] > found.hook_load[2]).all() and (found.hook_load[2] > found.hook_load[1]).all()
     assert found.label(1, 1) == "trip in, friction 0.2, 0.4" and f"{found.hook_load[1, 1, 2] / 1e3:.3f}" in str(found)
-    assert cf.depth_sweep(HOLE, STRING, cf.TripOut(), 2000.0, mud=MUD).hook_load.shape == (1, 1, 1)
+    assert cf.depth_sweep(HOLE, STRING, cf.TripOut(), 2000.0, mud=MUD, model="soft").hook_load.shape == (1, 1, 1)
 
 
 def test_a_sweep_goes_on_where_it_was_broken_off(tmp_path, monkeypatch):
@@ -68,7 +68,7 @@ def test_lock_up_in_a_sweep_is_told():
     string = cf.DrillString([cf.Component(None, stiff, 16.6, 0.05)])
     path = cf.WellPath.from_survey([0, 12000], [90, 90], [0, 0])
     hole = cf.Borehole(path, [cf.HoleSection(12000, 2 * (0.05 + 0.041), 0.3)])
-    found = cf.depth_sweep(hole, string, cf.TripIn(), [5000, 9000, 11000])
+    found = cf.depth_sweep(hole, string, cf.TripIn(), [5000, 9000, 11000], model="soft, buckled")
     assert np.isfinite(found.hook_load[0, 0, :2]).all() and np.isnan(found.hook_load[0, 0, 2])
     assert found.values["locked"][0, 0, 2] == pytest.approx(11000 - 9688.9, abs=1) and found.done.all()
     assert "locks up at md = 1311" in str(found)
@@ -130,7 +130,7 @@ def test_charts(tmp_path):
     figure = found.plot()
     assert [axes.get_xlabel() for axes in figure.axes] == ["hook load (kN)", "surface torque (kN m)"]
     assert len(figure.axes[0].lines) == 6 and figure.axes[0].get_ylim() == pytest.approx((2585, 715))
-    answer = cf.torque_and_drag(HOLE, STRING, cf.Sliding(1e5), mud=MUD)
+    answer = cf.torque_and_drag(HOLE, STRING, cf.Sliding(1e5), mud=MUD, model="soft, buckled")
     answer.plot(tmp_path / "answer.png")
     assert (tmp_path / "answer.png").stat().st_size > 20000
     with pytest.raises(cf.SceneError, match="expected a name that ends in"):
@@ -144,7 +144,7 @@ def test_charts(tmp_path):
 @pytest.mark.slow
 def test_the_string_in_its_hole_in_space(tmp_path):
     pytest.importorskip("pyvista")
-    answer = cf.torque_and_drag(HOLE, STRING, cf.TripOut(), mud=MUD)
+    answer = cf.torque_and_drag(HOLE, STRING, cf.TripOut(), mud=MUD, model="soft")
     answer.plot_3d(tmp_path / "hole.png")
     assert (tmp_path / "hole.png").stat().st_size > 20000
     with pytest.raises(cf.SceneError, match="ends in .png"):

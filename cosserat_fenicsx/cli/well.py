@@ -18,6 +18,17 @@ from cosserat_fenicsx.well.scenefile import read_well
 # Options of the command line that are for rods alone.
 _OTHERS = ("load_factors", "elements", "degree", "formulation", "control", "branch", "duration", "dt", "scheme",
            "save_every", "start", "folder", "station", "at", "animate", "speed")  # fmt: skip
+_SOFT = (
+    "the soft string by a differential equation along the axis, and what that leaves out is estimated with each answer."
+)
+_ROD = "the exact rod in contact with the wall, stiff and with its clearance, on meshes that are refined until tol."
+#: What the models of `torque_and_drag` solve.
+_MODELS = {
+    "soft": _SOFT,
+    "soft, buckled": f"with the wall force of a helix where it is one, {_SOFT}",
+    "rod": _ROD,
+    "auto": f"first {_SOFT} Where that is above tol: {_ROD}",
+}
 
 
 def _scene(options):
@@ -105,8 +116,5 @@ def explain_well(options):
     if scene.sweep:
         lines.append(f"Sweep over {len(scene.sweep['depths'])} depths of the bit.")
     model, tol = scene.settings.get("model", "auto"), scene.settings.get("tol", 1e-4)
-    lines.append(
-        f"Model: {model}, tol = {tol:g}: the soft string by a differential equation along the axis, with the wall "
-        "force of a helix where it is one. What that leaves out is estimated with each answer."
-    )
+    lines.append(f"Model: {model}, tol = {tol:g}: {_MODELS.get(model, 'unknown')}")
     return "\n".join(lines)

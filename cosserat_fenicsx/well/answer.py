@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -14,8 +14,8 @@ from cosserat_fenicsx.well.mud import Mud
 from cosserat_fenicsx.well.operations import Operation
 from cosserat_fenicsx.well.string import DrillString
 
-#: The states in `TorqueAndDrag.buckling`, by their numbers.
-STATES = ("straight", "sinusoidal", "helical")
+# A torque below this share of the largest tension times the contact radius is nothing that errors are compared with.
+_LITTLE = 1e-2
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -26,15 +26,21 @@ class TorqueAndDrag:
     below. A string of components that are given by numbers has no true tension and no von Mises stress (NaN).
 
     Attributes:
-        model: what was solved: "soft" or "soft, buckled".
+        model: what was solved: "soft", "soft, buckled" or "rod".
         why: sentences on what decided for the model, and what it leaves out.
+        differences: {model: (N, N m)}: hook load and surface torque less those of the other models that were solved.
         error: estimated error of hook load and surface torque as solutions of the model's equations, over the largest
             tension and torque along the string (over 1 % of that tension times the contact radius where this is more).
         model_error: estimate, likewise relative, of how far those of the rod in contact may be, which is stiff and has
             a clearance: the error of the model, not of its solution.
         enough: whether both are within `tol`; False warns that the model does not suffice for the accuracy asked for.
         torque_convention: "coulomb" or "johancsik", see `torque_and_drag`.
+        laid, pieces: the string in its place, and cut where anything jumps; solved: what was found on it.
     """
+
+    #: What was solved, and which bending moment it has, in words.
+    words = property(lambda self: f"{self.model} string")
+    moment_words: ClassVar[str] = "EI times the hole's curvature"
 
     hole: Borehole
     string: DrillString
@@ -47,6 +53,7 @@ class TorqueAndDrag:
     why: tuple[str, ...]
     error: float
     model_error: float
+    differences: dict[str, tuple[float, float]]
     laid: Any
     pieces: Any
     solved: Any
@@ -82,9 +89,14 @@ class TorqueAndDrag:
         """Rows over pieces and places up the hole, as one array down it."""
         return np.ascontiguousarray(rows[::-1, ::-1]).ravel()
 
+    @cached_property
+    def _piece(self):
+        """Index of the piece at `md`."""
+        return self._down(np.repeat(self.solved.chain.origin[:, None], len(self.solved.at), axis=1))
+
     def _of_piece(self, values):
         """Values of pieces at `md`."""
-        return self._down(np.repeat(values[self.solved.chain.origin, None], len(self.solved.at), axis=1))
+        return values[self._piece]
 
     @cached_property
     def md(self) -> np.ndarray:
@@ -147,6 +159,22 @@ class TorqueAndDrag:
         """The side of the hole that the string touches, rad clockwise from its high side looking down it: pi is the low
         side. NaN where the hole is vertical, or nothing is touched. A rotating pipe climbs by atan(e_s mu)."""
         return self._down(sides_of(self.pieces, self.solved, self.torque_convention == "coulomb"))
+
+    @cached_property
+    def offset(self) -> np.ndarray:
+        """(n, 3) from the hole's axis to the string, across the hole, m. The soft string, which has no place of its
+        own: to the wall where it loads it; zero where the side is not known."""
+        t = self.hole.path.tangent(self.md)
+        high = t * t[:, 2:] - (0.0, 0.0, 1.0)
+        size = np.linalg.norm(high, axis=1, keepdims=True)
+        high = high / np.where(size > 0, size, 1.0)
+        side = self.contact_side[:, None]
+        return self.clearance[:, None] * np.nan_to_num(np.cos(side) * high + np.sin(side) * np.cross(t, high))
+
+    @property
+    def position(self) -> np.ndarray:
+        """(n, 3) north, east, down of the string, m."""
+        return self.hole.path.position(self.md) + self.offset
 
     @cached_property
     def contacts(self) -> list[tuple[float, float, float, str]]:
@@ -215,8 +243,7 @@ class TorqueAndDrag:
         known, or there is no clearance."""
         S, F = self._sections, -self.tension
         loose = np.where(self.clearance > 1e-9, self.clearance, np.nan)
-        chain = self.solved.chain
-        k, across, b = self._loads(chain)
+        k, across, b = self._loads()
         plain = np.hypot(across - k * F, b)
         weight = self._of_piece(self.pieces.weight)
         with np.errstate(invalid="ignore"):
@@ -229,13 +256,13 @@ class TorqueAndDrag:
         """True at `md` where the wall force of a helix is in the model's answer."""
         return self._down(np.repeat(self.solved.helical[:, None], len(self.solved.at), axis=1))
 
-    def _loads(self, chain):
+    def _loads(self):
         """Curvature, and weight along normal and binormal, at `md`."""
-        angle = chain.curvature[:, None] * chain.length[:, None] * self.solved.at
-        n = chain.n[:, None] * np.cos(angle) + chain.t[:, None] * np.sin(angle)
-        b = np.broadcast_to((chain.weight * chain.b)[:, None], n.shape)
-        k = np.broadcast_to(chain.curvature[:, None], n.shape)
-        return self._down(k), self._down(chain.weight[:, None] * n), self._down(b)
+        k, weight, t, n, b, bottom = (
+            self._of_piece(getattr(self.pieces, name)) for name in ("curvature", "weight", "t", "n", "b", "bottom")
+        )
+        angle = k * (bottom - self.md)
+        return k, weight * (n * np.cos(angle) + t * np.sin(angle)), weight * b
 
     def critical_load(self, criterion: str) -> np.ndarray:
         """Compression (N) at `md` at which the string buckles, by a criterion of `well/criteria.py`.
@@ -257,7 +284,7 @@ class TorqueAndDrag:
             return criteria.lubinski(EI, weight)
         if criterion != "He-Kyllingstad":
             refuse(self, "critical_load", criterion, f"{', '.join(straight)}, He-Kyllingstad or Lubinski")
-        k, across, b = self._loads(self.solved.chain)
+        k, across, b = self._loads()
         found, known = np.full(len(k), np.nan), ~np.isnan(EI * loose)
         found[known] = criteria.he_kyllingstad(*(x[known] for x in (EI, loose, b, across, k)))
         return found
@@ -307,3 +334,15 @@ class TorqueAndDrag:
         from cosserat_fenicsx.well.tables import answer_table
 
         return answer_table(self)
+
+
+def scales_of(solved, pieces):
+    """What errors of hook load and surface torque are relative to: the largest tension (N) and torque (N m) along the
+    string, and for the torque at least a little of that tension times the contact radius."""
+    tension = np.abs(solved.tension).max()
+    return tension, max(np.abs(solved.torque).max(), _LITTLE * tension * pieces.radius.max())
+
+
+def share(part, whole):
+    """Their ratio; 0 where there is nothing to compare with."""
+    return float(part / whole) if whole > 0 else 0.0

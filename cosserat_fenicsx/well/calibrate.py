@@ -13,7 +13,7 @@ from cosserat_fenicsx.well.hole import Borehole
 from cosserat_fenicsx.well.mud import Mud
 from cosserat_fenicsx.well.operations import Operation
 from cosserat_fenicsx.well.string import DrillString
-from cosserat_fenicsx.well.torque_and_drag import SOFT, torque_and_drag
+from cosserat_fenicsx.well.torque_and_drag import BUCKLED, SOFT, torque_and_drag
 
 # Where the search begins, its bounds, and the accuracy of the answers that it compares.
 _START, _MOST, _TOL = 0.2, 2.0, 1e-10
@@ -115,6 +115,8 @@ def calibrate_friction(
     measurements = [
         instance("calibrate_friction", "measurements", m, RigMeasurement, "Measurements") for m in measurements
     ]
+    if model not in (SOFT, BUCKLED):
+        refuse("calibrate_friction", "model", model, f"'{SOFT}' or '{BUCKLED}'")
     confidence = number("calibrate_friction", "confidence", confidence, "a number between 0 and 1", lambda x: 0 < x < 1)
     settings = {"mud": mud, "model": model, "tol": _TOL, "torque_convention": torque_convention}
     unknown_block, sections = block_weight is None, len(hole.sections)

@@ -23,6 +23,11 @@ def sides_of(pieces, solved, climbing):
     return side
 
 
+def name_of_side(side):
+    """The name of a side by its angle (rad clockwise from the high side), "wall" for NaN."""
+    return _SIDES[round(side / (np.pi / 2)) % 4] if np.isfinite(side) else "wall"
+
+
 def contacts_of(md, side_force, side):
     """[(from, to, force, side)], see `TorqueAndDrag.contacts`."""
     touched = np.isfinite(side)

@@ -23,8 +23,9 @@ import numpy as np
 
 _CHEN, _WU = np.sqrt(2.0), 2 * np.sqrt(2.0) - 1
 _LUBINSKI, _VERTICAL_HELIX = 1.94, 5.55
-#: States of a string.
+#: States of a string, and their names.
 STRAIGHT, SNAKE, HELIX = 0, 1, 2
+STATES = ("straight", "sinusoidal", "helical")
 
 
 def dawson_paslay(EI, clearance, weight, inclination):

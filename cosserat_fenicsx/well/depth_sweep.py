@@ -12,7 +12,7 @@ import numpy as np
 
 from cosserat_fenicsx.annotations import File, Numbers
 from cosserat_fenicsx.checks import finite_array, refuse
-from cosserat_fenicsx.errors import Interrupted, SceneError
+from cosserat_fenicsx.errors import Interrupted, NotConverged, SceneError
 from cosserat_fenicsx.progress import Progress
 from cosserat_fenicsx.ranks import on_first, world
 from cosserat_fenicsx.well.buckled import LockUp
@@ -134,7 +134,8 @@ def depth_sweep(
 
     Raises:
         SceneError: see `torque_and_drag`; a file of another sweep.
-        Interrupted: by Ctrl-C; its `path` is the sweep so far.
+        NotConverged: see `torque_and_drag`; its `path` is the sweep so far.
+        Interrupted: by Ctrl-C; likewise.
     """
     operations = (operations,) if isinstance(operations, Operation) else tuple(operations)
     if not operations:
@@ -161,6 +162,9 @@ def depth_sweep(
                 bar.reached(number)
     except KeyboardInterrupt:
         raise Interrupted(sweep) from None
+    except NotConverged as failed:
+        where = f"{sweep.label(i, j)}, bit at {depths[k]:g} m"
+        raise NotConverged(f"depth_sweep: {where}: {failed}; the exception's `path` has the {len(sweep)} before", sweep)
     finally:
         store.close()
     return sweep
@@ -169,7 +173,7 @@ def depth_sweep(
 def _answer(hole, string, operation, depth, settings):
     """The numbers of `KEPT`."""
     try:
-        answer = torque_and_drag(hole, string, operation, depth=depth, **settings)
+        answer = torque_and_drag(hole, string, operation, depth=depth, progress=False, **settings)
     except LockUp as locked:
         return (np.nan, np.nan, np.nan, np.nan, locked.md)
     return answer.hook_load, answer.surface_torque, answer.error, answer.model_error, np.nan

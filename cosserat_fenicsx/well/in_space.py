@@ -35,10 +35,9 @@ def _draw(answer, file, enlarge):
     hole = answer.hole.at(answer.md[at], "diameter") / 2
     if enlarge is None:
         enlarge = float(f"{_HOLE * np.ptp(axis, axis=0).max() / hole.max():.1g}")
-    offset = answer.clearance[at, None] * _sides(answer, at)
     plotter = pyvista.Plotter(off_screen=True, window_size=_WINDOW)
     plotter.set_background("white")
-    string = pyvista.MultipleLines(axis + enlarge * _picture(offset))
+    string = pyvista.MultipleLines(axis + enlarge * _picture(answer.offset[at]))
     string[_FIELD] = answer.side_force[at]
     string["radius"] = enlarge * (hole - answer.clearance[at])
     tube = string.tube(scalars="radius", absolute=True, n_sides=16)
@@ -49,7 +48,7 @@ def _draw(answer, file, enlarge):
     wall["radius"] = enlarge * hole
     plotter.add_mesh(wall.tube(scalars="radius", absolute=True, n_sides=24), color="peru", opacity=0.2)
     plotter.add_text(
-        f"{answer.operation.name}, bit at {answer.depth:g} m, {answer.model} string\n"
+        f"{answer.operation.name}, bit at {answer.depth:g} m, {answer.words}\n"
         f"radii and clearance {enlarge:g} times as large", font_size=11, color="black",
     )  # fmt: skip
     plotter.show_bounds(xtitle="east (m)", ytitle="north (m)", ztitle="height (m)", color="black", location="outer",
@@ -63,14 +62,3 @@ def _draw(answer, file, enlarge):
 def _picture(rows):
     """North, east, down as x to the east, y to the north, z upwards."""
     return np.stack([rows[:, 1], rows[:, 0], -rows[:, 2]], axis=1)
-
-
-def _sides(answer, at):
-    """(n, 3) unit vectors across the hole to where the string touches it; zero where it touches nothing."""
-    t = answer.hole.path.tangent(answer.md[at])
-    high = -(np.array([0.0, 0.0, 1.0]) - t * t[:, 2:])
-    size = np.linalg.norm(high, axis=1, keepdims=True)
-    high = high / np.where(size > 0, size, 1.0)
-    angle = np.nan_to_num(answer.contact_side[at])[:, None]
-    touches = np.isfinite(answer.contact_side[at])[:, None]
-    return np.where(touches, np.cos(angle) * high + np.sin(angle) * np.cross(t, high), 0.0)

@@ -98,36 +98,40 @@ def _unit(vectors, axis):
     return vectors / np.where(size > 0, size, 1.0)
 
 
-def reasons(used, asked, soft, solved, sections, left_out, scales, tol):
-    """Sentences on the model: what decided for it, and what it leaves out.
+def reasons(used, asked, soft, solved, sections, left_out, scales):
+    """Sentences on the soft string: whether it is buckled, and what it leaves out.
 
     Args:
         used, asked: names of models; soft, solved: the `Solved` without and with buckling; sections: `Sections`;
-        left_out: `ModelError` of hook load and torque; scales: the largest tension and torque; tol: asked for.
+        left_out: `ModelError` of hook load and torque; scales: the largest tension and torque.
     """
-    lines = []
     if asked != "auto":
-        lines.append(f"model = '{asked}' as asked")
+        yield f"model = '{asked}' as asked"
     if np.isnan(sections.EI).any():
-        lines.append("bending stiffness is not known for all components: these are taken as not buckled")
+        yield "bending stiffness is not known for all components: these are taken as not buckled"
     if solved.helical.any():
         change = float(solved.tension[-1, -1] - soft.tension[-1, -1])
         length = solved.chain.length[solved.helical].sum()
-        lines.append(
+        yield (
             f"helically buckled over {length:.4g} m: the wall force of the helix changes the hook load of the soft "
             f"string by {change:+.4g} N"
         )
     elif asked == "auto":
-        lines.append("no helical buckling")
-    for what, unit, parts, scale in zip(("hook load", "surface torque"), ("N", "N m"), left_out, scales, strict=True):
-        share = parts.total / scale if scale > 0 else 0.0
-        if share <= 1e-9:
-            continue
-        of = ", ".join(f"{name} {value:.3g}" for name, value in parts._asdict().items() if value > 1e-3 * parts.total)
-        lines.append(f"{what}: the rod in contact may differ by {parts.total:.3g} {unit}, {share:.1e} ({of})")
-        if share > tol:
-            lines.append(
-                f"NOT ENOUGH for tol = {tol:g} in the {what}: it needs the exact rod in contact, which is stiff and "
-                "has a clearance"
+        yield "no helical buckling"
+    for what, unit, parts, share in _shares(left_out, scales):
+        if share > 1e-9:
+            of = [f"{name} {value:.3g}" for name, value in parts._asdict().items() if value > 1e-3 * parts.total]
+            yield (
+                f"{what} of the {used} string: the rod in contact may differ by {parts.total:.3g} {unit}, {share:.1e} "
+                f"({', '.join(of)})"
             )
-    return tuple(lines)
+
+
+def too_much(left_out, scales, tol):
+    """Names of the quantities for whose tolerance the soft string leaves out too much."""
+    return [what for what, _, _, share in _shares(left_out, scales) if share > tol]
+
+
+def _shares(left_out, scales):
+    for what, unit, parts, scale in zip(("hook load", "surface torque"), ("N", "N m"), left_out, scales, strict=True):
+        yield what, unit, parts, parts.total / scale if scale > 0 else 0.0

@@ -10,16 +10,14 @@ from cosserat_fenicsx.ranks import on_first, world
 from cosserat_fenicsx.results.tables import as_text
 from cosserat_fenicsx.well import criteria
 
-_STATES = ("straight", "sinusoidal", "helical")
-
 
 def answer_table(answer):
     """Text: the state along the string, surface loads, and what decided for the model."""
     path, operation = answer.hole.path, answer.operation
     table = Table(
-        title=f"{operation.name}, bit at {answer.depth:g} m, {answer.model} string",
+        title=f"{operation.name}, bit at {answer.depth:g} m, {answer.words}",
         caption="md, inclination: of the hole. tension: effective. side force: of the wall, per length.\n"
-        "moment: EI times the hole's curvature. state: buckling.",
+        f"moment: {answer.moment_words}. state: buckling, by criteria.",
     )
     for heading in ("md (m)", "component", "inclination (deg)", "tension (kN)", "torque (kN m)", "side force (N/m)",
                     "moment (N m)", "von Mises (MPa)", "state"):  # fmt: skip
@@ -30,7 +28,8 @@ def answer_table(answer):
         table.add_row(
             f"{answer.md[i]:.6g}", part.name, f"{math.degrees(path.inclination_at(answer.md[i])):.2f}",
             f"{answer.tension[i] / 1e3:.3f}", f"{answer.torque[i] / 1e3:.3f}", f"{answer.side_force[i]:.1f}",
-            _known(answer.bending_moment[i], 1, ".0f"), _known(answer.von_mises[i], 1e-6, ".1f"), _STATES[states[i]],
+            _known(answer.bending_moment[i], 1, ".0f"), _known(answer.von_mises[i], 1e-6, ".1f"),
+            criteria.STATES[states[i]],
         )  # fmt: skip
     return "\n".join([as_text(table), *summary(answer)])
 
@@ -61,11 +60,18 @@ def summary(answer):
         lines.append(", ".join(more))
     if answer.hook_load < 0:
         lines.append("the string does not go down by its own weight: a negative hook load is a push at the surface")
+    at_points = [contact for contact in answer.contacts if contact[0] == contact[1]]
+    if at_points:
+        md, _, force, side = max(at_points, key=lambda contact: contact[2])
+        lines.append(
+            f"{len(at_points)} forces of the wall at points (contacts), the largest {force / 1e3:.3f} kN at {md:.5g} m "
+            f"({side} side)"
+        )
     states = answer.buckling
     for state in (criteria.SNAKE, criteria.HELIX):
         where = answer.md[states == state]
         if len(where):
-            lines.append(f"{_STATES[state]} buckling between {where.min():.5g} and {where.max():.5g} m")
+            lines.append(f"{criteria.STATES[state]} buckling between {where.min():.5g} and {where.max():.5g} m")
     lines.append(f"{answer.model}: {'; '.join(answer.why)}.")
     return lines
 
@@ -89,7 +95,7 @@ def write_answer(answer, file):
     lines = [",".join([*columns, "state", "component"])]
     for row, state, part in zip(rows, answer.buckling, answer.component, strict=True):
         numbers = ("" if math.isnan(x) else f"{x:.9g}" for x in row)
-        lines.append(",".join([*numbers, _STATES[state], names[part]]))
+        lines.append(",".join([*numbers, criteria.STATES[state], names[part]]))
     text = "\n".join(lines) + "\n"
     on_first(world(), lambda: Path(file).write_text(text, encoding="utf-8"))
 

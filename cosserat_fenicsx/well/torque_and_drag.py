@@ -1,22 +1,28 @@
 """Torque and drag of a string in its hole: the model is chosen, solved, and said why."""
 
+from dataclasses import replace
+
 from cosserat_fenicsx.checks import instance, number, refuse
-from cosserat_fenicsx.well.answer import TorqueAndDrag
-from cosserat_fenicsx.well.buckled import buckled_string
+from cosserat_fenicsx.errors import InstallationError, NotConverged, SceneError
+from cosserat_fenicsx.well.answer import TorqueAndDrag, scales_of, share
+from cosserat_fenicsx.well.buckled import LockUp, buckled_string
 from cosserat_fenicsx.well.hole import Borehole
-from cosserat_fenicsx.well.ladder import model_errors, reasons
+from cosserat_fenicsx.well.ladder import model_errors, reasons, too_much
 from cosserat_fenicsx.well.loaded import sections_of
 from cosserat_fenicsx.well.mud import Mud
 from cosserat_fenicsx.well.operations import Operation
 from cosserat_fenicsx.well.pieces import pieces_of
+from cosserat_fenicsx.well.rod_rung import rod_in_contact
 from cosserat_fenicsx.well.softstring import chain_of, soft_string
 from cosserat_fenicsx.well.string import DrillString
 
-SOFT, BUCKLED = "soft", "soft, buckled"
-MODELS = ("auto", SOFT, BUCKLED)
+AUTO, SOFT, BUCKLED, ROD = "auto", "soft", "soft, buckled", "rod"
+MODELS = (AUTO, SOFT, BUCKLED, ROD)
 CONVENTIONS = ("coulomb", "johancsik")
-# A torque below this share of the largest tension times the contact radius is nothing that errors are compared with.
-_LITTLE = 1e-2
+_NO_ROD = (
+    "the exact rod in contact is not tried: of the many equilibria of a string that is buckled beyond the load of a "
+    "helix it need not find the one that is there; model='rod' looks for one"
+)
 
 
 def torque_and_drag(
@@ -26,9 +32,10 @@ def torque_and_drag(
     *,
     mud: Mud | None = None,
     depth: float | None = None,
-    model: str = "auto",
+    model: str = AUTO,
     tol: float = 1e-4,
     torque_convention: str = "coulomb",
+    progress: bool | None = None,
 ) -> TorqueAndDrag:
     """Hook load, surface torque and the state along a string in its hole, at rest or in steady slow motion.
 
@@ -39,18 +46,22 @@ def torque_and_drag(
         mud: a `Mud`; None where all components have their weight in mud.
         depth: measured depth of the string's lower end, m; None for the bottom of the hole.
         model: "soft": a perfectly flexible string on the axis; "soft, buckled": with the wall force of a helix where
-            the compression exceeds its load; "auto": the first that suffices for `tol`, as far as there is one.
+            the compression exceeds its load; "rod": the exact rod in contact, which is stiff and has a clearance;
+            "auto": the first of these that suffices for `tol`, but not the rod where there is a helix, since it has
+            many equilibria there.
         tol: relative accuracy that is asked for, of hook load and surface torque.
         torque_convention: wall force of a pipe that rotates, from its load across the hole |q|: "coulomb", |q|/sqrt(1 +
             (e mu)^2) with e the share of the slip that is around it: part of the load is carried by friction, as on the
             rod in contact; "johancsik", |q|, the convention of most programs, which gives a torque 3 to 4 % higher.
+        progress: of the rod; True or False; None shows it in runs of more than two seconds.
 
     Returns:
-        a `TorqueAndDrag`; its `enough` is False where the accuracy asked for is beyond the model, and `why` says so.
+        a `TorqueAndDrag`. Its `enough` is False where the accuracy asked for is beyond the model, or where `model` is
+        "auto" and the rod could not be solved: the soft string's answer is then returned, and `why` says so.
 
     Raises:
-        SceneError: a string that does not fit the hole, missing mud, an unknown model, or a string that locks up (with
-            the place).
+        SceneError: a string that does not fit the hole, missing mud, an unknown model, a string that locks up (with the
+            place), or one that is no rod in contact where `model` is "rod".
         NotConverged: the tolerance was not reached.
     """
     for name, value, kind in (
@@ -68,23 +79,46 @@ def torque_and_drag(
     depth = hole.length if depth is None else number("torque_and_drag", "depth", depth, "a number (m)", lambda x: x > 0)
 
     pieces, laid = pieces_of(hole, string, operation, mud, depth)
+    given = hole, string, operation, mud, depth
+    flexible, why = _flexible(given, model, tol, torque_convention, pieces, laid)
+    if model in (SOFT, BUCKLED) or (model == AUTO and flexible.enough):
+        return flexible
+    if model == AUTO and flexible.model == BUCKLED:
+        return replace(flexible, why=(*flexible.why, _NO_ROD))
+    try:
+        return rod_in_contact(flexible, why, progress)
+    except (SceneError, NotConverged, InstallationError) as problem:
+        if model == ROD:
+            raise
+        failed = f"the exact rod in contact was tried, and not solved: {problem}"
+        return replace(flexible, why=(*flexible.why, failed))
+
+
+def _flexible(given, model, tol, torque_convention, pieces, laid):
+    """The `TorqueAndDrag` of the soft string, buckled where it is a helix and `model` is not "soft"; and sentences on
+    why it is not the answer where it is not."""
+    path, operation = given[0].path, given[2]
     sections = sections_of([place.component for place in laid])
-    chain = chain_of(pieces, torque_convention == "coulomb")
-    soft = soft_string(chain, -operation.weight, operation.torque, tol)
-    solved, used = soft, SOFT
+    soft = soft_string(chain_of(pieces, torque_convention == "coulomb"), -operation.weight, operation.torque, tol)
+    buckled, why = None, []
     if model != SOFT:
-        buckled = buckled_string(soft, pieces, sections, operation, tol)
-        if model == BUCKLED or buckled is not None:
-            solved, used = buckled or soft, BUCKLED
-    left_out = model_errors(hole.path, pieces, solved, sections)
-    scale = abs(solved.tension).max()
-    largest = max(abs(solved.torque).max(), _LITTLE * scale * pieces.radius.max())
-    error = max(_share(solved.error, scale), _share(solved.torque_error, largest))
-    model_error = max(_share(left_out[0].total, scale), _share(left_out[1].total, largest))
-    why = reasons(used, model, soft, solved, sections, left_out, (scale, largest), tol)
-    return TorqueAndDrag(hole, string, operation, mud, depth, used, tol, torque_convention, why, error, model_error,
-                         laid, pieces, solved)  # fmt: skip
-
-
-def _share(part, whole):
-    return float(part / whole) if whole > 0 else 0.0
+        try:
+            buckled = buckled_string(soft, pieces, sections, operation, tol)
+        except LockUp as stuck:
+            if model != ROD:
+                raise
+            why.append(f"WITH THE WALL FORCE OF A HELIX IT LOCKS UP: {stuck}")
+    solved, used = buckled or soft, BUCKLED if buckled or model == BUCKLED else SOFT
+    left_out, scales = model_errors(path, pieces, solved, sections), scales_of(solved, pieces)
+    error = max(map(share, (solved.error, solved.torque_error), scales))
+    model_error = max(share(parts.total, scale) for parts, scale in zip(left_out, scales, strict=True))
+    why = [*reasons(used, model, soft, solved, sections, left_out, scales), *why]
+    beyond = too_much(left_out, scales, tol - error)
+    told = [*why, *(f"NOT ENOUGH for tol = {tol:g} in the {what}" for what in beyond)]
+    if model == AUTO:
+        why.append(f"tol = {tol:g} is less in the {' and the '.join(beyond)}: it takes the exact rod in contact")
+    ends = [(x.tension[-1, -1], x.torque[-1, -1]) for x in (solved, soft)]
+    differences = {SOFT: tuple(float(a - b) for a, b in zip(*ends, strict=True))} if buckled else {}
+    answer = TorqueAndDrag(*given, used, tol, torque_convention, tuple(told), error, model_error, differences, laid,
+                           pieces, solved)  # fmt: skip
+    return answer, why
