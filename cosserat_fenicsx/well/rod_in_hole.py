@@ -1,6 +1,7 @@
 """The exact rod in its hole: a string of several sections, at rest against the hole's wall or slipping along it."""
 
 import contextlib
+import numbers
 
 import numpy as np
 from mpi4py import MPI
@@ -13,6 +14,7 @@ from cosserat_fenicsx.quaternions import product_conjugate
 from cosserat_fenicsx.results.accuracy import on_mesh
 from cosserat_fenicsx.results.path import Path
 from cosserat_fenicsx.results.records import Record
+from cosserat_fenicsx.statics.circulatory import conservative_along
 from cosserat_fenicsx.statics.settling import BACK, LAST, LAST_TWO, settle, stages_from
 from cosserat_fenicsx.statics.solvers import solvers_of
 from cosserat_fenicsx.well.in_hole import InHole
@@ -122,9 +124,9 @@ def _counts(elements):
     """Elements of the meshes in turn."""
     if elements is None:
         return [_FIRST * _FINER**k for k in range(1 + int(np.log2(_MOST / _FIRST)))]
-    if isinstance(elements, bool) or not isinstance(elements, int) or elements < 1:
+    if isinstance(elements, bool) or not isinstance(elements, numbers.Integral) or elements < 1:
         refuse("solve_in_hole", "elements", elements, "a whole number above zero")
-    return [max(1, elements // _BEFORE), elements]
+    return [max(1, int(elements) // _BEFORE), int(elements)]
 
 
 def _finer(string, count, degree, before, tol, bar, comm):
@@ -196,7 +198,8 @@ def _on_mesh(string, layout, degree, stages, start, before, bar, comm):
                        careful=[len(stages) - 2], on_stage=on_stage)  # fmt: skip
         answers = []
         for record in (*softer, _record(problem, steps, _negative_modes(string, problem, stability))):
-            path = Path.of(model, [f"{string.words}; {model.signature.formulation.words}"])
+            why = [f"{string.words}; {model.signature.formulation.words}"]
+            path = Path.of(model, why, conservative_along)
             path.append(record)
             answers.append(InHole(string, path))
     answer = answers[-1]
