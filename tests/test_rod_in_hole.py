@@ -4,6 +4,7 @@ The numbers in reference/rod_in_hole.json are of strong forms without any mesh: 
 are shot, and whose points of contact are solved for.
 """
 
+import itertools
 import json
 import math
 from pathlib import Path
@@ -13,6 +14,9 @@ import pytest
 
 import cosserat_fenicsx as cf
 from cosserat_fenicsx.actions.tube_wall import TubeRing, TubeWall
+from cosserat_fenicsx.models.rodmesh import Layout
+from cosserat_fenicsx.statics.settling import settle, stages_from
+from cosserat_fenicsx.statics.solvers import solvers_of
 from cosserat_fenicsx.well.rod_in_hole import on_axis, solve_in_hole
 
 pytestmark = pytest.mark.few_ranks
@@ -196,3 +200,32 @@ def test_walls_refuse_what_has_no_axis():
     path = cf.WellPath.from_survey([0, 20], [0, 0], [0, 0])
     with pytest.raises(cf.SceneError, match="contact_radius"):
         TubeRing(rod.end, path, 0.01, 0.0)
+
+
+def test_a_string_of_several_rods_is_the_same():
+    path, length, weight = cf.WellPath.from_survey([0, 60, 140, 260], [20, 20, 60, 60], [0, 0, 40, 40]), 200.0, 241.13
+    pipe = cf.Stiffness((1.35e8, 1.35e8), math.inf, (1228200.0, 1228200.0), 1.2282e10)
+    start, down, lines = path.position(0.0), path.tangent(0.0), []
+    for ends in ([0.0, length], [0.0, 75.0, length]):
+        rods = [cf.Rod(cf.Line(start + a * down, start + b * down), pipe) for a, b in itertools.pairwise(ends)]
+        walls = [
+            TubeWall(rod, path, 0.108, 0.0635, friction=0.2, slip=(0.6, 0.8), begins=a)
+            for rod, a in zip(rods, ends, strict=False)
+        ]
+        pull = cf.Force(rods[-1].end, 5e4 * path.tangent(length))
+        loads = [*(cf.LineForce(rod, (0, 0, weight)) for rod in rods), pull, *walls]
+        joints = [cf.Joint(a.end, b.start) for a, b in itertools.pairwise(rods)]
+        scene = cf.Scene(rods, [cf.Clamp(rods[0].start)], loads, joints=joints)
+        layout = Layout(tuple(np.linspace(0, 1, round(0.4 * rod.length) + 1) for rod in rods))
+        with solvers_of(scene, layout, degree=3) as (problem, _, _):
+            model = problem.model
+            problem.set_load_factor(1.0)
+            places = zip(rods, ends, layout.node_s(model.nodes), strict=False)
+            rq = np.concatenate([on_axis(rods[0], path, a + x * rod.length) for rod, a, x in places])
+            rq[:, :3] = (rq[:, :3] - start) / model.scales.length
+            problem.begin_at(model.unknowns_of(rq), np.zeros((80, 3, 3)), np.empty(0))
+            stages = [wall.stage for wall in walls]
+            settle(problem, stages, 0.0445 / model.scales.length, 1e-2 / model.scales.force, stages_from(1e-5))
+            found = model.snapshot()[0][:, :3] * model.scales.length + start
+        lines.append(np.delete(found, 91, axis=0) if len(rods) > 1 else found)
+    assert np.abs(lines[0] - lines[1]).max() < 1e-9

@@ -77,7 +77,7 @@ def settle(problem, walls, clearance, rounding, stages, careful=(), on_stage=Non
     newton = LimitedNewton(problem, max(_LONGEST * clearance, _OF_LENGTH), _WIDEST)
     for k, (stiffness, spring, viscous) in enumerate(stages):
         for wall in walls:
-            wall.wall, wall.spring = stiffness, spring
+            wall.wall, wall.spring, wall.anchor = stiffness, spring, None
         last = k == len(stages) - 1
         share = _ENOUGH if last else _CAREFUL if k in careful else _ROUGH
         name = f"stage {k + 1} of {len(stages)} of the start"
@@ -129,5 +129,3 @@ def _relax(newton, walls, spring, clearance, name):
         viscosity = min(max(change * viscosity, _BOUNDS[0] * spring), _BOUNDS[1] * spring)
     else:
         raise NotConverged(f"the rod has not come to rest in {name}")
-    for wall in walls:
-        wall.anchor = None

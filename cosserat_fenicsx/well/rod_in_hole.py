@@ -1,6 +1,7 @@
 """The exact rod in its hole: a string of several sections, at rest against the hole's wall or slipping along it."""
 
 import contextlib
+import numbers
 
 import numpy as np
 from mpi4py import MPI
@@ -13,6 +14,7 @@ from cosserat_fenicsx.quaternions import product_conjugate
 from cosserat_fenicsx.results.accuracy import on_mesh
 from cosserat_fenicsx.results.path import Path
 from cosserat_fenicsx.results.records import Record
+from cosserat_fenicsx.statics.circulatory import conservative_along
 from cosserat_fenicsx.statics.settling import BACK, LAST, LAST_TWO, settle, stages_from
 from cosserat_fenicsx.statics.solvers import solvers_of
 from cosserat_fenicsx.well.in_hole import InHole
@@ -122,22 +124,24 @@ def _counts(elements):
     """Elements of the meshes in turn."""
     if elements is None:
         return [_FIRST * _FINER**k for k in range(1 + int(np.log2(_MOST / _FIRST)))]
-    if isinstance(elements, bool) or not isinstance(elements, int) or elements < 1:
+    if isinstance(elements, bool) or not isinstance(elements, numbers.Integral) or elements < 1:
         refuse("solve_in_hole", "elements", elements, "a whole number above zero")
-    return [max(1, elements // _BEFORE), elements]
+    return [max(1, int(elements) // _BEFORE), int(elements)]
 
 
 def _finer(string, count, degree, before, tol, bar, comm):
     """The `InHole` on a mesh of so many elements, from that on the mesh before, or from the start in stages."""
     if before is not None:
-        layout = before.path.layout.resized(string.scene, [_wanted(before, count)])
+        layout = _divided(string, before.path.layout, _wanted(before), count)
         for stages in (LAST if before.of_stiffness <= _KNOWN * tol else LAST_TWO, BACK):
             with contextlib.suppress(NotConverged):  # the contact on the coarse mesh may be too far off
                 return _on_mesh(string, layout, degree, stages, before, before, bar, comm)
+    pieces = Layout.of(string.scene, 1)
+    layout = _divided(string, pieces, np.diff(pieces.breaks[0]), count)
     for way in _STARTS:
         try:
             stages = stages_from(string.spring, way)
-            return _on_mesh(string, Layout.of(string.scene, count), degree, stages, None, before, bar, comm)
+            return _on_mesh(string, layout, degree, stages, None, before, bar, comm)
         except NotConverged as failed:
             reason = failed
     raise NotConverged(
@@ -146,14 +150,31 @@ def _finer(string, count, degree, before, tol, bar, comm):
     )
 
 
-def _wanted(answer, count):
-    """(elements,) into how many parts the elements of a mesh are divided: more where the pressure changes."""
+def _wanted(answer):
+    """(elements,) density of elements on a finer mesh: larger where the pressure changes."""
     h, p = np.diff(answer.path.layout.breaks[0]), answer.element_pressures
     change = p.max(axis=1) - p.min(axis=1)
     change = np.maximum(change, np.maximum(np.append(change[1:], 0.0), np.append(0.0, change[:-1])))
     usual = np.median(p[p > 0]) if (p > 0).any() else 1.0
-    wanted = h * np.clip(np.sqrt(change / usual), _FEWEST, _DENSEST)
-    return wanted * count / wanted.sum()
+    return h * np.clip(np.sqrt(change / usual), _FEWEST, _DENSEST)
+
+
+def _divided(string, layout, wanted, count):
+    """The layout of exactly `count` elements, or one a piece, with the density `wanted` on the elements of another.
+
+    The number does not depend on the string, so that strings of any length share compiled problems.
+    """
+    breaks, pieces = layout.breaks[0], layout.pieces(string.scene)[0]
+    shares = np.array([wanted[piece].sum() for piece in pieces])
+    shares *= max(count - len(pieces), 0) / shares.sum()
+    counts = 1 + shares.astype(int)
+    counts[np.argsort(counts - shares)[: max(count - counts.sum(), 0)]] += 1
+    found = []
+    for piece, parts in zip(pieces, counts, strict=True):
+        so_far = np.append(0.0, np.cumsum(wanted[piece]))
+        ends = np.interp(np.linspace(0.0, so_far[-1], parts + 1), so_far, breaks[piece.start : piece.stop + 1])
+        found.append(ends[:-1])
+    return Layout((np.append(np.concatenate(found), 1.0),))
 
 
 def _on_mesh(string, layout, degree, stages, start, before, bar, comm):
@@ -177,7 +198,8 @@ def _on_mesh(string, layout, degree, stages, start, before, bar, comm):
                        careful=[len(stages) - 2], on_stage=on_stage)  # fmt: skip
         answers = []
         for record in (*softer, _record(problem, steps, _negative_modes(string, problem, stability))):
-            path = Path.of(model, [f"{string.words}; {model.signature.formulation.words}"])
+            why = [f"{string.words}; {model.signature.formulation.words}"]
+            path = Path.of(model, why, conservative_along)
             path.append(record)
             answers.append(InHole(string, path))
     answer = answers[-1]

@@ -16,8 +16,8 @@ from cosserat_fenicsx.scene.scene import Scene
 from cosserat_fenicsx.scene.sections import Stiffness
 from cosserat_fenicsx.scene.supports import Clamp, Hinge
 
-# Torsional stiffness of round sections over the true one: torsion winds a long string up by many turns, which changes
-# nothing else of it, but Newton's method fails on the way. The twist is computed from the torque afterwards.
+# Torsional stiffness of round sections over that of bending: torsion winds a long string up by many turns, which
+# changes nothing else of it, but Newton's method fails on the way. The twist is computed from the torque afterwards.
 _STIFFER = 1e4
 # Stiffness of the wall at a ring (N/m) over that along the string (N/m^2): a ring digs in less.
 _OF_RINGS = 100.0
@@ -141,7 +141,7 @@ def _in_place(section, extensible):
     if section.matrix is not None:
         return section
     held = section if extensible else replace(section, axial=math.inf)
-    return replace(held, torsion=_STIFFER * section.torsion) if is_round(section) else held
+    return replace(held, torsion=max(section.torsion, _STIFFER * section.bending[0])) if is_round(section) else held
 
 
 def is_round(section):
