@@ -36,7 +36,7 @@ def test_what_a_file_says():
     assert scene.mud == cf.Mud(10.2 * cf.units.ppg)
     assert scene.string.components[1] == cf.Collar(90.0, "NC46-65") and len(scene.sweep["depths"]) == 20
     assert scene.operations[2].torque == pytest.approx(3500 * cf.units.ft_lbf) and scene.operations[2].weight == 80e3
-    by_hand = cf.torque_and_drag(scene.hole, scene.string, cf.TripOut(), mud=scene.mud)
+    by_hand = cf.torque_and_drag(scene.hole, scene.string, cf.TripOut(), mud=scene.mud, **scene.settings)
     assert scene.answers()[0].hook_load == by_hand.hook_load
 
 

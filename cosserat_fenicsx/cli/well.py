@@ -48,7 +48,8 @@ def run_well(options):
     if scene.title:
         say(scene.title, file=sys.stdout)
     written = []
-    for answer, stem in zip(scene.answers(), _stems(scene.operations), strict=True):
+    for operation, stem in zip(scene.operations, _stems(scene.operations), strict=True):
+        answer = scene.answer(operation)
         say(str(answer), file=sys.stdout)
         if out is not None:
             written += _write(answer, out, stem, not options.no_picture)

@@ -32,7 +32,7 @@ torque = 5000.0
 [torque_and_drag]                # optional: depth, model, tol, torque_convention
 depth = 3438.0
 
-[depth_sweep]                    # optional: depths, or from, to and count; friction
+[depth_sweep]                    # optional: depths, or from, to and count; friction; model, tol other than above
 from = 300.0
 to = 3438.0
 count = 20
@@ -73,6 +73,7 @@ _DIMENSIONS = {
     "mass": "mass per length", "speed": "speed", "rpm": "rotation", "wall_stiffness": "pressure", "E": "pressure",
 }  # fmt: skip
 _SETTINGS = ("depth", "model", "tol", "torque_convention")
+_OF_SWEEPS = ("friction", "model", "tol")
 
 
 @dataclass(frozen=True)
@@ -93,17 +94,22 @@ class WellScene:
     settings: dict[str, Any] = field(default_factory=dict)
     sweep: dict[str, Any] = field(default_factory=dict)
 
+    def answer(self, operation: Operation) -> TorqueAndDrag:
+        """The answer of `torque_and_drag` for an operation."""
+        return torque_and_drag(self.hole, self.string, operation, mud=self.mud, **self.settings)
+
     def answers(self) -> list[TorqueAndDrag]:
         """The answers of `torque_and_drag`, one an operation."""
-        return [torque_and_drag(self.hole, self.string, operation, mud=self.mud, **self.settings)
-                for operation in self.operations]  # fmt: skip
+        return [self.answer(operation) for operation in self.operations]
 
     def depth_sweep(self, file: File | None = None) -> DepthSweep | None:
         """The sweep over depths that the file asks for, else None; `file`: see `depth_sweep`."""
         if not self.sweep:
             return None
         settings = {name: value for name, value in self.settings.items() if name != "depth"}
-        return depth_sweep(self.hole, self.string, self.operations, mud=self.mud, file=file, **settings, **self.sweep)
+        return depth_sweep(
+            self.hole, self.string, self.operations, mud=self.mud, file=file, **{**settings, **self.sweep}
+        )
 
 
 def read_well(file: File) -> WellScene:
@@ -169,7 +175,7 @@ def _hole(well, folder):
 
 
 def _sweep(given):
-    known_keys("[depth_sweep]", given, ("depths", "from", "to", "count", "friction"))
+    known_keys("[depth_sweep]", given, ("depths", "from", "to", "count", *_OF_SWEEPS))
     if "depths" in given:
         depths = [in_si(f"depth_sweep.depths[{i}]", x, "length") for i, x in enumerate(given["depths"])]
     else:
@@ -180,7 +186,7 @@ def _sweep(given):
         if not isinstance(count, int) or isinstance(count, bool) or count < 1:
             raise SceneError(f"depth_sweep.count = {count!r}: expected how many depths")
         depths = np.linspace(*(in_si(f"depth_sweep.{name}", given[name], "length") for name in ("from", "to")), count)
-    return {"depths": depths, **{name: given[name] for name in ("friction",) if name in given}}
+    return {"depths": depths, **{name: given[name] for name in _OF_SWEEPS if name in given}}
 
 
 def _made(where, entry, classes):
