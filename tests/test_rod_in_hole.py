@@ -15,6 +15,7 @@ import pytest
 import cosserat_fenicsx as cf
 from cosserat_fenicsx.actions.tube_wall import TubeRing, TubeWall
 from cosserat_fenicsx.models.rodmesh import Layout
+from cosserat_fenicsx.models.traits import found_traits, traits_of
 from cosserat_fenicsx.statics.settling import settle, stages_from
 from cosserat_fenicsx.statics.solvers import solvers_of
 from cosserat_fenicsx.well.rod_in_hole import on_axis, solve_in_hole
@@ -191,6 +192,13 @@ def test_refusals(arguments, word):
     given = {"lengths": [400], "stiffness": PIPE, "weight": 241.13, "contact_radius": 0.0635, "radius": 0.108}
     with pytest.raises(cf.SceneError, match=word.replace("(", r"\(")):
         solve_in_hole(path, **{**given, **arguments})
+
+
+@pytest.mark.slow
+def test_what_walls_tell_of_their_work_is_true():
+    rod = cf.Rod(cf.Line((0, 0, 0), (0, 0, 10)), PIPE)
+    wall = TubeWall(rod, cf.WellPath.from_survey([0, 20], [0, 0], [0, 0]), 0.1, 0.05)
+    assert found_traits(wall, [rod]) == traits_of(wall, [rod])
 
 
 def test_walls_refuse_what_has_no_axis():
