@@ -150,6 +150,19 @@ def test_whole_wells(name, way):
         assert answer.surface_torque == pytest.approx(15290.84, rel=6e-3)
 
 
+def test_drilling_with_weight_on_a_centred_bit():
+    """The soft string's hook load and torque are 661 189 N and 9548 N m; the clearance takes 3.4 % of the torque."""
+    path = cf.WellPath.from_survey(*np.transpose(WELLS["F-12"]["stations_md_inc_azi"]))
+    answer = solve_in_hole(
+        path, [path.length], PIPE, 241.13, 0.0635, radius=0.0635 + 0.04445, friction=0.25, slip=SLIP["turning"],
+        bottom_tension=-8e4, bottom_torque=5e3, rings=[(path.length, 0.0, 0.1)],
+    )  # fmt: skip
+    assert answer.hook_load == pytest.approx(661189.3, rel=5e-5)
+    assert answer.surface_torque == pytest.approx(5000 + 9547.85 * 0.966, rel=2e-3)
+    assert answer.tension[-1] == pytest.approx(-8e4, rel=2e-4)  # along the string, which tilts there
+    assert answer.distance[-1] < 1e-5 and answer.negative_modes == 0 and answer.error < 1e-4
+
+
 def test_two_sections_two_frictions_and_rings():
     path = cf.WellPath.from_survey(*np.transpose(WELLS["P"]["stations_md_inc_azi"]))
     collar = cf.Stiffness((1e9, 1e9), 5e9, (2e7, 2e7), 1.5e7)
