@@ -36,6 +36,7 @@ class _Confined:
     """What walls along rods and at stations share."""
 
     scaled, work = False, staticmethod(wall_work)
+    traits = {"dead": False, "known_force": False, "rates": False, "turns": True, "flat": False}
 
     def _check(self, unit):
         if not callable(getattr(self.path, "nearest", None)):

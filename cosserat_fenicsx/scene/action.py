@@ -84,9 +84,10 @@ class Action:
         memory: internal variables, kept from one accepted state to the next: a `Datum` each, its initial value, passed
             to `work` after `data`.
         evolve: a static method ``(point, *data, *memory)`` -> a list of UFL expressions, the new values of the memory.
+        traits: None; or a dict of the fields of `models.traits.Traits`, where it takes long to find them from `work`.
     """
 
-    at_nodes, scaled, permanent, follows, memory, evolve = False, True, False, False, (), None
+    at_nodes, scaled, permanent, follows, memory, evolve, traits = False, True, False, False, (), None, None
 
     def acts_on(self, rod):
         """Whether it acts along a rod."""

@@ -19,8 +19,9 @@ from cosserat_fenicsx.scene.supports import Clamp, Hinge
 # Torsional stiffness of round sections over that of bending: torsion winds a long string up by many turns, which
 # changes nothing else of it, but Newton's method fails on the way. The twist is computed from the torque afterwards.
 _STIFFER = 1e4
-# Stiffness of the wall at a ring (N/m) over that along the string (N/m^2): a ring digs in less.
-_OF_RINGS = 100.0
+# Stiffness of the wall at a ring (N/m) over that along the string (N/m^2), since a ring digs in less; but where it is
+# larger than that, not more than so many EI/L^3, for rounding.
+_OF_RINGS, _STIFFEST = 100.0, 1e13
 # Points at which the load across the hole is sampled, the part of them that it is not larger at, and its smallest value
 # over the weight.
 _SAMPLES, _TYPICAL, _LEAST = 257, 0.9, 0.1
@@ -115,8 +116,10 @@ def string_in(path, lengths, stiffness, weight, contact_radius, radius, friction
     loads = [LineForce(rod, down)]
     loads += [Force(rod.end, tuple(pull * t))] if pull else []
     loads += [Moment(rod.end, tuple(-torque * t))] if torque else []
+    stiffest = _STIFFEST * max(bending_of(section) for section in sections) / length**3
+    ring_stiffness = min(_OF_RINGS * wall.stiffness, max(wall.stiffness, stiffest))
     around = tuple(
-        TubeRing(rod.at(s), path, clearance, ring_radius, _OF_RINGS * wall_stiffness, *_friction_at(wall, s))
+        TubeRing(rod.at(s), path, clearance, ring_radius, ring_stiffness, *_friction_at(wall, s))
         for s, clearance, ring_radius in rings
     )
     support = Clamp(rod.start) if hinge is None else Hinge(rod.start, hinge)
