@@ -105,6 +105,15 @@ def test_the_state_along_the_string():
     assert shallow.md[-1] == 800.0 and shallow.hook_load < out.hook_load
 
 
+@pytest.mark.parametrize(("weight", "where"), [(200e3, 1800.0), (100e3, 1900.0), (123.4e3, 1876.6), (450e3, 800.0)])
+def test_neutral_point_on_a_joint_and_on_a_point_of_the_answer(weight, where):
+    """Tension that vanishes where the string is cut, in the middle of a piece, and between."""
+    collars = cf.Component(200.0, weight=1000.0, contact_radius=0.08)
+    string = cf.DrillString([collars, cf.Component(weight=250.0, contact_radius=0.0635)])
+    answer = cf.torque_and_drag(vertical(2000.0), string, cf.RotaryDrilling(weight, 0.0))
+    assert answer.neutral_points == pytest.approx([where], rel=1e-12)
+
+
 def test_auto_says_what_the_soft_string_leaves_out():
     answer = drag(cf.TripOut(), model="auto", tol=1e-4)
     assert answer.model == "soft" and not answer.enough and any("NOT ENOUGH" in line for line in answer.why)
