@@ -147,6 +147,7 @@ def test_auto_says_what_the_soft_string_leaves_out():
         (lambda: cf.Ream(0.1, 0), "Ream.rpm = 0"),
         (lambda: cf.RotaryDrilling(math.nan, 0), "RotaryDrilling.weight"),
         (lambda: drag(cf.TripOut(), mud=None), "mud = None: expected Mud"),
+        (lambda: drag(cf.TripOut(), depth=2500.004), "depth = 2500.004 m"),
         (lambda: drag(cf.TripOut(), depth=2600), "hole, which ends at 2500 m"),
         (lambda: drag(cf.TripOut(), depth=100), "above the surface at the depth 100 m"),
         (
@@ -157,7 +158,7 @@ def test_auto_says_what_the_soft_string_leaves_out():
         (lambda: drag(cf.TripOut(), hole=cf.Borehole(PATH, cf.HoleSection(2500, 0.15, 0))), "bit: 0.2159 m wide"),
         (lambda: drag(cf.TripOut(), model="rod?"), "torque_and_drag.model = 'rod.'"),
         (lambda: drag(cf.TripOut(), torque_convention="none"), "'coulomb' or 'johancsik'"),
-        (lambda: drag(cf.TripOut), "expected a Operation"),
+        (lambda: drag(cf.TripOut), r"expected an operation, such as TripOut\(\)"),
         (lambda: drag(cf.TripOut(), tol=0), "tol = 0"),
         (lambda: drag(cf.TripOut()).critical_load("Euler"), "He-Kyllingstad or Lubinski"),
     ],
