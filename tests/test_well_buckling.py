@@ -105,3 +105,14 @@ def test_auto_takes_the_first_rung_without_helices():
     assert any("the exact rod in contact is not tried" in line for line in helix.why)
     before, after = (pushed(case, 500.0, 400e3, model=name).hook_load for name in ("soft", "soft, buckled"))
     assert helix.differences["soft"][0] == after - before
+
+
+def test_buckled_stretches_are_told_apart():
+    """A string that is a helix above and below a bend, whose wall force holds it straight."""
+    path = cf.WellPath.from_survey([0, 1500, 1800, 3300], [90, 90, 30, 30], [0, 0, 0, 0])
+    hole = cf.Borehole(path, [cf.HoleSection(3300, 0.21, 0.0)])
+    pipe = cf.Component(None, cf.Stiffness((1e9, 1e9), 2.6e9, (2063790.0, 2063790.0), 1.59e6), 1.0, 0.064)
+    answer = cf.torque_and_drag(hole, cf.DrillString([pipe]), cf.Sliding(60e3), model="auto")
+    states = answer.buckling[(answer.md > 1600) & (answer.md < 1700)]
+    assert (states == 0).all() and answer.buckling[0] == answer.buckling[-1] == 2
+    assert "helical buckling at md = 0 to 1500, 1800 to 3300 m" in str(answer)

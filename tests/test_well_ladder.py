@@ -58,3 +58,16 @@ def test_torque_of_rotating_strings_is_covered():
     """The rod in contact gives 0.54 and 3.4 % less torque than the soft string by Coulomb's law."""
     for name, less in (("P", 0.0054), ("F-12", 0.034)):
         assert less <= soft(well(name), 0.04445, cf.RotateOffBottom(), 0.25).model_error < 4 * less
+
+
+def test_a_snake_that_is_a_small_part_of_a_piece():
+    """Above the helix of a vertical string: mu times half the wall force of a helix, by hand."""
+    EI, weight, radius, friction = 1228200.0, 241.13, 0.0635, 0.3
+    stiffness = cf.Stiffness((1e9, 1e9), 7e8, (EI, EI), 9.4e5)
+    path = cf.WellPath.from_survey([0, 3000], [0, 0], [0, 0])
+    hole = cf.Borehole(path, [cf.HoleSection(3000, 0.2159, friction)])
+    string = cf.DrillString([cf.Component(None, stiffness, weight, radius)])
+    answer = cf.torque_and_drag(hole, string, cf.Sliding(60e3))
+    most, least = (factor * math.cbrt(EI * weight**2) for factor in (5.55, 1.94))
+    snake = friction * (0.10795 - radius) * (most**3 - least**3) / (24 * EI * weight)
+    assert answer.helical.any() and answer.model_error * 662.6e3 == pytest.approx(snake, rel=0.05)

@@ -105,6 +105,15 @@ def test_the_state_along_the_string():
     assert shallow.md[-1] == 800.0 and shallow.hook_load < out.hook_load
 
 
+@pytest.mark.parametrize(("weight", "where"), [(200e3, 1800.0), (100e3, 1900.0), (123.4e3, 1876.6), (450e3, 800.0)])
+def test_neutral_point_on_a_joint_and_on_a_point_of_the_answer(weight, where):
+    """Tension that vanishes where the string is cut, in the middle of a piece, and between."""
+    collars = cf.Component(200.0, weight=1000.0, contact_radius=0.08)
+    string = cf.DrillString([collars, cf.Component(weight=250.0, contact_radius=0.0635)])
+    answer = cf.torque_and_drag(vertical(2000.0), string, cf.RotaryDrilling(weight, 0.0))
+    assert answer.neutral_points == pytest.approx([where], rel=1e-12)
+
+
 def test_the_soft_string_says_what_it_leaves_out():
     answer = drag(cf.TripOut(), tol=1e-4)
     assert not answer.enough and any("NOT ENOUGH" in line for line in answer.why)
@@ -138,6 +147,7 @@ def test_the_soft_string_says_what_it_leaves_out():
         (lambda: cf.Ream(0.1, 0), "Ream.rpm = 0"),
         (lambda: cf.RotaryDrilling(math.nan, 0), "RotaryDrilling.weight"),
         (lambda: drag(cf.TripOut(), mud=None), "mud = None: expected Mud"),
+        (lambda: drag(cf.TripOut(), depth=2500.004), "depth = 2500.004 m"),
         (lambda: drag(cf.TripOut(), depth=2600), "hole, which ends at 2500 m"),
         (lambda: drag(cf.TripOut(), depth=100), "above the surface at the depth 100 m"),
         (
@@ -148,7 +158,7 @@ def test_the_soft_string_says_what_it_leaves_out():
         (lambda: drag(cf.TripOut(), hole=cf.Borehole(PATH, cf.HoleSection(2500, 0.15, 0))), "bit: 0.2159 m wide"),
         (lambda: drag(cf.TripOut(), model="rod?"), "torque_and_drag.model = 'rod.'"),
         (lambda: drag(cf.TripOut(), torque_convention="none"), "'coulomb' or 'johancsik'"),
-        (lambda: drag(cf.TripOut), "expected a Operation"),
+        (lambda: drag(cf.TripOut), r"expected an operation, such as TripOut\(\)"),
         (lambda: drag(cf.TripOut(), tol=0), "tol = 0"),
         (lambda: drag(cf.TripOut()).critical_load("Euler"), "He-Kyllingstad or Lubinski"),
     ],

@@ -228,9 +228,12 @@ class TorqueAndDrag:
     def neutral_points(self) -> np.ndarray:
         """Measured depths where the effective tension changes its sign, m, from the surface down."""
         T, md = self.tension, self.md
-        T = np.where(np.abs(T) > 1e-12 * np.abs(T).max(), T, 0.0)  # rounding
-        i = np.flatnonzero(T[:-1] * T[1:] < 0)
-        return md[i] + (md[i + 1] - md[i]) * T[i] / (T[i] - T[i + 1])
+        # rounding may leave something where T vanishes at a point: the crossing is there, between its neighbours
+        i = np.flatnonzero(np.abs(T) > 1e-12 * np.abs(T).max())
+        crosses = T[i[:-1]] * T[i[1:]] < 0
+        above, below = i[:-1][crosses], i[1:][crosses]
+        between = md[above] + (md[below] - md[above]) * T[above] / (T[above] - T[below])
+        return np.where(below > above + 1, md[np.minimum(above + 1, len(md) - 1)], between)
 
     @property
     def neutral_point(self) -> float:
@@ -258,9 +261,8 @@ class TorqueAndDrag:
 
     def _loads(self):
         """Curvature, and weight along normal and binormal, at `md`."""
-        k, weight, t, n, b, bottom = (
-            self._of_piece(getattr(self.pieces, name)) for name in ("curvature", "weight", "t", "n", "b", "bottom")
-        )
+        names = "curvature", "weight", "t", "n", "b", "bottom"
+        k, weight, t, n, b, bottom = (self._of_piece(getattr(self.pieces, name)) for name in names)
         angle = k * (bottom - self.md)
         return k, weight * (n * np.cos(angle) + t * np.sin(angle)), weight * b
 

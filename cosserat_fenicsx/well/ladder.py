@@ -19,6 +19,9 @@ import numpy as np
 
 from cosserat_fenicsx.well import criteria
 
+# Places on a piece where a snake is looked for.
+_FINE = 512
+
 
 class ModelError(NamedTuple):
     """What the soft string leaves out, in hook load (N), or in surface torque (N m) where it rotates."""
@@ -38,7 +41,7 @@ def model_errors(path, pieces, solved, sections):
     Args:
         path: a `WellPath`; pieces, solved: see `softstring`; sections: `Sections` of the components.
     """
-    chain, middle = solved.chain, len(solved.at) // 2
+    chain = solved.chain
     groups = np.flatnonzero(np.diff(chain.origin, prepend=-1))  # the first part of each piece, from below
     load, turn, EI = np.abs(chain.drag), chain.turn, np.nan_to_num(sections.EI[pieces.component[chain.origin]])
     clearance = (pieces.hole - pieces.radius)[chain.origin]
@@ -47,14 +50,22 @@ def model_errors(path, pieces, solved, sections):
     jumps, stiffer = _jumps(path, pieces, solved.tension[groups[1:], 0], EI[groups])
     missed[groups[1:]] += jumps
     stiff[groups[1:]] = stiffer
-    F = np.maximum(-solved.tension[:, middle], 0.0)
-    side = np.hypot(chain.curvature * -F + chain.weight * chain.n, chain.weight * chain.b)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        snakes = (F > criteria.snake_load(EI, clearance, chain.weight, side)) & (clearance > 1e-9) & ~solved.helical
-        extra = np.where(snakes & (EI > 0), criteria.helix_side(EI, clearance, F) / 2 * chain.length, 0.0)
+    extra = _snakes(chain, solved, EI, clearance)
     hook, torque = ([float(share @ part) for part in (missed, stiff, extra)] for share in (load, turn))
     hook[0] += _lower(pieces)
     return ModelError(*hook), ModelError(*torque)
+
+
+def _snakes(chain, solved, EI, clearance):
+    """Half the wall force (N) of a helix, of the snakes in pieces; a snake may be a small part of a long piece."""
+    extra = np.zeros(len(EI))
+    fine = (np.arange(_FINE) + 0.5) / _FINE
+    for i in np.flatnonzero((solved.tension.min(axis=1) < 0) & ~solved.helical & (clearance > 1e-9) & (EI > 0)):
+        F = np.maximum(-np.interp(fine, solved.at, solved.tension[i]), 0.0)
+        side = np.interp(fine, solved.at, solved.side[i]) * chain.climb[i]
+        snakes = F > criteria.snake_load(EI[i], clearance[i], chain.weight[i], side)
+        extra[i] = np.mean(np.where(snakes, criteria.helix_side(EI[i], clearance[i], F) / 2, 0.0)) * chain.length[i]
+    return extra
 
 
 def _lower(pieces):

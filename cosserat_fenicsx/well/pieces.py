@@ -22,8 +22,8 @@ def pieces_of(hole, string, operation, mud, depth):
     """
     if not 0 < depth <= hole.length * (1 + 1e-12):
         raise SceneError(
-            f"torque_and_drag: depth = {depth:g} m: expected a measured depth in the hole, which ends at "
-            f"{hole.length:g} m (survey {hole.path.length:g} m, sections {hole.sections[-1].to:g} m)"
+            f"torque_and_drag: depth = {depth:.10g} m: expected a measured depth in the hole, which ends at "
+            f"{hole.length:.10g} m (survey {hole.path.length:.10g} m, sections {hole.sections[-1].to:.10g} m)"
         )
     laid = string.laid(depth)
     ends = [place.top for place in laid]

@@ -69,9 +69,10 @@ def summary(answer):
         )
     states = answer.buckling
     for state in (criteria.SNAKE, criteria.HELIX):
-        where = answer.md[states == state]
-        if len(where):
-            lines.append(f"{criteria.STATES[state]} buckling between {where.min():.5g} and {where.max():.5g} m")
+        ends = np.flatnonzero(np.diff(states == state, prepend=False, append=False)).reshape(-1, 2) - (0, 1)
+        stretches = [f"{answer.md[a]:.5g} to {answer.md[b]:.5g}" for a, b in ends if answer.md[b] > answer.md[a]]
+        if stretches:
+            lines.append(f"{criteria.STATES[state]} buckling at md = {', '.join(stretches)} m")
     lines.append(f"{answer.model}: {'; '.join(answer.why)}.")
     return lines
 

@@ -64,12 +64,12 @@ def torque_and_drag(
             place), or one that is no rod in contact where `model` is "rod".
         NotConverged: the tolerance was not reached.
     """
-    for name, value, kind in (
-        ("hole", hole, Borehole),
-        ("string", string, DrillString),
-        ("operation", operation, Operation),
+    for name, value, kind, expected in (
+        ("hole", hole, Borehole, "a Borehole"),
+        ("string", string, DrillString, "a DrillString"),
+        ("operation", operation, Operation, "an operation, such as TripOut()"),
     ):
-        instance("torque_and_drag", name, value, kind, f"a {kind.__name__}")
+        instance("torque_and_drag", name, value, kind, expected)
     instance("torque_and_drag", "mud", mud, (Mud, type(None)), "Mud(density), or None where weights are in mud")
     tol = number("torque_and_drag", "tol", tol, "a number from 1e-12 to 0.1", lambda x: 1e-12 <= x <= 0.1)
     if model not in MODELS:
