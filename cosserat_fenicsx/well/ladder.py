@@ -8,7 +8,8 @@ hole between without touching it; the friction that is missed there is mu times
 - (6 d T)^(2/3) q'^(1/3) where the load changes its sign within a bend, with the rate q': the span on which it moves
   the string by d.
 
-A string on the low side also hangs lower by r sin(inclination), which its weight feels. Bending stiffness changes the
+A string on the low side also hangs lower by r sin(inclination), and is moved along the hole by r times the angle of its
+bends, since its way there is longer or shorter than the axis; its weight feels both. Bending stiffness changes the
 friction by mu EI dk^2, and a snake adds at most half the wall force of a helix. These are sums of sizes: differences of
 opposite signs do not cancel.
 """
@@ -70,8 +71,10 @@ def _snakes(chain, solved, EI, clearance):
 
 def _lower(pieces):
     """Weight (N) that hangs lower or higher where the string leans on the wall: where it changes, and at the end."""
-    lean = (pieces.hole - pieces.radius) * np.sqrt(np.maximum(1 - pieces.t**2, 0.0))
-    return float(np.abs(np.diff(pieces.weight, append=0.0)) @ lean)
+    clearance = pieces.hole - pieces.radius
+    lean = clearance * np.sqrt(np.maximum(1 - pieces.t**2, 0.0))
+    moved = np.cumsum(clearance * pieces.curvature * (pieces.bottom - pieces.top)) * np.abs(pieces.t)
+    return float(np.abs(np.diff(pieces.weight, append=0.0)) @ (lean + moved))
 
 
 def _turns(chain, solved, groups, clearance):
