@@ -77,6 +77,18 @@ def test_lock_up(name):
     assert 1.1 * length - place == pytest.approx(length, rel=2e-4)
 
 
+@pytest.mark.parametrize("tol", [1e-2, 1e-9])
+def test_errors_from_below_are_multiplied_by_helices(tol):
+    """Just short of lock-up, with a bend at the bottom that the soft string solves to no more than its tolerance."""
+    path = cf.WellPath.from_survey([0, 800, 1500, 2500, 3200, 4200, 5200], [5, 60, 30, 90, 80, 95, 90],
+                                   [0, 0, 0, 0, 3, 2, 0])  # fmt: skip
+    pipe = cf.Component(None, cf.Stiffness((1e9, 1e9), 2.6e9, (2063790.0,) * 2, 1.59e6), 315.0, 0.064)
+    hole = cf.Borehole(path, [cf.HoleSection(5200, 0.21, 0.341)])
+    one, best = (cf.torque_and_drag(hole, cf.DrillString([pipe]), cf.Sliding(5e4), model="soft, buckled", tol=asked)
+                 for asked in (tol, 1e-10))  # fmt: skip
+    assert one.error <= tol and abs(one.hook_load - best.hook_load) <= one.solved.error + best.solved.error
+
+
 def test_helices_in_straight_holes():
     for case in LOCK_UP["helix_horizontal_F_at"]:
         answer = pushed(case, case["z"], case["F_bit"], tol=1e-8)

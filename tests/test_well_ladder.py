@@ -61,13 +61,39 @@ def test_torque_of_rotating_strings_is_covered():
 
 
 def test_a_snake_that_is_a_small_part_of_a_piece():
-    """Above the helix of a vertical string: mu times half the wall force of a helix, by hand."""
+    """Above the helix of a vertical string: mu times the wall force of a helix that goes on to its top, by hand."""
     EI, weight, radius, friction = 1228200.0, 241.13, 0.0635, 0.3
     stiffness = cf.Stiffness((1e9, 1e9), 7e8, (EI, EI), 9.4e5)
     path = cf.WellPath.from_survey([0, 3000], [0, 0], [0, 0])
     hole = cf.Borehole(path, [cf.HoleSection(3000, 0.2159, friction)])
     string = cf.DrillString([cf.Component(None, stiffness, weight, radius)])
     answer = cf.torque_and_drag(hole, string, cf.Sliding(60e3))
-    most, least = (factor * math.cbrt(EI * weight**2) for factor in (5.55, 1.94))
-    snake = friction * (0.10795 - radius) * (most**3 - least**3) / (24 * EI * weight)
+    most, least = (factor * math.cbrt(EI * weight**2) for factor in (5.55, 0.14))
+    snake = friction * (0.10795 - radius) * (most**3 - least**3) / (12 * EI * weight)
     assert answer.helical.any() and answer.model_error * 662.6e3 == pytest.approx(snake, rel=0.05)
+
+
+@pytest.mark.parametrize("length", [3500.0, 4000.0, 4500.0, 4800.0, 5000.0])
+def test_snakes_that_a_helix_above_multiplies(length):
+    """A string pushed into a horizontal hole whose snake has half the wall force of a helix, in closed form: near
+    lock-up this changes the hook load to a multiple."""
+    EI, w, r, mu = 2063790.0, 315.0, 0.041, 0.3
+    snake = 2 * math.sqrt(EI * w / r)
+    thrust, place = snake, snake / (mu * w)
+    for part, end in ((0.5, math.sqrt(2) * snake), (1.0, math.inf)):
+        k = math.sqrt(part * r / (4 * EI * w))
+        angle = min(math.atan(k * end), math.atan(k * thrust) + mu * w * k * (length - place))
+        place += (angle - math.atan(k * thrust)) / (mu * w * k)
+        thrust = math.tan(angle) / k if angle < math.pi / 2 - 1e-12 else math.inf
+    hole = cf.Borehole(
+        cf.WellPath.from_survey([0, 6000], [90, 90], [0, 0]), [cf.HoleSection(6000, 2 * (0.064 + r), mu)]
+    )
+    string = cf.DrillString([cf.Component(None, cf.Stiffness((1e9, 1e9), 2.6e9, (EI, EI), 1.59e6), w, 0.064)])
+    for model in ("soft", "soft, buckled"):
+        answer = cf.torque_and_drag(hole, string, cf.TripIn(), depth=length, model=model)
+        told = answer.model_error * abs(answer.tension).max()
+        assert thrust + answer.hook_load <= told and not answer.enough
+        if length < 4600:
+            assert told < 4 * abs(thrust + answer.hook_load)
+        else:
+            assert math.isinf(told) and "may lock up" in str(answer)

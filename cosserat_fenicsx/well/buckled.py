@@ -7,47 +7,88 @@ finite there; where the state changes is found as an event.
 """
 
 import math
+from collections import namedtuple
 
 import numpy as np
 from scipy.integrate import solve_ivp
 
 from cosserat_fenicsx.errors import NotConverged, SceneError
 from cosserat_fenicsx.well import criteria
-from cosserat_fenicsx.well.softstring import UP_TO, Chain, Solved
+from cosserat_fenicsx.well.softstring import UP_TO, Chain, Solved, soft_string
 
-_RTOLS = 1e-10, 1e-12  # of the solution whose distance from the other is its error estimate, and of that other
+# Of the solution whose distance from the other is its error estimate, and of that other; then again more closely.
+_RTOLS = (1e-10, 1e-12), (1e-11, 1e-13)
+_ROUGH = 1e-6  # where a few digits do
+_LEAST = 1e-12  # the smallest tolerance of the soft string
 _CHANGES = 20  # of the state, within one piece
 _INFINITE = math.pi / 2 - 1e-6  # atan(F/F_0) from where F is beyond all bounds
 
+#: Arrays over the pieces of a chain: EI (N m^2), clearance (m), known: whether these are; and load: the compression of
+#: a helix, such as `criteria.helix_load`.
+_Start = namedtuple("_Start", "EI clearance known load")
 
-def buckled_string(soft, pieces, sections, operation, tol):
+
+def buckled_string(soft, pieces, sections, tol):
     """The `Solved` with helices, from that of the soft string; None where it has none.
 
     Args:
-        soft: a `Solved`; pieces: `Pieces`; sections: `Sections` of the components; operation, tol: see
-            `torque_and_drag`.
+        soft: a `Solved`; pieces: `Pieces`; sections: `Sections` of the components; tol: see `torque_and_drag`.
 
     Raises:
         LockUp: the string locks up.
         NotConverged: the tolerance was not reached.
     """
-    EI = sections.EI[pieces.component[soft.chain.origin]]
-    clearance = (pieces.hole - pieces.radius)[soft.chain.origin]
-    known = np.isfinite(EI) & (clearance > 1e-9)
+    for rtols in _RTOLS:
+        start, first = _begin(soft, pieces, sections, criteria.helix_load)
+        if first is None:
+            return None
+        marches = [_March(soft, start, pieces.bottom[-1], rtol).up(first) for rtol in rtols]
+        ends = zip(*((m.tension[-1, -1], m.torque[-1, -1]) for m in marches), strict=True)
+        errors, found = [abs(float(a - b)) for a, b in ends], marches[-1]
+        grown = growth(found, pieces, sections)[first]
+        errors = soft.error * grown + errors[0], soft.torque_error * grown + errors[1]
+        if errors[0] <= tol * np.abs(found.tension).max() and errors[1] <= tol * np.abs(found.torque).max():
+            return found._replace(error=errors[0], torque_error=errors[1])
+        soft = soft_string(soft.chain, soft.tension[0, 0], soft.torque[0, 0], max(tol / (4 * grown), _LEAST))
+    raise NotConverged(
+        f"torque_and_drag: the buckled string did not reach tol = {tol:g}: its helix multiplies errors from below by "
+        f"{grown:.2g}, as close to lock-up as it is. Expected a larger tol"
+    )
+
+
+def earliest_helix(soft, pieces, sections):
+    """The `Solved`, roughly, of a string whose snakes are helices, and which begins to be one as early as a helix is
+    known to be possible: more than the friction of whatever shape it has.
+
+    Raises:
+        LockUp: such a string locks up.
+    """
+    start, first = _begin(soft, pieces, sections, criteria.earliest_helix_load)
+    return soft if first is None else _March(soft, start, pieces.bottom[-1], _ROUGH).up(first)
+
+
+def growth(solved, pieces, sections):
+    """(n,) by what the helices above the lower ends of pieces multiply a change of the tension there."""
+    start = _start(solved.chain, pieces, sections, None)
+    mean = np.abs(solved.tension @ UP_TO[-1])
     with np.errstate(invalid="ignore", divide="ignore"):
-        loads = criteria.helix_load(
-            EI[:, None], clearance[:, None], soft.chain.weight[:, None], soft.side * soft.chain.climb[:, None]
-        )
-        first = np.flatnonzero((known[:, None] & (-soft.tension > loads)).any(axis=1))
-    if not len(first):
-        return None
-    marches = [_March(soft, EI, clearance, known, pieces.bottom[-1], rtol).up(first[0]) for rtol in _RTOLS]
-    errors = [abs(float(a[-1, -1] - b[-1, -1])) for a, b in zip(*((m.tension, m.torque) for m in marches), strict=True)]
-    found = marches[-1]
-    for field, given, error in (("tension", soft.error, errors[0]), ("torque", soft.torque_error, errors[1])):
-        if given + error > tol * np.abs(getattr(found, field)).max():
-            raise NotConverged(f"torque_and_drag: the {field} of the buckled string did not reach its tolerance")
-    return found._replace(error=soft.error + errors[0], torque_error=soft.torque_error + errors[1])
+        rate = np.where(solved.helical, np.abs(solved.chain.drag) * start.clearance * mean / (2 * start.EI), 0.0)
+    return np.exp(np.cumsum((rate * solved.chain.length)[::-1])[::-1])
+
+
+def _start(chain, pieces, sections, load):
+    EI, clearance = sections.EI[pieces.component[chain.origin]], (pieces.hole - pieces.radius)[chain.origin]
+    return _Start(EI, clearance, np.isfinite(EI) & (clearance > 1e-9), load)
+
+
+def _begin(soft, pieces, sections, load):
+    """The `_Start`, and the lowest piece of the soft string with compression above `load`, None without one."""
+    start = _start(soft.chain, pieces, sections, load)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        loads = load(start.EI[:, None], start.clearance[:, None], soft.chain.weight[:, None],
+                     soft.side * soft.chain.climb[:, None])  # fmt: skip
+        above = np.flatnonzero((start.known[:, None] & (-soft.tension > loads)).any(axis=1))
+    return start, int(above[0]) if len(above) else None
 
 
 class LockUp(SceneError):
@@ -68,8 +109,8 @@ class LockUp(SceneError):
 class _March:
     """One integration up the hole."""
 
-    def __init__(self, soft, EI, clearance, known, depth, rtol):
-        self._soft, self._EI, self._clearance, self._known, self._rtol = soft, EI, clearance, known, rtol
+    def __init__(self, soft, start, depth, rtol):
+        self._soft, self._start, self._rtol = soft, start, rtol
         self._scale = max(np.abs(soft.tension).max(), 1.0)
         self._depth = depth - np.concatenate([[0.0], np.cumsum(soft.chain.length)])
         self._rows = []
@@ -96,7 +137,7 @@ class _March:
         done, helical = 0.0, None
         for _ in range(_CHANGES):
             part = _rest(piece, done)
-            equations = _Equations(part, self._EI[i], self._clearance[i], self._known[i], self._scale)
+            equations = _Equations(part, self._start, i, self._scale)
             helical = equations.over(0.0, tension) > 0 if helical is None else not helical
             end, tension, torque, row = self._integrate(equations, helical, tension, torque, self._depth[i] - done)
             self._rows.append(row)
@@ -146,8 +187,9 @@ class _March:
 class _Equations:
     """Loads on a piece at the distance u from its lower end; scalars."""
 
-    def __init__(self, piece, EI, clearance, known, scale):
-        self.piece, self._EI, self._clearance, self._known, self._scale = piece, EI, clearance, known, scale
+    def __init__(self, piece, start, i, scale):
+        self.piece, self._load, self._scale = piece, start.load, scale
+        self._EI, self._clearance, self._known = start.EI[i], start.clearance[i], start.known[i]
 
     def weight_along(self, u):
         angle = self.piece.curvature * u
@@ -164,7 +206,7 @@ class _Equations:
         """Positive where the string is a helix, over the scale of its tension."""
         if not self._known:
             return -1.0
-        load = criteria.helix_load(self._EI, self._clearance, self.piece.weight, self.side(u, tension, False))
+        load = self._load(self._EI, self._clearance, self.piece.weight, self.side(u, tension, False))
         return float(-tension - load) / self._scale
 
 

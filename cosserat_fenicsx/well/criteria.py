@@ -12,17 +12,23 @@ compression: N, positive. All functions take arrays.
 - He-Kyllingstad: sinusoidal, any hole: 2 sqrt(EI N/r) with the wall force per length N of the straight string under
   this load. X. He & A. Kyllingstad, SPE Drilling & Completion 10 (1995) 10, doi:10.2118/25370-PA.
 - Lubinski: vertical hole, 1.94 (EI w^2)^(1/3). A. Lubinski, Drilling and Production Practice (1950) 178, API-50-178.
+- Wu, Juvkam-Wold & Lu: helical, vertical hole, 5.55 (EI w^2)^(1/3) at the lower end when the first turn of a helix
+  appears there, at whose top the compression is 0.14 (EI w^2)^(1/3). Oil & Gas J. 91 (1993) no. 33, 76.
 
-The state of a string: a snake where the compression is above the greater of He-Kyllingstad's and Lubinski's loads, a
-helix above the greater of sqrt(2) He-Kyllingstad's and 5.55 (EI w^2)^(1/3), the load of a helix in a vertical hole: J.
-Wu, H. C. Juvkam-Wold & R. Lu, Oil & Gas J. 91 (1993) no. 33, 76. A helix adds r F^2/(4 EI) to the wall force per
-length.
+The state of a string is told by the compression at each place: a snake above the greater of He-Kyllingstad's and
+Lubinski's loads, a helix above the greater of sqrt(2) He-Kyllingstad's and 5.55 (EI w^2)^(1/3). A helix adds
+r F^2/(4 EI) to the wall force per length.
+
+The last three numbers belong to weight on the lower end of a string in a vertical hole. Taken at each place they leave
+out the uppermost turn of a helix, from 5.55 down to 0.14 (EI w^2)^(1/3), and hold for compression that friction built
+up farther below as well. What this may change is in the estimate of the model's error, for which the string is a helix
+as early as one is known to be possible, `earliest_helix_load`.
 """
 
 import numpy as np
 
 _CHEN, _WU = np.sqrt(2.0), 2 * np.sqrt(2.0) - 1
-_LUBINSKI, _VERTICAL_HELIX = 1.94, 5.55
+_LUBINSKI, _VERTICAL_HELIX, _VERTICAL_TOP = 1.94, 5.55, 0.14
 #: States of a string, and their names.
 STRAIGHT, SNAKE, HELIX = 0, 1, 2
 STATES = ("straight", "sinusoidal", "helical")
@@ -81,6 +87,11 @@ def snake_load(EI, clearance, weight, side):
 def helix_load(EI, clearance, weight, side):
     """N: above it the string is a helix; side: wall force per length without buckling, N/m."""
     return np.maximum(2 * _CHEN * np.sqrt(EI * side / clearance), _VERTICAL_HELIX * np.cbrt(EI * weight**2))
+
+
+def earliest_helix_load(EI, clearance, weight, side):
+    """N: below it no part of a helix is expected: the load of a snake, in a vertical hole that at a helix' top."""
+    return np.maximum(2 * np.sqrt(EI * side / clearance), _VERTICAL_TOP * np.cbrt(EI * weight**2))
 
 
 def helix_side(EI, clearance, compression):

@@ -10,8 +10,9 @@ hole between without touching it; the friction that is missed there is mu times
 
 A string on the low side also hangs lower by r sin(inclination), and is moved along the hole by r times the angle of its
 bends, since its way there is longer or shorter than the axis; its weight feels both. Bending stiffness changes the
-friction by mu EI dk^2, and a snake adds at most half the wall force of a helix. These are sums of sizes: differences of
-opposite signs do not cancel.
+friction by mu EI dk^2. A snake adds at most half the wall force of a helix; its friction makes the string a helix
+farther down, and the helix multiplies it on the way up: the string is solved again with a helix wherever there may be
+one. These are sums of sizes: differences of opposite signs do not cancel.
 """
 
 from typing import NamedTuple
@@ -19,6 +20,7 @@ from typing import NamedTuple
 import numpy as np
 
 from cosserat_fenicsx.well import criteria
+from cosserat_fenicsx.well.buckled import LockUp, earliest_helix, growth
 
 # Places on a piece where a snake is looked for.
 _FINE = 512
@@ -36,11 +38,15 @@ class ModelError(NamedTuple):
         return sum(self)
 
 
-def model_errors(path, pieces, solved, sections):
+def model_errors(path, pieces, soft, solved, sections):
     """`ModelError` of the hook load and of the surface torque.
 
     Args:
-        path: a `WellPath`; pieces, solved: see `softstring`; sections: `Sections` of the components.
+        path: a `WellPath`; pieces: `Pieces`; soft, solved: the `Solved` without and with buckling; sections: `Sections`
+            of the components.
+
+    Returns:
+        infinite parts for snakes with which the string may lock up.
     """
     chain = solved.chain
     groups = np.flatnonzero(np.diff(chain.origin, prepend=-1))  # the first part of each piece, from below
@@ -52,9 +58,22 @@ def model_errors(path, pieces, solved, sections):
     missed[groups[1:]] += jumps
     stiff[groups[1:]] = stiffer
     extra = _snakes(chain, solved, EI, clearance)
-    hook, torque = ([float(share @ part) for part in (missed, stiff, extra)] for share in (load, turn))
+    grown = growth(solved, pieces, sections)
+    hook, torque = ([float(share @ (part * grown)) for part in (missed, stiff, extra)] for share in (load, turn))
     hook[0] += _lower(pieces)
+    if extra.any() or solved.helical.any():
+        hook[2], torque[2] = map(max, _earlier(soft, solved, pieces, sections), (hook[2], torque[2]))
     return ModelError(*hook), ModelError(*torque)
+
+
+def _earlier(soft, solved, pieces, sections):
+    """By how much hook load and surface torque change where snakes are helices: their friction makes the string a helix
+    farther down, and the helix multiplies it on the way up."""
+    try:
+        early = earliest_helix(soft, pieces, sections)
+    except LockUp:
+        return np.inf, np.inf if solved.chain.turn.any() else 0.0
+    return [abs(float(getattr(early, x)[-1, -1] - getattr(solved, x)[-1, -1])) for x in ("tension", "torque")]
 
 
 def _snakes(chain, solved, EI, clearance):
@@ -133,7 +152,9 @@ def reasons(used, asked, soft, solved, sections, left_out, scales):
     elif asked == "auto":
         yield "no helical buckling"
     for what, unit, parts, share in _shares(left_out, scales):
-        if share > 1e-9:
+        if np.isinf(share):
+            yield f"{what} of the {used} string: it may lock up: with a helix from the load of a snake on, it does"
+        elif share > 1e-9:
             of = [f"{name} {value:.3g}" for name, value in parts._asdict().items() if value > 1e-3 * parts.total]
             yield (
                 f"{what} of the {used} string: the rod in contact may differ by {parts.total:.3g} {unit}, {share:.1e} "

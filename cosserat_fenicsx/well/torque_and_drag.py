@@ -103,13 +103,13 @@ def _flexible(given, model, tol, torque_convention, pieces, laid):
     buckled, why = None, []
     if model != SOFT:
         try:
-            buckled = buckled_string(soft, pieces, sections, operation, tol)
+            buckled = buckled_string(soft, pieces, sections, tol)
         except LockUp as stuck:
             if model != ROD:
                 raise
             why.append(f"WITH THE WALL FORCE OF A HELIX IT LOCKS UP: {stuck}")
     solved, used = buckled or soft, BUCKLED if buckled or model == BUCKLED else SOFT
-    left_out, scales = model_errors(path, pieces, solved, sections), scales_of(solved, pieces)
+    left_out, scales = model_errors(path, pieces, soft, solved, sections), scales_of(solved, pieces)
     error = max(map(share, (solved.error, solved.torque_error), scales))
     model_error = max(share(parts.total, scale) for parts, scale in zip(left_out, scales, strict=True))
     why = [*reasons(used, model, soft, solved, sections, left_out, scales), *why]
