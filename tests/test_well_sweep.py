@@ -118,7 +118,7 @@ def test_measurements_that_are_refused():
     one = cf.RigMeasurement(1400.0, cf.TripOut(), 1e6)
     with pytest.raises(cf.SceneError, match="2 readings for 2 unknowns"):
         cf.calibrate_friction(HOLE, STRING, [one, one], mud=MUD)
-    with pytest.raises(cf.SceneError, match=r"do not tell section 2 \(to 2500 m\)"):
+    with pytest.raises(cf.SceneError, match=r"no reading depends on friction of section 2 \(to 2500 m\)"):
         cf.calibrate_friction(HOLE, STRING, [one, one, cf.RigMeasurement(900, cf.TripIn(), 9e5)], mud=MUD)
     with pytest.raises(cf.SceneError, match="hook_load = None"):
         cf.RigMeasurement(1400.0, cf.TripOut())

@@ -160,11 +160,18 @@ def calibrate_friction(
 
 def _check_told(hole, sensitivity, unknown_block):
     """Refuse readings that leave an unknown open."""
+    names = [f"section {i + 1} (to {section.to:g} m)" for i, section in enumerate(hole.sections)]
+    names += ["block_weight"] * unknown_block
+    told = np.linalg.norm(sensitivity, axis=0)[: len(hole.sections)]
+    silent = [name for name, size in zip(names, told, strict=False) if size <= _SINGULAR * np.linalg.norm(sensitivity)]
+    if silent:
+        raise SceneError(
+            f"calibrate_friction: no reading depends on friction of {' and '.join(silent)}: expected readings with "
+            "the string there, of hook loads up or down or of torques where it rotates"
+        )
     _, sizes, rows = np.linalg.svd(sensitivity, full_matrices=False)
     if sizes[-1] > _SINGULAR * sizes[0]:
         return
-    names = [f"section {i + 1} (to {section.to:g} m)" for i, section in enumerate(hole.sections)]
-    names += ["block_weight"] * unknown_block
     open_ones = [name for name, share in zip(names, np.abs(rows[-1]), strict=True) if share > 0.1]
     raise SceneError(
         f"calibrate_friction: the measurements do not tell {' and '.join(open_ones)} apart: expected readings with "

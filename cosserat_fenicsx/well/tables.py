@@ -134,9 +134,9 @@ def fit_table(fit):
         table.add_column(heading, justify="left" if heading == "section" else "right")
     for i, section in enumerate(fit.hole.sections):
         low, high = fit.interval[i]
-        table.add_row(
-            section.name or str(i + 1), f"{section.to:.6g}", f"{fit.friction[i]:.4f}", f"{low:.4f} to {high:.4f}"
-        )
+        bound = ", at its bound: the readings ask for less than none" if fit.friction[i] < 1e-6 else ""
+        table.add_row(section.name or str(i + 1), f"{section.to:.6g}", f"{fit.friction[i]:.4f}{bound}",
+                      f"{low:.4f} to {high:.4f}")  # fmt: skip
     if np.isfinite(fit.block_interval).all():
         low, high = fit.block_interval / 1e3
         table.add_row("block weight", "", f"{fit.block_weight / 1e3:.2f} kN", f"{low:.2f} to {high:.2f} kN")
