@@ -172,3 +172,10 @@ def test_a_density_in_other_units_is_doubted():
     for density in (1.2, 10.2):
         with pytest.warns(cf.SceneWarning, match="hardly that of a mud"):
             cf.Mud(density)
+
+
+def test_dimensions_in_other_units_are_warned_of():
+    with pytest.warns(cf.SceneWarning, match="wider than holes are"):
+        cf.HoleSection(100.0, 8.5, 0.2)
+    with pytest.warns(cf.SceneWarning, match="hardly that of a mud"):
+        cf.Mud(9000.0)

@@ -1,12 +1,16 @@
 """A hole along an axis: diameters and friction of its cased and open sections."""
 
+import warnings
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from cosserat_fenicsx.checks import instance, number, positive, refuse, store
-from cosserat_fenicsx.errors import SceneError
+from cosserat_fenicsx.errors import SceneError, SceneWarning
 from cosserat_fenicsx.well.path import WellPath
+
+# Diameters (m) above this are hardly those of holes.
+_WIDEST = 1.5
 
 
 @dataclass(frozen=True)
@@ -32,6 +36,9 @@ class HoleSection:
         store(self, to=positive(self, "to", self.to, "m"), diameter=positive(self, "diameter", self.diameter, "m"))
         store(self, friction=number(self, "friction", self.friction, "a coefficient of friction from 0 to 5",
                                     lambda x: 0 <= x <= 5))  # fmt: skip
+        if self.diameter > _WIDEST:
+            warnings.warn(f"HoleSection.diameter = {self.diameter:g} m is wider than holes are: 8.5 in are "
+                          "8.5 * units.inch = 0.2159", SceneWarning, stacklevel=3)  # fmt: skip
 
 
 @dataclass(frozen=True)
