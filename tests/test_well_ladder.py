@@ -97,3 +97,11 @@ def test_snakes_that_a_helix_above_multiplies(length):
             assert told < 4 * abs(thrust + answer.hook_load)
         else:
             assert math.isinf(told) and "may lock up" in str(answer)
+
+
+def test_tension_beyond_what_a_pipe_carries_is_told():
+    path = cf.WellPath.from_survey([0, 1000], [0, 0], [0, 0])
+    hole = cf.Borehole(path, [cf.HoleSection(1000, 0.2159, 0.3)])
+    for weight, told in ((-6e6, False), (-8e6, True)):
+        answer = cf.torque_and_drag(hole, STRING, cf.TripOut(weight=weight), model="soft")
+        assert ("BEYOND WHAT ANY PIPE CARRIES" in str(answer)) == told

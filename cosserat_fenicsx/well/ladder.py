@@ -24,6 +24,8 @@ from cosserat_fenicsx.well.buckled import LockUp, earliest_helix, growth
 
 # Places on a piece where a snake is looked for.
 _FINE = 512
+# Strain beyond what any pipe carries.
+_BREAKS = 0.01
 
 
 class ModelError(NamedTuple):
@@ -160,6 +162,13 @@ def reasons(used, asked, soft, solved, sections, left_out, scales):
                 f"{what} of the {used} string: the rod in contact may differ by {parts.total:.3g} {unit}, {share:.1e} "
                 f"({', '.join(of)})"
             )
+
+
+def beyond_pipes(solved, EA):
+    """A sentence where tension strains the string beyond what any pipe carries; EA: (n,) N, NaN where not known."""
+    strain = float(np.nan_to_num(np.abs(solved.tension) / EA[:, None]).max())
+    if strain > _BREAKS:
+        yield f"BEYOND WHAT ANY PIPE CARRIES: the tension strains it by {100 * strain:.3g} %"
 
 
 def too_much(left_out, scales, tol):

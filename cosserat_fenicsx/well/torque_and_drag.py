@@ -7,7 +7,7 @@ from cosserat_fenicsx.errors import InstallationError, NotConverged, SceneError
 from cosserat_fenicsx.well.answer import TorqueAndDrag, scales_of, share
 from cosserat_fenicsx.well.buckled import LockUp, buckled_string
 from cosserat_fenicsx.well.hole import Borehole
-from cosserat_fenicsx.well.ladder import model_errors, reasons, too_much
+from cosserat_fenicsx.well.ladder import beyond_pipes, model_errors, reasons, too_much
 from cosserat_fenicsx.well.loaded import sections_of
 from cosserat_fenicsx.well.mud import Mud
 from cosserat_fenicsx.well.operations import Operation
@@ -113,6 +113,7 @@ def _flexible(given, model, tol, torque_convention, pieces, laid):
     error = max(map(share, (solved.error, solved.torque_error), scales))
     model_error = max(share(parts.total, scale) for parts, scale in zip(left_out, scales, strict=True))
     why = [*reasons(used, model, soft, solved, sections, left_out, scales), *why]
+    why += beyond_pipes(solved, sections.EA[pieces.component[solved.chain.origin]])
     beyond = too_much(left_out, scales, tol - error)
     told = [*why, *(f"NOT ENOUGH for tol = {tol:g} in the {what}" for what in beyond)]
     if model == AUTO:
