@@ -7,11 +7,12 @@ import numpy as np
 from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.pictures.figures import save
 from cosserat_fenicsx.ranks import on_first, world
+from cosserat_fenicsx.well.contacts import usual_force
 
 _COLOURS = ("tab:blue", "tab:orange", "tab:green", "tab:red", "tab:purple", "tab:brown", "tab:pink", "tab:gray")
 _STYLES = ("-", "--", ":", "-.")
-# Side forces beyond so many times the one that most of the string does not exceed are peaks.
-_USUAL, _MOSTLY = 1.5, 0.97
+# A torque below this part of the largest tension times the contact radius is not drawn.
+_LITTLE = 1e-4
 
 
 def draw(make, file):
@@ -54,7 +55,8 @@ def answer_figure(answer):
     """Along the string: tension with the loads of buckling, torque where there is some, side force, and the forces of
     the wall at points where there are some."""
     points = [(md, force, side) for md, end, force, side in answer.contacts if md == end]
-    draws = [_tension, *([_torque] if np.abs(answer.torque).max() > 0 else []), _side_force]
+    turns = np.abs(answer.torque).max() > _LITTLE * np.abs(answer.tension).max() * answer.pieces.radius.max()
+    draws = [_tension, *([_torque] if turns else []), _side_force]
     draws += [lambda axes, _: _at_points(axes, points)] if points else []
     figure, axes = _axes(len(draws), 1 + 4 * len(draws))
     ends = [section.to for section in answer.hole.sections[:-1] if section.to < answer.depth]
@@ -65,7 +67,7 @@ def answer_figure(answer):
     axes[0].set_ylabel("measured depth (m)")
     figure.suptitle(
         f"{answer.operation.name}, bit at {answer.depth:g} m, {answer.words}: hook load "
-        f"{answer.hook_load / 1e3:.1f} kN, surface torque {answer.surface_torque / 1e3:.2f} kN m"
+        f"{answer.hook_load / 1e3:.1f} kN, surface torque {round(answer.surface_torque / 1e3, 2) + 0.0:.2f} kN m"
     )
     return figure
 
@@ -94,7 +96,7 @@ def _torque(axes, answer):
 def _side_force(axes, answer):
     axes.plot(answer.side_force, answer.md, color="black")
     axes.set_xlabel("side force of the wall per length (N/m)")
-    usual = _USUAL * np.quantile(answer.side_force, _MOSTLY)
+    usual = usual_force(answer.side_force)
     if answer.side_force.max() > usual > 0:
         axes.set_xlim(-0.03 * usual, usual)
         axes.set_xlabel("side force of the wall per length (N/m), peaks cut off")

@@ -159,7 +159,7 @@ class InHole:
     @cached_property
     def element_pressures(self):
         """(elements, nodes) force of the wall across the rod, per length, N/m."""
-        return -(self._wall_density * self._outward[self._nodes]).sum(axis=2)
+        return 0.0 - (self._wall_density * self._outward[self._nodes]).sum(axis=2)
 
     @cached_property
     def side_force(self):

@@ -8,6 +8,7 @@ from cosserat_fenicsx.checks import positive
 from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.pictures.drawing import load_pyvista
 from cosserat_fenicsx.ranks import on_first, world
+from cosserat_fenicsx.well.contacts import usual_force
 
 _WINDOW = 1300, 1000
 # Radius of the hole in the picture, over the extent of the well.
@@ -41,7 +42,8 @@ def _draw(answer, file, enlarge):
     string[_FIELD] = answer.side_force[at]
     string["radius"] = enlarge * (hole - answer.clearance[at])
     tube = string.tube(scalars="radius", absolute=True, n_sides=16)
-    plotter.add_mesh(tube, scalars=_FIELD, cmap="viridis",
+    most = min(answer.side_force.max(), usual_force(answer.side_force)) or 1.0  # peaks would hide all else
+    plotter.add_mesh(tube, scalars=_FIELD, cmap="viridis", clim=(0.0, most),
                      scalar_bar_args={"vertical": True, "position_x": 0.86, "position_y": 0.25,
                                       "color": "black"})  # fmt: skip
     wall = pyvista.MultipleLines(axis)
