@@ -25,7 +25,7 @@ def well_p(scene, answers, sweep):
 
 
 def volve_f12(scene, answers, sweep):
-    """Rotating, the hook load is the weight in mud of all parts times their heights on the axis, less the weight on bit;
+    """Rotating, the hook load is the weight in mud of all parts times their heights on the axis less the weight on bit;
     the rod in contact, which leans on the wall, differs by some newtons."""
     drilling = answers[2]
     heights = [np.ptp(scene.hole.path.position([place.top, place.bottom])[:, 2]) for place in drilling.laid]
