@@ -95,6 +95,13 @@ _HOME = {
     "TripIn": "well.operations",
     "TripOut": "well.operations",
     "torque_and_drag": "well.torque_and_drag",
+    "DepthSweep": "well.depth_sweep",
+    "depth_sweep": "well.depth_sweep",
+    "RigMeasurement": "well.calibrate",
+    "FrictionFit": "well.calibrate",
+    "calibrate_friction": "well.calibrate",
+    "read_well": "well.scenefile",
+    "WellScene": "well.scenefile",
     "WellPath": "well.path",
     "euler_load": "scene.rod",
     "read_motion": "scene.scenefile",
@@ -190,12 +197,17 @@ if TYPE_CHECKING:  # the same names, for editors and type checkers
     from cosserat_fenicsx.statics.reading import read_path as read_path
     from cosserat_fenicsx.statics.solve import solve as solve
     from cosserat_fenicsx.well.answer import TorqueAndDrag as TorqueAndDrag
+    from cosserat_fenicsx.well.calibrate import FrictionFit as FrictionFit
+    from cosserat_fenicsx.well.calibrate import RigMeasurement as RigMeasurement
+    from cosserat_fenicsx.well.calibrate import calibrate_friction as calibrate_friction
     from cosserat_fenicsx.well.components import Bit as Bit
     from cosserat_fenicsx.well.components import Collar as Collar
     from cosserat_fenicsx.well.components import Component as Component
     from cosserat_fenicsx.well.components import DrillPipe as DrillPipe
     from cosserat_fenicsx.well.components import HeavyWeight as HeavyWeight
     from cosserat_fenicsx.well.components import Stabiliser as Stabiliser
+    from cosserat_fenicsx.well.depth_sweep import DepthSweep as DepthSweep
+    from cosserat_fenicsx.well.depth_sweep import depth_sweep as depth_sweep
     from cosserat_fenicsx.well.hole import Borehole as Borehole
     from cosserat_fenicsx.well.hole import HoleSection as HoleSection
     from cosserat_fenicsx.well.mud import Mud as Mud
@@ -208,6 +220,8 @@ if TYPE_CHECKING:  # the same names, for editors and type checkers
     from cosserat_fenicsx.well.operations import TripIn as TripIn
     from cosserat_fenicsx.well.operations import TripOut as TripOut
     from cosserat_fenicsx.well.path import WellPath as WellPath
+    from cosserat_fenicsx.well.scenefile import WellScene as WellScene
+    from cosserat_fenicsx.well.scenefile import read_well as read_well
     from cosserat_fenicsx.well.string import DrillString as DrillString
     from cosserat_fenicsx.well.torque_and_drag import torque_and_drag as torque_and_drag
 

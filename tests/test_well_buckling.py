@@ -1,18 +1,16 @@
 """Buckling of strings in holes: critical loads, the friction of helices, lock-up."""
 
-import json
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
+from reference_wells import WELLS
 
 import cosserat_fenicsx as cf
 from cosserat_fenicsx.well import criteria
 
 pytestmark = pytest.mark.serial
-REFERENCE = json.loads((Path(__file__).parent / "reference" / "wells.json").read_text(encoding="utf-8"))
-LOCK_UP, CRITICAL = REFERENCE["lock-up"], REFERENCE["critical"]
+LOCK_UP, CRITICAL = WELLS["lock-up"], WELLS["critical"]
 
 
 def string(case):

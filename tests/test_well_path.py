@@ -1,20 +1,15 @@
 """Axes of wells: closed forms of arcs, another program's positions, the closest point, and surveys that are refused."""
 
-import json
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
+import reference_wells
+from reference_wells import WELLS
 
 import cosserat_fenicsx as cf
 
 pytestmark = pytest.mark.serial
-WELLS = json.loads((Path(__file__).parent / "reference" / "wells.json").read_text(encoding="utf-8"))
-
-
-def surveyed(name):
-    return cf.WellPath.from_survey(*np.transpose(WELLS[name]["stations_md_inc_azi"]))
 
 
 def arc(angle, radius, azimuth=30.0):
@@ -41,7 +36,7 @@ def test_a_planar_arc_is_a_circle(angle):
 
 @pytest.mark.parametrize("name", ["P", "F-12", "ISCWSA 2"])
 def test_the_ends_of_reference_wells(name):
-    well = surveyed(name)
+    well = reference_wells.well(name)
     assert well.position(well.length) == pytest.approx(WELLS[name]["end_NED"], abs=1e-9)
     assert well.position(0.0) == pytest.approx(0)
 
@@ -49,7 +44,7 @@ def test_the_ends_of_reference_wells(name):
 @pytest.mark.parametrize("name", ["P", "F-12", "ISCWSA 2"])
 def test_positions_are_those_of_wellpathpy(name):
     wellpathpy = pytest.importorskip("wellpathpy")
-    well = surveyed(name)
+    well = reference_wells.well(name)
     other = wellpathpy.deviation(*np.transpose(WELLS[name]["stations_md_inc_azi"])).minimum_curvature(course_length=30)
     theirs = np.stack([other.northing, other.easting, other.depth], axis=-1)
     assert np.abs(well.position(well.md) - theirs).max() < 1e-9
@@ -57,7 +52,7 @@ def test_positions_are_those_of_wellpathpy(name):
 
 
 def test_tangent_and_curvature_are_derivatives():
-    well, h = surveyed("F-12"), 1e-3
+    well, h = reference_wells.well("F-12"), 1e-3
     md = np.linspace(250.0, 3430.0, 400)
     inside = np.abs(md[:, None] - well.md).min(axis=1) > h
     md = md[inside]
@@ -79,7 +74,7 @@ def test_azimuth_does_not_enter_by_itself():
 
 @pytest.mark.parametrize("name", ["P", "F-12", "ISCWSA 2"])
 def test_the_closest_point(name):
-    well, rng = surveyed(name), np.random.default_rng(5)
+    well, rng = reference_wells.well(name), np.random.default_rng(5)
     md = np.sort(rng.uniform(0, well.length, 300))
     away = np.cross(well.tangent(md), rng.normal(size=(300, 3)))
     points = well.position(md) + 0.05 * away / np.linalg.norm(away, axis=1)[:, None]

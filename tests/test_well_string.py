@@ -126,7 +126,10 @@ def test_auto_says_what_the_soft_string_leaves_out():
         (lambda: cf.DrillPipe(100.0), "outer_diameter = None: expected a diameter"),
         (lambda: cf.DrillPipe(outer_diameter=0.1, inner_diameter=0.12), "inner_diameter"),
         (lambda: cf.DrillPipe(size="5 in 19.50 lb/ft", tool_joint=0.1), "at least the body's diameter"),
-        (lambda: cf.HoleSection(100, 0.2, -0.1), "HoleSection.friction = -0.1: expected a coefficient of friction, 0"),
+        (
+            lambda: cf.HoleSection(100, 0.2, -0.1),
+            "HoleSection.friction = -0.1: expected a coefficient of friction from 0",
+        ),
         (lambda: cf.Borehole(PATH, [cf.HoleSection(900, 0.2, 0), cf.HoleSection(800, 0.2, 0)]), "more than 900 m"),
         (lambda: cf.Mud(-5), "Mud.density = -5"),
         (lambda: cf.DrillString([PIPE, cf.Bit(0.2159)]), "only the uppermost component, bit, fills up"),

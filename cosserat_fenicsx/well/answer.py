@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from cosserat_fenicsx.annotations import File
 from cosserat_fenicsx.well import criteria, loaded
 from cosserat_fenicsx.well.contacts import contacts_of, sides_of
 from cosserat_fenicsx.well.hole import Borehole
@@ -28,7 +29,7 @@ class TorqueAndDrag:
         model: what was solved: "soft" or "soft, buckled".
         why: sentences on what decided for the model, and what it leaves out.
         error: estimated error of hook load and surface torque as solutions of the model's equations, over the largest
-            tension and torque along the string.
+            tension and torque along the string (over 1 % of that tension times the contact radius where this is more).
         model_error: estimate, likewise relative, of how far those of the rod in contact may be, which is stiff and has
             a clearance: the error of the model, not of its solution.
         enough: whether both are within `tol`; False warns that the model does not suffice for the accuracy asked for.
@@ -88,9 +89,12 @@ class TorqueAndDrag:
     @cached_property
     def md(self) -> np.ndarray:
         """Measured depths, m."""
-        chain = self.solved.chain
-        bottom = self.depth - np.concatenate([[0.0], np.cumsum(chain.length)[:-1]])
-        return np.maximum(self._down(bottom[:, None] - chain.length[:, None] * self.solved.at), 0.0)
+        chain, pieces = self.solved.chain, self.pieces
+        below = np.concatenate([[0.0], np.cumsum(chain.length)])[:-1]
+        first = np.flatnonzero(np.diff(chain.origin, prepend=-1))  # parts of each piece, whose ends are exact
+        bottom = pieces.bottom[chain.origin] - (below - np.repeat(below[first], np.diff(first, append=len(below))))
+        top = np.append(bottom[1:], 0.0)
+        return self._down(bottom[:, None] + (top - bottom)[:, None] * self.solved.at)
 
     @cached_property
     def tension(self) -> np.ndarray:
@@ -196,7 +200,8 @@ class TorqueAndDrag:
     def neutral_points(self) -> np.ndarray:
         """Measured depths where the effective tension changes its sign, m, from the surface down."""
         T, md = self.tension, self.md
-        i = np.flatnonzero((T[:-1] > 0) != (T[1:] > 0))
+        T = np.where(np.abs(T) > 1e-12 * np.abs(T).max(), T, 0.0)  # rounding
+        i = np.flatnonzero(T[:-1] * T[1:] < 0)
         return md[i] + (md[i + 1] - md[i]) * T[i] / (T[i] - T[i + 1])
 
     @property
@@ -256,6 +261,43 @@ class TorqueAndDrag:
         found, known = np.full(len(k), np.nan), ~np.isnan(EI * loose)
         found[known] = criteria.he_kyllingstad(*(x[known] for x in (EI, loose, b, across, k)))
         return found
+
+    def write(self, file: File) -> None:
+        """Write the arrays along the string as a .csv file, one row a place. Rank 0 writes.
+
+        Raises:
+            OSError: it cannot be written.
+        """
+        from cosserat_fenicsx.well.tables import write_answer
+
+        write_answer(self, file)
+
+    def plot(self, file: File | None = None):
+        """Draw tension with the loads of buckling, torque, and side force along the string, depth downwards.
+
+        Args:
+            file: .png, .pdf or another format of matplotlib (rank 0 writes); None returns the Figure.
+
+        Raises:
+            SceneError: matplotlib is missing, or the ending is unknown.
+        """
+        from cosserat_fenicsx.well.charts import answer_figure, draw
+
+        return draw(lambda: answer_figure(self), file)
+
+    def plot_3d(self, file: File, enlarge: float | None = None) -> None:
+        """Draw the string in its hole in space, coloured by the side force.
+
+        Args:
+            file: .png (rank 0 writes).
+            enlarge: factor on radii and clearance, which the picture says; None for one that shows them.
+
+        Raises:
+            SceneError: pyvista is missing, or the name does not end in .png.
+        """
+        from cosserat_fenicsx.well.in_space import draw_in_space
+
+        draw_in_space(self, file, enlarge)
 
     def __repr__(self):
         loads = f"hook load {self.hook_load:.6g} N, surface torque {self.surface_torque:.6g} N m"

@@ -15,7 +15,7 @@ from cosserat_fenicsx.errors import NotConverged, SceneError
 from cosserat_fenicsx.well import criteria
 from cosserat_fenicsx.well.softstring import UP_TO, Chain, Solved
 
-_RTOLS = 1e-8, 1e-11  # of the solution whose distance from the other is its error estimate, and of that other
+_RTOLS = 1e-10, 1e-12  # of the solution whose distance from the other is its error estimate, and of that other
 _CHANGES = 20  # of the state, within one piece
 _INFINITE = math.pi / 2 - 1e-6  # atan(F/F_0) from where F is beyond all bounds
 
@@ -28,7 +28,7 @@ def buckled_string(soft, pieces, sections, operation, tol):
             `torque_and_drag`.
 
     Raises:
-        SceneError: the string locks up.
+        LockUp: the string locks up.
         NotConverged: the tolerance was not reached.
     """
     EI = sections.EI[pieces.component[soft.chain.origin]]
@@ -48,6 +48,21 @@ def buckled_string(soft, pieces, sections, operation, tol):
         if given + error > tol * np.abs(getattr(found, field)).max():
             raise NotConverged(f"torque_and_drag: the {field} of the buckled string did not reach its tolerance")
     return found._replace(error=soft.error + errors[0], torque_error=soft.torque_error + errors[1])
+
+
+class LockUp(SceneError):
+    """The string locks up: no thrust moves it.
+
+    Attributes:
+        md: where, m.
+    """
+
+    def __init__(self, md):
+        super().__init__(
+            f"torque_and_drag: the string locks up at md = {md:.6g} m: the wall force of its helix holds any thrust "
+            "from above there, and nothing moves. Expected less friction, weight on bit or length"
+        )
+        self.md = md
 
 
 class _March:
@@ -118,10 +133,7 @@ class _March:
             raise NotConverged(f"torque_and_drag: the buckled string at md = {md:.6g} m: {found.message}")
         end = float(found.t[-1])
         if len(found.t_events[1]):
-            raise SceneError(
-                f"torque_and_drag: the string locks up at md = {md - end:.6g} m: the wall force of its helix holds "
-                "any thrust from above there, and nothing moves. Expected less friction, weight on bit or length"
-            )
+            raise LockUp(md - end)
         u = self._soft.at * end
         x, moments = found.sol(u)
         tensions = -scale * np.tan(x)

@@ -1,6 +1,5 @@
 """A hole along an axis: diameters and friction of its cased and open sections."""
 
-import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -17,7 +16,7 @@ class HoleSection:
     Args:
         to: measured depth of its lower end, m.
         diameter: of the hole, or inside the casing, m.
-        friction: coefficient of friction between string and wall (friction factor), 0 or more.
+        friction: coefficient of friction between string and wall (friction factor), 0 to 5.
         name: in tables and charts, such as "casing".
 
     Raises:
@@ -31,8 +30,8 @@ class HoleSection:
 
     def __post_init__(self):
         store(self, to=positive(self, "to", self.to, "m"), diameter=positive(self, "diameter", self.diameter, "m"))
-        store(self, friction=number(self, "friction", self.friction, "a coefficient of friction, 0 or more",
-                                    lambda x: 0 <= x < math.inf))  # fmt: skip
+        store(self, friction=number(self, "friction", self.friction, "a coefficient of friction from 0 to 5",
+                                    lambda x: 0 <= x <= 5))  # fmt: skip
 
 
 @dataclass(frozen=True)

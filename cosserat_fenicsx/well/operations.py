@@ -65,11 +65,14 @@ class RotateOffBottom(_Plain):
 
 
 @dataclass(frozen=True)
-class RotaryDrilling(_Plain):
+class RotaryDrilling(Operation):
     """Drilling with the string rotating; its axial speed is negligible.
 
     Args:
         weight: on bit, N. torque: on bit, N m.
+
+    Raises:
+        SceneError: numbers that are not finite.
     """
 
     weight: float
@@ -79,15 +82,19 @@ class RotaryDrilling(_Plain):
 
 
 @dataclass(frozen=True)
-class Sliding(_Plain):
+class Sliding(Operation):
     """Drilling with a motor, the string sliding down without rotation.
 
     Args:
         weight: on bit, N.
         torque: of the motor's reaction, N m, twisting the string all the way up.
+
+    Raises:
+        SceneError: numbers that are not finite.
     """
 
     weight: float
+    torque: float = 0.0
 
     name, slip = "sliding", (-1.0, 0.0)
 

@@ -1,10 +1,12 @@
-"""An answer as a table for the screen."""
+"""Answers, sweeps and fits as tables: for the screen, and as .csv."""
 
 import math
+from pathlib import Path
 
 import numpy as np
 from rich.table import Table
 
+from cosserat_fenicsx.ranks import on_first, world
 from cosserat_fenicsx.results.tables import as_text
 from cosserat_fenicsx.well import criteria
 
@@ -45,8 +47,9 @@ def _shown(answer):
 
 def summary(answer):
     """Lines: surface loads and their errors, what follows from them, and why this model."""
+    friction = f"friction {answer.drag / 1e3:+.3f} kN" if abs(answer.drag) > 1e-9 * abs(answer.hook_load) else "no drag"
     lines = [
-        f"hook load {answer.hook_load / 1e3:.3f} kN (friction {answer.drag / 1e3:+.3f} kN), surface torque "
+        f"hook load {answer.hook_load / 1e3:.3f} kN ({friction}), surface torque "
         f"{answer.surface_torque / 1e3:.3f} kN m (convention: {answer.torque_convention})",
         f"estimated relative errors: of the solution {answer.error:.0e}, of the model {answer.model_error:.0e}; asked "
         f"for {answer.tol:g}: {'enough' if answer.enough else 'NOT ENOUGH'}",
@@ -69,3 +72,65 @@ def summary(answer):
 
 def _known(value, factor, form):
     return "-" if math.isnan(value) else format(value * factor, form)
+
+
+def write_answer(answer, file):
+    """The .csv file of an answer; angles in degrees."""
+    position = answer.hole.path.position(answer.md)
+    columns = {
+        "md (m)": answer.md, "north (m)": position[:, 0], "east (m)": position[:, 1], "down (m)": position[:, 2],
+        "inclination (deg)": np.degrees(answer.inclination), "effective tension (N)": answer.tension,
+        "true tension (N)": answer.true_tension, "torque (N m)": answer.torque, "side force (N/m)": answer.side_force,
+        "contact side (deg from high side)": np.degrees(answer.contact_side), "stand-off": answer.standoff,
+        "bending moment (N m)": answer.bending_moment, "von Mises (Pa)": answer.von_mises,
+    }  # fmt: skip
+    rows = np.stack(list(columns.values()), axis=1)
+    names = [part.name for part in answer.string.components]
+    lines = [",".join([*columns, "state", "component"])]
+    for row, state, part in zip(rows, answer.buckling, answer.component, strict=True):
+        numbers = ("" if math.isnan(x) else f"{x:.9g}" for x in row)
+        lines.append(",".join([*numbers, _STATES[state], names[part]]))
+    text = "\n".join(lines) + "\n"
+    on_first(world(), lambda: Path(file).write_text(text, encoding="utf-8"))
+
+
+def sweep_table(sweep):
+    """Text: hook loads and torques over the depth of the bit."""
+    table = Table(title="hook load (kN), and surface torque (kN m) where the string rotates, over the depth of the bit")
+    table.add_column("depth (m)", justify="right")
+    columns = []
+    for i, operation in enumerate(sweep.operations):
+        for j in range(len(sweep.friction)):
+            columns.append(sweep.hook_load[i, j] / 1e3)
+            table.add_column(sweep.label(i, j), justify="right", overflow="fold")
+            if operation.direction(1.0)[1]:
+                columns.append(sweep.surface_torque[i, j] / 1e3)
+                table.add_column("torque", justify="right")
+    for k, depth in enumerate(sweep.depths):
+        table.add_row(f"{depth:.6g}", *(_known(values[k], 1, ".3f") for values in columns))
+    lines = [as_text(table)]
+    locked = np.argwhere(~np.isnan(sweep.values["locked"]))
+    for i, j, k in locked:
+        at = sweep.values["locked"][i, j, k]
+        lines.append(f"{sweep.label(i, j)}: locks up at md = {at:.5g} m with the bit at {sweep.depths[k]:.5g} m")
+    if len(sweep):
+        worst = np.nanmax(sweep.values["model_error"], initial=0.0)
+        lines.append(f"largest estimated relative error of the model {worst:.0e}")
+    return "\n".join(lines)
+
+
+def fit_table(fit):
+    """Text: coefficients of friction with their intervals."""
+    table = Table(title="coefficients of friction by least squares",
+                  caption=f"misfit {fit.misfit:.3g} (1: as the standard deviations say)")  # fmt: skip
+    for heading in ("section", "to (m)", "friction", f"{100 * fit.confidence:g} % interval"):
+        table.add_column(heading, justify="left" if heading == "section" else "right")
+    for i, section in enumerate(fit.hole.sections):
+        low, high = fit.interval[i]
+        table.add_row(
+            section.name or str(i + 1), f"{section.to:.6g}", f"{fit.friction[i]:.4f}", f"{low:.4f} to {high:.4f}"
+        )
+    if np.isfinite(fit.block_interval).all():
+        low, high = fit.block_interval / 1e3
+        table.add_row("block weight", "", f"{fit.block_weight / 1e3:.2f} kN", f"{low:.2f} to {high:.2f} kN")
+    return as_text(table)

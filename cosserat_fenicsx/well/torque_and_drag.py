@@ -15,6 +15,8 @@ from cosserat_fenicsx.well.string import DrillString
 SOFT, BUCKLED = "soft", "soft, buckled"
 MODELS = ("auto", SOFT, BUCKLED)
 CONVENTIONS = ("coulomb", "johancsik")
+# A torque below this share of the largest tension times the contact radius is nothing that errors are compared with.
+_LITTLE = 1e-2
 
 
 def torque_and_drag(
@@ -75,7 +77,8 @@ def torque_and_drag(
         if model == BUCKLED or buckled is not None:
             solved, used = buckled or soft, BUCKLED
     left_out = model_errors(hole.path, pieces, solved, sections)
-    scale, largest = abs(solved.tension).max(), abs(solved.torque).max()
+    scale = abs(solved.tension).max()
+    largest = max(abs(solved.torque).max(), _LITTLE * scale * pieces.radius.max())
     error = max(_share(solved.error, scale), _share(solved.torque_error, largest))
     model_error = max(_share(left_out[0].total, scale), _share(left_out[1].total, largest))
     why = reasons(used, model, soft, solved, sections, left_out, (scale, largest), tol)
