@@ -288,16 +288,17 @@ class InHole:
             self._by_stiffness = {name: abs(getattr(self, name) - getattr(softer, name)) for name in scales}
         elif coarse is not None:
             self._by_stiffness = coarse._by_stiffness
-        self.of_stiffness = max(
-            (self._by_stiffness[name] / scales[name] for name in self._by_stiffness), default=np.inf
-        )
-        change = np.inf
-        if coarse is not None:  # a single quantity may change little by chance
+        counted = [name for name in scales if turns or name != "surface_torque"]
+        if self._by_stiffness:
+            self.of_stiffness = max(self._by_stiffness[name] / scales[name] for name in counted)
+        changes = dict.fromkeys(scales, np.inf)
+        if coarse is not None:
             changes = {name: abs(getattr(self, name) - getattr(coarse, name)) / scales[name] for name in scales}
-            change = _OF_CHANGE * max(changes[name] for name in scales if turns or name != "surface_torque")
+        largest = max(changes[name] for name in counted)  # a single quantity may change little by chance
         for name, scale in scales.items():
             rounding = self.balance * (arm if name == "surface_torque" else 1.0)
-            self.errors[name] = change * scale + self._by_stiffness.get(name, np.inf) + rounding
+            change = _OF_CHANGE * max(largest, changes[name]) * scale
+            self.errors[name] = change + self._by_stiffness.get(name, np.inf) + rounding
         of_load, of_torque = (self.errors[name] / scales[name] for name in ("hook_load", "surface_torque"))
         self.error = max(of_load, of_torque) if turns else of_load
         if coarse is not None:
