@@ -53,7 +53,7 @@ def _draw(answer, file, enlarge):
         f"radii and clearance {enlarge:g} times as large", font_size=11, color="black",
     )  # fmt: skip
     plotter.show_bounds(xtitle="east (m)", ytitle="north (m)", ztitle="height (m)", color="black", location="outer",
-                        font_size=9, n_xlabels=3, n_ylabels=3)  # fmt: skip
+                        font_size=10, n_xlabels=2, n_ylabels=2, use_3d_text=False, fmt="%.0f")  # fmt: skip
     plotter.view_vector((1.0, -1.6, 0.5))
     plotter.camera.zoom(0.95)
     plotter.screenshot(file)
