@@ -6,12 +6,12 @@ import numpy as np
 
 from cosserat_fenicsx.checks import positive
 from cosserat_fenicsx.errors import SceneError
-from cosserat_fenicsx.pictures.drawing import load_pyvista
+from cosserat_fenicsx.pictures.drawing import frame, load_pyvista
 from cosserat_fenicsx.ranks import on_first, world
 
-_WINDOW = 1300, 1000
+_WINDOW = 1100, 1200
 # Radius of the hole in the picture, over the extent of the well.
-_HOLE = 0.012
+_HOLE = 0.02
 _FIELD = "side force (N/m)"
 # Points along the string; more are left out.
 _POINTS = 1500
@@ -50,12 +50,9 @@ def _draw(answer, file, enlarge):
     plotter.add_mesh(wall.tube(scalars="radius", absolute=True, n_sides=24), color="peru", opacity=0.2)
     plotter.add_text(
         f"{answer.operation.name}, bit at {answer.depth:g} m, {answer.model} string\n"
-        f"radii and clearance {enlarge:g} times as large", font_size=11, color="black",
+        f"radii and clearance {enlarge:g} times as large; x east, y north, z upwards", font_size=11, color="black",
     )  # fmt: skip
-    plotter.show_bounds(xtitle="east (m)", ytitle="north (m)", ztitle="height (m)", color="black", location="outer",
-                        font_size=10, n_xlabels=2, n_ylabels=2, use_3d_text=False, fmt="%.0f")  # fmt: skip
-    plotter.view_vector((1.0, -1.6, 0.5))
-    plotter.camera.zoom(0.95)
+    frame(plotter, axis)
     plotter.screenshot(file)
     plotter.close()
 
