@@ -158,6 +158,11 @@ class Stabiliser:
     def __post_init__(self):
         if self.length is None:
             refuse(self, "length", None, "a length (m)")
+        store(self, diameter=positive(self, "diameter", self.diameter, "m"))
+        if self.diameter < positive(self, "outer_diameter", self.outer_diameter, "m"):
+            refuse(
+                self, "diameter", self.diameter, f"across the blades, at least the body's, {self.outer_diameter:g} m"
+            )
         sizes = (self.outer_diameter, self.inner_diameter, self.diameter, self.mass)
         body = Collar(self.length, None, *sizes, self.material)  # its checks and its stiffness are those of a collar
         store(self, length=body.length, mass=body.mass, _body=body)

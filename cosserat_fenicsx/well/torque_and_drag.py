@@ -64,19 +64,20 @@ def torque_and_drag(
             place), or one that is no rod in contact where `model` is "rod".
         NotConverged: the tolerance was not reached.
     """
-    for name, value, kind in (
-        ("hole", hole, Borehole),
-        ("string", string, DrillString),
-        ("operation", operation, Operation),
-    ):
-        instance("torque_and_drag", name, value, kind, f"a {kind.__name__}")
+    instance("torque_and_drag", "hole", hole, Borehole, "a Borehole")
+    instance("torque_and_drag", "string", string, DrillString, "a DrillString")
+    instance("torque_and_drag", "operation", operation, Operation, "an operation, such as TripOut()")
     instance("torque_and_drag", "mud", mud, (Mud, type(None)), "Mud(density), or None where weights are in mud")
     tol = number("torque_and_drag", "tol", tol, "a number from 1e-12 to 0.1", lambda x: 1e-12 <= x <= 0.1)
     if model not in MODELS:
         refuse("torque_and_drag", "model", model, " or ".join(f"'{name}'" for name in MODELS))
     if torque_convention not in CONVENTIONS:
         refuse("torque_and_drag", "torque_convention", torque_convention, "'coulomb' or 'johancsik'")
-    depth = hole.length if depth is None else number("torque_and_drag", "depth", depth, "a number (m)", lambda x: x > 0)
+    depth = (
+        hole.length
+        if depth is None
+        else number("torque_and_drag", "depth", depth, "a measured depth (m), positive", lambda x: x > 0)
+    )
 
     pieces, laid = pieces_of(hole, string, operation, mud, depth)
     given = hole, string, operation, mud, depth
