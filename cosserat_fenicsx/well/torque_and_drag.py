@@ -57,7 +57,8 @@ def torque_and_drag(
 
     Returns:
         a `TorqueAndDrag`. Its `enough` is False where the accuracy asked for is beyond the model, or where `model` is
-        "auto" and the rod could not be solved: the soft string's answer is then returned, and `why` says so.
+        "auto" and the rod could not be solved as accurately, or not at all: its answer, or that of the soft string, is
+        then returned, and `why` says so.
 
     Raises:
         SceneError: a string that does not fit the hole, missing mud, an unknown model, a string that locks up (with the
@@ -87,7 +88,7 @@ def torque_and_drag(
     if model == AUTO and flexible.model == BUCKLED:
         return replace(flexible, why=(*flexible.why, _NO_ROD))
     try:
-        return rod_in_contact(flexible, why, progress)
+        return rod_in_contact(flexible, why, progress, exact=model == ROD)
     except (SceneError, NotConverged, InstallationError) as problem:
         if model == ROD:
             raise
