@@ -9,8 +9,8 @@ from cosserat_fenicsx.results.recovery import at_nodes
 from cosserat_fenicsx.well.resultants import contacts_along
 from cosserat_fenicsx.well.string_scene import bending_of, is_round
 
-# Errors of the finer mesh over changes from one mesh to the next, whose signs alternate: what covered all of 97 random
-# wells with strings of any size.
+# Errors of the finer mesh over changes from one mesh to the next, whose signs alternate: what covered 97 random wells,
+# but for the wall force of one buckled string.
 _OF_CHANGE = {"hook_load": 3.0, "surface_torque": 4.0, "wall_force": 6.0}
 # Smallest scales that errors are relative to: of the hook load, over the string's weight; of the torque, over that of
 # the wall's forces at the string's surface.
