@@ -9,8 +9,9 @@ from cosserat_fenicsx.results.recovery import at_nodes
 from cosserat_fenicsx.well.resultants import contacts_along
 from cosserat_fenicsx.well.string_scene import bending_of, is_round
 
-# Change from one mesh to the next, whose signs alternate, that is counted as the error of the finer one.
-_OF_CHANGE = 3.0
+# Errors of the finer mesh over changes from one mesh to the next, whose signs alternate: what covered 97 random wells,
+# but for the wall force of one buckled string.
+_OF_CHANGE = {"hook_load": 3.0, "surface_torque": 4.0, "wall_force": 6.0}
 # Smallest scales that errors are relative to: of the hook load, over the string's weight; of the torque, over that of
 # the wall's forces at the string's surface.
 _LEAST_LOAD, _LEAST_TORQUE = 1e-3, 1e-3
@@ -297,7 +298,7 @@ class InHole:
         largest = max(changes[name] for name in counted)  # a single quantity may change little by chance
         for name, scale in scales.items():
             rounding = self.balance * (arm if name == "surface_torque" else 1.0)
-            change = _OF_CHANGE * max(largest, changes[name]) * scale
+            change = _OF_CHANGE[name] * max(largest, changes[name]) * scale
             self.errors[name] = change + self._by_stiffness.get(name, np.inf) + rounding
         of_load, of_torque = (self.errors[name] / scales[name] for name in ("hook_load", "surface_torque"))
         self.error = max(of_load, of_torque) if turns else of_load
