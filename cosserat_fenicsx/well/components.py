@@ -117,17 +117,19 @@ class _Tubular:
 
 
 class DrillPipe(_Tubular):
-    __doc__ = f"Drill pipe, such as DrillPipe(size='5 in 19.50 lb/ft').\n{_Tubular.__doc__.partition(chr(10))[2]}"
+    __doc__ = (
+        f"Drill pipe, such as DrillPipe(size='5 in 19.50 lb/ft').\n{(_Tubular.__doc__ or '').partition(chr(10))[2]}"
+    )
     _called = "drill pipe"
 
 
 class HeavyWeight(_Tubular):
-    __doc__ = f"Heavy-weight drill pipe, such as size='5 in'.\n{_Tubular.__doc__.partition(chr(10))[2]}"
+    __doc__ = f"Heavy-weight drill pipe, such as size='5 in'.\n{(_Tubular.__doc__ or '').partition(chr(10))[2]}"
     _called = "heavy-weight"
 
 
 class Collar(_Tubular):
-    __doc__ = f"Drill collars, such as size='NC46-65'.\n{_Tubular.__doc__.partition(chr(10))[2]}"
+    __doc__ = f"Drill collars, such as size='NC46-65'.\n{(_Tubular.__doc__ or '').partition(chr(10))[2]}"
     _called = "collar"
 
 
