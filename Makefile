@@ -29,7 +29,7 @@ help:
 	@echo "make test    all tests on one, two and four processes"
 	@echo "make tables  the tables of accuracy and cost in docs/, measured anew and put there"
 	@echo "make figure3 every curve of the paper's Figure 3, and what was found; writes out/ (about 4 minutes)"
-	@echo "make work-precision  speed against accuracy, beside Exudyn, OpenSeesPy, PyElastica and CalculiX (half an hour at most)"
+	@echo "make work-precision  speed against accuracy, beside Exudyn, OpenSeesPy, PyElastica, CalculiX, welleng and torque-drag (half an hour at most)"
 	@echo "make failures where methods fail: a map of methods against trials; writes out/ (at most a quarter of an hour)"
 	@echo "make random  200 random scenes against the strong form, at three tolerances (about 5 minutes)"
 	@echo "make setup   only what all of these need first: the Debian packages and the environment .venv"
@@ -85,7 +85,8 @@ random: setup
 work-precision: setup
 	$(PYTHON) demos/evidence/work_precision.py
 	$(PYTHON) demos/evidence/work_precision_motion.py
-	$(PYTHON) demos/evidence/put_in_docs.py work_precision work_precision_motion
+	$(PYTHON) demos/evidence/soft_string.py
+	$(PYTHON) demos/evidence/put_in_docs.py work_precision work_precision_motion soft_string
 
 setup: .venv/.stamp
 

@@ -66,14 +66,21 @@ def test_what_the_answer_of_the_rod_tells(out):
     assert np.isfinite(out.critical_load("He-Kyllingstad")).any() and math.isnan(out.neutral_point)
 
 
-def test_a_small_clearance_and_a_smooth_well_are_those_of_the_soft_string():
-    """A drop in the vertical plane, on whose low side the string lies: nothing turns to the other side."""
-    path = cf.WellPath.from_survey([0, 300, 700], [60, 60, 30], [0, 0, 0])
-    for operation in (cf.TripOut(), cf.RotateOffBottom()):
-        found = cf.torque_and_drag(hole(path, 0.01), STRING, operation, model="rod")
-        apart = found.differences["soft"]
-        assert abs(apart[0]) < 1e-3 * found.hook_load and abs(apart[1]) < 2e-3 * abs(found.surface_torque) + 1
+def test_the_difference_is_one_of_clearance():
+    """What a string misses that leaves one wall for the other grows like the root of the clearance, T sqrt(4 r/R)."""
+    wide, narrow = (cf.torque_and_drag(hole(well("P"), r), STRING, cf.TripOut(), model="rod").differences["soft"]
+                    for r in (0.04, 0.01))  # fmt: skip
+    assert wide[0] / narrow[0] == pytest.approx(2, rel=0.1)
+
+
+def test_a_rotating_string_climbs_and_has_torque():
+    found = cf.torque_and_drag(hole(build(), 0.01), STRING, cf.RotateOffBottom(weight=-50e3), model="rod")
+    hook, torque = found.differences["soft"]
+    assert abs(hook) < 1e-4 * found.hook_load and -0.05 * found.surface_torque < torque < 0
     assert found.torque[0] == pytest.approx(found.surface_torque, rel=1e-6) and found.twist > 0
+    lying = np.isclose(found.side_force, 241.13 * math.sin(math.radians(40)) / math.hypot(1, 0.25), rtol=1e-3)
+    assert found.contact_side[lying & (found.md > 400)] == pytest.approx(math.pi - math.atan(0.25), abs=1e-3)
+    assert np.count_nonzero(lying & (found.md > 400)) > 20
 
 
 @pytest.mark.parametrize("case", KNOWN["stiff build"][:2], ids=lambda case: case["name"])
@@ -164,7 +171,8 @@ def test_charts_and_the_picture_show_points_and_places(out, tmp_path_all):
     out.write(tmp_path_all / "out.csv")
 
 
-#: Hook loads of another program (a prototype, elements of 2 m, friction on the centreline), N.
+#: Hook loads of another program (a prototype, elements of 2 m), N, with friction on the centreline: that its arm along
+#: the pipe changes them by up to 41 N was found with this package.
 FOUND = [
     ("P", cf.TripOut(), 907306.0), ("P", cf.TripIn(), 379920.4), ("P", cf.RotateOffBottom(), 598622.0),
     ("F-12", cf.TripOut(), 938745.5), ("F-12", cf.TripIn(), 595230.4), ("ISCWSA 2", cf.TripOut(), 1091313.3),
@@ -175,5 +183,5 @@ FOUND = [
 @pytest.mark.parametrize(("name", "operation", "load"), FOUND)
 def test_whole_wells(name, operation, load):
     found = cf.torque_and_drag(hole(well(name)), STRING, operation)
-    assert found.model == "rod" and found.enough and found.hook_load == pytest.approx(load, rel=3e-5)
+    assert found.model == "rod" and found.enough and found.hook_load == pytest.approx(load, rel=5e-5)
     assert not any("MORE" in line for line in found.why)  # the soft string's estimate covers the difference

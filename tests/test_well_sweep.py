@@ -59,6 +59,8 @@ def test_a_sweep_goes_on_where_it_was_broken_off(tmp_path, monkeypatch):
 def test_depths_that_do_not_fit_are_refused_first():
     with pytest.raises(cf.SceneError, match="hole, which ends at 2500 m"):
         cf.depth_sweep(HOLE, STRING, OPERATIONS, [1000, 2600], mud=MUD)
+    with pytest.raises(cf.SceneError, match="at least one measured depth"):
+        cf.depth_sweep(HOLE, STRING, OPERATIONS, [], mud=MUD)
     with pytest.raises(cf.SceneError, match="above the surface at the depth 50 m"):
         cf.depth_sweep(HOLE, STRING, OPERATIONS, [1000, 50], mud=MUD)
 

@@ -117,17 +117,19 @@ class _Tubular:
 
 
 class DrillPipe(_Tubular):
-    __doc__ = f"Drill pipe, such as DrillPipe(size='5 in 19.50 lb/ft').\n{_Tubular.__doc__.partition(chr(10))[2]}"
+    __doc__ = (
+        f"Drill pipe, such as DrillPipe(size='5 in 19.50 lb/ft').\n{(_Tubular.__doc__ or '').partition(chr(10))[2]}"
+    )
     _called = "drill pipe"
 
 
 class HeavyWeight(_Tubular):
-    __doc__ = f"Heavy-weight drill pipe, such as size='5 in'.\n{_Tubular.__doc__.partition(chr(10))[2]}"
+    __doc__ = f"Heavy-weight drill pipe, such as size='5 in'.\n{(_Tubular.__doc__ or '').partition(chr(10))[2]}"
     _called = "heavy-weight"
 
 
 class Collar(_Tubular):
-    __doc__ = f"Drill collars, such as size='NC46-65'.\n{_Tubular.__doc__.partition(chr(10))[2]}"
+    __doc__ = f"Drill collars, such as size='NC46-65'.\n{(_Tubular.__doc__ or '').partition(chr(10))[2]}"
     _called = "collar"
 
 
@@ -158,6 +160,11 @@ class Stabiliser:
     def __post_init__(self):
         if self.length is None:
             refuse(self, "length", None, "a length (m)")
+        store(self, diameter=positive(self, "diameter", self.diameter, "m"))
+        if self.diameter < positive(self, "outer_diameter", self.outer_diameter, "m"):
+            refuse(
+                self, "diameter", self.diameter, f"across the blades, at least the body's, {self.outer_diameter:g} m"
+            )
         sizes = (self.outer_diameter, self.inner_diameter, self.diameter, self.mass)
         body = Collar(self.length, None, *sizes, self.material)  # its checks and its stiffness are those of a collar
         store(self, length=body.length, mass=body.mass, _body=body)

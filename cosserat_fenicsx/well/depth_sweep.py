@@ -135,7 +135,8 @@ def depth_sweep(
     Raises:
         SceneError: see `torque_and_drag`; a file of another sweep.
         NotConverged: see `torque_and_drag`; its `path` is the sweep so far.
-        Interrupted: by Ctrl-C; likewise.
+        OSError: the file cannot be written.
+        Interrupted: by Ctrl-C; its `path` is the sweep so far.
     """
     operations = (operations,) if isinstance(operations, Operation) else tuple(operations)
     if not operations:
@@ -144,6 +145,8 @@ def depth_sweep(
         if not isinstance(operation, Operation):
             refuse("depth_sweep", "operations", operation, "operations, such as TripOut()")
     depths = np.atleast_1d(finite_array("depth_sweep", "depths", depths, "measured depths (m)"))
+    if not len(depths):
+        refuse("depth_sweep", "depths", depths, "at least one measured depth (m)")
     friction = tuple(friction) if isinstance(friction, Sequence | np.ndarray) else (friction,)
     holes = [hole if value is None else hole.with_friction(value) for value in friction]
     settings = {"mud": mud, "model": model, "tol": tol, "torque_convention": torque_convention}

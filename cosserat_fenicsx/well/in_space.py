@@ -6,12 +6,13 @@ import numpy as np
 
 from cosserat_fenicsx.checks import positive
 from cosserat_fenicsx.errors import SceneError
-from cosserat_fenicsx.pictures.drawing import load_pyvista
+from cosserat_fenicsx.pictures.drawing import frame, load_pyvista
 from cosserat_fenicsx.ranks import on_first, world
+from cosserat_fenicsx.well.contacts import usual_force
 
-_WINDOW = 1300, 1000
+_WINDOW = 1100, 1200
 # Radius of the hole in the picture, over the extent of the well.
-_HOLE = 0.012
+_HOLE = 0.02
 _FIELD = "side force (N/m)"
 # Points along the string; more are left out.
 _POINTS = 1500
@@ -41,7 +42,8 @@ def _draw(answer, file, enlarge):
     string[_FIELD] = answer.side_force[at]
     string["radius"] = enlarge * (hole - answer.clearance[at])
     tube = string.tube(scalars="radius", absolute=True, n_sides=16)
-    plotter.add_mesh(tube, scalars=_FIELD, cmap="viridis",
+    most = min(answer.side_force.max(), usual_force(answer.side_force)) or 1.0  # peaks would hide all else
+    plotter.add_mesh(tube, scalars=_FIELD, cmap="viridis", clim=(0.0, most),
                      scalar_bar_args={"vertical": True, "position_x": 0.86, "position_y": 0.25,
                                       "color": "black"})  # fmt: skip
     wall = pyvista.MultipleLines(axis)
@@ -49,12 +51,9 @@ def _draw(answer, file, enlarge):
     plotter.add_mesh(wall.tube(scalars="radius", absolute=True, n_sides=24), color="peru", opacity=0.2)
     plotter.add_text(
         f"{answer.operation.name}, bit at {answer.depth:g} m, {answer.words}\n"
-        f"radii and clearance {enlarge:g} times as large", font_size=11, color="black",
+        f"radii and clearance {enlarge:g} times as large; x east, y north, z upwards", font_size=11, color="black",
     )  # fmt: skip
-    plotter.show_bounds(xtitle="east (m)", ytitle="north (m)", ztitle="height (m)", color="black", location="outer",
-                        font_size=9, n_xlabels=3, n_ylabels=3)  # fmt: skip
-    plotter.view_vector((1.0, -1.6, 0.5))
-    plotter.camera.zoom(0.95)
+    frame(plotter, axis)
     plotter.screenshot(file)
     plotter.close()
 

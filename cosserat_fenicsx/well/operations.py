@@ -126,14 +126,14 @@ class _Reaming(Operation):
 
 @dataclass(frozen=True)
 class Ream(_Reaming):
-    __doc__ = f"Moving down while rotating.\n{_Reaming.__doc__.partition(chr(10))[2]}"
+    __doc__ = f"Moving down while rotating.\n{(_Reaming.__doc__ or '').partition(chr(10))[2]}"
 
     name, slip = "ream", (-1.0, 1.0)
 
 
 @dataclass(frozen=True)
 class BackReam(_Reaming):
-    __doc__ = f"Moving up while rotating.\n{_Reaming.__doc__.partition(chr(10))[2]}"
+    __doc__ = f"Moving up while rotating.\n{(_Reaming.__doc__ or '').partition(chr(10))[2]}"
 
     name, slip = "back ream", (1.0, 1.0)
 

@@ -18,7 +18,8 @@ _VERTICAL = 1e-9
 class RodInContact(TorqueAndDrag):
     """What a string in its hole carries as an exact rod in contact; the places of the arrays are the rod's nodes.
 
-    `solved` is the `InHole`, whose `path` has all that the package tells of a rod. `md` is the measured depth of the
+    `error` is relative to hook load and surface torque themselves, the latter only where the string turns. `solved` is
+    the `InHole`, whose `path` has all that the package tells of a rod. `md` is the measured depth of the
     closest point of the hole's axis. Forces at points, such as those of stabilisers, are in `contacts`, which has their
     resultants; in `side_force` they are narrow peaks, as wide as the wall's stiffness makes them.
     """
@@ -30,14 +31,18 @@ class RodInContact(TorqueAndDrag):
     def of(cls, flexible, solved, decided):
         """From the answer of the soft string, the `InHole`, and sentences on what decided for it."""
         given = {field.name: getattr(flexible, field.name) for field in fields(TorqueAndDrag)}
-        errors = solved.errors["hook_load"], solved.errors["surface_torque"]
-        error = max(map(share, errors, scales_of(solved, flexible.pieces)))
         here = solved.hook_load, solved.surface_torque
         there = {flexible.model: (flexible.hook_load, flexible.surface_torque)}
         there |= {name: (flexible.hook_load - hook, flexible.surface_torque - torque)
                   for name, (hook, torque) in flexible.differences.items()}  # fmt: skip
         differences = {name: (here[0] - hook, here[1] - torque) for name, (hook, torque) in there.items()}
-        changed = {"model": "rod", "error": error, "model_error": 0.0, "differences": differences, "solved": solved}
+        changed = {
+            "model": "rod",
+            "error": solved.error,
+            "model_error": 0.0,
+            "differences": differences,
+            "solved": solved,
+        }
         return cls(**{**given, **changed, "why": (*decided, *_found(flexible, solved, differences))})
 
     @property

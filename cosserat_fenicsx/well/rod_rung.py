@@ -11,19 +11,20 @@ from cosserat_fenicsx.well.components import Bit, Stabiliser, weight_in_mud
 from cosserat_fenicsx.well.rod_answer import RodInContact
 
 
-def rod_in_contact(flexible, decided, progress=None):
+def rod_in_contact(flexible, decided, progress=None, exact=True):
     """The `RodInContact` of the same string in the same hole as a soft one.
 
     Args:
         flexible: the `TorqueAndDrag` by the soft string; decided: sentences on why it is not enough; progress: see
-            `solve`.
+            `solve`. exact: False for an answer that may be less accurate than asked, and says so.
 
     Raises:
         SceneError: a component without stiffness, or as wide as the hole; a weight in mud that is not positive;
             Johancsik's convention of a torque.
         NotConverged: no equilibrium was found, or not as accurately as asked.
     """
-    from cosserat_fenicsx.well.rod_in_hole import solve_in_hole  # it needs dolfinx, which the soft string does not
+    # imported here, since it needs dolfinx, which the soft string does not
+    from cosserat_fenicsx.well.rod_in_hole import NotAccurate, solve_in_hole
 
     if flexible.torque_convention != "coulomb" and flexible.pieces.around.any():
         refuse("torque_and_drag", "torque_convention", flexible.torque_convention,
@@ -32,22 +33,27 @@ def rod_in_contact(flexible, decided, progress=None):
     for place in laid:
         _check(place.component, flexible.mud)
     hole, operation = flexible.hole, flexible.operation
-    solved = solve_in_hole(
-        hole.path,
-        [place.bottom - place.top for place in laid],
-        [place.component.stiffness for place in laid],
-        [weight_in_mud(place.component, flexible.mud) for place in laid],
-        [_body_radius(place.component) for place in laid],
-        radius=_along(hole, flexible.depth, lambda section: section.diameter / 2),
-        friction=_along(hole, flexible.depth, lambda section: section.friction),
-        slip=[operation.direction(place.component.contact_radius) for place in laid],
-        bottom_tension=-operation.weight,
-        bottom_torque=operation.torque,
-        rings=[_ring(place, hole) for place in laid if _is_ring(place.component)],
-        wall_stiffness=hole.wall_stiffness,
-        tol=flexible.tol,
-        progress=progress,
-    )
+    try:
+        solved = solve_in_hole(
+            hole.path,
+            [place.bottom - place.top for place in laid],
+            [place.component.stiffness for place in laid],
+            [weight_in_mud(place.component, flexible.mud) for place in laid],
+            [_body_radius(place.component) for place in laid],
+            radius=_along(hole, flexible.depth, lambda section: section.diameter / 2),
+            friction=_along(hole, flexible.depth, lambda section: section.friction),
+            slip=[operation.direction(place.component.contact_radius) for place in laid],
+            bottom_tension=-operation.weight,
+            bottom_torque=operation.torque,
+            rings=[_ring(place, hole) for place in laid if _is_ring(place.component)],
+            wall_stiffness=hole.wall_stiffness,
+            tol=flexible.tol,
+            progress=progress,
+        )
+    except NotAccurate as short:
+        if exact:
+            raise
+        solved, decided = short.answer, (*decided, f"NOT ENOUGH for tol = {flexible.tol:g}: {short}")
     return RodInContact.of(flexible, solved, decided)
 
 

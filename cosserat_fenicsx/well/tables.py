@@ -27,7 +27,8 @@ def answer_table(answer):
         part = answer.string.components[answer.component[i]]
         table.add_row(
             f"{answer.md[i]:.6g}", part.name, f"{math.degrees(path.inclination_at(answer.md[i])):.2f}",
-            f"{answer.tension[i] / 1e3:.3f}", f"{answer.torque[i] / 1e3:.3f}", f"{answer.side_force[i]:.1f}",
+            f"{answer.tension[i] / 1e3:.3f}", f"{round(answer.torque[i] / 1e3, 3) + 0.0:.3f}",
+            f"{answer.side_force[i]:.1f}",
             _known(answer.bending_moment[i], 1, ".0f"), _known(answer.von_mises[i], 1e-6, ".1f"),
             criteria.STATES[states[i]],
         )  # fmt: skip
@@ -49,7 +50,7 @@ def summary(answer):
     friction = f"friction {answer.drag / 1e3:+.3f} kN" if abs(answer.drag) > 1e-9 * abs(answer.hook_load) else "no drag"
     lines = [
         f"hook load {answer.hook_load / 1e3:.3f} kN ({friction}), surface torque "
-        f"{answer.surface_torque / 1e3:.3f} kN m (convention: {answer.torque_convention})",
+        f"{round(answer.surface_torque / 1e3, 3) + 0.0:.3f} kN m (convention: {answer.torque_convention})",
         f"estimated relative errors: of the solution {answer.error:.0e}, of the model {answer.model_error:.0e}; asked "
         f"for {answer.tol:g}: {'enough' if answer.enough else 'NOT ENOUGH'}",
     ]

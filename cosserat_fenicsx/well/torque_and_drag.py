@@ -57,26 +57,28 @@ def torque_and_drag(
 
     Returns:
         a `TorqueAndDrag`. Its `enough` is False where the accuracy asked for is beyond the model, or where `model` is
-        "auto" and the rod could not be solved: the soft string's answer is then returned, and `why` says so.
+        "auto" and the rod could not be solved as accurately, or not at all: its answer, or that of the soft string, is
+        then returned, and `why` says so.
 
     Raises:
         SceneError: a string that does not fit the hole, missing mud, an unknown model, a string that locks up (with the
             place), or one that is no rod in contact where `model` is "rod".
         NotConverged: the tolerance was not reached.
     """
-    for name, value, kind, expected in (
-        ("hole", hole, Borehole, "a Borehole"),
-        ("string", string, DrillString, "a DrillString"),
-        ("operation", operation, Operation, "an operation, such as TripOut()"),
-    ):
-        instance("torque_and_drag", name, value, kind, expected)
+    instance("torque_and_drag", "hole", hole, Borehole, "a Borehole")
+    instance("torque_and_drag", "string", string, DrillString, "a DrillString")
+    instance("torque_and_drag", "operation", operation, Operation, "an operation, such as TripOut()")
     instance("torque_and_drag", "mud", mud, (Mud, type(None)), "Mud(density), or None where weights are in mud")
     tol = number("torque_and_drag", "tol", tol, "a number from 1e-12 to 0.1", lambda x: 1e-12 <= x <= 0.1)
     if model not in MODELS:
         refuse("torque_and_drag", "model", model, " or ".join(f"'{name}'" for name in MODELS))
     if torque_convention not in CONVENTIONS:
         refuse("torque_and_drag", "torque_convention", torque_convention, "'coulomb' or 'johancsik'")
-    depth = hole.length if depth is None else number("torque_and_drag", "depth", depth, "a number (m)", lambda x: x > 0)
+    depth = (
+        hole.length
+        if depth is None
+        else number("torque_and_drag", "depth", depth, "a measured depth (m), positive", lambda x: x > 0)
+    )
 
     pieces, laid = pieces_of(hole, string, operation, mud, depth)
     given = hole, string, operation, mud, depth
@@ -86,7 +88,7 @@ def torque_and_drag(
     if model == AUTO and flexible.model == BUCKLED:
         return replace(flexible, why=(*flexible.why, _NO_ROD))
     try:
-        return rod_in_contact(flexible, why, progress)
+        return rod_in_contact(flexible, why, progress, exact=model == ROD)
     except (SceneError, NotConverged, InstallationError) as problem:
         if model == ROD:
             raise

@@ -93,10 +93,14 @@ def measure(install):
 
 
 def table(rows, silent):
-    """Markdown."""
-    lines = ["| well | program | setting | relative error of hook loads | ms |", "|---|---|---|---:|---:|"]
+    """Markdown: errors and times in both wells."""
+    cells = {}
     for name, program, setting, error, seconds in rows:
-        lines.append(f"| `{name}` | {program} | {setting} | {max(error, 1e-16):.0e} | {1e3 * seconds:.2f} |")
+        cells.setdefault((program, setting), {})[name] = f"{max(error, 1e-16):.0e} | {1e3 * seconds:.2f}"
+    heads = " | ".join(f"`{name}`: relative error | ms" for name in TRUTH)
+    lines = [f"| program | setting | {heads} |", f"|---|---|{'---:|' * (2 * len(TRUTH))}"]
+    for (program, setting), found in cells.items():
+        lines.append(f"| {program} | {setting} | {' | '.join(found[name] for name in TRUTH)} |")
     return "\n".join([*lines, "", *(f"Not measured: {line}." for line in silent), in_words(record())])
 
 
