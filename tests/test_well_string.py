@@ -183,3 +183,8 @@ def test_dimensions_in_other_units_are_warned_of():
         cf.HoleSection(100.0, 8.5, 0.2)
     with pytest.warns(cf.SceneWarning, match="hardly that of a mud"):
         cf.Mud(9000.0)
+
+
+def test_contacts_add_up_to_the_friction():
+    out = drag(cf.TripOut(), hole=HOLE.with_friction(0.3))
+    assert sum(force for _, _, force, _ in out.contacts) == pytest.approx(out.drag / 0.3, rel=1e-9)

@@ -8,10 +8,11 @@ import numpy as np
 
 from cosserat_fenicsx.annotations import File
 from cosserat_fenicsx.well import criteria, loaded
-from cosserat_fenicsx.well.contacts import contacts_of, sides_of
+from cosserat_fenicsx.well.contacts import contacts_of, side_force_up_to, sides_of
 from cosserat_fenicsx.well.hole import Borehole
 from cosserat_fenicsx.well.mud import Mud
 from cosserat_fenicsx.well.operations import Operation
+from cosserat_fenicsx.well.softstring import UP_TO
 from cosserat_fenicsx.well.string import DrillString
 
 # A torque below this share of the largest tension times the contact radius is nothing that errors are compared with.
@@ -180,7 +181,7 @@ class TorqueAndDrag:
     def contacts(self) -> list[tuple[float, float, float, str]]:
         """(from, to, force, side): measured depths (m), the force on the wall (N) and "high", "right", "low" or "left",
         looking down the hole ("wall" where it is vertical), of each stretch on one side."""
-        return contacts_of(self.md, self.side_force, self.contact_side)
+        return contacts_of(self.md, self.side_force, self.contact_side, -self._down(side_force_up_to(self.solved)))
 
     @cached_property
     def _sections(self):
@@ -208,8 +209,6 @@ class TorqueAndDrag:
 
     def _integral(self, values):
         """Of values at `md` along the string: by the points of pieces."""
-        from cosserat_fenicsx.well.softstring import UP_TO
-
         rows = values.reshape(-1, len(self.solved.at))[::-1, ::-1]
         return float((rows @ UP_TO[-1]) @ self.solved.chain.length)
 

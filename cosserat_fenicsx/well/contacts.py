@@ -2,6 +2,8 @@
 
 import numpy as np
 
+from cosserat_fenicsx.well.softstring import UP_TO
+
 _SIDES = ("high", "right", "low", "left")
 _USUAL, _MOSTLY = 1.5, 0.97
 
@@ -34,8 +36,18 @@ def name_of_side(side):
     return _SIDES[round(side / (np.pi / 2)) % 4] if np.isfinite(side) else "wall"
 
 
-def contacts_of(md, side_force, side):
-    """[(from, to, force, side)], see `TorqueAndDrag.contacts`."""
+def side_force_up_to(solved):
+    """(n, m) force of the wall (N) from the lower end up to the places of a `Solved`."""
+    within = (solved.side @ UP_TO.T) * solved.chain.length[:, None]
+    return np.cumsum(within[:, -1:], axis=0) - within[:, -1:] + within
+
+
+def contacts_of(md, side_force, side, up_to):
+    """[(from, to, force, side)], see `TorqueAndDrag.contacts`.
+
+    Args:
+        up_to: (n,) integral of the side force over the depth, from anywhere, N.
+    """
     touched = np.isfinite(side)
     quadrant = np.where(
         touched, np.round(np.where(touched, side, 0.0) / (np.pi / 2)) % 4, np.where(side_force > 0, 4, 5)
@@ -47,7 +59,7 @@ def contacts_of(md, side_force, side):
         # a stretch that ends inside a piece reaches to the next point
         last = min(stretch[-1] + 1, len(md) - 1)
         points = np.append(stretch, last) if last > stretch[-1] else stretch
-        force = (np.diff(md[points]) * (side_force[points][1:] + side_force[points][:-1])).sum() / 2
+        force = up_to[points[-1]] - up_to[points[0]]
         if kind < 5 and md[points[-1]] > md[points[0]]:
             name = (*_SIDES, "wall")[kind]
             found.append((float(md[points[0]]), float(md[points[-1]]), float(force), name))
