@@ -144,6 +144,9 @@ def _scene(tables, folder):
         settings["depth"] = in_si("torque_and_drag.depth", settings["depth"], "length")
     whole = DrillString(parts, **{name: string[name] for name in ("order",) if name in string})
     sweep = _sweep(table("depth_sweep", tables["depth_sweep"])) if "depth_sweep" in tables else {}
+    for depth in (*np.atleast_1d(settings.get("depth", hole.length)), *sweep.get("depths", ())):
+        if not 0 < depth <= hole.length * (1 + 1e-12):
+            raise SceneError(f"depth = {depth:.10g} m: expected a measured depth in the hole, to {hole.length:.10g} m")
     return WellScene(str(tables.get("title", "")), hole, whole, mud, operations, settings, sweep)
 
 
