@@ -183,6 +183,9 @@ def test_dimensions_in_other_units_are_warned_of():
         cf.HoleSection(100.0, 8.5, 0.2)
     with pytest.warns(cf.SceneWarning, match="hardly that of a mud"):
         cf.Mud(9000.0)
+    hollow = cf.DrillString([cf.Component(None, weight=-20.0, contact_radius=0.06)])
+    with pytest.warns(cf.SceneWarning, match="floats: it weighs -20 N/m"):
+        cf.torque_and_drag(HOLE, hollow, cf.TripIn(), model="soft")
 
 
 def test_contacts_add_up_to_the_friction():
