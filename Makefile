@@ -18,17 +18,18 @@ export VTK_DEFAULT_OPENGL_WINDOW = vtkEGLRenderWindow
 # A numpy in the user's own site directory would hide the distribution's.
 export PYTHONNOUSERSITE = 1
 
-.PHONY: help setup packages demo motion gallery test docs tables figure3 work-precision failures random clean
+.PHONY: help setup packages demo motion gallery well test docs tables figure3 work-precision failures random clean
 
 help:
 	@echo "make demo    solve the eccentric cantilever of the paper on two processes; writes out/"
 	@echo "make motion  seven motions, each a scene file, a picture and a number that must come out; writes out/ (a minute)"
 	@echo "make gallery the scene files of demos/, each with a picture and a number that must come out; writes out/"
+	@echo "make well    strings in wells: torque and drag, each with pictures and a number that must come out; writes out/wells/"
 	@echo "make docs    the documentation as a site that needs no network; writes out/docs/index.html"
 	@echo "make test    all tests on one, two and four processes"
 	@echo "make tables  the tables of accuracy and cost in docs/, measured anew and put there"
 	@echo "make figure3 every curve of the paper's Figure 3, and what was found; writes out/ (about 4 minutes)"
-	@echo "make work-precision  speed against accuracy, beside Exudyn, OpenSeesPy, PyElastica and CalculiX (half an hour at most)"
+	@echo "make work-precision  speed against accuracy, beside Exudyn, OpenSeesPy, PyElastica, CalculiX, welleng and torque-drag (half an hour at most)"
 	@echo "make failures where methods fail: a map of methods against trials; writes out/ (at most a quarter of an hour)"
 	@echo "make random  200 random scenes against the strong form, at three tolerances (about 5 minutes)"
 	@echo "make setup   only what all of these need first: the Debian packages and the environment .venv"
@@ -42,6 +43,9 @@ motion: setup
 
 gallery: setup
 	$(PYTHON) demos/gallery.py
+
+well: setup
+	$(PYTHON) demos/wells.py
 
 # Warnings are errors. What Sphinx keeps between two builds lies beside the pages.
 docs: setup .venv/.docs
@@ -81,7 +85,8 @@ random: setup
 work-precision: setup
 	$(PYTHON) demos/evidence/work_precision.py
 	$(PYTHON) demos/evidence/work_precision_motion.py
-	$(PYTHON) demos/evidence/put_in_docs.py work_precision work_precision_motion
+	$(PYTHON) demos/evidence/soft_string.py
+	$(PYTHON) demos/evidence/put_in_docs.py work_precision work_precision_motion soft_string
 
 setup: .venv/.stamp
 

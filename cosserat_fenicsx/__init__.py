@@ -69,10 +69,40 @@ _HOME = {
     "StepControl": "statics.path.load_control",
     "Stiffness": "scene.sections",
     "Tube": "scene.sections",
+    "TubeRing": "actions.tube_wall",
+    "TubeWall": "actions.tube_wall",
     "UniformCurvature": "scene.curves",
     "units": None,
     "Wall": "actions.wall",
     "Weight": "scene.loads",
+    "BackReam": "well.operations",
+    "Bit": "well.components",
+    "Borehole": "well.hole",
+    "Collar": "well.components",
+    "Component": "well.components",
+    "DrillPipe": "well.components",
+    "DrillString": "well.string",
+    "HeavyWeight": "well.components",
+    "HoleSection": "well.hole",
+    "Mud": "well.mud",
+    "Ream": "well.operations",
+    "RotaryDrilling": "well.operations",
+    "RotateOffBottom": "well.operations",
+    "Sliding": "well.operations",
+    "Stabiliser": "well.components",
+    "Static": "well.operations",
+    "TorqueAndDrag": "well.answer",
+    "TripIn": "well.operations",
+    "TripOut": "well.operations",
+    "torque_and_drag": "well.torque_and_drag",
+    "DepthSweep": "well.depth_sweep",
+    "depth_sweep": "well.depth_sweep",
+    "RigMeasurement": "well.calibrate",
+    "FrictionFit": "well.calibrate",
+    "calibrate_friction": "well.calibrate",
+    "read_well": "well.scenefile",
+    "WellScene": "well.scenefile",
+    "WellPath": "well.path",
     "euler_load": "scene.rod",
     "read_motion": "scene.scenefile",
     "read_path": "statics.reading",
@@ -99,6 +129,8 @@ if TYPE_CHECKING:  # the same names, for editors and type checkers
     from cosserat_fenicsx.actions.foundation import Foundation as Foundation
     from cosserat_fenicsx.actions.point_mass import PointMass as PointMass
     from cosserat_fenicsx.actions.spring import Spring as Spring
+    from cosserat_fenicsx.actions.tube_wall import TubeRing as TubeRing
+    from cosserat_fenicsx.actions.tube_wall import TubeWall as TubeWall
     from cosserat_fenicsx.actions.wall import Wall as Wall
     from cosserat_fenicsx.dynamics.natural_modes import modes as modes
     from cosserat_fenicsx.dynamics.resuming import read_history as read_history
@@ -164,6 +196,34 @@ if TYPE_CHECKING:  # the same names, for editors and type checkers
     from cosserat_fenicsx.statics.path.load_control import StepControl as StepControl
     from cosserat_fenicsx.statics.reading import read_path as read_path
     from cosserat_fenicsx.statics.solve import solve as solve
+    from cosserat_fenicsx.well.answer import TorqueAndDrag as TorqueAndDrag
+    from cosserat_fenicsx.well.calibrate import FrictionFit as FrictionFit
+    from cosserat_fenicsx.well.calibrate import RigMeasurement as RigMeasurement
+    from cosserat_fenicsx.well.calibrate import calibrate_friction as calibrate_friction
+    from cosserat_fenicsx.well.components import Bit as Bit
+    from cosserat_fenicsx.well.components import Collar as Collar
+    from cosserat_fenicsx.well.components import Component as Component
+    from cosserat_fenicsx.well.components import DrillPipe as DrillPipe
+    from cosserat_fenicsx.well.components import HeavyWeight as HeavyWeight
+    from cosserat_fenicsx.well.components import Stabiliser as Stabiliser
+    from cosserat_fenicsx.well.depth_sweep import DepthSweep as DepthSweep
+    from cosserat_fenicsx.well.depth_sweep import depth_sweep as depth_sweep
+    from cosserat_fenicsx.well.hole import Borehole as Borehole
+    from cosserat_fenicsx.well.hole import HoleSection as HoleSection
+    from cosserat_fenicsx.well.mud import Mud as Mud
+    from cosserat_fenicsx.well.operations import BackReam as BackReam
+    from cosserat_fenicsx.well.operations import Ream as Ream
+    from cosserat_fenicsx.well.operations import RotaryDrilling as RotaryDrilling
+    from cosserat_fenicsx.well.operations import RotateOffBottom as RotateOffBottom
+    from cosserat_fenicsx.well.operations import Sliding as Sliding
+    from cosserat_fenicsx.well.operations import Static as Static
+    from cosserat_fenicsx.well.operations import TripIn as TripIn
+    from cosserat_fenicsx.well.operations import TripOut as TripOut
+    from cosserat_fenicsx.well.path import WellPath as WellPath
+    from cosserat_fenicsx.well.scenefile import WellScene as WellScene
+    from cosserat_fenicsx.well.scenefile import read_well as read_well
+    from cosserat_fenicsx.well.string import DrillString as DrillString
+    from cosserat_fenicsx.well.torque_and_drag import torque_and_drag as torque_and_drag
 
 __all__ = sorted(_HOME)
 

@@ -1,6 +1,34 @@
 """Work that one MPI rank does for all: files and pictures."""
 
+import os
 import pickle
+
+
+class Alone:
+    """The communicator of a process that is alone, for what needs no MPI otherwise."""
+
+    rank = 0
+
+    @staticmethod
+    def bcast(value):
+        return value
+
+
+def launched():
+    """(rank, number of ranks) of this process, without loading MPI."""
+    for rank, size in (("OMPI_COMM_WORLD_RANK", "OMPI_COMM_WORLD_SIZE"), ("PMI_RANK", "PMI_SIZE")):
+        if size in os.environ:
+            return int(os.environ.get(rank, 0)), int(os.environ[size])
+    return 0, 1
+
+
+def world():
+    """The communicator of all ranks; MPI is loaded where there are others alone."""
+    if launched()[1] == 1:
+        return Alone
+    from mpi4py import MPI
+
+    return MPI.COMM_WORLD
 
 
 def on_first(comm, action):

@@ -79,7 +79,7 @@ def test_programs_run(page, program, tmp_path, monkeypatch, capsys):
 def test_scene_files_are_read(page, scene, tmp_path):
     file = tmp_path / "scene.toml"
     file.write_text(scene, encoding="utf-8")
-    found, _ = cf.read_scene(file)
+    found = cf.read_well(file) if "[well]" in scene else cf.read_scene(file)[0]
     assert found.title
 
 

@@ -141,3 +141,14 @@ def test_every_table_has_its_place_in_the_documentation():
 
 def text_in(page):
     return (EVIDENCE.parents[1] / "docs" / page).read_text(encoding="utf-8")
+
+
+def test_soft_strings_of_this_package():
+    """Peers are not asked; errors fall to those of the reference numbers, times are not tested."""
+    import soft_string
+
+    rows, silent = soft_string.measure(install=False)
+    own = [row for row in rows if row[1] == "cosserat_fenicsx"]
+    assert len(own) == 12 and all(error <= float(told.split("=")[1]) for _, _, told, error, _ in own)
+    assert all(error < 1e-11 for _, _, told, error, _ in own if told == "tol = 1e-12") and len(silent) <= 2
+    assert "| cosserat_fenicsx | tol = 1e-12 |" in soft_string.table(rows, silent)

@@ -61,7 +61,7 @@ SHARED = {
 }
 ROOMS = {
     "scene": {"pictures"},
-    "actions": {"scene"},
+    "actions": {"scene", "forms"},
     "algebra": set(),
     "models": {"scene", "forms"},
     "results": {"scene", "pictures"},
@@ -69,7 +69,8 @@ ROOMS = {
     "pictures": {"scene", "results"},
     "statics": {"scene", "models", "algebra", "results"},
     "dynamics": {"scene", "models", "algebra", "results", "storage", "statics"},
-    "cli": {"scene", "models", "statics", "dynamics", "results", "storage", "pictures"},
+    "well": {"actions", "scene", "models", "statics", "results", "pictures"},
+    "cli": {"well", "scene", "models", "statics", "dynamics", "results", "storage", "pictures"},
 }
 #: Files that combine scenes, models, solvers and results; all other solver files import none of scene, models and
 #: results.
@@ -176,6 +177,7 @@ def test_the_wheel_holds_the_forms_and_works(tmp_path):
     assert {f"cosserat_fenicsx/pictures/page/{file.name}" for file in page.iterdir()} <= set(names)
     assert {f"cosserat_fenicsx/algebra/{file.name}" for file in (PACKAGE / "algebra").glob("*.[ch]")} <= set(names)
     assert "cosserat_fenicsx/py.typed" in names and "cosserat_fenicsx/scene/rolled_profiles.csv" in names
+    assert "cosserat_fenicsx/well/standard_sizes.csv" in names
     zipfile.ZipFile(wheel).extractall(tmp_path / "site")
     code = "import cosserat_fenicsx.forms.spatial as f, cosserat_fenicsx as cf; print(f.__file__); cf.solve"
     done = subprocess.run([sys.executable, "-S", "-c",

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 import cosserat_fenicsx as cf
-from cosserat_fenicsx.scene import scenefile
+from cosserat_fenicsx.scene import toml_tables
 
 pytestmark = pytest.mark.serial
 FILES = sorted((Path(__file__).parent.parent / "demos").glob("**/*.toml"))
@@ -61,7 +61,7 @@ def test_damaged_files(seed, monkeypatch):
     for _ in range(200):
         file = chance.choice(FILES)
         table = damaged(tables[file], chance)
-        monkeypatch.setattr(scenefile.tomllib, "loads", lambda stream, table=table: copy.deepcopy(table))
+        monkeypatch.setattr(toml_tables.tomllib, "loads", lambda stream, table=table: copy.deepcopy(table))
         with warnings.catch_warnings():
             warnings.simplefilter("error", RuntimeWarning)
             try:

@@ -60,7 +60,12 @@ def _settings(options):
 
 def _run(options):
     from cosserat_fenicsx.cli.motion import motion_of
+    from cosserat_fenicsx.scene.toml_tables import tables_of
 
+    if "well" in tables_of(options.scene):
+        from cosserat_fenicsx.cli.well import run_well
+
+        return run_well(options)
     moving = motion_of(options)
     scene, load_factors, settings = (None, None, None) if moving else _settings(options)
 
@@ -100,7 +105,13 @@ def _resume(options):
 
 def _explain(options):
     from cosserat_fenicsx.cli.motion import motion_of
+    from cosserat_fenicsx.scene.toml_tables import tables_of
 
+    if "well" in tables_of(options.scene):
+        from cosserat_fenicsx.cli.well import explain_well
+
+        say(explain_well(options), file=sys.stdout)
+        return DONE
     moving = motion_of(options)
     if moving:
         from cosserat_fenicsx.cli.explain_motion import explain_motion

@@ -128,7 +128,8 @@ def _common(parser):
     parser.add_argument("--elements", type=int, help="elements per rod; fixes the mesh, no error estimate")
     parser.add_argument("--degree", type=int, help="polynomial degree of r and q, 1 to 4 [4]")
     parser.add_argument("--formulation", help="mixed, displacement or multiplier [mixed]")
-    parser.add_argument("--model", help="auto, determinate, planar or spatial [auto]")
+    parser.add_argument("--model", help="auto, determinate, planar or spatial; of a string in a well auto, "
+                        "soft, 'soft, buckled' or rod [auto]")  # fmt: skip
     parser.add_argument(
         "--control", help="auto, load (stop at a limit point) or arc (arc length along the path, never back) [auto]"
     )

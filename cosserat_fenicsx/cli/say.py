@@ -2,7 +2,7 @@
 
 import sys
 
-from cosserat_fenicsx.cli.together import ranks
+from cosserat_fenicsx.ranks import launched
 
 #: Exit codes.
 DONE, NOT_CONVERGED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
@@ -11,7 +11,7 @@ DONE, NOT_CONVERGED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
 def first_rank():
     """True on rank 0 alone."""
     if "mpi4py" not in sys.modules:
-        return ranks()[0] == 0
+        return launched()[0] == 0
     from mpi4py import MPI
 
     return MPI.COMM_WORLD.rank == 0

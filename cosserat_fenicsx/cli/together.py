@@ -1,19 +1,12 @@
 """Under mpirun: what only one rank raises ends all of them, which would wait for it for ever otherwise."""
 
-import os
 import sys
 import time
 
+from cosserat_fenicsx.ranks import launched
+
 # Time (s) within which ranks that fail together get here.
 _PATIENCE = 10.0
-
-
-def ranks():
-    """(rank, number of ranks) of this process, without loading MPI."""
-    for rank, size in (("OMPI_COMM_WORLD_RANK", "OMPI_COMM_WORLD_SIZE"), ("PMI_RANK", "PMI_SIZE")):
-        if size in os.environ:
-            return int(os.environ.get(rank, 0)), int(os.environ[size])
-    return 0, 1
 
 
 def together(action):
@@ -21,7 +14,7 @@ def together(action):
 
     Ranks that raise meet at a barrier, which those that still compute do not reach. Every rank calls.
     """
-    rank, size = ranks()
+    rank, size = launched()
     if size == 1:
         return action()
     try:

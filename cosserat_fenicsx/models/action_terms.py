@@ -12,6 +12,8 @@ from cosserat_fenicsx.scene.signals import at, signals_of, values_at, with_value
 
 # Points of an element, in [0, 1], that are closer than this are the same.
 _SAME = 1e-9
+# Share of an element's length by which nodes at its ends count as inside it.
+_INSIDE = 1e-9
 
 
 class ActionTerms:
@@ -158,7 +160,9 @@ class Term:
         begin, size = np.concatenate([b[:-1] for b in layout.breaks]), layout.sizes(scene)
         lengths = np.array([rod.length for rod in scene.rods])
         along = np.where(rods.reversed[:, None], 1 - x, x)
-        s = (begin[cells] * lengths[rods.cell_rod])[:, None] + size[cells][:, None] * along
+        # where data jump at an end of elements, a node there counts to each of them with the data of its side
+        inside = np.clip(along, _INSIDE, 1 - _INSIDE) if self.kind.place == "node" else along
+        s = (begin[cells] * lengths[rods.cell_rod])[:, None] + size[cells][:, None] * inside
         weight = np.zeros(self.weight.x.array.shape)
         # (action, rod, rows of the values, arc lengths, mask over elements and points, starts and lengths of elements)
         self._where = []

@@ -17,7 +17,7 @@ from cosserat_fenicsx.pictures.between import Between
 from cosserat_fenicsx.pictures.drawing import add_body, at_rest, frame, load_pyvista, points_of, prefix, thickening
 from cosserat_fenicsx.pictures.labels import plain
 from cosserat_fenicsx.progress import Progress
-from cosserat_fenicsx.ranks import on_first
+from cosserat_fenicsx.ranks import Alone, on_first
 from cosserat_fenicsx.results.export.beside import replaced
 
 #: Default frames per second, and width and height in pixels.
@@ -136,7 +136,7 @@ def record(make_stage, file, times, fps, progress):
         with (
             replaced(file) as fresh,
             _WRITERS[file.suffix](fresh, fps, samples[0].shape[1::-1], samples) as writer,
-            Progress([len(times)], progress, _Alone, "frame") as bar,
+            Progress([len(times)], progress, Alone, "frame") as bar,
         ):
             bar.start(file.name)
             try:
@@ -150,12 +150,6 @@ def record(make_stage, file, times, fps, progress):
         stage.close()
     if stopped:
         raise stopped
-
-
-class _Alone:
-    """Stands for the communicator in `Progress`: one rank draws."""
-
-    rank = 0
 
 
 class _Stage:

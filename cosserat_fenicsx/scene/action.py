@@ -18,6 +18,7 @@ Datum = namedtuple("Datum", "value unit size")
 _UNITS = {
     "1": (0, 0, 0, False),
     "m": (0, 1, 0, False),
+    "1/m": (0, -1, 0, False),
     "m from origin": (0, 1, 0, False),
     "m/s": (0, 1, -1, False),
     "rad/s": (0, 0, -1, True),
@@ -83,9 +84,10 @@ class Action:
         memory: internal variables, kept from one accepted state to the next: a `Datum` each, its initial value, passed
             to `work` after `data`.
         evolve: a static method ``(point, *data, *memory)`` -> a list of UFL expressions, the new values of the memory.
+        traits: None; or a dict of the fields of `models.traits.Traits`, where it takes long to find them from `work`.
     """
 
-    at_nodes, scaled, permanent, follows, memory, evolve = False, True, False, False, (), None
+    at_nodes, scaled, permanent, follows, memory, evolve, traits = False, True, False, False, (), None, None
 
     def acts_on(self, rod):
         """Whether it acts along a rod."""

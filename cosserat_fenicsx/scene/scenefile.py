@@ -39,7 +39,6 @@ start = 0.9                       # optional: begin at the equilibrium of the lo
 
 import dataclasses
 import inspect
-import tomllib
 from pathlib import Path
 from typing import Any
 
@@ -59,6 +58,10 @@ from cosserat_fenicsx.scene.scene import Scene
 from cosserat_fenicsx.scene.sections import Stiffness
 from cosserat_fenicsx.scene.signals import SIGNALS
 from cosserat_fenicsx.scene.supports import SUPPORTS
+from cosserat_fenicsx.scene.toml_tables import entries as _entries
+from cosserat_fenicsx.scene.toml_tables import known_keys as _known_keys
+from cosserat_fenicsx.scene.toml_tables import table as _table
+from cosserat_fenicsx.scene.toml_tables import tables_of
 
 #: Keys of [solve]: the arguments of `solve` that are plain values, with their TOML types.
 SOLVE_KEYS = {
@@ -115,14 +118,11 @@ def read_motion(file: File) -> tuple[Scene, dict[str, Any]]:
 def _read(file):
     """Scene, [solve] and [simulate] of a file."""
     file = Path(file)
-    try:
-        tables = tomllib.loads(file.read_text(encoding="utf-8-sig"))  # some editors begin a file with a mark
-    except OSError as problem:
-        raise SceneError(f"{file}: cannot be read ({problem.strerror}): expected a scene file in TOML") from None
-    except UnicodeDecodeError as problem:
-        raise SceneError(f"{file}: not UTF-8 ({problem.reason} at byte {problem.start}): save it as UTF-8") from None
-    except tomllib.TOMLDecodeError as problem:
-        raise SceneError(f"{file}: not valid TOML: {problem}") from None
+    tables = tables_of(file)
+    if "well" in tables:
+        raise SceneError(
+            f"{file}: a string in a well: expected `read_well` in Python, `cosserat run` or `cosserat explain`"
+        )
     try:
         return _scene(tables, file.parent)
     except SceneError as problem:
@@ -289,23 +289,3 @@ def _build(where, entry, classes, rods, folder=None):
         return kind(**entry)
     except SceneError as problem:
         raise SceneError(f"{where}: {problem}") from None
-
-
-def _entries(key, tables):
-    """The tables of an array of tables, numbered."""
-    entries = tables.get(key, [])
-    if not isinstance(entries, list):
-        raise SceneError(f"{key} = {entries!r}: expected an array of tables, [[{key}]]")
-    return [(i, _table(f"{key}[{i}]", entry)) for i, entry in enumerate(entries)]
-
-
-def _table(where, value):
-    if not isinstance(value, dict):
-        raise SceneError(f"{where} = {value!r}: expected a table")
-    return value
-
-
-def _known_keys(where, table, known):
-    for key in table:
-        if key not in known:
-            raise SceneError(f"{where}: unknown key '{key}', {nearest(key, known)}")

@@ -29,6 +29,7 @@ PAGES = {
     "overhead": ("speed.md",),
     "work_precision": ("speed.md", "work_precision_sweep.png"),
     "work_precision_motion": ("speed.md", "work_precision_motion.png"),
+    "soft_string": ("wells.md", "soft_string.png"),
 }
 #: The tables with a page of their own: its title and pictures.
 ALONE = {

@@ -15,6 +15,8 @@ PINNED = {
     "Exudyn": ("exudyn==1.13.6", "numpy==2.4.6"),
     "OpenSeesPy": ("openseespy==3.7.1.2",),
     "PyElastica": ("pyelastica==1.0.0", "numba==0.68.1", "numpy==2.4.6"),
+    "welleng": ("welleng==0.30.0",),
+    "torque-drag": ("torque-drag==0.1.1",),
 }
 SCRIPTS = {
     "cosserat_fenicsx": "own_rod.py",
@@ -22,6 +24,8 @@ SCRIPTS = {
     "OpenSeesPy": "opensees_rod.py",
     "PyElastica": "elastica_rod.py",
     "CalculiX": "calculix_rod.py",
+    "welleng": "welleng_string.py",
+    "torque-drag": "torque_drag_string.py",
 }
 OWN = "cosserat_fenicsx"
 

@@ -1,0 +1,261 @@
+"""The wall of a curved tube around rods, such as that of a borehole, with friction in a known direction of slip."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from cosserat_fenicsx.annotations import Numbers
+from cosserat_fenicsx.checks import number, positive, refuse, store, vector
+from cosserat_fenicsx.forms.contact import wall_work
+from cosserat_fenicsx.scene import action
+from cosserat_fenicsx.scene.action import LineAction, PointAction
+from cosserat_fenicsx.scene.rod import Rod, RodOrName, Station, StationOrName, is_known
+
+# Half the length over which sizes and coefficients of the tube change at a jump, over the length of its axis.
+_RAMP = 1e-4
+
+
+@dataclass
+class Stage:
+    """What solvers change of a wall for a while: its stiffness, and that of a spring, both over the wall's own
+    stiffness; and the part of the friction that acts. The spring leads to the axis, or to where the rod was when it was
+    anchored."""
+
+    wall: float = 1.0
+    spring: float = 0.0
+    friction: float = 1.0
+    anchor: np.ndarray | None = None
+    last: np.ndarray | None = None
+
+    def fasten(self):
+        """Anchor the spring where the rod is."""
+        self.anchor = self.last.copy()
+
+
+class _Confined:
+    """What walls along rods and at stations share."""
+
+    scaled, work = False, staticmethod(wall_work)
+    traits = {"dead": False, "known_force": False, "rates": False, "turns": True, "flat": False}
+
+    def _check(self, unit):
+        if not callable(getattr(self.path, "nearest", None)):
+            refuse(self, "path", self.path, "the axis of the tube, such as a WellPath")
+        store(self, stiffness=positive(self, "stiffness", self.stiffness, unit))
+        store(self, begins=number(self, "begins", self.begins, "a number (m)", np.isfinite))
+
+    def data(self, rod, s):
+        """See `Action`: as where the rod lies on the axis, to which the spring leads again."""
+        self.stage.anchor = None
+        return self.refreshed(rod, s, self.path.nearest(None, s + self.begins).position)
+
+    def refreshed(self, rod, s, r):
+        """See `Action`."""
+        near = self.path.nearest(r, s + self.begins)
+        clearance, arm, friction = self.sizes(s, near.md)
+        stage, kp = self.stage, np.full(len(s), self.stiffness)
+        stage.last = r
+        slip = stage.friction * value_at(self.slip, s)
+        return (
+            action.vector(near.position, "m from origin"),
+            action.vector(near.tangent, "1"),
+            action.vector(near.curvature, "1/m"),
+            action.scalar(clearance, "m"),
+            action.scalar(stage.wall * kp, self.unit),
+            action.scalar(stage.spring * kp, self.unit),
+            action.vector(near.position if stage.anchor is None else stage.anchor, "m from origin"),
+            action.scalar(slip[:, 0] * friction, "1"),
+            action.scalar(slip[:, 1] * friction, "1"),
+            action.scalar(arm, "m"),
+        )
+
+
+@dataclass(frozen=True)
+class TubeWall(_Confined, LineAction):
+    """The wall of a tube with a curved axis around a rod: a pressure stiffness <a - clearance>, force per reference
+    length, towards the axis, a the distance from it, and Coulomb friction of the pressure where the rod slips in a
+    known direction.
+
+    It is integrated with the nodes as quadrature points and is not multiplied by the load factor. The nearest point of
+    the axis is found again in every Newton iteration. Beyond its ends the tube goes on straight.
+
+    Args:
+        rod: the rod.
+        path: the axis of the tube, a `WellPath`, m, inertial.
+        radius: of the tube, m; or pieces [(md_end, radius)] along the axis.
+        contact_radius: of the rod's surface, m; or pieces [(s_end, radius)] along the rod.
+        stiffness: of the wall, N/m^2: the penetration is the force per length over it.
+        friction: friction coefficient; or pieces [(md_end, coefficient)] along the axis.
+        slip: (c_a, c_r), the unit direction in which the rod's surface slips: c_a towards the start of the axis, c_r
+            round the axis, by a right-handed rotation about its tangent; (0, 0) for none; or pieces [(s_end, slip)]
+            along the rod.
+        begins: measured depth near which the rod's start lies, m.
+        has_arm: whether friction has a moment about the centreline; False where it acts on the centreline itself.
+
+    Raises:
+        SceneError: numbers outside their range, a rod as wide as the tube, or a direction of slip without unit length.
+    """
+
+    rod: RodOrName
+    path: object
+    radius: float | Numbers
+    contact_radius: float | Numbers
+    stiffness: float = 1e9
+    friction: float | Numbers = 0.0
+    slip: Numbers = (0.0, 0.0)
+    begins: float = 0.0
+    has_arm: bool = True
+    stage: Stage = field(default_factory=Stage, init=False, repr=False, compare=False)
+
+    at_nodes, unit = True, "N/m^2"
+
+    def __post_init__(self):
+        self._check("N/m^2")
+        store(self, radius=pieces(self, "radius", self.radius, "m", least=0.0))
+        store(self, contact_radius=pieces(self, "contact_radius", self.contact_radius, "m", least=0.0))
+        store(self, friction=pieces(self, "friction", self.friction, "1"), slip=slip_pieces(self, self.slip))
+        if is_known(self, "rod", Rod):
+            self._check_inside()
+
+    def _check_inside(self):
+        s, clearance = self._clearances()
+        k = int(np.argmin(clearance))
+        if not clearance[k] > 0:
+            wide, narrow = value_at(self.contact_radius, s)[k], value_at(self.radius, s + self.begins)[k]
+            expected = f"less than the radius of the tube, {narrow:g} m at s = {s[k]:.6g} m"
+            refuse(self, "contact_radius", float(wide), expected)
+
+    def _clearances(self):
+        """In the middle of each part of equal sizes: arc length and clearance, m, of a rod on the axis."""
+        ends = np.array([0.0, *self.breaks(self.rod), self.rod.length])
+        s = (ends[1:] + ends[:-1]) / 2
+        return s, value_at(self.radius, s + self.begins) - value_at(self.contact_radius, s)
+
+    @property
+    def clearance(self):
+        """The smallest clearance, m."""
+        return float(self._clearances()[1].min())
+
+    def sizes(self, s, md):
+        """(n,) clearance (m), radius of the surface where friction acts (m) and friction coefficient, at arc lengths s
+        of the rod and measured depths md."""
+        arm = value_at(self.contact_radius, s)
+        clearance = self._smooth(self.radius, md) - arm
+        return clearance, arm if self.has_arm else np.zeros_like(arm), self._smooth(self.friction, md)
+
+    def _smooth(self, given, md):
+        """(n,) values of `pieces` along the axis, linear over a short length at a jump: the contact there would
+        alternate."""
+        ends, values = np.array([end for end, _ in given[:-1]]), np.array([value for _, value in given])
+        half = _RAMP * self.path.length
+        knots = np.ravel(np.column_stack([ends - half, ends + half]))
+        return np.interp(md, knots, np.repeat(values, 2)[1:-1]) if len(ends) else np.full(len(md), values[0])
+
+    def breaks(self, rod):
+        """See `Action`: element ends where sizes and coefficients jump."""
+        along = [end - self.begins for given in (self.radius, self.friction) for end, _ in given[:-1]]
+        along += [end for given in (self.contact_radius, self.slip) for end, _ in given[:-1]]
+        return tuple(sorted({end for end in along if 0 < end < rod.length}))
+
+    def holds(self, scene):
+        """See `Action`: it confines the rod across the axis."""
+        held = []
+        for station in (self.rod.start, self.rod.end):
+            near = self.path.nearest(None, np.array([station.s + self.begins]))
+            across = np.linalg.svd(near.tangent)[2][1:]
+            held += [(station, np.r_[row, 0, 0, 0]) for row in across]
+        return held
+
+
+@dataclass(frozen=True)
+class TubeRing(_Confined, PointAction):
+    """The wall of a tube at one station of a rod, such as a stabiliser or a bit; see `TubeWall`.
+
+    Args:
+        station: where.
+        path: the axis of the tube, a `WellPath`.
+        clearance: radius of the tube minus that of the ring, m; zero holds the station on the axis elastically.
+        contact_radius: radius of the ring, m, the arm of its friction.
+        stiffness: N/m.
+        friction: friction coefficient.
+        slip, begins: see `TubeWall`.
+
+    Raises:
+        SceneError: numbers outside their range.
+    """
+
+    station: StationOrName
+    path: object
+    clearance: float
+    contact_radius: float
+    stiffness: float = 1e9
+    friction: float = 0.0
+    slip: Numbers = (0.0, 0.0)
+    begins: float = 0.0
+    stage: Stage = field(default_factory=Stage, init=False, repr=False, compare=False)
+
+    unit = "N/m"
+
+    def __post_init__(self):
+        self._check("N/m")
+        store(self, contact_radius=positive(self, "contact_radius", self.contact_radius, "m"))
+        for name, unit in (("clearance", "m"), ("friction", "1")):
+            value = number(
+                self, name, getattr(self, name), f"a number of zero or more ({unit})", lambda x: 0 <= x < np.inf
+            )
+            store(self, **{name: value})
+        store(self, slip=slip_pieces(self, self.slip))
+        is_known(self, "station", Station)
+
+    def sizes(self, s, md):
+        """See `TubeWall`."""
+        return tuple(np.full(len(s), x) for x in (self.clearance, self.contact_radius, self.friction))
+
+
+def pieces(owner, name, value, unit, least=None):
+    """((end, value), ..) with ascending ends, the last infinite, of a number or of pairs.
+
+    Args:
+        least: values must exceed it; None where they may be zero, not less.
+    """
+    expected = f"a number {'of zero or more' if least is None else f'above {least:g}'} ({unit}), or pairs (end, number)"
+
+    def checked(x):
+        return number(owner, name, x, expected, lambda x: (x >= 0 if least is None else x > least) and np.isfinite(x))
+
+    if not isinstance(value, list | tuple):
+        return ((np.inf, checked(value)),)
+    return _of_pairs(owner, name, value, expected, checked)
+
+
+def slip_pieces(owner, value):
+    """((end, (c_a, c_r)), ..) of one direction or of pairs."""
+    expected = "a unit vector (c_a, c_r), or (0, 0), or pairs (end, vector)"
+
+    def checked(x):
+        slip = vector(owner, "slip", x, "1", 2)
+        if slip != (0.0, 0.0) and abs(np.hypot(*slip) - 1) > 1e-9:
+            refuse(owner, "slip", x, expected)
+        return slip
+
+    if not isinstance(value, list | tuple) or not all(isinstance(x, list | tuple) for x in value):
+        return ((np.inf, checked(value)),)
+    return _of_pairs(owner, "slip", value, expected, checked)
+
+
+def _of_pairs(owner, name, value, expected, checked):
+    found, last = [], 0.0
+    for piece in value:
+        if not isinstance(piece, list | tuple) or len(piece) != 2 or np.ndim(piece[0]):
+            refuse(owner, name, value, expected)
+        end = number(owner, name, piece[0], "ends (m) that ascend from above zero", lambda x, last=last: x > last)
+        found.append((end, checked(piece[1])))
+        last = end
+    if not found:
+        refuse(owner, name, value, expected)
+    return (*found[:-1], (np.inf, found[-1][1]))
+
+
+def value_at(given, x):
+    """(n, ..) values of `pieces` at x (n,); at an end that of the piece before it."""
+    return np.array([value for _, value in given])[np.searchsorted([end for end, _ in given], x)]

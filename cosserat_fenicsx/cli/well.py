@@ -1,0 +1,121 @@
+"""Strings in wells on the command line: `cosserat run` and `cosserat explain` of a scene with a [well] table."""
+
+import math
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from cosserat_fenicsx import units
+from cosserat_fenicsx.cli.deliver import prepare
+from cosserat_fenicsx.cli.say import DONE, INTERRUPTED, say
+from cosserat_fenicsx.errors import Interrupted, SceneError
+from cosserat_fenicsx.ranks import on_first, world
+from cosserat_fenicsx.well.components import weight_in_mud
+from cosserat_fenicsx.well.scenefile import read_well
+
+# Options of the command line that are for rods alone.
+_OTHERS = ("load_factors", "elements", "degree", "formulation", "control", "branch", "duration", "dt", "scheme",
+           "save_every", "start", "folder", "station", "at", "animate", "speed")  # fmt: skip
+_SOFT = (
+    "the soft string by a differential equation along the axis, and what that leaves out is estimated with each answer."
+)
+_ROD = "the exact rod in contact with the wall, stiff and with its clearance, on meshes that are refined until tol."
+#: What the models of `torque_and_drag` solve.
+_MODELS = {
+    "soft": _SOFT,
+    "soft, buckled": f"{_SOFT[:-1]}; with the wall force of a helix where it is one.",
+    "rod": _ROD,
+    "auto": f"first {_SOFT} Where that is above tol: {_ROD}",
+}
+
+
+def _scene(options):
+    for name in _OTHERS:
+        if getattr(options, name, None) is not None:
+            raise SceneError(f"--{name.replace('_', '-')} is for rods, and this scene is a well")
+    scene = read_well(options.scene)
+    asked = {name: getattr(options, name) for name in ("tol", "model") if getattr(options, name) is not None}
+    return replace(scene, settings={**scene.settings, **asked})
+
+
+def run_well(options):
+    """`cosserat run`; returns the exit code."""
+    scene, out = _scene(options), Path(options.output) if options.output else None
+    if out is not None:
+        prepare(out)
+    if scene.title:
+        say(scene.title, file=sys.stdout)
+    written = []
+    for operation, stem in zip(scene.operations, _stems(scene.operations), strict=True):
+        answer = scene.answer(operation)
+        say(str(answer), file=sys.stdout)
+        if out is not None:
+            written += _write(answer, out, stem, not options.no_picture)
+    code = DONE
+    try:
+        sweep = scene.depth_sweep(out / "depth_sweep.jsonl" if out is not None else None)
+    except Interrupted as stop:
+        sweep, code = stop.path, INTERRUPTED
+        say(f"cosserat: {stop}" + ("; the same command goes on from there" if out is not None else ""))
+    if sweep is not None:
+        say(str(sweep), file=sys.stdout)
+        if out is not None:
+            if code == DONE:  # complete: another run begins anew
+                on_first(world(), lambda: (out / "depth_sweep.jsonl").unlink(missing_ok=True))
+            sweep.write(out / "depth_sweep.csv")
+            written.append("depth_sweep.csv")
+            if not options.no_picture and len(sweep):
+                sweep.plot(out / "depth_sweep.png")
+                written.append("depth_sweep.png")
+    if written:
+        say(f"written to {out}/: {', '.join(written)}", file=sys.stdout)
+    return code
+
+
+def _stems(operations):
+    """Names of files; operations of one kind are told apart by numbers."""
+    names = [operation.name.replace(" ", "_") for operation in operations]
+    return [name + (f"_{names[:i].count(name) + 1}" if name in names[:i] else "") for i, name in enumerate(names)]
+
+
+def _write(answer, out, stem, pictures):
+    """Write the files of an answer; returns their names."""
+    files = {f"{stem}.csv": answer.write}
+    if pictures:
+        files |= {f"{stem}.png": answer.plot, f"{stem}_3d.png": answer.plot_3d}
+    for name, write in files.items():
+        write(out / name)
+    return list(files)
+
+
+def explain_well(options):
+    """Text of `cosserat explain`."""
+    scene = _scene(options)
+    hole, path = scene.hole, scene.hole.path
+    end, worst = path.position(path.length), int(np.argmax(path.dogleg_severity))
+    lines = [scene.title] if scene.title else []
+    lines.append(
+        f"Well: {len(path.md)} stations to md = {path.length:g} m, which is north {end[0]:.2f}, east {end[1]:.2f} and "
+        f"down {end[2]:.2f} m; largest inclination {math.degrees(path.inclination.max()):.2f} degrees, largest dogleg "
+        f"{path.dogleg_severity[worst] / units.deg_per_30m:.2f} degrees per 30 m below {path.md[worst]:g} m."
+    )
+    for i, section in enumerate(hole.sections, start=1):
+        name = section.name or f"section {i}"
+        lines.append(f"Hole, {name}: to {section.to:g} m, {section.diameter:g} m wide, friction {section.friction:g}.")
+    depth = scene.settings.get("depth", hole.length)
+    for place in scene.string.laid(depth):
+        part, S = place.component, place.component.stiffness
+        stiff = "stiffness not known" if S is None or S.matrix is not None else f"EI = {min(S.bending):.4g} N m^2"
+        lines.append(
+            f"String, {part.name}: md {place.top:g} to {place.bottom:g} m, {weight_in_mud(part, scene.mud):.2f} N/m in "
+            f"mud, touches the wall at a radius of {part.contact_radius:g} m, {stiff}."
+        )
+    for operation in scene.operations:
+        lines.append(f"Operation: {operation.name}, on bit {operation.weight:g} N and {operation.torque:g} N m.")
+    if scene.sweep:
+        lines.append(f"Sweep over {len(scene.sweep['depths'])} depths of the bit.")
+    model, tol = scene.settings.get("model", "auto"), scene.settings.get("tol", 1e-4)
+    lines.append(f"Model: {model}, tol = {tol:g}: {_MODELS.get(model, 'unknown')}")
+    return "\n".join(lines)

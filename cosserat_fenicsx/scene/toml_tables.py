@@ -1,0 +1,45 @@
+"""TOML files as tables, and checks of their shape."""
+
+import tomllib
+from pathlib import Path
+
+from cosserat_fenicsx.errors import SceneError, nearest
+
+
+def tables_of(file):
+    """The tables of a TOML file.
+
+    Raises:
+        SceneError: the file is missing, or not TOML.
+    """
+    file = Path(file)
+    try:
+        return tomllib.loads(file.read_text(encoding="utf-8-sig"))  # some editors begin a file with a mark
+    except OSError as problem:
+        raise SceneError(f"{file}: cannot be read ({problem.strerror}): expected a scene file in TOML") from None
+    except UnicodeDecodeError as problem:
+        raise SceneError(f"{file}: not UTF-8 ({problem.reason} at byte {problem.start}): save it as UTF-8") from None
+    except tomllib.TOMLDecodeError as problem:
+        raise SceneError(f"{file}: not valid TOML: {problem}") from None
+
+
+def entries(key, tables):
+    """The tables of an array of tables, numbered."""
+    found = tables.get(key, [])
+    if not isinstance(found, list):
+        raise SceneError(f"{key} = {found!r}: expected an array of tables, [[{key}]]")
+    return [(i, table(f"{key}[{i}]", entry)) for i, entry in enumerate(found)]
+
+
+def table(where, value):
+    """`value`, refused where it is no table."""
+    if not isinstance(value, dict):
+        raise SceneError(f"{where} = {value!r}: expected a table")
+    return value
+
+
+def known_keys(where, given, known):
+    """Refuse keys that are not known, with the nearest one that is."""
+    for key in given:
+        if key not in known:
+            raise SceneError(f"{where}: unknown key '{key}', {nearest(key, known)}")

@@ -1,0 +1,349 @@
+"""The answer of `torque_and_drag`: surface loads, and the state along the string."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, ClassVar
+
+import numpy as np
+
+from cosserat_fenicsx.annotations import File
+from cosserat_fenicsx.well import criteria, loaded
+from cosserat_fenicsx.well.contacts import contacts_of, side_force_up_to, sides_of
+from cosserat_fenicsx.well.hole import Borehole
+from cosserat_fenicsx.well.mud import Mud
+from cosserat_fenicsx.well.operations import Operation
+from cosserat_fenicsx.well.softstring import UP_TO
+from cosserat_fenicsx.well.string import DrillString
+
+# A torque below this share of the largest tension times the contact radius is nothing that errors are compared with.
+_LITTLE = 1e-2
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class TorqueAndDrag:
+    """What a string in its hole carries, from `torque_and_drag`. SI units; depths are measured depths.
+
+    Arrays run down the hole along `md`, which repeats a depth where something jumps: the value above it, then that
+    below. A string of components that are given by numbers has no true tension and no von Mises stress (NaN).
+
+    Attributes:
+        model: what was solved: "soft", "soft, buckled" or "rod".
+        why: sentences on what decided for the model, and what it leaves out.
+        differences: {model: (N, N m)}: hook load and surface torque less those of the other models that were solved.
+        error: estimated error of hook load and surface torque as solutions of the model's equations, over the largest
+            tension and torque along the string (over 1 % of that tension times the contact radius where this is more).
+        model_error: estimate, likewise relative, of how far those of the rod in contact may be, which is stiff and has
+            a clearance: the error of the model, not of its solution.
+        enough: whether both are within `tol`; False warns that the model does not suffice for the accuracy asked for.
+        torque_convention: "coulomb" or "johancsik", see `torque_and_drag`.
+        laid, pieces: the string in its place, and cut where anything jumps; solved: what was found on it.
+    """
+
+    #: What was solved, and which bending moment it has, in words.
+    words = property(lambda self: f"{self.model} string")
+    moment_words: ClassVar[str] = "EI times the hole's curvature"
+
+    hole: Borehole
+    string: DrillString
+    operation: Operation
+    mud: Mud | None
+    depth: float
+    model: str
+    tol: float
+    torque_convention: str
+    why: tuple[str, ...]
+    error: float
+    model_error: float
+    differences: dict[str, tuple[float, float]]
+    laid: Any
+    pieces: Any
+    solved: Any
+
+    @property
+    def enough(self) -> bool:
+        """Whether the errors of solution and model are within `tol`."""
+        return self.error + self.model_error <= self.tol
+
+    @property
+    def hook_load(self) -> float:
+        """Effective tension at the surface, N, without block and sheaves. Negative where the string must be pushed."""
+        return float(self.solved.tension[-1, -1])
+
+    @property
+    def surface_torque(self) -> float:
+        """N m."""
+        return float(self.solved.torque[-1, -1])
+
+    @cached_property
+    def drag(self) -> float:
+        """Hook load less that of the same string without friction, N."""
+        return self.hook_load + self.operation.weight - self._gravity
+
+    @cached_property
+    def _gravity(self):
+        """The weight in mud that pulls along the hole, N."""
+        pieces, down = self.pieces, self.hole.path.position
+        heights = down(pieces.bottom)[:, 2] - down(pieces.top)[:, 2]
+        return float((pieces.weight * heights).sum())
+
+    def _down(self, rows):
+        """Rows over pieces and places up the hole, as one array down it."""
+        return np.ascontiguousarray(rows[::-1, ::-1]).ravel()
+
+    @cached_property
+    def _piece(self):
+        """Index of the piece at `md`."""
+        return self._down(np.repeat(self.solved.chain.origin[:, None], len(self.solved.at), axis=1))
+
+    def _of_piece(self, values):
+        """Values of pieces at `md`."""
+        return values[self._piece]
+
+    @cached_property
+    def md(self) -> np.ndarray:
+        """Measured depths, m."""
+        chain, pieces = self.solved.chain, self.pieces
+        below = np.concatenate([[0.0], np.cumsum(chain.length)])[:-1]
+        first = np.flatnonzero(np.diff(chain.origin, prepend=-1))  # parts of each piece, whose ends are exact
+        bottom = pieces.bottom[chain.origin] - (below - np.repeat(below[first], np.diff(first, append=len(below))))
+        top = np.append(bottom[1:], 0.0)
+        return self._down(bottom[:, None] + (top - bottom)[:, None] * self.solved.at)
+
+    @cached_property
+    def tension(self) -> np.ndarray:
+        """Effective tension, N: that of the string with the buoyed weight. Compression is negative."""
+        return self._down(self.solved.tension)
+
+    @cached_property
+    def torque(self) -> np.ndarray:
+        """N m."""
+        return self._down(self.solved.torque)
+
+    @cached_property
+    def side_force(self) -> np.ndarray:
+        """Force of the wall per length, N/m, across the hole and without friction."""
+        return self._down(self.solved.side)
+
+    @cached_property
+    def component(self) -> np.ndarray:
+        """Index of the component in `string.components`."""
+        return self._of_piece(self.pieces.component)
+
+    @cached_property
+    def clearance(self) -> np.ndarray:
+        """Radius of the hole less the contact radius, m."""
+        return self._of_piece(self.pieces.hole - self.pieces.radius)
+
+    @cached_property
+    def inclination(self) -> np.ndarray:
+        """rad."""
+        return self.hole.path.inclination_at(self.md)
+
+    @cached_property
+    def dogleg_severity(self) -> np.ndarray:
+        """Curvature of the hole, rad/m."""
+        return self._of_piece(self.pieces.curvature)
+
+    @cached_property
+    def bending_moment(self) -> np.ndarray:
+        """N m. Of the soft string: EI times the curvature of the hole's axis. NaN where EI is not known."""
+        return self._sections.EI * self.dogleg_severity
+
+    @cached_property
+    def standoff(self) -> np.ndarray:
+        """Distance from the wall over the clearance: 0 in contact. The soft string is in contact wherever it loads the
+        wall; 1, in the middle, elsewhere."""
+        return np.where(self.side_force > 0, 0.0, 1.0)
+
+    @cached_property
+    def contact_side(self) -> np.ndarray:
+        """The side of the hole that the string touches, rad clockwise from its high side looking down it: pi is the low
+        side. NaN where the hole is vertical, or nothing is touched. A rotating pipe climbs by atan(e_s mu)."""
+        return self._down(sides_of(self.pieces, self.solved, self.torque_convention == "coulomb"))
+
+    @cached_property
+    def offset(self) -> np.ndarray:
+        """(n, 3) from the hole's axis to the string, across the hole, m. The soft string, which has no place of its
+        own: to the wall where it loads it; zero where the side is not known."""
+        t = self.hole.path.tangent(self.md)
+        high = t * t[:, 2:] - (0.0, 0.0, 1.0)
+        size = np.linalg.norm(high, axis=1, keepdims=True)
+        high = high / np.where(size > 0, size, 1.0)
+        side = self.contact_side[:, None]
+        return self.clearance[:, None] * np.nan_to_num(np.cos(side) * high + np.sin(side) * np.cross(t, high))
+
+    @property
+    def position(self) -> np.ndarray:
+        """(n, 3) north, east, down of the string, m."""
+        return self.hole.path.position(self.md) + self.offset
+
+    @cached_property
+    def contacts(self) -> list[tuple[float, float, float, str]]:
+        """(from, to, force, side): measured depths (m), the force on the wall (N) and "high", "right", "low" or "left",
+        looking down the hole ("wall" where it is vertical), of each stretch on one side."""
+        return contacts_of(self.md, self.side_force, self.contact_side, -self._down(side_force_up_to(self.solved)))
+
+    @cached_property
+    def _sections(self):
+        found = loaded.sections_of([place.component for place in self.laid])
+        return loaded.Sections(*(values[self.component] for values in found))
+
+    @cached_property
+    def _pressures(self):
+        """Outside and inside at `md`, Pa; NaN where there is no mud."""
+        if self.mud is None:
+            return np.full((2, len(self.md)), np.nan)
+        head = self.mud.gravity * self.hole.path.position(self.md)[:, 2]
+        return self.mud.density * head, self.mud.inside * head
+
+    @cached_property
+    def true_tension(self) -> np.ndarray:
+        """Force in the wall of the pipe, N: effective tension + p_i A_i - p_o A_o, with the pressures of the fluids at
+        rest and the areas of the body. NaN without mud, or without diameters."""
+        return loaded.true_tension(self._sections, self.tension, *self._pressures)
+
+    @cached_property
+    def von_mises(self) -> np.ndarray:
+        """The largest von Mises stress in the body of the pipe, Pa. NaN without mud, or without diameters."""
+        return loaded.von_mises(self._sections, self.tension, self.torque, self.bending_moment, *self._pressures)
+
+    def _integral(self, values):
+        """Of values at `md` along the string: by the points of pieces."""
+        rows = values.reshape(-1, len(self.solved.at))[::-1, ::-1]
+        return float((rows @ UP_TO[-1]) @ self.solved.chain.length)
+
+    @cached_property
+    def stretch(self) -> float:
+        """How much longer the string is than at rest on the ground, m: by its tension, and by the pressures of the mud
+        where these and the diameters are known. NaN where EA is not known."""
+        return self._integral(loaded.stretch(self._sections, self.tension, *self._pressures))
+
+    @cached_property
+    def twist(self) -> float:
+        """Rotation of the surface against the lower end, rad. NaN where GJ is not known."""
+        return self._integral(self.torque / self._sections.GJ)
+
+    @cached_property
+    def neutral_points(self) -> np.ndarray:
+        """Measured depths where the effective tension changes its sign, m, from the surface down."""
+        T, md = self.tension, self.md
+        # rounding may leave something where T vanishes at a point: the crossing is there, between its neighbours
+        i = np.flatnonzero(np.abs(T) > 1e-12 * np.abs(T).max())
+        crosses = T[i[:-1]] * T[i[1:]] < 0
+        above, below = i[:-1][crosses], i[1:][crosses]
+        between = md[above] + (md[below] - md[above]) * T[above] / (T[above] - T[below])
+        return np.where(below > above + 1, md[np.minimum(above + 1, len(md) - 1)], between)
+
+    @property
+    def neutral_point(self) -> float:
+        """The lowest of these, m: what is below is in compression. NaN where there is none."""
+        return float(self.neutral_points[-1]) if len(self.neutral_points) else np.nan
+
+    @cached_property
+    def buckling(self) -> np.ndarray:
+        """State at `md`: 0 straight, 1 sinusoidal, 2 helical, by the loads of `well/criteria.py`. 0 where EI is not
+        known, or there is no clearance."""
+        S, F = self._sections, -self.tension
+        loose = np.where(self.clearance > 1e-9, self.clearance, np.nan)
+        k, across, b = self._loads()
+        plain = np.hypot(across - k * F, b)
+        weight = self._of_piece(self.pieces.weight)
+        with np.errstate(invalid="ignore"):
+            snake = criteria.snake_load(S.EI, loose, weight, plain) < F
+            helix = criteria.helix_load(S.EI, loose, weight, plain) < F
+        return np.where(helix, criteria.HELIX, np.where(snake, criteria.SNAKE, criteria.STRAIGHT))
+
+    @cached_property
+    def helical(self) -> np.ndarray:
+        """True at `md` where the wall force of a helix is in the model's answer."""
+        return self._down(np.repeat(self.solved.helical[:, None], len(self.solved.at), axis=1))
+
+    def _loads(self):
+        """Curvature, and weight along normal and binormal, at `md`."""
+        names = "curvature", "weight", "t", "n", "b", "bottom"
+        k, weight, t, n, b, bottom = (self._of_piece(getattr(self.pieces, name)) for name in names)
+        angle = k * (bottom - self.md)
+        return k, weight * (n * np.cos(angle) + t * np.sin(angle)), weight * b
+
+    def critical_load(self, criterion: str) -> np.ndarray:
+        """Compression (N) at `md` at which the string buckles, by a criterion of `well/criteria.py`.
+
+        Args:
+            criterion: "Dawson-Paslay", "Chen", "Wu", "He-Kyllingstad" or "Lubinski".
+
+        Raises:
+            SceneError: an unknown name.
+        """
+        from cosserat_fenicsx.checks import refuse
+
+        EI, weight = self._sections.EI, self._of_piece(self.pieces.weight)
+        loose = np.where(self.clearance > 1e-9, self.clearance, np.nan)
+        straight = {"Dawson-Paslay": criteria.dawson_paslay, "Chen": criteria.chen, "Wu": criteria.wu}
+        if criterion in straight:
+            return straight[criterion](EI, loose, weight, self.inclination)
+        if criterion == "Lubinski":
+            return criteria.lubinski(EI, weight)
+        if criterion != "He-Kyllingstad":
+            refuse(self, "critical_load", criterion, f"{', '.join(straight)}, He-Kyllingstad or Lubinski")
+        k, across, b = self._loads()
+        found, known = np.full(len(k), np.nan), ~np.isnan(EI * loose)
+        found[known] = criteria.he_kyllingstad(*(x[known] for x in (EI, loose, b, across, k)))
+        return found
+
+    def write(self, file: File) -> None:
+        """Write the arrays along the string as a .csv file, one row a place. Rank 0 writes.
+
+        Raises:
+            OSError: it cannot be written.
+        """
+        from cosserat_fenicsx.well.tables import write_answer
+
+        write_answer(self, file)
+
+    def plot(self, file: File | None = None):
+        """Draw tension with the loads of buckling, torque, and side force along the string, depth downwards.
+
+        Args:
+            file: .png, .pdf or another format of matplotlib (rank 0 writes); None returns the Figure.
+
+        Raises:
+            SceneError: matplotlib is missing, or the ending is unknown.
+        """
+        from cosserat_fenicsx.well.charts import answer_figure, draw
+
+        return draw(lambda: answer_figure(self), file)
+
+    def plot_3d(self, file: File, enlarge: float | None = None) -> None:
+        """Draw the string in its hole in space, coloured by the side force.
+
+        Args:
+            file: .png (rank 0 writes).
+            enlarge: factor on radii and clearance, which the picture says; None for one that shows them.
+
+        Raises:
+            SceneError: pyvista is missing, or the name does not end in .png.
+        """
+        from cosserat_fenicsx.well.in_space import draw_in_space
+
+        draw_in_space(self, file, enlarge)
+
+    def __repr__(self):
+        loads = f"hook load {self.hook_load:.6g} N, surface torque {self.surface_torque:.6g} N m"
+        return f"TorqueAndDrag({self.operation.name}, bit at {self.depth:g} m, {self.model}: {loads})"
+
+    def __str__(self):
+        from cosserat_fenicsx.well.tables import answer_table
+
+        return answer_table(self)
+
+
+def scales_of(solved, pieces):
+    """What errors of hook load and surface torque are relative to: the largest tension (N) and torque (N m) along the
+    string, and for the torque at least a little of that tension times the contact radius."""
+    tension = np.abs(solved.tension).max()
+    return tension, max(np.abs(solved.torque).max(), _LITTLE * tension * pieces.radius.max())
+
+
+def share(part, whole):
+    """Their ratio; 0 where there is nothing to compare with."""
+    return float(part / whole) if whole > 0 else 0.0

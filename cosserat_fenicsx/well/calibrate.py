@@ -1,0 +1,179 @@
+"""Coefficients of friction from measured hook loads and torques."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import least_squares
+from scipy.stats import t as student
+
+from cosserat_fenicsx.checks import instance, number, positive, refuse, store
+from cosserat_fenicsx.errors import SceneError
+from cosserat_fenicsx.well.hole import Borehole
+from cosserat_fenicsx.well.mud import Mud
+from cosserat_fenicsx.well.operations import Operation
+from cosserat_fenicsx.well.string import DrillString
+from cosserat_fenicsx.well.torque_and_drag import BUCKLED, SOFT, torque_and_drag
+
+# Where the search begins, its bounds, and the accuracy of the answers that it compares.
+_START, _MOST, _TOL = 0.2, 2.0, 1e-10
+# Unit of the block's weight in the search, N.
+_BLOCK = 1e5
+# Smallest singular value of the sensitivities over the largest one.
+_SINGULAR = 1e-6
+
+
+@dataclass(frozen=True)
+class RigMeasurement:
+    """What was read at the rig at one depth of the bit.
+
+    Args:
+        depth: measured depth of the bit, m.
+        operation: what was done, with weight and torque on bit.
+        hook_load: N, the weight of block and top drive included; None where it was not read.
+        torque: at the surface, N m; None where it was not read.
+        hook_load_sd, torque_sd: their standard deviations, N and N m: the weights of the readings.
+
+    Raises:
+        SceneError: neither was read, or numbers outside their range.
+    """
+
+    depth: float
+    operation: Operation
+    hook_load: float | None = None
+    torque: float | None = None
+    hook_load_sd: float = 10e3
+    torque_sd: float = 500.0
+
+    def __post_init__(self):
+        store(self, depth=positive(self, "depth", self.depth, "m"))
+        instance(self, "operation", self.operation, Operation, "an operation, such as TripOut()")
+        if self.hook_load is None and self.torque is None:
+            refuse(self, "hook_load", None, "a hook load (N) or a torque (N m)")
+        for name, unit in (("hook_load", "N"), ("torque", "N m")):
+            if getattr(self, name) is not None:
+                store(self, **{name: number(self, name, getattr(self, name), f"a number ({unit})", np.isfinite)})
+            store(self, **{f"{name}_sd": positive(self, f"{name}_sd", getattr(self, f"{name}_sd"), unit)})
+
+
+@dataclass(frozen=True, eq=False)
+class FrictionFit:
+    """Coefficients of friction by least squares, from `calibrate_friction`.
+
+    Attributes:
+        hole: the `Borehole` with these coefficients.
+        friction: (n,) of its sections. interval: (n, 2) confidence intervals; 0 where a coefficient is at this bound.
+        block_weight: N, as given or found; block_interval: (2,), NaN where it was given.
+        confidence: of the intervals, such as 0.95.
+        correlation: (m, m) of the estimates: close to 1 or -1 where the readings tell sums or differences alone.
+        residuals: (k,) measured less computed over the standard deviations, hook loads before torques.
+        misfit: root of the sum of their squares over the readings in excess: 1 where the standard deviations are right.
+    """
+
+    hole: Borehole
+    friction: np.ndarray
+    interval: np.ndarray
+    block_weight: float
+    block_interval: np.ndarray
+    confidence: float
+    correlation: np.ndarray
+    residuals: np.ndarray
+    misfit: float
+
+    def __str__(self):
+        from cosserat_fenicsx.well.tables import fit_table
+
+        return fit_table(self)
+
+
+def calibrate_friction(
+    hole: Borehole,
+    string: DrillString,
+    measurements: Sequence[RigMeasurement],
+    *,
+    mud: Mud | None = None,
+    block_weight: float | None = 0.0,
+    model: str = SOFT,
+    torque_convention: str = "coulomb",
+    confidence: float = 0.95,
+) -> FrictionFit:
+    """One coefficient of friction for each section of a hole, such that hook loads and torques fit measured ones best.
+
+    Weighted least squares by SciPy. The intervals are Student's, of the linearised problem, scaled by the misfit.
+
+    Args:
+        hole: its own friction is not used.
+        measurements: `RigMeasurement`s, more than there are unknowns.
+        block_weight: of block and top drive in the hook loads, N; None: one more unknown.
+        model: "soft", or "soft, buckled". mud, string, torque_convention: see `torque_and_drag`.
+        confidence: between 0 and 1.
+
+    Raises:
+        SceneError: too few readings, or readings that do not tell a section's friction (named); see also
+            `torque_and_drag`.
+    """
+    measurements = [
+        instance("calibrate_friction", "measurements", m, RigMeasurement, "Measurements") for m in measurements
+    ]
+    if model not in (SOFT, BUCKLED):
+        refuse("calibrate_friction", "model", model, f"'{SOFT}' or '{BUCKLED}'")
+    confidence = number("calibrate_friction", "confidence", confidence, "a number between 0 and 1", lambda x: 0 < x < 1)
+    settings = {"mud": mud, "model": model, "tol": _TOL, "torque_convention": torque_convention}
+    unknown_block, sections = block_weight is None, len(hole.sections)
+    hooks = [m for m in measurements if m.hook_load is not None]
+    turns = [m for m in measurements if m.torque is not None]
+    wanted, readings = sections + unknown_block, len(hooks) + len(turns)
+    if readings <= wanted:
+        raise SceneError(f"calibrate_friction: {readings} readings for {wanted} unknowns: expected more")
+
+    def residuals(unknowns):
+        with_friction = hole.with_friction(np.maximum(unknowns[:sections], 0.0))
+        block = unknowns[sections] * _BLOCK if unknown_block else block_weight
+        answers = {id(m): torque_and_drag(with_friction, string, m.operation, depth=m.depth, **settings)
+                   for m in measurements}  # fmt: skip
+        return np.array(
+            [(m.hook_load - answers[id(m)].hook_load - block) / m.hook_load_sd for m in hooks]
+            + [(m.torque - answers[id(m)].surface_torque) / m.torque_sd for m in turns]
+        )
+
+    free = [np.inf] * unknown_block  # of the block's weight
+    bounds = [0.0] * sections + [-x for x in free], [_MOST] * sections + free
+    start = [_START] * sections + [0.5] * unknown_block
+    found = least_squares(residuals, start, bounds=bounds, xtol=1e-10, ftol=1e-12, gtol=1e-12)
+    _check_told(hole, found.jac, unknown_block)
+    misfit = float(np.sqrt(2 * found.cost / (readings - wanted)))
+    covariance = np.linalg.inv(found.jac.T @ found.jac) * misfit**2
+    spread = np.sqrt(np.diag(covariance))
+    half = student.ppf((1 + confidence) / 2, readings - wanted) * spread
+    scale = np.array([1.0] * sections + [_BLOCK] * unknown_block)
+    values, half = found.x * scale, half * scale
+    ends = np.stack([values - half, values + half], axis=1)
+    friction = values[:sections]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        correlation = covariance / np.outer(spread, spread)
+    return FrictionFit(
+        hole.with_friction(friction), friction, np.maximum(ends[:sections], 0.0),
+        float(values[-1]) if unknown_block else float(block_weight), ends[-1] if unknown_block else np.full(2, np.nan),
+        confidence, correlation, found.fun, misfit,
+    )  # fmt: skip
+
+
+def _check_told(hole, sensitivity, unknown_block):
+    """Refuse readings that leave an unknown open."""
+    names = [f"section {i + 1} (to {section.to:g} m)" for i, section in enumerate(hole.sections)]
+    names += ["block_weight"] * unknown_block
+    told = np.linalg.norm(sensitivity, axis=0)[: len(hole.sections)]
+    silent = [name for name, size in zip(names, told, strict=False) if size <= _SINGULAR * np.linalg.norm(sensitivity)]
+    if silent:
+        raise SceneError(
+            f"calibrate_friction: no reading depends on friction of {' and '.join(silent)}: expected readings with "
+            "the string there, of hook loads up or down or of torques where it rotates"
+        )
+    _, sizes, rows = np.linalg.svd(sensitivity, full_matrices=False)
+    if sizes[-1] > _SINGULAR * sizes[0]:
+        return
+    open_ones = [name for name, share in zip(names, np.abs(rows[-1]), strict=True) if share > 0.1]
+    raise SceneError(
+        f"calibrate_friction: the measurements do not tell {' and '.join(open_ones)} apart: expected readings with "
+        "friction there, at several depths, and both up and down or rotating where block_weight is None"
+    )

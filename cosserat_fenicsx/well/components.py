@@ -1,0 +1,247 @@
+"""What a string in a well is made of: by numbers, by dimensions, or by standard sizes.
+
+Lengths in m. `mass` is that in air, kg/m, tool joints included; its volume of steel is mass over density. The weight in
+mud follows from it (`Mud`), or is given (`Component`).
+"""
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+from cosserat_fenicsx.checks import instance, number, positive, refuse, store
+from cosserat_fenicsx.errors import SceneError
+from cosserat_fenicsx.scene.materials import Material
+from cosserat_fenicsx.scene.sections import Circle, Stiffness, Tube
+from cosserat_fenicsx.well.sizes import standard_size
+
+#: Drill-pipe steel: E = 30 million psi, as in API RP 7G.
+STEEL = Material(E=206.8e9, nu=0.3, density=7850.0)
+# Body of a bit over its diameter, where nothing else is known.
+_BIT_BODY = 0.7
+
+
+@dataclass(frozen=True)
+class Component:
+    """A part of a string by its numbers, with its weight in mud.
+
+    Args:
+        length: m; None for the one that fills up to the surface.
+        stiffness: a `Stiffness`, or None: only the soft string can be solved, without bending moments and stretch.
+        weight: in mud, N/m.
+        contact_radius: where it touches the wall, m: that of the tool joints where there are some.
+        name: in tables.
+
+    Raises:
+        SceneError: a number that is missing or not positive.
+    """
+
+    length: float | None = None
+    stiffness: Stiffness | None = None
+    weight: float | None = None
+    contact_radius: float | None = None
+    name: str = "component"
+
+    outer_diameter = inner_diameter = mass = None
+
+    def __post_init__(self):
+        store(self, length=_length(self))
+        if self.stiffness is not None:
+            instance(self, "stiffness", self.stiffness, Stiffness, "a Stiffness or None")
+        if self.weight is None:
+            refuse(self, "weight", None, "the weight in mud (N/m): a component without weight cannot be placed")
+        store(self, weight=number(self, "weight", self.weight, "a number (N/m)", math.isfinite))
+        store(self, contact_radius=positive(self, "contact_radius", self.contact_radius, "m"))
+
+
+@dataclass(frozen=True)
+class _Tubular:
+    """Base of the components of steel, by their dimensions or by the name of a standard size.
+
+    Args:
+        length: m; None for the one that fills up to the surface.
+        size: the name of a standard size, from which whatever is not given is taken.
+        outer_diameter, inner_diameter: of the body, m.
+        tool_joint: largest outer diameter, which touches the wall, m; None for the body's.
+        mass: in air with tool joints, kg/m; None for that of the body.
+        material: a `Material` with a density.
+        name: in tables.
+
+    Raises:
+        SceneError: a dimension that is missing or not positive, an inner diameter that is not below the outer one, or
+            an unknown size.
+    """
+
+    length: float | None = None
+    size: str | None = None
+    outer_diameter: float | None = None
+    inner_diameter: float | None = None
+    tool_joint: float | None = None
+    mass: float | None = None
+    material: Material = STEEL
+    name: str = ""
+
+    def __post_init__(self):
+        store(self, length=_length(self), name=self.name or type(self)._called)
+        if self.size is not None:
+            given = ("outer_diameter", "inner_diameter", "mass")
+            changed = any(getattr(self, name) is not None for name in given)
+            for field, value in standard_size(type(self).__name__, self.size).items():
+                # the weight of another section is not that of this one
+                if field == "size" or (getattr(self, field) is None and not (field == "mass" and changed)):
+                    store(self, **{field: value})
+        instance(self, "material", self.material, Material, "a Material")
+        positive("Material", "density", self.material.density, "kg/m^3, for the weight")
+        for field in ("outer_diameter", "inner_diameter"):
+            if getattr(self, field) is None:
+                refuse(self, field, None, "a diameter (m), or the name of a standard size, size='...'")
+        Tube(self.outer_diameter, self.inner_diameter)  # refuses what is no tube
+        if self.mass is None:
+            store(self, mass=self.material.density * math.pi / 4 * (self.outer_diameter**2 - self.inner_diameter**2))
+        store(self, mass=positive(self, "mass", self.mass, "kg/m"))
+        if self.tool_joint is not None:
+            store(self, tool_joint=positive(self, "tool_joint", self.tool_joint, "m"))
+            if self.tool_joint < self.outer_diameter:
+                refuse(self, "tool_joint", self.tool_joint, f"at least the body's diameter, {self.outer_diameter:g} m")
+
+    weight = None
+
+    @property
+    def contact_radius(self):
+        """m."""
+        return (self.tool_joint or self.outer_diameter) / 2
+
+    @cached_property
+    def stiffness(self):
+        """That of the body."""
+        return Tube(self.outer_diameter, self.inner_diameter).stiffness(self.material)
+
+
+class DrillPipe(_Tubular):
+    __doc__ = (
+        f"Drill pipe, such as DrillPipe(size='5 in 19.50 lb/ft').\n{(_Tubular.__doc__ or '').partition(chr(10))[2]}"
+    )
+    _called = "drill pipe"
+
+
+class HeavyWeight(_Tubular):
+    __doc__ = f"Heavy-weight drill pipe, such as size='5 in'.\n{(_Tubular.__doc__ or '').partition(chr(10))[2]}"
+    _called = "heavy-weight"
+
+
+class Collar(_Tubular):
+    __doc__ = f"Drill collars, such as size='NC46-65'.\n{(_Tubular.__doc__ or '').partition(chr(10))[2]}"
+    _called = "collar"
+
+
+@dataclass(frozen=True)
+class Stabiliser:
+    """A stabiliser: a tube with blades that touch the wall.
+
+    Args:
+        length: m.
+        diameter: across the blades, m; that of the hole at most.
+        outer_diameter, inner_diameter: of the body, m.
+        mass, material, name: as of `DrillPipe`.
+
+    Raises:
+        SceneError: as of `DrillPipe`.
+    """
+
+    length: float
+    diameter: float
+    outer_diameter: float
+    inner_diameter: float
+    mass: float | None = None
+    material: Material = STEEL
+    name: str = "stabiliser"
+
+    weight = None
+
+    def __post_init__(self):
+        if self.length is None:
+            refuse(self, "length", None, "a length (m)")
+        store(self, diameter=positive(self, "diameter", self.diameter, "m"))
+        if self.diameter < positive(self, "outer_diameter", self.outer_diameter, "m"):
+            refuse(
+                self, "diameter", self.diameter, f"across the blades, at least the body's, {self.outer_diameter:g} m"
+            )
+        sizes = (self.outer_diameter, self.inner_diameter, self.diameter, self.mass)
+        body = Collar(self.length, None, *sizes, self.material)  # its checks and its stiffness are those of a collar
+        store(self, length=body.length, mass=body.mass, _body=body)
+
+    contact_radius = property(lambda self: self._body.contact_radius)
+    stiffness = property(lambda self: self._body.stiffness)
+
+
+@dataclass(frozen=True)
+class Bit:
+    """A bit, as a short solid cylinder.
+
+    Args:
+        diameter: m; that of the hole at most.
+        length: m.
+        body_diameter: of the cylinder, m; None for 0.7 of the diameter.
+        mass: in air, kg/m; None for that of the cylinder.
+        material, name: as of `DrillPipe`.
+
+    Raises:
+        SceneError: a number that is not positive, or a body wider than the bit.
+    """
+
+    diameter: float
+    length: float = 0.3
+    body_diameter: float | None = None
+    mass: float | None = None
+    material: Material = STEEL
+    name: str = "bit"
+
+    inner_diameter, weight = 0.0, None
+
+    def __post_init__(self):
+        store(self, diameter=positive(self, "diameter", self.diameter, "m"), length=_length(self))
+        if self.length is None:
+            refuse(self, "length", None, "a length (m)")
+        body = _BIT_BODY * self.diameter if self.body_diameter is None else self.body_diameter
+        store(self, body_diameter=positive(self, "body_diameter", body, "m"))
+        if self.body_diameter > self.diameter:
+            refuse(self, "body_diameter", self.body_diameter, f"at most the bit's, {self.diameter:g} m")
+        mass = self.material.density * math.pi / 4 * self.body_diameter**2 if self.mass is None else self.mass
+        store(self, mass=positive(self, "mass", mass, "kg/m"))
+
+    outer_diameter = property(lambda self: self.body_diameter)
+    contact_radius = property(lambda self: self.diameter / 2)
+
+    @cached_property
+    def stiffness(self):
+        """That of the cylinder."""
+        return Circle(self.body_diameter).stiffness(self.material)
+
+
+#: The components; `DrillString` takes any object with their attributes.
+COMPONENTS = (Component, DrillPipe, HeavyWeight, Collar, Stabiliser, Bit)
+
+
+def weight_in_mud(component, mud):
+    """N/m: as given, or from the mass in air and the fluids outside and inside, whose pressures carry a part of it.
+
+    w = m g - rho_o g A_o + rho_i g A_i, the weight that goes with the effective tension: A. Sparks, J. Energy Resour.
+    Technol. 106 (1984) 46, doi:10.1115/1.3231023. The outer area A_o is that of the steel, mass over density, and of
+    the bore A_i, so that tool joints count.
+
+    Raises:
+        SceneError: no mud, and no weight in it.
+    """
+    if component.weight is not None:
+        return component.weight
+    if mud is None:
+        raise SceneError(
+            f"torque_and_drag: mud = None: expected Mud(density), since {component.name} is given by its weight in air "
+            "(Mud(0) for air, or Component(weight=...) by the weight in mud)"
+        )
+    steel, bore = component.mass / component.material.density, math.pi / 4 * component.inner_diameter**2
+    lifted = mud.density * (steel + bore) - mud.inside * bore
+    return (component.mass - lifted) * mud.gravity
+
+
+def _length(component):
+    return None if component.length is None else positive(component, "length", component.length, "m")

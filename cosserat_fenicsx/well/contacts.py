@@ -1,0 +1,66 @@
+"""Where a string touches the wall, and how much each stretch on one side carries."""
+
+import numpy as np
+
+from cosserat_fenicsx.well.softstring import UP_TO
+
+_SIDES = ("high", "right", "low", "left")
+_USUAL, _MOSTLY = 1.5, 0.97
+
+
+def sides_of(pieces, solved, climbing):
+    """(n, m) angles of contact at the places of a `Solved`, rad clockwise from the high side; see `TorqueAndDrag`."""
+    chain = solved.chain
+    angle = chain.curvature[:, None] * chain.length[:, None] * solved.at
+    n = chain.n[:, None] * np.cos(angle) + chain.t[:, None] * np.sin(angle)
+    b = chain.b[:, None]
+    load, aside = chain.curvature[:, None] * solved.tension + chain.weight[:, None] * n, chain.weight[:, None] * b
+    # high side -(n, b), and to its right -(-b, n), in the plane of normal and binormal
+    side = np.arctan2(load * b - aside * n, -(load * n + aside * b))
+    if climbing:
+        side = side - np.arctan(pieces.around * pieces.friction)[chain.origin, None]
+    leans = np.hypot(n, b) > 1e-9
+    side = np.where(leans & (solved.side > 0), side % (2 * np.pi), np.nan)
+    for end, beside in ((0, 1), (-1, -2)):  # a bend that starts vertically presses to one side from its first point on
+        side[:, end] = np.where(leans[:, end], side[:, end], side[:, beside])
+    return side
+
+
+def usual_force(side_force):
+    """Side force (N/m) beyond which it is a peak in pictures: one that is much above what most of the string has."""
+    return _USUAL * float(np.quantile(side_force, _MOSTLY))
+
+
+def name_of_side(side):
+    """The name of a side by its angle (rad clockwise from the high side), "wall" for NaN."""
+    return _SIDES[round(side / (np.pi / 2)) % 4] if np.isfinite(side) else "wall"
+
+
+def side_force_up_to(solved):
+    """(n, m) force of the wall (N) from the lower end up to the places of a `Solved`."""
+    within = (solved.side @ UP_TO.T) * solved.chain.length[:, None]
+    return np.cumsum(within[:, -1:], axis=0) - within[:, -1:] + within
+
+
+def contacts_of(md, side_force, side, up_to):
+    """[(from, to, force, side)], see `TorqueAndDrag.contacts`.
+
+    Args:
+        up_to: (n,) integral of the side force over the depth, from anywhere, N.
+    """
+    touched = np.isfinite(side)
+    quadrant = np.where(
+        touched, np.round(np.where(touched, side, 0.0) / (np.pi / 2)) % 4, np.where(side_force > 0, 4, 5)
+    )
+    ends = np.flatnonzero(np.diff(quadrant)) + 1
+    found = []
+    for stretch in np.split(np.arange(len(md)), ends):
+        kind = int(quadrant[stretch[0]])
+        # a stretch that ends inside a piece reaches to the next point
+        last = min(stretch[-1] + 1, len(md) - 1)
+        points = np.append(stretch, last) if last > stretch[-1] else stretch
+        force = up_to[points[-1]] - up_to[points[0]]
+        if kind < 5 and md[points[-1]] > md[points[0]]:
+            name = (*_SIDES, "wall")[kind]
+            found.append((float(md[points[0]]), float(md[points[-1]]), float(force), name))
+    return found

@@ -1,0 +1,250 @@
+"""Torque and drag over many depths of the bit, for several operations and coefficients of friction."""
+
+import hashlib
+import itertools
+import json
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from cosserat_fenicsx.annotations import File, Numbers
+from cosserat_fenicsx.checks import finite_array, refuse
+from cosserat_fenicsx.errors import Interrupted, NotConverged, SceneError
+from cosserat_fenicsx.progress import Progress
+from cosserat_fenicsx.ranks import on_first, world
+from cosserat_fenicsx.well.buckled import LockUp
+from cosserat_fenicsx.well.hole import Borehole
+from cosserat_fenicsx.well.mud import Mud
+from cosserat_fenicsx.well.operations import Operation
+from cosserat_fenicsx.well.pieces import pieces_of
+from cosserat_fenicsx.well.string import DrillString
+from cosserat_fenicsx.well.torque_and_drag import torque_and_drag
+
+#: What is kept of an answer; `locked` is where the string locks up, m, or NaN.
+KEPT = ("hook_load", "surface_torque", "error", "model_error", "locked")
+
+
+@dataclass(frozen=True, eq=False)
+class DepthSweep:
+    """Surface loads over the depth of the bit, from `depth_sweep`.
+
+    Attributes:
+        operations, depths (m), friction: as asked for; friction is (None,) for that of the hole.
+        values: {name: array (operations, friction, depths)} of "hook_load" (N), "surface_torque" (N m), "error" and
+            "model_error" (see `TorqueAndDrag`) and "locked" (m): where the string locks up, which leaves the others
+            NaN. What is not computed yet is NaN.
+    """
+
+    operations: tuple[Operation, ...]
+    depths: np.ndarray
+    friction: tuple
+    values: dict[str, np.ndarray]
+
+    #: For messages.
+    axis = "answer"
+
+    hook_load = property(lambda self: self.values["hook_load"], doc="(operations, friction, depths) N.")
+    surface_torque = property(lambda self: self.values["surface_torque"], doc="(operations, friction, depths) N m.")
+
+    @property
+    def done(self) -> np.ndarray:
+        """(operations, friction, depths) whether it is computed."""
+        return ~(np.isnan(self.hook_load) & np.isnan(self.values["locked"]))
+
+    def __len__(self):
+        return int(self.done.sum())
+
+    def label(self, i: int, j: int) -> str:
+        """The name of the line of operation i and friction j."""
+        friction = self.friction[j]
+        if friction is None:
+            return self.operations[i].name
+        told = f"{friction:g}" if np.ndim(friction) == 0 else ", ".join(f"{x:g}" for x in friction)
+        return f"{self.operations[i].name}, friction {told}"
+
+    def write(self, file: File) -> None:
+        """Write a .csv file, one row a depth. Rank 0 writes.
+
+        Raises:
+            OSError: it cannot be written.
+        """
+        lines = ["depth_m," + ",".join(f'"{label}: {what}"' for label, what, _ in self._columns())]
+        columns = [values for *_, values in self._columns()]
+        for k, depth in enumerate(self.depths):
+            lines.append(",".join([f"{depth:.9g}", *(f"{values[k]:.9g}" for values in columns)]))
+        on_first(world(), lambda: Path(file).write_text("\n".join(lines) + "\n", encoding="utf-8"))
+
+    def _columns(self):
+        for i, j in itertools.product(range(len(self.operations)), range(len(self.friction))):
+            for what, name in (("hook load (N)", "hook_load"), ("surface torque (N m)", "surface_torque")):
+                yield self.label(i, j), what, self.values[name][i, j]
+
+    def plot(self, file: File | None = None):
+        """Draw hook load and surface torque over the depth of the bit, the depth downwards ("broomstick").
+
+        Args:
+            file: .png, .pdf or another format of matplotlib (rank 0 writes); None returns the Figure.
+
+        Raises:
+            SceneError: matplotlib is missing, or the ending is unknown.
+        """
+        from cosserat_fenicsx.well.charts import draw, sweep_figure
+
+        return draw(lambda: sweep_figure(self), file)
+
+    def __repr__(self):
+        names = ", ".join(operation.name for operation in self.operations)
+        return f"DepthSweep({names}; {len(self.depths)} depths; {len(self)} of {self.done.size} answers)"
+
+    def __str__(self):
+        from cosserat_fenicsx.well.tables import sweep_table
+
+        return sweep_table(self)
+
+
+def depth_sweep(
+    hole: Borehole,
+    string: DrillString,
+    operations: Sequence[Operation],
+    depths: Numbers,
+    *,
+    mud: Mud | None = None,
+    friction: Sequence | None = None,
+    model: str = "auto",
+    tol: float = 1e-4,
+    torque_convention: str = "coulomb",
+    file: File | None = None,
+    progress: bool | None = None,
+) -> DepthSweep:
+    """Hook load and surface torque over the depth of the bit.
+
+    Args:
+        operations: one or several. depths: measured depths of the bit, m.
+        friction: coefficients to compare, each a number for the whole hole, or one for each of its sections; None for
+            those of the hole.
+        file: keeps the answers as they come, as lines of JSON; the same call goes on from there. None keeps none.
+        progress: True or False; None shows it in runs of more than two seconds.
+        hole, string, mud, model, tol, torque_convention: see `torque_and_drag`.
+
+    Returns:
+        a `DepthSweep`. Where a string locks up, its loads are NaN.
+
+    Raises:
+        SceneError: see `torque_and_drag`; a file of another sweep.
+        NotConverged: see `torque_and_drag`; its `path` is the sweep so far.
+        OSError: the file cannot be written.
+        Interrupted: by Ctrl-C; its `path` is the sweep so far.
+    """
+    operations = (operations,) if isinstance(operations, Operation) else tuple(operations)
+    if not operations:
+        refuse("depth_sweep", "operations", operations, "at least one operation")
+    for operation in operations:
+        if not isinstance(operation, Operation):
+            refuse("depth_sweep", "operations", operation, "operations, such as TripOut()")
+    depths = np.atleast_1d(finite_array("depth_sweep", "depths", depths, "measured depths (m)"))
+    if not len(depths):
+        refuse("depth_sweep", "depths", depths, "at least one measured depth (m)")
+    friction = tuple(friction) if isinstance(friction, Sequence | np.ndarray) else (friction,)
+    holes = [hole if value is None else hole.with_friction(value) for value in friction]
+    settings = {"mud": mud, "model": model, "tol": tol, "torque_convention": torque_convention}
+    for depth in (depths.min(), depths.max()):  # what does not fit is refused before the computation
+        pieces_of(hole, string, operations[0], mud, float(depth))
+    shape = (len(operations), len(friction), len(depths))
+    values = {name: np.full(shape, np.nan) for name in KEPT}
+    sweep = DepthSweep(operations, depths, friction, values)
+    store = _Store(file, _mark(hole, string, operations, depths, friction, settings), values)
+    missing = np.argwhere(~sweep.done)
+    try:
+        with Progress([len(missing)], progress, world(), "answer") as bar:
+            bar.start("depth sweep")
+            for number, (i, j, k) in enumerate(missing, start=1):
+                store.keep((i, j, k), _answer(holes[j], string, operations[i], float(depths[k]), settings))
+                bar.reached(number)
+    except KeyboardInterrupt:
+        raise Interrupted(sweep) from None
+    except NotConverged as failed:
+        where = f"{sweep.label(i, j)}, bit at {depths[k]:g} m"
+        raise NotConverged(f"depth_sweep: {where}: {failed}; the exception's `path` has the {len(sweep)} before", sweep)
+    finally:
+        store.close()
+    return sweep
+
+
+def _answer(hole, string, operation, depth, settings):
+    """The numbers of `KEPT`."""
+    try:
+        answer = torque_and_drag(hole, string, operation, depth=depth, progress=False, **settings)
+    except LockUp as locked:
+        return (np.nan, np.nan, np.nan, np.nan, locked.md)
+    return answer.hook_load, answer.surface_torque, answer.error, answer.model_error, np.nan
+
+
+class _Store:
+    """The answers of a sweep in a file, one a line: indices, then `KEPT`."""
+
+    def __init__(self, file, mark, values):
+        self._values, self._stream = values, None
+        if file is None:
+            return
+        comm, rows = world(), []
+        on_first(comm, lambda: rows.extend(self._open(Path(file), mark)))
+        for index, numbers in comm.bcast(rows):
+            self._set(index, numbers)
+
+    def _open(self, file, mark):
+        """Open the file for more rows, and return those that are there."""
+        rows = self._read(file, mark)
+        new = not file.exists() or file.stat().st_size == 0
+        self._stream = file.open("a", encoding="utf-8")
+        if new:
+            self._write({"sweep": mark})
+        return rows
+
+    @staticmethod
+    def _read(file, mark):
+        text = file.read_text(encoding="utf-8") if file.exists() else ""
+        if text and not text.endswith("\n"):  # the run was ended while it wrote
+            text = text[: text.rfind("\n") + 1]
+            os.truncate(file, len(text.encode()))
+        if not text:
+            return []
+        try:
+            head, *rows = [json.loads(line) for line in text.splitlines()]
+            other = head["sweep"] != mark
+        except (ValueError, KeyError, TypeError):
+            other = True
+        if other:
+            raise SceneError(
+                f"depth_sweep.file = {str(file)!r}: it holds another sweep (hole, string, depths or settings "
+                "differ): expected the same call, or another file"
+            )
+        return [(row[:3], row[3:]) for row in rows]
+
+    def keep(self, index, numbers):
+        """Take an answer, and write it."""
+        self._set(index, numbers)
+        if self._stream is not None:
+            self._write([*(int(i) for i in index), *numbers])
+
+    def _set(self, index, numbers):
+        for name, number in zip(KEPT, numbers, strict=True):
+            self._values[name][tuple(index)] = number
+
+    def _write(self, row):
+        self._stream.write(json.dumps(row) + "\n")
+        self._stream.flush()
+
+    def close(self):
+        if self._stream is not None:
+            self._stream.close()
+
+
+def _mark(hole, string, operations, depths, friction, settings):
+    """A hash of everything that a sweep's numbers follow from."""
+    path = hole.path
+    survey = [array.tolist() for array in (path.md, path.inclination, path.azimuth)]
+    told = repr((survey, hole.sections, string, operations, depths.tolist(), [np.array(x).tolist() for x in friction]))
+    return hashlib.sha256((told + repr(settings)).encode()).hexdigest()[:16]

@@ -1,0 +1,181 @@
+"""Which model is enough: how far the soft string may be from the rod in contact, and why.
+
+The soft string lies on the axis. With a clearance, a string changes sides where its load turns round, and spans the
+hole between without touching it; the friction that is missed there is mu times
+
+- T sqrt(2 d dk) where the hole's curvature jumps by dk: a string that leaves a wall tangentially reaches the other
+  side, at a distance d, after that angle. On a build section of radius R it is T sqrt(4 r/R) for a clearance r.
+- (6 d T)^(2/3) q'^(1/3) where the load changes its sign within a bend, with the rate q': the span on which it moves
+  the string by d.
+
+A string on the low side also hangs lower by r sin(inclination), and is moved along the hole by r times the angle of its
+bends, since its way there is longer or shorter than the axis; its weight feels both. Bending stiffness changes the
+friction by mu EI dk^2. A snake adds at most half the wall force of a helix; its friction makes the string a helix
+farther down, and the helix multiplies it on the way up: the string is solved again with a helix wherever there may be
+one. These are sums of sizes: differences of opposite signs do not cancel.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from cosserat_fenicsx.well import criteria
+from cosserat_fenicsx.well.buckled import LockUp, earliest_helix, growth
+
+# Places on a piece where a snake is looked for.
+_FINE = 512
+# Strain beyond what any pipe carries.
+_BREAKS = 0.01
+
+
+class ModelError(NamedTuple):
+    """What the soft string leaves out, in hook load (N), or in surface torque (N m) where it rotates."""
+
+    clearance: float
+    bending: float
+    snake: float
+
+    @property
+    def total(self):
+        return sum(self)
+
+
+def model_errors(path, pieces, soft, solved, sections):
+    """`ModelError` of the hook load and of the surface torque.
+
+    Args:
+        path: a `WellPath`; pieces: `Pieces`; soft, solved: the `Solved` without and with buckling; sections: `Sections`
+            of the components.
+
+    Returns:
+        infinite parts for snakes with which the string may lock up.
+    """
+    chain = solved.chain
+    groups = np.flatnonzero(np.diff(chain.origin, prepend=-1))  # the first part of each piece, from below
+    load, turn, EI = np.abs(chain.drag), chain.turn, np.nan_to_num(sections.EI[pieces.component[chain.origin]])
+    clearance = (pieces.hole - pieces.radius)[chain.origin]
+    missed, stiff = (np.zeros(len(load)) for _ in range(2))
+    missed[groups] = _turns(chain, solved, groups, clearance[groups])
+    jumps, stiffer = _jumps(path, pieces, solved.tension[groups[1:], 0], EI[groups])
+    missed[groups[1:]] += jumps
+    stiff[groups[1:]] = stiffer
+    extra = _snakes(chain, solved, EI, clearance)
+    grown = growth(solved, pieces, sections)
+    hook, torque = ([float(share @ (part * grown)) for part in (missed, stiff, extra)] for share in (load, turn))
+    hook[0] += _lower(pieces)
+    if extra.any() or solved.helical.any():
+        hook[2], torque[2] = map(max, _earlier(soft, solved, pieces, sections), (hook[2], torque[2]))
+    return ModelError(*hook), ModelError(*torque)
+
+
+def _earlier(soft, solved, pieces, sections):
+    """By how much hook load and surface torque change where snakes are helices: their friction makes the string a helix
+    farther down, and the helix multiplies it on the way up."""
+    try:
+        early = earliest_helix(soft, pieces, sections)
+    except LockUp:
+        return np.inf, np.inf if solved.chain.turn.any() else 0.0
+    return [abs(float(getattr(early, x)[-1, -1] - getattr(solved, x)[-1, -1])) for x in ("tension", "torque")]
+
+
+def _snakes(chain, solved, EI, clearance):
+    """Half the wall force (N) of a helix, of the snakes in pieces; a snake may be a small part of a long piece."""
+    extra = np.zeros(len(EI))
+    fine = (np.arange(_FINE) + 0.5) / _FINE
+    for i in np.flatnonzero((solved.tension.min(axis=1) < 0) & ~solved.helical & (clearance > 1e-9) & (EI > 0)):
+        F = np.maximum(-np.interp(fine, solved.at, solved.tension[i]), 0.0)
+        side = np.interp(fine, solved.at, solved.side[i]) * chain.climb[i]
+        snakes = F > criteria.snake_load(EI[i], clearance[i], chain.weight[i], side)
+        extra[i] = np.mean(np.where(snakes, criteria.helix_side(EI[i], clearance[i], F) / 2, 0.0)) * chain.length[i]
+    return extra
+
+
+def _lower(pieces):
+    """Weight (N) that hangs lower or higher where the string leans on the wall: where it changes, and at the end."""
+    clearance = pieces.hole - pieces.radius
+    lean = clearance * np.sqrt(np.maximum(1 - pieces.t**2, 0.0))
+    moved = np.cumsum(clearance * pieces.curvature * (pieces.bottom - pieces.top)) * np.abs(pieces.t)
+    return float(np.abs(np.diff(pieces.weight, append=0.0)) @ (lean + moved))
+
+
+def _turns(chain, solved, groups, clearance):
+    """Wall force (N) that is missed within pieces whose load turns to the other side."""
+    last = np.append(groups[1:], len(chain.length)) - 1
+    length = np.add.reduceat(chain.length, groups)
+    angle = chain.curvature[groups] * length
+    lower, upper = chain.n[groups], chain.n[groups] * np.cos(angle) + chain.t[groups] * np.sin(angle)
+    q = [
+        np.stack([chain.curvature[groups] * T + chain.weight[groups] * n, chain.weight[groups] * chain.b[groups]])
+        for n, T in ((lower, solved.tension[groups, 0]), (upper, solved.tension[last, -1]))
+    ]
+    way = np.linalg.norm(_unit(q[1], 0) - _unit(q[0], 0), axis=0)
+    rate = np.linalg.norm(q[1] - q[0], axis=0) / length
+    T = np.maximum(np.abs(solved.tension[groups, 0]), np.abs(solved.tension[last, -1]))
+    return np.where(way > 1, (6 * way * clearance * T) ** (2 / 3) * rate ** (1 / 3), 0.0)  # others slide along the wall
+
+
+def _jumps(path, pieces, tension, EI):
+    """Wall force (N) that is missed where pieces meet, from below, and EI dk^2 (N m)."""
+    md, up = pieces.bottom[:-1], slice(None, None, -1)
+    t, down = path.tangent(md), np.array([0.0, 0.0, 1.0])
+    k = path.curvature(np.maximum(md - 1e-6, 0.0)), path.curvature(md)  # above and below
+    offsets = []
+    for i, curvature in ((slice(None, -1), k[0]), (slice(1, None), k[1])):
+        q = tension[up, None] * curvature + pieces.weight[i, None] * (down - t * t[:, 2:])
+        offsets.append((pieces.hole - pieces.radius)[i, None] * _unit(q, 1))
+    jump, away = np.linalg.norm(k[1] - k[0], axis=1), np.linalg.norm(offsets[1] - offsets[0], axis=1)
+    return np.abs(tension) * np.sqrt(2 * away * jump)[up], np.minimum(EI[1:], EI[:-1]) * jump[up] ** 2
+
+
+def _unit(vectors, axis):
+    """Vectors over their lengths; zero stays zero."""
+    size = np.linalg.norm(vectors, axis=axis, keepdims=True)
+    return vectors / np.where(size > 0, size, 1.0)
+
+
+def reasons(used, asked, soft, solved, sections, left_out, scales):
+    """Sentences on the soft string: whether it is buckled, and what it leaves out.
+
+    Args:
+        used, asked: names of models; soft, solved: the `Solved` without and with buckling; sections: `Sections`;
+        left_out: `ModelError` of hook load and torque; scales: the largest tension and torque.
+    """
+    if asked != "auto":
+        yield f"model = '{asked}' as asked"
+    if np.isnan(sections.EI).any():
+        yield "bending stiffness is not known for all components: these are taken as not buckled"
+    if solved.helical.any():
+        change = float(solved.tension[-1, -1] - soft.tension[-1, -1])
+        length = solved.chain.length[solved.helical].sum()
+        yield (
+            f"helically buckled over {length:.4g} m: the wall force of the helix changes the hook load of the soft "
+            f"string by {change:+.4g} N"
+        )
+    elif asked == "auto":
+        yield "no helical buckling"
+    for what, unit, parts, share in _shares(left_out, scales):
+        if np.isinf(share):
+            yield f"{what} of the {used} string: it may lock up: with a helix from the load of a snake on, it does"
+        elif share > 1e-9:
+            of = [f"{name} {value:.3g}" for name, value in parts._asdict().items() if value > 1e-3 * parts.total]
+            yield (
+                f"{what} of the {used} string: the rod in contact may differ by {parts.total:.3g} {unit}, {share:.1e} "
+                f"({', '.join(of)})"
+            )
+
+
+def beyond_pipes(solved, EA):
+    """A sentence where tension strains the string beyond what any pipe carries; EA: (n,) N, NaN where not known."""
+    strain = float(np.nan_to_num(np.abs(solved.tension) / EA[:, None]).max())
+    if strain > _BREAKS:
+        yield f"BEYOND WHAT ANY PIPE CARRIES: the tension strains it by {100 * strain:.3g} %"
+
+
+def too_much(left_out, scales, tol):
+    """Names of the quantities for whose tolerance the soft string leaves out too much."""
+    return [what for what, _, _, share in _shares(left_out, scales) if share > tol]
+
+
+def _shares(left_out, scales):
+    for what, unit, parts, scale in zip(("hook load", "surface torque"), ("N", "N m"), left_out, scales, strict=True):
+        yield what, unit, parts, parts.total / scale if scale > 0 else 0.0

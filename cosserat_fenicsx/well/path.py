@@ -1,0 +1,264 @@
+"""The axis of a hole from a survey: circular arcs of minimum curvature, and all that is asked of them, in closed form.
+
+Frame: (north, east, down), m, its origin at the first station. md is the measured depth, the arc length along the axis
+from there. Between two stations the axis is the circular arc that is tangent to both directions (straight where they
+are equal): S. J. Sawaryn & J. L. Thorogood, SPE Drilling & Completion 20 (2005) 24, doi:10.2118/84246-PA. An arc is
+described by its first tangent t and curvature vector k alone, so that nothing is divided by the curvature:
+
+    r(x) = r + t x sinc(kx) + k x^2/2 sinc(kx/2)^2,    t(x) = t cos(kx) + k x sinc(kx),    sinc(a) = sin(a)/a
+"""
+
+from collections import namedtuple
+from dataclasses import dataclass
+
+import numpy as np
+
+from cosserat_fenicsx.annotations import File, Numbers
+from cosserat_fenicsx.checks import finite_array, refuse
+from cosserat_fenicsx.well.survey import checked_survey, read_columns
+
+#: The arcs between stations, arrays over these: md of the start (m), there position (m, 3), tangent (3) and curvature
+#: vector (1/m, 3), and length (m).
+Sections = namedtuple("Sections", "start position tangent curvature length")
+
+#: Measured depth (n,), position (n, 3), tangent (n, 3) and curvature vector (n, 3, 1/m) of points of the axis.
+Nearest = namedtuple("Nearest", "md position tangent curvature")
+
+# Pairs of a point and an arc that are compared at a time, in a search along the whole axis.
+_PAIRS = 1 << 20
+
+
+@dataclass(frozen=True, eq=False)
+class WellPath:
+    """The axis of a hole, of circular arcs and straight lines. Made by `from_survey` or `from_csv`.
+
+    Attributes:
+        md: (n,) measured depth of the stations, m.
+        inclination, azimuth: (n,) of the stations, rad.
+        sections: `Sections`, n - 1 arcs.
+        length: md of the last station, m.
+        dogleg: (n - 1,) angle between the tangents at both ends of each section, rad.
+        dogleg_severity: (n - 1,) dogleg per length, rad/m: over `units.deg_per_30m` in degrees per 30 m.
+    """
+
+    md: np.ndarray
+    inclination: np.ndarray
+    azimuth: np.ndarray
+
+    def __post_init__(self):
+        length, tangent = np.diff(self.md), _tangents(self.inclination, self.azimuth)
+        dogleg, curvature = _curvatures(self.inclination, self.azimuth, length)
+        sections = Sections(self.md[:-1], np.zeros_like(curvature), tangent[:-1], curvature, length)
+        _, along, aside = _arc(sections, np.arange(len(length)), length)
+        steps = along[:, None] * tangent[:-1] + aside[:, None] * curvature
+        sections.position[1:] = np.cumsum(steps[:-1], axis=0)
+        for name, value in (("sections", sections), ("length", float(self.md[-1])), ("dogleg", dogleg)):
+            object.__setattr__(self, name, value)
+        object.__setattr__(self, "dogleg_severity", dogleg / length)
+        for array in (self.md, self.inclination, self.azimuth, dogleg, self.dogleg_severity, *sections):
+            array.flags.writeable = False
+
+    @classmethod
+    def from_survey(cls, md: Numbers, inc: Numbers, azi: Numbers, degrees: bool | None = None) -> "WellPath":
+        """The axis through the stations of a survey.
+
+        Args:
+            md: measured depths, m, ascending from 0 (where the survey begins further down, add the station
+                (0, 0, azimuth of the next) of a vertical start).
+            inc: inclinations from the vertical, 0 to 180 degrees; above 90 the hole climbs.
+            azi: azimuths from north towards east, of any turn from -360 to 360 degrees; that of a vertical station has
+                no meaning.
+            degrees: False where the angles are in radians. None: degrees, refused where they look like radians; True:
+                degrees, whatever they look like.
+
+        Raises:
+            SceneError: fewer than two stations, numbers that are missing or out of their range, depths that do not
+                ascend from 0, or two stations of opposite directions, between which no arc is defined.
+        """
+        return cls(*checked_survey(md, inc, azi, degrees))
+
+    @classmethod
+    def from_csv(
+        cls,
+        file: File,
+        md: str = "md",
+        inc: str = "inc",
+        azi: str = "azi",
+        *,
+        degrees: bool | None = None,
+        length_unit: float | None = None,
+    ) -> "WellPath":
+        """The axis from a .csv file with one row of names, separated by commas, semicolons or tabs.
+
+        Args:
+            file: its path.
+            md, inc, azi: names of the columns, upper or lower case alike; what follows in brackets in the file, such as
+                "MD (m)", need not be said.
+            degrees: see `from_survey`.
+            length_unit: of the measured depths, m, such as `units.foot`; None for metres, refused where the file's
+                heading says feet.
+
+        Raises:
+            SceneError: the file cannot be read, a column is missing or not of numbers; see also `from_survey`.
+        """
+        return cls.from_survey(*read_columns(file, md, inc, azi, length_unit), degrees)
+
+    def position(self, md: float | Numbers) -> np.ndarray:
+        """(..., 3) north, east, down at measured depths, m."""
+        i, x = self._place(md)
+        _, along, aside = _arc(self.sections, i, x)
+        s = self.sections
+        return s.position[i] + along[..., None] * s.tangent[i] + aside[..., None] * s.curvature[i]
+
+    def tangent(self, md: float | Numbers) -> np.ndarray:
+        """(..., 3) unit vectors down the hole at measured depths (m)."""
+        i, x = self._place(md)
+        cos, along, _ = _arc(self.sections, i, x)
+        return cos[..., None] * self.sections.tangent[i] + along[..., None] * self.sections.curvature[i]
+
+    def curvature(self, md: float | Numbers) -> np.ndarray:
+        """(..., 3) derivative of the tangent by md, 1/m; at a station that of the section below it."""
+        i, x = self._place(md)
+        cos, along, _ = _arc(self.sections, i, x)
+        k, t = self.sections.curvature[i], self.sections.tangent[i]
+        return cos[..., None] * k - (along * (k * k).sum(axis=-1))[..., None] * t
+
+    def inclination_at(self, md: float | Numbers) -> np.ndarray:
+        """(...) inclination at measured depths (m), rad."""
+        t = self.tangent(md)
+        return np.arctan2(np.hypot(t[..., 0], t[..., 1]), t[..., 2])
+
+    def azimuth_at(self, md: float | Numbers) -> np.ndarray:
+        """(...) azimuth at measured depths (m), rad from 0 to 2 pi; without meaning where the hole is vertical."""
+        t = self.tangent(md)
+        return np.arctan2(t[..., 1], t[..., 0]) % (2 * np.pi)
+
+    def closest(self, points: Numbers, near: float | Numbers | None = None) -> np.ndarray:
+        """(...) measured depths of the points of the axis that are closest to points.
+
+        In closed form on each arc. A point beyond an end of the axis has the measured depth of that end.
+
+        Args:
+            points: (..., 3) m.
+            near: (...) measured depths (m) to start from, such as the last answer: the search then walks from section
+                to section as long as the distance falls, and finds the closest point on that part of the axis.
+                None: on the whole axis.
+
+        Raises:
+            SceneError: points that are not three finite numbers each.
+        """
+        points = finite_array("WellPath.closest", "points", points, "(..., 3) finite numbers (m)")
+        if points.shape[-1:] != (3,):
+            refuse("WellPath.closest", "points", points, "(..., 3) finite numbers (m)")
+        rows = points.reshape(-1, 3)
+        if near is None:
+            found = np.empty(len(rows))
+            many = max(1, _PAIRS // len(self.sections.length))
+            for a in range(0, len(rows), many):
+                found[a : a + many] = self._on_the_whole(rows[a : a + many])
+        else:
+            found = self._walked(rows, np.broadcast_to(np.asarray(near, dtype=float), points.shape[:-1]).ravel())
+        return found.reshape(points.shape[:-1])
+
+    def nearest(self, points: Numbers | None, near: Numbers) -> "Nearest":
+        """The points of the axis that are closest to points, with what a projection on the axis needs there.
+
+        Args:
+            points: (n, 3) m; None for the points of the axis at `near`.
+            near: (n,) measured depths (m) to start from, see `closest`; of any value.
+
+        Returns:
+            `Nearest`. Beyond its ends the axis goes on straight: a point there has the measured depth and the position
+            of the end, and no curvature.
+        """
+        s, at = self.sections, np.clip(near, 0.0, self.length)
+        if points is None:
+            beyond, md = near - at, at
+        else:
+            md, beyond = np.nan_to_num(self._walked(points, at)), None  # a solver that diverges sees it by its points
+        i, x = self._place(md)
+        cos, along, aside = _arc(s, i, x)
+        k, t0 = s.curvature[i], s.tangent[i]
+        position = s.position[i] + along[:, None] * t0 + aside[:, None] * k
+        tangent = cos[:, None] * t0 + along[:, None] * k
+        curvature = cos[:, None] * k - (along * (k * k).sum(axis=-1))[:, None] * t0
+        if beyond is not None:
+            position += beyond[:, None] * tangent
+        curvature[(md <= 0.0) | (md >= self.length)] = 0.0
+        return Nearest(md, position, tangent, curvature)
+
+    def _on_the_whole(self, points):
+        every = np.arange(len(self.sections.length))
+        x = np.clip(self._projected(points[:, None], every), 0.0, self.sections.length)
+        _, along, aside = _arc(self.sections, every, x)
+        s = self.sections
+        away = s.position + along[..., None] * s.tangent + aside[..., None] * s.curvature - points[:, None]
+        best = np.argmin((away * away).sum(axis=-1), axis=1)
+        return s.start[best] + x[np.arange(len(points)), best]
+
+    def _walked(self, points, near):
+        """Section by section in one direction, so that it ends; neighbours share the plane across their station."""
+        s = self.sections
+        i, _ = self._place(near)
+        x = self._projected(points, i)
+        way = np.where(x < 0, -1, np.where(x > s.length[i], 1, 0))
+        while True:
+            moving = np.flatnonzero(
+                (way < 0) & (x < 0) & (i > 0) | (way > 0) & (x > s.length[i]) & (i < len(s.start) - 1)
+            )
+            if not len(moving):
+                return s.start[i] + np.clip(x, 0.0, s.length[i])
+            i[moving] += way[moving]
+            x[moving] = self._projected(points[moving], i[moving])
+
+    def _projected(self, points, i):
+        """Arc length from the starts of sections i to the closest points on their circles, nearest to their middles."""
+        s = self.sections
+        away = points - s.position[i]
+        k = np.sqrt((s.curvature * s.curvature).sum(axis=-1))[i]
+        x = (away * s.tangent[i]).sum(axis=-1)
+        angle = np.arctan2(k * x, 1.0 - (away * s.curvature[i]).sum(axis=-1))
+        middle = k * s.length[i] / 2
+        angle = (angle - middle + np.pi) % (2 * np.pi) - np.pi + middle
+        return np.where(k > 0, angle / np.where(k > 0, k, 1.0), x)
+
+    def _place(self, md):
+        """Index of the section and arc length from its start, for measured depths."""
+        md = np.asarray(md, dtype=float)
+        slack = 1e-9 * self.length
+        if not ((md >= -slack) & (md <= self.length + slack)).all():
+            refuse("WellPath", "md", md, f"measured depths from 0 to {self.length:g} m")
+        i = np.clip(np.searchsorted(self.md, md, side="right") - 1, 0, len(self.md) - 2)
+        return i, md - self.md[i]
+
+    def __repr__(self):
+        return f"WellPath({len(self.md)} stations, {self.length:g} m)"
+
+
+def _tangents(inc, azi):
+    return np.stack([np.sin(inc) * np.cos(azi), np.sin(inc) * np.sin(azi), np.cos(inc)], axis=-1)
+
+
+def _curvatures(inc, azi, length):
+    """Doglegs (rad) and curvature vectors (1/m), of full relative accuracy for small angles.
+
+    By the differences of the angles: the second tangent along the directions of growing inclination and azimuth at the
+    first has the size sin(dogleg).
+    """
+    i, a, j = inc[:-1], azi[:-1], inc[1:]
+    half = np.sin(np.diff(azi) / 2)
+    up = np.sin(j - i) - 2 * np.cos(i) * np.sin(j) * half**2
+    across = np.sin(j) * np.sin(np.diff(azi))
+    sine, cosine = np.hypot(up, across), np.cos(j - i) - 2 * np.sin(i) * np.sin(j) * half**2
+    dogleg = np.arctan2(sine, cosine)
+    share = np.divide(dogleg, sine, out=np.ones_like(sine), where=sine > 0) / length
+    grows = np.stack([np.cos(i) * np.cos(a), np.cos(i) * np.sin(a), -np.sin(i)], axis=-1)
+    turns = np.stack([-np.sin(a), np.cos(a), np.zeros_like(a)], axis=-1)
+    return dogleg, (share * up)[:, None] * grows + (share * across)[:, None] * turns
+
+
+def _arc(sections, i, x):
+    """cos(kx), x sinc(kx), x^2/2 sinc(kx/2)^2 at x from the starts of sections i; sinc without pi."""
+    k = np.sqrt((sections.curvature * sections.curvature).sum(axis=-1))[i]
+    angle = k * x
+    return np.cos(angle), x * np.sinc(angle / np.pi), x**2 / 2 * np.sinc(angle / (2 * np.pi)) ** 2

@@ -1,0 +1,151 @@
+"""The answer of the exact rod in contact, in the words of torque and drag."""
+
+from dataclasses import dataclass, fields
+from functools import cached_property
+from typing import ClassVar
+
+import numpy as np
+
+from cosserat_fenicsx.well import criteria
+from cosserat_fenicsx.well.answer import TorqueAndDrag, scales_of, share
+from cosserat_fenicsx.well.contacts import name_of_side
+
+# Inclinations (rad) below this have no high side.
+_VERTICAL = 1e-9
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class RodInContact(TorqueAndDrag):
+    """What a string in its hole carries as an exact rod in contact; the places of the arrays are the rod's nodes.
+
+    `error` is relative to hook load and surface torque themselves, the latter only where the string turns. `solved` is
+    the `InHole`, whose `path` has all that the package tells of a rod. `md` is the measured depth of the
+    closest point of the hole's axis. Forces at points, such as those of stabilisers, are in `contacts`, which has their
+    resultants; in `side_force` they are narrow peaks, as wide as the wall's stiffness makes them.
+    """
+
+    words: ClassVar[str] = "exact rod in contact"
+    moment_words: ClassVar[str] = "of the rod"
+
+    @classmethod
+    def of(cls, flexible, solved, decided):
+        """From the answer of the soft string, the `InHole`, and sentences on what decided for it."""
+        given = {field.name: getattr(flexible, field.name) for field in fields(TorqueAndDrag)}
+        here = solved.hook_load, solved.surface_torque
+        there = {flexible.model: (flexible.hook_load, flexible.surface_torque)}
+        there |= {name: (flexible.hook_load - hook, flexible.surface_torque - torque)
+                  for name, (hook, torque) in flexible.differences.items()}  # fmt: skip
+        differences = {name: (here[0] - hook, here[1] - torque) for name, (hook, torque) in there.items()}
+        changed = {
+            "model": "rod",
+            "error": solved.error,
+            "model_error": 0.0,
+            "differences": differences,
+            "solved": solved,
+        }
+        return cls(**{**given, **changed, "why": (*decided, *_found(flexible, solved, differences))})
+
+    @property
+    def hook_load(self):
+        """Force along the hole on the held end, N, without block and sheaves."""
+        return self.solved.hook_load
+
+    @property
+    def surface_torque(self):
+        """N m."""
+        return self.solved.surface_torque
+
+    @cached_property
+    def _gravity(self):
+        z = np.interp([0.0, *(place.bottom for place in self.laid[::-1])], self.solved.s, self.position[:, 2])
+        weights = [self.pieces.weight[self.pieces.component == i][0] for i in range(len(self.laid))][::-1]
+        return float(np.diff(z) @ weights)
+
+    @cached_property
+    def _piece(self):
+        return np.minimum(np.searchsorted(self.pieces.bottom, self.solved.s), len(self.pieces.bottom) - 1)
+
+    @cached_property
+    def md(self):
+        """Measured depths, m."""
+        return np.maximum.accumulate(self.solved.md)  # rounding
+
+    @property
+    def tension(self):
+        """Effective tension, N."""
+        return self.solved.tension
+
+    @property
+    def torque(self):
+        """N m."""
+        return self.solved.torque
+
+    @property
+    def side_force(self):
+        """Force of the wall per length, N/m, across the hole and without friction."""
+        return self.solved.side_force
+
+    @property
+    def bending_moment(self):
+        """N m: of the rod itself."""
+        return self.solved.bending_moment
+
+    @property
+    def standoff(self):
+        """Distance from the wall over the clearance: 0 in contact, 1 on the axis."""
+        return self.solved.standoff
+
+    @property
+    def offset(self):
+        """(n, 3) from the hole's axis to the string, m."""
+        return self.solved.offset
+
+    @property
+    def position(self):
+        """(n, 3) north, east, down of the string, m."""
+        return self.solved.position
+
+    @cached_property
+    def contact_side(self):
+        """The side of the hole that the string touches, rad clockwise from its high side; NaN where it touches none."""
+        known = (self.side_force > 0) & (self.inclination > _VERTICAL)
+        return np.where(known, self.solved.side % (2 * np.pi), np.nan)
+
+    @cached_property
+    def contacts(self):
+        """(from, to, force, side), see `TorqueAndDrag`; a force at a point has from = to."""
+        depths = [np.interp([x.start, x.end], self.solved.s, self.md) for x in self.solved.contacts]
+        leans = [self.hole.path.inclination_at(ends.mean()) > _VERTICAL for ends in depths]
+        return [(float(a), float(b), x.force, name_of_side(x.side if leaning else np.nan))
+                for (a, b), x, leaning in zip(depths, self.solved.contacts, leans, strict=True)]  # fmt: skip
+
+    @cached_property
+    def helical(self):
+        """True at `md` where the criteria tell a helix: the rod's wall force is that of whatever shape it has."""
+        return self.buckling == criteria.HELIX
+
+    def _integral(self, values):
+        return float(values @ self.solved.node_length)
+
+
+def _found(flexible, solved, differences):
+    """Sentences on the rod, and how it differs from the soft string."""
+    yield (
+        f"the exact rod in contact, {solved.path.elements[0]} elements, {solved.steps} Newton steps: hook load to "
+        f"{solved.errors['hook_load']:.2g} N, surface torque to {solved.errors['surface_torque']:.2g} N m"
+    )
+    scales = scales_of(flexible.solved, flexible.pieces)
+    for name, apart in differences.items():
+        shares = ", ".join(f"{value:+.4g} {unit}, {share(abs(value), scale):.1e}, in the {what}"
+                           for what, unit, value, scale in
+                           zip(("hook load", "surface torque"), ("N", "N m"), apart, scales, strict=True)
+                           if share(abs(value), scale) > 1e-9)  # fmt: skip
+        yield f"it differs from the {name} string by {shares or 'nothing'}"
+        most = max(share(abs(value), scale) for value, scale in zip(apart, scales, strict=True))
+        if name == flexible.model and most > flexible.model_error + flexible.error + solved.error:
+            yield f"this is MORE than was estimated for the {name} string, {flexible.model_error:.1e}: look at both"
+    if solved.negative_modes > 0:
+        yield (
+            f"without friction it would buckle, or buckle otherwise: {solved.negative_modes} negative eigenvalues of "
+            "the second variation"
+        )

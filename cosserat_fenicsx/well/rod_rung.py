@@ -1,0 +1,95 @@
+"""The exact rod in contact as the third rung of the ladder: a string, its hole and an operation, handed to
+`solve_in_hole`.
+
+A stabiliser touches with its blades in the middle of its length, a bit at the lower end of the string: both are rings.
+Their bodies, and all other components, touch with their contact radius along their whole length.
+"""
+
+from cosserat_fenicsx.checks import refuse
+from cosserat_fenicsx.errors import SceneError
+from cosserat_fenicsx.well.components import Bit, Stabiliser, weight_in_mud
+from cosserat_fenicsx.well.rod_answer import RodInContact
+
+
+def rod_in_contact(flexible, decided, progress=None, exact=True):
+    """The `RodInContact` of the same string in the same hole as a soft one.
+
+    Args:
+        flexible: the `TorqueAndDrag` by the soft string; decided: sentences on why it is not enough; progress: see
+            `solve`. exact: False for an answer that may be less accurate than asked, and says so.
+
+    Raises:
+        SceneError: a component without stiffness, or as wide as the hole; a weight in mud that is not positive;
+            Johancsik's convention of a torque.
+        NotConverged: no equilibrium was found, or not as accurately as asked.
+    """
+    # imported here, since it needs dolfinx, which the soft string does not
+    from cosserat_fenicsx.well.rod_in_hole import NotAccurate, solve_in_hole
+
+    if flexible.torque_convention != "coulomb" and flexible.pieces.around.any():
+        refuse("torque_and_drag", "torque_convention", flexible.torque_convention,
+               "'coulomb', the law that the rod in contact follows")  # fmt: skip
+    laid = flexible.laid[::-1]  # from the top down
+    for place in laid:
+        _check(place.component, flexible.mud)
+    hole, operation = flexible.hole, flexible.operation
+    try:
+        solved = solve_in_hole(
+            hole.path,
+            [place.bottom - place.top for place in laid],
+            [place.component.stiffness for place in laid],
+            [weight_in_mud(place.component, flexible.mud) for place in laid],
+            [_body_radius(place.component) for place in laid],
+            radius=_along(hole, flexible.depth, lambda section: section.diameter / 2),
+            friction=_along(hole, flexible.depth, lambda section: section.friction),
+            slip=[operation.direction(place.component.contact_radius) for place in laid],
+            bottom_tension=-operation.weight,
+            bottom_torque=operation.torque,
+            rings=[_ring(place, hole) for place in laid if _is_ring(place.component)],
+            wall_stiffness=hole.wall_stiffness,
+            tol=flexible.tol,
+            progress=progress,
+        )
+    except NotAccurate as short:
+        if exact:
+            raise
+        solved, decided = short.answer, (*decided, f"NOT ENOUGH for tol = {flexible.tol:g}: {short}")
+    return RodInContact.of(flexible, solved, decided)
+
+
+def _check(component, mud):
+    if component.stiffness is None:
+        raise SceneError(
+            f"{component.name}: stiffness = None: expected a Stiffness for model = 'rod', the rod in contact"
+        )
+    weight = weight_in_mud(component, mud)
+    if not weight > 0:
+        raise SceneError(
+            f"{component.name}: it weighs {weight:g} N/m in mud: expected a positive weight for model = 'rod'"
+        )
+
+
+def _along(hole, depth, value):
+    """[(md_end, value)] of the sections that the string reaches."""
+    above, found = 0.0, []
+    for section in hole.sections:
+        if above < depth:
+            found.append((section.to, value(section)))
+        above = section.to
+    return found
+
+
+def _is_ring(component):
+    return isinstance(component, Bit | Stabiliser)
+
+
+def _body_radius(component):
+    """m; of what touches along its whole length."""
+    return component.outer_diameter / 2 if _is_ring(component) else component.contact_radius
+
+
+def _ring(place, hole):
+    """(s, clearance, radius), see `solve_in_hole`."""
+    s = place.bottom if isinstance(place.component, Bit) else (place.top + place.bottom) / 2
+    radius = place.component.contact_radius
+    return s, max(0.0, float(hole.at(s, "diameter")) / 2 - radius), radius

@@ -1,0 +1,217 @@
+"""Scene files of strings in wells, in TOML: keys and types are the argument and class names of the package.
+
+title = "..."
+
+[well]
+survey = "survey.csv"            # beside this file; or stations = [[0, 0, 0], [1100, 40, 30]], rows of md, inc, azi
+columns = ["md", "inc", "azi"]   # optional: names of the columns of the file
+degrees = true                   # optional
+length_unit = "m"                # optional: of the measured depths of survey or stations, such as "ft"
+wall_stiffness = 1e9             # optional
+sections = [
+    { to = 2500.0, diameter = 0.2224, friction = 0.20, name = "casing" },
+    { to = 3438.0, diameter = "8.5 in", friction = 0.30, name = "open hole" },
+]
+
+[string]
+order = "bit up"                 # optional, or "top down"
+components = [
+    { type = "Bit", diameter = "8.5 in" },
+    { type = "Collar", size = "NC46-65", length = 90.0 },
+    { type = "DrillPipe", size = "5 in 19.50 lb/ft" },
+]
+
+[mud]                            # not where all components have their weight in mud
+density = "10.2 ppg"
+
+[[operations]]
+type = "RotaryDrilling"
+weight = "18 klbf"
+torque = 5000.0
+
+[torque_and_drag]                # optional: depth, model, tol, torque_convention
+depth = 3438.0
+
+[depth_sweep]                    # optional: depths, or from, to and count; friction; model, tol other than above
+from = 300.0
+to = 3438.0
+count = 20
+friction = [0.1, 0.2, 0.3]
+
+Numbers are in SI, or text with a unit (`field_units`).
+"""
+
+import dataclasses
+import inspect
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from cosserat_fenicsx.annotations import File
+from cosserat_fenicsx.errors import SceneError, nearest
+from cosserat_fenicsx.scene.materials import Material
+from cosserat_fenicsx.scene.sections import Stiffness
+from cosserat_fenicsx.scene.toml_tables import entries, known_keys, table, tables_of
+from cosserat_fenicsx.well.answer import TorqueAndDrag
+from cosserat_fenicsx.well.components import COMPONENTS
+from cosserat_fenicsx.well.depth_sweep import DepthSweep, depth_sweep
+from cosserat_fenicsx.well.field_units import DIMENSIONS, in_si
+from cosserat_fenicsx.well.hole import Borehole, HoleSection
+from cosserat_fenicsx.well.mud import Mud
+from cosserat_fenicsx.well.operations import OPERATIONS, Operation
+from cosserat_fenicsx.well.path import WellPath
+from cosserat_fenicsx.well.string import DrillString
+from cosserat_fenicsx.well.torque_and_drag import torque_and_drag
+
+#: Dimensions of arguments that may be written with a unit.
+_LENGTHS = ("to", "diameter", "length", "contact_radius", "outer_diameter", "inner_diameter", "tool_joint",
+            "body_diameter", "depth")  # fmt: skip
+_DIMENSIONS = {
+    **dict.fromkeys(_LENGTHS, "length"), "torque": "moment", "density": "density", "inside": "density",
+    "mass": "mass per length", "speed": "speed", "rpm": "rotation", "wall_stiffness": "pressure", "E": "pressure",
+}  # fmt: skip
+_SETTINGS = ("depth", "model", "tol", "torque_convention")
+_OF_SWEEPS = ("friction", "model", "tol")
+
+
+@dataclass(frozen=True)
+class WellScene:
+    """A string in its hole and what is done with it, from `read_well`.
+
+    Attributes:
+        title, hole, string, mud, operations: of the file.
+        settings: arguments of `torque_and_drag`.
+        sweep: arguments of `depth_sweep` beside these, empty where the file asks for none.
+    """
+
+    title: str
+    hole: Borehole
+    string: DrillString
+    mud: Mud | None
+    operations: tuple[Operation, ...]
+    settings: dict[str, Any] = field(default_factory=dict)
+    sweep: dict[str, Any] = field(default_factory=dict)
+
+    def answer(self, operation: Operation) -> TorqueAndDrag:
+        """The answer of `torque_and_drag` for an operation."""
+        return torque_and_drag(self.hole, self.string, operation, mud=self.mud, **self.settings)
+
+    def answers(self) -> list[TorqueAndDrag]:
+        """The answers of `torque_and_drag`, one an operation."""
+        return [self.answer(operation) for operation in self.operations]
+
+    def depth_sweep(self, file: File | None = None) -> DepthSweep | None:
+        """The sweep over depths that the file asks for, else None; `file`: see `depth_sweep`."""
+        if not self.sweep:
+            return None
+        settings = {name: value for name, value in self.settings.items() if name != "depth"}
+        return depth_sweep(
+            self.hole, self.string, self.operations, mud=self.mud, file=file, **{**settings, **self.sweep}
+        )
+
+
+def read_well(file: File) -> WellScene:
+    """A string in its hole from a scene file with a [well] table.
+
+    Raises:
+        SceneError: the file is missing or not TOML, a key, a type or a unit is unknown, or a value is refused.
+    """
+    file = Path(file)
+    tables = tables_of(file)
+    try:
+        return _scene(tables, file.parent)
+    except SceneError as problem:
+        raise SceneError(f"{file}: {problem}") from None
+
+
+def _scene(tables, folder):
+    known = ("title", "well", "string", "mud", "operations", "torque_and_drag", "depth_sweep")
+    known_keys("the file (of a well)", tables, known)
+    for name in ("well", "string", "operations"):
+        if name not in tables:
+            raise SceneError(f"[{name}] is missing: expected [well], [string] and [[operations]]")
+    hole = _hole(table("well", tables["well"]), folder)
+    string = dict(table("string", tables["string"]))
+    known_keys("[string]", string, ("components", "order"))
+    parts = [_made(f"string.components[{i}]", entry, COMPONENTS) for i, entry in entries("components", string)]
+    operations = tuple(_made(f"operations[{i}]", entry, OPERATIONS) for i, entry in entries("operations", tables))
+    mud = _made("mud", tables["mud"], (Mud,)) if "mud" in tables else None
+    settings = dict(table("torque_and_drag", tables.get("torque_and_drag", {})))
+    known_keys("[torque_and_drag]", settings, _SETTINGS)
+    if "depth" in settings:
+        settings["depth"] = in_si("torque_and_drag.depth", settings["depth"], "length")
+    whole = DrillString(parts, **{name: string[name] for name in ("order",) if name in string})
+    sweep = _sweep(table("depth_sweep", tables["depth_sweep"])) if "depth_sweep" in tables else {}
+    for depth in (*np.atleast_1d(settings.get("depth", hole.length)), *sweep.get("depths", ())):
+        if not 0 < depth <= hole.length * (1 + 1e-12):
+            raise SceneError(f"depth = {depth:.10g} m: expected a measured depth in the hole, to {hole.length:.10g} m")
+    return WellScene(str(tables.get("title", "")), hole, whole, mud, operations, settings, sweep)
+
+
+def _hole(well, folder):
+    known_keys(
+        "[well]", well, ("survey", "stations", "columns", "degrees", "length_unit", "wall_stiffness", "sections")
+    )
+    if ("survey" in well) == ("stations" in well):
+        raise SceneError("[well]: expected either survey, the name of a .csv file, or stations, rows of md, inc, azi")
+    unit, known = well.get("length_unit"), DIMENSIONS["length"][1]
+    if unit is not None and unit not in known:
+        raise SceneError(f"well.length_unit = {unit!r}: {nearest(unit, known)}")
+    degrees = well.get("degrees")
+    if "survey" in well:
+        columns = well.get("columns", ["md", "inc", "azi"])
+        if not isinstance(columns, list) or len(columns) != 3 or not isinstance(well["survey"], str):
+            raise SceneError("[well]: expected survey, the name of a .csv file, and columns, three names of columns")
+        settings = {"degrees": degrees, "length_unit": None if unit is None else known[unit]}
+        path = WellPath.from_csv(folder / well["survey"], *columns, **settings)
+    else:
+        try:
+            md, inc, azi = np.array(well["stations"], dtype=float).T
+        except (ValueError, TypeError):
+            raise SceneError("well.stations: expected rows of three numbers: md, inclination, azimuth") from None
+        path = WellPath.from_survey(md * known[unit or "m"], inc, azi, degrees)
+    sections = [_made(f"well.sections[{i}]", entry, (HoleSection,)) for i, entry in entries("sections", well)]
+    stiff = {name: in_si(f"well.{name}", well[name], "pressure") for name in ("wall_stiffness",) if name in well}
+    return Borehole(path, sections, **stiff)
+
+
+def _sweep(given):
+    known_keys("[depth_sweep]", given, ("depths", "from", "to", "count", *_OF_SWEEPS))
+    if "depths" in given:
+        depths = [in_si(f"depth_sweep.depths[{i}]", x, "length") for i, x in enumerate(given["depths"])]
+    else:
+        for name in ("from", "to", "count"):
+            if name not in given:
+                raise SceneError(f"[depth_sweep]: '{name}' is missing: expected depths, or from, to and count")
+        count = given["count"]
+        if not isinstance(count, int) or isinstance(count, bool) or count < 1:
+            raise SceneError(f"depth_sweep.count = {count!r}: expected how many depths")
+        depths = np.linspace(*(in_si(f"depth_sweep.{name}", given[name], "length") for name in ("from", "to")), count)
+    return {"depths": depths, **{name: given[name] for name in _OF_SWEEPS if name in given}}
+
+
+def _made(where, entry, classes):
+    """An object from a table whose keys are the arguments of its class."""
+    entry, names = dict(table(where, entry)), {cls.__name__: cls for cls in classes}
+    kind = classes[0].__name__ if len(classes) == 1 else entry.pop("type", None)
+    if kind not in names:
+        raise SceneError(f"{where}.type = {kind!r}: {nearest(kind, names)}")
+    cls = names[kind]
+    arguments = inspect.signature(cls).parameters
+    known_keys(f"{where} ({kind})", entry, arguments)
+    for name, argument in arguments.items():
+        if name not in entry and argument.default is inspect.Parameter.empty:
+            raise SceneError(f"{where} ({kind}): '{name}' is missing")
+    for name, value in entry.items():
+        if name in ("material", "stiffness"):
+            entry[name] = _made(f"{where}.{name}", value, (Material if name == "material" else Stiffness,))
+        elif name == "weight":  # on bit, or in mud
+            entry[name] = in_si(f"{where}.{name}", value, "force" if issubclass(cls, Operation) else "force per length")
+        elif name in _DIMENSIONS and name in {item.name for item in dataclasses.fields(cls)}:
+            entry[name] = in_si(f"{where}.{name}", value, _DIMENSIONS[name])
+    try:
+        return cls(**entry)
+    except SceneError as problem:
+        raise SceneError(f"{where}: {problem}") from None

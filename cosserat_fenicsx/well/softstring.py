@@ -1,0 +1,251 @@
+"""The soft string: a perfectly flexible string on the axis of the hole, with friction in a known direction of slip.
+
+With the distance u up the hole, the effective tension T, the weight in mud w, the axis' tangent t, normal n and
+curvature k, and e the unit vector downwards:
+
+    q = T k n + w (e - (e.t) t),    N = |q| / sqrt(1 + (e_s mu)^2)  or  |q|,
+    dT/du = w e.t + c mu N,    dM/du = e_s mu N R,                  (c, e_s) the direction of slip
+
+The first N is Coulomb's law: friction across the hole holds a part of q, N^2 + (e_s mu N)^2 = |q|^2; the pipe climbs
+the wall. The second is the field's convention: C. A. Johancsik, D. B. Friesen & R. Dawson, J. Petr. Technol. 36 (1984)
+987, doi:10.2118/11380-PA.
+
+Method: T = T_bottom + w (height) + P is exact but for the friction P, P' = c mu N(P). On pieces without jumps, all of
+them at once, Newton's method on the function P: the linear equation of each iteration is solved by its integrating
+factor, the integrals by Gauss's points. Pieces are cut where N has a kink, which is where q vanishes and turns round,
+and halved, until the friction on pieces and on their halves agrees to the tolerance.
+"""
+
+from collections import namedtuple
+
+import numpy as np
+from numpy.polynomial.legendre import legval, legvander
+from scipy.optimize import brentq
+
+from cosserat_fenicsx.errors import NotConverged
+from cosserat_fenicsx.quadrature import gauss
+
+_POINTS = 8  # Gauss points a piece
+_ITERATIONS, _ROUNDS = 60, 60
+_SHORTEST = 1e-9  # m, of pieces that are still cut
+_EPS = np.finfo(float).eps
+
+#: A string as arrays over pieces, from its lower end up. length (m); weight (N/m); curvature (1/m); t, n, b: downward
+#: components of tangent, normal, binormal at the lower end of the piece; drag: c mu over the root of Coulomb's law;
+#: turn: e_s mu R over the same root (m); climb: the root.
+Chain = namedtuple("Chain", "length weight curvature t n b drag turn climb origin")
+#: What is found on a chain. at: (m,) places on a piece, as shares of its length from its lower end; tension (N), torque
+#: (N m), side (wall force per length, N/m): (n, m) there; side_force: of each piece (N); error, torque_error: estimates
+#: for the uppermost values (N, N m); helical: (n,) True where the string is buckled into a helix.
+Solved = namedtuple("Solved", "chain at tension torque side side_force error torque_error helical")
+
+
+# On [0, 1]: points, weights, matrix of the integrals from 0 to the points, and that from the values at the points of an
+# interval to those at the points of its halves.
+_RULE = gauss(_POINTS)
+_X, _W = (1 + _RULE.points) / 2, _RULE.weights / 2
+_Q = legvander(_RULE.points, _POINTS) @ _RULE.integral / 2
+AT = np.concatenate([[0.0], _X, [1.0]])
+#: The integrals over a piece up to the places AT, from values at them.
+UP_TO = np.concatenate([np.zeros((1, _POINTS)), _Q, _W[None]])
+UP_TO = np.concatenate([np.zeros((_POINTS + 2, 1)), UP_TO, np.zeros((_POINTS + 2, 1))], axis=1)
+_HALVES = legvander(np.concatenate([_X - 1, _X]), _POINTS - 1) @ _RULE.series
+
+
+def chain_of(pieces, coulomb=True):
+    """The `Chain` of `Pieces`."""
+    up = slice(None, None, -1)
+    climb = np.sqrt(1 + (pieces.around * pieces.friction) ** 2) if coulomb else np.ones_like(pieces.friction)
+    found = Chain(
+        pieces.bottom - pieces.top, pieces.weight, pieces.curvature, pieces.t, pieces.n, pieces.b,
+        pieces.axial * pieces.friction / climb, pieces.around * pieces.friction * pieces.radius / climb, climb,
+        np.arange(len(pieces.top)),
+    )  # fmt: skip
+    return Chain(*(np.ascontiguousarray(array[up]) for array in found))
+
+
+def soft_string(chain, tension, torque, tol):
+    """Tension and torque along a `Chain`.
+
+    Args:
+        tension, torque: at the lower end, N and N m.
+        tol: of the uppermost tension and torque, over their largest values.
+
+    Returns:
+        a `Solved`, on the halves of the last pieces.
+
+    Raises:
+        NotConverged: the tolerance was not reached.
+    """
+    friction = None
+    for _ in range(_ROUNDS):
+        coarse = _Friction(chain, tension)
+        coarse.solve(friction)
+        halves = _cut(chain, np.full((len(chain.length), 1), 0.5))
+        fine = _Friction(halves, tension)
+        fine.solve(coarse.on_halves())
+        defects = np.abs(coarse.forces - fine.forces.reshape(-1, 2).sum(axis=1))
+        defects = 2 * (defects + (fine.unseen() + fine.unresolved()).reshape(-1, 2).sum(axis=1))
+        scale = np.abs(fine.tension).max() + np.abs(fine.heights).sum() * 1e-3
+        # what comes up from below is changed by the friction above, at most by this factor
+        grown = np.exp(np.cumsum((np.abs(chain.drag) * chain.curvature * chain.length)[::-1])[::-1])
+        pulls, turns = np.abs(chain.drag) * defects * grown, chain.turn * defects
+        moments = torque + np.concatenate([[0.0], np.cumsum(halves.turn * fine.forces)])
+        largest = np.abs(moments).max()
+        if pulls.sum() <= tol * scale and turns.sum() <= tol * largest:
+            rounding = _EPS * len(fine.forces)
+            errors = pulls.sum() + rounding * scale, turns.sum() + rounding * largest
+            return fine.solved(torque, *errors)
+        share = np.maximum(pulls / scale, turns / max(largest, _EPS * scale))
+        split = (share > tol / (2 * len(share))) & (chain.length > _SHORTEST)
+        if not split.any():
+            break
+        chain = _cut(chain, coarse.places(split))
+        friction = None
+    raise NotConverged("torque_and_drag: the soft string did not reach its tolerance: expected a larger tol")
+
+
+class _Friction:
+    """The friction P on the pieces of a chain."""
+
+    def __init__(self, chain, tension):
+        self.chain = chain
+        length, k = chain.length[:, None], chain.curvature[:, None]
+        u = length * AT
+        cos, sin = np.cos(k * u), np.sin(k * u)
+        self._across = chain.weight[:, None] * (chain.n[:, None] * cos + chain.t[:, None] * sin)
+        heights = chain.weight[:, None] * (
+            chain.t[:, None] * u * np.sinc(k * u / np.pi)
+            - chain.n[:, None] * k * u**2 / 2 * np.sinc(k * u / 2 / np.pi) ** 2
+        )
+        self.heights = heights[:, -1]
+        below = np.concatenate([[tension], tension + np.cumsum(self.heights)])
+        self._below, self._pull = below, below[:-1, None] + heights
+        self._b2 = (chain.weight * chain.b)[:, None] ** 2
+        self._k, self._drag, self._length = k, chain.drag[:, None], chain.length
+
+    def solve(self, start=None):
+        """Newton's method; `start`: P at the points."""
+        across, pull, b2 = self._across[:, 1:-1], self._pull[:, 1:-1], self._b2
+        k, drag, length = self._k, self._drag, self._length
+        P = np.zeros_like(pull) if start is None else start
+        scale, before = np.abs(self._below).max() + np.abs(self.heights).sum(), np.inf
+        self.starts = np.zeros(len(length) + 1)
+        if drag.any():
+            for _ in range(_ITERATIONS):
+                V = k * (pull + P) + across
+                N = np.sqrt(V * V + b2)
+                slope = drag * k * np.divide(V, N, out=np.zeros_like(V), where=N > 0)
+                A, A_end = (slope @ _Q.T) * length[:, None], (slope @ _W) * length
+                decay = (drag * N - slope * P) * np.exp(-A)
+                gain = np.exp(A_end)
+                self._chain(gain, gain * (decay @ _W) * length)
+                new = np.exp(A) * (self.starts[:-1, None] + (decay @ _Q.T) * length[:, None])
+                change = np.abs(new - P).max()
+                P = new
+                scale = max(scale, np.abs(self.starts).max())
+                if change <= 4 * _EPS * scale or (change <= 1e-10 * scale and change >= before / 4):
+                    break
+                before = change
+            else:
+                raise NotConverged("torque_and_drag: the friction of the soft string did not converge")
+        self._P = P
+        self.points = k * (pull + P) + across
+        self.forces = (np.sqrt(self.points**2 + b2) @ _W) * length
+        self._chain(np.ones_like(length), self._drag[:, 0] * self.forces)
+        self.tension = self._below + self.starts
+
+    def _chain(self, gain, added):
+        """P at the ends of pieces: each has gain times the P before plus what is added."""
+        now, starts = 0.0, [0.0]
+        for a, b in zip(gain.tolist(), added.tolist(), strict=True):
+            now = a * now + b
+            starts.append(now)
+        self.starts = np.array(starts)
+
+    def solved(self, torque, error, torque_error):
+        """The `Solved` of this chain; `torque` at the lower end."""
+        chain, climb = self.chain, self.chain.climb[:, None]
+        friction = np.concatenate([self.starts[:-1, None], self._P, self.starts[1:, None]], axis=1)
+        tension = self._pull + friction
+        load = np.sqrt((self._k * tension + self._across) ** 2 + self._b2)
+        turned = chain.turn[:, None] * chain.length[:, None] * (load @ UP_TO.T)
+        below = torque + np.concatenate([[0.0], np.cumsum(turned[:-1, -1])])
+        return Solved(chain, AT, tension, below[:, None] + turned, load / climb, self.forces / chain.climb,
+                      error, torque_error, np.zeros(len(below), dtype=bool))  # fmt: skip
+
+    def unresolved(self):
+        """Errors of forces (N) by the decay of Legendre's coefficients of the load: Gauss's rule has the square of what
+        is cut off."""
+        load = np.sqrt(self.points**2 + self._b2)
+        cut_off = (load @ _RULE.series[-2:].T) ** 2
+        return cut_off.sum(axis=1) * self._length / np.maximum(load.max(axis=1), np.finfo(float).tiny)
+
+    def unseen(self):
+        """Errors of forces (N) by sharp turns of the load between two points, which comparisons may miss."""
+        (below, _), (above, _) = self._end_loads()
+        load = np.concatenate([below[:, None], self.points, above[:, None]], axis=1)
+        steps, widths = np.abs(np.diff(load, axis=1)), np.diff(AT) * self._length[:, None]
+        sharp = np.sqrt(self._b2) < steps
+        if not sharp.any():
+            return np.zeros(len(below))
+        # inside: a part of the triangle over the step; beside an end: the triangle that has the wrong sign, twice, and
+        # what the load along the binormal adds to it
+        error = np.where(sharp & (load[:, 1:] * load[:, :-1] < 0), steps * widths / 4, 0.0)
+        for i, end in ((0, below), (-1, above)):
+            near = sharp[:, i] & (np.abs(end) < steps[:, i])
+            turned = np.where(end * self.points[:, i] < 0, end**2, 0.0)
+            error[:, i] = np.where(
+                near, 2 * (turned + self._b2[:, 0]) * widths[:, i] / np.where(near, steps[:, i], 1.0), 0.0
+            )
+        return error.sum(axis=1)
+
+    def _end_loads(self):
+        """(V, place) at the lower and the upper ends of pieces."""
+        for T, i in ((self.tension[:-1], 0), (self.tension[1:], -1)):
+            yield self._k[:, 0] * T + self._across[:, i], AT[i]
+
+    def on_halves(self):
+        """P at the points of the halves of all pieces, by interpolation."""
+        return (self._P @ _HALVES.T).reshape(-1, _POINTS)
+
+    def places(self, split):
+        """Where pieces are cut, as shares of their lengths (NaN: not): in the middle, and round a sharp turn of q."""
+        cuts = np.full((len(split), 7), np.nan)
+        cuts[split, 0] = 0.5
+        (below, _), (above, _) = self._end_loads()
+        for i in np.flatnonzero(split & (below * above < 0)):
+            zero = _zero(below[i], self.points[i], above[i])
+            width = 2 * np.sqrt(self._b2[i, 0]) / abs(above[i] - below[i])
+            cuts[i] = [zero, *(zero + side * width * far for far in (1, 5, 25) for side in (-1, 1))]
+            if width < 1e-7:
+                cuts[i, 1:] = np.nan
+        cuts[~((cuts > 1e-12) & (cuts < 1 - 1e-12))] = np.nan
+        cuts[split & np.isnan(cuts).all(axis=1), 0] = 0.5
+        return cuts
+
+
+def _zero(below, inside, above):
+    """Where a load changes its sign on a piece, as a share of it, from its values at the ends and at the points."""
+    signs = np.sign(np.concatenate([[below], inside, [above]]))
+    j = int(np.flatnonzero(np.diff(signs))[0])
+    at, series = np.concatenate([[0.0], _X, [1.0]]), _RULE.series @ inside
+    values = legval(2 * at[j : j + 2] - 1, series)
+    if values[0] * values[1] >= 0:
+        return at[j + int(abs(values[1]) < abs(values[0]))]
+    return brentq(lambda x: legval(2 * x - 1, series), at[j], at[j + 1], xtol=1e-15)
+
+
+def _cut(chain, places):
+    """The chain with its pieces cut at places, (n, any) shares of their lengths, NaN where there is none."""
+    ends = np.sort(np.concatenate([np.zeros((len(places), 1)), places], axis=1), axis=1)
+    which, _ = np.nonzero(~np.isnan(ends))
+    start = ends[~np.isnan(ends)]
+    last = np.append(which[1:] != which[:-1], True)
+    end = np.where(last, 1.0, np.append(start[1:], 1.0))
+    parts = Chain(*(array[which] for array in chain))
+    angle = parts.curvature * start * parts.length
+    cos, sin = np.cos(angle), np.sin(angle)
+    return parts._replace(
+        length=(end - start) * parts.length, t=parts.t * cos - parts.n * sin, n=parts.n * cos + parts.t * sin
+    )

@@ -1,0 +1,162 @@
+"""A string in its hole as a scene: one rod, hung from its upper end, with the hole's wall around it."""
+
+import math
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from cosserat_fenicsx.actions.tube_wall import TubeRing, TubeWall
+from cosserat_fenicsx.checks import finite_array, number, refuse
+from cosserat_fenicsx.scene.along import AlongPieces
+from cosserat_fenicsx.scene.curves import Line
+from cosserat_fenicsx.scene.loads import Force, LineForce, Moment
+from cosserat_fenicsx.scene.rod import Rod
+from cosserat_fenicsx.scene.scene import Scene
+from cosserat_fenicsx.scene.sections import Stiffness
+from cosserat_fenicsx.scene.supports import Clamp, Hinge
+
+# Torsional stiffness of round sections over that of bending: torsion winds a long string up by many turns, which
+# changes nothing else of it, but Newton's method fails on the way. The twist is computed from the torque afterwards.
+_STIFFER = 1e4
+# Stiffness of the wall at a ring (N/m) over that along the string (N/m^2), since a ring digs in less; but where it is
+# larger than that, not more than so many EI/L^3, for rounding.
+_OF_RINGS, _STIFFEST = 100.0, 1e13
+# Points at which the load across the hole is sampled, the part of them that it is not larger at, and its smallest value
+# over the weight.
+_SAMPLES, _TYPICAL, _LEAST = 257, 0.9, 0.1
+# The first spring over the one in which the string would buckle.
+_SAFE = 3.0
+
+
+@dataclass(frozen=True)
+class StringScene:
+    """A string in its hole.
+
+    Attributes:
+        path: the `WellPath`; scene: with one `rod`, its `support`, the `wall` and the `rings`.
+        sections: the true `Stiffness` of each section; ends: (n,) their lower ends, m.
+        weight: (n,) N/m; bottom: force at the lower end (3,), N.
+        clearance: the smallest one of the wall, m. turns: whether torque is applied, or friction exerts one.
+        words: what was simplified, as text.
+    """
+
+    path: object
+    scene: Scene
+    rod: Rod
+    support: object
+    wall: TubeWall
+    rings: tuple
+    sections: tuple
+    ends: np.ndarray
+    weight: np.ndarray
+    bottom: np.ndarray
+    clearance: float
+    turns: bool
+    words: str
+
+    @cached_property
+    def spring(self):
+        """Stiffness of a spring to the axis in which the loads, and the string's resistance to the axis's curvature k,
+        move it by about twice the clearance c, and in which its compression F does not buckle it; over that of the
+        wall. The moment EI k acts within the length sqrt(8 c/k), which gives EI k^2/(16 c^2); F^2/(4 EI) buckles."""
+        s = np.linspace(0.0, self.ends[-1], _SAMPLES)
+        near, at = self.path.nearest(None, s), np.searchsorted(self.ends[:-1], s)[1:]
+        fall = np.diff(near.position[:, 2]) * self.weight[at]
+        tension = self.bottom @ near.tangent[-1] + np.cumsum(fall[::-1])[::-1]
+        down = np.array([0.0, 0.0, 1.0]) - near.tangent[:, 2:] * near.tangent
+        load = tension[:, None] * near.curvature[1:] + self.weight[at, None] * down[1:]
+        typical = max(np.quantile(np.linalg.norm(load, axis=1), _TYPICAL), _LEAST * self.weight.max())
+        EI = np.array([bending_of(section) for section in self.sections])[at]
+        buckles = (np.minimum(tension, 0.0) ** 2 / (4 * EI)).max()
+        bends = (EI * (near.curvature[1:] ** 2).sum(axis=1)).max() / (16 * self.clearance**2)
+        return float(max(typical / (2 * self.clearance), bends, _SAFE * buckles) / self.wall.stiffness)
+
+    @property
+    def stages(self):
+        """The `Stage`s of the wall and of the rings."""
+        return [wall.stage for wall in (self.wall, *self.rings)]
+
+
+def string_in(path, lengths, stiffness, weight, contact_radius, radius, friction, slip, bottom_tension, bottom_torque,
+              rings, wall_stiffness, hinge, extensible, has_arm):  # fmt: skip
+    """The `StringScene` of the arguments of `solve_in_hole`.
+
+    Raises:
+        SceneError: naming the argument, its value and what was expected.
+    """
+    lengths = _numbers("lengths", lengths, None, "positive numbers (m)", lambda x: x > 0)
+    weight = _numbers("weight", weight, len(lengths), "positive numbers (N/m)", lambda x: x > 0)
+    arms = _numbers("contact_radius", contact_radius, len(lengths), "positive numbers (m)", lambda x: x > 0)
+    sections = tuple(stiffness) if isinstance(stiffness, list | tuple) else (stiffness,) * len(lengths)
+    if len(sections) != len(lengths) or not all(isinstance(x, Stiffness) for x in sections):
+        refuse("solve_in_hole", "stiffness", stiffness, f"one Stiffness, or {len(lengths)} of them")
+    ends = np.cumsum(lengths)
+    length = float(ends[-1])
+    if length > path.length * (1 + 1e-9):
+        refuse("solve_in_hole", "lengths", length, f"together no more than the length of the hole, {path.length:g} m")
+    top, bottom = (path.nearest(None, np.array([x])) for x in (0.0, length))
+    start = tuple(top.position[0])
+    held = [_in_place(x, extensible) for x in sections]
+    rod = Rod(
+        Line(start, tuple(top.position[0] + length * top.tangent[0])),
+        held[0] if len(held) == 1 else [*zip(ends[:-1].tolist(), held[:-1], strict=True), (None, held[-1])],
+        name="string",
+    )
+    if np.shape(slip) == (len(lengths), 2):
+        slip = [*zip(ends.tolist(), map(tuple, np.asarray(slip).tolist()), strict=True)]
+    wall = TubeWall(
+        rod, path, radius, [*zip(ends.tolist(), arms.tolist(), strict=True)], wall_stiffness, friction, slip,
+        has_arm=has_arm,
+    )  # fmt: skip
+    t = bottom.tangent[0]
+    pull = number("solve_in_hole", "bottom_tension", bottom_tension, "a number (N)", math.isfinite)
+    torque = number("solve_in_hole", "bottom_torque", bottom_torque, "a number (N m)", math.isfinite)
+    down = AlongPieces([(float(end), (0.0, 0.0, float(w))) for end, w in zip(ends, weight, strict=True)])
+    loads = [LineForce(rod, down)]
+    loads += [Force(rod.end, tuple(pull * t))] if pull else []
+    loads += [Moment(rod.end, tuple(-torque * t))] if torque else []
+    stiffest = _STIFFEST * max(bending_of(section) for section in sections) / length**3
+    ring_stiffness = min(_OF_RINGS * wall.stiffness, max(wall.stiffness, stiffest))
+    around = tuple(
+        TubeRing(rod.at(s), path, clearance, ring_radius, ring_stiffness, *_friction_at(wall, s))
+        for s, clearance, ring_radius in rings
+    )
+    support = Clamp(rod.start) if hinge is None else Hinge(rod.start, hinge)
+    words = "the string's lengths are those under load" if not extensible else "the string stretches"
+    turns = bool(torque or any(across for _, (_, across) in wall.slip))
+    return StringScene(path, Scene([rod], [support], [*loads, wall, *around]), rod, support, wall, around, sections,
+                       ends, weight, pull * t, wall.clearance, turns, words)  # fmt: skip
+
+
+def _numbers(name, value, count, expected, accept):
+    """(n,) numbers; one number counts for all `count`."""
+    array = np.atleast_1d(finite_array("solve_in_hole", name, value, expected))
+    if array.ndim == 1 and count is not None and len(array) == 1:
+        array = np.full(count, array[0])
+    if array.ndim != 1 or not len(array) or not accept(array).all() or (count is not None and len(array) != count):
+        refuse("solve_in_hole", name, value, expected if count is None else f"{expected}, one or {count}")
+    return array
+
+
+def _in_place(section, extensible):
+    """The stiffness that is solved with."""
+    if section.matrix is not None:
+        return section
+    held = section if extensible else replace(section, axial=math.inf)
+    return replace(held, torsion=max(section.torsion, _STIFFER * section.bending[0])) if is_round(section) else held
+
+
+def is_round(section):
+    """Whether a section's bending does not depend on its twist."""
+    return section.matrix is None and math.isclose(*section.bending, rel_tol=1e-12)
+
+
+def bending_of(section):
+    """The smaller bending stiffness of a section, N m^2."""
+    return float(min(section.bending) if section.matrix is None else np.diag(section.matrix)[3:5].min())
+
+
+def _friction_at(wall, s):
+    """Friction coefficient and slip at a station."""
+    return tuple(next(value for end, value in given if s <= end) for given in (wall.friction, wall.slip))

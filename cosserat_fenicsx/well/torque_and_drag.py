@@ -1,0 +1,127 @@
+"""Torque and drag of a string in its hole: the model is chosen, solved, and said why."""
+
+from dataclasses import replace
+
+from cosserat_fenicsx.checks import instance, number, refuse
+from cosserat_fenicsx.errors import InstallationError, NotConverged, SceneError
+from cosserat_fenicsx.well.answer import TorqueAndDrag, scales_of, share
+from cosserat_fenicsx.well.buckled import LockUp, buckled_string
+from cosserat_fenicsx.well.hole import Borehole
+from cosserat_fenicsx.well.ladder import beyond_pipes, model_errors, reasons, too_much
+from cosserat_fenicsx.well.loaded import sections_of
+from cosserat_fenicsx.well.mud import Mud
+from cosserat_fenicsx.well.operations import Operation
+from cosserat_fenicsx.well.pieces import pieces_of
+from cosserat_fenicsx.well.rod_rung import rod_in_contact
+from cosserat_fenicsx.well.softstring import chain_of, soft_string
+from cosserat_fenicsx.well.string import DrillString
+
+AUTO, SOFT, BUCKLED, ROD = "auto", "soft", "soft, buckled", "rod"
+MODELS = (AUTO, SOFT, BUCKLED, ROD)
+CONVENTIONS = ("coulomb", "johancsik")
+_NO_ROD = (
+    "the exact rod in contact is not tried: of the many equilibria of a string that is buckled beyond the load of a "
+    "helix it need not find the one that is there; model='rod' looks for one"
+)
+
+
+def torque_and_drag(
+    hole: Borehole,
+    string: DrillString,
+    operation: Operation,
+    *,
+    mud: Mud | None = None,
+    depth: float | None = None,
+    model: str = AUTO,
+    tol: float = 1e-4,
+    torque_convention: str = "coulomb",
+    progress: bool | None = None,
+) -> TorqueAndDrag:
+    """Hook load, surface torque and the state along a string in its hole, at rest or in steady slow motion.
+
+    Args:
+        hole: a `Borehole`. string: a `DrillString`.
+        operation: what is done: `TripOut()`, `TripIn()`, `RotateOffBottom()`, `RotaryDrilling(weight, torque)`,
+            `Sliding(weight)`, `Ream(speed, rpm)`, `BackReam(speed, rpm)` or `Static()`.
+        mud: a `Mud`; None where all components have their weight in mud.
+        depth: measured depth of the string's lower end, m; None for the bottom of the hole.
+        model: "soft": a perfectly flexible string on the axis; "soft, buckled": with the wall force of a helix where
+            the compression exceeds its load; "rod": the exact rod in contact, which is stiff and has a clearance;
+            "auto": the first of these that suffices for `tol`, but not the rod where there is a helix, since it has
+            many equilibria there.
+        tol: relative accuracy that is asked for, of hook load and surface torque.
+        torque_convention: wall force of a pipe that rotates, from its load across the hole |q|: "coulomb", |q|/sqrt(1 +
+            (e mu)^2) with e the share of the slip that is around it: part of the load is carried by friction, as on the
+            rod in contact; "johancsik", |q|, the convention of most programs, which gives a torque 3 to 4 % higher.
+        progress: of the rod; True or False; None shows it in runs of more than two seconds.
+
+    Returns:
+        a `TorqueAndDrag`. Its `enough` is False where the accuracy asked for is beyond the model, or where `model` is
+        "auto" and the rod could not be solved as accurately, or not at all: its answer, or that of the soft string, is
+        then returned, and `why` says so.
+
+    Raises:
+        SceneError: a string that does not fit the hole, missing mud, an unknown model, a string that locks up (with the
+            place), or one that is no rod in contact where `model` is "rod".
+        NotConverged: the tolerance was not reached.
+    """
+    instance("torque_and_drag", "hole", hole, Borehole, "a Borehole")
+    instance("torque_and_drag", "string", string, DrillString, "a DrillString")
+    instance("torque_and_drag", "operation", operation, Operation, "an operation, such as TripOut()")
+    instance("torque_and_drag", "mud", mud, (Mud, type(None)), "Mud(density), or None where weights are in mud")
+    tol = number("torque_and_drag", "tol", tol, "a number from 1e-12 to 0.1", lambda x: 1e-12 <= x <= 0.1)
+    if model not in MODELS:
+        refuse("torque_and_drag", "model", model, " or ".join(f"'{name}'" for name in MODELS))
+    if torque_convention not in CONVENTIONS:
+        refuse("torque_and_drag", "torque_convention", torque_convention, "'coulomb' or 'johancsik'")
+    depth = (
+        hole.length
+        if depth is None
+        else number("torque_and_drag", "depth", depth, "a measured depth (m), positive", lambda x: x > 0)
+    )
+
+    pieces, laid = pieces_of(hole, string, operation, mud, depth)
+    given = hole, string, operation, mud, depth
+    flexible, why = _flexible(given, model, tol, torque_convention, pieces, laid)
+    if model in (SOFT, BUCKLED) or (model == AUTO and flexible.enough):
+        return flexible
+    if model == AUTO and flexible.model == BUCKLED:
+        return replace(flexible, why=(*flexible.why, _NO_ROD))
+    try:
+        return rod_in_contact(flexible, why, progress, exact=model == ROD)
+    except (SceneError, NotConverged, InstallationError) as problem:
+        if model == ROD:
+            raise
+        failed = f"the exact rod in contact was tried, and not solved: {problem}"
+        return replace(flexible, why=(*flexible.why, failed))
+
+
+def _flexible(given, model, tol, torque_convention, pieces, laid):
+    """The `TorqueAndDrag` of the soft string, buckled where it is a helix and `model` is not "soft"; and sentences on
+    why it is not the answer where it is not."""
+    path, operation = given[0].path, given[2]
+    sections = sections_of([place.component for place in laid])
+    soft = soft_string(chain_of(pieces, torque_convention == "coulomb"), -operation.weight, operation.torque, tol)
+    buckled, why = None, []
+    if model != SOFT:
+        try:
+            buckled = buckled_string(soft, pieces, sections, tol)
+        except LockUp as stuck:
+            if model != ROD:
+                raise
+            why.append(f"WITH THE WALL FORCE OF A HELIX IT LOCKS UP: {stuck}")
+    solved, used = buckled or soft, BUCKLED if buckled or model == BUCKLED else SOFT
+    left_out, scales = model_errors(path, pieces, soft, solved, sections), scales_of(solved, pieces)
+    error = max(map(share, (solved.error, solved.torque_error), scales))
+    model_error = max(share(parts.total, scale) for parts, scale in zip(left_out, scales, strict=True))
+    why = [*reasons(used, model, soft, solved, sections, left_out, scales), *why]
+    why += beyond_pipes(solved, sections.EA[pieces.component[solved.chain.origin]])
+    beyond = too_much(left_out, scales, tol - error)
+    told = [*why, *(f"NOT ENOUGH for tol = {tol:g} in the {what}" for what in beyond)]
+    if model == AUTO:
+        why.append(f"tol = {tol:g} is less in the {' and the '.join(beyond)}: it takes the exact rod in contact")
+    ends = [(x.tension[-1, -1], x.torque[-1, -1]) for x in (solved, soft)]
+    differences = {SOFT: tuple(float(a - b) for a, b in zip(*ends, strict=True))} if buckled else {}
+    answer = TorqueAndDrag(*given, used, tol, torque_convention, tuple(told), error, model_error, differences, laid,
+                           pieces, solved)  # fmt: skip
+    return answer, why

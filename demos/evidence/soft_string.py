@@ -1,0 +1,136 @@
+"""Speed against accuracy of the soft string: this package beside welleng and torque-drag, on wells with a known answer.
+
+    python demos/evidence/soft_string.py           installs the peers in environments of their own (a minute)
+    python demos/evidence/soft_string.py --quick   without peers that are not installed
+
+Writes to out/: soft_string.md (the table), soft_string.png (the chart).
+
+Hook loads of pulling out and running in a uniform string, bit free, coefficient of friction 0.25, in well P (turn and
+horizontal) and in Volve 15/9-F-12. Peers get the exact survey at stations that are closer and closer; this package gets
+the stations as they are and a tolerance. Times are processor times of one warm answer, the median of 25, on one thread.
+"""
+
+import argparse
+import statistics
+import time
+from pathlib import Path
+
+import numpy as np
+from machine import in_words, record
+from peers.environments import Missing
+from peers.process import Peer
+
+import cosserat_fenicsx as cf
+
+SCENES = Path(__file__).resolve().parents[1] / "wells"
+#: Hook loads out and in, N, by a differential equation at 1e-13.
+TRUTH = {
+    "well_p": (910081.8146665769, 379604.44686990423),
+    "volve_f12": (946450.3232989962, 590676.3187135797),
+}
+PEERS = "welleng", "torque-drag"
+WEIGHT, RADIUS, FRICTION = 241.13, 0.0635, 0.25
+TOLS, SPACINGS = (1e-2, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12), (100.0, 30.0, 10.0, 3.0, 1.0)
+SAMPLES, LIMIT = 25, 60.0  # of a row; s, of a request
+
+
+def ours(path, tol):
+    """(error, s) of this package: the largest relative error of both hook loads, the processor time of one."""
+    hole = cf.Borehole(path, cf.HoleSection(path.length, 0.2159, FRICTION))
+    string = cf.DrillString([cf.Component(weight=WEIGHT, contact_radius=RADIUS)])
+    loads, seconds = [], []
+    for operation in (cf.TripOut(), cf.TripIn()):
+        for _ in range(SAMPLES):
+            began = time.process_time()
+            answer = cf.torque_and_drag(hole, string, operation, model="soft", tol=tol)
+            seconds.append(time.process_time() - began)
+        loads.append(answer.hook_load)
+    return loads, statistics.median(seconds)
+
+
+def theirs(peer, path, spacing):
+    """As `ours`, of a peer on stations at most `spacing` (m) apart."""
+    parts = [np.linspace(a, b, max(2, int(np.ceil((b - a) / spacing)) + 1))[:-1]
+             for a, b in zip(path.md[:-1], path.md[1:], strict=True)]  # fmt: skip
+    md = np.append(np.concatenate(parts), path.length)
+    inc, azi = path.inclination_at(md), path.azimuth_at(md)
+    for i in range(len(md) - 2, -1, -1):  # a vertical station takes the azimuth of the next
+        azi[i] = azi[i + 1] if inc[i] < 1e-9 else azi[i]
+    inc, azi = np.degrees(inc), np.degrees(np.unwrap(azi))
+    problem = {"md": md.tolist(), "inc": inc.tolist(), "azi": azi.tolist(), "weight": WEIGHT,
+               "radius": RADIUS, "friction": FRICTION}  # fmt: skip
+    loads, seconds = [], []
+    for out in (True, False):
+        reply = peer.ask({**problem, "out": out}, {}, warm=1, samples=SAMPLES if spacing >= 10 else 5, limit=LIMIT)
+        if "failed" in reply:
+            raise Missing(reply["failed"])
+        loads.append(reply["tip"][0][0])
+        seconds += reply["seconds"]
+    return loads, statistics.median(seconds)
+
+
+def measure(install):
+    """[(well, program, setting, relative error, s)], and what could not be measured."""
+    rows, silent = [], []
+    paths = {name: cf.read_well(SCENES / f"{name}.toml").hole.path for name in TRUTH}
+
+    def keep(name, program, setting, found):
+        loads, seconds = found
+        rows.append((name, program, setting, float(np.max(np.abs(np.divide(loads, TRUTH[name]) - 1))), seconds))
+
+    for name, path in paths.items():
+        for tol in TOLS:
+            keep(name, "cosserat_fenicsx", f"tol = {tol:g}", ours(path, tol))
+    for program in PEERS:
+        try:
+            with Peer(program, install) as peer:
+                for name, path in paths.items():
+                    for spacing in SPACINGS:
+                        keep(name, program, f"every {spacing:g} m", theirs(peer, path, spacing))
+        except Missing as missing:
+            silent.append(f"{program}: {missing}")
+    return rows, silent
+
+
+def table(rows, silent):
+    """Markdown: errors and times in both wells."""
+    cells = {}
+    for name, program, setting, error, seconds in rows:
+        cells.setdefault((program, setting), {})[name] = f"{max(error, 1e-16):.0e} | {1e3 * seconds:.2f}"
+    heads = " | ".join(f"`{name}`: relative error | ms" for name in TRUTH)
+    lines = [f"| program | setting | {heads} |", f"|---|---|{'---:|' * (2 * len(TRUTH))}"]
+    for (program, setting), found in cells.items():
+        lines.append(f"| {program} | {setting} | {' | '.join(found[name] for name in TRUTH)} |")
+    return "\n".join([*lines, "", *(f"Not measured: {line}." for line in silent), in_words(record())])
+
+
+def chart(rows, file):
+    """Error over time, one panel a well."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(12, 5), layout="constrained")
+    FigureCanvasAgg(figure)
+    for panel, name in zip(figure.subplots(1, 2, sharey=True), TRUTH, strict=True):
+        for program, colour in zip(("cosserat_fenicsx", *PEERS), ("#08519c", "#d95f02", "#7570b3"), strict=True):
+            here = [(seconds, error) for well, by, _, error, seconds in rows if (well, by) == (name, program)]
+            if here:
+                seconds, errors = zip(*here, strict=True)
+                panel.loglog(1e3 * np.array(seconds), np.maximum(errors, 1e-15), "o-", color=colour, label=program)
+        panel.set(xlabel="processor time of an answer (ms)", title=name)
+        panel.grid(alpha=0.3)
+        panel.legend()
+    figure.axes[0].set_ylabel("largest relative error of hook loads out and in")
+    figure.suptitle("Soft string: speed against accuracy")
+    figure.savefig(file, dpi=110)
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--quick", action="store_true", help="without peers that are not installed")
+    found, unmeasured = measure(not parser.parse_args().quick)
+    out = Path("out")
+    out.mkdir(exist_ok=True)
+    (out / "soft_string.md").write_text(table(found, unmeasured) + "\n", encoding="utf-8")
+    chart(found, out / "soft_string.png")
+    print(table(found, unmeasured))

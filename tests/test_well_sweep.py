@@ -1,0 +1,153 @@
+"""Sweeps over depths, that are kept and gone on with; friction from measurements; charts."""
+
+import numpy as np
+import pytest
+
+import cosserat_fenicsx as cf
+from cosserat_fenicsx.well import depth_sweep as module
+
+pytestmark = pytest.mark.serial
+PATH = cf.WellPath.from_survey([0, 600, 1200, 1800, 2500], [0, 0, 50, 60, 85], [0, 0, 120, 150, 150])
+HOLE = cf.Borehole(PATH, [cf.HoleSection(1500, 0.2224, 0.2, "casing"), cf.HoleSection(2500, 0.2159, 0.3, "open hole")])
+STRING = cf.DrillString([cf.Bit(0.2159), cf.Collar(90, "NC46-65"), cf.DrillPipe(size="5 in 19.50 lb/ft")])
+MUD = cf.Mud(1200.0)
+OPERATIONS = cf.TripOut(), cf.TripIn(), cf.RotateOffBottom()
+DEPTHS = np.linspace(800, 2500, 5)
+
+
+def sweep(**settings):
+    given = {"mud": MUD, "model": "soft", "friction": [0.1, [0.2, 0.4]], **settings}
+    return cf.depth_sweep(HOLE, STRING, OPERATIONS, DEPTHS, **given)
+
+
+def test_a_sweep_is_its_answers():
+    found = sweep()
+    assert found.hook_load.shape == (3, 2, 5) and len(found) == 30 and found.done.all()
+    hole = HOLE.with_friction([0.2, 0.4])
+    for i, operation in enumerate(OPERATIONS):
+        answer = cf.torque_and_drag(hole, STRING, operation, mud=MUD, depth=DEPTHS[3], model="soft")
+        assert found.hook_load[i, 1, 3] == answer.hook_load and found.surface_torque[i, 1, 3] == answer.surface_torque
+    assert (found.hook_load[0] > found.hook_load[2]).all() and (found.hook_load[2] > found.hook_load[1]).all()
+    assert found.label(1, 1) == "trip in, friction 0.2, 0.4" and f"{found.hook_load[1, 1, 2] / 1e3:.3f}" in str(found)
+    assert cf.depth_sweep(HOLE, STRING, cf.TripOut(), 2000.0, mud=MUD, model="soft").hook_load.shape == (1, 1, 1)
+
+
+def test_a_sweep_goes_on_where_it_was_broken_off(tmp_path, monkeypatch):
+    file, asked = tmp_path / "sweep.jsonl", []
+
+    def counted(*args, **named):
+        asked.append(named["depth"])
+        if len(asked) == 12:
+            raise KeyboardInterrupt
+        return cf.torque_and_drag(*args, **named)
+
+    monkeypatch.setattr(module, "torque_and_drag", counted)
+    with pytest.raises(cf.Interrupted, match="after 11 answers") as stop:
+        sweep(file=file)
+    assert len(stop.value.path) == 11 and np.isfinite(stop.value.path.hook_load).sum() == 11
+    with file.open("a") as stream:
+        stream.write("[0, 0, 3, 1.5")  # as by a machine that stopped
+    again = sweep(file=file)
+    assert len(asked) == 12 + 19 and len(again) == 30
+    assert (again.hook_load == sweep().hook_load).all()
+    asked.clear()
+    assert (sweep(file=file).surface_torque == again.surface_torque).all() and not asked
+    with pytest.raises(cf.SceneError, match="holds another sweep"):
+        sweep(file=file, tol=1e-3)
+
+
+def test_depths_that_do_not_fit_are_refused_first():
+    with pytest.raises(cf.SceneError, match="hole, which ends at 2500 m"):
+        cf.depth_sweep(HOLE, STRING, OPERATIONS, [1000, 2600], mud=MUD)
+    with pytest.raises(cf.SceneError, match="at least one measured depth"):
+        cf.depth_sweep(HOLE, STRING, OPERATIONS, [], mud=MUD)
+    with pytest.raises(cf.SceneError, match="above the surface at the depth 50 m"):
+        cf.depth_sweep(HOLE, STRING, OPERATIONS, [1000, 50], mud=MUD)
+
+
+def test_lock_up_in_a_sweep_is_told():
+    stiff = cf.Stiffness((1e9, 1e9), 7e8, (348950.0,) * 2, 9.4e5)
+    string = cf.DrillString([cf.Component(None, stiff, 16.6, 0.05)])
+    path = cf.WellPath.from_survey([0, 12000], [90, 90], [0, 0])
+    hole = cf.Borehole(path, [cf.HoleSection(12000, 2 * (0.05 + 0.041), 0.3)])
+    found = cf.depth_sweep(hole, string, cf.TripIn(), [5000, 9000, 11000], model="soft, buckled")
+    assert np.isfinite(found.hook_load[0, 0, :2]).all() and np.isnan(found.hook_load[0, 0, 2])
+    assert found.values["locked"][0, 0, 2] == pytest.approx(11000 - 9688.9, abs=1) and found.done.all()
+    assert "locks up at md = 1311" in str(found)
+
+
+def measured(noise, block=0.0):
+    """Readings with normal errors of standard deviation `noise`, of the hole's friction 0.2 and 0.3."""
+    rng, found = np.random.default_rng(3), []
+    for operation in OPERATIONS:
+        for depth in (900, 1300, 1700, 2100, 2500):
+            answer = cf.torque_and_drag(HOLE, STRING, operation, mud=MUD, depth=depth, model="soft")
+            hook = answer.hook_load + block + noise * 10e3 * rng.normal()
+            torque = answer.surface_torque + noise * 500 * rng.normal() if operation.slip[1] else None
+            found.append(cf.RigMeasurement(depth, operation, hook, torque))
+    return found
+
+
+def test_friction_from_measurements():
+    exact = cf.calibrate_friction(HOLE.with_friction(0.5), STRING, measured(0.0), mud=MUD)
+    assert exact.friction == pytest.approx([0.2, 0.3], abs=1e-7) and exact.misfit < 1e-4
+    noisy = cf.calibrate_friction(HOLE.with_friction(0.0), STRING, measured(1.0), mud=MUD)
+    assert ((noisy.interval[:, 0] < [0.2, 0.3]) & ([0.2, 0.3] < noisy.interval[:, 1])).all()
+    assert 0.5 < noisy.misfit < 1.5 and (np.diff(noisy.interval) < 0.2).all() and (np.diff(noisy.interval) > 1e-3).all()
+    assert "open hole" in str(noisy) and noisy.hole.sections[1].friction == noisy.friction[1]
+    block = cf.calibrate_friction(HOLE, STRING, measured(0.0, 250e3), mud=MUD, block_weight=None)
+    assert block.block_weight == pytest.approx(250e3, rel=1e-6) and block.friction == pytest.approx(
+        [0.2, 0.3], abs=1e-6
+    )
+
+
+def test_the_interval_covers_as_often_as_it_says():
+    """Of a linear problem with the same solver: a rotating string, whose torque is nearly linear in the friction."""
+    rng, hits = np.random.default_rng(8), 0
+    torques = {
+        depth: cf.torque_and_drag(HOLE, STRING, cf.RotateOffBottom(), mud=MUD, depth=depth, model="soft").surface_torque
+        for depth in (800.0, 1400.0, 2000.0, 2500.0)
+    }
+    for _ in range(40):
+        readings = [cf.RigMeasurement(depth, cf.RotateOffBottom(), None, torque + 300 * rng.normal(), torque_sd=300)
+                    for depth, torque in torques.items()]  # fmt: skip
+        fit = cf.calibrate_friction(HOLE, STRING, readings, mud=MUD, confidence=0.5)
+        hits += int(fit.interval[0, 0] < 0.2 < fit.interval[0, 1])
+    assert 11 <= hits <= 29  # 20 with a standard deviation of 3.2
+
+
+def test_measurements_that_are_refused():
+    one = cf.RigMeasurement(1400.0, cf.TripOut(), 1e6)
+    with pytest.raises(cf.SceneError, match="2 readings for 2 unknowns"):
+        cf.calibrate_friction(HOLE, STRING, [one, one], mud=MUD)
+    with pytest.raises(cf.SceneError, match=r"no reading depends on friction of section 2 \(to 2500 m\)"):
+        cf.calibrate_friction(HOLE, STRING, [one, one, cf.RigMeasurement(900, cf.TripIn(), 9e5)], mud=MUD)
+    with pytest.raises(cf.SceneError, match="hook_load = None"):
+        cf.RigMeasurement(1400.0, cf.TripOut())
+
+
+def test_charts(tmp_path):
+    pytest.importorskip("matplotlib")
+    found = sweep()
+    figure = found.plot()
+    assert [axes.get_xlabel() for axes in figure.axes] == ["hook load (kN)", "surface torque (kN m)"]
+    assert len(figure.axes[0].lines) == 6 and figure.axes[0].get_ylim() == pytest.approx((2585, 715))
+    answer = cf.torque_and_drag(HOLE, STRING, cf.Sliding(1e5), mud=MUD, model="soft, buckled")
+    answer.plot(tmp_path / "answer.png")
+    assert (tmp_path / "answer.png").stat().st_size > 20000
+    with pytest.raises(cf.SceneError, match="expected a name that ends in"):
+        found.plot(tmp_path / "sweep.doc")
+    found.write(tmp_path / "sweep.csv")
+    rows = (tmp_path / "sweep.csv").read_text(encoding="utf-8").splitlines()
+    assert len(rows) == 6 and rows[0].startswith('depth_m,"trip out, friction 0.1: hook load (N)"')
+    assert float(rows[5].split(",")[1]) == pytest.approx(found.hook_load[0, 0, 4])
+
+
+@pytest.mark.slow
+def test_the_string_in_its_hole_in_space(tmp_path):
+    pytest.importorskip("pyvista")
+    answer = cf.torque_and_drag(HOLE, STRING, cf.TripOut(), mud=MUD, model="soft")
+    answer.plot_3d(tmp_path / "hole.png")
+    assert (tmp_path / "hole.png").stat().st_size > 20000
+    with pytest.raises(cf.SceneError, match="ends in .png"):
+        answer.plot_3d(tmp_path / "hole.jpg")
