@@ -40,9 +40,9 @@ def resume(
     It does not matter what ended the run: a killed process, Ctrl-C, a full disk. All saved states are kept. The run
     continues from the last checkpoint of the solver and computes what came after it again. Checkpoints are two seconds
     of computing time apart, or fifty times as long as it takes to write one, whichever is longer. In serial, with the
-    same libraries, every number is bit by bit that of an uninterrupted run; in parallel it agrees to rounding, since
-    MUMPS chooses its pivots at run time. A motion that fails again in the same way, such as where steps fail however
-    short they are, needs another `simulate`, with `start=` if need be.
+    same libraries, every number is bit by bit that of an uninterrupted run; in parallel it agrees to rounding.
+    A motion that fails again in the same way, such as where steps fail however short they are, needs another
+    `simulate`, with `start=` if need be.
 
     Args:
         folder: its name.

@@ -132,8 +132,8 @@ def main(runs=15, out="out"):
         f"{compat.version()}; medians of {runs} run(s), processor time, one process.",
         "",
         (
-            "| degree, elements | Newton iterations | `cf.solve` (ms) | bare loop (ms) | ratio | with stability (ms) |"
-            " ratio |"
+            "| degree, elements | Newton iterations | `cf.solve` (ms) | bare loop (ms) | ratio | bare loop with"
+            " stability count (ms) | ratio |"
         ),
         "|---|---|---|---|---|---|---|",
     ]

@@ -152,7 +152,8 @@ def floor_table(runs):
     )
     yield ""
     heads = (
-        "step (us) | two residuals | kernels of the tangent | its elimination | solution | the rest | over the floor"
+        "step (us) | two residuals | kernels of the tangent | its elimination | solution | the rest |"
+        " over the rod in plain C"
     )
     yield f"| model | {heads} | {HEADS}"
     yield "|---|---|---|---|---|---|---|---|---|---|"

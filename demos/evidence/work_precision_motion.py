@@ -128,7 +128,7 @@ def draw(rows, file):
         _, _, share = ratio(rows, problem)
         axes.axvline(ASKED_AT, color="0.5", lw=1, ls="--")
         if share:
-            words = f"at {ASKED_AT:.0e}: 1/{1 / share:.2g} of Exudyn's time "
+            words = f"at {ASKED_AT:.0e}: 1/{1 / share:.3g} of Exudyn's time "
             axes.text(ASKED_AT, 0.985, words, va="top", ha="right", fontsize=9, transform=axes.get_xaxis_transform())
         axes.set(xscale="log", yscale="log", title=title)
         axes.set_xlabel("error of the ends' positions, over a rod's length (-)")
