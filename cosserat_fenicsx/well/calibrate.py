@@ -103,7 +103,7 @@ def calibrate_friction(
 
     Args:
         hole: its own friction is not used.
-        measurements: `RigMeasurement`s, more than there are unknowns.
+        measurements: each a `RigMeasurement`, more than there are unknowns.
         block_weight: of block and top drive in the hook loads, N; None: one more unknown.
         model: "soft", or "soft, buckled". mud, string, torque_convention: see `torque_and_drag`.
         confidence: between 0 and 1.

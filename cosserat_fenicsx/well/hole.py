@@ -47,7 +47,7 @@ class Borehole:
 
     Args:
         path: a `WellPath`.
-        sections: `HoleSection`s from the surface down.
+        sections: those of the hole, each a `HoleSection`, from the surface down.
         wall_stiffness: pressure per length over penetration, N/m^2; rock and steel have 1e9 and more. Only the rod in
             contact needs it.
 

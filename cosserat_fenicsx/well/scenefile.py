@@ -81,7 +81,7 @@ class WellScene:
     """A string in its hole and what is done with it, from `read_well`.
 
     Attributes:
-        title, hole, string, mud, operations: of the file.
+        hole: the `Borehole`. string: the `DrillString`. mud: the `Mud`, or None. operations: in the order of the file.
         settings: arguments of `torque_and_drag`.
         sweep: arguments of `depth_sweep` beside these, empty where the file asks for none.
     """

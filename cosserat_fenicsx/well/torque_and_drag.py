@@ -50,9 +50,10 @@ def torque_and_drag(
             "auto": the first of these that suffices for `tol`, but not the rod where there is a helix, since it has
             many equilibria there.
         tol: relative accuracy that is asked for, of hook load and surface torque.
-        torque_convention: wall force of a pipe that rotates, from its load across the hole |q|: "coulomb", |q|/sqrt(1 +
-            (e mu)^2) with e the share of the slip that is around it: part of the load is carried by friction, as on the
-            rod in contact; "johancsik", |q|, the convention of most programs, which gives a torque 3 to 4 % higher.
+        torque_convention: wall force of a pipe that rotates, from its load across the hole q: "coulomb",
+            q/sqrt(1 + e^2 mu^2) with e the share of the slip that is around it: part of the load is carried by
+            friction, as on the rod in contact; "johancsik", q itself, the convention of most programs, which gives a
+            torque 3 to 4 % higher.
         progress: of the rod; True or False; None shows it in runs of more than two seconds.
 
     Returns:
