@@ -11,7 +11,7 @@ import sys
 from pathlib import Path
 
 import numpy as np
-from known_numbers import Check, deviation, report
+from known_numbers import Check, chosen, report, verdict
 from mpi4py import MPI
 from scipy.optimize import brentq
 
@@ -137,11 +137,7 @@ def main(names=(), out="out"):
     Returns:
         list of `Check`s.
     """
-    known = {demo.__name__: demo for demo in GALLERY}
-    for name in names:
-        if name not in known:
-            sys.exit(f"demos/gallery.py: no scene is named '{name}': known: {', '.join(known)}")
-    found = {name: run(known[name], out) for name in names or known}
+    found = {demo.__name__: run(demo, out) for demo in chosen("demos/gallery.py", "scene", GALLERY, names)}
     if MPI.COMM_WORLD.rank == 0:
         print(
             report(
@@ -157,4 +153,4 @@ if __name__ == "__main__":
     parser.add_argument("--quick", action="store_true", help="without pictures")
     options = parser.parse_args()
     checks = main(options.names, None if options.quick else "out")
-    sys.exit(int(any(deviation(check) > check.allowed for check in checks)))
+    sys.exit(verdict(checks))

@@ -1,5 +1,6 @@
 """Numbers that demos must give, and the table that shows them."""
 
+import sys
 from collections import namedtuple
 
 import numpy as np
@@ -14,6 +15,20 @@ Check = namedtuple("Check", "what found expected allowed source")
 def deviation(check):
     """The largest difference of a number from what it should be."""
     return float(np.max(np.abs(np.subtract(check.found, check.expected))))
+
+
+def chosen(program, kind, demos, names):
+    """The demos (functions) of these names, or all; ends the program where there is none of a name."""
+    known = {demo.__name__: demo for demo in demos}
+    for name in names:
+        if name not in known:
+            sys.exit(f"{program}: no {kind} is named '{name}': known: {', '.join(known)}")
+    return [known[name] for name in names or known]
+
+
+def verdict(checks):
+    """The exit code of a program: whether a number is off by more than is allowed."""
+    return int(any(deviation(check) > check.allowed for check in checks))
 
 
 def report(title, rows, headings=()):

@@ -10,7 +10,7 @@ import sys
 from pathlib import Path
 
 import numpy as np
-from known_numbers import Check, deviation, report
+from known_numbers import Check, chosen, report, verdict
 
 import cosserat_fenicsx as cf
 
@@ -76,11 +76,7 @@ def main(names=(), out="out/wells"):
     Returns:
         list of `Check`s.
     """
-    known = {demo.__name__: demo for demo in WELLS}
-    for name in names:
-        if name not in known:
-            sys.exit(f"demos/wells.py: no well is named '{name}': known: {', '.join(known)}")
-    found = {name: run(known[name], out) for name in names or known}
+    found = {demo.__name__: run(demo, out) for demo in chosen("demos/wells.py", "well", WELLS, names)}
     rows = [(name, answers[-1].model, check) for name, (answers, check) in found.items()]
     print(report("Strings in wells: what must come out", rows))
     return [check for _, check in found.values()]
@@ -92,4 +88,4 @@ if __name__ == "__main__":
     parser.add_argument("--quick", action="store_true", help="without pictures")
     options = parser.parse_args()
     checks = main(options.names, None if options.quick else "out/wells")
-    sys.exit(int(any(deviation(check) > check.allowed for check in checks)))
+    sys.exit(verdict(checks))

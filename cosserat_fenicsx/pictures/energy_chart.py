@@ -1,12 +1,9 @@
 """A chart of the energies of a motion and of the error of their balance, by matplotlib."""
 
-from pathlib import Path
-
 import numpy as np
 
 from cosserat_fenicsx.errors import SceneError
-from cosserat_fenicsx.pictures.figures import save
-from cosserat_fenicsx.ranks import on_first
+from cosserat_fenicsx.pictures.figures import draw_chart, empty_figure
 
 _CURVES = (
     ("kinetic", "kinetic", "tab:blue", "-"),
@@ -30,28 +27,11 @@ def draw(history, file=None):
     """
     if len(history) < 2:
         raise SceneError("chart of energies: expected a history with at least two times")
-    if file is None:
-        return _figure(history)
-    on_first(history.comm, lambda: _save(history, Path(file)))
-    return None
-
-
-def _save(history, file):
-    figure = _figure(history)
-    known = figure.canvas.get_supported_filetypes()
-    if file.suffix.removeprefix(".") not in known:
-        raise SceneError(f"{file}: expected a name that ends in .{', .'.join(sorted(known))}")
-    save(figure, file)
+    return draw_chart(lambda: _figure(history), file, history.comm)
 
 
 def _figure(history):
-    try:
-        from matplotlib.backends.backend_agg import FigureCanvasAgg
-        from matplotlib.figure import Figure
-    except ImportError:
-        raise SceneError("charts need matplotlib: pip install matplotlib") from None
-    figure = Figure(figsize=(11, 6), layout="constrained")
-    FigureCanvasAgg(figure)
+    figure = empty_figure(11, 6)
     above, below = figure.subplots(2, 1, sharex=True, height_ratios=(3, 1))
     for name, label, colour, style in _CURVES:
         values = getattr(history, name)

@@ -3,7 +3,45 @@
 import io
 from pathlib import Path
 
+from cosserat_fenicsx.errors import SceneError
+from cosserat_fenicsx.ranks import on_first
 from cosserat_fenicsx.results.export.beside import replaced
+
+
+def empty_figure(width, height):
+    """A Figure (inches) that needs no screen.
+
+    Raises:
+        SceneError: matplotlib is missing.
+    """
+    try:
+        from matplotlib.backends.backend_agg import FigureCanvasAgg
+        from matplotlib.figure import Figure
+    except ImportError:
+        raise SceneError("charts need matplotlib: pip install matplotlib") from None
+    figure = Figure(figsize=(width, height), layout="constrained")
+    FigureCanvasAgg(figure)
+    return figure
+
+
+def draw_chart(make, file, comm):
+    """The Figure that `make` returns; or None where a file is given, which rank 0 writes.
+
+    Raises:
+        SceneError: the file's ending is unknown to matplotlib; or `make` raised it.
+        OSError: the file cannot be written.
+    """
+    if file is None:
+        return make()
+    on_first(comm, lambda: _write(make(), Path(file)))
+    return None
+
+
+def _write(figure, file):
+    known = figure.canvas.get_supported_filetypes()
+    if file.suffix.removeprefix(".") not in known:
+        raise SceneError(f"{file}: expected a name that ends in .{', .'.join(sorted(known))}")
+    save(figure, file)
 
 
 def save(figure, file):

@@ -58,10 +58,10 @@ from cosserat_fenicsx.scene.scene import Scene
 from cosserat_fenicsx.scene.sections import Stiffness
 from cosserat_fenicsx.scene.signals import SIGNALS
 from cosserat_fenicsx.scene.supports import SUPPORTS
+from cosserat_fenicsx.scene.toml_tables import check_arguments, tables_of
 from cosserat_fenicsx.scene.toml_tables import entries as _entries
 from cosserat_fenicsx.scene.toml_tables import known_keys as _known_keys
 from cosserat_fenicsx.scene.toml_tables import table as _table
-from cosserat_fenicsx.scene.toml_tables import tables_of
 
 #: Keys of [solve]: the arguments of `solve` that are plain values, with their TOML types.
 SOLVE_KEYS = {
@@ -272,11 +272,7 @@ def _build(where, entry, classes, rods, folder=None):
     if not isinstance(name, str) or name not in names:
         raise SceneError(f"{where}.type = {name!r}: {nearest(name, names)}")
     kind = names[name]
-    arguments = inspect.signature(kind).parameters
-    _known_keys(f"{where} ({kind.__name__})", entry, arguments)
-    for name, parameter in arguments.items():
-        if name not in entry and parameter.default is inspect.Parameter.empty:
-            raise SceneError(f"{where} ({kind.__name__}): '{name}' is missing")
+    arguments = check_arguments(where, kind, entry)
     for field in dataclasses.fields(kind):
         if field.metadata.get("file") and isinstance(entry.get(field.name), str):
             entry[field.name] = folder / entry[field.name]

@@ -1,5 +1,6 @@
 """TOML files as tables, and checks of their shape."""
 
+import inspect
 import tomllib
 from pathlib import Path
 
@@ -43,3 +44,17 @@ def known_keys(where, given, known):
     for key in given:
         if key not in known:
             raise SceneError(f"{where}: unknown key '{key}', {nearest(key, known)}")
+
+
+def check_arguments(where, cls, entry):
+    """The parameters of a class by name, where a table gives all that it needs and nothing else.
+
+    Raises:
+        SceneError: an unknown argument, or one that is missing.
+    """
+    arguments = inspect.signature(cls).parameters
+    known_keys(f"{where} ({cls.__name__})", entry, arguments)
+    for name, argument in arguments.items():
+        if name not in entry and argument.default is inspect.Parameter.empty:
+            raise SceneError(f"{where} ({cls.__name__}): '{name}' is missing")
+    return arguments

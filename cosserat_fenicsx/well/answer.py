@@ -309,9 +309,9 @@ class TorqueAndDrag:
         Raises:
             SceneError: matplotlib is missing, or the ending is unknown.
         """
-        from cosserat_fenicsx.well.charts import answer_figure, draw
+        from cosserat_fenicsx.well.charts import draw_answer
 
-        return draw(lambda: answer_figure(self), file)
+        return draw_answer(self, file)
 
     def plot_3d(self, file: File, enlarge: float | None = None) -> None:
         """Draw the string in its hole in space, coloured by the side force.

@@ -1,12 +1,9 @@
 """Charts of torque and drag, by matplotlib: depth runs downwards."""
 
-from pathlib import Path
-
 import numpy as np
 
-from cosserat_fenicsx.errors import SceneError
-from cosserat_fenicsx.pictures.figures import save
-from cosserat_fenicsx.ranks import on_first, world
+from cosserat_fenicsx.pictures.figures import draw_chart, empty_figure
+from cosserat_fenicsx.ranks import world
 from cosserat_fenicsx.well.contacts import usual_force
 
 _COLOURS = ("tab:blue", "tab:orange", "tab:green", "tab:red", "tab:purple", "tab:brown", "tab:pink", "tab:gray")
@@ -15,35 +12,19 @@ _STYLES = ("-", "--", ":", "-.")
 _LITTLE = 1e-4
 
 
-def draw(make, file):
-    """Make a Figure, and write it where a file is given.
-
-    Raises:
-        SceneError: matplotlib is missing, or the file's ending is unknown to it.
-        OSError: the file cannot be written.
-    """
-    if file is None:
-        return make()
-    on_first(world(), lambda: _save(make(), Path(file)))
-    return None
+def draw_answer(answer, file):
+    """See `TorqueAndDrag.plot`."""
+    return draw_chart(lambda: answer_figure(answer), file, world())
 
 
-def _save(figure, file):
-    known = figure.canvas.get_supported_filetypes()
-    if file.suffix.removeprefix(".") not in known:
-        raise SceneError(f"{file}: expected a name that ends in .{', .'.join(sorted(known))}")
-    save(figure, file)
+def draw_sweep(sweep, file):
+    """See `DepthSweep.plot`."""
+    return draw_chart(lambda: sweep_figure(sweep), file, world())
 
 
 def _axes(columns, width):
     """A Figure and axes side by side that share the depth, which runs downwards."""
-    try:
-        from matplotlib.backends.backend_agg import FigureCanvasAgg
-        from matplotlib.figure import Figure
-    except ImportError:
-        raise SceneError("charts need matplotlib: pip install matplotlib") from None
-    figure = Figure(figsize=(width, 7), layout="constrained")
-    FigureCanvasAgg(figure)
+    figure = empty_figure(width, 7)
     axes = figure.subplots(1, columns, sharey=True, squeeze=False)[0]
     axes[0].invert_yaxis()
     for panel in axes:

@@ -91,9 +91,9 @@ class DepthSweep:
         Raises:
             SceneError: matplotlib is missing, or the ending is unknown.
         """
-        from cosserat_fenicsx.well.charts import draw, sweep_figure
+        from cosserat_fenicsx.well.charts import draw_sweep
 
-        return draw(lambda: sweep_figure(self), file)
+        return draw_sweep(self, file)
 
     def __repr__(self):
         names = ", ".join(operation.name for operation in self.operations)

@@ -13,8 +13,8 @@ from cosserat_fenicsx.progress import Progress
 from cosserat_fenicsx.quaternions import product_conjugate
 from cosserat_fenicsx.results.accuracy import on_mesh
 from cosserat_fenicsx.results.path import Path
-from cosserat_fenicsx.results.records import Record
 from cosserat_fenicsx.statics.circulatory import conservative_along
+from cosserat_fenicsx.statics.path.recorder import record_of
 from cosserat_fenicsx.statics.settling import BACK, LAST, LAST_TWO, settle, stages_from
 from cosserat_fenicsx.statics.solvers import solvers_of
 from cosserat_fenicsx.well.in_hole import InHole
@@ -205,14 +205,15 @@ def _on_mesh(string, layout, degree, stages, start, before, bar, comm):
         def on_stage(k):
             bar.reached(float(k + 1))
             if k == len(stages) - 2:
-                softer.append(_record(problem, 0, 0))
+                softer.append(record_of(problem, 1.0, 0, 0, 0))
 
         stiffest = string.wall.stiffness * float(layout.sizes(scene).max())
         rounding = _ROUNDED * np.finfo(float).eps * stiffest * scales.length / scales.force
         steps = settle(problem, string.stages, string.clearance / scales.length, rounding, stages,
                        careful=[len(stages) - 2], on_stage=on_stage)  # fmt: skip
         answers = []
-        for record in (*softer, _record(problem, steps, _negative_modes(string, problem, stability))):
+        last = record_of(problem, 1.0, _negative_modes(string, problem, stability), steps, steps)
+        for record in (*softer, last):
             why = [f"{string.words}; {model.signature.formulation.words}"]
             path = Path.of(model, why, conservative_along)
             path.append(record)
@@ -224,12 +225,6 @@ def _on_mesh(string, layout, degree, stages, start, before, bar, comm):
         )
     answer.compare(before, answers[0] if softer else None)
     return answer
-
-
-def _record(problem, steps, negative_modes):
-    model = problem.model
-    return Record(1.0, *model.snapshot(), negative_modes, steps, problem.multipliers(), False, model.densities.here(),
-                  problem.tie_forces(), model.clamps.loads(1.0), steps)  # fmt: skip
 
 
 def _negative_modes(string, problem, stability):

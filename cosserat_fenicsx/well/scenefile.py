@@ -42,7 +42,6 @@ Numbers are in SI, or text with a unit (`field_units`).
 """
 
 import dataclasses
-import inspect
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -53,7 +52,7 @@ from cosserat_fenicsx.annotations import File
 from cosserat_fenicsx.errors import SceneError, nearest
 from cosserat_fenicsx.scene.materials import Material
 from cosserat_fenicsx.scene.sections import Stiffness
-from cosserat_fenicsx.scene.toml_tables import entries, known_keys, table, tables_of
+from cosserat_fenicsx.scene.toml_tables import check_arguments, entries, known_keys, table, tables_of
 from cosserat_fenicsx.well.answer import TorqueAndDrag
 from cosserat_fenicsx.well.components import COMPONENTS
 from cosserat_fenicsx.well.depth_sweep import DepthSweep, depth_sweep
@@ -199,11 +198,7 @@ def _made(where, entry, classes):
     if kind not in names:
         raise SceneError(f"{where}.type = {kind!r}: {nearest(kind, names)}")
     cls = names[kind]
-    arguments = inspect.signature(cls).parameters
-    known_keys(f"{where} ({kind})", entry, arguments)
-    for name, argument in arguments.items():
-        if name not in entry and argument.default is inspect.Parameter.empty:
-            raise SceneError(f"{where} ({kind}): '{name}' is missing")
+    check_arguments(where, cls, entry)
     for name, value in entry.items():
         if name in ("material", "stiffness"):
             entry[name] = _made(f"{where}.{name}", value, (Material if name == "material" else Stiffness,))

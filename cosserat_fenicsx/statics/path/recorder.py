@@ -122,10 +122,10 @@ class Tracing:
     def _record(self, point):
         track = self.track
         iterations, self._counted = track.iterations - self._counted, track.iterations
-        self.path.append(Record(point.load_factor, *self.model.snapshot(), point.negative_modes, iterations,
-                                self.problem.multipliers(), track.neutral is not None,
-                                self.model.densities.here(), self.problem.tie_forces(),
-                                self.model.clamps.loads(point.load_factor), track.steps))  # fmt: skip
+        neutral = track.neutral is not None
+        self.path.append(
+            record_of(self.problem, point.load_factor, point.negative_modes, iterations, track.steps, neutral)
+        )
         if self._until and self._until(self.path):
             raise _Enough
 
@@ -336,3 +336,10 @@ class Tracing:
         self.stability.count()
         (motion,) = self.stability.whole.modes(1)
         return motion / np.sqrt(self.track.product(motion, motion))
+
+
+def record_of(problem, load_factor, negative_modes, iterations, steps, neutral=False):
+    """The `Record` of a problem's state, an equilibrium; see there for what is given."""
+    model = problem.model
+    return Record(load_factor, *model.snapshot(), negative_modes, iterations, problem.multipliers(), neutral,
+                  model.densities.here(), problem.tie_forces(), model.clamps.loads(load_factor), steps)  # fmt: skip
