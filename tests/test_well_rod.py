@@ -97,6 +97,23 @@ def test_a_build_section_against_its_strong_form(case):
     assert found.hook_load == pytest.approx(case["hook_load_vertical"], rel=2e-3)
 
 
+def test_a_rigid_wall_is_approached_as_closely_as_the_accuracy_needs():
+    """Beside a stabiliser with little clearance a wall of 1e8 N/m^2 is too soft for a hook load to 1e-4."""
+    sections = cf.HoleSection(500.0, 0.2159, 0.25)
+    near_gauge = cf.Stabiliser(1.5, 0.2143, 0.165, 0.07)
+    string = cf.DrillString([cf.Bit(0.2159), near_gauge, cf.Collar(60, "NC46-65"), STRING.components[-1]])
+    given = {"depth": 400.0, "model": "rod"}
+    rigid = cf.torque_and_drag(cf.Borehole(build(), sections), string, cf.TripOut(), mud=MUD, **given)
+    assert rigid.enough and rigid.solved.wall_stiffness >= 1e9
+    with pytest.raises(cf.NotConverged, match="stiffer wall") as refused:
+        cf.torque_and_drag(cf.Borehole(build(), sections, wall_stiffness=1e8), string, cf.TripOut(), mud=MUD, **given)
+    soft = refused.value.answer
+    assert soft.wall_stiffness == 1e8 and soft.of_stiffness > 1e-4
+    for name in ("hook_load", "wall_force"):
+        apart = abs(getattr(soft, name) - getattr(rigid.solved, name))
+        assert 0.02 * soft.errors[name] < apart < soft.errors[name]
+
+
 class Asked(Exception):
     """With what `solve_in_hole` was asked for."""
 

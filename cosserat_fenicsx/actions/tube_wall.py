@@ -17,11 +17,12 @@ _RAMP = 1e-4
 
 @dataclass
 class Stage:
-    """What solvers change of a wall for a while: its stiffness, and that of a spring, both over the wall's own
-    stiffness; and the part of the friction that acts. The spring leads to the axis, or to where the rod was when it was
-    anchored."""
+    """What solvers change of a wall for a while: its stiffness, `most` at most, and that of a spring, both over the
+    wall's own stiffness; and the part of the friction that acts. The spring leads to the axis, or to where the rod was
+    when it was anchored."""
 
     wall: float = 1.0
+    most: float = np.inf
     spring: float = 0.0
     friction: float = 1.0
     anchor: np.ndarray | None = None
@@ -61,7 +62,7 @@ class _Confined:
             action.vector(near.tangent, "1"),
             action.vector(near.curvature, "1/m"),
             action.scalar(clearance, "m"),
-            action.scalar(stage.wall * kp, self.unit),
+            action.scalar(min(stage.wall, stage.most) * kp, self.unit),
             action.scalar(stage.spring * kp, self.unit),
             action.vector(near.position if stage.anchor is None else stage.anchor, "m from origin"),
             action.scalar(slip[:, 0] * friction, "1"),

@@ -14,12 +14,15 @@ from cosserat_fenicsx.interrupts import obey
 #: From a state close to the solution, such as that of a coarser mesh: the wall as it is, or softer by ten before.
 LAST = ((1.0, 0.0, False),)
 LAST_TWO = ((0.1, 0.0, False), *LAST)
+#: The last stages of a start, from which follows how the solution depends on the wall's stiffness.
+DECADES = ((1e-2, 0.0, False), *LAST_TWO)
 #: From such a state where these fail.
-BACK = ((1e-3, 0.0, False), (1e-2, 0.0, False), *LAST_TWO)
+BACK = ((1e-3, 0.0, False), *DECADES)
 # The wall that takes over from the spring is so much stiffer; smallest spring over the wall's stiffness.
 _TAKES_OVER, _SOFTEST = 10.0, 1e-12
-# Powers of ten by which the spring fades before it is left out; factor of a small step.
-_FADED, _SMALL_STEP = 2, 2.0
+# Powers of ten by which the spring fades before it is left out; factors of its steps and of those of the wall, usual
+# ones and small ones. (A spring that fades by ten at once lets a string with weight on bit buckle.)
+_FADED, _STEPS, _SMALL_STEPS = 2, (10.0 ** (2 / 3), 10.0), (2.0, 2.0)
 # Steps of a viscous motion at most; movement of a step that is wanted, over the clearance; bounds of the change of the
 # viscosity after a step, and of the viscosity, over the first one.
 _VISCOUS, _WANTED, _CHANGE, _BOUNDS = 300, 0.3, (0.5, 4.0), (1e-4, 30.0)
@@ -46,15 +49,16 @@ def stages_from(spring, way="fast"):
         spring: the first spring, with which the loads move the rod by about the clearance.
         way: "fast"; "gentle", by small steps; or "relaxed", for a rod that is compressed beyond its buckling load.
     """
-    spring = min(max(spring, _SOFTEST), 0.1 / _TAKES_OVER)
-    wall, step = _TAKES_OVER * spring, 10.0 if way == "fast" else _SMALL_STEP
-    count = max(0, math.ceil(math.log(0.1 / wall, step) - 1e-9))
-    stiffer = [(0.1 * (wall / 0.1) ** (1 - k / count), 0.0, False) for k in range(1, count + 1)]
+    least = DECADES[0][0]
+    spring = min(max(spring, _SOFTEST), least / _TAKES_OVER)
+    wall, (fades, step) = _TAKES_OVER * spring, _STEPS if way == "fast" else _SMALL_STEPS
+    count = max(0, math.ceil(math.log(least / wall, step) - 1e-9))
+    stiffer = [(least * (wall / least) ** (1 - k / count), 0.0, False) for k in range(1, count)]
     if way == "relaxed":
         fading = [(wall, spring, True)]
     else:
-        fading = [(wall, spring / step**k, False) for k in range(1, 1 + math.ceil(_FADED / math.log10(step)))]
-    return ((0.0, spring, False), *fading, (wall, 0.0, False), *stiffer, *LAST)
+        fading = [(wall, spring / fades**k, False) for k in range(1, 1 + math.ceil(_FADED / math.log10(fades) - 1e-9))]
+    return ((0.0, spring, False), *fading, (wall, 0.0, False), *stiffer, *DECADES)
 
 
 def settle(problem, walls, clearance, rounding, stages, careful=(), on_stage=None):

@@ -7,14 +7,9 @@ import numpy as np
 from cosserat_fenicsx.quaternions import directors
 from cosserat_fenicsx.results.recovery import at_nodes
 from cosserat_fenicsx.well.resultants import contacts_along
+from cosserat_fenicsx.well.rod_errors import errors_of
 from cosserat_fenicsx.well.string_scene import bending_of, is_round
 
-# Errors of the finer mesh over changes from one mesh to the next, whose signs alternate: what covered 97 random wells,
-# but for the wall force of one buckled string.
-_OF_CHANGE = {"hook_load": 3.0, "surface_torque": 4.0, "wall_force": 6.0}
-# Smallest scales that errors are relative to: of the hook load, over the string's weight; of the torque, over that of
-# the wall's forces at the string's surface.
-_LEAST_LOAD, _LEAST_TORQUE = 1e-3, 1e-3
 # Distances from the axis below this share of the clearance have no direction.
 _CENTRED = 1e-9
 
@@ -37,26 +32,48 @@ class InHole:
         contacts: [`Contact`] resultants, from the top down, see `contacts_along`.
         stretch: m, twist: rad, of the string by tension and torque, from the true stiffness (NaN where a section has
             none); an `extensible` string has them in its state.
-        errors: {"hook_load": N, "surface_torque": N m, "wall_force": N}, estimated; error: the largest relative one of
-            the first two, that of the torque only where the string turns.
-        of_stiffness: largest relative change of these quantities from a wall softer by ten, a part of the errors.
+        factor: stiffness of the wall that it was solved with, over that in the scene; wall_stiffness: N/m^2, with it.
+        errors: {"hook_load": N, "surface_torque": N m, "wall_force": N}, estimated, from those in a rigid wall; error:
+            the largest relative one of the first two, that of the torque only where the string turns; of_stiffness: the
+            part of it that is left of the wall's softness, see `RodErrors`.
         balance: N, between the reaction and the sum of all other forces.
         negative_modes: number of negative eigenvalues of the second variation without friction, -1 where it is
             singular. Where it is not 0, the string would buckle, or buckle otherwise, but for friction.
         steps: Newton steps, on this mesh and on those before.
     """
 
-    def __init__(self, string, path):
-        self._string, self.path, self.scene = string, path, path.scene
+    def __init__(self, string, path, factor=1.0):
+        """
+        Args:
+            string: a `StringScene`; path: see there; factor: stiffness of the wall over that in the scene.
+        """
+        self.string, self.path, self.scene, self.factor = string, path, path.scene, factor
         self.steps, self.negative_modes = int(path.iterations[0]), int(path.negative_modes[0])
-        self.errors, self.error, self._by_stiffness, self.of_stiffness = {}, np.inf, {}, np.inf
+        self.estimates, self.errors, self.error, self.of_stiffness = None, {}, np.inf, np.inf
+
+    def estimate(self, values, before):
+        """Set the errors.
+
+        Args:
+            values: {factor: {name: value}} in walls of several stiffnesses on this mesh; before: the `InHole` on the
+                mesh before, or None.
+        """
+        self.estimates = found = errors_of(self, values, before and before.estimates)
+        self.errors, self.error, self.of_stiffness = found.errors, found.error, found.of_stiffness
+        if before is not None:
+            self.steps += before.steps
+
+    @property
+    def wall_stiffness(self):
+        """N/m^2, with which it was solved."""
+        return self.factor * self.string.wall.stiffness
 
     # -- along the string --------------------------------------------------------------------------------------------
 
     @cached_property
     def s(self):
         """(n,) m."""
-        return self.path.layout.node_s(self.path.rule.nodes)[0] * self._string.rod.length
+        return self.path.layout.node_s(self.path.rule.nodes)[0] * self.string.rod.length
 
     @property
     def _record(self):
@@ -65,11 +82,11 @@ class InHole:
     @cached_property
     def position(self):
         """(n, 3) m."""
-        return self._record.rq[:, :3] * self.path.scales.length + self.scene.origin(self._string.rod)
+        return self._record.rq[:, :3] * self.path.scales.length + self.scene.origin(self.string.rod)
 
     @cached_property
     def _near(self):
-        return self._string.path.nearest(self.position, self.s)
+        return self.string.path.nearest(self.position, self.s)
 
     @property
     def md(self):
@@ -90,13 +107,13 @@ class InHole:
     @cached_property
     def _outward(self):
         """(n, 3) unit vectors from the axis to the rod; zero where it is centred."""
-        clear = self.distance > _CENTRED * self._string.clearance
+        clear = self.distance > _CENTRED * self.string.clearance
         return np.where(clear[:, None], self.offset / np.where(clear, self.distance, 1.0)[:, None], 0.0)
 
     @cached_property
     def standoff(self):
         """(n,) the part of the clearance that is left."""
-        return 1 - self.distance / self._string.wall.sizes(self.s, self.md)[0]
+        return 1 - self.distance / self.string.wall.sizes(self.s, self.md)[0]
 
     @cached_property
     def side(self):
@@ -118,7 +135,7 @@ class InHole:
         """(n, 3) tangents of the rod: its third director."""
         q = self._record.rq[:, 3:7]
         q = q / np.linalg.norm(q, axis=1, keepdims=True)
-        return directors(q) @ self._string.rod.curve.frame(np.zeros(1))[0, :, 2]
+        return directors(q) @ self.string.rod.curve.frame(np.zeros(1))[0, :, 2]
 
     def _component(self, part):
         return (at_nodes(self._contact[..., part]) * self._along).sum(axis=1)
@@ -187,10 +204,10 @@ class InHole:
     @cached_property
     def ring_forces(self):
         """(rings, 3) N: the jump of the contact force, which no other load at the station shares."""
-        found = np.empty((len(self._string.rings), 3))
-        for i, ring in enumerate(self._string.rings):
+        found = np.empty((len(self.string.rings), 3))
+        for i, ring in enumerate(self.string.rings):
             _, vertex = self.path.layout.vertex(self.scene, ring.station)
-            after = self._contact[vertex, 0, :3] if vertex < len(self._contact) else self._string.bottom
+            after = self._contact[vertex, 0, :3] if vertex < len(self._contact) else self.string.bottom
             found[i] = self._contact[vertex - 1, -1, :3] - after
         return found
 
@@ -199,16 +216,16 @@ class InHole:
         """N."""
         across = [
             np.linalg.norm(force) / np.hypot(1.0, ring.friction * np.hypot(*ring.slip[0][1]))
-            for ring, force in zip(self._string.rings, self.ring_forces, strict=True)
+            for ring, force in zip(self.string.rings, self.ring_forces, strict=True)
         ]
         return float(self.node_force.sum() + sum(across))
 
     @cached_property
     def contacts(self):
         """[`Contact`]."""
-        string = self._string
+        string = self.string
         EI = max(bending_of(section) for section in string.sections)
-        layer = (4 * EI / string.wall.stiffness) ** 0.25
+        layer = (4 * EI / self.wall_stiffness) ** 0.25
         rings = [
             (ring.station.s, np.linalg.norm(force)) for ring, force in zip(string.rings, self.ring_forces, strict=True)
         ]
@@ -220,7 +237,7 @@ class InHole:
     @cached_property
     def reaction(self):
         """Force (3,), N, and moment (3,), N m, on the held end."""
-        force, moment = self.path.reaction(self._string.support)
+        force, moment = self.path.reaction(self.string.support)
         return force[0], moment[0]
 
     @property
@@ -236,7 +253,7 @@ class InHole:
     @cached_property
     def balance(self):
         """N."""
-        string = self._string
+        string = self.string
         weight = np.array([0.0, 0.0, np.diff(string.ends, prepend=0.0) @ string.weight])
         wall = (self._wall_density * self._of_nodes[..., None]).sum(axis=(0, 1)) + self.ring_forces.sum(axis=0)
         return float(np.linalg.norm(self.reaction[0] + weight + string.bottom + wall))
@@ -244,7 +261,7 @@ class InHole:
     @property
     def scale(self):
         """Size of the forces that are balanced, N."""
-        string = self._string
+        string = self.string
         weight = np.diff(string.ends, prepend=0.0) @ string.weight
         return self.wall_force + weight + float(np.linalg.norm(string.bottom))
 
@@ -252,8 +269,8 @@ class InHole:
 
     def _integral(self, values, of_section):
         """Integral over the string of values at the nodes over a stiffness of the sections."""
-        at = np.minimum(np.searchsorted(self._string.ends, self.s, side="left"), len(self._string.ends) - 1)
-        found = np.array([np.nan if x.matrix is not None else of_section(x) for x in self._string.sections])
+        at = np.minimum(np.searchsorted(self.string.ends, self.s, side="left"), len(self.string.ends) - 1)
+        found = np.array([np.nan if x.matrix is not None else of_section(x) for x in self.string.sections])
         return float((self.node_length * values / found[at]).sum())
 
     @property
@@ -265,45 +282,6 @@ class InHole:
     def twist(self):
         """rad."""
         return self._integral(self.torque, lambda x: x.torsion if is_round(x) else np.nan)
-
-    # -- errors ------------------------------------------------------------------------------------------------------
-
-    def compare(self, coarse, softer=None):
-        """Estimate the errors.
-
-        Args:
-            coarse: the `InHole` on the mesh before, or None. softer: that of a wall softer by ten on the same mesh, or
-                None where that of the mesh before counts.
-        """
-        turns = self._string.turns
-        weight = np.diff(self._string.ends, prepend=0.0) @ self._string.weight
-        arm = max(radius for _, radius in self._string.wall.contact_radius)
-        least = _LEAST_LOAD * weight
-        wall = max(self.wall_force, least)
-        scales = {
-            "hook_load": max(abs(self.hook_load), least),
-            "surface_torque": max(abs(self.surface_torque), _LEAST_TORQUE * arm * wall),
-            "wall_force": wall,
-        }
-        if softer is not None:
-            self._by_stiffness = {name: abs(getattr(self, name) - getattr(softer, name)) for name in scales}
-        elif coarse is not None:
-            self._by_stiffness = coarse._by_stiffness
-        counted = [name for name in scales if turns or name != "surface_torque"]
-        if self._by_stiffness:
-            self.of_stiffness = max(self._by_stiffness[name] / scales[name] for name in counted)
-        changes = dict.fromkeys(scales, np.inf)
-        if coarse is not None:
-            changes = {name: abs(getattr(self, name) - getattr(coarse, name)) / scales[name] for name in scales}
-        largest = max(changes[name] for name in counted)  # a single quantity may change little by chance
-        for name, scale in scales.items():
-            rounding = self.balance * (arm if name == "surface_torque" else 1.0)
-            change = _OF_CHANGE[name] * max(largest, changes[name]) * scale
-            self.errors[name] = change + self._by_stiffness.get(name, np.inf) + rounding
-        of_load, of_torque = (self.errors[name] / scales[name] for name in ("hook_load", "surface_torque"))
-        self.error = max(of_load, of_torque) if turns else of_load
-        if coarse is not None:
-            self.steps = int(self.path.iterations[0]) + coarse.steps
 
     def __repr__(self):
         elements = self.path.elements[0]

@@ -2,6 +2,7 @@
 
 import contextlib
 import numbers
+from typing import NamedTuple
 
 import numpy as np
 from mpi4py import MPI
@@ -15,9 +16,10 @@ from cosserat_fenicsx.results.accuracy import on_mesh
 from cosserat_fenicsx.results.path import Path
 from cosserat_fenicsx.statics.circulatory import conservative_along
 from cosserat_fenicsx.statics.path.recorder import record_of
-from cosserat_fenicsx.statics.settling import BACK, LAST, LAST_TWO, settle, stages_from
+from cosserat_fenicsx.statics.settling import BACK, DECADES, LAST, LAST_TWO, settle, stages_from
 from cosserat_fenicsx.statics.solvers import solvers_of
 from cosserat_fenicsx.well.in_hole import InHole
+from cosserat_fenicsx.well.rod_errors import values_of
 from cosserat_fenicsx.well.string_scene import string_in
 
 # Degree of the elements where none is asked for: lift-off forces limit the regularity, higher degrees gain nothing.
@@ -29,8 +31,13 @@ _FIRST, _MOST, _FINER, _BEFORE = 256, 8192, 2, 4
 _FEWEST, _DENSEST = 0.3, 2.4
 # An error below this times that by the wall's stiffness is hardly one of the mesh.
 _BY_WALL = 1.25
-# Part of the accuracy asked for below which the effect of the wall's stiffness is not found again on a finer mesh.
-_KNOWN = 0.1
+# Ratio of the changes by the wall's stiffness above which it is found again on a finer mesh.
+_REGULAR = 0.3
+# Part of the accuracy asked for below which the effect of the wall's stiffness is not found again on a finer mesh; and
+# the part above which a rigid wall is approached by one that is stiffer by ten, up to the stiffest one, over the first.
+_KNOWN, _TOO_SOFT, _STIFFEST = 0.1, 0.25, 1e3
+# Stiffness of the first wall in place of a rigid one, N/m^2.
+_FIRST_WALL = 1e9
 # Starts in turn, see `stages_from`.
 _STARTS = ("fast", "gentle", "relaxed")
 # Rounding of the residual of a node, over that of its position times the stiffness of its piece of wall.
@@ -52,7 +59,7 @@ def solve_in_hole(
     bottom_tension=0.0,
     bottom_torque=0.0,
     rings=(),
-    wall_stiffness=1e9,
+    wall_stiffness=None,
     hinge=None,
     extensible=False,
     has_arm=True,
@@ -86,7 +93,8 @@ def solve_in_hole(
         bottom_torque: torque on bit, N m, against the rotation.
         rings: [(s, clearance, radius)] of stabilisers and bits: stations (m from the top) that stay within a clearance
             (m) of the hole's axis; 0 centres the string there.
-        wall_stiffness: N/m^2; of rings N/m.
+        wall_stiffness: N/m^2; None for a rigid wall, which is approached by stiffer ones until what is left is small
+            beside `tol`. Errors are those from a rigid wall in both cases.
         hinge: None; or the direction about which the top turns freely, in place of a clamp.
         extensible: whether the axial stiffness counts in the equilibrium; the lengths are then those of the
             unstretched string.
@@ -103,15 +111,17 @@ def solve_in_hole(
         SceneError: numbers that are not what was expected.
         NotConverged: no equilibrium was found, or, as a `NotAccurate`, not as accurately as asked.
     """
+    first = _FIRST_WALL if wall_stiffness is None else wall_stiffness
     string = string_in(path, lengths, stiffness, weight, contact_radius, radius, friction, slip, bottom_tension,
-                       bottom_torque, rings, wall_stiffness, hinge, extensible, has_arm)  # fmt: skip
+                       bottom_torque, rings, first, hinge, extensible, has_arm)  # fmt: skip
     tol = number("solve_in_hole", "tol", tol, "a number from 1e-12 to below 1", lambda x: 1e-12 <= x < 1)
     comm, counts = comm or MPI.COMM_WORLD, _counts(elements)
+    asked = _Asked(tol, _STIFFEST if wall_stiffness is None else 1.0)
     with Progress([float(len(stages_from(string.spring)))], progress, comm, "stage") as bar:
         answer = None
         for count in counts:
-            answer = _finer(string, count, degree, answer, tol, bar, comm)
-            # finer meshes change nothing of what the wall's stiffness does
+            answer = _finer(string, count, degree, answer, asked, bar, comm)
+            # finer meshes change nothing of what is left of the wall's softness
             if elements is None and answer.error <= max(tol, _BY_WALL * answer.of_stiffness):
                 break
     if elements is None and answer.error > tol:
@@ -144,19 +154,29 @@ def _counts(elements):
     return [max(1, int(elements) // _BEFORE), int(elements)]
 
 
-def _finer(string, count, degree, before, tol, bar, comm):
+class _Asked(NamedTuple):
+    """The accuracy asked for, and the stiffest wall that may be taken for it, over the first one."""
+
+    tol: float
+    stiffest: float
+
+
+def _finer(string, count, degree, before, asked, bar, comm):
     """The `InHole` on a mesh of so many elements, from that on the mesh before, or from the start in stages."""
     if before is not None:
         layout = _divided(string, before.path.layout, _wanted(before), count)
-        for stages in (LAST if before.of_stiffness <= _KNOWN * tol else LAST_TWO, BACK):
-            with contextlib.suppress(NotConverged):  # the contact on the coarse mesh may be too far off
-                return _on_mesh(string, layout, degree, stages, before, before, bar, comm)
+        near = LAST_TWO if before.estimates.ratio <= _REGULAR else DECADES
+        near = LAST if before.of_stiffness <= _KNOWN * asked.tol else near
+        # the contact on the coarse mesh may be too far off, or the wall too stiff for this one
+        for stages, factor in ((near, before.factor), (BACK, before.factor), (BACK, 1.0)):
+            with contextlib.suppress(NotConverged):
+                return _on_mesh(string, layout, degree, stages, factor, before, before, asked, bar, comm)
     pieces = Layout.of(string.scene, 1)
     layout = _divided(string, pieces, np.diff(pieces.breaks[0]), count)
     for way in _STARTS:
         try:
             stages = stages_from(string.spring, way)
-            return _on_mesh(string, layout, degree, stages, None, before, bar, comm)
+            return _on_mesh(string, layout, degree, stages, 1.0, None, before, asked, bar, comm)
         except NotConverged as failed:
             reason = failed
     raise NotConverged(
@@ -192,39 +212,61 @@ def _divided(string, layout, wanted, count):
     return Layout((np.append(np.concatenate(found), 1.0),))
 
 
-def _on_mesh(string, layout, degree, stages, start, before, bar, comm):
-    """The `InHole` on one mesh, from that on another mesh or from the axis, with errors by that on the mesh before."""
+def _on_mesh(string, layout, degree, stages, factor, start, before, asked, bar, comm):
+    """The `InHole` on one mesh, in a wall stiffer by a factor or more, from that on another mesh or from the axis, with
+    errors by that on the mesh before."""
     scene = string.scene
     with solvers_of(scene, layout, degree=degree, comm=comm) as (problem, _, stability):
-        model, scales = problem.model, problem.model.scales
         problem.set_load_factor(1.0)
         _begin(problem, string, layout, start)
-        bar.start(f"rod in its hole, {model.unknowns} unknowns")
-        softer = []
+        bar.start(f"rod in its hole, {problem.model.unknowns} unknowns")
+        steps, values, answer = 0, {}, None
+        while True:
+            try:
+                *softer, found = _in_walls(string, problem, stability, stages, factor, steps, bar)
+            except NotConverged:
+                if answer is None:
+                    raise
+                for stage in string.stages:
+                    stage.wall = answer.factor
+                return answer  # in the wall before
+            answer, steps = found, found.steps
+            values |= {each.factor: values_of(each) for each in (*softer, answer)}
+            answer.estimate(values, before)
+            if answer.of_stiffness <= _TOO_SOFT * asked.tol or factor >= asked.stiffest:
+                return answer
+            stages, factor = LAST, 10.0 * factor
 
-        def on_stage(k):
-            bar.reached(float(k + 1))
-            if k == len(stages) - 2:
-                softer.append(record_of(problem, 1.0, 0, 0, 0))
 
-        stiffest = string.wall.stiffness * float(layout.sizes(scene).max())
-        rounding = _ROUNDED * np.finfo(float).eps * stiffest * scales.length / scales.force
-        steps = settle(problem, string.stages, string.clearance / scales.length, rounding, stages,
-                       careful=[len(stages) - 2], on_stage=on_stage)  # fmt: skip
-        answers = []
-        last = record_of(problem, 1.0, _negative_modes(string, problem, stability), steps, steps)
-        for record in (*softer, last):
-            why = [f"{string.words}; {model.signature.formulation.words}"]
-            path = Path.of(model, why, conservative_along)
-            path.append(record)
-            answers.append(InHole(string, path))
-    answer = answers[-1]
-    if not answer.balance <= _UNBALANCED * answer.scale:
+def _in_walls(string, problem, stability, stages, factor, steps, bar):
+    """[`InHole`] of the stages that are solved precisely, in walls of stiffnesses times a factor, after so many Newton
+    steps on this mesh."""
+    model, records = problem.model, {}
+    careful = [k for k, stage in enumerate(stages[:-1]) if stage in DECADES]
+
+    def on_stage(k):
+        bar.reached(float(k + 1))
+        if k in careful:
+            records[factor * stages[k][0]] = record_of(problem, 1.0, 0, 0, 0)
+
+    rounding = (
+        _ROUNDED * np.finfo(float).eps * factor * string.wall.stiffness * float(model.layout.sizes(model.scene).max())
+    )
+    steps += settle(problem, string.stages, string.clearance / model.scales.length,
+                    rounding * model.scales.length / model.scales.force,
+                    [(factor * wall, factor * spring, viscous) for wall, spring, viscous in stages],
+                    careful, on_stage)  # fmt: skip
+    records[factor] = record_of(problem, 1.0, _negative_modes(string, problem, stability), steps, steps)
+    answers = []
+    for stiffness, record in records.items():
+        path = Path.of(model, [f"{string.words}; {model.signature.formulation.words}"], conservative_along)
+        path.append(record)
+        answers.append(InHole(string, path, stiffness))
+    if not answers[-1].balance <= _UNBALANCED * answers[-1].scale:
         raise NotConverged(
-            f"the contact alternates: the reaction and all other forces differ by {answer.balance:.3g} N"
+            f"the contact alternates: the reaction and all other forces differ by {answers[-1].balance:.3g} N"
         )
-    answer.compare(before, answers[0] if softer else None)
-    return answer
+    return answers
 
 
 def _negative_modes(string, problem, stability):

@@ -22,6 +22,8 @@ _STIFFER = 1e4
 # Stiffness of the wall at a ring (N/m) over that along the string (N/m^2), since a ring digs in less; but where it is
 # larger than that, not more than so many EI/L^3, for rounding.
 _OF_RINGS, _STIFFEST = 100.0, 1e13
+# Largest stiffness of a ring where the wall is made stiffer, N/m: its deformation has to exceed rounding.
+_STIFFEST_RING = 1e11
 # Points at which the load across the hole is sampled, the part of them that it is not larger at, and its smallest value
 # over the weight.
 _SAMPLES, _TYPICAL, _LEAST = 257, 0.9, 0.1
@@ -122,6 +124,8 @@ def string_in(path, lengths, stiffness, weight, contact_radius, radius, friction
         TubeRing(rod.at(s), path, clearance, ring_radius, ring_stiffness, *_friction_at(wall, s))
         for s, clearance, ring_radius in rings
     )
+    for ring in around:
+        ring.stage.most = max(1.0, _STIFFEST_RING / ring.stiffness)
     support = Clamp(rod.start) if hinge is None else Hinge(rod.start, hinge)
     words = "the string's lengths are those under load" if not extensible else "the string stretches"
     turns = bool(torque or any(across for _, (_, across) in wall.slip))
