@@ -114,6 +114,21 @@ def test_a_rigid_wall_is_approached_as_closely_as_the_accuracy_needs():
         assert 0.02 * soft.errors[name] < apart < soft.errors[name]
 
 
+@pytest.mark.parametrize("operation", [cf.RotaryDrilling(80e3, 5e3), cf.Sliding(50e3), cf.TripOut()], ids=str)
+def test_a_soft_string_knows_that_bit_and_stabilisers_pry(operation):
+    """A stabiliser near the bit: the span above it presses it down, and the bit up."""
+    near_bit, upper = cf.Stabiliser(1.5, 0.2127, 0.165, 0.07), cf.Stabiliser(1.5, 0.2096, 0.165, 0.07)
+    collars = cf.Collar(18, "NC46-65"), cf.Collar(60, "NC46-65")
+    string = cf.DrillString([cf.Bit(0.2159), near_bit, collars[0], upper, collars[1], STRING.components[-1]])
+    where = cf.Borehole(build(), cf.HoleSection(500.0, 0.2159, 0.25))
+    soft, rod = (cf.torque_and_drag(where, string, operation, mud=MUD, model=model) for model in ("soft", "rod"))
+    sides = {side for start, end, force, side in rod.contacts if start == end > 495 and force > 10e3}
+    assert sides == {"low", "high"}
+    for name, scale in (("hook_load", np.abs(soft.tension).max()), ("surface_torque", np.abs(soft.torque).max() or 1.0)):
+        if scale > 1.0:
+            assert abs(getattr(rod, name) - getattr(soft, name)) < soft.model_error * scale
+
+
 class Asked(Exception):
     """With what `solve_in_hole` was asked for."""
 

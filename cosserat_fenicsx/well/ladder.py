@@ -12,7 +12,8 @@ A string on the low side also hangs lower by r sin(inclination), and is moved al
 bends, since its way there is longer or shorter than the axis; its weight feels both. Bending stiffness changes the
 friction by mu EI dk^2. A snake adds at most half the wall force of a helix; its friction makes the string a helix
 farther down, and the helix multiplies it on the way up: the string is solved again with a helix wherever there may be
-one. These are sums of sizes: differences of opposite signs do not cancel.
+one. Bits and stabilisers bear the load of their spans on a larger radius, and pry, see `prying`. These
+are sums of sizes: differences of opposite signs do not cancel.
 """
 
 from typing import NamedTuple
@@ -21,6 +22,7 @@ import numpy as np
 
 from cosserat_fenicsx.well import criteria
 from cosserat_fenicsx.well.buckled import LockUp, earliest_helix, growth
+from cosserat_fenicsx.well.rings import prying
 
 # Places on a piece where a snake is looked for.
 _FINE = 512
@@ -33,6 +35,7 @@ class ModelError(NamedTuple):
 
     clearance: float
     bending: float
+    rings: float
     snake: float
 
     @property
@@ -40,12 +43,12 @@ class ModelError(NamedTuple):
         return sum(self)
 
 
-def model_errors(path, pieces, soft, solved, sections):
+def model_errors(path, pieces, soft, solved, sections, rings=()):
     """`ModelError` of the hook load and of the surface torque.
 
     Args:
         path: a `WellPath`; pieces: `Pieces`; soft, solved: the `Solved` without and with buckling; sections: `Sections`
-            of the components.
+            of the components; rings: [`Ring`] from the bit up.
 
     Returns:
         infinite parts for snakes with which the string may lock up.
@@ -61,10 +64,13 @@ def model_errors(path, pieces, soft, solved, sections):
     stiff[groups[1:]] = stiffer
     extra = _snakes(chain, solved, EI, clearance)
     grown = growth(solved, pieces, sections)
-    hook, torque = ([float(share @ (part * grown)) for part in (missed, stiff, extra)] for share in (load, turn))
+    pried, arms = _at_rings(chain, solved, pieces, sections, rings)
+    parts = (missed, stiff, pried, extra)
+    hook, torque = ([float(share @ (part * grown)) for part in parts] for share in (load, turn))
     hook[0] += _lower(pieces)
+    torque[2] += float(turn @ arms)
     if extra.any() or solved.helical.any():
-        hook[2], torque[2] = map(max, _earlier(soft, solved, pieces, sections), (hook[2], torque[2]))
+        hook[3], torque[3] = map(max, _earlier(soft, solved, pieces, sections), (hook[3], torque[3]))
     return ModelError(*hook), ModelError(*torque)
 
 
@@ -88,6 +94,26 @@ def _snakes(chain, solved, EI, clearance):
         snakes = F > criteria.snake_load(EI[i], clearance[i], chain.weight[i], side)
         extra[i] = np.mean(np.where(snakes, criteria.helix_side(EI[i], clearance[i], F) / 2, 0.0)) * chain.length[i]
     return extra
+
+
+def _at_rings(chain, solved, pieces, sections, rings):
+    """Wall force (N) of bits and stabilisers that pry; and (N) by what the larger radius on which they bear the load of
+    their spans multiplies the torque."""
+    depth = pieces.bottom[-1]
+    ends = depth - np.append(0.0, np.cumsum(chain.length))  # measured depths, from the lower end up
+    largest = np.array([solved.side.max(axis=1) * chain.climb, np.maximum(-solved.tension.min(axis=1), 0.0),
+                        chain.curvature, (pieces.hole - pieces.radius)[chain.origin],
+                        np.nan_to_num(sections.EI[pieces.component[chain.origin]])])  # fmt: skip
+
+    def along(a, b):
+        return largest[:, (ends[:-1] > a + 1e-9) & (ends[1:] < b - 1e-9)].max(axis=1, initial=0.0)
+
+    pried, arms = np.zeros(len(chain.length)), np.zeros(len(chain.length))
+    for ring, pries, carries in zip(rings, *prying(rings, depth, along), strict=True):
+        i = int(np.clip(np.searchsorted(-ends, -ring.s) - 1, 0, len(chain.length) - 1))
+        pried[i] += pries
+        arms[i] += carries * max(1 - ring.body / ring.radius, 0.0)
+    return pried, arms
 
 
 def _lower(pieces):

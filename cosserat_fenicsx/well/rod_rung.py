@@ -7,7 +7,8 @@ Their bodies, and all other components, touch with their contact radius along th
 
 from cosserat_fenicsx.checks import refuse
 from cosserat_fenicsx.errors import SceneError
-from cosserat_fenicsx.well.components import Bit, Stabiliser, weight_in_mud
+from cosserat_fenicsx.well.components import weight_in_mud
+from cosserat_fenicsx.well.rings import is_ring, ring_of
 from cosserat_fenicsx.well.rod_answer import RodInContact
 
 
@@ -45,7 +46,7 @@ def rod_in_contact(flexible, decided, progress=None, exact=True):
             slip=[operation.direction(place.component.contact_radius) for place in laid],
             bottom_tension=-operation.weight,
             bottom_torque=operation.torque,
-            rings=[_ring(place, hole) for place in laid if _is_ring(place.component)],
+            rings=[ring_of(place, hole)[:3] for place in laid if is_ring(place.component)],
             wall_stiffness=hole.wall_stiffness,
             tol=flexible.tol,
             progress=progress,
@@ -79,17 +80,6 @@ def _along(hole, depth, value):
     return found
 
 
-def _is_ring(component):
-    return isinstance(component, Bit | Stabiliser)
-
-
 def _body_radius(component):
     """m; of what touches along its whole length."""
-    return component.outer_diameter / 2 if _is_ring(component) else component.contact_radius
-
-
-def _ring(place, hole):
-    """(s, clearance, radius), see `solve_in_hole`."""
-    s = place.bottom if isinstance(place.component, Bit) else (place.top + place.bottom) / 2
-    radius = place.component.contact_radius
-    return s, max(0.0, float(hole.at(s, "diameter")) / 2 - radius), radius
+    return component.outer_diameter / 2 if is_ring(component) else component.contact_radius
