@@ -123,10 +123,11 @@ def test_a_long_string_on_the_low_side_says_that_it_would_snake(share, stable):
     assert answer.hook_load == pytest.approx(-share * F_SNAKE, rel=1e-9)
 
 
-def test_the_helix_of_a_thrust():
-    """A weightless rod with finite EA and GA in a frictionless cylinder, at 100 kN: a Cosserat helix in the middle. It
-    starts as a helix of the same turn rate, whose radius fades at the ends, which are on the axis."""
-    case = json.loads((Path(__file__).parent / "reference" / "rod_in_hole.json").read_text(encoding="utf-8"))["helix"]
+@pytest.mark.parametrize("name", ["helix", "helix at 400 kN"])
+def test_the_helix_of_a_thrust(name):
+    """A weightless rod with finite EA and GA in a frictionless cylinder, at 100 and 400 kN: a Cosserat helix in the
+    middle. It starts as a helix of the same turn rate, whose radius fades at the ends, which are on the axis."""
+    case = json.loads((Path(__file__).parent / "reference" / "rod_in_hole.json").read_text(encoding="utf-8"))[name]
     length, rate, radius = 250.0, case["turn_rate"], case["r"]
     path = cf.WellPath.from_survey([0, length + 10], [0, 0], [0, 0])
     pipe = cf.Stiffness((case["GA"],) * 2, case["EA"], (case["EI"],) * 2, case["EI"])
@@ -149,9 +150,9 @@ def test_the_helix_of_a_thrust():
         force = model.densities.here()[1][..., :3] * model.scales.force / model.scales.length
     middle = (s > 0.35 * length) & (s < 0.65 * length)
     angle = np.unwrap(np.arctan2(position[:, 1], position[:, 0]))[middle]
-    assert np.polyfit(s[middle], angle, 1)[0] == pytest.approx(rate, rel=1e-7)
+    assert np.polyfit(s[middle], angle, 1)[0] == pytest.approx(rate, rel=3e-7)
     pressure = np.linalg.norm(force, axis=2)[90:160]
-    assert pressure == pytest.approx(case["contact_per_reference_length"], rel=1e-3)
+    assert pressure == pytest.approx(case["contact_per_reference_length"], rel=3e-3)
     z = position[middle, 2]
     shortening = 1 - (z[-1] - z[0]) / (s[middle][-1] - s[middle][0])
-    assert shortening == pytest.approx(case["shortening"], rel=1e-5)
+    assert shortening == pytest.approx(case["shortening"], rel=3e-5)  # the wall gives way
