@@ -54,6 +54,15 @@ def test_build_sections(radius, angle, below, pull, operation, mu, stiff, flexib
     assert abs(stiff - flexible) <= told < 8 * abs(stiff - flexible)
 
 
+@pytest.mark.parametrize(("md", "inc", "differs"), [
+    ([0, 200, 600], [0, 40, 40], -103.52), ([0, 300], [0, 60], -110.03), ([0, 100, 400], [30, 30, 70], -13.84),
+])  # fmt: skip
+def test_a_bend_at_an_end_takes_from_the_tension(md, inc, differs):
+    """Without friction, with a pull of 300 kN; the rod in contact on 1024 elements."""
+    answer = soft(cf.WellPath.from_survey(md, inc, [20] * len(md)), 0.04445, cf.Static(-300e3), 0.25)
+    assert abs(differs) <= answer.model_error * answer.tension.max() < 6 * abs(differs)
+
+
 def test_torque_of_rotating_strings_is_covered():
     """The rod in contact gives 0.54 and 3.4 % less torque than the soft string by Coulomb's law."""
     for name, less in (("P", 0.0054), ("F-12", 0.034)):

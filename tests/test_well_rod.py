@@ -85,7 +85,7 @@ def test_a_rotating_string_climbs_and_has_torque():
 
 @pytest.mark.parametrize("case", KNOWN["stiff build"][:2], ids=lambda case: case["name"])
 def test_a_build_section_against_its_strong_form(case):
-    """There the upper end turns freely and friction acts on the centreline: a difference of some newtons."""
+    """There the upper end turns freely and friction acts on the centreline: a difference of 31 and 18 N."""
     given, alpha = case["input"], case["input"]["alpha"]
     md = np.cumsum([0, given["h"], given["R"] * math.radians(alpha), given["D"] + 50.0])
     path = cf.WellPath.from_survey(md, [0, 0, alpha, alpha], [0, 0, 0, 0])
@@ -94,7 +94,7 @@ def test_a_build_section_against_its_strong_form(case):
     operation = {1: cf.TripOut, -1: cf.TripIn, 0: cf.Static}[given["c"]](weight=-given["T0"])
     section = cf.HoleSection(path.length, 2 * (0.06 + given["r"]), given["mu"])
     found = cf.torque_and_drag(cf.Borehole(path, section), string, operation, depth=case["rod_length"], model="rod")
-    assert found.hook_load == pytest.approx(case["hook_load_vertical"], rel=2e-3)
+    assert found.hook_load == pytest.approx(case["hook_load_vertical"], rel=2e-4)
 
 
 def test_a_rigid_wall_is_approached_as_closely_as_the_accuracy_needs():

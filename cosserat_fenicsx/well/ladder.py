@@ -10,11 +10,12 @@ hole between without touching it; the friction that is missed there is mu times
   the string by d.
 
 A string on the low side also hangs lower by r sin(inclination), and is moved along the hole by r times the angle of its
-bends, since its way there is longer or shorter than the axis; its weight feels both. Bending stiffness changes the
-friction by mu EI dk^2. A snake adds at most half the wall force of a helix; its friction makes the string a helix
-farther down, and the helix multiplies it on the way up: the string is solved again with a helix wherever there may be
-one. Bits and stabilisers bear the load of their spans on a larger radius, and pry, see `prying`. These
-are sums of sizes: differences of opposite signs do not cancel.
+bends, since its way there is longer or shorter than the axis; its weight feels both. Where the hole bends at an end at
+which the string is held on the axis, it leaves the axis at the angle a = k (x + sqrt(x^2 + 2 d/k)), x = sqrt(EI/T),
+which takes T a^2/2 from its tension. Bending stiffness changes the friction by mu EI dk^2. Bits and stabilisers bear
+the load of their spans on a larger radius, and pry, see `prying`. A snake adds at most half the wall force of a helix;
+its friction makes the string a helix farther down, and the helix multiplies it on the way up: the string is solved
+again with a helix wherever there may be one. These are sums of sizes: differences of opposite signs do not cancel.
 """
 
 from typing import NamedTuple
@@ -73,7 +74,7 @@ def model_errors(path, pieces, soft, solved, sections, rings=()):
     pried, arms = _at_rings(chain, solved, pieces, sections, rings)
     parts = (missed, stiff, pried, extra)
     hook, torque = ([float(share @ (part * grown)) for part in parts] for share in (load, turn))
-    hook[0] += _lower(pieces)
+    hook[0] += _lower(pieces) + _at_ends(pieces, solved, sections)
     torque[2] += float(turn @ arms)
     if extra.any() or solved.helical.any():
         hook[3], torque[3] = map(max, _earlier(soft, solved, pieces, sections), (hook[3], torque[3]))
@@ -128,6 +129,17 @@ def _lower(pieces):
     lean = clearance * np.sqrt(np.maximum(1 - pieces.t**2, 0.0))
     moved = np.cumsum(clearance * pieces.curvature * (pieces.bottom - pieces.top)) * np.abs(pieces.t)
     return float(np.abs(np.diff(pieces.weight, append=0.0)) @ (lean + moved))
+
+
+def _at_ends(pieces, solved, sections):
+    """Tension (N) that is lost where the string leaves the axis, at both ends."""
+    lost = 0.0
+    for at, tension in ((0, abs(solved.tension[-1, -1])), (-1, abs(solved.tension[0, 0]))):
+        k, EI = pieces.curvature[at], np.nan_to_num(sections.EI[pieces.component[at]])
+        clearance = (pieces.hole - pieces.radius)[at]
+        # T a^2/2 without the divisions by k and by T
+        lost += k * (np.sqrt(EI * k) + np.sqrt(EI * k + 2 * clearance * tension)) ** 2 / 2
+    return float(lost)
 
 
 def _turns(chain, solved, groups, clearance):
