@@ -10,6 +10,9 @@ from cosserat_fenicsx.ranks import on_first, world
 from cosserat_fenicsx.results.tables import as_text
 from cosserat_fenicsx.well import criteria
 
+# Notes of a sweep that are shown; more are counted.
+_NOTES = 12
+
 
 def answer_table(answer):
     """Text: the state along the string, surface loads, and what decided for the model."""
@@ -117,10 +120,10 @@ def sweep_table(sweep):
     for k, depth in enumerate(sweep.depths):
         table.add_row(f"{depth:.6g}", *(_known(values[k], 1, ".3f") for values in columns))
     lines = [as_text(table)]
-    locked = np.argwhere(~np.isnan(sweep.values["locked"]))
-    for i, j, k in locked:
-        at = sweep.values["locked"][i, j, k]
-        lines.append(f"{sweep.label(i, j)}: locks up at md = {at:.5g} m with the bit at {sweep.depths[k]:.5g} m")
+    notes = sweep.noted()
+    lines += notes[:_NOTES]
+    if len(notes) > _NOTES:
+        lines.append(f"and {len(notes) - _NOTES} more, see `notes`")
     if len(sweep):
         worst = np.nanmax(sweep.values["model_error"], initial=0.0)
         lines.append(f"largest estimated relative error of the model {worst:.0e}")
