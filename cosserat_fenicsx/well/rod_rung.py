@@ -54,7 +54,7 @@ def rod_in_contact(flexible, decided, progress=None, exact=True):
         if exact:
             raise
         solved, decided = short.answer, (*decided, f"NOT ENOUGH for tol = {flexible.tol:g}: {short}")
-    return RodInContact.of(flexible, solved, decided)
+    return RodInContact._of(flexible, solved, decided)
 
 
 def _check(component, mud):
