@@ -192,6 +192,8 @@ def test_charts(tmp_path):
     assert [axes.get_xlabel() for axes in figure.axes] == ["hook load (kN)", "surface torque (kN m)"]
     assert len(figure.axes[0].lines) == 6 and figure.axes[0].get_ylim() == pytest.approx((2585, 715))
     answer = cf.torque_and_drag(HOLE, STRING, cf.Sliding(1e5), mud=MUD, model="soft, buckled")
+    with pytest.raises(cf.SceneError, match="ends in .csv"):
+        answer.write(tmp_path / "answer.xlsx")
     answer.plot(tmp_path / "answer.png")
     assert (tmp_path / "answer.png").stat().st_size > 20000
     with pytest.raises(cf.SceneError, match="expected a name that ends in"):

@@ -87,7 +87,7 @@ def _write(answer, out, stem, pictures):
         files |= {f"{stem}.png": answer.plot, f"{stem}_3d.png": answer.plot_3d}
     for name, write in files.items():
         write(out / name)
-    return list(files)
+    return [f"{stem}_contacts.csv", *files]  # which `TorqueAndDrag.write` writes too
 
 
 def explain_well(options):

@@ -20,8 +20,9 @@ class InHole:
     Attributes:
         path: a `Path` with the rod's state as its only point, for all that a `Path` offers; scene: its `Scene`.
         s: arc length from the top, m. md: measured depth of the closest point of the hole's axis, m.
-        position: (n, 3), m. offset: (n, 3) from the hole's axis, m; distance: its size. standoff: 1 on the axis, 0
-            where it touches. node_length: the weights of integrals along the string, m.
+        position: (n, 3), m. offset: (n, 3) from the hole's axis, m; distance: its size. clearance: m, at a ring that of
+            the ring; standoff: the part of it that is left, 1 on the axis, 0 where it touches; touches: (n,) whether it
+            does. node_length: the weights of integrals along the string, m.
         side: direction of the rod from the axis, rad, from the high side of the hole, clockwise looking down the hole
             (from the first axis, north, where it is vertical).
         tension: effective, N. torque: N m, that the upper part exerts in the sense of clockwise rotation on the lower.
@@ -111,9 +112,36 @@ class InHole:
         return np.where(clear[:, None], self.offset / np.where(clear, self.distance, 1.0)[:, None], 0.0)
 
     @cached_property
+    def _ring_nodes(self):
+        """(rings,) the node of each ring."""
+        stations = np.array([ring.station.s for ring in self.string.rings])
+        return np.abs(self.s - stations[:, None]).argmin(axis=1)
+
+    @cached_property
+    def clearance(self):
+        """(n,) m: radius of the hole less that of the string, at a ring less that of the ring."""
+        found = self.string.wall.sizes(self.s, self.md)[0]
+        found[self._ring_nodes] = [ring.clearance for ring in self.string.rings]
+        return found
+
+    @cached_property
     def standoff(self):
-        """(n,) the part of the clearance that is left."""
-        return 1 - self.distance / self.string.wall.sizes(self.s, self.md)[0]
+        """(n,) the part of the clearance that is left; 0 where there is none."""
+        clear = self.clearance > 0
+        return np.where(clear, 1 - self.distance / np.where(clear, self.clearance, 1.0), 0.0)
+
+    @cached_property
+    def _pressed(self):
+        """(rings,) whether each ring touches."""
+        at = self._ring_nodes
+        return self.distance[at] > self.clearance[at]
+
+    @cached_property
+    def touches(self):
+        """(n,) whether the string touches the wall, or a ring does."""
+        found = self.side_force > 0
+        found[self._ring_nodes] |= self._pressed
+        return found
 
     @cached_property
     def side(self):
@@ -212,13 +240,15 @@ class InHole:
         return found
 
     @cached_property
+    def _ring_pressures(self):
+        """(rings,) N: across the hole, without friction; what is left of rounding where a ring does not touch."""
+        friction = [ring.friction * np.hypot(*ring.slip[0][1]) for ring in self.string.rings]
+        return np.linalg.norm(self.ring_forces, axis=1) / np.hypot(1.0, friction)
+
+    @cached_property
     def wall_force(self):
         """N."""
-        across = [
-            np.linalg.norm(force) / np.hypot(1.0, ring.friction * np.hypot(*ring.slip[0][1]))
-            for ring, force in zip(self.string.rings, self.ring_forces, strict=True)
-        ]
-        return float(self.node_force.sum() + sum(across))
+        return float(self.node_force.sum() + self._ring_pressures.sum())
 
     @cached_property
     def contacts(self):
@@ -227,7 +257,9 @@ class InHole:
         EI = max(bending_of(section) for section in string.sections)
         layer = (4 * EI / self.wall_stiffness) ** 0.25
         rings = [
-            (ring.station.s, np.linalg.norm(force)) for ring, force in zip(string.rings, self.ring_forces, strict=True)
+            (ring.station.s, force)
+            for ring, force, pressed in zip(string.rings, self._ring_pressures, self._pressed, strict=True)
+            if pressed
         ]
         s, side = self.s[self._nodes], self.side[self._nodes]
         return contacts_along(s, self._of_nodes, self.element_pressures, side, layer, rings)

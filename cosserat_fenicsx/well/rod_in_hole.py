@@ -138,9 +138,9 @@ class NotAccurate(NotConverged):
 
     def __init__(self, answer, tol):
         super().__init__(
-            f"solve_in_hole: the estimated error is {answer.error:.1e} on {answer.path.elements[0]} elements, of which "
-            f"the wall's stiffness makes {answer.of_stiffness:.1e}: expected a tol above it, not {tol:g}, or a stiffer "
-            "wall"
+            f"the estimated error of the rod in contact is {answer.error:.1e} on {answer.path.elements[0]} elements, of "
+            f"which the wall's softness makes {answer.of_stiffness:.1e}: expected a tol above it, not {tol:g}, or a "
+            "stiffer wall"
         )
         self.answer = answer
 
@@ -180,8 +180,9 @@ def _finer(string, count, degree, before, asked, bar, comm):
         except NotConverged as failed:
             reason = failed
     raise NotConverged(
-        f"solve_in_hole: no equilibrium was found on {count} elements: {reason}. A string that is compressed beyond "
-        "its buckling load may have many: expected more elements, a softer wall, or less compression"
+        f"no equilibrium of the rod in contact was found on {count} elements: {reason}. A string that is compressed "
+        "beyond its buckling load may have many, or none where it locks up: expected less compression or friction, or "
+        "a softer wall (wall_stiffness)"
     )
 
 

@@ -31,9 +31,9 @@ def rod_in_contact(flexible, decided, progress=None, exact=True):
         refuse("torque_and_drag", "torque_convention", flexible.torque_convention,
                "'coulomb', the law that the rod in contact follows")  # fmt: skip
     laid = flexible.laid[::-1]  # from the top down
-    for place in laid:
-        _check(place.component, flexible.mud)
     hole, operation = flexible.hole, flexible.operation
+    for place in laid:
+        _check(place, hole, flexible.mud)
     try:
         solved = solve_in_hole(
             hole.path,
@@ -55,10 +55,11 @@ def rod_in_contact(flexible, decided, progress=None, exact=True):
         if exact:
             raise
         solved, decided = short.answer, (*decided, f"NOT ENOUGH for tol = {flexible.tol:g}: {short}")
-    return RodInContact.of(flexible, solved, decided)
+    return RodInContact._of(flexible, solved, decided)
 
 
-def _check(component, mud):
+def _check(place, hole, mud):
+    component = place.component
     if component.stiffness is None:
         raise SceneError(
             f"{component.name}: stiffness = None: expected a Stiffness for model = 'rod', the rod in contact"
@@ -67,6 +68,13 @@ def _check(component, mud):
     if not weight > 0:
         raise SceneError(
             f"{component.name}: it weighs {weight:g} N/m in mud: expected a positive weight for model = 'rod'"
+        )
+    inside = [x.to for x in hole.sections if place.top < x.to < place.bottom]
+    narrowest, wide = float(hole.at([*inside, place.bottom], "diameter").min()), 2 * _body_radius(component)
+    if not wide < narrowest:
+        raise SceneError(
+            f"{component.name}: its body is {wide:g} m wide in a hole of {narrowest:g} m: expected a clearance for "
+            "model = 'rod'"
         )
 
 

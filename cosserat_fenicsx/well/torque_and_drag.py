@@ -20,6 +20,7 @@ from cosserat_fenicsx.well.string import DrillString
 AUTO, SOFT, BUCKLED, ROD = "auto", "soft", "soft, buckled", "rod"
 MODELS = (AUTO, SOFT, BUCKLED, ROD)
 CONVENTIONS = ("coulomb", "johancsik")
+_LOCKS_UP = "WITH THE WALL FORCE OF A HELIX IT LOCKS UP"
 _NO_ROD = (
     "the exact rod in contact is not tried: of the many equilibria of a string that is buckled beyond the load of a "
     "helix it need not find the one that is there; model='rod' looks for one"
@@ -93,6 +94,8 @@ def torque_and_drag(
         return rod_in_contact(flexible, why, progress, exact=model == ROD)
     except (SceneError, NotConverged, InstallationError) as problem:
         if model == ROD:
+            if isinstance(problem, NotConverged):
+                problem.args = ("; ".join([str(problem), *(line for line in why if line.startswith(_LOCKS_UP))]),)
             raise
         failed = f"the exact rod in contact was tried, and not solved: {problem}"
         return replace(flexible, why=(*flexible.why, failed))
@@ -112,7 +115,7 @@ def _flexible(given, model, tol, torque_convention, pieces, laid):
         except LockUp as stuck:
             if model != ROD:
                 raise
-            why.append(f"WITH THE WALL FORCE OF A HELIX IT LOCKS UP: {stuck}")
+            why.append(f"{_LOCKS_UP}: {stuck}")
     solved, used = buckled or soft, BUCKLED if buckled or model == BUCKLED else SOFT
     left_out, scales = model_errors(path, pieces, soft, solved, sections, rings), scales_of(solved, pieces)
     error = max(map(share, (solved.error, solved.torque_error), scales))
