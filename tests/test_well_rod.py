@@ -56,6 +56,8 @@ def test_what_the_answer_of_the_rod_tells(out):
     assert out.drag == pytest.approx(out.hook_load - 50e3 - 241.13 * np.ptp(out.position[:, 2]), rel=1e-6)
     in_arc = (out.md > 150) & (out.md < 250)
     assert out.bending_moment[in_arc] == pytest.approx(EI * math.radians(40) / 200, rel=0.02)
+    errors = out.errors_along
+    assert 0 < errors["side_force"] < 20 and f"side force to {errors['side_force']:.2g} N/m" in str(out)
     # out of the hole the pipe is pulled to the high side of the build section, and lies on the low side below it
     sides = {side: sum(force for _, _, force, name in out.contacts if name == side) for side in ("high", "low")}
     assert {name for *_, name in out.contacts} == {"high", "low"} and min(sides.values()) > 1e3
