@@ -44,17 +44,21 @@ def stages_from(spring, way="fast"):
 
     Args:
         spring: the first spring, with which the loads move the rod by about the clearance.
-        way: "fast"; "gentle", by small steps; or "relaxed", for a rod that is compressed beyond its buckling load.
+        way: "fast"; "gentle", by small steps; "relaxed", for a rod that is compressed beyond its buckling load; or
+            "helix", for one that begins buckled, at the wall: the same without the spring to the axis.
     """
     spring = min(max(spring, _SOFTEST), 0.1 / _TAKES_OVER)
     wall, step = _TAKES_OVER * spring, 10.0 if way == "fast" else _SMALL_STEP
+    if way == "helix":
+        wall = min(_TAKES_OVER * wall, 0.1)
     count = max(0, math.ceil(math.log(0.1 / wall, step) - 1e-9))
     stiffer = [(0.1 * (wall / 0.1) ** (1 - k / count), 0.0, False) for k in range(1, count + 1)]
-    if way == "relaxed":
+    if way in ("relaxed", "helix"):
         fading = [(wall, spring, True)]
     else:
         fading = [(wall, spring / step**k, False) for k in range(1, 1 + math.ceil(_FADED / math.log10(step)))]
-    return ((0.0, spring, False), *fading, (wall, 0.0, False), *stiffer, *LAST)
+    to_axis = () if way == "helix" else ((0.0, spring, False),)
+    return (*to_axis, *fading, (wall, 0.0, False), *stiffer, *LAST)
 
 
 def settle(problem, walls, clearance, rounding, stages, careful=(), on_stage=None):

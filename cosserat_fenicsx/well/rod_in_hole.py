@@ -10,7 +10,6 @@ from cosserat_fenicsx.checks import number, refuse
 from cosserat_fenicsx.errors import NotConverged
 from cosserat_fenicsx.models.rodmesh import Layout
 from cosserat_fenicsx.progress import Progress
-from cosserat_fenicsx.quaternions import product_conjugate
 from cosserat_fenicsx.results.accuracy import on_mesh
 from cosserat_fenicsx.results.path import Path
 from cosserat_fenicsx.statics.circulatory import conservative_along
@@ -18,6 +17,7 @@ from cosserat_fenicsx.statics.path.recorder import record_of
 from cosserat_fenicsx.statics.settling import BACK, LAST, LAST_TWO, settle, stages_from
 from cosserat_fenicsx.statics.solvers import solvers_of
 from cosserat_fenicsx.well.in_hole import InHole
+from cosserat_fenicsx.well.starts import in_helix, on_axis
 from cosserat_fenicsx.well.string_scene import string_in
 
 # Degree of the elements where none is asked for: lift-off forces limit the regularity, higher degrees gain nothing.
@@ -31,8 +31,8 @@ _FEWEST, _DENSEST = 0.3, 2.4
 _BY_WALL = 1.25
 # Part of the accuracy asked for below which the effect of the wall's stiffness is not found again on a finer mesh.
 _KNOWN = 0.1
-# Starts in turn, see `stages_from`.
-_STARTS = ("fast", "gentle", "relaxed")
+# Starts on the axis in turn, see `stages_from`; and the one from a helix, which begins as in a viscous fluid.
+_STARTS, _FROM_HELIX = ("fast", "gentle", "relaxed"), ("helix",)
 # Rounding of the residual of a node, over that of its position times the stiffness of its piece of wall.
 _ROUNDED = 20.0
 # Largest difference between the reaction and the balance of all forces, over the sum of the wall's forces.
@@ -56,6 +56,7 @@ def solve_in_hole(
     hinge=None,
     extensible=False,
     has_arm=True,
+    helix=False,
     tol=1e-4,
     elements=None,
     degree=_DEGREE,
@@ -91,6 +92,8 @@ def solve_in_hole(
         extensible: whether the axial stiffness counts in the equilibrium; the lengths are then those of the
             unstretched string.
         has_arm: whether friction acts on the surface; False: on the centreline.
+        helix: whether to begin as a helix along the wall where the string is compressed beyond its buckling load, see
+            `in_helix`; False: on the axis. Where there are several equilibria, the start decides which one is found.
         tol: relative accuracy of hook load and torque.
         elements: their number, which fixes the mesh; the estimate is then that of a mesh of a quarter of them.
         degree: of the elements, 2 to 4.
@@ -110,7 +113,7 @@ def solve_in_hole(
     with Progress([float(len(stages_from(string.spring)))], progress, comm, "stage") as bar:
         answer = None
         for count in counts:
-            answer = _finer(string, count, degree, answer, tol, bar, comm)
+            answer = _finer(string, count, degree, answer, helix, tol, bar, comm)
             # finer meshes change nothing of what the wall's stiffness does
             if elements is None and answer.error <= max(tol, _BY_WALL * answer.of_stiffness):
                 break
@@ -144,7 +147,7 @@ def _counts(elements):
     return [max(1, int(elements) // _BEFORE), int(elements)]
 
 
-def _finer(string, count, degree, before, tol, bar, comm):
+def _finer(string, count, degree, before, helix, tol, bar, comm):
     """The `InHole` on a mesh of so many elements, from that on the mesh before, or from the start in stages."""
     if before is not None:
         layout = _divided(string, before.path.layout, _wanted(before), count)
@@ -153,10 +156,10 @@ def _finer(string, count, degree, before, tol, bar, comm):
                 return _on_mesh(string, layout, degree, stages, before, before, bar, comm)
     pieces = Layout.of(string.scene, 1)
     layout = _divided(string, pieces, np.diff(pieces.breaks[0]), count)
-    for way in _STARTS:
+    for way in _FROM_HELIX if helix else _STARTS:
         try:
             stages = stages_from(string.spring, way)
-            return _on_mesh(string, layout, degree, stages, None, before, bar, comm)
+            return _on_mesh(string, layout, degree, stages, in_helix if helix else None, before, bar, comm)
         except NotConverged as failed:
             reason = failed
     raise NotConverged(
@@ -209,8 +212,10 @@ def _on_mesh(string, layout, degree, stages, start, before, bar, comm):
 
         stiffest = string.wall.stiffness * float(layout.sizes(scene).max())
         rounding = _ROUNDED * np.finfo(float).eps * stiffest * scales.length / scales.force
-        steps = settle(problem, string.stages, string.clearance / scales.length, rounding, stages,
-                       careful=[len(stages) - 2], on_stage=on_stage)  # fmt: skip
+        # a helix is almost free to turn as a whole, and must be found before the wall is made stiffer
+        careful = range(len(stages) - 1) if start is in_helix else [len(stages) - 2]
+        clearance = string.clearance / scales.length
+        steps = settle(problem, string.stages, clearance, rounding, stages, careful, on_stage)
         answers = []
         last = record_of(problem, 1.0, _negative_modes(string, problem, stability), steps, steps)
         for record in (*softer, last):
@@ -239,29 +244,14 @@ def _negative_modes(string, problem, stability):
 
 
 def _begin(problem, string, layout, before):
-    """Set the state: that of another mesh, or on the axis without contact force."""
+    """Set the state: that of another mesh, or a helix or on the axis without contact force."""
     model = problem.model
-    if before is not None:
+    if isinstance(before, InHole):
         rq, n = on_mesh(before.path, layout)
         problem.begin_at(model.unknowns_of(rq[0]), n[0], before.path._records[0].reactions)
         return
-    rod = string.rod
-    rq = on_axis(rod, string.path, layout.node_s(model.nodes)[0] * rod.length)
+    rod, s = string.rod, layout.node_s(model.nodes)[0] * string.rod.length
+    rq = in_helix(string, s) if before is in_helix else on_axis(rod, string.path, s)
     rq[:, :3] = (rq[:, :3] - string.scene.origin(rod)) / model.scales.length
     n = np.zeros((sum(layout.counts), len(model.forms.gauss), 3))
     problem.begin_at(model.unknowns_of(rq), n, np.zeros_like(problem.multipliers()))
-
-
-def on_axis(rod, path, s):
-    """(r, q) (n, 7) of a rod that lies on the axis without twist, at ascending arc lengths s (n,), from the path's
-    start; q is the rotation from the rod's straight reference, without a jump of sign."""
-    near = path.nearest(None, s)
-    before = np.concatenate([rod.curve.frame(np.zeros(1))[:, :, 2], near.tangent[:-1]])
-    cos = np.einsum("ni,ni->n", before, near.tangent)
-    q = np.column_stack([1 + cos, np.cross(before, near.tangent)])
-    q /= np.linalg.norm(q, axis=1, keepdims=True)
-    done = 1  # products of the small rotations of 1, 2, 4, .. nodes
-    while done < len(q):
-        q[done:] = product_conjugate(q[done:], q[:-done] * (1.0, -1.0, -1.0, -1.0))
-        done *= 2
-    return np.column_stack([near.position, q / np.linalg.norm(q, axis=1, keepdims=True)])
