@@ -33,6 +33,10 @@ _BY_WALL = 1.25
 _KNOWN = 0.1
 # Starts on the axis in turn, see `stages_from`; and the one from a helix, which begins as in a viscous fluid.
 _STARTS, _FROM_HELIX = ("fast", "gentle", "relaxed"), ("helix",)
+# Springs that hold a helix, see `settle`.
+_HOLD = 1e-10
+# Elements of the first mesh that a helix is looked for on, at most.
+_FINE = 1024
 # Rounding of the residual of a node, over that of its position times the stiffness of its piece of wall.
 _ROUNDED = 20.0
 # Largest difference between the reaction and the balance of all forces, over the sum of the wall's forces.
@@ -113,7 +117,12 @@ def solve_in_hole(
     with Progress([float(len(stages_from(string.spring)))], progress, comm, "stage") as bar:
         answer = None
         for count in counts:
-            answer = _finer(string, count, degree, answer, helix, tol, bar, comm)
+            try:
+                answer = _finer(string, count, degree, answer, helix, tol, bar, comm)
+            except NotConverged:
+                if answer is not None or not helix or count >= min(_FINE, counts[-1]):
+                    raise
+                continue  # too few elements for its turns
             # finer meshes change nothing of what the wall's stiffness does
             if elements is None and answer.error <= max(tol, _BY_WALL * answer.of_stiffness):
                 break
@@ -153,13 +162,13 @@ def _finer(string, count, degree, before, helix, tol, bar, comm):
         layout = _divided(string, before.path.layout, _wanted(before), count)
         for stages in (LAST if before.of_stiffness <= _KNOWN * tol else LAST_TWO, BACK):
             with contextlib.suppress(NotConverged):  # the contact on the coarse mesh may be too far off
-                return _on_mesh(string, layout, degree, stages, before, before, bar, comm)
+                return _on_mesh(string, layout, degree, stages, before, before, helix, bar, comm)
     pieces = Layout.of(string.scene, 1)
     layout = _divided(string, pieces, np.diff(pieces.breaks[0]), count)
     for way in _FROM_HELIX if helix else _STARTS:
         try:
             stages = stages_from(string.spring, way)
-            return _on_mesh(string, layout, degree, stages, in_helix if helix else None, before, bar, comm)
+            return _on_mesh(string, layout, degree, stages, None, before, helix, bar, comm)
         except NotConverged as failed:
             reason = failed
     raise NotConverged(
@@ -195,13 +204,13 @@ def _divided(string, layout, wanted, count):
     return Layout((np.append(np.concatenate(found), 1.0),))
 
 
-def _on_mesh(string, layout, degree, stages, start, before, bar, comm):
-    """The `InHole` on one mesh, from that on another mesh or from the axis, with errors by that on the mesh before."""
+def _on_mesh(string, layout, degree, stages, start, before, helix, bar, comm):
+    """The `InHole` on one mesh, from that on another mesh, a helix or the axis; its errors by the mesh before."""
     scene = string.scene
     with solvers_of(scene, layout, degree=degree, comm=comm) as (problem, _, stability):
         model, scales = problem.model, problem.model.scales
         problem.set_load_factor(1.0)
-        _begin(problem, string, layout, start)
+        _begin(problem, string, layout, start, helix)
         bar.start(f"rod in its hole, {model.unknowns} unknowns")
         softer = []
 
@@ -213,9 +222,9 @@ def _on_mesh(string, layout, degree, stages, start, before, bar, comm):
         stiffest = string.wall.stiffness * float(layout.sizes(scene).max())
         rounding = _ROUNDED * np.finfo(float).eps * stiffest * scales.length / scales.force
         # a helix is almost free to turn as a whole, and must be found before the wall is made stiffer
-        careful = range(len(stages) - 1) if start is in_helix else [len(stages) - 2]
-        clearance = string.clearance / scales.length
-        steps = settle(problem, string.stages, clearance, rounding, stages, careful, on_stage)
+        careful = range(len(stages) - 1) if helix else [len(stages) - 2]
+        clearance, hold = string.clearance / scales.length, _HOLD if helix else 0.0
+        steps = settle(problem, string.stages, clearance, rounding, stages, careful, on_stage, hold)
         answers = []
         last = record_of(problem, 1.0, _negative_modes(string, problem, stability), steps, steps)
         for record in (*softer, last):
@@ -243,15 +252,15 @@ def _negative_modes(string, problem, stability):
     return found
 
 
-def _begin(problem, string, layout, before):
-    """Set the state: that of another mesh, or a helix or on the axis without contact force."""
+def _begin(problem, string, layout, before, helix):
+    """Set the state: that of another mesh, or a helix or on the axis, without contact force."""
     model = problem.model
-    if isinstance(before, InHole):
+    if before is not None:
         rq, n = on_mesh(before.path, layout)
         problem.begin_at(model.unknowns_of(rq[0]), n[0], before.path._records[0].reactions)
         return
     rod, s = string.rod, layout.node_s(model.nodes)[0] * string.rod.length
-    rq = in_helix(string, s) if before is in_helix else on_axis(rod, string.path, s)
+    rq = in_helix(string, s) if helix else on_axis(rod, string.path, s)
     rq[:, :3] = (rq[:, :3] - string.scene.origin(rod)) / model.scales.length
     n = np.zeros((sum(layout.counts), len(model.forms.gauss), 3))
     problem.begin_at(model.unknowns_of(rq), n, np.zeros_like(problem.multipliers()))
