@@ -156,3 +156,25 @@ def test_the_helix_of_a_thrust(name):
     z = position[middle, 2]
     shortening = 1 - (z[-1] - z[0]) / (s[middle][-1] - s[middle][0])
     assert shortening == pytest.approx(case["shortening"], rel=3e-5)  # the wall gives way
+
+
+def test_a_string_that_is_pressed_on_its_bit_is_a_helix():
+    """In a vertical hole, hung from a clamp: it is as slender a helix everywhere as its compression F there asks for,
+    with sqrt(F/(2 EI)) rad per m and r F^2/(4 EI) of the wall, and it is stable, unlike the straight string."""
+    length, thrust = 500.0, 150e3
+    path = cf.WellPath.from_survey([0, length + 10], [0, 0], [0, 0])
+    pipe = cf.Stiffness((1.35e8, 1.35e8), 7e8, (EI, EI), 1e6)
+    given = {"radius": 0.0635 + R, "rings": [(length, 0.0, 0.1)], "bottom_tension": -thrust}
+    straight = solve_in_hole(path, [length], pipe, W, 0.0635, elements=256, **given)
+    answer = solve_in_hole(path, [length], pipe, W, 0.0635, helix=True, **given)
+    assert straight.distance.max() < 1e-9 and straight.negative_modes > 10
+    assert answer.negative_modes == 0 and answer.error < 1e-4
+    assert answer.hook_load == pytest.approx(W * length - thrust, rel=1e-9)
+    wound = (answer.s > 50) & (answer.s < 480)
+    F = thrust - W * (length - answer.s)
+    rate = np.gradient(np.unwrap(answer.side), answer.s)
+    assert rate[wound] == pytest.approx(np.sqrt(F / (2 * EI))[wound], rel=1e-3)
+    pressure = (answer.node_force / answer.node_length)[wound]
+    assert pressure == pytest.approx((R * F**2 / (4 * EI))[wound], rel=2e-2)
+    s, z = answer.s[wound], answer.position[wound, 2]
+    assert np.ptp(s) - np.ptp(z) == pytest.approx(np.trapz((R**2 * F / (4 * EI))[wound], s), rel=1e-3)

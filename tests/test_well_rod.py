@@ -137,9 +137,12 @@ def test_a_soft_string_knows_that_bit_and_stabilisers_pry(operation):
     string = cf.DrillString([cf.Bit(0.2159), near_bit, collars[0], upper, collars[1], STRING.components[-1]])
     where = cf.Borehole(build(), cf.HoleSection(500.0, 0.2159, 0.25))
     soft, rod = (cf.torque_and_drag(where, string, operation, mud=MUD, model=model) for model in ("soft", "rod"))
-    sides = {side for start, end, force, side in rod.contacts if start == end > 495 and force > 10e3}
+    sides = {side for start, end, force, side in rod.contacts if start == end > 495 and force > 9e3}
     assert sides == {"low", "high"}
-    for name, scale in (("hook_load", np.abs(soft.tension).max()), ("surface_torque", np.abs(soft.torque).max() or 1.0)):
+    for name, scale in (
+        ("hook_load", np.abs(soft.tension).max()),
+        ("surface_torque", np.abs(soft.torque).max() or 1.0),
+    ):
         if scale > 1.0:
             assert abs(getattr(rod, name) - getattr(soft, name)) < soft.model_error * scale
 
@@ -226,3 +229,16 @@ def test_whole_wells(name, operation, load):
     found = cf.torque_and_drag(hole(well(name)), STRING, operation)
     assert found.model == "rod" and found.enough and found.hook_load == pytest.approx(load, rel=5e-5)
     assert not any("MORE" in line for line in found.why)  # the soft string's estimate covers the difference
+
+
+def test_a_string_in_a_vertical_hole_is_a_helix_and_not_straight():
+    path = cf.WellPath.from_survey([0, 310], [0, 0], [0, 0])
+    string = cf.DrillString([cf.Bit(0.2159), cf.DrillPipe(size="5 in 19.50 lb/ft")])
+    given = {"mud": MUD, "depth": 300.0, "model": "rod", "tol": 1e-3}
+    answer = cf.torque_and_drag(cf.Borehole(path, cf.HoleSection(310, 0.2159, 0.0)), string, cf.Static(75e3), **given)
+    assert "begun as a helix: from the axis an equilibrium was found that would buckle" in "\n".join(answer.why)
+    assert answer.solved.negative_modes == 0 and 0 < answer.neutral_point < 40
+    wound = (answer.md > 100) & (answer.md < 240)
+    rate = np.gradient(np.unwrap(answer.solved.side), answer.solved.s)[wound]
+    EI = string.components[1].stiffness.bending[0]
+    assert rate == pytest.approx(np.sqrt(-answer.tension[wound] / (2 * EI)), rel=5e-3)

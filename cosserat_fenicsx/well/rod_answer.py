@@ -154,8 +154,8 @@ def _found(flexible, solved, differences):
     )
     yield (
         f"side force to {solved.errors_along['side_force']:.2g} N/m and bending moment to "
-        f"{solved.errors_along['bending_moment']:.2g} N m on {100 * MOSTLY:g} % of the string, which do not count in what is "
-        "enough"
+        f"{solved.errors_along['bending_moment']:.2g} N m on {100 * MOSTLY:g} % of the string, which do not count in "
+        "what is enough"
     )
     scales = scales_of(flexible.solved, flexible.pieces)
     for name, apart in differences.items():
