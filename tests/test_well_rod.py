@@ -2,6 +2,7 @@
 
 import json
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -145,6 +146,25 @@ def test_a_soft_string_knows_that_bit_and_stabilisers_pry(operation):
     ):
         if scale > 1.0:
             assert abs(getattr(rod, name) - getattr(soft, name)) < soft.model_error * scale
+
+
+def test_many_pieces_are_solved_on_two_meshes():
+    """A string of more components than the first mesh has elements: as of one component."""
+    joints = cf.DrillString([*(replace(STRING.components[-1], length=1.0) for _ in range(300)), STRING.components[-1]])
+    whole, cut = (cf.torque_and_drag(hole(build()), x, cf.TripOut(-50e3), model="rod") for x in (STRING, joints))
+    assert abs(whole.hook_load - cut.hook_load) < cut.error * cut.hook_load < 1e-4 * cut.hook_load
+    assert cut.solved.path.elements[0] > 512
+
+
+def test_the_survey_below_the_string_changes_nothing():
+    md, inc = [0, 100, 300, 500], [10, 10, 60, 60]
+    sections = [cf.HoleSection(250.0, 0.25, 0.2), cf.HoleSection(400.0, 0.2, 0.4)]
+    loads = []
+    for more in (1.0, 10_000.0):
+        path = cf.WellPath.from_survey([*md, 500 + more], [*inc, 60], [0] * 5)
+        where = cf.Borehole(path, [*sections, cf.HoleSection(path.length, 0.22, 0.3)])
+        loads.append(cf.torque_and_drag(where, STRING, cf.TripOut(), depth=500.0, model="rod").hook_load)
+    assert loads[0] == pytest.approx(loads[1], rel=1e-9)
 
 
 class Asked(Exception):

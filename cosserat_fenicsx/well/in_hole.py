@@ -6,6 +6,7 @@ import numpy as np
 
 from cosserat_fenicsx.quaternions import directors
 from cosserat_fenicsx.results.recovery import at_nodes
+from cosserat_fenicsx.well.contacts import side_in_space
 from cosserat_fenicsx.well.resultants import contacts_along
 from cosserat_fenicsx.well.rod_errors import errors_of
 from cosserat_fenicsx.well.smoothed import along_elements, apart_mostly
@@ -68,12 +69,14 @@ class InHole:
 
         Args:
             values: {factor: {name: value}} in walls of several stiffnesses on this mesh; before: the `InHole` on the
-                mesh before, or None.
+                mesh before, or None. Where that is no coarser, it tells nothing.
         """
-        self.estimates = found = errors_of(self, values, before and before.estimates)
+        coarser = before if before and before.path.elements[0] < self.path.elements[0] else None
+        self.estimates = found = errors_of(self, values, coarser and coarser.estimates)
         self.errors, self.error, self.of_stiffness = found.errors, found.error, found.of_stiffness
-        if before is not None:
+        if before:
             self.steps += before.steps
+        if coarser:
             self._coarser = before.s, {name: getattr(before, name) for name in _ALONG}
 
     @property
@@ -158,12 +161,7 @@ class InHole:
     @cached_property
     def side(self):
         """(n,) rad."""
-        t = self._near.tangent
-        high = t[:, 2:] * t - (0.0, 0.0, 1.0)
-        vertical = np.linalg.norm(high, axis=1) < 1e-9
-        high[vertical] = np.array([1.0, 0.0, 0.0]) - t[vertical, :1] * t[vertical]
-        right = np.cross(t, high)
-        return np.arctan2((self._outward * right).sum(axis=1), (self._outward * high).sum(axis=1))
+        return side_in_space(self._near.tangent, self._outward)
 
     @cached_property
     def _contact(self):

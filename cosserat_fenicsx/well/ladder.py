@@ -15,7 +15,8 @@ which the string is held on the axis, it leaves the axis at the angle a = k (x +
 which takes T a^2/2 from its tension. Bending stiffness changes the friction by mu EI dk^2. Bits and stabilisers bear
 the load of their spans on a larger radius, and pry, see `prying`. A snake adds at most half the wall force of a helix;
 its friction makes the string a helix farther down, and the helix multiplies it on the way up: the string is solved
-again with a helix wherever there may be one. These are sums of sizes: differences of opposite signs do not cancel.
+again with a helix wherever there may be one. A helix is pressed on the wall by its own force alone, on average, and not
+by its load as well, as is usually reckoned. These are sums of sizes: differences of opposite signs do not cancel.
 """
 
 from typing import NamedTuple
@@ -92,7 +93,8 @@ def _earlier(soft, solved, pieces, sections):
 
 
 def _snakes(chain, solved, EI, clearance):
-    """Half the wall force (N) of a helix, of the snakes in pieces; a snake may be a small part of a long piece."""
+    """Half the wall force (N) of a helix, of the snakes in pieces (a snake may be a small part of a long piece); and
+    the load across of the helices, since the mean wall force of a helix with gravity is r F^2/(4 EI) alone."""
     extra = np.zeros(len(EI))
     fine = (np.arange(_FINE) + 0.5) / _FINE
     for i in np.flatnonzero((solved.tension.min(axis=1) < 0) & ~solved.helical & (clearance > 1e-9) & (EI > 0)):
@@ -100,6 +102,10 @@ def _snakes(chain, solved, EI, clearance):
         side = np.interp(fine, solved.at, solved.side[i]) * chain.climb[i]
         snakes = F > criteria.snake_load(EI[i], clearance[i], chain.weight[i], side)
         extra[i] = np.mean(np.where(snakes, criteria.helix_side(EI[i], clearance[i], F) / 2, 0.0)) * chain.length[i]
+    for i in np.flatnonzero(solved.helical):
+        compressions = np.maximum(-np.interp(fine, solved.at, solved.tension[i]), 0.0)
+        both = np.interp(fine, solved.at, solved.side[i]) * chain.climb[i]
+        extra[i] = np.mean(both - criteria.helix_side(EI[i], clearance[i], compressions)) * chain.length[i]
     return extra
 
 

@@ -1,6 +1,7 @@
 """The exact rod in its hole: a string of several sections, at rest against the hole's wall or slipping along it."""
 
 import contextlib
+import math
 import numbers
 from typing import NamedTuple
 
@@ -27,6 +28,8 @@ _DEGREE = 3
 # Elements of the first mesh and the most, where none are asked for; factor from one mesh to the next. Where a number is
 # asked for, the mesh before it has this part of it.
 _FIRST, _MOST, _FINER, _BEFORE = 256, 8192, 2, 4
+# Elements of the first mesh over the pieces of the string, at least.
+_OF_PIECES = 1.5
 # A finer mesh has shorter elements where the pressure changes: bounds of their number, over that of equal ones.
 _FEWEST, _DENSEST = 0.3, 2.4
 # An error below this times that by the wall's stiffness is hardly one of the mesh.
@@ -122,7 +125,7 @@ def solve_in_hole(
     string = string_in(path, lengths, stiffness, weight, contact_radius, radius, friction, slip, bottom_tension,
                        bottom_torque, rings, first, hinge, extensible, has_arm)  # fmt: skip
     tol = number("solve_in_hole", "tol", tol, "a number from 1e-12 to below 1", lambda x: 1e-12 <= x < 1)
-    comm, counts = comm or MPI.COMM_WORLD, _counts(elements)
+    comm, counts = comm or MPI.COMM_WORLD, _counts(elements, len(Layout.of(string.scene, 1).breaks[0]) - 1)
     with Progress([float(len(stages_from(string.spring)))], progress, comm, "stage") as bar:
         job = _Job(degree, bool(helix), tol, _STIFFEST if wall_stiffness is None else 1.0, bar, comm)
         answer = None
@@ -157,12 +160,16 @@ class NotAccurate(NotConverged):
         self.answer = answer
 
 
-def _counts(elements):
-    """Elements of the meshes in turn."""
+def _counts(elements, pieces):
+    """Elements of the meshes in turn, for a string of so many pieces, each of which has at least one."""
     if elements is None:
-        return [_FIRST * _FINER**k for k in range(1 + int(np.log2(_MOST / _FIRST)))]
+        first = _FIRST * _FINER ** max(0, math.ceil(math.log(_OF_PIECES * pieces / _FIRST, _FINER)))
+        most = max(_MOST, first * _FINER**2)
+        return [first * _FINER**k for k in range(1 + int(np.log2(most / first)))]
     if isinstance(elements, bool) or not isinstance(elements, numbers.Integral) or elements < 1:
         refuse("solve_in_hole", "elements", elements, "a whole number above zero")
+    if elements < pieces:
+        refuse("solve_in_hole", "elements", elements, f"at least one for each of the {pieces} pieces of the string")
     return [max(1, int(elements) // _BEFORE), int(elements)]
 
 
