@@ -148,6 +148,18 @@ def test_a_soft_string_knows_that_bit_and_stabilisers_pry(operation):
             assert abs(getattr(rod, name) - getattr(soft, name)) < soft.model_error * scale
 
 
+@pytest.mark.parametrize("inc, operation", [((60, 60, 60, 60), cf.TripIn()), ((0, 0, 90, 90), cf.TripOut())], ids=str)
+def test_a_soft_string_knows_what_clamps_and_sharp_bends_add(inc, operation):
+    """A rod hangs on the axis of a hole that is inclined from the surface on; collars in a bend of 40 m radius."""
+    path = cf.WellPath.from_survey([0, 100, 163, 300], inc, [0, 0, 0, 0])
+    string = cf.DrillString([cf.Collar(60, "NC46-65"), STRING.components[-1]])
+    where = cf.Borehole(path, cf.HoleSection(300.0, 0.2159, 0.25))
+    given = {"mud": MUD, "depth": 180.0, "tol": 1e-3}
+    soft, rod = (cf.torque_and_drag(where, string, operation, model=model, **given) for model in ("soft", "rod"))
+    told, differs = soft.model_error * np.abs(soft.tension).max(), abs(rod.hook_load - soft.hook_load)
+    assert 0.1 * told < differs < told
+
+
 def test_many_pieces_are_solved_on_two_meshes():
     """A string of more components than the first mesh has elements: as of one component."""
     joints = cf.DrillString([*(replace(STRING.components[-1], length=1.0) for _ in range(300)), STRING.components[-1]])
