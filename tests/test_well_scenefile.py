@@ -55,6 +55,14 @@ def test_what_a_file_says():
         ("60 ft/min", "speed", 0.3048),
         ("120 rpm", "rotation", 120.0),
         ("3 deg/100ft", "angle per length", 0.001717843752),
+        ("8 1/2 in", "length", 0.2159),
+        ("9-5/8 in", "length", 0.244475),
+        ('3/4"', "length", 0.01905),
+        ("10 lb/gal", "density", 1198.264273),
+        ("12 klb-ft", "moment", 16269.815397),
+        ("20 klbs", "force", 88964.43230521),
+        ("12 lb/ft", "force per length", 175.1268324),
+        ("12 lb/ft", "mass per length", 17.8579673),
     ],
 )
 def test_field_units(text, dimension, value):
@@ -64,7 +72,14 @@ def test_field_units(text, dimension, value):
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
-        ('"Bit", diameter = "8.5 in"', '"Bit", diameter = "8.5 inches"', "inches"),
+        ('"Bit", diameter = "8.5 in"', '"Bit", diameter = "8.5 yards"', "yards"),
+        ("weight = 80e3", 'weight = "8 tons"', "expected tf, 1000 kgf, or kN or klbf: there are several tons"),
+        ('survey = "volve_f12.csv"', "survey = volve", "a number with its unit, stand in quotes"),
+        (
+            'survey = "volve_f12.csv"',
+            'survey = "volve_f12.csv"\nlength_unit = "yd"',
+            "length_unit = 'yd': known: cm, f",
+        ),
         (
             '"Bit", diameter = "8.5 in"',
             '"Bit", diameter = "8.5 ppg"',

@@ -56,7 +56,7 @@ from cosserat_fenicsx.scene.toml_tables import check_arguments, entries, known_k
 from cosserat_fenicsx.well.answer import TorqueAndDrag
 from cosserat_fenicsx.well.components import COMPONENTS
 from cosserat_fenicsx.well.depth_sweep import DepthSweep, depth_sweep
-from cosserat_fenicsx.well.field_units import DIMENSIONS, in_si
+from cosserat_fenicsx.well.field_units import in_si, size_of
 from cosserat_fenicsx.well.hole import Borehole, HoleSection
 from cosserat_fenicsx.well.mud import Mud
 from cosserat_fenicsx.well.operations import OPERATIONS, Operation
@@ -155,22 +155,21 @@ def _hole(well, folder):
     )
     if ("survey" in well) == ("stations" in well):
         raise SceneError("[well]: expected either survey, the name of a .csv file, or stations, rows of md, inc, azi")
-    unit, known = well.get("length_unit"), DIMENSIONS["length"][1]
-    if unit is not None and unit not in known:
-        raise SceneError(f"well.length_unit = {unit!r}: {nearest(unit, known)}")
+    unit = None
+    if "length_unit" in well:
+        unit = size_of("well.length_unit", well["length_unit"], "length")
     degrees = well.get("degrees")
     if "survey" in well:
         columns = well.get("columns", ["md", "inc", "azi"])
         if not isinstance(columns, list) or len(columns) != 3 or not isinstance(well["survey"], str):
             raise SceneError("[well]: expected survey, the name of a .csv file, and columns, three names of columns")
-        settings = {"degrees": degrees, "length_unit": None if unit is None else known[unit]}
-        path = WellPath.from_csv(folder / well["survey"], *columns, **settings)
+        path = WellPath.from_csv(folder / well["survey"], *columns, degrees=degrees, length_unit=unit)
     else:
         try:
             md, inc, azi = np.array(well["stations"], dtype=float).T
         except (ValueError, TypeError):
             raise SceneError("well.stations: expected rows of three numbers: md, inclination, azimuth") from None
-        path = WellPath.from_survey(md * known[unit or "m"], inc, azi, degrees)
+        path = WellPath.from_survey(md * (unit or 1.0), inc, azi, degrees)
     sections = [_made(f"well.sections[{i}]", entry, (HoleSection,)) for i, entry in entries("sections", well)]
     stiff = {name: in_si(f"well.{name}", well[name], "pressure") for name in ("wall_stiffness",) if name in well}
     return Borehole(path, sections, **stiff)
