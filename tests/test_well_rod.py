@@ -184,15 +184,6 @@ def test_what_cannot_be_a_rod(monkeypatch):
     flat = cf.WellPath.from_survey([0, 20000], [90, 90], [0, 0])
     with pytest.raises(cf.NotConverged, match=r"alternates; WITH THE WALL FORCE OF A HELIX IT LOCKS UP: .* md = "):
         cf.torque_and_drag(hole(flat), STRING, cf.TripIn(), model="rod")
-    with pytest.raises(cf.NotConverged, match="trip out, bit at 400 m: the contact") as stop:
-        cf.depth_sweep(hole(path), STRING, cf.TripOut(), [400.0, 500.0], model="rod")
-    assert len(stop.value.path) == 0
-
-
-def test_a_sweep_by_the_rod(out):
-    found = cf.depth_sweep(hole(build()), STRING, cf.TripOut(weight=-50e3), [300.0, 500.0], model="rod")
-    assert found.hook_load[0, 0, 1] == pytest.approx(out.hook_load, rel=2e-4) and len(found) == 2
-    assert np.isnan(found.values["model_error"]).all() and (found.values["error"] <= 1e-4).all()
 
 
 def test_charts_and_the_picture_show_points_and_places(out, tmp_path_all):

@@ -1,10 +1,14 @@
 """Sweeps over depths, that are kept and gone on with; friction from measurements; charts."""
 
+import os
+import signal
+
 import numpy as np
 import pytest
 
 import cosserat_fenicsx as cf
 from cosserat_fenicsx.well import depth_sweep as module
+from cosserat_fenicsx.well import rod_in_hole
 
 pytestmark = pytest.mark.serial
 PATH = cf.WellPath.from_survey([0, 600, 1200, 1800, 2500], [0, 0, 50, 60, 85], [0, 0, 120, 150, 150])
@@ -56,6 +60,63 @@ def test_a_sweep_goes_on_where_it_was_broken_off(tmp_path, monkeypatch):
         sweep(file=file, tol=1e-3)
 
 
+def test_a_depth_without_an_answer_is_a_row_that_says_so(monkeypatch, tmp_path):
+    """No equilibrium leaves no number; one that is not as accurate as asked leaves its number and its error."""
+    pytest.importorskip("matplotlib")
+    solve, calls = rod_in_hole.solve_in_hole, []
+
+    def fails(path, lengths, *args, **named):
+        calls.append(round(sum(lengths)))
+        if calls[-1] == 800:
+            raise cf.NotConverged("the contact alternates")
+        found = solve(path, lengths, *args, **{**named, "tol": 1e-3})
+        if calls[-1] == 1200:
+            raise rod_in_hole.NotAccurate(found, 1e-4)
+        return found
+
+    monkeypatch.setattr(rod_in_hole, "solve_in_hole", fails)
+    given = HOLE, STRING, cf.TripOut(), [800.0, 1200.0, 1600.0]
+    for _ in range(2):  # solved, and read from the file
+        found = cf.depth_sweep(*given, mud=MUD, model="rod", file=tmp_path / "sweep.jsonl")
+        assert calls == [800, 1200, 1600] and len(found) == 3 and found.done.all()
+        assert np.isnan(found.hook_load[0, 0]).tolist() == [True, False, False] and sorted(found.notes) == [
+            (0, 0, 0), (0, 0, 1)]  # fmt: skip
+        assert "trip out, bit at 800 m: the contact alternates" in str(found)
+        assert f"the estimated error of the rod in contact is {found.values['error'][0, 0, 1]:.1e}" in found.noted(1)[0]
+    found.write(tmp_path / "sweep.csv")
+    rows = (tmp_path / "sweep.csv").read_text(encoding="utf-8").splitlines()
+    assert rows[1].endswith(',,,"trip out, bit at 800 m: the contact alternates"') and rows[3].endswith(",rod,")
+    assert [line.get_label() for line in found.plot().axes[0].lines] == ["trip out", "trip out: no answer"]
+    either = cf.depth_sweep(*given[:3], [800.0], mud=MUD)
+    both = cf.depth_sweep(HOLE, STRING, cf.RotateOffBottom(), [400.0, 1200.0], mud=MUD, tol=1e-3)
+    assert both.models[0, 0].tolist() == ["soft", "rod"] and "│ soft" in str(both) and "│ rod" in str(both)
+    assert np.isfinite(either.hook_load).all() and "soft string; NOT ENOUGH for tol = 0.0001 in the" in str(either)
+    assert "and not solved: the contact alternates" in str(either)
+
+
+def test_a_sweep_by_the_rod_is_stopped_and_goes_on(monkeypatch, tmp_path):
+    """The signal comes while C asks for the wall's data in a Newton step, as most of them do."""
+    given = HOLE, STRING, cf.TripOut(), [800.0, 1200.0, 1600.0]
+    file, nearest, calls = tmp_path / "sweep.jsonl", cf.WellPath.nearest, []
+
+    def stops(self, *args):
+        if file.read_text(encoding="utf-8").count("\n") == 2:  # its head, and the first answer
+            calls.append(1)
+            if len(calls) == 60:
+                os.kill(os.getpid(), signal.SIGINT)
+        return nearest(self, *args)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(cf.WellPath, "nearest", stops)
+        with pytest.raises(cf.Interrupted, match="after 1 answer, which .* they are kept in .*sweep.jsonl") as stop:
+            cf.depth_sweep(*given, mud=MUD, model="rod", file=file)
+    assert np.isfinite(stop.value.path.hook_load[0, 0]).tolist() == [True, False, False]
+    found = cf.depth_sweep(*given, mud=MUD, model="rod", file=file)
+    assert (found.hook_load == cf.depth_sweep(*given, mud=MUD, model="rod").hook_load).all()
+    assert not found.notes
+    assert np.isnan(found.values["model_error"]).all() and (found.values["error"] <= 1e-4).all()
+
+
 def test_depths_that_do_not_fit_are_refused_first():
     with pytest.raises(cf.SceneError, match="hole, which ends at 2500 m"):
         cf.depth_sweep(HOLE, STRING, OPERATIONS, [1000, 2600], mud=MUD)
@@ -70,10 +131,11 @@ def test_lock_up_in_a_sweep_is_told():
     string = cf.DrillString([cf.Component(None, stiff, 16.6, 0.05)])
     path = cf.WellPath.from_survey([0, 12000], [90, 90], [0, 0])
     hole = cf.Borehole(path, [cf.HoleSection(12000, 2 * (0.05 + 0.041), 0.3)])
-    found = cf.depth_sweep(hole, string, cf.TripIn(), [5000, 9000, 11000], model="soft, buckled")
+    found = cf.depth_sweep(hole, string, cf.TripIn(), [5000, 9687, 11000], model="soft, buckled")
     assert np.isfinite(found.hook_load[0, 0, :2]).all() and np.isnan(found.hook_load[0, 0, 2])
     assert found.values["locked"][0, 0, 2] == pytest.approx(11000 - 9688.9, abs=1) and found.done.all()
-    assert "locks up at md = 1311" in str(found)
+    assert "locks up at md = 1311" in str(found) and found.models[0, 0].tolist() == ["soft, buckled"] * 2 + [""]
+    assert "bit at 9687 m: BEYOND WHAT ANY PIPE CARRIES" in str(found)
 
 
 def measured(noise, block=0.0):
@@ -142,6 +204,7 @@ def test_charts(tmp_path):
     found.write(tmp_path / "sweep.csv")
     rows = (tmp_path / "sweep.csv").read_text(encoding="utf-8").splitlines()
     assert len(rows) == 6 and rows[0].startswith('depth_m,"trip out, friction 0.1: hook load (N)"')
+    assert ": model" in rows[0] and "soft" in rows[1] and "model: soft" in str(found)
     assert float(rows[5].split(",")[1]) == pytest.approx(found.hook_load[0, 0, 4])
 
 

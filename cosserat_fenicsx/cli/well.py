@@ -58,7 +58,7 @@ def run_well(options):
         sweep = scene.depth_sweep(out / "depth_sweep.jsonl" if out is not None else None)
     except Interrupted as stop:
         sweep, code = stop.path, INTERRUPTED
-        say(f"cosserat: {stop}" + ("; the same command goes on from there" if out is not None else ""))
+        say(f"cosserat: {stop}")
     if sweep is not None:
         say(str(sweep), file=sys.stdout)
         if out is not None:

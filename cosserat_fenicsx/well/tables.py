@@ -9,6 +9,9 @@ from cosserat_fenicsx.results.tables import as_text
 from cosserat_fenicsx.well import criteria
 from cosserat_fenicsx.well.components import DrillPipe
 
+# Notes of a sweep that are shown; more are counted.
+_NOTES = 12
+
 
 def answer_table(answer):
     """Text: the state along the string, surface loads, and what decided for the model."""
@@ -149,25 +152,40 @@ def sweep_table(sweep):
     """Text: hook loads and torques over the depth of the bit."""
     table = Table(title="hook load (kN), and surface torque (kN m) where the string rotates, over the depth of the bit")
     table.add_column("depth (m)", justify="right")
-    columns = []
+    columns, used = [], sorted({*sweep.models.ravel()} - {""})
     for i, operation in enumerate(sweep.operations):
         for j in range(len(sweep.friction)):
-            columns.append(sweep.hook_load[i, j] / 1e3)
+            columns.append([_known(x, 1e-3, ".3f") for x in sweep.hook_load[i, j]])
             table.add_column(sweep.label(i, j), justify="right", overflow="fold")
             if operation.direction(1.0)[1]:
-                columns.append(sweep.surface_torque[i, j] / 1e3)
+                columns.append([_known(x, 1e-3, ".3f") for x in sweep.surface_torque[i, j]])
                 table.add_column("torque", justify="right")
+            if len(used) > 1:
+                columns.append(sweep.models[i, j])
+                table.add_column("model")
     for k, depth in enumerate(sweep.depths):
-        table.add_row(f"{depth:.6g}", *(_known(values[k], 1, ".3f") for values in columns))
-    lines = [as_text(table)]
-    locked = np.argwhere(~np.isnan(sweep.values["locked"]))
-    for i, j, k in locked:
-        at = sweep.values["locked"][i, j, k]
-        lines.append(f"{sweep.label(i, j)}: locks up at md = {at:.5g} m with the bit at {sweep.depths[k]:.5g} m")
-    if len(sweep):
-        worst = np.nanmax(sweep.values["model_error"], initial=0.0)
-        lines.append(f"largest estimated relative error of the model {worst:.0e}")
+        table.add_row(f"{depth:.6g}", *(values[k] for values in columns))
+    lines = [as_text(table), *(f"model: {name}" for name in used if len(used) == 1)]
+    notes = sweep.noted()
+    lines += notes[:_NOTES]
+    if len(notes) > _NOTES:
+        lines.append(f"and {len(notes) - _NOTES} more, see `notes`")
+    told = sweep.values["model_error"][~np.isnan(sweep.values["model_error"])]
+    if len(told):
+        lines.append(f"largest estimated relative error of the model {told.max():.0e}")
     return "\n".join(lines)
+
+
+def sweep_columns(sweep):
+    """{heading: (depths,)} of loads, models and notes."""
+    columns = {"depth_m": sweep.depths}
+    for i in range(len(sweep.operations)):
+        for j in range(len(sweep.friction)):
+            label = sweep.label(i, j)
+            columns[f"{label}: hook load (N)"] = sweep.hook_load[i, j]
+            columns[f"{label}: surface torque (N m)"] = sweep.surface_torque[i, j]
+            columns[f"{label}: model"] = sweep.models[i, j].tolist()
+    return columns | {"notes": ["; ".join(sweep.noted(k)) for k in range(len(sweep.depths))]}
 
 
 def fit_table(fit):
