@@ -98,6 +98,14 @@ def test_field_units(text, dimension, value):
         ("[string]", "[strings]", "unknown key 'strings', did you mean 'string'"),
         ('survey = "volve_f12.csv"', 'survey = "none.csv"', "cannot be read"),
         ("count = 20", "", "'count' is missing"),
+        ("from = 300.0\nto = 3438.0\ncount = 20", "depths = 3000", "depths = 3000: expected a list of measured depths"),
+        ("to = 3438.0\ncount", 'to = "11400 ft"\ncount', "depth = 3474.72 m: expected a measured depth in the hole"),
+        ("tol = 2e-2", 'tol = "1 %"', "torque_and_drag.tol = '1 %': expected a number"),
+        ("tol = 2e-2", 'model = "stiff"', "torque_and_drag.model = 'stiff': expected 'auto'"),
+        ("tol = 2e-2", 'torque_convention = "api"', "expected 'coulomb' or 'johancsik'"),
+        ("friction = [0.1, 0.2, 0.3]", "friction = [[0.1, 0.2, 0.3]]", "a number, or 2, one for each section"),
+        ('"Bit", diameter = "8.5 in"', '"Bit", diameter = "8.75 in"', "bit: 0.22225 m wide"),
+        ("[string]", '[string]\norder = "top down"', "bit, fills up; where the list .* order='bit up'"),
         ("tol = 2e-2", "tol = 2e-2\nelements = 4", "unknown key 'elements'"),
     ],
 )
@@ -107,7 +115,7 @@ def test_files_that_are_refused(old, new, words, tmp_path):
     (tmp_path / "well.toml").write_text(text.replace(old, new), encoding="utf-8")
     (tmp_path / "volve_f12.csv").write_text(VOLVE.with_suffix(".csv").read_text(encoding="utf-8"), encoding="utf-8")
     with pytest.raises(cf.SceneError, match=words):
-        cf.read_well(tmp_path / "well.toml").answers()
+        cf.read_well(tmp_path / "well.toml")
 
 
 def test_the_command_line(tmp_path, capsys):
@@ -122,8 +130,28 @@ def test_the_command_line(tmp_path, capsys):
     assert {file.name for file in tmp_path.iterdir()} == names == set(re.findall(r"\w+\.csv", told))
     rows = (tmp_path / "trip_out.csv").read_text(encoding="utf-8").splitlines()
     assert rows[0].startswith("md (m),north (m)") and rows[-1].startswith("3438,-346.4")
-    assert main(["run", str(VOLVE), "--elements", "4"]) == 2
-    assert "--elements is for rods" in capsys.readouterr().err
+    for option, value in (("--elements", "4"), ("--color", "tension")):
+        assert main(["run", str(VOLVE), option, value]) == 2
+        assert f"{option} is for rods" in capsys.readouterr().err
+    assert main(["explain", str(VOLVE), "--model", "stiff"]) == 2
+    text = VOLVE.read_text(encoding="utf-8")
+    (tmp_path / "no_well.toml").write_text(text[text.index("[string]") :], encoding="utf-8")
+    assert main(["run", str(tmp_path / "no_well.toml")]) == 2 and "[well] is missing" in capsys.readouterr().err
+
+
+def test_doubts_are_said_once_and_without_code(tmp_path, capsys):
+    stations = (
+        "[well]\nstations = [[0, 0, 0], [1000, 0, 0], [3281, 30, 0]]\nsections = [{ to = 1000, diameter = 0.2159, "
+    )
+    rest = "friction = 0.2 }]\n[string]\ncomponents = [{ type = 'DrillPipe', size = '5 19.5' }]\n[mud]\ndensity = 10\n"
+    operation = "[[operations]]\ntype = 'RotaryDrilling'\nweight = 60\ntorque = 5\n[torque_and_drag]\nmodel = 'soft'\n"
+    (tmp_path / "well.toml").write_text(stations + rest + operation, encoding="utf-8")
+    assert main(["run", str(tmp_path / "well.toml")]) == 0
+    told = capsys.readouterr().err.splitlines()
+    assert len(told) == 4 and all(line.startswith("cosserat: warning: ") for line in told)
+    for words in ("survey ends at 3281 m and the sections at 1000 m.*3.28 times as deep", "hardly that of a mud",
+                  "RotaryDrilling.weight = 60 N is hardly", "RotaryDrilling.torque = 5 N m is hardly"):  # fmt: skip
+        assert re.search(words, "\n".join(told)), words
 
 
 @pytest.mark.slow

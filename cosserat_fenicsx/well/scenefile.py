@@ -49,6 +49,7 @@ from typing import Any
 import numpy as np
 
 from cosserat_fenicsx.annotations import File
+from cosserat_fenicsx.checks import number, refuse
 from cosserat_fenicsx.errors import SceneError, nearest
 from cosserat_fenicsx.scene.materials import Material
 from cosserat_fenicsx.scene.sections import Stiffness
@@ -61,8 +62,9 @@ from cosserat_fenicsx.well.hole import Borehole, HoleSection
 from cosserat_fenicsx.well.mud import Mud
 from cosserat_fenicsx.well.operations import OPERATIONS, Operation
 from cosserat_fenicsx.well.path import WellPath
+from cosserat_fenicsx.well.pieces import pieces_of
 from cosserat_fenicsx.well.string import DrillString
-from cosserat_fenicsx.well.torque_and_drag import torque_and_drag
+from cosserat_fenicsx.well.torque_and_drag import check_settings, torque_and_drag
 
 #: Dimensions of arguments that may be written with a unit.
 _LENGTHS = ("to", "diameter", "length", "contact_radius", "outer_diameter", "inner_diameter", "tool_joint",
@@ -92,6 +94,18 @@ class WellScene:
     operations: tuple[Operation, ...]
     settings: dict[str, Any] = field(default_factory=dict)
     sweep: dict[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self):
+        """Refuse, before anything is solved, what does not fit the hole, and unknown settings."""
+        settings = {name: value for name, value in self.settings.items() if name != "depth"}
+        friction, depths = self.sweep.get("friction", []), self.sweep.get("depths", [])
+        of_sweep = {name: self.sweep[name] for name in ("model", "tol") if name in self.sweep}
+        for asked in (settings, {**settings, **of_sweep}):
+            check_settings(**asked)
+        for value in friction if isinstance(friction, list) else [friction]:
+            self.hole.with_friction(value)
+        for depth in (self.settings.get("depth", self.hole.length), *depths):
+            pieces_of(self.hole, self.string, self.operations[0], self.mud, depth)
 
     def answer(self, operation: Operation) -> TorqueAndDrag:
         """The answer of `torque_and_drag` for an operation."""
@@ -129,7 +143,7 @@ def _scene(tables, folder):
     known = ("title", "well", "string", "mud", "operations", "torque_and_drag", "depth_sweep")
     known_keys("the file (of a well)", tables, known)
     for name in ("well", "string", "operations"):
-        if name not in tables:
+        if not tables.get(name):
             raise SceneError(f"[{name}] is missing: expected [well], [string] and [[operations]]")
     hole = _hole(table("well", tables["well"]), folder)
     string = dict(table("string", tables["string"]))
@@ -140,12 +154,9 @@ def _scene(tables, folder):
     settings = dict(table("torque_and_drag", tables.get("torque_and_drag", {})))
     known_keys("[torque_and_drag]", settings, _SETTINGS)
     if "depth" in settings:
-        settings["depth"] = in_si("torque_and_drag.depth", settings["depth"], "length")
+        settings["depth"] = _depth("torque_and_drag", "depth", settings["depth"])
     whole = DrillString(parts, **{name: string[name] for name in ("order",) if name in string})
     sweep = _sweep(table("depth_sweep", tables["depth_sweep"])) if "depth_sweep" in tables else {}
-    for depth in (*np.atleast_1d(settings.get("depth", hole.length)), *sweep.get("depths", ())):
-        if not 0 < depth <= hole.length * (1 + 1e-12):
-            raise SceneError(f"depth = {depth:.10g} m: expected a measured depth in the hole, to {hole.length:.10g} m")
     return WellScene(str(tables.get("title", "")), hole, whole, mud, operations, settings, sweep)
 
 
@@ -178,7 +189,9 @@ def _hole(well, folder):
 def _sweep(given):
     known_keys("[depth_sweep]", given, ("depths", "from", "to", "count", *_OF_SWEEPS))
     if "depths" in given:
-        depths = [in_si(f"depth_sweep.depths[{i}]", x, "length") for i, x in enumerate(given["depths"])]
+        if not isinstance(given["depths"], list) or not given["depths"]:
+            refuse("depth_sweep", "depths", given["depths"], "a list of measured depths, such as [1000.0, 2000.0]")
+        depths = [_depth("depth_sweep", f"depths[{i}]", x) for i, x in enumerate(given["depths"])]
     else:
         for name in ("from", "to", "count"):
             if name not in given:
@@ -186,8 +199,13 @@ def _sweep(given):
         count = given["count"]
         if not isinstance(count, int) or isinstance(count, bool) or count < 1:
             raise SceneError(f"depth_sweep.count = {count!r}: expected how many depths")
-        depths = np.linspace(*(in_si(f"depth_sweep.{name}", given[name], "length") for name in ("from", "to")), count)
+        depths = np.linspace(*(_depth("depth_sweep", name, given[name]) for name in ("from", "to")), count)
     return {"depths": depths, **{name: given[name] for name in _OF_SWEEPS if name in given}}
+
+
+def _depth(table, name, value):
+    value = in_si(f"{table}.{name}", value, "length")
+    return number(table, name, value, "a measured depth (m), positive", lambda x: 0 < x < np.inf)
 
 
 def _made(where, entry, classes):
