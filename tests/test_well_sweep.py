@@ -163,6 +163,23 @@ def test_friction_from_measurements():
     )
 
 
+@pytest.mark.parametrize(
+    ("wrong", "words"),
+    [
+        (lambda m: (m.operation, m.hook_load + 150e3), "with block_weight=None it is .*weigh 1(49|50)"),
+        (lambda m: (m.operation, m.hook_load / 1e3), "the hook loads are .*e-0. times those computed: expected N"),
+        (lambda m: ({"trip out": OPERATIONS[1], "trip in": OPERATIONS[0]}.get(m.operation.name, m.operation),
+                    m.hook_load), "at the depth 900 m the hook load out is below that in: are they swapped"),
+    ],
+)  # fmt: skip
+def test_readings_that_do_not_fit_are_doubted(wrong, words):
+    readings = [m for m in measured(0.1) if m.torque is None and m.depth in (900, 1700, 2500)]
+    changed = [cf.RigMeasurement(m.depth, *wrong(m)) for m in readings]
+    with pytest.warns(cf.SceneWarning, match=words):
+        found = cf.calibrate_friction(HOLE, STRING, changed, mud=MUD)
+    assert f"DOUBTFUL: misfit {found.misfit:.3g} where 1" in str(found)
+
+
 def test_the_interval_covers_as_often_as_it_says():
     """Of a linear problem with the same solver: a rotating string, whose torque is nearly linear in the friction."""
     rng, hits = np.random.default_rng(8), 0

@@ -177,13 +177,21 @@ def _hole(well, folder):
         path = WellPath.from_csv(folder / well["survey"], *columns, degrees=degrees, length_unit=unit)
     else:
         try:
-            md, inc, azi = np.array(well["stations"], dtype=float).T
-        except (ValueError, TypeError):
+            rows = [(_station(i, depth, unit or 1.0), *angles) for i, (depth, *angles) in enumerate(well["stations"])]
+            md, inc, azi = np.array(rows, dtype=float).T
+        except (ValueError, TypeError) as problem:
+            if isinstance(problem, SceneError):
+                raise
             raise SceneError("well.stations: expected rows of three numbers: md, inclination, azimuth") from None
-        path = WellPath.from_survey(md * (unit or 1.0), inc, azi, degrees)
+        path = WellPath.from_survey(md, inc, azi, degrees)
     sections = [_made(f"well.sections[{i}]", entry, (HoleSection,)) for i, entry in entries("sections", well)]
     stiff = {name: in_si(f"well.{name}", well[name], "pressure") for name in ("wall_stiffness",) if name in well}
     return Borehole(path, sections, **stiff)
+
+
+def _station(i, depth, unit):
+    """Measured depth of a station, m: text has its own unit."""
+    return in_si(f"well.stations[{i}]", depth, "length") if isinstance(depth, str) else depth * unit
 
 
 def _sweep(given):

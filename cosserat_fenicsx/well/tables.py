@@ -202,4 +202,4 @@ def fit_table(fit):
     if np.isfinite(fit.block_interval).all():
         low, high = fit.block_interval / 1e3
         table.add_row("block weight", "", f"{fit.block_weight / 1e3:.2f} kN", f"{low:.2f} to {high:.2f} kN")
-    return as_text(table)
+    return "\n".join([as_text(table), *(f"DOUBTFUL: {x}" for x in fit.doubts)])
