@@ -1,5 +1,6 @@
 """Scene files of strings in wells: what they say, units, refusals, the command line, the demos."""
 
+import inspect
 import re
 import sys
 from pathlib import Path
@@ -8,7 +9,11 @@ import pytest
 
 import cosserat_fenicsx as cf
 from cosserat_fenicsx.cli.main import main
-from cosserat_fenicsx.well.field_units import in_si
+from cosserat_fenicsx.well.components import COMPONENTS
+from cosserat_fenicsx.well.field_units import DIMENSIONS, in_si
+from cosserat_fenicsx.well.operations import OPERATIONS
+from cosserat_fenicsx.well.scenefile import KEYS
+from cosserat_fenicsx.well.sizes import standard_sizes
 
 pytestmark = pytest.mark.serial
 DEMOS = Path(__file__).parent.parent / "demos"
@@ -141,7 +146,7 @@ def test_the_command_line(tmp_path, capsys):
 
 def test_doubts_are_said_once_and_without_code(tmp_path, capsys):
     stations = (
-        "[well]\nstations = [[0, 0, 0], [1000, 0, 0], [3281, 30, 0]]\nsections = [{ to = 1000, diameter = 0.2159, "
+        "[well]\nstations = [[0, 0, 0], ['1 km', 0, 0], [3281, 30, 0]]\nsections = [{ to = 1000, diameter = 0.2159, "
     )
     rest = "friction = 0.2 }]\n[string]\ncomponents = [{ type = 'DrillPipe', size = '5 19.5' }]\n[mud]\ndensity = 10\n"
     operation = "[[operations]]\ntype = 'RotaryDrilling'\nweight = 60\ntorque = 5\n[torque_and_drag]\nmodel = 'soft'\n"
@@ -152,6 +157,19 @@ def test_doubts_are_said_once_and_without_code(tmp_path, capsys):
     for words in ("survey ends at 3281 m and the sections at 1000 m.*3.28 times as deep", "hardly that of a mud",
                   "RotaryDrilling.weight = 60 N is hardly", "RotaryDrilling.torque = 5 N m is hardly"):  # fmt: skip
         assert re.search(words, "\n".join(told)), words
+
+
+def test_the_reference_has_every_key_unit_and_size():
+    page = (DEMOS.parent / "docs" / "well_files.md").read_text(encoding="utf-8")
+    told = set(re.findall(r"`([^`]+)`", re.sub(r"```.*?```", "", page, flags=re.S)))
+    classes = (*COMPONENTS, *OPERATIONS)
+    assert {cls.__name__ for cls in classes} <= told
+    arguments = {name for cls in (*classes, cf.Mud, cf.HoleSection) for name in inspect.signature(cls).parameters}
+    keys = {f"[{table}]" for table in KEYS} | {key for keys in KEYS.values() for key in keys}
+    units = {unit for name, (_, known) in DIMENSIONS.items() if name != "angle per length" for unit in known}
+    sizes = {name for known in standard_sizes().values() for name in known}
+    for expected in (arguments, keys, units, sizes):
+        assert expected <= told, expected - told
 
 
 @pytest.mark.slow

@@ -73,7 +73,13 @@ _DIMENSIONS = {
     **dict.fromkeys(_LENGTHS, "length"), "torque": "moment", "density": "density", "inside": "density",
     "mass": "mass per length", "speed": "speed", "rpm": "rotation", "wall_stiffness": "pressure", "E": "pressure",
 }  # fmt: skip
-_SETTINGS = ("depth", "model", "tol", "torque_convention")
+#: Keys of the tables whose keys are not the arguments of a class.
+KEYS = {
+    "well": ("survey", "stations", "columns", "degrees", "length_unit", "wall_stiffness", "sections"),
+    "string": ("components", "order"),
+    "torque_and_drag": ("depth", "model", "tol", "torque_convention"),
+    "depth_sweep": ("depths", "from", "to", "count", "friction", "model", "tol"),
+}
 _OF_SWEEPS = ("friction", "model", "tol")
 
 
@@ -147,12 +153,12 @@ def _scene(tables, folder):
             raise SceneError(f"[{name}] is missing: expected [well], [string] and [[operations]]")
     hole = _hole(table("well", tables["well"]), folder)
     string = dict(table("string", tables["string"]))
-    known_keys("[string]", string, ("components", "order"))
+    known_keys("[string]", string, KEYS["string"])
     parts = [_made(f"string.components[{i}]", entry, COMPONENTS) for i, entry in entries("components", string)]
     operations = tuple(_made(f"operations[{i}]", entry, OPERATIONS) for i, entry in entries("operations", tables))
     mud = _made("mud", tables["mud"], (Mud,)) if "mud" in tables else None
     settings = dict(table("torque_and_drag", tables.get("torque_and_drag", {})))
-    known_keys("[torque_and_drag]", settings, _SETTINGS)
+    known_keys("[torque_and_drag]", settings, KEYS["torque_and_drag"])
     if "depth" in settings:
         settings["depth"] = _depth("torque_and_drag", "depth", settings["depth"])
     whole = DrillString(parts, **{name: string[name] for name in ("order",) if name in string})
@@ -161,9 +167,7 @@ def _scene(tables, folder):
 
 
 def _hole(well, folder):
-    known_keys(
-        "[well]", well, ("survey", "stations", "columns", "degrees", "length_unit", "wall_stiffness", "sections")
-    )
+    known_keys("[well]", well, KEYS["well"])
     if ("survey" in well) == ("stations" in well):
         raise SceneError("[well]: expected either survey, the name of a .csv file, or stations, rows of md, inc, azi")
     unit = None
@@ -195,7 +199,7 @@ def _station(i, depth, unit):
 
 
 def _sweep(given):
-    known_keys("[depth_sweep]", given, ("depths", "from", "to", "count", *_OF_SWEEPS))
+    known_keys("[depth_sweep]", given, KEYS["depth_sweep"])
     if "depths" in given:
         if not isinstance(given["depths"], list) or not given["depths"]:
             refuse("depth_sweep", "depths", given["depths"], "a list of measured depths, such as [1000.0, 2000.0]")
