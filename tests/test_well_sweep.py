@@ -225,6 +225,14 @@ def test_charts(tmp_path):
     assert float(rows[5].split(",")[1]) == pytest.approx(found.hook_load[0, 0, 4])
 
 
+def test_tables_of_pandas():
+    pytest.importorskip("pandas")
+    answer, found = cf.torque_and_drag(HOLE, STRING, cf.TripOut(), mud=MUD, model="soft"), sweep()
+    along = answer.to_dataframe()
+    assert (along["side force (N/m)"] == answer.side_force).all() and along["component"].iloc[-1] == "bit"
+    assert (found.to_dataframe()["trip in, friction 0.1: hook load (N)"] == found.hook_load[1, 0]).all()
+
+
 @pytest.mark.slow
 def test_the_string_in_its_hole_in_space(tmp_path):
     pytest.importorskip("pyvista")

@@ -110,7 +110,9 @@ def _known(value, factor, form):
 def _estimate(answer):
     """The estimated error of the model in words."""
     left_out = f" (it leaves out {answer._leaves_out})" if answer._leaves_out else ""
-    return f"not estimated{left_out}" if math.isnan(answer.model_error) else f"{answer.model_error:.0e}"
+    if math.isnan(answer.model_error):
+        return f"not estimated{left_out}"
+    return "without a bound" if math.isinf(answer.model_error) else f"{answer.model_error:.0e}"
 
 
 def _on_bit(answer):
@@ -172,7 +174,8 @@ def sweep_table(sweep):
         lines.append(f"and {len(notes) - _NOTES} more, see `notes`")
     told = sweep.values["model_error"][~np.isnan(sweep.values["model_error"])]
     if len(told):
-        lines.append(f"largest estimated relative error of the model {told.max():.0e}")
+        worst = "without a bound: it may lock up" if np.isinf(told).any() else f"{told.max():.0e}"
+        lines.append(f"largest estimated relative error of the model {worst}")
     return "\n".join(lines)
 
 
