@@ -152,3 +152,14 @@ def test_soft_strings_of_this_package():
     assert len(own) == 12 and all(error <= float(told.split("=")[1]) for _, _, told, error, _ in own)
     assert all(error < 1e-11 for _, _, told, error, _ in own if told == "tol = 1e-12") and len(silent) <= 2
     assert "| cosserat_fenicsx | tol = 1e-12 |" in soft_string.table(rows, silent)
+
+
+def test_rods_in_wells_quick(tmp_path):
+    """Errors are within their estimates; steps and times are not tested."""
+    import rods_in_wells
+
+    rows, sweeps = rods_in_wells.main(quick=True, out=tmp_path)
+    ((_, _, found),) = rows
+    assert all(found["covered"]) and max(found["errors"]) < 1e-5 and max(found["estimates"]) <= 1e-4
+    assert len(sweeps) == 1 and sweeps[0][-1] <= 1e-4
+    assert "| P | trip in | " in (tmp_path / "rods_in_wells.md").read_text(encoding="utf-8")

@@ -41,7 +41,7 @@ def test_the_difference_of_whole_wells_is_covered(name, operation, clearance, di
     told = answer.model_error * abs(answer.tension).max()
     assert abs(differs) <= told
     if operation.slip[0]:
-        assert told < 5 * abs(differs)  # and not by far too much
+        assert told < 6 * abs(differs)  # and not by far too much
 
 
 @pytest.mark.parametrize(("radius", "angle", "below", "pull", "operation", "mu", "stiff", "flexible"), PLANE)
@@ -52,6 +52,15 @@ def test_build_sections(radius, angle, below, pull, operation, mu, stiff, flexib
     assert answer.hook_load == pytest.approx(flexible, rel=1e-10)
     told = answer.model_error * abs(answer.tension).max()
     assert abs(stiff - flexible) <= told < 8 * abs(stiff - flexible)
+
+
+@pytest.mark.parametrize(("md", "inc", "differs"), [
+    ([0, 200, 600], [0, 40, 40], -103.52), ([0, 300], [0, 60], -110.03), ([0, 100, 400], [30, 30, 70], -13.84),
+])  # fmt: skip
+def test_a_bend_at_an_end_takes_from_the_tension(md, inc, differs):
+    """Without friction, with a pull of 300 kN; the rod in contact on 1024 elements."""
+    answer = soft(cf.WellPath.from_survey(md, inc, [20] * len(md)), 0.04445, cf.Static(-300e3), 0.25)
+    assert abs(differs) <= answer.model_error * answer.tension.max() < 6 * abs(differs)
 
 
 def test_torque_of_rotating_strings_is_covered():

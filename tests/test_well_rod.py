@@ -2,6 +2,7 @@
 
 import json
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -56,6 +57,8 @@ def test_what_the_answer_of_the_rod_tells(out):
     assert out.drag == pytest.approx(out.hook_load - 50e3 - 241.13 * np.ptp(out.position[:, 2]), rel=1e-6)
     in_arc = (out.md > 150) & (out.md < 250)
     assert out.bending_moment[in_arc] == pytest.approx(EI * math.radians(40) / 200, rel=0.02)
+    errors = out.errors_along
+    assert 0 < errors["side_force"] < 20 and f"side force to {errors['side_force']:.2g} N/m" in str(out)
     # out of the hole the pipe is pulled to the high side of the build section, and lies on the low side below it
     sides = {side: sum(force for _, _, force, name in out.contacts if name == side) for side in ("high", "low")}
     assert {name for *_, name in out.contacts} == {"high", "low"} and min(sides.values()) > 1e3
@@ -85,7 +88,7 @@ def test_a_rotating_string_climbs_and_has_torque():
 
 @pytest.mark.parametrize("case", KNOWN["stiff build"][:2], ids=lambda case: case["name"])
 def test_a_build_section_against_its_strong_form(case):
-    """There the upper end turns freely and friction acts on the centreline: a difference of some newtons."""
+    """There the upper end turns freely and friction acts on the centreline: a difference of 31 and 18 N."""
     given, alpha = case["input"], case["input"]["alpha"]
     md = np.cumsum([0, given["h"], given["R"] * math.radians(alpha), given["D"] + 50.0])
     path = cf.WellPath.from_survey(md, [0, 0, alpha, alpha], [0, 0, 0, 0])
@@ -94,7 +97,7 @@ def test_a_build_section_against_its_strong_form(case):
     operation = {1: cf.TripOut, -1: cf.TripIn, 0: cf.Static}[given["c"]](weight=-given["T0"])
     section = cf.HoleSection(path.length, 2 * (0.06 + given["r"]), given["mu"])
     found = cf.torque_and_drag(cf.Borehole(path, section), string, operation, depth=case["rod_length"], model="rod")
-    assert found.hook_load == pytest.approx(case["hook_load_vertical"], rel=2e-3)
+    assert found.hook_load == pytest.approx(case["hook_load_vertical"], rel=2e-4)
 
 
 def test_a_rigid_wall_is_approached_as_closely_as_the_accuracy_needs(tmp_path):
@@ -125,6 +128,43 @@ def test_a_rigid_wall_is_approached_as_closely_as_the_accuracy_needs(tmp_path):
     for name in ("hook_load", "wall_force"):
         apart = abs(getattr(soft, name) - getattr(rigid.solved, name))
         assert 0.02 * soft.errors[name] < apart < soft.errors[name]
+
+
+@pytest.mark.parametrize("operation", [cf.RotaryDrilling(80e3, 5e3), cf.Sliding(50e3), cf.TripOut()], ids=str)
+def test_a_soft_string_knows_that_bit_and_stabilisers_pry(operation):
+    """A stabiliser near the bit: the span above it presses it down, and the bit up."""
+    near_bit, upper = cf.Stabiliser(1.5, 0.2127, 0.165, 0.07), cf.Stabiliser(1.5, 0.2096, 0.165, 0.07)
+    collars = cf.Collar(18, "NC46-65"), cf.Collar(60, "NC46-65")
+    string = cf.DrillString([cf.Bit(0.2159), near_bit, collars[0], upper, collars[1], STRING.components[-1]])
+    where = cf.Borehole(build(), cf.HoleSection(500.0, 0.2159, 0.25))
+    soft, rod = (cf.torque_and_drag(where, string, operation, mud=MUD, model=model) for model in ("soft", "rod"))
+    sides = {side for start, end, force, side in rod.contacts if start == end > 495 and force > 9e3}
+    assert sides == {"low", "high"}
+    for name, scale in (
+        ("hook_load", np.abs(soft.tension).max()),
+        ("surface_torque", np.abs(soft.torque).max() or 1.0),
+    ):
+        if scale > 1.0:
+            assert abs(getattr(rod, name) - getattr(soft, name)) < soft.model_error * scale
+
+
+def test_many_pieces_are_solved_on_two_meshes():
+    """A string of more components than the first mesh has elements: as of one component."""
+    joints = cf.DrillString([*(replace(STRING.components[-1], length=1.0) for _ in range(300)), STRING.components[-1]])
+    whole, cut = (cf.torque_and_drag(hole(build()), x, cf.TripOut(-50e3), model="rod") for x in (STRING, joints))
+    assert abs(whole.hook_load - cut.hook_load) < cut.error * cut.hook_load < 1e-4 * cut.hook_load
+    assert cut.solved.path.elements[0] > 512
+
+
+def test_the_survey_below_the_string_changes_nothing():
+    md, inc = [0, 100, 300, 500], [10, 10, 60, 60]
+    sections = [cf.HoleSection(250.0, 0.25, 0.2), cf.HoleSection(400.0, 0.2, 0.4)]
+    loads = []
+    for more in (1.0, 10_000.0):
+        path = cf.WellPath.from_survey([*md, 500 + more], [*inc, 60], [0] * 5)
+        where = cf.Borehole(path, [*sections, cf.HoleSection(path.length, 0.22, 0.3)])
+        loads.append(cf.torque_and_drag(where, STRING, cf.TripOut(), depth=500.0, model="rod").hook_load)
+    assert loads[0] == pytest.approx(loads[1], rel=1e-9)
 
 
 class Asked(Exception):
@@ -209,3 +249,16 @@ def test_whole_wells(name, operation, load):
     found = cf.torque_and_drag(hole(well(name)), STRING, operation)
     assert found.model == "rod" and found.enough and found.hook_load == pytest.approx(load, rel=5e-5)
     assert not any("MORE" in line for line in found.why)  # the soft string's estimate covers the difference
+
+
+def test_a_string_in_a_vertical_hole_is_a_helix_and_not_straight():
+    path = cf.WellPath.from_survey([0, 310], [0, 0], [0, 0])
+    string = cf.DrillString([cf.Bit(0.2159), cf.DrillPipe(size="5 in 19.50 lb/ft")])
+    given = {"mud": MUD, "depth": 300.0, "model": "rod", "tol": 1e-3}
+    answer = cf.torque_and_drag(cf.Borehole(path, cf.HoleSection(310, 0.2159, 0.0)), string, cf.Static(75e3), **given)
+    assert "begun as a helix: from the axis an equilibrium was found that would buckle" in "\n".join(answer.why)
+    assert answer.solved.negative_modes == 0 and 0 < answer.neutral_point < 40
+    wound = (answer.md > 100) & (answer.md < 240)
+    rate = np.gradient(np.unwrap(answer.solved.side), answer.solved.s)[wound]
+    EI = string.components[1].stiffness.bending[0]
+    assert rate == pytest.approx(np.sqrt(-answer.tension[wound] / (2 * EI)), rel=5e-3)

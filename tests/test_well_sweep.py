@@ -1,5 +1,6 @@
 """Sweeps over depths, that are kept and gone on with; friction from measurements; charts."""
 
+import contextlib
 import os
 import signal
 
@@ -106,7 +107,9 @@ def test_a_sweep_by_the_rod_is_stopped_and_goes_on(monkeypatch, tmp_path):
                 os.kill(os.getpid(), signal.SIGINT)
         return nearest(self, *args)
 
-    with monkeypatch.context() as patch:
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)  # not that of the command line
+    with monkeypatch.context() as patch, contextlib.ExitStack() as stack:
+        stack.callback(signal.signal, signal.SIGINT, before)
         patch.setattr(cf.WellPath, "nearest", stops)
         with pytest.raises(cf.Interrupted, match="after 1 answer, which .* they are kept in .*sweep.jsonl") as stop:
             cf.depth_sweep(*given, mud=MUD, model="rod", file=file)

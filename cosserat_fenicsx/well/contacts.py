@@ -30,6 +30,16 @@ class WallContact(NamedTuple):
         return self.top == self.bottom
 
 
+def side_in_space(tangents, outward):
+    """(n,) angles of directions across the hole (n, 3), rad clockwise from its high side, looking down it; from the
+    first axis, north, where it is vertical. tangents: (n, 3) of the hole's axis."""
+    high = tangents[:, 2:] * tangents - (0.0, 0.0, 1.0)
+    vertical = np.linalg.norm(high, axis=1) < 1e-9
+    high[vertical] = np.array([1.0, 0.0, 0.0]) - tangents[vertical, :1] * tangents[vertical]
+    right = np.cross(tangents, high)
+    return np.arctan2((outward * right).sum(axis=1), (outward * high).sum(axis=1))
+
+
 def sides_of(pieces, solved, climbing):
     """(n, m) angles of contact at the places of a `Solved`, rad clockwise from the high side; see `TorqueAndDrag`."""
     chain = solved.chain

@@ -6,12 +6,16 @@ import numpy as np
 
 from cosserat_fenicsx.quaternions import directors
 from cosserat_fenicsx.results.recovery import at_nodes
+from cosserat_fenicsx.well.contacts import side_in_space
 from cosserat_fenicsx.well.resultants import contacts_along
 from cosserat_fenicsx.well.rod_errors import errors_of
+from cosserat_fenicsx.well.smoothed import along_elements, apart_mostly
 from cosserat_fenicsx.well.string_scene import bending_of, is_round
 
 # Distances from the axis below this share of the clearance have no direction.
 _CENTRED = 1e-9
+# Arrays whose errors are told.
+_ALONG = ("side_force", "bending_moment")
 
 
 class InHole:
@@ -26,7 +30,12 @@ class InHole:
         side: direction of the rod from the axis, rad, from the high side of the hole, clockwise looking down the hole
             (from the first axis, north, where it is vertical).
         tension: effective, N. torque: N m, that the upper part exerts in the sense of clockwise rotation on the lower.
-        bending_moment: N m. side_force: of the wall on the rod, per length, N/m; node_force: the same per node, N.
+        bending_moment: N m, at the nodes by the polynomials through the Gauss points of each element, where it is most
+            accurate: on 256 elements of whole wells 20 to 100 times nearer to that of a fine mesh than at the nodes.
+        side_force: of the wall on the rod, per length, N/m: of each element its mean, which is accurate, and the slope
+            between the means of its neighbours. Within an element the wall's forces at the nodes alternate about it on
+            coarse meshes: 15 to 60 times farther from those of a fine mesh. node_force: those forces, N, exact in the
+            balance of forces.
         hook_load: of the held end, along the hole, N; surface_torque: N m; reaction: (3,) N and (3,) N m there.
         wall_force: sum of all forces of the wall and of the rings, across the rod, without friction, N.
         ring_forces: (rings, 3) on the string, with friction, N.
@@ -37,6 +46,8 @@ class InHole:
         errors: {"hook_load": N, "surface_torque": N m, "wall_force": N}, estimated, from those in a rigid wall; error:
             the largest relative one of the first two, that of the torque only where the string turns; of_stiffness: the
             part of it that is left of the wall's softness, see `RodErrors`.
+        errors_along: {"side_force": N/m, "bending_moment": N m}: the differences from the mesh before that 95 % of the
+            string's length are below; beside concentrated forces they may be larger. They do not count in `error`.
         balance: N, between the reaction and the sum of all other forces.
         negative_modes: number of negative eigenvalues of the second variation without friction, -1 where it is
             singular. Where it is not 0, the string would buckle, or buckle otherwise, but for friction.
@@ -51,18 +62,22 @@ class InHole:
         self.string, self.path, self.scene, self.factor = string, path, path.scene, factor
         self.steps, self.negative_modes = int(path.iterations[0]), int(path.negative_modes[0])
         self.estimates, self.errors, self.error, self.of_stiffness = None, {}, np.inf, np.inf
+        self._coarser = None
 
     def estimate(self, values, before):
         """Set the errors.
 
         Args:
             values: {factor: {name: value}} in walls of several stiffnesses on this mesh; before: the `InHole` on the
-                mesh before, or None.
+                mesh before, or None. Where that is no coarser, it tells nothing.
         """
-        self.estimates = found = errors_of(self, values, before and before.estimates)
+        coarser = before if before and before.path.elements[0] < self.path.elements[0] else None
+        self.estimates = found = errors_of(self, values, coarser and coarser.estimates)
         self.errors, self.error, self.of_stiffness = found.errors, found.error, found.of_stiffness
-        if before is not None:
+        if before:
             self.steps += before.steps
+        if coarser:
+            self._coarser = before.s, {name: getattr(before, name) for name in _ALONG}
 
     @property
     def wall_stiffness(self):
@@ -146,12 +161,7 @@ class InHole:
     @cached_property
     def side(self):
         """(n,) rad."""
-        t = self._near.tangent
-        high = t[:, 2:] * t - (0.0, 0.0, 1.0)
-        vertical = np.linalg.norm(high, axis=1) < 1e-9
-        high[vertical] = np.array([1.0, 0.0, 0.0]) - t[vertical, :1] * t[vertical]
-        right = np.cross(t, high)
-        return np.arctan2((self._outward * right).sum(axis=1), (self._outward * high).sum(axis=1))
+        return side_in_space(self._near.tangent, self._outward)
 
     @cached_property
     def _contact(self):
@@ -181,8 +191,9 @@ class InHole:
     @cached_property
     def bending_moment(self):
         """(n,) N m."""
-        m = at_nodes(self._contact[..., 3:])
-        return np.linalg.norm(m + self.torque[:, None] * self._along, axis=1)
+        at_gauss = self._record.gauss_fields[..., 3:6] * self.path.scales.moment
+        m = self._averaged(np.einsum("jg,cgi->cji", self.path.rule.between_gauss(self.path.rule.nodes), at_gauss))
+        return np.linalg.norm(m - (m * self._along).sum(axis=1)[:, None] * self._along, axis=1)
 
     # -- the wall ----------------------------------------------------------------------------------------------------
 
@@ -210,7 +221,9 @@ class InHole:
     @cached_property
     def side_force(self):
         """(n,) N/m."""
-        return at_nodes(self.element_pressures[..., None])[:, 0]
+        sizes = self._of_nodes.sum(axis=1)
+        means = (self.element_pressures * self._of_nodes).sum(axis=1) / sizes
+        return self._averaged(along_elements(means, sizes, self.path.rule.nodes)[..., None])[:, 0]
 
     def _summed(self, values):
         """(n, ..) sums over the elements at every node of values (elements, nodes, ..)."""
@@ -218,6 +231,21 @@ class InHole:
         for j in range(p + 1):
             found[j : len(found) - p + j : p] += values[:, j]
         return found
+
+    def _averaged(self, values):
+        """(n, k) from values of each element at its nodes (elements, nodes, k): means where two elements meet."""
+        return self._summed(values) / self._summed(np.ones((*values.shape[:2], 1)))
+
+    @cached_property
+    def errors_along(self):
+        """See the class; infinite where there is no mesh before."""
+        if self._coarser is None:
+            return dict.fromkeys(_ALONG, np.inf)
+        s, coarser = self._coarser
+        return {
+            name: apart_mostly(getattr(self, name), np.interp(self.s, s, values), self.node_length)
+            for name, values in coarser.items()
+        }
 
     @cached_property
     def node_length(self):

@@ -12,6 +12,7 @@ from cosserat_fenicsx.well.loaded import sections_of
 from cosserat_fenicsx.well.mud import Mud
 from cosserat_fenicsx.well.operations import Operation
 from cosserat_fenicsx.well.pieces import pieces_of
+from cosserat_fenicsx.well.rings import is_ring, ring_of
 from cosserat_fenicsx.well.rod_rung import rod_in_contact
 from cosserat_fenicsx.well.softstring import chain_of, soft_string
 from cosserat_fenicsx.well.string import DrillString
@@ -114,6 +115,7 @@ def _flexible(given, model, tol, torque_convention, pieces, laid):
     why it is not the answer where it is not."""
     path, operation = given[0].path, given[2]
     sections = sections_of([place.component for place in laid])
+    rings = [ring_of(place, given[0]) for place in laid if is_ring(place.component)]
     soft = soft_string(chain_of(pieces, torque_convention == "coulomb"), -operation.weight, operation.torque, tol)
     buckled, why = None, []
     if model != SOFT:
@@ -124,7 +126,7 @@ def _flexible(given, model, tol, torque_convention, pieces, laid):
                 raise
             why.append(f"{_LOCKS_UP}: {stuck}")
     solved, used = buckled or soft, BUCKLED if buckled or model == BUCKLED else SOFT
-    left_out, scales = model_errors(path, pieces, soft, solved, sections), scales_of(solved, pieces)
+    left_out, scales = model_errors(path, pieces, soft, solved, sections, rings), scales_of(solved, pieces)
     error = max(map(share, (solved.error, solved.torque_error), scales))
     model_error = max(share(parts.total, scale) for parts, scale in zip(left_out, scales, strict=True))
     why = [*reasons(used, model, soft, solved, sections, left_out, scales), *why]

@@ -30,6 +30,7 @@ PAGES = {
     "work_precision": ("speed.md", "work_precision_sweep.png"),
     "work_precision_motion": ("speed.md", "work_precision_motion.png"),
     "soft_string": ("wells.md", "soft_string.png"),
+    "rods_in_wells": ("wells.md",),
 }
 #: The tables with a page of their own: its title and pictures.
 ALONE = {
