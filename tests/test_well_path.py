@@ -98,16 +98,40 @@ def test_the_closest_point_of_a_wide_arc_far_away():
 
 def test_a_survey_from_a_file(tmp_path):
     file = tmp_path / "survey.csv"
-    file.write_text("MD (ft);Inc [deg];Azimuth\n0;0;0\n1000;0;0\n2000;30;45\n", encoding="utf-8")
-    with pytest.raises(cf.SceneError, match="says feet"):
-        cf.WellPath.from_csv(file, azi="azimuth")
-    well = cf.WellPath.from_csv(file, azi="azimuth", length_unit=cf.units.foot)
-    assert well.md.tolist() == pytest.approx([0, 304.8, 609.6]) and np.degrees(well.inclination[2]) == pytest.approx(30)
-    with pytest.raises(cf.SceneError, match="no column 'azi'.*did you mean 'azimuth'"):
-        cf.WellPath.from_csv(file)
-    file.write_text("md,inc,azi\n0,0,0\n10,none,0\n", encoding="utf-8")
-    with pytest.raises(cf.SceneError, match="line 3.*expected numbers"):
-        cf.WellPath.from_csv(file)
+    stations = "\n0;0;0\n1000;0;0\n2000;30;45\n"
+    for heading, given in (
+        ("MD (ft);Inc [deg];Azimuth", {"length_unit": cf.units.foot}),
+        ("Measured Depth (ftKB);Inclination (deg);Azimuth (deg)", {}),
+        ("# My company\nWell: A-1, 2024\n\nMD;INC;AZI\nft;deg;deg", {"length_unit": "ft"}),
+        ("depth_ft;tilt;Azimuth", {"md": "Depth", "inc": "tilt"}),
+    ):
+        file.write_text(heading + stations, encoding="utf-8")
+        well = cf.WellPath.from_csv(file, **given)
+        assert well.md.tolist() == pytest.approx([0, 304.8, 609.6]), heading
+        assert np.degrees([well.inclination[2], well.azimuth[2]]) == pytest.approx([30, 45]), heading
+    file.write_text("MD (m),Inc (rad),Azi\n0,0,0\n900,0.3,0.2\n", encoding="utf-8")
+    assert cf.WellPath.from_csv(file).inclination[1] == 0.3
+
+
+@pytest.mark.parametrize(
+    ("text", "given", "words"),
+    [
+        ("md,inc,azi\n0,0,0\n\n10,none,0", {}, "line 4, '10,none,0': expected numbers in md, inc, azi"),
+        ("md;inc;azi\n0;0;0\n10;10,5;20", {}, "line 3.*decimals stand behind a point"),
+        ("md,inc,azi\n0,0,0\n10,10,5,20", {}, "line 3.*no more columns than names"),
+        ("MD (m),inc,azi\n0,0,0\n10,5,20", {"length_unit": "ft"}, "'MD .m.' says a unit of 1 m"),
+        ("MD (m),inc,azi\n0,0,0\n10,5,20", {"length_unit": "yd"}, "length_unit = 'yd': known: cm, f"),
+        ("md,inc (rad),azi\n0,0,0\n10,5,20", {"degrees": True}, "contradict"),
+        ("md,inc,direction\n0,0,0\n10,5,20", {}, "no column 'azi' in md, inc, direction: .*columns = "),
+        ("md,azim,azimuth,inc\n0,0,0,0\n10,5,5,20", {}, "no column 'azi' in"),
+        ("0,0,0\n10,5,20\n", {}, "expected a row of names, such as"),
+        ("md,inc,azi\n0,0,0\n", {}, "1 stations below the row of names"),
+    ],
+)
+def test_files_that_are_refused(text, given, words, tmp_path):
+    (tmp_path / "survey.csv").write_text(text, encoding="utf-8")
+    with pytest.raises(cf.SceneError, match=words):
+        cf.WellPath.from_csv(tmp_path / "survey.csv", **given)
 
 
 @pytest.mark.parametrize(

@@ -1,5 +1,6 @@
 """Scene files of strings in wells: what they say, units, refusals, the command line, the demos."""
 
+import inspect
 import re
 import sys
 from pathlib import Path
@@ -8,7 +9,11 @@ import pytest
 
 import cosserat_fenicsx as cf
 from cosserat_fenicsx.cli.main import main
-from cosserat_fenicsx.well.field_units import in_si
+from cosserat_fenicsx.well.components import COMPONENTS
+from cosserat_fenicsx.well.field_units import DIMENSIONS, in_si
+from cosserat_fenicsx.well.operations import OPERATIONS
+from cosserat_fenicsx.well.scenefile import KEYS
+from cosserat_fenicsx.well.sizes import standard_sizes
 
 pytestmark = pytest.mark.serial
 DEMOS = Path(__file__).parent.parent / "demos"
@@ -55,6 +60,14 @@ def test_what_a_file_says():
         ("60 ft/min", "speed", 0.3048),
         ("120 rpm", "rotation", 120.0),
         ("3 deg/100ft", "angle per length", 0.001717843752),
+        ("8 1/2 in", "length", 0.2159),
+        ("9-5/8 in", "length", 0.244475),
+        ('3/4"', "length", 0.01905),
+        ("10 lb/gal", "density", 1198.264273),
+        ("12 klb-ft", "moment", 16269.815397),
+        ("20 klbs", "force", 88964.43230521),
+        ("12 lb/ft", "force per length", 175.1268324),
+        ("12 lb/ft", "mass per length", 17.8579673),
     ],
 )
 def test_field_units(text, dimension, value):
@@ -64,7 +77,14 @@ def test_field_units(text, dimension, value):
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
-        ('"Bit", diameter = "8.5 in"', '"Bit", diameter = "8.5 inches"', "inches"),
+        ('"Bit", diameter = "8.5 in"', '"Bit", diameter = "8.5 yards"', "yards"),
+        ("weight = 80e3", 'weight = "8 tons"', "expected tf, 1000 kgf, or kN or klbf: there are several tons"),
+        ('survey = "volve_f12.csv"', "survey = volve", "a number with its unit, stand in quotes"),
+        (
+            'survey = "volve_f12.csv"',
+            'survey = "volve_f12.csv"\nlength_unit = "yd"',
+            "length_unit = 'yd': known: cm, f",
+        ),
         (
             '"Bit", diameter = "8.5 in"',
             '"Bit", diameter = "8.5 ppg"',
@@ -83,6 +103,14 @@ def test_field_units(text, dimension, value):
         ("[string]", "[strings]", "unknown key 'strings', did you mean 'string'"),
         ('survey = "volve_f12.csv"', 'survey = "none.csv"', "cannot be read"),
         ("count = 20", "", "'count' is missing"),
+        ("from = 300.0\nto = 3438.0\ncount = 20", "depths = 3000", "depths = 3000: expected a list of measured depths"),
+        ("to = 3438.0\ncount", 'to = "11400 ft"\ncount', "depth = 3474.72 m: expected a measured depth in the hole"),
+        ("tol = 2e-2", 'tol = "1 %"', "torque_and_drag.tol = '1 %': expected a number"),
+        ("tol = 2e-2", 'model = "stiff"', "torque_and_drag.model = 'stiff': expected 'auto'"),
+        ("tol = 2e-2", 'torque_convention = "api"', "expected 'coulomb' or 'johancsik'"),
+        ("friction = [0.1, 0.2, 0.3]", "friction = [[0.1, 0.2, 0.3]]", "a number, or 2, one for each section"),
+        ('"Bit", diameter = "8.5 in"', '"Bit", diameter = "8.75 in"', "bit: 0.22225 m wide"),
+        ("[string]", '[string]\norder = "top down"', "bit, fills up; where the list .* order='bit up'"),
         ("tol = 2e-2", "tol = 2e-2\nelements = 4", "unknown key 'elements'"),
     ],
 )
@@ -92,7 +120,7 @@ def test_files_that_are_refused(old, new, words, tmp_path):
     (tmp_path / "well.toml").write_text(text.replace(old, new), encoding="utf-8")
     (tmp_path / "volve_f12.csv").write_text(VOLVE.with_suffix(".csv").read_text(encoding="utf-8"), encoding="utf-8")
     with pytest.raises(cf.SceneError, match=words):
-        cf.read_well(tmp_path / "well.toml").answers()
+        cf.read_well(tmp_path / "well.toml")
 
 
 def test_the_command_line(tmp_path, capsys):
@@ -107,8 +135,41 @@ def test_the_command_line(tmp_path, capsys):
     assert {file.name for file in tmp_path.iterdir()} == names == set(re.findall(r"\w+\.csv", told))
     rows = (tmp_path / "trip_out.csv").read_text(encoding="utf-8").splitlines()
     assert rows[0].startswith("md (m),north (m)") and rows[-1].startswith("3438,-346.4")
-    assert main(["run", str(VOLVE), "--elements", "4"]) == 2
-    assert "--elements is for rods" in capsys.readouterr().err
+    for option, value in (("--elements", "4"), ("--color", "tension")):
+        assert main(["run", str(VOLVE), option, value]) == 2
+        assert f"{option} is for rods" in capsys.readouterr().err
+    assert main(["explain", str(VOLVE), "--model", "stiff"]) == 2
+    text = VOLVE.read_text(encoding="utf-8")
+    (tmp_path / "no_well.toml").write_text(text[text.index("[string]") :], encoding="utf-8")
+    assert main(["run", str(tmp_path / "no_well.toml")]) == 2 and "[well] is missing" in capsys.readouterr().err
+
+
+def test_doubts_are_said_once_and_without_code(tmp_path, capsys):
+    stations = (
+        "[well]\nstations = [[0, 0, 0], ['1 km', 0, 0], [3281, 30, 0]]\nsections = [{ to = 1000, diameter = 0.2159, "
+    )
+    rest = "friction = 0.2 }]\n[string]\ncomponents = [{ type = 'DrillPipe', size = '5 19.5' }]\n[mud]\ndensity = 10\n"
+    operation = "[[operations]]\ntype = 'RotaryDrilling'\nweight = 60\ntorque = 5\n[torque_and_drag]\nmodel = 'soft'\n"
+    (tmp_path / "well.toml").write_text(stations + rest + operation, encoding="utf-8")
+    assert main(["run", str(tmp_path / "well.toml")]) == 0
+    told = capsys.readouterr().err.splitlines()
+    assert len(told) == 4 and all(line.startswith("cosserat: warning: ") for line in told)
+    for words in ("survey ends at 3281 m and the sections at 1000 m.*3.28 times as deep", "hardly that of a mud",
+                  "RotaryDrilling.weight = 60 N is hardly", "RotaryDrilling.torque = 5 N m is hardly"):  # fmt: skip
+        assert re.search(words, "\n".join(told)), words
+
+
+def test_the_reference_has_every_key_unit_and_size():
+    page = (DEMOS.parent / "docs" / "well_files.md").read_text(encoding="utf-8")
+    told = set(re.findall(r"`([^`]+)`", re.sub(r"```.*?```", "", page, flags=re.S)))
+    classes = (*COMPONENTS, *OPERATIONS)
+    assert {cls.__name__ for cls in classes} <= told
+    arguments = {name for cls in (*classes, cf.Mud, cf.HoleSection) for name in inspect.signature(cls).parameters}
+    keys = {f"[{table}]" for table in KEYS} | {key for keys in KEYS.values() for key in keys}
+    units = {unit for name, (_, known) in DIMENSIONS.items() if name != "angle per length" for unit in known}
+    sizes = {name for known in standard_sizes().values() for name in known}
+    for expected in (arguments, keys, units, sizes):
+        assert expected <= told, expected - told
 
 
 @pytest.mark.slow

@@ -86,9 +86,11 @@ def test_a_depth_without_an_answer_is_a_row_that_says_so(monkeypatch, tmp_path):
         assert f"the estimated error of the rod in contact is {found.values['error'][0, 0, 1]:.1e}" in found.noted(1)[0]
     found.write(tmp_path / "sweep.csv")
     rows = (tmp_path / "sweep.csv").read_text(encoding="utf-8").splitlines()
-    assert rows[1].endswith('nan,nan,"trip out, bit at 800 m: the contact alternates"') and rows[3].endswith(',""')
+    assert rows[1].endswith(',,,"trip out, bit at 800 m: the contact alternates"') and rows[3].endswith(",rod,")
     assert [line.get_label() for line in found.plot().axes[0].lines] == ["trip out", "trip out: no answer"]
     either = cf.depth_sweep(*given[:3], [800.0], mud=MUD)
+    both = cf.depth_sweep(HOLE, STRING, cf.RotateOffBottom(), [400.0, 1200.0], mud=MUD, tol=1e-3)
+    assert both.models[0, 0].tolist() == ["soft", "rod"] and "│ soft" in str(both) and "│ rod" in str(both)
     assert np.isfinite(either.hook_load).all() and "soft string; NOT ENOUGH for tol = 0.0001 in the" in str(either)
     assert "and not solved: the contact alternates" in str(either)
 
@@ -132,10 +134,11 @@ def test_lock_up_in_a_sweep_is_told():
     string = cf.DrillString([cf.Component(None, stiff, 16.6, 0.05)])
     path = cf.WellPath.from_survey([0, 12000], [90, 90], [0, 0])
     hole = cf.Borehole(path, [cf.HoleSection(12000, 2 * (0.05 + 0.041), 0.3)])
-    found = cf.depth_sweep(hole, string, cf.TripIn(), [5000, 9000, 11000], model="soft, buckled")
+    found = cf.depth_sweep(hole, string, cf.TripIn(), [5000, 9687, 11000], model="soft, buckled")
     assert np.isfinite(found.hook_load[0, 0, :2]).all() and np.isnan(found.hook_load[0, 0, 2])
     assert found.values["locked"][0, 0, 2] == pytest.approx(11000 - 9688.9, abs=1) and found.done.all()
-    assert "locks up at md = 1311" in str(found)
+    assert "locks up at md = 1311" in str(found) and found.models[0, 0].tolist() == ["soft, buckled"] * 2 + [""]
+    assert "bit at 9687 m: BEYOND WHAT ANY PIPE CARRIES" in str(found)
 
 
 def measured(noise, block=0.0):
@@ -161,6 +164,23 @@ def test_friction_from_measurements():
     assert block.block_weight == pytest.approx(250e3, rel=1e-6) and block.friction == pytest.approx(
         [0.2, 0.3], abs=1e-6
     )
+
+
+@pytest.mark.parametrize(
+    ("wrong", "words"),
+    [
+        (lambda m: (m.operation, m.hook_load + 150e3), "with block_weight=None it is .*weigh 1(49|50)"),
+        (lambda m: (m.operation, m.hook_load / 1e3), "the hook loads are .*e-0. times those computed: expected N"),
+        (lambda m: ({"trip out": OPERATIONS[1], "trip in": OPERATIONS[0]}.get(m.operation.name, m.operation),
+                    m.hook_load), "at the depth 900 m the hook load out is below that in: are they swapped"),
+    ],
+)  # fmt: skip
+def test_readings_that_do_not_fit_are_doubted(wrong, words):
+    readings = [m for m in measured(0.1) if m.torque is None and m.depth in (900, 1700, 2500)]
+    changed = [cf.RigMeasurement(m.depth, *wrong(m)) for m in readings]
+    with pytest.warns(cf.SceneWarning, match=words):
+        found = cf.calibrate_friction(HOLE, STRING, changed, mud=MUD)
+    assert f"DOUBTFUL: misfit {found.misfit:.3g} where 1" in str(found)
 
 
 def test_the_interval_covers_as_often_as_it_says():
@@ -204,7 +224,16 @@ def test_charts(tmp_path):
     found.write(tmp_path / "sweep.csv")
     rows = (tmp_path / "sweep.csv").read_text(encoding="utf-8").splitlines()
     assert len(rows) == 6 and rows[0].startswith('depth_m,"trip out, friction 0.1: hook load (N)"')
+    assert ": model" in rows[0] and "soft" in rows[1] and "model: soft" in str(found)
     assert float(rows[5].split(",")[1]) == pytest.approx(found.hook_load[0, 0, 4])
+
+
+def test_tables_of_pandas():
+    pytest.importorskip("pandas")
+    answer, found = cf.torque_and_drag(HOLE, STRING, cf.TripOut(), mud=MUD, model="soft"), sweep()
+    along = answer.to_dataframe()
+    assert (along["side force (N/m)"] == answer.side_force).all() and along["component"].iloc[-1] == "bit"
+    assert (found.to_dataframe()["trip in, friction 0.1: hook load (N)"] == found.hook_load[1, 0]).all()
 
 
 @pytest.mark.slow

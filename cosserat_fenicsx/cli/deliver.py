@@ -29,8 +29,9 @@ def deliver(computed, options, moving):
         out = Path(options.output)
         prepare(out)  # fail before the computation, not after it
     _check_film(options, moving)
-    positive("plot", "magnify", options.magnify, "-")
-    colour_of(options.color)
+    magnify = 1.0 if options.magnify is None else positive("plot", "magnify", options.magnify, "-")
+    color = options.color or "bending_moment"
+    colour_of(color)
     if at is not None and out is None:
         say("cosserat: --at has no effect without -o DIR, which pictures are written to")
 
@@ -54,7 +55,7 @@ def deliver(computed, options, moving):
             if code == INTERRUPTED:
                 say("cosserat: interrupted; writing the partial result, Ctrl-C again skips what is not written yet")
             try:
-                look = {"magnify": options.magnify, "color": options.color, "shown": _shown(path, at)}
+                look = {"magnify": magnify, "color": color, "shown": _shown(path, at)}
                 look |= {"film": film, "speed": options.speed}
                 with patience():
                     _write(path, out, station, picture=not options.no_picture, stops=code != INTERRUPTED, **look)

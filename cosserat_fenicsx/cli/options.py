@@ -77,17 +77,17 @@ def _outputs(parser):
         "--output",
         metavar="DIR",
         help="write path.xdmf, path.h5, path.csv, rods.png and rods.html there, or of a motion motion.xdmf, .h5, .csv, "
-        "rods.png, rods.html and energy.png, and result.h5, which read_path or read_history of Python reads; without "
-        "it only the table is shown",
+        "rods.png, rods.html and energy.png, and result.h5, which read_path or read_history of Python reads; of a "
+        "string in a well a .csv and pictures for each operation and for the depth_sweep; without it only the table is "
+        "shown",
     )
     parser.add_argument("--no-picture", action="store_true", help="write no pictures")
     parser.add_argument(
         "--color",
         metavar="FIELD",
-        default="bending_moment",
         help="rods.png: what colours the rods, such as shear_force, tension, displacement or m.x [bending_moment]",
     )
-    parser.add_argument("--magnify", type=float, default=1.0, help="pictures: factor on displacements [1]")
+    parser.add_argument("--magnify", type=float, help="pictures: factor on displacements [1]")
     parser.add_argument(
         "--station",
         metavar="ROD@S",
@@ -124,7 +124,8 @@ def _common(parser):
                         "with =, --load-factors=-1:1")  # fmt: skip
     parser.add_argument("--tol", type=float,
                         help="estimated error of positions over the largest displacement [1e-6]; of a motion that of "
-                        "its steps, over the longest rod's length [1e-3]")  # fmt: skip
+                        "its steps, over the longest rod's length [1e-3]; of a string in a well that of hook load and "
+                        "torque [1e-4]")  # fmt: skip
     parser.add_argument("--elements", type=int, help="elements per rod; fixes the mesh, no error estimate")
     parser.add_argument("--degree", type=int, help="polynomial degree of r and q, 1 to 4 [4]")
     parser.add_argument("--formulation", help="mixed, displacement or multiplier [mixed]")

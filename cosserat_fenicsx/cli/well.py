@@ -2,6 +2,8 @@
 
 import math
 import sys
+import warnings
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,14 +12,14 @@ import numpy as np
 from cosserat_fenicsx import units
 from cosserat_fenicsx.cli.deliver import prepare
 from cosserat_fenicsx.cli.say import DONE, INTERRUPTED, say
-from cosserat_fenicsx.errors import Interrupted, SceneError
+from cosserat_fenicsx.errors import Interrupted, SceneError, SceneWarning
 from cosserat_fenicsx.ranks import on_first, world
 from cosserat_fenicsx.well.components import weight_in_mud
 from cosserat_fenicsx.well.scenefile import read_well
 
 # Options of the command line that are for rods alone.
 _OTHERS = ("load_factors", "elements", "degree", "formulation", "control", "branch", "duration", "dt", "scheme",
-           "save_every", "start", "folder", "station", "at", "animate", "speed")  # fmt: skip
+           "save_every", "start", "folder", "station", "at", "animate", "speed", "color", "magnify")  # fmt: skip
 _SOFT = (
     "the soft string by a differential equation along the axis, and what that leaves out is estimated with each answer."
 )
@@ -40,6 +42,25 @@ def _scene(options):
     return replace(scene, settings={**scene.settings, **asked})
 
 
+@contextmanager
+def _warnings_in_words():
+    """Say each warning about a scene once, without the place in the code that it comes from."""
+    said = set()
+
+    def show(message, category, *where, **more):
+        if not issubclass(category, SceneWarning):
+            usual(message, category, *where, **more)
+        elif str(message) not in said:
+            said.add(str(message))
+            say(f"cosserat: warning: {message}")
+
+    with warnings.catch_warnings():
+        usual, warnings.showwarning = warnings.showwarning, show
+        warnings.simplefilter("always", SceneWarning)
+        yield
+
+
+@_warnings_in_words()
 def run_well(options):
     """`cosserat run`; returns the exit code."""
     scene, out = _scene(options), Path(options.output) if options.output else None
@@ -90,6 +111,7 @@ def _write(answer, out, stem, pictures):
     return [f"{stem}_contacts.csv", *files]  # which `TorqueAndDrag.write` writes too
 
 
+@_warnings_in_words()
 def explain_well(options):
     """Text of `cosserat explain`."""
     scene = _scene(options)
@@ -117,5 +139,5 @@ def explain_well(options):
     if scene.sweep:
         lines.append(f"Sweep over {len(scene.sweep['depths'])} depths of the bit.")
     model, tol = scene.settings.get("model", "auto"), scene.settings.get("tol", 1e-4)
-    lines.append(f"Model: {model}, tol = {tol:g}: {_MODELS.get(model, 'unknown')}")
+    lines.append(f"Model: {model}, tol = {tol:g}: {_MODELS[model]}")
     return "\n".join(lines)

@@ -123,6 +123,8 @@ def _read(file):
         raise SceneError(
             f"{file}: a string in a well: expected `read_well` in Python, `cosserat run` or `cosserat explain`"
         )
+    if "rods" not in tables and not tables.keys().isdisjoint({"string", "operations"}):
+        raise SceneError(f"{file}: [well] is missing: expected [well], [string] and [[operations]]")
     try:
         return _scene(tables, file.parent)
     except SceneError as problem:

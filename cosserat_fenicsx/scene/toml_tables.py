@@ -21,7 +21,8 @@ def tables_of(file):
     except UnicodeDecodeError as problem:
         raise SceneError(f"{file}: not UTF-8 ({problem.reason} at byte {problem.start}): save it as UTF-8") from None
     except tomllib.TOMLDecodeError as problem:
-        raise SceneError(f"{file}: not valid TOML: {problem}") from None
+        hint = "; text, and a number with its unit, stand in quotes" if "Invalid value" in str(problem) else ""
+        raise SceneError(f"{file}: not valid TOML: {problem}{hint}") from None
 
 
 def entries(key, tables):

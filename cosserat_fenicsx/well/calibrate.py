@@ -1,5 +1,6 @@
 """Coefficients of friction from measured hook loads and torques."""
 
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -8,7 +9,7 @@ from scipy.optimize import least_squares
 from scipy.stats import t as student
 
 from cosserat_fenicsx.checks import instance, number, positive, refuse, store
-from cosserat_fenicsx.errors import SceneError
+from cosserat_fenicsx.errors import SceneError, SceneWarning
 from cosserat_fenicsx.well.hole import Borehole
 from cosserat_fenicsx.well.mud import Mud
 from cosserat_fenicsx.well.operations import Operation
@@ -19,6 +20,9 @@ from cosserat_fenicsx.well.torque_and_drag import BUCKLED, SOFT, torque_and_drag
 _START, _MOST, _TOL = 0.2, 2.0, 1e-10
 # Unit of the block's weight in the search, N.
 _BLOCK = 1e5
+# Misfit above which something is wrong with readings or string, and by which it falls where the cause is found; factor
+# by which hook loads in another unit differ at least.
+_BAD, _OTHER_UNIT = 3.0, 50.0
 # Smallest singular value of the sensitivities over the largest one.
 _SINGULAR = 1e-6
 
@@ -30,7 +34,8 @@ class RigMeasurement:
     Args:
         depth: measured depth of the bit, m.
         operation: what was done, with weight and torque on bit.
-        hook_load: N, the weight of block and top drive included; None where it was not read.
+        hook_load: N, as the indicator shows it; None where it was not read. The weight of block and top drive that it
+            includes is the `block_weight` of `calibrate_friction`, which is zero unless given, or found.
         torque: at the surface, N m; None where it was not read.
         hook_load_sd, torque_sd: their standard deviations, N and N m: the weights of the readings.
 
@@ -68,6 +73,7 @@ class FrictionFit:
         correlation: (m, m) of the estimates: close to 1 or -1 where the readings tell sums or differences alone.
         residuals: (k,) measured less computed over the standard deviations, hook loads before torques.
         misfit: root of the sum of their squares over the readings in excess: 1 where the standard deviations are right.
+        doubts: sentences on what may be wrong, where the misfit is far above 1; these are warned of, too.
     """
 
     hole: Borehole
@@ -79,6 +85,7 @@ class FrictionFit:
     correlation: np.ndarray
     residuals: np.ndarray
     misfit: float
+    doubts: tuple[str, ...] = ()
 
     def __str__(self):
         from cosserat_fenicsx.well.tables import fit_table
@@ -99,12 +106,14 @@ def calibrate_friction(
 ) -> FrictionFit:
     """One coefficient of friction for each section of a hole, such that hook loads and torques fit measured ones best.
 
-    Weighted least squares by SciPy. The intervals are Student's, of the linearised problem, scaled by the misfit.
+    Where they fit badly, a warning says what may be the cause. Weighted least squares by SciPy. The intervals are
+    Student's, of the linearised problem, scaled by the misfit.
 
     Args:
         hole: its own friction is not used.
         measurements: each a `RigMeasurement`, more than there are unknowns.
-        block_weight: of block and top drive in the hook loads, N; None: one more unknown.
+        block_weight: of block and top drive in the hook loads, N: 0 where they were subtracted, None where they were
+            not and it is one more unknown.
         model: "soft", or "soft, buckled". mud, string, torque_convention: see `torque_and_drag`.
         confidence: between 0 and 1.
 
@@ -151,11 +160,56 @@ def calibrate_friction(
     friction = values[:sections]
     with np.errstate(divide="ignore", invalid="ignore"):
         correlation = covariance / np.outer(spread, spread)
+    block = float(values[-1]) if unknown_block else float(block_weight)
+    doubts = ()
+    if misfit > _BAD:
+        computed = [m.hook_load - x * m.hook_load_sd for m, x in zip(hooks, found.fun, strict=False)]
+
+        def with_block():
+            return calibrate_friction(hole, string, measurements, mud=mud, block_weight=None, model=model,
+                                      torque_convention=torque_convention)  # fmt: skip
+
+        doubts = (
+            f"misfit {misfit:.3g} where 1 is as the standard deviations say: neither coefficients nor intervals are to "
+            "be relied on",
+            *_causes(hooks, computed, misfit, None if unknown_block else with_block),
+        )
+        warnings.warn(f"calibrate_friction: {'; '.join(doubts)}", SceneWarning, stacklevel=2)
     return FrictionFit(
-        hole.with_friction(friction), friction, np.maximum(ends[:sections], 0.0),
-        float(values[-1]) if unknown_block else float(block_weight), ends[-1] if unknown_block else np.full(2, np.nan),
-        confidence, correlation, found.fun, misfit,
+        hole.with_friction(friction), friction, np.maximum(ends[:sections], 0.0), block,
+        ends[-1] if unknown_block else np.full(2, np.nan), confidence, correlation, found.fun, misfit, doubts,
     )  # fmt: skip
+
+
+def _causes(hooks, computed, misfit, with_block):
+    """Sentences on why readings may not fit.
+
+    Args:
+        hooks: measurements of hook loads; computed: these, N, with the block; with_block: fits the block's weight too,
+            None where it was fitted.
+    """
+    sizes = [sum(abs(x) for x in values) for values in ([m.hook_load for m in hooks], computed)]
+    if hooks and not sizes[1] / _OTHER_UNIT < sizes[0] < sizes[1] * _OTHER_UNIT:
+        yield f"the hook loads are {sizes[0] / sizes[1]:.1e} times those computed: expected N"
+        return
+    out, into = ([m for m in hooks if m.operation.direction(1.0)[0] * sign > 0] for sign in (1, -1))
+    swapped = [up.depth for up in out for down in into if up.depth == down.depth and up.hook_load < down.hook_load]
+    if swapped:
+        yield f"at the depth {swapped[0]:g} m the hook load out is below that in: are they swapped?"
+        return
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", SceneWarning)
+            free = with_block() if with_block and hooks else None
+    except SceneError:  # the readings do not tell it
+        free = None
+    if free is not None and free.misfit < misfit / _BAD:
+        yield (
+            f"with block_weight=None it is {free.misfit:.3g}, and block and top drive weigh "
+            f"{free.block_weight / 1e3:.4g} kN: hook loads include them unless they were subtracted"
+        )
+    else:
+        yield "expected depths in m, hook loads in N, torques in N m, and the string and mud of the readings"
 
 
 def _check_told(hole, sensitivity, unknown_block):

@@ -6,7 +6,6 @@ answer does not depend on those before it, nor on where a sweep was broken off.
 """
 
 import hashlib
-import itertools
 import json
 import os
 from collections.abc import Sequence
@@ -26,23 +25,25 @@ from cosserat_fenicsx.well.mud import Mud
 from cosserat_fenicsx.well.operations import Operation
 from cosserat_fenicsx.well.pieces import pieces_of
 from cosserat_fenicsx.well.string import DrillString
-from cosserat_fenicsx.well.torque_and_drag import AUTO, ROD, torque_and_drag
+from cosserat_fenicsx.well.tabular import Tabular
+from cosserat_fenicsx.well.torque_and_drag import AUTO, BUCKLED, ROD, SOFT, torque_and_drag
 
-#: Numbers that are kept of an answer; `locked` is where the string locks up, m, or NaN.
-KEPT = ("hook_load", "surface_torque", "error", "model_error", "locked")
+#: Numbers that are kept of an answer; `locked` is where the string locks up, m, or NaN; `rung` the index of its model.
+KEPT = ("hook_load", "surface_torque", "error", "model_error", "locked", "rung")
+_RUNGS = (SOFT, BUCKLED, ROD)
 # Of the form of files, which are gone on with.
-_VERSION = 2
+_VERSION = 3
 
 
 @dataclass(frozen=True, eq=False)
-class DepthSweep:
+class DepthSweep(Tabular):
     """Surface loads over the depth of the bit, from `depth_sweep`.
 
     Attributes:
         operations, depths (m), friction: as asked for; friction is (None,) for that of the hole.
         values: {name: array (operations, friction, depths)} of "hook_load" (N), "surface_torque" (N m), "error" and
-            "model_error" (see `TorqueAndDrag`) and "locked" (m): where the string locks up, which leaves the others
-            NaN. What is not computed yet is NaN.
+            "model_error" (see `TorqueAndDrag`), "locked" (m): where the string locks up, which leaves the others NaN,
+            and "rung", from which `models` follows. What is not computed yet is NaN.
         notes: {(operation, friction, depth): text}, by indices, of the answers to look at: why there is none (the
             string locks up, no equilibrium was found), or why it is not as accurate as asked.
     """
@@ -67,6 +68,11 @@ class DepthSweep:
             found[index] = True
         return found
 
+    @property
+    def models(self) -> np.ndarray:
+        """(operations, friction, depths) what was solved: "soft", "soft, buckled" or "rod"; "" where nothing was."""
+        return np.array([*_RUNGS, ""])[np.nan_to_num(self.values["rung"], nan=len(_RUNGS)).astype(int)]
+
     def __len__(self):
         return int(self.done.sum())
 
@@ -86,23 +92,10 @@ class DepthSweep:
             if k in (None, index[2])
         ]
 
-    def write(self, file: File) -> None:
-        """Write a .csv file, one row a depth, with the notes on it. Rank 0 writes.
+    def _tables(self):
+        from cosserat_fenicsx.well.tables import sweep_columns
 
-        Raises:
-            OSError: it cannot be written.
-        """
-        lines = ["depth_m," + ",".join(f'"{label}: {what}"' for label, what, _ in self._columns()) + ",notes"]
-        columns = [values for *_, values in self._columns()]
-        for k, depth in enumerate(self.depths):
-            notes = "; ".join(self.noted(k)).replace('"', "'")
-            lines.append(",".join([f"{depth:.9g}", *(f"{values[k]:.9g}" for values in columns), f'"{notes}"']))
-        on_first(world(), lambda: Path(file).write_text("\n".join(lines) + "\n", encoding="utf-8"))
-
-    def _columns(self):
-        for i, j in itertools.product(range(len(self.operations)), range(len(self.friction))):
-            for what, name in (("hook load (N)", "hook_load"), ("surface torque (N m)", "surface_torque")):
-                yield self.label(i, j), what, self.values[name][i, j]
+        return {"": sweep_columns(self)}
 
     def plot(self, file: File | None = None):
         """Draw hook load and surface torque over the depth of the bit, the depth downwards ("broomstick").
@@ -197,18 +190,19 @@ def _answer(hole, string, operation, depth, settings):
     try:
         answer = torque_and_drag(hole, string, operation, depth=depth, progress=False, **settings)
     except LockUp as locked:
-        return (np.nan, np.nan, np.nan, np.nan, locked.md), f"locks up at md = {locked.md:.5g} m"
+        return tuple(locked.md if name == "locked" else np.nan for name in KEPT), f"locks up at md = {locked.md:.5g} m"
     except NotConverged as failed:
         # an equilibrium that is not as accurate as asked is one
         found, none = getattr(failed, "answer", None), (np.nan,) * len(KEPT)
-        numbers = none if found is None else (found.hook_load, found.surface_torque, found.error, 0.0, np.nan)
-        return numbers, str(failed)
-    note = ""
+        told = found and (found.hook_load, found.surface_torque, found.error, np.nan, np.nan, float(_RUNGS.index(ROD)))
+        return told or none, str(failed)
+    notes = [line for line in answer.why if line.startswith("BEYOND")]
     if settings["model"] == AUTO and not answer.enough:
         why = [line for line in answer.why if line.startswith("NOT ENOUGH")]
         why += [] if answer.model == ROD else answer.why[-1:]  # why it is not the rod
-        note = "; ".join([answer.words, *why])
-    return (answer.hook_load, answer.surface_torque, answer.error, answer.model_error, np.nan), note
+        notes += [answer.words, *why]
+    numbers = (answer.hook_load, answer.surface_torque, answer.error, answer.model_error, np.nan)
+    return (*numbers, float(_RUNGS.index(answer.model))), "; ".join(notes)
 
 
 class _Store:

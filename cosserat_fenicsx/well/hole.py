@@ -1,14 +1,18 @@
 """A hole along an axis: diameters and friction of its cased and open sections."""
 
 import warnings
+from copy import copy
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from cosserat_fenicsx import units
 from cosserat_fenicsx.checks import instance, number, positive, refuse, store
 from cosserat_fenicsx.errors import SceneError, SceneWarning
 from cosserat_fenicsx.well.path import WellPath
 
+# Survey and sections that differ by more than this part end at different depths.
+_APART = 1e-3
 # Diameters (m) above this are hardly those of holes.
 _WIDEST = 1.5
 
@@ -74,6 +78,11 @@ class Borehole:
             if section.to <= above:
                 raise SceneError(f"HoleSection.to = {section.to:g}: expected more than {above:g} m, the section above")
             above = section.to
+        if abs(self.path.length - above) > _APART * self.length:
+            ratio = max(self.path.length, above) * units.foot / self.length
+            feet = ": 3.28 times as deep, as feet are that are taken for metres" if abs(ratio - 1) < 0.05 else ""
+            warnings.warn(f"Borehole: the survey ends at {self.path.length:.6g} m and the sections at {above:.6g} m; "
+                          f"the hole ends at the shallower one{feet}", SceneWarning, stacklevel=3)  # fmt: skip
 
     @property
     def length(self):
@@ -96,4 +105,6 @@ class Borehole:
         if len(values) != len(self.sections):
             refuse(self, "friction", friction, f"a number, or {len(self.sections)}, one for each section of the hole")
         sections = [replace(section, friction=value) for section, value in zip(self.sections, values, strict=True)]
-        return replace(self, sections=tuple(sections))
+        found = copy(self)  # which was checked, and warned of
+        store(found, sections=tuple(sections))
+        return found

@@ -5,11 +5,16 @@ along the string (+1 where it moves up), e the part that acts around it.
 """
 
 import math
+import warnings
 from dataclasses import dataclass
 from typing import ClassVar
 
 from cosserat_fenicsx import units
 from cosserat_fenicsx.checks import number, positive, store
+from cosserat_fenicsx.errors import SceneWarning
+
+# Weights (N) and torques (N m) on bit below these are numbers in other units by all appearance.
+_HARDLY = {"weight": 500.0, "torque": 50.0}
 
 
 class Operation:
@@ -20,7 +25,15 @@ class Operation:
 
     def __post_init__(self):
         for field, unit in (("weight", "N"), ("torque", "N m")):
-            store(self, **{field: number(self, field, getattr(self, field), f"a number ({unit})", math.isfinite)})
+            value = number(self, field, getattr(self, field), f"a number ({unit})", math.isfinite)
+            store(self, **{field: value})
+            if 0 < abs(value) < _HARDLY[field]:
+                warnings.warn(
+                    f"{type(self).__name__}.{field} = {value:g} {unit} is hardly a {field} on bit: 25 kN are 25e3, 25 "
+                    "klbf 25 * units.kip; 5 kN m are 5e3, 4000 ft-lbf 4000 * units.ft_lbf",
+                    SceneWarning,
+                    stacklevel=4,
+                )
 
     def direction(self, radius):
         """(c, e) for a contact radius (m)."""

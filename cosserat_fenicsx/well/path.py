@@ -86,22 +86,24 @@ class WellPath:
         azi: str = "azi",
         *,
         degrees: bool | None = None,
-        length_unit: float | None = None,
+        length_unit: float | str | None = None,
     ) -> "WellPath":
         """The axis from a .csv file with one row of names, separated by commas, semicolons or tabs.
 
+        What stands above that row is passed over. Units that the file names, as in "MD (ft)" or in a row below the
+        names, are taken.
+
         Args:
             file: its path.
-            md, inc, azi: names of the columns, upper or lower case alike; what follows in brackets in the file, such as
-                "MD (m)", need not be said.
-            degrees: see `from_survey`.
-            length_unit: of the measured depths, m, such as `units.foot`; None for metres, refused where the file's
-                heading says feet.
+            md, inc, azi: names of the columns, upper or lower case alike, without units. Usual other names, such as
+                "Measured Depth" and "Azimuth", are found by these.
+            degrees: see `from_survey`. length_unit: of the measured depths, in m or by name, such as `units.foot` or
+                "ft"; None for what the file says, else metres. Both are refused where the file says otherwise.
 
         Raises:
             SceneError: the file cannot be read, a column is missing or not of numbers; see also `from_survey`.
         """
-        return cls.from_survey(*read_columns(file, md, inc, azi, length_unit), degrees)
+        return cls.from_survey(*read_columns(file, md, inc, azi, degrees, length_unit))
 
     def position(self, md: float | Numbers) -> np.ndarray:
         """(..., 3) north, east, down at measured depths, m."""

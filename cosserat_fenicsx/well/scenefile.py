@@ -49,6 +49,7 @@ from typing import Any
 import numpy as np
 
 from cosserat_fenicsx.annotations import File
+from cosserat_fenicsx.checks import number, refuse
 from cosserat_fenicsx.errors import SceneError, nearest
 from cosserat_fenicsx.scene.materials import Material
 from cosserat_fenicsx.scene.sections import Stiffness
@@ -56,13 +57,14 @@ from cosserat_fenicsx.scene.toml_tables import check_arguments, entries, known_k
 from cosserat_fenicsx.well.answer import TorqueAndDrag
 from cosserat_fenicsx.well.components import COMPONENTS
 from cosserat_fenicsx.well.depth_sweep import DepthSweep, depth_sweep
-from cosserat_fenicsx.well.field_units import DIMENSIONS, in_si
+from cosserat_fenicsx.well.field_units import in_si, size_of
 from cosserat_fenicsx.well.hole import Borehole, HoleSection
 from cosserat_fenicsx.well.mud import Mud
 from cosserat_fenicsx.well.operations import OPERATIONS, Operation
 from cosserat_fenicsx.well.path import WellPath
+from cosserat_fenicsx.well.pieces import pieces_of
 from cosserat_fenicsx.well.string import DrillString
-from cosserat_fenicsx.well.torque_and_drag import torque_and_drag
+from cosserat_fenicsx.well.torque_and_drag import check_settings, torque_and_drag
 
 #: Dimensions of arguments that may be written with a unit.
 _LENGTHS = ("to", "diameter", "length", "contact_radius", "outer_diameter", "inner_diameter", "tool_joint",
@@ -71,7 +73,13 @@ _DIMENSIONS = {
     **dict.fromkeys(_LENGTHS, "length"), "torque": "moment", "density": "density", "inside": "density",
     "mass": "mass per length", "speed": "speed", "rpm": "rotation", "wall_stiffness": "pressure", "E": "pressure",
 }  # fmt: skip
-_SETTINGS = ("depth", "model", "tol", "torque_convention")
+#: Keys of the tables whose keys are not the arguments of a class.
+KEYS = {
+    "well": ("survey", "stations", "columns", "degrees", "length_unit", "wall_stiffness", "sections"),
+    "string": ("components", "order"),
+    "torque_and_drag": ("depth", "model", "tol", "torque_convention"),
+    "depth_sweep": ("depths", "from", "to", "count", "friction", "model", "tol"),
+}
 _OF_SWEEPS = ("friction", "model", "tol")
 
 
@@ -92,6 +100,18 @@ class WellScene:
     operations: tuple[Operation, ...]
     settings: dict[str, Any] = field(default_factory=dict)
     sweep: dict[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self):
+        """Refuse, before anything is solved, what does not fit the hole, and unknown settings."""
+        settings = {name: value for name, value in self.settings.items() if name != "depth"}
+        friction, depths = self.sweep.get("friction", []), self.sweep.get("depths", [])
+        of_sweep = {name: self.sweep[name] for name in ("model", "tol") if name in self.sweep}
+        for asked in (settings, {**settings, **of_sweep}):
+            check_settings(**asked)
+        for value in friction if isinstance(friction, list) else [friction]:
+            self.hole.with_friction(value)
+        for depth in (self.settings.get("depth", self.hole.length), *depths):
+            pieces_of(self.hole, self.string, self.operations[0], self.mud, depth)
 
     def answer(self, operation: Operation) -> TorqueAndDrag:
         """The answer of `torque_and_drag` for an operation."""
@@ -129,57 +149,61 @@ def _scene(tables, folder):
     known = ("title", "well", "string", "mud", "operations", "torque_and_drag", "depth_sweep")
     known_keys("the file (of a well)", tables, known)
     for name in ("well", "string", "operations"):
-        if name not in tables:
+        if not tables.get(name):
             raise SceneError(f"[{name}] is missing: expected [well], [string] and [[operations]]")
     hole = _hole(table("well", tables["well"]), folder)
     string = dict(table("string", tables["string"]))
-    known_keys("[string]", string, ("components", "order"))
+    known_keys("[string]", string, KEYS["string"])
     parts = [_made(f"string.components[{i}]", entry, COMPONENTS) for i, entry in entries("components", string)]
     operations = tuple(_made(f"operations[{i}]", entry, OPERATIONS) for i, entry in entries("operations", tables))
     mud = _made("mud", tables["mud"], (Mud,)) if "mud" in tables else None
     settings = dict(table("torque_and_drag", tables.get("torque_and_drag", {})))
-    known_keys("[torque_and_drag]", settings, _SETTINGS)
+    known_keys("[torque_and_drag]", settings, KEYS["torque_and_drag"])
     if "depth" in settings:
-        settings["depth"] = in_si("torque_and_drag.depth", settings["depth"], "length")
+        settings["depth"] = _depth("torque_and_drag", "depth", settings["depth"])
     whole = DrillString(parts, **{name: string[name] for name in ("order",) if name in string})
     sweep = _sweep(table("depth_sweep", tables["depth_sweep"])) if "depth_sweep" in tables else {}
-    for depth in (*np.atleast_1d(settings.get("depth", hole.length)), *sweep.get("depths", ())):
-        if not 0 < depth <= hole.length * (1 + 1e-12):
-            raise SceneError(f"depth = {depth:.10g} m: expected a measured depth in the hole, to {hole.length:.10g} m")
     return WellScene(str(tables.get("title", "")), hole, whole, mud, operations, settings, sweep)
 
 
 def _hole(well, folder):
-    known_keys(
-        "[well]", well, ("survey", "stations", "columns", "degrees", "length_unit", "wall_stiffness", "sections")
-    )
+    known_keys("[well]", well, KEYS["well"])
     if ("survey" in well) == ("stations" in well):
         raise SceneError("[well]: expected either survey, the name of a .csv file, or stations, rows of md, inc, azi")
-    unit, known = well.get("length_unit"), DIMENSIONS["length"][1]
-    if unit is not None and unit not in known:
-        raise SceneError(f"well.length_unit = {unit!r}: {nearest(unit, known)}")
+    unit = None
+    if "length_unit" in well:
+        unit = size_of("well.length_unit", well["length_unit"], "length")
     degrees = well.get("degrees")
     if "survey" in well:
         columns = well.get("columns", ["md", "inc", "azi"])
         if not isinstance(columns, list) or len(columns) != 3 or not isinstance(well["survey"], str):
             raise SceneError("[well]: expected survey, the name of a .csv file, and columns, three names of columns")
-        settings = {"degrees": degrees, "length_unit": None if unit is None else known[unit]}
-        path = WellPath.from_csv(folder / well["survey"], *columns, **settings)
+        path = WellPath.from_csv(folder / well["survey"], *columns, degrees=degrees, length_unit=unit)
     else:
         try:
-            md, inc, azi = np.array(well["stations"], dtype=float).T
-        except (ValueError, TypeError):
+            rows = [(_station(i, depth, unit or 1.0), *angles) for i, (depth, *angles) in enumerate(well["stations"])]
+            md, inc, azi = np.array(rows, dtype=float).T
+        except (ValueError, TypeError) as problem:
+            if isinstance(problem, SceneError):
+                raise
             raise SceneError("well.stations: expected rows of three numbers: md, inclination, azimuth") from None
-        path = WellPath.from_survey(md * known[unit or "m"], inc, azi, degrees)
+        path = WellPath.from_survey(md, inc, azi, degrees)
     sections = [_made(f"well.sections[{i}]", entry, (HoleSection,)) for i, entry in entries("sections", well)]
     stiff = {name: in_si(f"well.{name}", well[name], "pressure") for name in ("wall_stiffness",) if name in well}
     return Borehole(path, sections, **stiff)
 
 
+def _station(i, depth, unit):
+    """Measured depth of a station, m: text has its own unit."""
+    return in_si(f"well.stations[{i}]", depth, "length") if isinstance(depth, str) else depth * unit
+
+
 def _sweep(given):
-    known_keys("[depth_sweep]", given, ("depths", "from", "to", "count", *_OF_SWEEPS))
+    known_keys("[depth_sweep]", given, KEYS["depth_sweep"])
     if "depths" in given:
-        depths = [in_si(f"depth_sweep.depths[{i}]", x, "length") for i, x in enumerate(given["depths"])]
+        if not isinstance(given["depths"], list) or not given["depths"]:
+            refuse("depth_sweep", "depths", given["depths"], "a list of measured depths, such as [1000.0, 2000.0]")
+        depths = [_depth("depth_sweep", f"depths[{i}]", x) for i, x in enumerate(given["depths"])]
     else:
         for name in ("from", "to", "count"):
             if name not in given:
@@ -187,8 +211,13 @@ def _sweep(given):
         count = given["count"]
         if not isinstance(count, int) or isinstance(count, bool) or count < 1:
             raise SceneError(f"depth_sweep.count = {count!r}: expected how many depths")
-        depths = np.linspace(*(in_si(f"depth_sweep.{name}", given[name], "length") for name in ("from", "to")), count)
+        depths = np.linspace(*(_depth("depth_sweep", name, given[name]) for name in ("from", "to")), count)
     return {"depths": depths, **{name: given[name] for name in _OF_SWEEPS if name in given}}
+
+
+def _depth(table, name, value):
+    value = in_si(f"{table}.{name}", value, "length")
+    return number(table, name, value, "a measured depth (m), positive", lambda x: 0 < x < np.inf)
 
 
 def _made(where, entry, classes):

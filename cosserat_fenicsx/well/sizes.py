@@ -16,7 +16,8 @@ _TABLE = Path(__file__).with_name("standard_sizes.csv")
 
 
 @functools.cache
-def _table():
+def standard_sizes():
+    """{kind: {name: what `standard_size` returns}}."""
     with _TABLE.open(encoding="utf-8", newline="") as stream:
         rows = list(csv.DictReader(stream))
     sizes = {}
@@ -44,7 +45,7 @@ def standard_size(kind, name):
     Raises:
         SceneError: an unknown name, with the nearest known one.
     """
-    known = _table()[kind]
+    known = standard_sizes()[kind]
     plain = {_plain(size): size for size in known}
     if not isinstance(name, str) or _plain(name) not in plain:
         raise SceneError(f"{kind}.size = {name!r}: {nearest(name, known)}")

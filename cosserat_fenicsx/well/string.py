@@ -45,11 +45,15 @@ class DrillString:
                 refuse(self, "components", part, "components: DrillPipe, HeavyWeight, Collar, ..., or Component")
         if not given:
             refuse(self, "components", given, "at least one component")
+        other = _ORDERS[1 - _ORDERS.index(self.order)]
         given = given if self.order == "bit up" else given[::-1]
         store(self, components=given, order="bit up")
         for part in given[:-1]:
             if part.length is None:
-                refuse(part, "length", None, f"a length (m): only the uppermost component, {given[-1].name}, fills up")
+                expected = f"a length (m): only the uppermost component, {given[-1].name}, fills up"
+                if part is given[0]:
+                    expected += f"; where the list runs the other way, say order='{other}'"
+                refuse(part, "length", None, expected)
 
     def laid(self, depth):
         """The components in their places with the lower end at a measured depth (m), from the bit up.

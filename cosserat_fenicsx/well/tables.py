@@ -110,7 +110,9 @@ def _known(value, factor, form):
 def _estimate(answer):
     """The estimated error of the model in words."""
     left_out = f" (it leaves out {answer._leaves_out})" if answer._leaves_out else ""
-    return f"not estimated{left_out}" if math.isnan(answer.model_error) else f"{answer.model_error:.0e}"
+    if math.isnan(answer.model_error):
+        return f"not estimated{left_out}"
+    return "without a bound" if math.isinf(answer.model_error) else f"{answer.model_error:.0e}"
 
 
 def _on_bit(answer):
@@ -152,25 +154,41 @@ def sweep_table(sweep):
     """Text: hook loads and torques over the depth of the bit."""
     table = Table(title="hook load (kN), and surface torque (kN m) where the string rotates, over the depth of the bit")
     table.add_column("depth (m)", justify="right")
-    columns = []
+    columns, used = [], sorted({*sweep.models.ravel()} - {""})
     for i, operation in enumerate(sweep.operations):
         for j in range(len(sweep.friction)):
-            columns.append(sweep.hook_load[i, j] / 1e3)
+            columns.append([_known(x, 1e-3, ".3f") for x in sweep.hook_load[i, j]])
             table.add_column(sweep.label(i, j), justify="right", overflow="fold")
             if operation.direction(1.0)[1]:
-                columns.append(sweep.surface_torque[i, j] / 1e3)
+                columns.append([_known(x, 1e-3, ".3f") for x in sweep.surface_torque[i, j]])
                 table.add_column("torque", justify="right")
+            if len(used) > 1:
+                columns.append(sweep.models[i, j])
+                table.add_column("model")
     for k, depth in enumerate(sweep.depths):
-        table.add_row(f"{depth:.6g}", *(_known(values[k], 1, ".3f") for values in columns))
-    lines = [as_text(table)]
+        table.add_row(f"{depth:.6g}", *(values[k] for values in columns))
+    lines = [as_text(table), *(f"model: {name}" for name in used if len(used) == 1)]
     notes = sweep.noted()
     lines += notes[:_NOTES]
     if len(notes) > _NOTES:
         lines.append(f"and {len(notes) - _NOTES} more, see `notes`")
-    if len(sweep):
-        worst = np.nanmax(sweep.values["model_error"], initial=0.0)
-        lines.append(f"largest estimated relative error of the model {worst:.0e}")
+    told = sweep.values["model_error"][~np.isnan(sweep.values["model_error"])]
+    if len(told):
+        worst = "without a bound: it may lock up" if np.isinf(told).any() else f"{told.max():.0e}"
+        lines.append(f"largest estimated relative error of the model {worst}")
     return "\n".join(lines)
+
+
+def sweep_columns(sweep):
+    """{heading: (depths,)} of loads, models and notes."""
+    columns = {"depth_m": sweep.depths}
+    for i in range(len(sweep.operations)):
+        for j in range(len(sweep.friction)):
+            label = sweep.label(i, j)
+            columns[f"{label}: hook load (N)"] = sweep.hook_load[i, j]
+            columns[f"{label}: surface torque (N m)"] = sweep.surface_torque[i, j]
+            columns[f"{label}: model"] = sweep.models[i, j].tolist()
+    return columns | {"notes": ["; ".join(sweep.noted(k)) for k in range(len(sweep.depths))]}
 
 
 def fit_table(fit):
@@ -187,4 +205,4 @@ def fit_table(fit):
     if np.isfinite(fit.block_interval).all():
         low, high = fit.block_interval / 1e3
         table.add_row("block weight", "", f"{fit.block_weight / 1e3:.2f} kN", f"{low:.2f} to {high:.2f} kN")
-    return as_text(table)
+    return "\n".join([as_text(table), *(f"DOUBTFUL: {x}" for x in fit.doubts)])

@@ -72,11 +72,7 @@ def torque_and_drag(
     instance("torque_and_drag", "string", string, DrillString, "a DrillString")
     instance("torque_and_drag", "operation", operation, Operation, "an operation, such as TripOut()")
     instance("torque_and_drag", "mud", mud, (Mud, type(None)), "Mud(density), or None where weights are in mud")
-    tol = number("torque_and_drag", "tol", tol, "a number from 1e-12 to 0.1", lambda x: 1e-12 <= x <= 0.1)
-    if model not in MODELS:
-        refuse("torque_and_drag", "model", model, " or ".join(f"'{name}'" for name in MODELS))
-    if torque_convention not in CONVENTIONS:
-        refuse("torque_and_drag", "torque_convention", torque_convention, "'coulomb' or 'johancsik'")
+    tol = check_settings(model, tol, torque_convention)
     depth = (
         hole.length
         if depth is None
@@ -99,6 +95,19 @@ def torque_and_drag(
             raise
         failed = f"the exact rod in contact was tried, and not solved: {problem}"
         return replace(flexible, why=(*flexible.why, failed))
+
+
+def check_settings(model=AUTO, tol=1e-4, torque_convention=CONVENTIONS[0]):
+    """`tol`, where `torque_and_drag` takes it and the others.
+
+    Raises:
+        SceneError: it does not.
+    """
+    if model not in MODELS:
+        refuse("torque_and_drag", "model", model, " or ".join(f"'{name}'" for name in MODELS))
+    if torque_convention not in CONVENTIONS:
+        refuse("torque_and_drag", "torque_convention", torque_convention, "'coulomb' or 'johancsik'")
+    return number("torque_and_drag", "tol", tol, "a number from 1e-12 to 0.1", lambda x: 1e-12 <= x <= 0.1)
 
 
 def _flexible(given, model, tol, torque_convention, pieces, laid):
