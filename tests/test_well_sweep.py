@@ -87,7 +87,9 @@ def test_a_depth_without_an_answer_is_a_row_that_says_so(monkeypatch, tmp_path):
     found.write(tmp_path / "sweep.csv")
     rows = (tmp_path / "sweep.csv").read_text(encoding="utf-8").splitlines()
     assert rows[1].endswith('nan,nan,"trip out, bit at 800 m: the contact alternates"') and rows[3].endswith(',""')
-    assert [line.get_label() for line in found.plot().axes[0].lines] == ["trip out", "trip out: no answer"]
+    hook = found.plot().axes[0]
+    assert [text.get_text() for text in hook.get_legend().get_texts()] == ["trip out", "locks up, or no answer"]
+    assert [list(line.get_ydata()) for line in hook.lines if line.get_marker() == "X"] == [[800.0], []]
     either = cf.depth_sweep(*given[:3], [800.0], mud=MUD)
     assert np.isfinite(either.hook_load).all() and "soft string; NOT ENOUGH for tol = 0.0001 in the" in str(either)
     assert "and not solved: the contact alternates" in str(either)
