@@ -242,6 +242,8 @@ def test_tables_of_pandas():
     along = answer.to_dataframe()
     assert (along["side force (N/m)"] == answer.side_force).all() and along["component"].iloc[-1] == "bit"
     assert (found.to_dataframe()["trip in, friction 0.1: hook load (N)"] == found.hook_load[1, 0]).all()
+
+
 def test_the_chart_of_a_sweep_marks_lock_up_and_thrusts_beyond_all_others():
     pytest.importorskip("matplotlib")
     loads = np.array([[[-1e5, -2e5, -3e5, -7e7, np.nan]], [[2e5, 3e5, np.nan, np.nan, np.nan]]])
