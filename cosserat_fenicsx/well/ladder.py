@@ -5,14 +5,16 @@ hole between without touching it; the friction that is missed there is mu times
 
 - T sqrt(2 d dk) where the hole's curvature jumps by dk: a string that leaves a wall tangentially reaches the other
   side, at a distance d, after that angle. On a build section of radius R it is T sqrt(4 r/R) for a clearance r.
-- (2 d q T)^(1/2) below the surface, where the rod hangs on the axis, and comes to the wall farther down.
+- (2 d q T)^(1/2) below the surface, where the rod hangs on the axis, and comes to the wall farther down; and as much as
+  it spans there by its bending stiffness.
 - (6 d T)^(2/3) q'^(1/3) where the load changes its sign within a bend, with the rate q': the span on which it moves
   the string by d.
 
 A string on the low side also hangs lower by r sin(inclination), and is moved along the hole by r times the angle of its
 bends, since its way there is longer or shorter than the axis; its weight feels both. Where the hole bends at an end at
 which the string is held on the axis, it leaves the axis at the angle a = k (x + sqrt(x^2 + 2 d/k)), x = sqrt(EI/T),
-which takes T a^2/2 from its tension. Bending stiffness changes the friction by mu EI dk^2. Bits and stabilisers bear
+which takes T a^2/2 from its tension. Bending stiffness changes the friction by mu EI dk^2, and more where
+the moment EI k jumps by more than the load beside it can take. Bits and stabilisers bear
 the load of their spans on a larger radius, and pry, see `prying`. A snake adds at most half the wall force of a helix;
 its friction makes the string a helix farther down, and the helix multiplies it on the way up: the string is solved
 again with a helix wherever there may be one. A helix is pressed on the wall by its own force alone, on average, and not
@@ -32,6 +34,10 @@ from cosserat_fenicsx.well.rings import prying
 _CAUTION = 1.25
 # Places on a piece where a snake is looked for.
 _FINE = 512
+# As of a beam that is clamped and touches the wall, see `rings`.
+_SPAN = 72.0
+# Length of components whose own bending stiffness does not count, and the shortest distance of a pair of forces, m.
+_SHORT, _NEAREST = 3.0, 0.3
 # Strain beyond what any pipe carries.
 _BREAKS = 0.01
 
@@ -67,9 +73,10 @@ def model_errors(path, pieces, soft, solved, sections, rings=()):
     missed[groups] = _turns(chain, solved, groups, clearance[groups])
     jumps, stiffer = _jumps(path, pieces, solved.tension[groups[1:], 0], EI[groups])
     missed[groups[1:]] += jumps
-    missed[groups[-1]] += _hung(chain, solved, clearance[-1])
+    missed[groups[-1]] += _hung(chain, solved, clearance[-1], EI[-1])
     missed *= _CAUTION
     stiff[groups[1:]] = stiffer
+    stiff[groups] += _levers(path, pieces, solved, groups, EI[groups], clearance[groups])
     extra = _snakes(chain, solved, EI, clearance)
     grown = growth(solved, pieces, sections)
     pried, arms = _at_rings(chain, solved, pieces, sections, rings)
@@ -164,11 +171,26 @@ def _turns(chain, solved, groups, clearance):
     return np.where(way > 1, (6 * way * clearance * T) ** (2 / 3) * rate ** (1 / 3), 0.0)  # others slide along the wall
 
 
-def _hung(chain, solved, clearance):
+def _hung(chain, solved, clearance, EI):
     """Wall force (N) that is missed below the surface, where the rod hangs on the axis and comes to the wall farther
     down."""
     q, T = solved.side[-1, -1] * chain.climb[-1], max(solved.tension[-1, -1], 0.0)
-    return min(np.sqrt(2 * clearance * q * T), q * chain.length.sum())
+    bent = (_SPAN * EI * clearance * q**3) ** 0.25
+    return min(np.sqrt(2 * clearance * q * T) + bent, q * chain.length.sum())
+
+
+def _levers(path, pieces, solved, groups, EI, clearance):
+    """Wall force (N) that is missed at the lower ends of pieces, from below, where EI k jumps: the string takes the
+    moment by a pair of forces at a distance of sqrt(8 d/k), where they exceed the load there."""
+    md, n = pieces.bottom[::-1], len(groups)
+    wide = np.maximum(np.append(EI[1:], 0.0), np.append(0.0, EI[:-1]))  # of neighbours
+    EI = np.where(pieces.bottom[::-1] - pieces.top[::-1] < _SHORT, np.minimum(EI, wide), EI) if n > 1 else EI
+    below = np.append(0.0, EI[:-1])[:, None] * path.curvature(md)
+    moment = np.linalg.norm(EI[:, None] * path.curvature(np.maximum(md - 1e-6, 0.0)) - below, axis=1)
+    known = (moment > 0) & (EI > 0)
+    moment, stiff = np.where(known, moment, 0.0), np.where(known, EI, 1.0)
+    apart = np.maximum(np.sqrt(8 * clearance * stiff / np.where(known, moment, 1.0)), _NEAREST)
+    return np.maximum(moment / apart - solved.side[groups, 0] * solved.chain.climb[groups] * apart, 0.0)
 
 
 def _jumps(path, pieces, tension, EI):

@@ -1,0 +1,95 @@
+"""What pictures of a string in its hole share: the depths that they show, sides and their colours, stretches."""
+
+import numpy as np
+
+from cosserat_fenicsx.checks import finite_array, refuse
+from cosserat_fenicsx.well.contacts import name_of_side
+
+#: Colours of the sides of the hole, the same in all pictures.
+SIDES = {"low": "tab:blue", "high": "tab:red", "left": "tab:green", "right": "tab:orange", "wall": "dimgray"}
+
+#: Inclinations (rad) below this have no high side.
+VERTICAL = 1e-9
+# Nodes of the rod beside a force at a point that its peak reaches to, and lengths of the layer in an elastic wall.
+_NODES, _LAYERS = 10, 4.0
+# What remains is cut off beyond so many times what this part of the string has.
+_USUAL, _MOSTLY = 1.5, 0.995
+
+
+def depths_between(where, between, depth):
+    """(top, bottom), m, of the depths that a picture shows, at most from 0 to the depth of the bit.
+
+    Raises:
+        SceneError: they are not two depths of the string, the upper one first.
+    """
+    if between is None:
+        return 0.0, float(depth)
+    ends = finite_array(where, "between", between, "two measured depths (m), such as (3000, 3400)")
+    if ends.shape != (2,) or not 0 <= ends[0] < min(ends[1], depth):
+        refuse(where, "between", between, f"two measured depths of the string, from 0 to {depth:.10g} m, ascending")
+    return float(ends[0]), float(min(ends[1], depth))
+
+
+def rows_between(md, top, bottom):
+    """A slice of ascending depths that holds those from top to bottom, and one more at each end."""
+    first, last = np.searchsorted(md, (top, bottom), side="left"), np.searchsorted(md, (top, bottom), side="right")
+    return slice(max(0, int(first[0]) - 1), int(last[1]) + 1)
+
+
+def sides_along(answer):
+    """(n,) names of the sides that the string touches at `md`, see `SIDES`; "" where it touches none."""
+    names = np.array([name_of_side(side) for side in answer.contact_side])
+    vertical = (answer.inclination < VERTICAL) & (answer.side_force > 0)
+    return np.where(np.isfinite(answer.contact_side) | vertical, names, "")
+
+
+def high_side(path, md):
+    """(n, 3) unit vectors to the high side of a hole, zero where it is vertical."""
+    t = path.tangent(md)
+    high = t * t[:, 2:] - (0.0, 0.0, 1.0)
+    size = np.linalg.norm(high, axis=1, keepdims=True)
+    return np.where(size > 1e-9, high / np.where(size > 1e-9, size, 1.0), 0.0)
+
+
+def stretches(md, where):
+    """[(from, to)] depths of the stretches on which a condition (n,) holds, without those of no length."""
+    ends = np.flatnonzero(np.diff(where, prepend=False, append=False)).reshape(-1, 2) - (0, 1)
+    return [(float(md[a]), float(md[b])) for a, b in ends if md[b] > md[a]]
+
+
+def points_between(answer, top, bottom):
+    """[(md, force, side)] of the wall's forces at points, m and N."""
+    at = [contact for contact in answer.contacts if contact.at_point and top <= contact.top <= bottom]
+    return [(contact.top, contact.force, contact.side) for contact in at]
+
+
+def regular_side_force(answer):
+    """(n,) N/m, NaN where it is the peak of a force at a point, or that at the end of a contact."""
+    force, md = np.array(answer.side_force), answer.md
+    if answer.model != "rod":
+        return force
+    layer = (4 * np.nanmax(answer._sections.EI) / answer.solved.wall_stiffness) ** 0.25
+    on_stretch = np.zeros(len(md), dtype=bool)
+    for contact in answer.contacts:
+        on_stretch |= (contact.top < md) & (md < contact.bottom)
+    force[(force > 0) & ~on_stretch] = np.nan
+    for place in {end for contact in answer.contacts for end in (contact.top, contact.bottom)}:
+        i = int(np.searchsorted(md, place))
+        low = min(md[max(i - _NODES, 0)], place - _LAYERS * layer)
+        high = max(md[min(i + _NODES, len(md) - 1)], place + _LAYERS * layer)
+        force[(md >= low) & (md <= high) & (force > 0)] = np.nan
+    return force
+
+
+def usual_side_force(answer, force, md):
+    """N/m, up to which axes and colours reach, of a regular side force (n,) at depths (n,): of the rod less than the
+    largest where some short part of it has much more, such as what is left of a peak."""
+    known = np.isfinite(force)
+    most = float(force[known].max(initial=0.0))
+    if answer.model != "rod" or not most > 0:
+        return most
+    values, lengths = force[known], np.gradient(md)[known]
+    order = np.argsort(values)
+    so_far = np.cumsum(lengths[order])
+    at = min(int(np.searchsorted(so_far, _MOSTLY * so_far[-1])), len(order) - 1)
+    return min(most, _USUAL * float(values[order][at]))
