@@ -104,10 +104,14 @@ def test_a_sweep_by_the_rod_is_stopped_and_goes_on(monkeypatch, tmp_path):
                 os.kill(os.getpid(), signal.SIGINT)
         return nearest(self, *args)
 
-    with monkeypatch.context() as patch:
-        patch.setattr(cf.WellPath, "nearest", stops)
-        with pytest.raises(cf.Interrupted, match="after 1 answer, which .* they are kept in .*sweep.jsonl") as stop:
-            cf.depth_sweep(*given, mud=MUD, model="rod", file=file)
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)  # tests of the command line may have left theirs
+    try:
+        with monkeypatch.context() as patch:
+            patch.setattr(cf.WellPath, "nearest", stops)
+            with pytest.raises(cf.Interrupted, match="after 1 answer, which .* they are kept in .*sweep.jsonl") as stop:
+                cf.depth_sweep(*given, mud=MUD, model="rod", file=file)
+    finally:
+        signal.signal(signal.SIGINT, before)
     assert np.isfinite(stop.value.path.hook_load[0, 0]).tolist() == [True, False, False]
     found = cf.depth_sweep(*given, mud=MUD, model="rod", file=file)
     assert (found.hook_load == cf.depth_sweep(*given, mud=MUD, model="rod").hook_load).all()
