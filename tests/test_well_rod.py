@@ -157,8 +157,14 @@ def test_charts_and_the_picture_show_points_and_places(out, tmp_path_all):
     pytest.importorskip("matplotlib")
     figure = out.plot()
     assert [axes.get_xlabel() for axes in figure.axes] == [
-        "tension (kN)", "side force of the wall per length (N/m), peaks cut off", "forces of the wall at points (kN)"
+        "tension (kN)", "side force of the wall per length (N/m)\nwithout forces at points",
+        "forces of the wall at points (kN)",
     ]  # fmt: skip
+    (curve,) = figure.axes[1].lines
+    points = [(md, force) for md, end, force, _ in out.contacts if md == end]
+    assert curve.get_xdata().max() < 0.5 * out.side_force.max()  # no peak of a force at a point
+    drawn = sorted((x, y) for line in figure.axes[2].lines for x, y in zip(*line.get_data(), strict=True))
+    assert np.array(drawn) == pytest.approx(np.array(sorted((force / 1e3, md) for md, force in points)))
     out.write(tmp_path_all / "out.csv")
 
 

@@ -42,6 +42,7 @@ class TorqueAndDrag:
     #: What was solved, and which bending moment it has, in words.
     words = property(lambda self: f"{self.model} string")
     moment_words: ClassVar[str] = "EI times the hole's curvature"
+    distributed_force = property(lambda self: self.side_force, doc="`side_force` (N/m) without forces at points.")
 
     hole: Borehole
     string: DrillString
@@ -83,8 +84,7 @@ class TorqueAndDrag:
     def _gravity(self):
         """The weight in mud that pulls along the hole, N."""
         pieces, down = self.pieces, self.hole.path.position
-        heights = down(pieces.bottom)[:, 2] - down(pieces.top)[:, 2]
-        return float((pieces.weight * heights).sum())
+        return float(pieces.weight @ (down(pieces.bottom) - down(pieces.top))[:, 2])
 
     def _down(self, rows):
         """Rows over pieces and places up the hole, as one array down it."""
@@ -179,8 +179,8 @@ class TorqueAndDrag:
 
     @cached_property
     def contacts(self) -> list[tuple[float, float, float, str]]:
-        """(from, to, force, side): measured depths (m), the force on the wall (N) and "high", "right", "low" or "left",
-        looking down the hole ("wall" where it is vertical), of each stretch on one side."""
+        """(from, to, force, side) of each stretch on one side: measured depths (m), the force on the wall (N), "high",
+        "right", "low" or "left", looking down the hole ("wall" where it is vertical)."""
         return contacts_of(self.md, self.side_force, self.contact_side, -self._down(side_force_up_to(self.solved)))
 
     @cached_property

@@ -10,6 +10,8 @@ _COLOURS = ("tab:blue", "tab:orange", "tab:green", "tab:red", "tab:purple", "tab
 _STYLES = ("-", "--", ":", "-.")
 # A torque below this part of the largest tension times the contact radius is not drawn.
 _LITTLE = 1e-4
+# A side force above this times the usual one is cut off.
+_FAR = 4.0
 
 
 def draw_answer(answer, file):
@@ -33,8 +35,8 @@ def _axes(columns, width):
 
 
 def answer_figure(answer):
-    """Along the string: tension with the loads of buckling, torque where there is some, side force, and the forces of
-    the wall at points where there are some."""
+    """Along the string: tension with the loads of buckling, torque where there is some, the distributed side force, and
+    the forces of the wall at points where there are some."""
     points = [(md, force, side) for md, end, force, side in answer.contacts if md == end]
     turns = np.abs(answer.torque).max() > _LITTLE * np.abs(answer.tension).max() * answer.pieces.radius.max()
     draws = [_tension, *([_torque] if turns else []), _side_force]
@@ -76,12 +78,13 @@ def _torque(axes, answer):
 
 
 def _side_force(axes, answer):
-    axes.plot(answer.side_force, answer.md, color="black")
-    axes.set_xlabel("side force of the wall per length (N/m)")
-    usual = usual_force(answer.side_force)
-    if answer.side_force.max() > usual > 0:
+    force, usual = answer.distributed_force, usual_force(answer.distributed_force)
+    axes.plot(force, answer.md, color="black")
+    words = ["without forces at points"] if answer.side_force is not force else []
+    if force.max() > _FAR * usual > 0:
         axes.set_xlim(-0.03 * usual, usual)
-        axes.set_xlabel("side force of the wall per length (N/m), peaks cut off")
+        words.append("peaks cut off")
+    axes.set_xlabel("\n".join(["side force of the wall per length (N/m)", *([", ".join(words)] if words else [])]))
 
 
 def _at_points(axes, points):

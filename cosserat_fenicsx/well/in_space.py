@@ -39,10 +39,11 @@ def _draw(answer, file, enlarge):
     plotter = pyvista.Plotter(off_screen=True, window_size=_WINDOW)
     plotter.set_background("white")
     string = pyvista.MultipleLines(axis + enlarge * _picture(answer.offset[at]))
-    string[_FIELD] = answer.side_force[at]
+    string[_FIELD] = answer.distributed_force[at]
     string["radius"] = enlarge * (hole - answer.clearance[at])
     tube = string.tube(scalars="radius", absolute=True, n_sides=16)
-    most = min(answer.side_force.max(), usual_force(answer.side_force)) or 1.0  # peaks would hide all else
+    force = answer.distributed_force
+    most = min(force.max(), usual_force(force)) or 1.0  # peaks would hide all else
     plotter.add_mesh(tube, scalars=_FIELD, cmap="viridis", clim=(0.0, most),
                      scalar_bar_args={"vertical": True, "position_x": 0.86, "position_y": 0.25,
                                       "color": "black"})  # fmt: skip

@@ -86,6 +86,11 @@ class RodInContact(TorqueAndDrag):
         return self.solved.side_force
 
     @property
+    def distributed_force(self):
+        """See `TorqueAndDrag`: its integral and the forces at points are the `wall_force` of `solved`."""
+        return self.solved.distributed_force
+
+    @property
     def bending_moment(self):
         """N m: of the rod itself."""
         return self.solved.bending_moment
