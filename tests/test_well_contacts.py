@@ -133,3 +133,25 @@ def test_forces_that_the_mesh_does_not_resolve_are_told():
     rough = found.solved.rough
     assert rough and f"{len(rough)} of them are ROUGH" in str(found) and is_balanced(found)
     assert {x.start for x in rough} <= {x.start for x in found.solved.contacts if x.start == x.end}
+
+
+def test_resultants_of_any_pressure_add_up():
+    """Of rough pressures with gaps and jumps, on elements of any length, in layers of any length."""
+    rng, nodes = np.random.default_rng(0), np.array([0.0, 0.5 - math.sqrt(0.05), 0.5 + math.sqrt(0.05), 1.0])
+    found = 0
+    for _ in range(300):
+        count = int(rng.integers(1, 200))
+        h = np.full(count, 10 ** rng.uniform(-2, 1)) * rng.uniform(0.5, 1.5, count)
+        s = np.cumsum(h)[:, None] + h[:, None] * (nodes - 1)
+        sizes = h[:, None] * lobatto_weights(nodes)
+        values = np.repeat(np.maximum(rng.normal(rng.uniform(-1, 1), 1, 3 * count + 1), 0), rng.integers(1, 9))
+        pressure = (values[: 3 * count + 1] * rng.uniform(0.5, 1.5, 3 * count + 1))[
+            np.arange(count)[:, None] * 3 + np.arange(4)
+        ]
+        contacts, regular = contacts_along(s, sizes, pressure, np.zeros(s.shape), 10 ** rng.uniform(-1.5, 0.5))
+        points, total = [x.force for x in contacts if x.start == x.end], (pressure * sizes).sum()
+        assert sum(x.force for x in contacts) == pytest.approx(total, rel=1e-12)
+        assert sum(points) + (regular * sizes).sum() == pytest.approx(total, rel=1e-12) and regular.min() >= 0
+        assert all(x.force > -1e-12 * total and x.start <= x.end for x in contacts)
+        found += len(points)
+    assert found > 300

@@ -120,7 +120,7 @@ def _peaks(s, sizes, pressure, inside, layer):
         k = np.searchsorted(lower, i)
         if pressure[i] <= level or not 0 < k < len(lower):
             continue
-        first, last = lower[k - 1] + 1, lower[k]  # the nodes above the regular pressure
+        first, last = max(lower[k - 1] + 1, until), lower[k]  # the nodes above the regular pressure
         excess = (pressure[first:last] - level) @ sizes[first:last]
         if inside[first:last].all() and s[last] - s[first] < longest and excess > _PEAK * level * layer:
             until = last
