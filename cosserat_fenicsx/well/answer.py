@@ -43,6 +43,7 @@ class TorqueAndDrag(Tabular):
     """
 
     words = property(lambda self: f"{self.model} string", doc="What was solved, for titles.")
+    distributed_force = property(lambda self: self.side_force, doc="`side_force` (N/m) without forces at points.")
     # Which bending moment it has; and what the model leaves out for all that is estimated.
     _moment_words: ClassVar[str] = "EI times the hole's curvature"
     _leaves_out: ClassVar[str] = ""
@@ -87,8 +88,7 @@ class TorqueAndDrag(Tabular):
     def _gravity(self):
         """The weight in mud that pulls along the hole, N."""
         pieces, down = self.pieces, self.hole.path.position
-        heights = down(pieces.bottom)[:, 2] - down(pieces.top)[:, 2]
-        return float((pieces.weight * heights).sum())
+        return float(pieces.weight @ (down(pieces.bottom) - down(pieces.top))[:, 2])
 
     def _down(self, rows):
         """Rows over pieces and places up the hole, as one array down it."""

@@ -7,10 +7,10 @@ import numpy as np
 from cosserat_fenicsx.quaternions import directors
 from cosserat_fenicsx.results.recovery import at_nodes
 from cosserat_fenicsx.well.contacts import side_in_space
-from cosserat_fenicsx.well.resultants import contacts_along
+from cosserat_fenicsx.well.on_wall import OnWall
 from cosserat_fenicsx.well.rod_errors import errors_of
-from cosserat_fenicsx.well.smoothed import along_elements, apart_mostly
-from cosserat_fenicsx.well.string_scene import bending_of, is_round
+from cosserat_fenicsx.well.smoothed import apart_mostly
+from cosserat_fenicsx.well.string_scene import is_round
 
 # Distances from the axis below this share of the clearance have no direction.
 _CENTRED = 1e-9
@@ -18,7 +18,7 @@ _CENTRED = 1e-9
 _ALONG = ("side_force", "bending_moment")
 
 
-class InHole:
+class InHole(OnWall):
     """A string at rest in its hole, or slipping along it; arrays are over the nodes along the string, from the top.
 
     Attributes:
@@ -39,7 +39,9 @@ class InHole:
         hook_load: of the held end, along the hole, N; surface_torque: N m; reaction: (3,) N and (3,) N m there.
         wall_force: sum of all forces of the wall and of the rings, across the rod, without friction, N.
         ring_forces: (rings, 3) on the string, with friction, N.
-        contacts: [`Contact`] resultants, from the top down, see `contacts_along`.
+        contacts: [`Contact`] resultants, from the top down, see `contacts_along`. distributed_force: `side_force`
+            without the peaks of those that are concentrated, N/m: its integral and these are the `wall_force`. rough:
+            the concentrated ones that the mesh does not resolve, which may be off by a factor of three.
         stretch: m, twist: rad, of the string by tension and torque, from the true stiffness (NaN where a section has
             none); an `extensible` string has them in its state.
         factor: stiffness of the wall that it was solved with, over that in the scene; wall_stiffness: N/m^2, with it.
@@ -78,6 +80,17 @@ class InHole:
             self.steps += before.steps
         if coarser:
             self._coarser = before.s, {name: getattr(before, name) for name in _ALONG}
+
+    @cached_property
+    def errors_along(self):
+        """See the class; infinite where there is no mesh before."""
+        if self._coarser is None:
+            return dict.fromkeys(_ALONG, np.inf)
+        s, coarser = self._coarser
+        return {
+            name: apart_mostly(getattr(self, name), np.interp(self.s, s, values), self.node_length)
+            for name, values in coarser.items()
+        }
 
     @property
     def wall_stiffness(self):
@@ -194,103 +207,6 @@ class InHole:
         at_gauss = self._record.gauss_fields[..., 3:6] * self.path.scales.moment
         m = self._averaged(np.einsum("jg,cgi->cji", self.path.rule.between_gauss(self.path.rule.nodes), at_gauss))
         return np.linalg.norm(m - (m * self._along).sum(axis=1)[:, None] * self._along, axis=1)
-
-    # -- the wall ----------------------------------------------------------------------------------------------------
-
-    @property
-    def _nodes(self):
-        """(elements, nodes) the nodes of each element."""
-        degree = self.path.degree
-        return np.arange(self.path.elements[0])[:, None] * degree + np.arange(degree + 1)
-
-    @cached_property
-    def _of_nodes(self):
-        """(elements, nodes) lengths that the nodes stand for, m."""
-        return self.path.layout.sizes(self.scene)[:, None] * self.path.rule.lobatto
-
-    @cached_property
-    def _wall_density(self):
-        """(elements, nodes, 3) force of the wall per length, friction included, N/m."""
-        return self._record.densities[1][..., :3] * self.path.scales.force / self.path.scales.length
-
-    @cached_property
-    def element_pressures(self):
-        """(elements, nodes) force of the wall across the rod, per length, N/m."""
-        return 0.0 - (self._wall_density * self._outward[self._nodes]).sum(axis=2)
-
-    @cached_property
-    def side_force(self):
-        """(n,) N/m."""
-        sizes = self._of_nodes.sum(axis=1)
-        means = (self.element_pressures * self._of_nodes).sum(axis=1) / sizes
-        return self._averaged(along_elements(means, sizes, self.path.rule.nodes)[..., None])[:, 0]
-
-    def _summed(self, values):
-        """(n, ..) sums over the elements at every node of values (elements, nodes, ..)."""
-        p, found = self.path.degree, np.zeros((len(self.s), *values.shape[2:]))
-        for j in range(p + 1):
-            found[j : len(found) - p + j : p] += values[:, j]
-        return found
-
-    def _averaged(self, values):
-        """(n, k) from values of each element at its nodes (elements, nodes, k): means where two elements meet."""
-        return self._summed(values) / self._summed(np.ones((*values.shape[:2], 1)))
-
-    @cached_property
-    def errors_along(self):
-        """See the class; infinite where there is no mesh before."""
-        if self._coarser is None:
-            return dict.fromkeys(_ALONG, np.inf)
-        s, coarser = self._coarser
-        return {
-            name: apart_mostly(getattr(self, name), np.interp(self.s, s, values), self.node_length)
-            for name, values in coarser.items()
-        }
-
-    @cached_property
-    def node_length(self):
-        """(n,) lengths that the nodes stand for, m: the weights of integrals along the string."""
-        return self._summed(self._of_nodes)
-
-    @cached_property
-    def node_force(self):
-        """(n,) N."""
-        return self._summed(self.element_pressures * self._of_nodes)
-
-    @cached_property
-    def ring_forces(self):
-        """(rings, 3) N: the jump of the contact force, which no other load at the station shares."""
-        found = np.empty((len(self.string.rings), 3))
-        for i, ring in enumerate(self.string.rings):
-            _, vertex = self.path.layout.vertex(self.scene, ring.station)
-            after = self._contact[vertex, 0, :3] if vertex < len(self._contact) else self.string.bottom
-            found[i] = self._contact[vertex - 1, -1, :3] - after
-        return found
-
-    @cached_property
-    def _ring_pressures(self):
-        """(rings,) N: across the hole, without friction; what is left of rounding where a ring does not touch."""
-        friction = [ring.friction * np.hypot(*ring.slip[0][1]) for ring in self.string.rings]
-        return np.linalg.norm(self.ring_forces, axis=1) / np.hypot(1.0, friction)
-
-    @cached_property
-    def wall_force(self):
-        """N."""
-        return float(self.node_force.sum() + self._ring_pressures.sum())
-
-    @cached_property
-    def contacts(self):
-        """[`Contact`]."""
-        string = self.string
-        EI = max(bending_of(section) for section in string.sections)
-        layer = (4 * EI / self.wall_stiffness) ** 0.25
-        rings = [
-            (ring.station.s, force)
-            for ring, force, pressed in zip(string.rings, self._ring_pressures, self._pressed, strict=True)
-            if pressed
-        ]
-        s, side = self.s[self._nodes], self.side[self._nodes]
-        return contacts_along(s, self._of_nodes, self.element_pressures, side, layer, rings)
 
     # -- the ends ----------------------------------------------------------------------------------------------------
 

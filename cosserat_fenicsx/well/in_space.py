@@ -16,7 +16,6 @@ from cosserat_fenicsx.well.shown import (
     SIDES,
     depths_between,
     points_between,
-    regular_side_force,
     rows_between,
     usual_side_force,
 )
@@ -144,10 +143,10 @@ def _view_of(points, axes):
 
 def _add_string(plotter, pyvista, answer, at, line, radius, tube):
     """As a tube, or as a line where a tube were thinner than a pixel."""
-    force = answer.side_force[at]
+    force = answer.distributed_force[at]
     string = pyvista.MultipleLines(line)
     string[_FIELD], string["radius"] = force, radius
-    usual = usual_side_force(answer, regular_side_force(answer)[at], answer.md[at]) or force.max(initial=0.0)
+    usual = usual_side_force(answer, answer.distributed_force[at], answer.md[at]) or force.max(initial=0.0)
     step = round_step(usual, _BAR) if usual > 0 else 1.0
     most = math.ceil(usual / step - 1e-9) * step or step
     labels = round(most / step) + 1

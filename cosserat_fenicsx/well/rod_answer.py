@@ -92,6 +92,11 @@ class RodInContact(TorqueAndDrag):
         return self.solved.side_force
 
     @property
+    def distributed_force(self):
+        """See `TorqueAndDrag`: its integral and the forces at points are the `wall_force` of `solved`."""
+        return self.solved.distributed_force
+
+    @property
     def clearance(self):
         """Radius of the hole less that of the string where it is solved: of the blades in the middle of a stabiliser,
         of the bit at its lower end, else of the body or the tool joints, m."""

@@ -10,8 +10,6 @@ SIDES = {"low": "tab:blue", "high": "tab:red", "left": "tab:green", "right": "ta
 
 #: Inclinations (rad) below this have no high side.
 VERTICAL = 1e-9
-# Nodes of the rod beside a force at a point that its peak reaches to, and lengths of the layer in an elastic wall.
-_NODES, _LAYERS = 10, 4.0
 # What remains is cut off beyond so many times what this part of the string has.
 _USUAL, _MOSTLY = 1.5, 0.995
 
@@ -61,24 +59,6 @@ def points_between(answer, top, bottom):
     """[(md, force, side)] of the wall's forces at points, m and N."""
     at = [contact for contact in answer.contacts if contact.at_point and top <= contact.top <= bottom]
     return [(contact.top, contact.force, contact.side) for contact in at]
-
-
-def regular_side_force(answer):
-    """(n,) N/m, NaN where it is the peak of a force at a point, or that at the end of a contact."""
-    force, md = np.array(answer.side_force), answer.md
-    if answer.model != "rod":
-        return force
-    layer = (4 * np.nanmax(answer._sections.EI) / answer.solved.wall_stiffness) ** 0.25
-    on_stretch = np.zeros(len(md), dtype=bool)
-    for contact in answer.contacts:
-        on_stretch |= (contact.top < md) & (md < contact.bottom)
-    force[(force > 0) & ~on_stretch] = np.nan
-    for place in {end for contact in answer.contacts for end in (contact.top, contact.bottom)}:
-        i = int(np.searchsorted(md, place))
-        low = min(md[max(i - _NODES, 0)], place - _LAYERS * layer)
-        high = max(md[min(i + _NODES, len(md) - 1)], place + _LAYERS * layer)
-        force[(md >= low) & (md <= high) & (force > 0)] = np.nan
-    return force
 
 
 def usual_side_force(answer, force, md):

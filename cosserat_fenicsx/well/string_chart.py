@@ -13,7 +13,6 @@ from cosserat_fenicsx.well.shown import (
     depths_between,
     high_side,
     points_between,
-    regular_side_force,
     rows_between,
     sides_along,
     stretches,
@@ -177,7 +176,7 @@ def _bending(panel, answer, rows):
 
 def _side_force(panel, answer, rows):
     """Per length, without the peaks by which the rod has forces at points."""
-    md, force = answer.md[rows], regular_side_force(answer)[rows]
+    md, force = answer.md[rows], answer.distributed_force[rows]
     sides = sides_along(answer)[rows]
     for side, colour in SIDES.items():
         if (sides == side).any():

@@ -19,7 +19,8 @@ def answer_table(answer):
     path, operation = answer.hole.path, answer.operation
     table = Table(
         title=f"{operation.name}, bit at {answer.depth:g} m, {answer.words}",
-        caption="md, inclination: of the hole. tension: effective. side force: of the wall, per length.\n"
+        caption="md, inclination: of the hole. tension: effective. side force: of the wall, per length, without forces "
+        "at points.\n"
         f"moment: {answer._moment_words}. state: buckling, by criteria.",
     )
     for heading in ("md (m)", "component", "inclination (deg)", "tension (kN)", "torque (kN m)", "side force (N/m)",
@@ -31,7 +32,7 @@ def answer_table(answer):
         table.add_row(
             f"{answer.md[i]:.6g}", part.name, f"{math.degrees(path.inclination_at(answer.md[i])):.2f}",
             f"{answer.tension[i] / 1e3:.3f}", f"{round(answer.torque[i] / 1e3, 3) + 0.0:.3f}",
-            f"{answer.side_force[i]:.1f}",
+            f"{answer.distributed_force[i]:.1f}",
             _known(answer.bending_moment[i], 1, ".0f"), _known(answer.von_mises[i], 1e-6, ".1f"),
             criteria.STATES[states[i]],
         )  # fmt: skip
@@ -94,6 +95,12 @@ def summary(answer):
             f"{len(at_points)} forces of the wall at points (contacts), the largest {force / 1e3:.3f} kN at {md:.5g} m "
             f"({side} side)"
         )
+        rough = getattr(answer.solved, "rough", ())
+        if rough:
+            lines.append(
+                f"{len(rough)} of them are ROUGH, some off by a factor of three: the mesh is fine enough for tol, not "
+                "for them, and a smaller tol makes it finer"
+            )
     states = answer.buckling
     for state in (criteria.SNAKE, criteria.HELIX):
         found = [f"{a:.5g} to {b:.5g}" for a, b in stretches(answer.md, states == state)]
@@ -134,6 +141,7 @@ def answer_columns(answer):
         "inclination (deg)": np.degrees(answer.inclination), "azimuth (deg)": np.degrees(answer.azimuth),
         "effective tension (N)": answer.tension,
         "true tension (N)": answer.true_tension, "torque (N m)": answer.torque, "side force (N/m)": answer.side_force,
+        "distributed side force (N/m)": answer.distributed_force,
         "contact side (deg from high side)": np.degrees(answer.contact_side), "stand-off": answer.standoff,
         "clearance (m)": answer.clearance,
         "bending moment (N m)": answer.bending_moment, "von Mises (Pa)": answer.von_mises,

@@ -1,0 +1,121 @@
+"""The forces of the wall on a rod in its hole: at its nodes, along its elements, at rings, and as resultants."""
+
+from functools import cached_property
+
+import numpy as np
+
+from cosserat_fenicsx.well.resultants import contacts_along
+from cosserat_fenicsx.well.smoothed import along_elements
+from cosserat_fenicsx.well.string_scene import bending_of
+
+# Elements of up to so many lengths of the layer in the wall resolve a concentrated force: forces on longer ones were
+# found to be off by a factor of up to three, most of those on shorter ones by less than 5 %.
+_RESOLVES = 10.0
+
+
+class OnWall:
+    """The part of `InHole`, whose attributes are described there, that is about the wall."""
+
+    @property
+    def _nodes(self):
+        """(elements, nodes) the nodes of each element."""
+        degree = self.path.degree
+        return np.arange(self.path.elements[0])[:, None] * degree + np.arange(degree + 1)
+
+    @cached_property
+    def _of_nodes(self):
+        """(elements, nodes) lengths that the nodes stand for, m."""
+        return self.path.layout.sizes(self.scene)[:, None] * self.path.rule.lobatto
+
+    @cached_property
+    def _wall_density(self):
+        """(elements, nodes, 3) force of the wall per length, friction included, N/m."""
+        return self._record.densities[1][..., :3] * self.path.scales.force / self.path.scales.length
+
+    @cached_property
+    def element_pressures(self):
+        """(elements, nodes) force of the wall across the rod, per length, N/m."""
+        return 0.0 - (self._wall_density * self._outward[self._nodes]).sum(axis=2)
+
+    @cached_property
+    def side_force(self):
+        """(n,) N/m."""
+        sizes = self._of_nodes.sum(axis=1)
+        means = (self.element_pressures * self._of_nodes).sum(axis=1) / sizes
+        return self._averaged(along_elements(means, sizes, self.path.rule.nodes)[..., None])[:, 0]
+
+    def _summed(self, values):
+        """(n, ..) sums over the elements at every node of values (elements, nodes, ..)."""
+        p, found = self.path.degree, np.zeros((len(self.s), *values.shape[2:]))
+        for j in range(p + 1):
+            found[j : len(found) - p + j : p] += values[:, j]
+        return found
+
+    def _averaged(self, values):
+        """(n, k) from values of each element at its nodes (elements, nodes, k): means where two elements meet."""
+        return self._summed(values) / self._summed(np.ones((*values.shape[:2], 1)))
+
+    @cached_property
+    def node_length(self):
+        """(n,) lengths that the nodes stand for, m: the weights of integrals along the string."""
+        return self._summed(self._of_nodes)
+
+    @cached_property
+    def node_force(self):
+        """(n,) N."""
+        return self._summed(self.element_pressures * self._of_nodes)
+
+    @cached_property
+    def ring_forces(self):
+        """(rings, 3) N: the jump of the contact force, which no other load at the station shares."""
+        found = np.empty((len(self.string.rings), 3))
+        for i, ring in enumerate(self.string.rings):
+            _, vertex = self.path.layout.vertex(self.scene, ring.station)
+            after = self._contact[vertex, 0, :3] if vertex < len(self._contact) else self.string.bottom
+            found[i] = self._contact[vertex - 1, -1, :3] - after
+        return found
+
+    @cached_property
+    def _ring_pressures(self):
+        """(rings,) N: across the hole, without friction; what is left of rounding where a ring does not touch."""
+        friction = [ring.friction * np.hypot(*ring.slip[0][1]) for ring in self.string.rings]
+        return np.linalg.norm(self.ring_forces, axis=1) / np.hypot(1.0, friction)
+
+    @cached_property
+    def wall_force(self):
+        """N."""
+        return float(self.node_force.sum() + self._ring_pressures.sum())
+
+    def _layer(self, of):
+        """Length of the layer in the wall of the stiffest (`max`) or softest (`min`) section, m."""
+        EI = of(bending_of(section) for section in self.string.sections)
+        return (4 * EI / self.wall_stiffness) ** 0.25
+
+    @cached_property
+    def _resultants(self):
+        """See `contacts_along`."""
+        rings = [
+            (ring.station.s, force)
+            for ring, force, pressed in zip(self.string.rings, self._ring_pressures, self._pressed, strict=True)
+            if pressed
+        ]
+        s, side = self.s[self._nodes], self.side[self._nodes]
+        return contacts_along(s, self._of_nodes, self.element_pressures, side, self._layer(max), rings)
+
+    @property
+    def contacts(self):
+        """[`Contact`]."""
+        return self._resultants[0]
+
+    @property
+    def rough(self):
+        """[`Contact`] on elements too long for it."""
+        at_rings, ends = [ring.station.s for ring in self.string.rings], self.s[:: self.path.degree]
+        points = [x for x in self.contacts if x.start == x.end and x.start not in at_rings]
+        i = np.clip(np.searchsorted(ends, [x.start for x in points]), 1, len(ends) - 1)
+        return [x for x, h in zip(points, ends[i] - ends[i - 1], strict=True) if h > _RESOLVES * self._layer(min)]
+
+    @cached_property
+    def distributed_force(self):
+        """(n,) N/m."""
+        return self._summed(self._resultants[1] * self._of_nodes) / self.node_length

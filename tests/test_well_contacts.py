@@ -1,0 +1,157 @@
+"""Resultants of the wall's forces: forces at points told apart from pressure, through the public face and by moments.
+
+The numbers in reference/rod_in_hole.json are of strong forms without any mesh, see test_rod_in_hole.py.
+"""
+
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import cosserat_fenicsx as cf
+from cosserat_fenicsx.element import lobatto_weights
+from cosserat_fenicsx.well.resultants import contacts_along
+
+pytestmark = pytest.mark.serial
+KNOWN = json.loads((Path(__file__).parent / "reference" / "rod_in_hole.json").read_text(encoding="utf-8"))
+LAYER = 0.25
+
+
+def points_of(answer):
+    return [contact for contact in answer.contacts if contact[0] == contact[1]]
+
+
+def is_balanced(answer):
+    """Whether forces at points and the distributed force are the wall's force, and so are all contacts."""
+    solved = answer.solved
+    distributed = float(answer.distributed_force @ solved.node_length)
+    sums = sum(force for _, _, force, _ in points_of(answer)) + distributed, sum(x.force for x in solved.contacts)
+    return sums == pytest.approx((solved.wall_force,) * 2, rel=1e-9)
+
+
+@pytest.mark.parametrize("case", KNOWN["stiff build"], ids=lambda case: case["name"])
+def test_a_build_section_through_the_public_face(case):
+    given, alpha = case["input"], case["input"]["alpha"]
+    md = np.cumsum([0, given["h"], given["R"] * math.radians(alpha), given["D"] + 50.0])
+    path = cf.WellPath.from_survey(md, [0, 0, alpha, alpha], [0, 0, 0, 0])
+    stiff = cf.Stiffness((1e12, 1e12), 1e12, (given["EI"],) * 2, given["EI"])
+    string = cf.DrillString([cf.Component(None, stiff, given["w"], 0.06)])
+    operation = {1: cf.TripOut, -1: cf.TripIn, 0: cf.Static}[given["c"]](weight=-given["T0"])
+    section = cf.HoleSection(path.length, 2 * (0.06 + given["r"]), given["mu"])
+    found = cf.torque_and_drag(cf.Borehole(path, section), string, operation, depth=case["rod_length"], model="rod")
+    lift = case["rod_length"] - given["D"] + case["lift_off_d_below_arc_end"]
+    points = points_of(found)
+    assert [md for md, *_ in points] == pytest.approx([case["free_span_2"], lift - case["free_span_1"], lift], abs=0.06)
+    assert [x[2] for x in points] == pytest.approx([case[f"point_force_{k}"] for k in (3, 2, 1)], rel=1e-3)
+    assert [x[3] for x in points] == ["high", "high", "low"] and is_balanced(found)
+    assert not found.solved.rough and "ROUGH" not in str(found)
+    # what is left is smooth: the pressure of an arc and of a straight hole, without a trace of the peaks
+    assert found.side_force.max() > 6 * found.distributed_force.max()
+    lying = given["w"] * math.sin(math.radians(alpha))
+    below = (found.md > lift + 0.1) & (found.md < case["rod_length"] - 1)
+    assert found.distributed_force[below] == pytest.approx(lying, rel=0.01)
+
+
+@pytest.mark.parametrize("case", KNOWN["bottom-hole assembly"][:2], ids=["free", "thrust"])
+def test_an_assembly_through_the_public_face(case):
+    exact, length, r = case["exact_kirchhoff"], 60.0, 0.1
+    path = cf.WellPath.from_survey([0, length + 20], [case["inclination_deg"]] * 2, [0, 0])
+    wide = 2 * (r + case["clearance"])
+    stiff = cf.Stiffness((1e12,) * 2, 1e12, (case["EI"],) * 2, case["EI"])
+    bit = cf.Bit(wide, length=1e-3, body_diameter=2 * r, mass=case["w"] / 9.81)
+    string = cf.DrillString([bit, cf.Component(None, stiff, case["w"], r)])
+    found = cf.torque_and_drag(
+        cf.Borehole(path, cf.HoleSection(length + 20, wide, 0.0)), string, cf.Static(weight=case["WOB"]),
+        mud=cf.Mud(1e-3), depth=length, model="rod",
+    )  # fmt: skip
+    *_, tangency, at_bit = points_of(found)
+    assert length - tangency[0] == pytest.approx(exact["arc_length_to_tangency"], abs=1e-3)
+    assert tangency[2] == pytest.approx(exact["reaction_at_tangency"], rel=1e-4)
+    assert at_bit[2] == pytest.approx(exact["bit_side_force"], rel=1e-4) and is_balanced(found)
+
+
+def wall(pressure, start=20.0, end=60.0, h=0.3):
+    """What `contacts_along` finds of a pressure as a function of the arc length, and the sum of the pressure."""
+    nodes = np.array([0.0, 0.5 - math.sqrt(0.05), 0.5 + math.sqrt(0.05), 1.0])
+    ends = 20 + h * np.arange(-4, round((end - 20) / h) + 4)
+    s = ends[:-1, None] + h * nodes
+    sizes = np.broadcast_to(h * lobatto_weights(nodes), s.shape)
+    p = np.where((s >= start) & (s <= end), pressure(s), 0.0)
+    contacts, regular = contacts_along(s, sizes, p, np.zeros(s.shape), LAYER)
+    return contacts, s, regular, sizes, float((p * sizes).sum())
+
+
+def bump(s, at, force):
+    """The pressure of an elastic wall on a beam that is pressed against it by a force at a point."""
+    x = np.abs(s - at) / LAYER
+    return force / (2 * LAYER) * np.exp(-x) * (np.cos(x) + np.sin(x))
+
+
+def test_a_peak_inside_a_contact_is_a_force():
+    """A peak on a pressure that grows and jumps; that the wall is elastic makes it 7 % larger than the force."""
+    contacts, s, regular, sizes, total = wall(lambda s: 300 + 4 * (s - 20) + 200 * (s > 50) + bump(s, 35.0, 400.0))
+    (point,) = (x for x in contacts if x.start == x.end)
+    assert point.start == pytest.approx(35.0, abs=0.02) and point.force == pytest.approx(400, rel=0.1)
+    inside = (s > 21) & (s < 59)
+    assert np.abs(regular - 300 - 4 * (s - 20) - 200 * (s > 50))[inside].max() < 60
+    assert point.force + (regular * sizes).sum() == pytest.approx(total, rel=1e-12)
+    assert sum(x.force for x in contacts) == pytest.approx(total, rel=1e-12)
+
+
+@pytest.mark.parametrize("h", [0.1, 2.4], ids=["the gap is seen", "a coarse mesh"])
+def test_the_edge_of_a_wider_part_presses_alone(h):
+    """A force at the edge, a gap, and pressure beyond it: the moments tell them apart where the mesh does not."""
+    contacts, s, regular, sizes, total = wall(
+        lambda s: np.where(s < 20.01, 100.0 / h, np.where(s < 22.2, 0.0, 5.0)), h=h, start=19.999, end=57.5
+    )
+    given = 100.0 / h * sizes[np.isclose(s, 20.0)].sum()
+    edge, between, *_ = contacts
+    assert edge.start == pytest.approx(20.0, abs=1e-9) and edge.force == pytest.approx(given, rel=0.05)
+    assert between.start == pytest.approx(22.2, abs=0.25) and (regular < 8).all()
+    points = sum(x.force for x in contacts if x.start == x.end)
+    assert points + (regular * sizes).sum() == pytest.approx(total, rel=1e-12)
+
+
+def test_a_force_that_is_small_beside_the_pressure():
+    """At the end of a contact."""
+    contacts, s, regular, sizes, total = wall(lambda s: 500 + bump(s, 60.0, 600.0), h=0.1)
+    between, end = contacts
+    assert end.force + (regular * sizes).sum() == pytest.approx(total, rel=1e-12)
+    assert end.start == pytest.approx(60, abs=0.2) and 300 < end.force < 400
+
+
+def test_forces_that_the_mesh_does_not_resolve_are_told():
+    """Those of a mesh that is fine enough for a rough hook load."""
+    path = cf.WellPath.from_survey([0, 400, 1000, 2000], [0, 0, 60, 60], [0, 0, 40, 40])
+    stiff = cf.Stiffness((1.35e8,) * 2, 7e8, (1228200.0,) * 2, 9.4e5)
+    string = cf.DrillString([cf.Component(None, stiff, 241.13, 0.0635)])
+    found = cf.torque_and_drag(
+        cf.Borehole(path, cf.HoleSection(2000, 0.216, 0.25)), string, cf.TripIn(), model="rod", tol=5e-2
+    )
+    rough = found.solved.rough
+    assert rough and f"{len(rough)} of them are ROUGH" in str(found) and is_balanced(found)
+    assert {x.start for x in rough} <= {x.start for x in found.solved.contacts if x.start == x.end}
+
+
+def test_resultants_of_any_pressure_add_up():
+    """Of rough pressures with gaps and jumps, on elements of any length, in layers of any length."""
+    rng, nodes = np.random.default_rng(0), np.array([0.0, 0.5 - math.sqrt(0.05), 0.5 + math.sqrt(0.05), 1.0])
+    found = 0
+    for _ in range(300):
+        count = int(rng.integers(1, 200))
+        h = np.full(count, 10 ** rng.uniform(-2, 1)) * rng.uniform(0.5, 1.5, count)
+        s = np.cumsum(h)[:, None] + h[:, None] * (nodes - 1)
+        sizes = h[:, None] * lobatto_weights(nodes)
+        values = np.repeat(np.maximum(rng.normal(rng.uniform(-1, 1), 1, 3 * count + 1), 0), rng.integers(1, 9))
+        pressure = (values[: 3 * count + 1] * rng.uniform(0.5, 1.5, 3 * count + 1))[
+            np.arange(count)[:, None] * 3 + np.arange(4)
+        ]
+        contacts, regular = contacts_along(s, sizes, pressure, np.zeros(s.shape), 10 ** rng.uniform(-1.5, 0.5))
+        points, total = [x.force for x in contacts if x.start == x.end], (pressure * sizes).sum()
+        assert sum(x.force for x in contacts) == pytest.approx(total, rel=1e-12)
+        assert sum(points) + (regular * sizes).sum() == pytest.approx(total, rel=1e-12) and regular.min() >= 0
+        assert all(x.force > -1e-12 * total and x.start <= x.end for x in contacts)
+        found += len(points)
+    assert found > 300
