@@ -1,8 +1,9 @@
 """Torque and drag over many depths of the bit, for several operations and coefficients of friction.
 
-Every depth is solved on its own, the rod too. From the state at a neighbouring depth or friction Newton's method needs
-as many steps as from the start by springs, since they go into finding which nodes of the mesh touch the wall; and an
-answer does not depend on those before it, nor on where a sweep was broken off.
+Every depth is solved on its own, the rod too: an answer does not depend on those before it, nor on where a sweep was
+broken off. Starting from the state at a neighbouring depth saves little: Newton's steps go into finding which nodes of
+the mesh touch the wall. On the first mesh they were 21 to 23, and one start of ten failed, at depths 110 m apart, and
+13 at 1 to 30 m, where the start by springs takes 24; the finer meshes, which take 60 % of the time, remain the same.
 """
 
 import hashlib
