@@ -238,13 +238,28 @@ def test_what_cannot_be_a_rod(monkeypatch):
         cf.torque_and_drag(hole(flat), STRING, cf.TripIn(), model="rod")
 
 
-def test_charts_and_the_picture_show_points_and_places(out, tmp_path_all):
+def test_the_chart_shows_side_force_without_peaks_and_forces_at_points_with_numbers(out):
     pytest.importorskip("matplotlib")
     figure = out.plot()
-    assert [axes.get_xlabel() for axes in figure.axes] == [
-        "tension (kN)", "side force of the wall per length (N/m), peaks cut off", "forces of the wall at points (kN)"
-    ]  # fmt: skip
-    out.write(tmp_path_all / "out.csv")
+    labels = [axes.get_xlabel() for axes in figure.axes]
+    assert labels[1:] == [
+        "tension (kN)",
+        "side force per length (N/m)",
+        "forces at points (kN)",
+        "bending moment (kN m)",
+    ]
+    side, points = figure.axes[2], figure.axes[3]
+    (curve,) = side.lines
+    assert np.nanmax(curve.get_xdata()) < 1.1 * 1000 < out.side_force.max()  # the pull over the radius of the bend
+    told = {text.get_text() for text in points.texts}
+    found = [contact for contact in out.contacts if contact.at_point]
+    assert told == {f"{contact.force / 1e3:.3g} kN, {contact.top:.6g} m" for contact in found} and len(told) >= 3
+    part = out.plot(between=(80, 320))
+    assert sorted(part.axes[0].get_ylim()) == pytest.approx([77.6, 322.4])
+    assert len(part.axes[3].texts) == sum(80 <= contact.top <= 320 for contact in found)
+    for wrong in ((200, 100), (600, 700), 3.0):
+        with pytest.raises(cf.SceneError, match="plot.between"):
+            out.plot(between=wrong)
 
 
 #: Hook loads of another program (a prototype, elements of 2 m), N, with friction on the centreline: that its arm along

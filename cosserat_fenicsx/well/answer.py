@@ -12,6 +12,7 @@ from cosserat_fenicsx.well.contacts import WallContact, contacts_of, side_force_
 from cosserat_fenicsx.well.hole import Borehole
 from cosserat_fenicsx.well.mud import Mud
 from cosserat_fenicsx.well.operations import Operation
+from cosserat_fenicsx.well.shown import high_side
 from cosserat_fenicsx.well.softstring import UP_TO
 from cosserat_fenicsx.well.string import DrillString
 from cosserat_fenicsx.well.tabular import Tabular
@@ -173,12 +174,9 @@ class TorqueAndDrag(Tabular):
     def offset(self) -> np.ndarray:
         """(n, 3) from the hole's axis to the string, across the hole, m. The soft string, which has no place of its
         own: to the wall where it loads it; zero where the side is not known."""
-        t = self.hole.path.tangent(self.md)
-        high = t * t[:, 2:] - (0.0, 0.0, 1.0)
-        size = np.linalg.norm(high, axis=1, keepdims=True)
-        high = high / np.where(size > 0, size, 1.0)
-        side = self.contact_side[:, None]
-        return self.clearance[:, None] * np.nan_to_num(np.cos(side) * high + np.sin(side) * np.cross(t, high))
+        high, side = high_side(self.hole.path, self.md), self.contact_side[:, None]
+        right = np.cross(self.hole.path.tangent(self.md), high)
+        return self.clearance[:, None] * np.nan_to_num(np.cos(side) * high + np.sin(side) * right)
 
     @property
     def position(self) -> np.ndarray:
@@ -291,32 +289,35 @@ class TorqueAndDrag(Tabular):
 
         return {"": answer_columns(self), "_contacts": contact_columns(self)}
 
-    def plot(self, file: File | None = None):
-        """Draw tension with the loads of buckling, torque, and side force along the string, depth downwards.
+    def plot(self, file: File | None = None, between: tuple[float, float] | None = None):
+        """Draw the string in its hole, tension with the loads of buckling, torque, side force per length and at points,
+        and bending moment along the string, depth downwards.
 
         Args:
             file: .png, .pdf or another format of matplotlib (rank 0 writes); None returns the Figure.
+            between: measured depths (m) from which to which it shows them, such as those of the bottom-hole assembly.
 
         Raises:
-            SceneError: matplotlib is missing, or the ending is unknown.
+            SceneError: matplotlib is missing, or the ending is unknown; depths that the string has not.
         """
-        from cosserat_fenicsx.well.charts import draw_answer
+        from cosserat_fenicsx.well.string_chart import draw_answer
 
-        return draw_answer(self, file)
+        return draw_answer(self, file, between)
 
-    def plot_3d(self, file: File, enlarge: float | None = None) -> None:
+    def plot_3d(self, file: File, enlarge: float | None = None, between: tuple[float, float] | None = None) -> None:
         """Draw the string in its hole in space, coloured by the side force.
 
         Args:
             file: .png (rank 0 writes).
             enlarge: factor on radii and clearance, which the picture says; None for one that shows them.
+            between: measured depths (m) from which to which it shows them.
 
         Raises:
-            SceneError: pyvista is missing, or the name does not end in .png.
+            SceneError: pyvista is missing, or the name does not end in .png; depths that the string has not.
         """
         from cosserat_fenicsx.well.in_space import draw_in_space
 
-        draw_in_space(self, file, enlarge)
+        draw_in_space(self, file, enlarge, between)
 
     def __repr__(self):
         loads = f"hook load {self.hook_load:.6g} N, surface torque {self.surface_torque:.6g} N m"

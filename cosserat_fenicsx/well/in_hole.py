@@ -154,7 +154,7 @@ class InHole:
     @cached_property
     def touches(self):
         """(n,) whether the string touches the wall, or a ring does."""
-        found = self.side_force > 0
+        found = self.node_force > 0
         found[self._ring_nodes] |= self._pressed
         return found
 

@@ -8,6 +8,7 @@ from rich.table import Table
 from cosserat_fenicsx.results.tables import as_text
 from cosserat_fenicsx.well import criteria
 from cosserat_fenicsx.well.components import DrillPipe
+from cosserat_fenicsx.well.shown import stretches
 
 # Notes of a sweep that are shown; more are counted.
 _NOTES = 12
@@ -95,10 +96,9 @@ def summary(answer):
         )
     states = answer.buckling
     for state in (criteria.SNAKE, criteria.HELIX):
-        ends = np.flatnonzero(np.diff(states == state, prepend=False, append=False)).reshape(-1, 2) - (0, 1)
-        stretches = [f"{answer.md[a]:.5g} to {answer.md[b]:.5g}" for a, b in ends if answer.md[b] > answer.md[a]]
-        if stretches:
-            lines.append(f"{criteria.STATES[state]} buckling at md = {', '.join(stretches)} m")
+        found = [f"{a:.5g} to {b:.5g}" for a, b in stretches(answer.md, states == state)]
+        if found:
+            lines.append(f"{criteria.STATES[state]} buckling at md = {', '.join(found)} m")
     lines.append(f"{answer.model}: {'; '.join(answer.why)}.")
     return lines
 
