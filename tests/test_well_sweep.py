@@ -160,6 +160,12 @@ def test_friction_from_measurements():
     assert ((noisy.interval[:, 0] < [0.2, 0.3]) & ([0.2, 0.3] < noisy.interval[:, 1])).all()
     assert 0.5 < noisy.misfit < 1.5 and (np.diff(noisy.interval) < 0.2).all() and (np.diff(noisy.interval) > 1e-3).all()
     assert "open hole" in str(noisy) and noisy.hole.sections[1].friction == noisy.friction[1]
+    pytest.importorskip("matplotlib")
+    hook = noisy.plot().axes[0]
+    computed = np.concatenate([line.get_xdata() for line in hook.lines if line.get_marker() == "x"])
+    loads = [m.hook_load for m in noisy.measurements if m.hook_load is not None]
+    off = [m.hook_load_sd for m in noisy.measurements if m.hook_load is not None] * noisy.residuals[: len(loads)]
+    assert np.sort(computed) == pytest.approx(np.sort(np.array(loads) - off) / 1e3)
     block = cf.calibrate_friction(HOLE, STRING, measured(0.0, 250e3), mud=MUD, block_weight=None)
     assert block.block_weight == pytest.approx(250e3, rel=1e-6) and block.friction == pytest.approx(
         [0.2, 0.3], abs=1e-6
@@ -234,6 +240,25 @@ def test_tables_of_pandas():
     along = answer.to_dataframe()
     assert (along["side force (N/m)"] == answer.side_force).all() and along["component"].iloc[-1] == "bit"
     assert (found.to_dataframe()["trip in, friction 0.1: hook load (N)"] == found.hook_load[1, 0]).all()
+
+
+def test_the_chart_of_a_sweep_marks_lock_up_and_thrusts_beyond_all_others():
+    pytest.importorskip("matplotlib")
+    loads = np.array([[[-1e5, -2e5, -3e5, -7e7, np.nan]], [[2e5, 3e5, np.nan, np.nan, np.nan]]])
+    values = {name: np.full(loads.shape, np.nan) for name in module.KEPT} | {
+        "hook_load": loads,
+        "surface_torque": 0 * loads,
+    }
+    values["locked"][0, 0, 4] = 90.0
+    values["model_error"][0, 0] = 0.1  # soft; that of the rod is not estimated
+    operations, depths = (cf.TripIn(), cf.RotateOffBottom()), np.arange(1e3, 6e3, 1e3)
+    found = cf.DepthSweep(operations, depths, (None,), values, {(0, 0, 4): "locks up"})
+    hook, torque = found.plot().axes
+    assert [text.get_text() for text in hook.texts] == ["-70,000 kN", "locks up at 90 m"]
+    assert -1e3 < hook.get_xlim()[0] < -300 and 300 < hook.get_xlim()[1] < 1e3
+    told = [text.get_text() for text in hook.get_legend().get_texts()]
+    assert told == ["trip in", "rotate off bottom", "by the exact rod, others soft", "locks up, or no answer"]
+    assert hook.figure.get_suptitle().endswith("7 of 10 answers so far") and len(torque.lines) == 2
 
 
 @pytest.mark.slow

@@ -8,6 +8,7 @@ import numpy as np
 from scipy.optimize import least_squares
 from scipy.stats import t as student
 
+from cosserat_fenicsx.annotations import File
 from cosserat_fenicsx.checks import instance, number, positive, refuse, store
 from cosserat_fenicsx.errors import SceneError, SceneWarning
 from cosserat_fenicsx.well.hole import Borehole
@@ -74,6 +75,7 @@ class FrictionFit:
         residuals: (k,) measured less computed over the standard deviations, hook loads before torques.
         misfit: root of the sum of their squares over the readings in excess: 1 where the standard deviations are right.
         doubts: sentences on what may be wrong, where the misfit is far above 1; these are warned of, too.
+        measurements: as given.
     """
 
     hole: Borehole
@@ -86,6 +88,20 @@ class FrictionFit:
     residuals: np.ndarray
     misfit: float
     doubts: tuple[str, ...] = ()
+    measurements: tuple[RigMeasurement, ...] = ()
+
+    def plot(self, file: File | None = None):
+        """Draw measured loads and those computed with the coefficients found, over the depth of the bit.
+
+        Args:
+            file: .png, .pdf or another format of matplotlib (rank 0 writes); None returns the Figure.
+
+        Raises:
+            SceneError: matplotlib is missing, or the ending is unknown.
+        """
+        from cosserat_fenicsx.well.charts import draw_fit
+
+        return draw_fit(self, file)
 
     def __str__(self):
         from cosserat_fenicsx.well.tables import fit_table
@@ -178,6 +194,7 @@ def calibrate_friction(
     return FrictionFit(
         hole.with_friction(friction), friction, np.maximum(ends[:sections], 0.0), block,
         ends[-1] if unknown_block else np.full(2, np.nan), confidence, correlation, found.fun, misfit, doubts,
+        tuple(measurements),
     )  # fmt: skip
 
 
