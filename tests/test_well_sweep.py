@@ -264,8 +264,14 @@ def test_the_chart_of_a_sweep_marks_lock_up_and_thrusts_beyond_all_others():
 @pytest.mark.slow
 def test_the_string_in_its_hole_in_space(tmp_path):
     pytest.importorskip("pyvista")
+    image = pytest.importorskip("matplotlib.image")
     answer = cf.torque_and_drag(HOLE, STRING, cf.TripOut(), mud=MUD, model="soft")
-    answer.plot_3d(tmp_path / "hole.png")
-    assert (tmp_path / "hole.png").stat().st_size > 20000
+    for how in ({}, {"enlarge": 1}, {"between": (2400, 2500)}):
+        answer.plot_3d(tmp_path / "hole.png", **how)
+        pixels = image.imread(tmp_path / "hole.png")[:, :-230, :3]  # without the colour bar
+        extents = np.ptp(np.argwhere(np.ptp(pixels, axis=2) > 0.15), axis=0)
+        assert (extents > 0.5 * np.array(pixels.shape[:2])).any()  # the string crosses the page, however thin it is
     with pytest.raises(cf.SceneError, match="ends in .png"):
         answer.plot_3d(tmp_path / "hole.jpg")
+    with pytest.raises(cf.SceneError, match="plot_3d.between"):
+        answer.plot_3d(tmp_path / "hole.png", between=(2600, 2700))

@@ -7,7 +7,6 @@ import numpy as np
 from cosserat_fenicsx.well.softstring import UP_TO
 
 _SIDES = ("high", "right", "low", "left")
-_USUAL, _MOSTLY = 1.5, 0.97
 
 
 class WallContact(NamedTuple):
@@ -56,11 +55,6 @@ def sides_of(pieces, solved, climbing):
     for end, beside in ((0, 1), (-1, -2)):  # a bend that starts vertically presses to one side from its first point on
         side[:, end] = np.where(leans[:, end], side[:, end], side[:, beside])
     return side
-
-
-def usual_force(side_force):
-    """Side force (N/m) beyond which it is a peak in pictures: one that is much above what most of the string has."""
-    return _USUAL * float(np.quantile(side_force, _MOSTLY))
 
 
 def name_of_side(side):

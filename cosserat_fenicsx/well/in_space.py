@@ -1,63 +1,228 @@
 """A string in its hole in space, by pyvista, with radii and clearance enlarged."""
 
+import math
 from pathlib import Path
 
 import numpy as np
 
 from cosserat_fenicsx.checks import positive
 from cosserat_fenicsx.errors import SceneError
-from cosserat_fenicsx.pictures.drawing import frame, load_pyvista
+from cosserat_fenicsx.pictures.axes import Axis, draw_axes, round_step, text_of
+from cosserat_fenicsx.pictures.drawing import load_pyvista
+from cosserat_fenicsx.pictures.labels import Labels
+from cosserat_fenicsx.pictures.view import View
 from cosserat_fenicsx.ranks import on_first, world
-from cosserat_fenicsx.well.contacts import usual_force
+from cosserat_fenicsx.well.shown import (
+    SIDES,
+    depths_between,
+    points_between,
+    regular_side_force,
+    rows_between,
+    usual_side_force,
+)
 
-_WINDOW = 1100, 1200
-# Radius of the hole in the picture, over the extent of the well.
-_HOLE = 0.02
+# Pixels: height of the drawing, bounds of its width, margins at the left (numbers of depths), right (colour bar), above
+# (title) and below (names of axes).
+_HEIGHT, _WIDTHS, _MARGINS = 1000, (560, 1300), (190, 230, 130, 130)
+# Radius of the hole in the picture, over the extent of what is shown: of the whole string, and of a part.
+_HOLE, _HOLE_OF_PART = 0.015, 0.03
+# Smallest extent of the box along any axis, over the largest one; most intervals of numbers along the longest axis, and
+# at least along the others; of the colour bar.
+_THIN, _INTERVALS, _BAR = 0.15, (6, 3), 8
+# The camera looks across the well's main direction, turned and raised by these angles.
+_TURNED, _RAISED = math.radians(25), math.radians(14)
+# Points along the string and its shadow; more are left out. Forces at points with numbers, of the whole string
+# and of a part.
+_POINTS, _SHADOW, _NUMBERED = 20000, 300, (3, 8)
+# Radius of the sphere of a force at a point over that of the hole; width of lines, pixels.
+_SPHERE, _LINE = 0.35, 4
+# Radii of the hole in the picture that a well goes down at least, which is not horizontal.
+_SLENDER = 10
 _FIELD = "side force (N/m)"
-# Points along the string; more are left out.
-_POINTS = 1500
 
 
-def draw_in_space(answer, file, enlarge=None):
+def draw_in_space(answer, file, enlarge=None, between=None):
     """See `TorqueAndDrag.plot_3d`."""
     file = Path(file)
     if file.suffix != ".png":
         raise SceneError(f"{file}: expected a name that ends in .png")
     if enlarge is not None:
         positive("plot_3d", "enlarge", enlarge, "-")
-    on_first(world(), lambda: _draw(answer, file, enlarge))
+    ends = depths_between("plot_3d", between, answer.depth)
+    on_first(world(), lambda: _draw(answer, file, enlarge, *ends))
 
 
-def _draw(answer, file, enlarge):
+def _draw(answer, file, enlarge, top, bottom):
     pyvista = load_pyvista()
-    at = np.flatnonzero(np.diff(answer.md, prepend=-1.0) > 1e-9)
-    at = at[np.unique(np.linspace(0, len(at) - 1, min(len(at), _POINTS)).astype(int))]
-    axis = _picture(answer.hole.path.position(answer.md[at]))
-    hole = answer.hole.at(answer.md[at], "diameter") / 2
+    md, at = _places(answer, top, bottom)
+    axis, radius = _picture(answer.hole.path.position(md)), answer.hole.at(md, "diameter") / 2
+    whole = (top, bottom) == (0.0, answer.depth)
+    size = float(np.ptp(axis, axis=0).max())
     if enlarge is None:
-        enlarge = float(f"{_HOLE * np.ptp(axis, axis=0).max() / hole.max():.1g}")
-    plotter = pyvista.Plotter(off_screen=True, window_size=_WINDOW)
+        enlarge = max(1.0, float(f"{(_HOLE if whole else _HOLE_OF_PART) * size / radius.max():.1g}"))
+    axes = _axes_of(axis, enlarge * radius.max())
+    view = _view_of(axis, axes)
+    plotter = pyvista.Plotter(off_screen=True, window_size=view.window)
     plotter.set_background("white")
-    string = pyvista.MultipleLines(axis + enlarge * _picture(answer.offset[at]))
-    string[_FIELD] = answer.side_force[at]
-    string["radius"] = enlarge * (hole - answer.clearance[at])
-    tube = string.tube(scalars="radius", absolute=True, n_sides=16)
-    most = min(answer.side_force.max(), usual_force(answer.side_force)) or 1.0  # peaks would hide all else
-    plotter.add_mesh(tube, scalars=_FIELD, cmap="viridis", clim=(0.0, most),
-                     scalar_bar_args={"vertical": True, "position_x": 0.86, "position_y": 0.25,
-                                      "color": "black"})  # fmt: skip
-    wall = pyvista.MultipleLines(axis)
-    wall["radius"] = enlarge * hole
-    plotter.add_mesh(wall.tube(scalars="radius", absolute=True, n_sides=24), color="peru", opacity=0.2)
-    plotter.add_text(
-        f"{answer.operation.name}, bit at {answer.depth:g} m, {answer.words}\n"
-        f"radii and clearance {enlarge:g} times as large; x east, y north, z upwards", font_size=11, color="black",
-    )  # fmt: skip
-    frame(plotter, axis)
+    tubes = enlarge * radius.max() > view.pixel
+    if not tubes:  # of lines, parts shorter than pixels would be drawn as dots
+        way = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(axis, axis=0), axis=1)))
+        some = np.unique(np.searchsorted(way, np.append(np.arange(0.0, way[-1], 3 * view.pixel), way[-1])))
+        md, at, axis, radius = md[some], at[some], axis[some], radius[some]
+    line = axis + enlarge * _picture(answer.offset[at])
+    _add_string(plotter, pyvista, answer, at, line, enlarge * (radius - answer.clearance[at]), tubes)
+    if tubes:
+        _add_hole(plotter, pyvista, answer, md, axis, enlarge * radius)
+    _add_surroundings(plotter, pyvista, axes, axis, top == 0 and axes[2].high == axis[:, 2].max())
+    beside = enlarge * radius[:, None]
+    labels = Labels(view, [axis, *(axis + sign * beside * way for sign in (-1, 1) for way in (view.above, view.right))])
+    labels.reserve(
+        (view.window[0] - 0.85 * _MARGINS[1], 0.15 * view.window[1]), (view.window[0], 0.85 * view.window[1])
+    )
+    draw_axes(plotter, pyvista, axes, view, labels)
+    _add_names(plotter, pyvista, answer, labels, view, (md, axis, line, enlarge * radius), (top, bottom))
+    labels.draw(plotter, pyvista)
+    _add_title(plotter, answer, enlarge, "" if whole else f", from {top:g} to {bottom:g} m", view.window)
+    view.place(plotter)
     plotter.screenshot(file)
     plotter.close()
 
 
+def _places(answer, top, bottom):
+    """Measured depths that are shown, m, and their indices in the answer's arrays."""
+    rows = np.arange(len(answer.md))[rows_between(answer.md, top, bottom)]
+    rows = rows[np.diff(answer.md[rows], prepend=-1.0) > 1e-9]
+    rows = rows[np.unique(np.linspace(0, len(rows) - 1, min(len(rows), _POINTS)).astype(int))]
+    return answer.md[rows], rows
+
+
 def _picture(rows):
     """North, east, down as x to the east, y to the north, z upwards."""
-    return np.stack([rows[:, 1], rows[:, 0], -rows[:, 2]], axis=1)
+    return np.stack([rows[..., 1], rows[..., 0], -rows[..., 2]], axis=-1)
+
+
+def _axes_of(points, room):
+    """Three `Axis` around points (n, 3), m, with room beside them: to the east, to the north, and depth."""
+    low, high = points.min(axis=0) - room, points.max(axis=0) + room
+    if low[2] + _SLENDER * room < high[2]:
+        high[2] = points[:, 2].max()  # the surface
+    thin = np.maximum(_THIN * (high - low).max() - (high - low), 0.0) * (1, 1, 0) / 2
+    low, high = low - thin, high + thin
+    most, least = _INTERVALS
+    found = []
+    for name, a, b, sign in zip(("east (m)", "north (m)", "depth (m)"), low, high, (1, 1, -1), strict=True):
+        step = min(round_step(float((high - low).max()), most), round_step(float(b - a), least))
+        ticks = step * np.arange(math.ceil(a / step - 1e-6), math.floor(b / step + 1e-6) + 1)
+        found.append(Axis(name, float(a), float(b), tuple((float(x), text_of(sign * x, step)) for x in ticks)))
+    return tuple(found)
+
+
+def _view_of(points, axes):
+    """The `View` whose window is as large as the drawing of a box needs."""
+    main = points[-1, :2] - points[0, :2]
+    main = main if np.linalg.norm(main) > 1e-9 else np.array([1.0, 0.0])
+    across = math.atan2(main[1], main[0]) - math.pi / 2 + _TURNED  # its end is at the right
+    to_camera = np.array([math.cos(across) * math.cos(_RAISED), math.sin(across) * math.cos(_RAISED),
+                          math.sin(_RAISED)])  # fmt: skip
+    up = np.array([0.0, 0.0, 1.0])
+    right = np.cross(up, to_camera)
+    right /= np.linalg.norm(right)
+    above = np.cross(to_camera, right)
+    corners = np.array(np.meshgrid(*((axis.low, axis.high) for axis in axes))).reshape(3, -1).T
+    wide, high = np.ptp(corners @ right), np.ptp(corners @ above)
+    left, beside, over, below = _MARGINS
+    width = float(np.clip(_HEIGHT * wide / high, *_WIDTHS))
+    pixel = max(wide / width, high / _HEIGHT)
+    height = max(high / pixel, _WIDTHS[0])
+    window = round(width + left + beside), round(height + over + below)
+    middle = (
+        (corners @ right).mean() * right + (corners @ above).mean() * above + (corners @ to_camera).mean() * to_camera
+    )
+    focus = middle + pixel * ((beside - left) / 2 * right + (over - below) / 2 * above)
+    return View(to_camera, right, above, up, focus, pixel * window[1] / 2, window)
+
+
+def _add_string(plotter, pyvista, answer, at, line, radius, tube):
+    """As a tube, or as a line where a tube were thinner than a pixel."""
+    force = answer.side_force[at]
+    string = pyvista.MultipleLines(line)
+    string[_FIELD], string["radius"] = force, radius
+    usual = usual_side_force(answer, regular_side_force(answer)[at], answer.md[at]) or force.max(initial=0.0)
+    step = round_step(usual, _BAR) if usual > 0 else 1.0
+    most = math.ceil(usual / step - 1e-9) * step or step
+    labels = round(most / step) + 1
+    (width, height), beside = plotter.window_size, _MARGINS[1]
+    more = "\n(more: yellow)" if force.max(initial=0.0) > most else ""
+    look = {"title": f"side force\n(N/m){more}\n", "n_labels": labels, "fmt": "%.0f" if step >= 1 else "%g"}
+    place = {"position_x": 1 - 0.75 * beside / width, "width": 0.4 * beside / width, "position_y": 0.2, "height": 0.5}
+    font = {"title_font_size": round(height / 60), "label_font_size": round(height / 60), "color": "black"}
+    if tube:
+        string = string.tube(scalars="radius", absolute=True, n_sides=24)
+    shading = {"smooth_shading": tube, "lighting": tube, "line_width": _LINE}
+    plotter.add_mesh(string, scalars=_FIELD, cmap="viridis", clim=(0.0, most), **shading,
+                     scalar_bar_args={"vertical": True, **look, **place, **font})  # fmt: skip
+
+
+def _add_hole(plotter, pyvista, answer, md, axis, radius):
+    above = 0.0
+    for section in answer.hole.sections:
+        inside = (md >= above) & (md <= section.to)
+        above = section.to
+        if np.count_nonzero(inside) > 1:
+            wall = pyvista.MultipleLines(axis[inside])
+            wall["radius"] = radius[inside]
+            wall = wall.tube(scalars="radius", absolute=True, n_sides=32)
+            last = section is answer.hole.sections[-1]
+            plotter.add_mesh(wall, color="peru" if last else "slategrey", opacity=0.2)
+
+
+def _add_surroundings(plotter, pyvista, axes, axis, surface):
+    """The outline of the surface, where the well begins there, and the well's shadow below."""
+    (x0, x1), (y0, y1), (low, high) = ((each.low, each.high) for each in axes)
+    if surface:
+        corners = np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1], [x0, y0]])
+        outline = np.column_stack([corners, np.full(5, high)])
+        plotter.add_mesh(pyvista.lines_from_points(outline), color="darkseagreen", line_width=2)
+    some = axis[np.unique(np.linspace(0, len(axis) - 1, _SHADOW).astype(int)), :2]
+    if np.ptp(some, axis=0).max() > 0:
+        shadow = pyvista.lines_from_points(np.column_stack([some, np.full(len(some), low)]))
+        plotter.add_mesh(shadow, color="silver", line_width=2)
+
+
+def _add_names(plotter, pyvista, answer, labels, view, lines, ends):
+    """Spheres at forces at points, the largest with numbers; ends of sections; components of a part of the string."""
+    md, axis, line, radius = lines
+    font = max(9, round(view.window[1] / 75))
+
+    def at(depth, curve):
+        return np.array([np.interp(depth, md, curve[:, i]) for i in range(3)])
+
+    points = sorted(points_between(answer, *ends), key=lambda point: -point[1])
+    for k, (depth, force, side) in enumerate(points):
+        centre, on = at(depth, axis), at(depth, line)
+        size = max(_SPHERE * float(np.interp(depth, md, radius)), 4 * view.pixel)
+        away = on - centre
+        centre = on + away / (np.linalg.norm(away) or 1.0) * size
+        plotter.add_mesh(pyvista.Sphere(radius=size, center=centre), color=SIDES[side].removeprefix("tab:"))
+        if k < _NUMBERED[ends != (0.0, answer.depth)]:
+            labels.near(f"{force / 1e3:.3g} kN at {depth:.5g} m", centre, away, size=font)
+    for section in answer.hole.sections[:-1]:
+        if ends[0] < section.to < ends[1]:
+            name = f"{section.name or 'section'} ends, {section.to:g} m"
+            labels.near(name, at(section.to, axis), view.right, size=font, colour="saddlebrown")
+    if ends != (0.0, answer.depth):
+        for place in answer.laid:
+            a, b = max(place.top, ends[0]), min(place.bottom, ends[1])
+            if b > a:
+                labels.near(place.component.name, at((a + b) / 2, axis), view.above, size=font, colour="dimgrey")
+
+
+def _add_title(plotter, answer, enlarge, part, window):
+    how = f"radii and clearance {enlarge:g} times as large" if enlarge != 1 else "radii and clearance as they are"
+    straight = answer.model != "rod" and answer.helical.any()
+    lines = [
+        f"{answer.operation.name}, bit at {answer.depth:g} m, {answer.words}{part}",
+        how + ("; its helix is drawn straight" if straight else ""),
+    ]
+    size = round(min(window[1] / 80, window[0] / (0.62 * max(map(len, lines))) / 1.5))
+    plotter.add_text("\n".join(lines), font_size=size, color="black", position="upper_left")

@@ -8,8 +8,12 @@ from cosserat_fenicsx.well.contacts import name_of_side
 #: Colours of the sides of the hole, the same in all pictures.
 SIDES = {"low": "tab:blue", "high": "tab:red", "left": "tab:green", "right": "tab:orange", "wall": "dimgray"}
 
-# Inclinations (rad) below this have no high side.
-_VERTICAL = 1e-9
+#: Inclinations (rad) below this have no high side.
+VERTICAL = 1e-9
+# Nodes of the rod beside a force at a point that its peak reaches to, and lengths of the layer in an elastic wall.
+_NODES, _LAYERS = 10, 4.0
+# What remains is cut off beyond so many times what this part of the string has.
+_USUAL, _MOSTLY = 1.5, 0.995
 
 
 def depths_between(where, between, depth):
@@ -35,7 +39,7 @@ def rows_between(md, top, bottom):
 def sides_along(answer):
     """(n,) names of the sides that the string touches at `md`, see `SIDES`; "" where it touches none."""
     names = np.array([name_of_side(side) for side in answer.contact_side])
-    vertical = (answer.inclination < _VERTICAL) & (answer.side_force > 0)
+    vertical = (answer.inclination < VERTICAL) & (answer.side_force > 0)
     return np.where(np.isfinite(answer.contact_side) | vertical, names, "")
 
 
@@ -57,3 +61,35 @@ def points_between(answer, top, bottom):
     """[(md, force, side)] of the wall's forces at points, m and N."""
     at = [contact for contact in answer.contacts if contact.at_point and top <= contact.top <= bottom]
     return [(contact.top, contact.force, contact.side) for contact in at]
+
+
+def regular_side_force(answer):
+    """(n,) N/m, NaN where it is the peak of a force at a point, or that at the end of a contact."""
+    force, md = np.array(answer.side_force), answer.md
+    if answer.model != "rod":
+        return force
+    layer = (4 * np.nanmax(answer._sections.EI) / answer.solved.wall_stiffness) ** 0.25
+    on_stretch = np.zeros(len(md), dtype=bool)
+    for contact in answer.contacts:
+        on_stretch |= (contact.top < md) & (md < contact.bottom)
+    force[(force > 0) & ~on_stretch] = np.nan
+    for place in {end for contact in answer.contacts for end in (contact.top, contact.bottom)}:
+        i = int(np.searchsorted(md, place))
+        low = min(md[max(i - _NODES, 0)], place - _LAYERS * layer)
+        high = max(md[min(i + _NODES, len(md) - 1)], place + _LAYERS * layer)
+        force[(md >= low) & (md <= high) & (force > 0)] = np.nan
+    return force
+
+
+def usual_side_force(answer, force, md):
+    """N/m, up to which axes and colours reach, of a regular side force (n,) at depths (n,): of the rod less than the
+    largest where some short part of it has much more, such as what is left of a peak."""
+    known = np.isfinite(force)
+    most = float(force[known].max(initial=0.0))
+    if answer.model != "rod" or not most > 0:
+        return most
+    values, lengths = force[known], np.gradient(md)[known]
+    order = np.argsort(values)
+    so_far = np.cumsum(lengths[order])
+    at = min(int(np.searchsorted(so_far, _MOSTLY * so_far[-1])), len(order) - 1)
+    return min(most, _USUAL * float(values[order][at]))

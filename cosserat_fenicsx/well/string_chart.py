@@ -9,20 +9,19 @@ from cosserat_fenicsx.well import criteria
 from cosserat_fenicsx.well.charts import depth_axes
 from cosserat_fenicsx.well.shown import (
     SIDES,
+    VERTICAL,
     depths_between,
     high_side,
     points_between,
+    regular_side_force,
     rows_between,
     sides_along,
     stretches,
+    usual_side_force,
 )
 
 # A torque below this part of the largest tension times the contact radius is not drawn.
 _LITTLE = 1e-4
-# Nodes of the rod beside a force at a point that its peak reaches to, and lengths of the layer in an elastic wall.
-_NODES, _LAYERS = 10, 4.0
-# What remains is cut off beyond so many times what this part of the string has.
-_USUAL, _MOSTLY = 1.5, 0.995
 # Smallest ranges of the axes: side force (N/m), forces at points and moment (kN, kN m).
 _LEAST_SIDE, _LEAST = 1.0, 0.1
 # Most forces at points with numbers; distance of labels over the height of a panel.
@@ -102,9 +101,11 @@ def _legend(axes):
 
 
 def _string(panel, answer, rows):
-    """The string in the hole, seen across its plane of high and low side."""
+    """The string in the hole, seen across its plane of high and low side, or across north where it is vertical."""
     md, hole = answer.md[rows], answer.hole.at(answer.md[rows], "diameter") / 2
-    across = (answer.offset[rows] * high_side(answer.hole.path, md)).sum(axis=1)
+    high = high_side(answer.hole.path, md)
+    vertical = not high.any()
+    across = answer.offset[rows][:, 0] if vertical else (answer.offset[rows] * high).sum(axis=1)
     panel.fill_betweenx(md, -1e3 * hole, 1e3 * hole, color="bisque", linewidth=0)
     panel.plot(-1e3 * hole, md, color="tab:brown", linewidth=1.2)
     panel.plot(1e3 * hole, md, color="tab:brown", linewidth=1.2)
@@ -125,7 +126,7 @@ def _string(panel, answer, rows):
         panel.text(1.4 * most, y, name, fontsize=7, va="center", clip_on=True)
     panel.set_xticks([-round(most), 0, round(most)])
     panel.tick_params(axis="x", labelsize=7)
-    panel.set_xlabel("low side ← → high side (mm)" if across.any() else "across the hole (mm)")
+    panel.set_xlabel("south ← → north (mm)" if vertical else "low side ← → high side (mm)")
     panel.set_ylabel("measured depth (m)")
     panel.grid(visible=False)
 
@@ -152,7 +153,9 @@ def _tension(panel, answer, rows):
         panel.plot(answer.true_tension[rows] / 1e3, md, color=_GREY, linestyle="--", label="true tension")
     low = min(tension.min(), 0.0) * 1.5 - 0.1 * np.abs(answer.tension).max()
     # what decides for the state: in a vertical hole Lubinski's load, which is the greater one there
-    critical = -np.maximum(answer.critical_load("He-Kyllingstad"), answer.critical_load("Lubinski"))[rows]
+    inclined = (answer.inclination > VERTICAL) | (answer.dogleg_severity > 0)  # without a wall force: Lubinski's alone
+    in_hole = np.where(inclined, answer.critical_load("He-Kyllingstad"), 0.0)
+    critical = -np.maximum(in_hole, answer.critical_load("Lubinski"))[rows]
     critical = np.where(critical > low, critical, np.nan)  # a picture of what is near
     if np.isfinite(critical).any():
         label = "tension at which it buckles (He-Kyllingstad, Lubinski)"
@@ -174,7 +177,7 @@ def _bending(panel, answer, rows):
 
 def _side_force(panel, answer, rows):
     """Per length, without the peaks by which the rod has forces at points."""
-    md, force = answer.md[rows], _without_points(answer)[rows]
+    md, force = answer.md[rows], regular_side_force(answer)[rows]
     sides = sides_along(answer)[rows]
     for side, colour in SIDES.items():
         if (sides == side).any():
@@ -182,9 +185,7 @@ def _side_force(panel, answer, rows):
                                 alpha=0.35, linewidth=0, label=_words(side))  # fmt: skip
     panel.plot(force, md, color="black", linewidth=1.0)
     most = np.nanmax(force, initial=0.0)
-    shown = most
-    if answer.model == "rod":  # what is left of peaks; the soft string has none
-        shown = min(most, _USUAL * _quantile(force, np.gradient(md)))
+    shown = usual_side_force(answer, force, md)
     panel.set_xlim(0.0, max(1.05 * shown, _LEAST_SIDE))
     cut = f"\ncut off: up to {most:.3g} N/m" if most > 1.05 * shown else ""
     panel.set_xlabel(f"side force per length (N/m){cut}")
@@ -194,34 +195,6 @@ def _side_force(panel, answer, rows):
 
 def _words(side):
     return "wall of a vertical hole" if side == "wall" else f"on the {side} side"
-
-
-def _quantile(values, lengths):
-    """What `_MOSTLY` of the length is below."""
-    known = np.isfinite(values)
-    if not known.any():
-        return 0.0
-    order = np.argsort(values[known])
-    so_far = np.cumsum(lengths[known][order])
-    return float(values[known][order][min(np.searchsorted(so_far, _MOSTLY * so_far[-1]), len(order) - 1)])
-
-
-def _without_points(answer):
-    """Side force, NaN where it is the peak of a force at a point, or that at the end of a contact."""
-    force, md = np.array(answer.side_force), answer.md
-    if answer.model != "rod":
-        return force
-    layer = (4 * np.nanmax(answer._sections.EI) / answer.solved.wall_stiffness) ** 0.25
-    on_stretch = np.zeros(len(md), dtype=bool)
-    for contact in answer.contacts:
-        on_stretch |= (contact.top < md) & (md < contact.bottom)
-    force[(force > 0) & ~on_stretch] = np.nan
-    for place in {end for contact in answer.contacts for end in (contact.top, contact.bottom)}:
-        i = int(np.searchsorted(md, place))
-        low = min(md[max(i - _NODES, 0)], place - _LAYERS * layer)
-        high = max(md[min(i + _NODES, len(md) - 1)], place + _LAYERS * layer)
-        force[(md >= low) & (md <= high) & (force > 0)] = np.nan
-    return force
 
 
 def _at_points(panel, answer, _):
