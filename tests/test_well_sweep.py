@@ -87,7 +87,9 @@ def test_a_depth_without_an_answer_is_a_row_that_says_so(monkeypatch, tmp_path):
     found.write(tmp_path / "sweep.csv")
     rows = (tmp_path / "sweep.csv").read_text(encoding="utf-8").splitlines()
     assert rows[1].endswith(',,,"trip out, bit at 800 m: the contact alternates"') and rows[3].endswith(",rod,")
-    assert [line.get_label() for line in found.plot().axes[0].lines] == ["trip out", "trip out: no answer"]
+    hook = found.plot().axes[0]
+    assert [text.get_text() for text in hook.get_legend().get_texts()] == ["trip out", "locks up, or no answer"]
+    assert [list(line.get_ydata()) for line in hook.lines if line.get_marker() == "X"] == [[800.0], []]
     either = cf.depth_sweep(*given[:3], [800.0], mud=MUD)
     both = cf.depth_sweep(HOLE, STRING, cf.RotateOffBottom(), [400.0, 1200.0], mud=MUD, tol=1e-3)
     assert both.models[0, 0].tolist() == ["soft", "rod"] and "│ soft" in str(both) and "│ rod" in str(both)
@@ -250,7 +252,7 @@ def test_the_chart_of_a_sweep_marks_lock_up_and_thrusts_beyond_all_others():
         "surface_torque": 0 * loads,
     }
     values["locked"][0, 0, 4] = 90.0
-    values["model_error"][0, 0] = 0.1  # soft; that of the rod is not estimated
+    values["rung"][0, 0], values["rung"][1, 0] = 0, 2  # soft, rod
     operations, depths = (cf.TripIn(), cf.RotateOffBottom()), np.arange(1e3, 6e3, 1e3)
     found = cf.DepthSweep(operations, depths, (None,), values, {(0, 0, 4): "locks up"})
     hook, torque = found.plot().axes
