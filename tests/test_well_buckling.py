@@ -111,7 +111,7 @@ def test_a_rotating_helix_has_no_axial_friction_but_torque():
 
 def test_auto_takes_the_first_rung_without_helices():
     case = {"EI": 1228200.0, "w": 241.13, "r": 0.04445, "mu": 0.25}
-    assert pushed(case, 500.0, 10e3, tol=1e-2).model == "soft"
+    assert pushed(case, 500.0, 10e3, tol=5e-2).model == "soft"
     helix = pushed(case, 500.0, 400e3)
     assert helix.model == "soft, buckled" and not helix.enough
     assert any("the exact rod in contact is not tried" in line for line in helix.why)

@@ -107,6 +107,7 @@ def test_field_units(text, dimension, value):
         ("to = 3438.0\ncount", 'to = "11400 ft"\ncount', "depth = 3474.72 m: expected a measured depth in the hole"),
         ("tol = 2e-2", 'tol = "1 %"', "torque_and_drag.tol = '1 %': expected a number"),
         ("tol = 2e-2", 'model = "stiff"', "torque_and_drag.model = 'stiff': expected 'auto'"),
+        ("tol = 2e-2", 'model = "rod"\ntorque_convention = "johancsik"', "the law that the rod in contact follows"),
         ("tol = 2e-2", 'torque_convention = "api"', "expected 'coulomb' or 'johancsik'"),
         ("friction = [0.1, 0.2, 0.3]", "friction = [[0.1, 0.2, 0.3]]", "a number, or 2, one for each section"),
         ('"Bit", diameter = "8.5 in"', '"Bit", diameter = "8.75 in"', "bit: 0.22225 m wide"),

@@ -30,13 +30,9 @@ def rod_in_contact(flexible, decided, progress=None, exact=True):
     # imported here, since it needs dolfinx, which the soft string does not
     from cosserat_fenicsx.well.rod_in_hole import NotAccurate, solve_in_hole
 
-    if flexible.torque_convention != "coulomb" and flexible.pieces.around.any():
-        refuse("torque_and_drag", "torque_convention", flexible.torque_convention,
-               "'coulomb', the law that the rod in contact follows")  # fmt: skip
     laid = flexible.laid[::-1]  # from the top down
     hole, operation = flexible.hole, flexible.operation
-    for place in laid:
-        _check(place, hole, flexible.mud)
+    check_rod(hole, laid, operation, flexible.mud, flexible.torque_convention)
 
     def solve(helix):
         """The `InHole`, and what it is short of accuracy in words, or None."""
@@ -77,6 +73,23 @@ def rod_in_contact(flexible, decided, progress=None, exact=True):
     if short is not None:
         decided = (*decided, f"NOT ENOUGH for tol = {flexible.tol:g}: {short}")
     return RodInContact._of(flexible, solved, decided)
+
+
+def check_rod(hole, laid, operation, mud, torque_convention):
+    """Refuse what is no rod in contact.
+
+    Args:
+        laid: the components in their places; the others: see `torque_and_drag`.
+
+    Raises:
+        SceneError: see `rod_in_contact`.
+    """
+    turns = any(operation.direction(place.component.contact_radius)[1] for place in laid)
+    if torque_convention != "coulomb" and turns:
+        refuse("torque_and_drag", "torque_convention", torque_convention,
+               "'coulomb', the law that the rod in contact follows")  # fmt: skip
+    for place in laid:
+        _check(place, hole, mud)
 
 
 def _check(place, hole, mud):

@@ -63,8 +63,9 @@ from cosserat_fenicsx.well.mud import Mud
 from cosserat_fenicsx.well.operations import OPERATIONS, Operation
 from cosserat_fenicsx.well.path import WellPath
 from cosserat_fenicsx.well.pieces import pieces_of
+from cosserat_fenicsx.well.rod_rung import check_rod
 from cosserat_fenicsx.well.string import DrillString
-from cosserat_fenicsx.well.torque_and_drag import check_settings, torque_and_drag
+from cosserat_fenicsx.well.torque_and_drag import CONVENTIONS, ROD, check_settings, torque_and_drag
 
 #: Dimensions of arguments that may be written with a unit.
 _LENGTHS = ("to", "diameter", "length", "contact_radius", "outer_diameter", "inner_diameter", "tool_joint",
@@ -106,12 +107,17 @@ class WellScene:
         settings = {name: value for name, value in self.settings.items() if name != "depth"}
         friction, depths = self.sweep.get("friction", []), self.sweep.get("depths", [])
         of_sweep = {name: self.sweep[name] for name in ("model", "tol") if name in self.sweep}
-        for asked in (settings, {**settings, **of_sweep}):
-            check_settings(**asked)
         for value in friction if isinstance(friction, list) else [friction]:
             self.hole.with_friction(value)
-        for depth in (self.settings.get("depth", self.hole.length), *depths):
-            pieces_of(self.hole, self.string, self.operations[0], self.mud, depth)
+        here = [self.settings.get("depth", self.hole.length)]
+        for asked, places in ((settings, here), ({**settings, **of_sweep}, depths)):
+            check_settings(**asked)
+            for depth in places:
+                _, laid = pieces_of(self.hole, self.string, self.operations[0], self.mud, depth)
+                if asked.get("model") == ROD:
+                    for operation in self.operations:
+                        convention = asked.get("torque_convention", CONVENTIONS[0])
+                        check_rod(self.hole, laid, operation, self.mud, convention)
 
     def answer(self, operation: Operation) -> TorqueAndDrag:
         """The answer of `torque_and_drag` for an operation."""
