@@ -252,7 +252,7 @@ def test_the_chart_of_a_sweep_marks_lock_up_and_thrusts_beyond_all_others():
         "surface_torque": 0 * loads,
     }
     values["locked"][0, 0, 4] = 90.0
-    values["model_error"][0, 0] = 0.1  # soft; that of the rod is not estimated
+    values["rung"][0, 0], values["rung"][1, 0] = 0, 2  # soft, rod
     operations, depths = (cf.TripIn(), cf.RotateOffBottom()), np.arange(1e3, 6e3, 1e3)
     found = cf.DepthSweep(operations, depths, (None,), values, {(0, 0, 4): "locks up"})
     hook, torque = found.plot().axes

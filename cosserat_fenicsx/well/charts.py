@@ -39,7 +39,7 @@ def sweep_figure(sweep):
     turns = any(operation.direction(1.0)[1] for operation in sweep.operations)
     figure, axes = depth_axes(6.5 * (1 + bool(turns)), 1 + bool(turns))
     low, high = _usual_range(sweep.hook_load / 1e3)
-    by_rod = np.isfinite(sweep.hook_load) & ~(sweep.values["model_error"] > 0)
+    by_rod = sweep.models == "rod"
     both = (by_rod.any(), (np.isfinite(sweep.hook_load) & ~by_rod).any()) == (True, True)
     for i, operation in enumerate(sweep.operations):
         for j in range(len(sweep.friction)):

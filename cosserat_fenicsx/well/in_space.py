@@ -22,7 +22,7 @@ from cosserat_fenicsx.well.shown import (
 
 # Pixels: height of the drawing, bounds of its width, margins at the left (numbers of depths), right (colour bar), above
 # (title) and below (names of axes).
-_HEIGHT, _WIDTHS, _MARGINS = 1000, (560, 1300), (190, 230, 130, 130)
+_HEIGHT, _WIDTHS, _MARGINS = 1000, (560, 1300), (240, 230, 130, 130)
 # Radius of the hole in the picture, over the extent of what is shown: of the whole string, and of a part.
 _HOLE, _HOLE_OF_PART = 0.015, 0.03
 # Smallest extent of the box along any axis, over the largest one; most intervals of numbers along the longest axis, and
@@ -30,9 +30,9 @@ _HOLE, _HOLE_OF_PART = 0.015, 0.03
 _THIN, _INTERVALS, _BAR = 0.15, (6, 3), 8
 # The camera looks across the well's main direction, turned and raised by these angles.
 _TURNED, _RAISED = math.radians(25), math.radians(14)
-# Points along the string and its shadow; more are left out. Forces at points with numbers, of the whole string
-# and of a part.
-_POINTS, _SHADOW, _NUMBERED = 20000, 300, (3, 8)
+# Most points along the string, and some that it has at least; of its shadow. Forces at points with numbers, of the
+# whole string and of a part.
+_POINTS, _BETWEEN, _SHADOW, _NUMBERED = 20000, 400, 300, (3, 8)
 # Radius of the sphere of a force at a point over that of the hole; width of lines, pixels.
 _SPHERE, _LINE = 0.35, 4
 # Radii of the hole in the picture that a well goes down at least, which is not horizontal.
@@ -53,7 +53,7 @@ def draw_in_space(answer, file, enlarge=None, between=None):
 
 def _draw(answer, file, enlarge, top, bottom):
     pyvista = load_pyvista()
-    md, at = _places(answer, top, bottom)
+    md = _places(answer.md, top, bottom)
     axis, radius = _picture(answer.hole.path.position(md)), answer.hole.at(md, "diameter") / 2
     whole = (top, bottom) == (0.0, answer.depth)
     size = float(np.ptp(axis, axis=0).max())
@@ -67,9 +67,10 @@ def _draw(answer, file, enlarge, top, bottom):
     if not tubes:  # of lines, parts shorter than pixels would be drawn as dots
         way = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(axis, axis=0), axis=1)))
         some = np.unique(np.searchsorted(way, np.append(np.arange(0.0, way[-1], 3 * view.pixel), way[-1])))
-        md, at, axis, radius = md[some], at[some], axis[some], radius[some]
-    line = axis + enlarge * _picture(answer.offset[at])
-    _add_string(plotter, pyvista, answer, at, line, enlarge * (radius - answer.clearance[at]), tubes)
+        md, axis, radius = md[some], axis[some], radius[some]
+    line = axis + enlarge * _picture(_at(md, answer, answer.offset))
+    thick = enlarge * (radius - _at(md, answer, answer.clearance))
+    _add_string(plotter, pyvista, answer, md, line, np.maximum(thick, 0.0), tubes)
     if tubes:
         _add_hole(plotter, pyvista, answer, md, axis, enlarge * radius)
     _add_surroundings(plotter, pyvista, axes, axis, top == 0 and axes[2].high == axis[:, 2].max())
@@ -87,12 +88,16 @@ def _draw(answer, file, enlarge, top, bottom):
     plotter.close()
 
 
-def _places(answer, top, bottom):
-    """Measured depths that are shown, m, and their indices in the answer's arrays."""
-    rows = np.arange(len(answer.md))[rows_between(answer.md, top, bottom)]
-    rows = rows[np.diff(answer.md[rows], prepend=-1.0) > 1e-9]
-    rows = rows[np.unique(np.linspace(0, len(rows) - 1, min(len(rows), _POINTS)).astype(int))]
-    return answer.md[rows], rows
+def _places(md, top, bottom):
+    """Measured depths that are shown, m: from top to bottom, those of the answer and some between."""
+    found = np.unique(np.concatenate([md[(md > top) & (md < bottom)], np.linspace(top, bottom, _BETWEEN)]))
+    return found[np.unique(np.linspace(0, len(found) - 1, min(len(found), _POINTS)).astype(int))]
+
+
+def _at(md, answer, values):
+    """Values (n,) or (n, 3) at the answer's depths, at other ones."""
+    columns = [np.interp(md, answer.md, column) for column in np.atleast_2d(values.T)]
+    return np.stack(columns, axis=-1) if values.ndim > 1 else columns[0]
 
 
 def _picture(rows):
@@ -141,12 +146,13 @@ def _view_of(points, axes):
     return View(to_camera, right, above, up, focus, pixel * window[1] / 2, window)
 
 
-def _add_string(plotter, pyvista, answer, at, line, radius, tube):
+def _add_string(plotter, pyvista, answer, md, line, radius, tube):
     """As a tube, or as a line where a tube were thinner than a pixel."""
-    force = answer.distributed_force[at]
+    distributed = answer.distributed_force
+    force, rows = _at(md, answer, distributed), rows_between(answer.md, md[0], md[-1])
     string = pyvista.MultipleLines(line)
     string[_FIELD], string["radius"] = force, radius
-    usual = usual_side_force(answer, answer.distributed_force[at], answer.md[at]) or force.max(initial=0.0)
+    usual = usual_side_force(answer, distributed[rows], answer.md[rows]) or force.max(initial=0.0)
     step = round_step(usual, _BAR) if usual > 0 else 1.0
     most = math.ceil(usual / step - 1e-9) * step or step
     labels = round(most / step) + 1
