@@ -318,7 +318,7 @@ class TorqueAndDrag:
 
         Args:
             file: .png (rank 0 writes).
-            enlarge: factor on radii and clearance, which the picture says; None for one that shows them.
+            enlarge: factor on the clearance, which the picture says; None for one that shows it.
 
         Raises:
             SceneError: pyvista is missing, or the name does not end in .png.

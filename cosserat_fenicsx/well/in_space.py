@@ -1,21 +1,23 @@
 """A string in its hole in space, by pyvista, with radii and clearance enlarged."""
 
+import math
 from pathlib import Path
 
 import numpy as np
 
 from cosserat_fenicsx.checks import positive
 from cosserat_fenicsx.errors import SceneError
+from cosserat_fenicsx.pictures.axes import round_step
 from cosserat_fenicsx.pictures.drawing import frame, load_pyvista
 from cosserat_fenicsx.ranks import on_first, world
 from cosserat_fenicsx.well.contacts import usual_force
 
 _WINDOW = 1100, 1200
-# Radius of the hole in the picture, over the extent of the well.
-_HOLE = 0.02
-_FIELD = "side force (N/m)"
-# Points along the string; more are left out.
-_POINTS = 1500
+# Largest distance from the string to the wall in the picture, and radius of the string, over the extent of the well.
+_CLEARANCE, _STRING = 0.02, 0.008
+_FIELD = "side force (N/m)\n"
+# Points along the string; more are left out. Intervals between the numbers of the colour bar, at most.
+_POINTS, _BAR = 1500, 5
 
 
 def draw_in_space(answer, file, enlarge=None):
@@ -33,25 +35,32 @@ def _draw(answer, file, enlarge):
     at = np.flatnonzero(np.diff(answer.md, prepend=-1.0) > 1e-9)
     at = at[np.unique(np.linspace(0, len(at) - 1, min(len(at), _POINTS)).astype(int))]
     axis = _picture(answer.hole.path.position(answer.md[at]))
-    hole = answer.hole.at(answer.md[at], "diameter") / 2
+    clearance, size = answer.clearance[at], float(np.ptp(axis, axis=0).max())
+    radius = answer.hole.at(answer.md[at], "diameter") / 2 - clearance
     if enlarge is None:
-        enlarge = float(f"{_HOLE * np.ptp(axis, axis=0).max() / hole.max():.1g}")
+        enlarge = max(float(f"{_CLEARANCE * size / max(clearance.max(), 1e-9):.1g}"), 1.0)
+    thicker = min(enlarge, max(float(f"{_STRING * size / radius.max():.1g}"), 1.0))
     plotter = pyvista.Plotter(off_screen=True, window_size=_WINDOW)
     plotter.set_background("white")
-    string = pyvista.MultipleLines(axis + enlarge * _picture(answer.offset[at]))
+    plotter.enable_anti_aliasing("ssaa")
+    line = axis + enlarge * _picture(answer.offset[at])
+    string = pyvista.MultipleLines(line)
     string[_FIELD] = answer.side_force[at]
-    string["radius"] = enlarge * (hole - answer.clearance[at])
+    string["radius"] = thicker * radius
     tube = string.tube(scalars="radius", absolute=True, n_sides=16)
     most = min(answer.side_force.max(), usual_force(answer.side_force)) or 1.0  # peaks would hide all else
-    plotter.add_mesh(tube, scalars=_FIELD, cmap="viridis", clim=(0.0, most),
-                     scalar_bar_args={"vertical": True, "position_x": 0.86, "position_y": 0.25,
-                                      "color": "black"})  # fmt: skip
+    step = round_step(most, _BAR)
+    count = math.ceil(most / step - 1e-9)
+    plotter.add_mesh(tube, scalars=_FIELD, cmap="viridis", clim=(0.0, count * step), smooth_shading=True,
+                     scalar_bar_args={"vertical": True, "position_x": 0.86, "position_y": 0.25, "color": "black",
+                                      "n_labels": count + 1, "fmt": "%g", "title_font_size": 18,
+                                      "label_font_size": 18})  # fmt: skip
     wall = pyvista.MultipleLines(axis)
-    wall["radius"] = enlarge * hole
+    wall["radius"] = thicker * radius + enlarge * clearance
     plotter.add_mesh(wall.tube(scalars="radius", absolute=True, n_sides=24), color="peru", opacity=0.2)
     plotter.add_text(
-        f"{answer.operation.name}, bit at {answer.depth:g} m, {answer.words}\n"
-        f"radii and clearance {enlarge:g} times as large; x east, y north, z upwards", font_size=11, color="black",
+        f"{answer.operation.name}, bit at {answer.depth:g} m, {answer.words}\nclearance {enlarge:g} times, string "
+        f"{thicker:g} times as large; x east, y north, z upwards", font_size=12, color="black",
     )  # fmt: skip
     frame(plotter, axis)
     plotter.screenshot(file)

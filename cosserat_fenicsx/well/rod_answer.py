@@ -6,6 +6,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from cosserat_fenicsx.annotations import File
 from cosserat_fenicsx.well import criteria
 from cosserat_fenicsx.well.answer import TorqueAndDrag, scales_of, share
 from cosserat_fenicsx.well.contacts import name_of_side
@@ -118,6 +119,21 @@ class RodInContact(TorqueAndDrag):
         leans = [self.hole.path.inclination_at(ends.mean()) > _VERTICAL for ends in depths]
         return [(float(a), float(b), x.force, name_of_side(x.side if leaning else np.nan))
                 for (a, b), x, leaning in zip(depths, self.solved.contacts, leans, strict=True)]  # fmt: skip
+
+    def plot_from_side(self, file: File | None = None, length: float | None = None):
+        """Draw the lower end of the string in its hole from the side, with the forces of the wall; across the hole
+        lengths are enlarged.
+
+        Args:
+            file: .png, .pdf or another format of matplotlib (rank 0 writes); None returns the Figure.
+            length: of the string that is drawn, from its lower end, m; None for all of it.
+
+        Raises:
+            SceneError: matplotlib is missing, or the ending is unknown.
+        """
+        from cosserat_fenicsx.well.side_view import draw_from_side
+
+        return draw_from_side(self, file, length)
 
     @cached_property
     def helical(self):
