@@ -93,16 +93,17 @@ def cable_in_conduit(folder):
     bend, straight, mu = 1.0, 0.5, 0.3  # m, m, -
     md = np.cumsum([0.0, straight, bend * math.pi / 2, straight])
     axis = cf.WellPath.from_survey(md, [90, 90, 90, 90], [0, 0, 90, 90])  # a horizontal one
-    cable = cf.Stiffness(shear=(1e6, 1e6), axial=1e6, bending=(2.0, 2.0), torsion=2.0)
+    cable, polymer = cf.Circle(0.012), cf.Material(E=2e9, nu=0.4)
     ends = [tuple(row) for row in axis.position(md)]
     curves = cf.Line(*ends[:2]), cf.Arc((straight, bend, 0.0), ends[1], math.pi / 2), cf.Line(*ends[2:])
-    rods = [cf.Rod(curve, cable, name=name) for curve, name in zip(curves, ("held", "bend", "pulled"), strict=True)]
+    names = "held", "bend", "pulled"
+    rods = [cf.Rod(curve, cable, polymer, name=name) for curve, name in zip(curves, names, strict=True)]
     conduit = [
         cf.TubeWall(rod, axis, radius=0.016, contact_radius=0.006, stiffness=1e6, friction=mu, slip=(-1.0, 0.0),
                     begins=begin, has_arm=False)
         for rod, begin in zip(rods, md.tolist(), strict=False)
     ]  # fmt: skip
-    held, pulled = cf.Clamp(rods[0].start), cf.Prescribed(rods[2].end, displacement=(0.0, 0.02, 0.0))
+    held, pulled = cf.Clamp(rods[0].start), cf.Prescribed(rods[2].end, displacement=(0.0, 0.03, 0.0))
     joints = [cf.Joint(a.end, b.start) for a, b in itertools.pairwise(rods)]
     scene = cf.Scene(rods, [held, pulled], conduit, joints=joints, title="A cable pulled round a bend in a conduit")
     path = cf.solve(scene, [0.0, 1.0], tol=1e-4)
@@ -110,7 +111,7 @@ def cable_in_conduit(folder):
     sizes = np.linalg.norm([near, far], axis=1)
     angle = math.acos(-near @ far / sizes.prod())
     if folder is not None:
-        path.plot(folder / "cable.png", [1])
+        path.plot(folder / "cable.png", [1], color="tension")
     check = Check("tension grows", sizes[1] / sizes[0], math.exp(mu * angle), 1.5e-3, "capstan: exp(mu angle)")
     return path.model, [check]
 

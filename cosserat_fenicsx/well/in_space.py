@@ -8,7 +8,7 @@ import numpy as np
 from cosserat_fenicsx.checks import positive
 from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.pictures.axes import round_step
-from cosserat_fenicsx.pictures.drawing import frame, load_pyvista
+from cosserat_fenicsx.pictures.drawing import add_wall, frame, load_pyvista
 from cosserat_fenicsx.ranks import on_first, world
 from cosserat_fenicsx.well.contacts import usual_force
 
@@ -55,9 +55,7 @@ def _draw(answer, file, enlarge):
                      scalar_bar_args={"vertical": True, "position_x": 0.86, "position_y": 0.25, "color": "black",
                                       "n_labels": count + 1, "fmt": "%g", "title_font_size": 18,
                                       "label_font_size": 18})  # fmt: skip
-    wall = pyvista.MultipleLines(axis)
-    wall["radius"] = thicker * radius + enlarge * clearance
-    plotter.add_mesh(wall.tube(scalars="radius", absolute=True, n_sides=24), color="peru", opacity=0.2)
+    add_wall(plotter, pyvista, axis, thicker * radius + enlarge * clearance)
     plotter.add_text(
         f"{answer.operation.name}, bit at {answer.depth:g} m, {answer.words}\nclearance {enlarge:g} times, string "
         f"{thicker:g} times as large; x east, y north, z upwards", font_size=12, color="black",
