@@ -20,7 +20,7 @@ def stiff_and_soft(scene, drilling, file):
         cf.depth_sweep(scene.hole, scene.string, OPERATIONS, depths, mud=scene.mud, model=model, tol=1e-3)
         for model in ("soft", "rod")
     )
-    figure = empty_figure(15, 6.5)
+    figure = empty_figure(13.5, 6.5)
     hook, apart, side = figure.subplots(1, 3, sharey=True)
     for i, (operation, colour) in enumerate(zip(OPERATIONS, COLOURS, strict=True)):
         loads, given = (sweep.hook_load[i, 0] / 1e3 for sweep in (stiff, soft))

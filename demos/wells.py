@@ -14,9 +14,11 @@ from pathlib import Path
 
 import numpy as np
 from known_numbers import Check, chosen, report, verdict
+from mpi4py import MPI
 from stiff_and_soft import stiff_and_soft
 
 import cosserat_fenicsx as cf
+from cosserat_fenicsx.progress import Progress
 
 SCENES = Path(__file__).parent / "wells"
 
@@ -156,10 +158,13 @@ def main(names=(), out="out/wells"):
     Returns:
         list of `Check`s.
     """
-    rows = []
-    for demo in chosen("demos/wells.py", "well", (*WELLS, *TUBES), names):
-        model, checks = run(demo, out)
-        rows += [(demo.__name__, model, check) for check in checks]
+    rows, demos = [], chosen("demos/wells.py", "well", (*WELLS, *TUBES), names)
+    with Progress([len(demos)], None, MPI.COMM_WORLD, "demo") as bar:
+        bar.start("strings in wells")
+        for i, demo in enumerate(demos):
+            bar.reached(i)
+            model, checks = run(demo, out)
+            rows += [(demo.__name__, model, check) for check in checks]
     print(report("Strings in wells: what must come out", rows))
     return [check for *_, check in rows]
 

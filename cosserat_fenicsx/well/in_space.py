@@ -12,7 +12,8 @@ from cosserat_fenicsx.pictures.drawing import add_wall, frame, load_pyvista
 from cosserat_fenicsx.ranks import on_first, world
 from cosserat_fenicsx.well.contacts import usual_force
 
-_WINDOW = 1100, 1200
+# Width and height, pixels: of a well, and of one that is this share as wide as deep.
+_WINDOW, _NARROW, _SLENDER = (1150, 950), (760, 1150), 0.2
 # Largest distance from the string to the wall in the picture, and radius of the string, over the extent of the well.
 _CLEARANCE, _STRING = 0.02, 0.008
 _FIELD = "side force (N/m)\n"
@@ -35,12 +36,14 @@ def _draw(answer, file, enlarge):
     at = np.flatnonzero(np.diff(answer.md, prepend=-1.0) > 1e-9)
     at = at[np.unique(np.linspace(0, len(at) - 1, min(len(at), _POINTS)).astype(int))]
     axis = _picture(answer.hole.path.position(answer.md[at]))
-    clearance, size = answer.clearance[at], float(np.ptp(axis, axis=0).max())
+    clearance, spans = answer.clearance[at], np.ptp(axis, axis=0)
+    size = float(spans.max())
     radius = answer.hole.at(answer.md[at], "diameter") / 2 - clearance
     if enlarge is None:
         enlarge = max(float(f"{_CLEARANCE * size / max(clearance.max(), 1e-9):.1g}"), 1.0)
     thicker = min(enlarge, max(float(f"{_STRING * size / radius.max():.1g}"), 1.0))
-    plotter = pyvista.Plotter(off_screen=True, window_size=_WINDOW)
+    window = _NARROW if np.hypot(*spans[:2]) < _SLENDER * spans[2] else _WINDOW
+    plotter = pyvista.Plotter(off_screen=True, window_size=window)
     plotter.set_background("white")
     plotter.enable_anti_aliasing("ssaa")
     line = axis + enlarge * _picture(answer.offset[at])
@@ -58,7 +61,7 @@ def _draw(answer, file, enlarge):
     add_wall(plotter, pyvista, axis, thicker * radius + enlarge * clearance)
     plotter.add_text(
         f"{answer.operation.name}, bit at {answer.depth:g} m, {answer.words}\nclearance {enlarge:g} times, string "
-        f"{thicker:g} times as large; x east, y north, z upwards", font_size=12, color="black",
+        f"{thicker:g} times as large\nx east, y north, z upwards", font_size=12, color="black",
     )  # fmt: skip
     frame(plotter, axis)
     plotter.screenshot(file)

@@ -19,7 +19,8 @@ _VERTICAL = 1e-9
 class RodInContact(TorqueAndDrag):
     """What a string in its hole carries as an exact rod in contact; the places of the arrays are the rod's nodes.
 
-    `error` is relative to hook load and surface torque themselves, the latter only where the string turns. `solved` is
+    `error` is relative to hook load and surface torque themselves, the latter only where the string turns;
+    `model_error` is zero, but of a string that would buckle into a helix what that would change. `solved` is
     the `InHole`, whose `path` has all that the package tells of a rod. `md` is the measured depth of the
     closest point of the hole's axis. Forces at points, such as those of stabilisers, are in `contacts`, which has their
     resultants; in `side_force` they are narrow peaks, as wide as the wall's stiffness makes them.
@@ -40,7 +41,7 @@ class RodInContact(TorqueAndDrag):
         changed = {
             "model": "rod",
             "error": solved.error,
-            "model_error": 0.0,
+            "model_error": _of_buckling(flexible, solved, differences),
             "differences": differences,
             "solved": solved,
         }
@@ -142,6 +143,14 @@ class RodInContact(TorqueAndDrag):
 
     def _integral(self, values):
         return float(values @ self.solved.node_length)
+
+
+def _of_buckling(flexible, solved, differences):
+    """Of an equilibrium that would buckle where there is a helix: how far it is from the buckled soft string."""
+    if not (solved.negative_modes > 0 and flexible.helical.any()):
+        return 0.0
+    scales = scales_of(flexible.solved, flexible.pieces)
+    return max(share(abs(x), scale) for x, scale in zip(differences[flexible.model], scales, strict=True))
 
 
 def _found(flexible, solved, differences):
