@@ -211,3 +211,17 @@ def test_a_string_that_stays_straight_where_there_is_a_helix_is_not_enough():
     apart = buckled.hook_load - answer.hook_load
     assert abs(apart) > 100 and not answer.enough
     assert answer.model_error == pytest.approx(abs(apart) / 90e3, rel=1e-3)
+
+
+def test_the_view_from_the_side(out, tmp_path):
+    """The lower 60 m in the hole: its wall, the low side that the string lies on, and what it presses there with."""
+    axes = out.plot_from_side(length=60.0).axes[0]
+    assert axes.get_xlim()[0] > 435 and axes.get_ylabel().endswith("high side (mm)")
+    (wall, *_) = (line.get_ydata() for line in axes.lines if len(line.get_ydata()) > 100)
+    assert wall == pytest.approx(1e3 * (0.0635 + 0.04445))
+    lying = [force for start, end, force, side in out.contacts if end > 440 and side == "low" and end > start]
+    assert lying and any(f"{lying[-1] / 1e3:.3g} kN from" in text.get_text() for text in axes.texts)
+    out.plot_from_side(tmp_path / "side.png")
+    assert (tmp_path / "side.png").stat().st_size > 10_000
+    with pytest.raises(cf.SceneError, match="length"):
+        out.plot_from_side(length=-1.0)
