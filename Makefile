@@ -24,7 +24,7 @@ help:
 	@echo "make demo    solve the eccentric cantilever of the paper on two processes; writes out/"
 	@echo "make motion  seven motions, each a scene file, a picture and a number that must come out; writes out/ (a minute)"
 	@echo "make gallery the scene files of demos/, each with a picture and a number that must come out; writes out/"
-	@echo "make well    strings in wells: torque and drag, each with pictures and a number that must come out; writes out/wells/"
+	@echo "make well    strings in wells: torque and drag, each with pictures and a number that must come out; writes out/wells/ (half a minute)"
 	@echo "make docs    the documentation as a site that needs no network; writes out/docs/index.html"
 	@echo "make test    all tests on one, two and four processes"
 	@echo "make tables  the tables of accuracy and cost in docs/, measured anew and put there"

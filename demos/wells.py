@@ -1,4 +1,5 @@
-"""The strings in wells of demos/wells/: each is solved and drawn, and numbers are compared with what must come out.
+"""The strings in wells of demos/wells/, and a cable in a conduit: each is solved and drawn, and numbers are compared
+with what must come out.
 
 python demos/wells.py                    all of them; writes to out/wells/NAME/
 python demos/wells.py volve_f12          some
@@ -6,64 +7,145 @@ python demos/wells.py --quick            without pictures
 """
 
 import argparse
+import itertools
+import math
 import sys
 from pathlib import Path
 
 import numpy as np
 from known_numbers import Check, chosen, report, verdict
+from mpi4py import MPI
+from stiff_and_soft import stiff_and_soft
 
 import cosserat_fenicsx as cf
+from cosserat_fenicsx.progress import Progress
 
 SCENES = Path(__file__).parent / "wells"
 
 
-def well_p(scene, answers, sweep):
+def well_p(scene, answers, sweep, folder):
     """Hook loads of five operations, and the torque while drilling."""
     loads = [1009059.16760857, 267741.24448960, 598614.87215726, 538614.87215726, 173041.37946106]
     found = [*(answer.hook_load for answer in answers), answers[3].surface_torque]
-    return Check("hook loads (N), torque (N m)", found, [*loads, 26414.94591394], 1e-4, "ODE at 1e-13")
+    yield Check("hook loads (N), torque (N m)", found, [*loads, 26414.94591394], 1e-4, "ODE at 1e-13")
 
 
-def volve_f12(scene, answers, sweep):
+def well_p_rod(scene, answers, sweep, folder):
+    """Hook loads out, in and rotating."""
+    known = [907306.0, 379920.4, 598622.0]
+    yield Check(
+        "hook loads (N)", [answer.hook_load for answer in answers], known, 20.0, "another program, 2 m elements"
+    )
+
+
+def volve_f12(scene, answers, sweep, folder):
     """Rotating, the hook load is the weight in mud of all parts times their heights on the axis less the weight on bit;
     the rod in contact, which leans on the wall, differs by some newtons."""
     drilling = answers[2]
     heights = [np.ptp(scene.hole.path.position([place.top, place.bottom])[:, 2]) for place in drilling.laid]
     mud = scene.mud
     weights = [place.component.mass * mud.gravity * (1 - mud.density / 7850) for place in drilling.laid]
-    return Check("hook load drilling (N)", drilling.hook_load, np.dot(weights, heights) - 80e3, 30.0, "balance")
+    yield Check("hook load drilling (N)", drilling.hook_load, np.dot(weights, heights) - 80e3, 30.0, "balance")
+    if folder is not None:
+        stiff_and_soft(scene, drilling, folder / "stiff_and_soft.png")
 
 
-def lock_up(scene, answers, sweep):
+def lock_up(scene, answers, sweep, folder):
     """The place where it locks up, from the bit at 5500 m."""
-    return Check("locked below (m)", 5500 - sweep.values["locked"][0, 0, -1], 5409.096127, 0.5, "closed form")
+    yield Check("locked below (m)", 5500 - sweep.values["locked"][0, 0, -1], 5409.096127, 0.5, "closed form")
 
 
-#: The scenes.
-WELLS = (well_p, volve_f12, lock_up)
+def assembly(scene, answers, sweep, folder):
+    """Forces of the wall on bit and stabilisers, how far the bit is tilted, and where the collars come to lie on the
+    low side."""
+    (answer,) = answers
+    points = [(md, force if side == "low" else -force) for md, end, force, side in answer.contacts if md == end]
+    tangency, *blades = points[-4:]
+    source = "strong form, by collocation"
+    known = [-536.5363, 3384.2588, 7839.7727]
+    yield Check("up on bit, blades (N)", [force for _, force in blades[::-1]], known, 0.05, source)
+    rod = answer.solved.scene.rods[0]
+    _, directors = answer.solved.path.sample(0, rod, np.array([1.0]))
+    tilt = math.degrees(math.acos(min(1.0, directors[0, :, 2] @ scene.hole.path.tangent(answer.depth))))
+    yield Check("tilt of the bit (degrees)", tilt, 0.0746971, 2e-6, source)
+    yield Check("collars lie from (m above bit)", answer.depth - tangency[0], 23.07817, 2e-3, source)
+    if folder is not None:
+        answer.plot_from_side(folder / "assembly.png", 40.0)
+
+
+def helix(scene, answers, sweep, folder):
+    """Turns, wall force and shortening between 200 and 460 m, where the compression is F."""
+    (answer,) = answers
+    solved, (EI, _) = answer.solved, scene.string.components[1].stiffness.bending
+    inside = (solved.s > 200) & (solved.s < 460)
+    s, F, r = solved.s[inside], -solved.tension[inside], answer.clearance[inside]
+    source = "Lubinski et al. (1962)"
+    turns = np.ptp(np.unwrap(solved.side[inside])) / (2 * np.pi)
+    yield Check("turns", turns, np.trapz(np.sqrt(F / (2 * EI)), s) / (2 * np.pi), 2e-3, f"{source}: sqrt(F/(2 EI))")
+    wall = np.trapz(solved.side_force[inside], s)
+    yield Check("wall force (N)", wall, np.trapz(r * F**2 / (4 * EI), s), 10.0, f"{source}: r F^2/(4 EI)")
+    shorter = 1e3 * (np.ptp(s) - np.ptp(solved.position[inside, 2]))
+    yield Check("shortening (mm)", shorter, 1e3 * np.trapz(r**2 * F / (4 * EI), s), 3e-3, f"{source}: r^2 F/(4 EI)")
+    yield Check("negative modes", solved.negative_modes, 0, 0, "a helix is stable")
+
+
+def cable_in_conduit(folder):
+    """A cable of 12 mm is pulled round a bend of 90 degrees in a conduit of 32 mm: from end to end its tension grows by
+    exp(mu times the angle that it turns by); its little bending stiffness changes that by about EI/(T R^2)."""
+    bend, straight, mu = 1.0, 0.5, 0.3  # m, m, -
+    md = np.cumsum([0.0, straight, bend * math.pi / 2, straight])
+    axis = cf.WellPath.from_survey(md, [90, 90, 90, 90], [0, 0, 90, 90])  # a horizontal one
+    cable, polymer = cf.Circle(0.012), cf.Material(E=2e9, nu=0.4)
+    ends = [tuple(row) for row in axis.position(md)]
+    curves = cf.Line(*ends[:2]), cf.Arc((straight, bend, 0.0), ends[1], math.pi / 2), cf.Line(*ends[2:])
+    names = "held", "bend", "pulled"
+    rods = [cf.Rod(curve, cable, polymer, name=name) for curve, name in zip(curves, names, strict=True)]
+    conduit = [
+        cf.TubeWall(rod, axis, radius=0.016, contact_radius=0.006, stiffness=1e6, friction=mu, slip=(-1.0, 0.0),
+                    begins=begin, has_arm=False)
+        for rod, begin in zip(rods, md.tolist(), strict=False)
+    ]  # fmt: skip
+    held, pulled = cf.Clamp(rods[0].start), cf.Prescribed(rods[2].end, displacement=(0.0, 0.03, 0.0))
+    joints = [cf.Joint(a.end, b.start) for a, b in itertools.pairwise(rods)]
+    scene = cf.Scene(rods, [held, pulled], conduit, joints=joints, title="A cable pulled round a bend in a conduit")
+    path = cf.solve(scene, [0.0, 1.0], tol=1e-4)
+    near, far = (path.reaction(support)[0][-1] for support in (held, pulled))
+    sizes = np.linalg.norm([near, far], axis=1)
+    angle = math.acos(-near @ far / sizes.prod())
+    if folder is not None:
+        path.plot(folder / "cable.png", [1], color="tension")
+    check = Check("tension grows", sizes[1] / sizes[0], math.exp(mu * angle), 1.5e-3, "capstan: exp(mu angle)")
+    return path.model, [check]
+
+
+#: The scenes of the folder, and those in other tubes.
+WELLS, TUBES = (well_p, well_p_rod, volve_f12, lock_up, assembly, helix), (cable_in_conduit,)
 
 
 def run(demo, out="out/wells"):
     """Solve a scene and draw it.
 
     Args:
-        demo: a function of `WELLS`; out: folder for its pictures, or None.
+        demo: a function of `WELLS` or `TUBES`; out: folder for its pictures, or None.
 
     Returns:
-        (answers, Check).
+        (the model's name, [Check]).
     """
+    folder = None if out is None else Path(out) / demo.__name__
+    if folder is not None:
+        folder.mkdir(parents=True, exist_ok=True)
+    if demo in TUBES:
+        return demo(folder)
     scene = cf.read_well(SCENES / f"{demo.__name__}.toml")
     answers, sweep = scene.answers(), scene.depth_sweep()
-    if out is not None:
-        folder = Path(out) / demo.__name__
-        folder.mkdir(parents=True, exist_ok=True)
+    if folder is not None:
         for answer in answers:
             name = answer.operation.name.replace(" ", "_")
             answer.plot(folder / f"{name}.png")
             answer.plot_3d(folder / f"{name}_3d.png")
         if sweep is not None:
             sweep.plot(folder / "depth_sweep.png")
-    return answers, demo(scene, answers, sweep)
+    return answers[-1].model, list(demo(scene, answers, sweep, folder))
 
 
 def main(names=(), out="out/wells"):
@@ -76,15 +158,20 @@ def main(names=(), out="out/wells"):
     Returns:
         list of `Check`s.
     """
-    found = {demo.__name__: run(demo, out) for demo in chosen("demos/wells.py", "well", WELLS, names)}
-    rows = [(name, answers[-1].model, check) for name, (answers, check) in found.items()]
+    rows, demos = [], chosen("demos/wells.py", "well", (*WELLS, *TUBES), names)
+    with Progress([len(demos)], None, MPI.COMM_WORLD, "demo") as bar:
+        bar.start("strings in wells")
+        for i, demo in enumerate(demos):
+            bar.reached(i)
+            model, checks = run(demo, out)
+            rows += [(demo.__name__, model, check) for check in checks]
     print(report("Strings in wells: what must come out", rows))
-    return [check for _, check in found.values()]
+    return [check for *_, check in rows]
 
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("names", nargs="*", help="; ".join(demo.__name__ for demo in WELLS))
+    parser.add_argument("names", nargs="*", help="; ".join(demo.__name__ for demo in (*WELLS, *TUBES)))
     parser.add_argument("--quick", action="store_true", help="without pictures")
     options = parser.parse_args()
     checks = main(options.names, None if options.quick else "out/wells")

@@ -15,6 +15,7 @@ from cosserat_fenicsx.pictures.axes import axes_of
 from cosserat_fenicsx.pictures.colours import colour_of, known, peak_of
 from cosserat_fenicsx.pictures.drawing import quantity
 from cosserat_fenicsx.pictures.labels import Labels
+from cosserat_fenicsx.pictures.signs import without_sign
 from cosserat_fenicsx.pictures.view import View
 
 STEEL = cf.Material(E=210e9, nu=0.3, density=7850.0)
@@ -141,6 +142,25 @@ def test_an_arrow_points_where_the_force_does():
 
 
 @pytest.mark.serial
+def test_tubes_are_drawn_around_their_rods():
+    """With their true clearance, 0.05 m, around rods that are drawn thicker; not where displacements are magnified."""
+    rod = cf.Rod(cf.Line((0.5, 0, 0), (3.5, 0, 0)), cf.Circle(0.02), STEEL, name="r")
+    axis = cf.WellPath.from_survey([0, 4], [90, 90], [0, 0])
+    walls = [cf.TubeWall(rod, axis, 0.06, 0.01, begins=0.5), cf.TubeRing(rod.at(1.5), axis, 0.02, 0.03, begins=0.5)]
+    scene = cf.Scene([rod], [cf.Clamp(rod.start)], [cf.Force(rod.end, (0, 0, 1.0)), *walls])
+    path = cf.solve(scene, [1.0], elements=2)
+    for plotter in (scene.plot(), path.plot(points=[0])):
+        tube, ring = (mesh for mesh in plotter.meshes if "radius" in mesh.point_data)
+        thick = 3.0 / 120
+        np.testing.assert_allclose(tube.bounds, [0.5, 3.5, *2 * (-0.05 - thick, 0.05 + thick)], rtol=1e-3)
+        np.testing.assert_allclose(ring.bounds[:4], [1.95, 2.05, -0.02 - thick, 0.02 + thick], rtol=1e-3)
+        plotter.close()
+    plotter = path.plot(points=[0], magnify=2.0)
+    assert not [mesh for mesh in plotter.meshes if "radius" in mesh.point_data]
+    plotter.close()
+    assert without_sign(scene, True) == "" and without_sign(scene, False).startswith("TubeWall on r")
+
+
 def test_a_scene_of_twenty_rods_stays_inside_its_picture():
     rods, loads = [], []
     for i in range(20):

@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 from reference_wells import WELLS
+from scipy.optimize import minimize_scalar
 
 import cosserat_fenicsx as cf
 from cosserat_fenicsx.well import criteria
@@ -42,6 +43,17 @@ def test_critical_loads():
         found = criteria.he_kyllingstad(case["EI"], case["r"], 0.0, across, 1 / case["radius"])
         assert found == pytest.approx(case["F"], rel=1e-9)
     assert criteria.lubinski(EI, w) == pytest.approx(1.94 * (EI * w**2) ** (1 / 3))
+
+
+def test_the_loads_of_a_helix_in_a_vertical_hole():
+    """The printed 5.55 and 0.14, lengths in (EI/w)^(1/3): 4.05 with the energy of the straight string is the mean over
+    the transition from half a sine wave, and the turn's weight is less at its top."""
+    turn, sine = (minimize_scalar(lambda x, c=c: c / x**2 + x / 2, (1.0, 5.0)) for c in (4 * math.pi**2, math.pi**2))
+    below = 2 * turn.fun - sine.fun
+    EI, w = 1228200.0, 241.13
+    unit = (EI * w**2) ** (1 / 3)
+    assert criteria.helix_load(EI, 0.04, w, 0.0) == pytest.approx(below * unit, rel=1e-3)
+    assert criteria.earliest_helix_load(EI, 0.04, w, 0.0) == pytest.approx((below - turn.x) * unit, abs=0.01 * unit)
 
 
 def test_critical_loads_along_a_string():

@@ -289,3 +289,30 @@ def test_a_string_in_a_vertical_hole_is_a_helix_and_not_straight():
     rate = np.gradient(np.unwrap(answer.solved.side), answer.solved.s)[wound]
     EI = string.components[1].stiffness.bending[0]
     assert rate == pytest.approx(np.sqrt(-answer.tension[wound] / (2 * EI)), rel=5e-3)
+
+
+def test_a_string_that_stays_straight_where_there_is_a_helix_is_not_enough():
+    """In a vertical hole with friction: what the helix rubs is the error of the model."""
+    path = cf.WellPath.from_survey([0, 400], [0, 0], [0, 0])
+    given = {"depth": 400.0, "tol": 1e-3}
+    lean, operation = hole(path, mu=0.3), cf.Sliding(90e3)
+    answer = cf.torque_and_drag(lean, STRING, operation, model="rod", **given)
+    buckled = cf.torque_and_drag(lean, STRING, operation, model="soft, buckled", **given)
+    assert answer.solved.negative_modes > 10 and answer.hook_load == pytest.approx(400 * 241.13 - 90e3, rel=1e-6)
+    apart = buckled.hook_load - answer.hook_load
+    assert abs(apart) > 100 and not answer.enough
+    assert answer.model_error == pytest.approx(abs(apart) / 90e3, rel=1e-3)
+
+
+def test_the_view_from_the_side(out, tmp_path):
+    """The lower 60 m in the hole: its wall, the low side that the string lies on, and what it presses there with."""
+    axes = out.plot_from_side(length=60.0).axes[0]
+    assert axes.get_xlim()[0] > 435 and axes.get_ylabel().endswith("high side (mm)")
+    (wall, *_) = (line.get_ydata() for line in axes.lines if len(line.get_ydata()) > 100)
+    assert wall == pytest.approx(1e3 * (0.0635 + 0.04445))
+    lying = [force for start, end, force, side in out.contacts if end > 440 and side == "low" and end > start]
+    assert lying and any(f"{lying[-1] / 1e3:.3g} kN from" in text.get_text() for text in axes.texts)
+    out.plot_from_side(tmp_path / "side.png")
+    assert (tmp_path / "side.png").stat().st_size > 10_000
+    with pytest.raises(cf.SceneError, match="length"):
+        out.plot_from_side(length=-1.0)

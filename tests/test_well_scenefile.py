@@ -1,11 +1,13 @@
 """Scene files of strings in wells: what they say, units, refusals, the command line, the demos."""
 
 import inspect
+import math
 import re
 import sys
 from pathlib import Path
 
 import pytest
+from assembly import assembly
 
 import cosserat_fenicsx as cf
 from cosserat_fenicsx.cli.main import main
@@ -33,6 +35,17 @@ def test_the_demos_give_their_numbers(demos_on_the_path, capsys):
     for check in wells.main(out=None):
         assert deviation(check) <= check.allowed, check
     assert "Strings in wells" in capsys.readouterr().out
+
+
+def test_the_assembly_by_its_strong_form(demos_on_the_path):
+    """Collocation gives the numbers that the demo expects."""
+    import wells
+
+    scene = cf.read_well(DEMOS / "wells" / "assembly.toml")
+    forces, tilt, lying = assembly(scene)
+    held, bit, collars = wells.assembly(scene, scene.answers(), None, None)
+    assert forces[:3] == pytest.approx(held.expected, abs=1e-3) and math.degrees(tilt) == pytest.approx(bit.expected)
+    assert lying == pytest.approx(collars.expected, abs=1e-4)
 
 
 def test_what_a_file_says():

@@ -14,6 +14,8 @@ from cosserat_fenicsx.scene.rod import Rod, RodOrName, Station, StationOrName, i
 # Half the length over which sizes and coefficients of the tube change at a jump, over its smallest radius; and over the
 # shortest piece, at most.
 _RAMP, _OF_PIECE = 0.05, 0.25
+# Points along a tube in a picture.
+_DRAWN = 201
 
 
 @dataclass
@@ -160,6 +162,12 @@ class TubeWall(_Confined, LineAction):
         along += [end for given in (self.contact_radius, self.slip) for end, _ in given[:-1]]
         return tuple(sorted({end for end in along if 0 < end < rod.length}))
 
+    def tube(self):
+        """See `Action`."""
+        s = np.linspace(0.0, self.rod.length, _DRAWN)
+        md = s + self.begins
+        return self.path.nearest(None, md).position, self.sizes(s, md)[0]
+
     def holds(self, scene):
         """See `Action`: it confines the rod across the axis."""
         held = []
@@ -209,6 +217,12 @@ class TubeRing(_Confined, PointAction):
             store(self, **{name: value})
         store(self, slip=slip_pieces(self, self.slip))
         is_known(self, "station", Station)
+
+    def tube(self):
+        """See `Action`: as long as it is wide."""
+        radius = self.clearance + self.contact_radius
+        md = self.station.s + self.begins + np.array([-radius, radius])
+        return self.path.nearest(None, md).position, np.full(2, self.clearance)
 
     def sizes(self, s, md):
         """See `TubeWall`."""

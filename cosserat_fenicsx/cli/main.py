@@ -62,10 +62,11 @@ def _run(options):
     from cosserat_fenicsx.cli.motion import motion_of
     from cosserat_fenicsx.scene.toml_tables import tables_of
 
-    if "well" in tables_of(options.scene):
+    tables = tables_of(options.scene)
+    if "well" in tables:
         from cosserat_fenicsx.cli.well import run_well
 
-        return run_well(options)
+        return run_well(options, tables)
     moving = motion_of(options)
     scene, load_factors, settings = (None, None, None) if moving else _settings(options)
 
@@ -107,10 +108,11 @@ def _explain(options):
     from cosserat_fenicsx.cli.motion import motion_of
     from cosserat_fenicsx.scene.toml_tables import tables_of
 
-    if "well" in tables_of(options.scene):
+    tables = tables_of(options.scene)
+    if "well" in tables:
         from cosserat_fenicsx.cli.well import explain_well
 
-        say(explain_well(options), file=sys.stdout)
+        say(explain_well(options, tables), file=sys.stdout)
         return DONE
     moving = motion_of(options)
     if moving:

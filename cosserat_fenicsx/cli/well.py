@@ -15,7 +15,7 @@ from cosserat_fenicsx.cli.say import DONE, INTERRUPTED, say
 from cosserat_fenicsx.errors import Interrupted, SceneError, SceneWarning
 from cosserat_fenicsx.ranks import on_first, world
 from cosserat_fenicsx.well.components import weight_in_mud
-from cosserat_fenicsx.well.scenefile import read_well
+from cosserat_fenicsx.well.scenefile import well_in
 
 # Options of the command line that are for rods alone.
 _OTHERS = ("load_factors", "elements", "degree", "formulation", "control", "branch", "duration", "dt", "scheme",
@@ -33,11 +33,11 @@ _MODELS = {
 }
 
 
-def _scene(options):
+def _scene(options, tables):
     for name in _OTHERS:
         if getattr(options, name, None) is not None:
             raise SceneError(f"--{name.replace('_', '-')} is for rods, and this scene is a well")
-    scene = read_well(options.scene)
+    scene = well_in(tables, Path(options.scene))
     asked = {name: getattr(options, name) for name in ("tol", "model") if getattr(options, name) is not None}
     return replace(scene, settings={**scene.settings, **asked})
 
@@ -61,9 +61,9 @@ def _warnings_in_words():
 
 
 @_warnings_in_words()
-def run_well(options):
-    """`cosserat run`; returns the exit code."""
-    scene, out = _scene(options), Path(options.output) if options.output else None
+def run_well(options, tables):
+    """`cosserat run` of the tables of a scene file; returns the exit code."""
+    scene, out = _scene(options, tables), Path(options.output) if options.output else None
     if out is not None:
         prepare(out)
     if scene.title:
@@ -112,9 +112,9 @@ def _write(answer, out, stem, pictures):
 
 
 @_warnings_in_words()
-def explain_well(options):
-    """Text of `cosserat explain`."""
-    scene = _scene(options)
+def explain_well(options, tables):
+    """Text of `cosserat explain` of the tables of a scene file."""
+    scene = _scene(options, tables)
     hole, path = scene.hole, scene.hole.path
     end, worst = path.position(path.length), int(np.argmax(path.dogleg_severity))
     lines = [scene.title] if scene.title else []

@@ -22,6 +22,7 @@ _PREFIXED = ("N", "m", "Pa", "rad")
 _BAR = 6
 # Up to so many digits after the point, smaller numbers have a power of ten.
 _MOST_DIGITS = 3
+_WALL = "peru"
 # Rods whose radius is below this share of the extent of the drawing are drawn thicker, and the picture says so.
 _SMALLEST_RADIUS = 1 / 120
 
@@ -183,6 +184,21 @@ def add_body(plotter, pyvista, body, factor, peak, moving=False, colour=BENDING)
         },
     )
     return surface
+
+
+def add_wall(plotter, pyvista, axis, radius):
+    """Draw the wall of a tube, translucent, from points of its axis (n, 3) and its radii (n,), m."""
+    wall = pyvista.MultipleLines(axis)
+    wall["radius"] = radius
+    plotter.add_mesh(wall.tube(scalars="radius", absolute=True, n_sides=24, capping=False), color=_WALL, opacity=0.2)
+
+
+def add_tubes(plotter, pyvista, scene, radii):
+    """Draw the tubes that rods are in, with true clearances around the rods as they are drawn; radii: {rod: m}."""
+    for load in scene.loads:
+        if (tube := load.tube()) is not None:
+            rod = load.rod if load.station is None else load.station.rod
+            add_wall(plotter, pyvista, tube[0], tube[1] + radii[rod])
 
 
 def _format(step):

@@ -89,6 +89,8 @@ def _size(marks):
 
 
 def _marks(load, scene, factor):
+    if load.tube() is not None:  # drawn as what it is, and its stiffness is none of a spring
+        return []
     if load.station is not None:
         return _at_station(load, load.station, factor)
     rods = [rod for rod in scene.rods if load.acts_on(rod)]

@@ -11,6 +11,7 @@ from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.pictures.colours import colour_of, known, peak_of
 from cosserat_fenicsx.pictures.drawing import (
     add_body,
+    add_tubes,
     at_rest,
     body_of,
     frame,
@@ -129,11 +130,13 @@ def _draw(path, points, magnify, colour):
     for line in resting:
         plotter.add_mesh(pyvista.lines_from_points(line), color="grey", line_width=2)
     radii = {rod: factors[shown[-1], rod] * bodies[shown[-1], rod].radius for rod in path.scene.rods}
+    if magnify == 1:  # elsewhere rods would leave their tubes
+        add_tubes(plotter, pyvista, path.scene, radii)
     shapes = [Deformed(path, k, radii, magnify) for k in shown]
     symbols = signs_of(pyvista, path.scene, shapes, everywhere)
     lines = [body.line for body in bodies.values()]
     title = _title(path, shown, factors.values(), magnify, _small(path, shown, size, magnify))
-    _finish(plotter, pyvista, everywhere, symbols, lines, title + _undrawn(path.scene),
+    _finish(plotter, pyvista, everywhere, symbols, lines, title + _undrawn(path.scene, magnify == 1),
             lambda labels: _label(labels, path, shown, bodies))  # fmt: skip
     return plotter
 
@@ -152,12 +155,13 @@ def _draw_scene(scene):
         plotter.add_mesh(
             surface_of(pyvista, body, factors[-1]), color=_AT_REST, split_sharp_edges=True, smooth_shading=True
         )
+    add_tubes(plotter, pyvista, scene, radii)
     symbols = signs_of(pyvista, scene, [Resting(radii)], everywhere)
     named = len(scene.rods) <= _NAMED
     title = [scene.title or "Scene", *_thicker(factors), *([] if named else [f"({len(scene.rods)} rods, not named)"])]
     if any(load.scaled for load in scene.loads):
         title[0] += ": loads at load factor 1"
-    _finish(plotter, pyvista, everywhere, symbols, at_rest(scene), title + _undrawn(scene),
+    _finish(plotter, pyvista, everywhere, symbols, at_rest(scene), title + _undrawn(scene, True),
             lambda labels: _name(labels, scene) if named else None)  # fmt: skip
     return plotter
 
@@ -222,8 +226,8 @@ def _thicker(factors):
     return [f"(sections drawn {' and '.join(thicker)} times their size)"] if thicker else []
 
 
-def _undrawn(scene):
-    words = without_sign(scene)
+def _undrawn(scene, tubes):
+    words = without_sign(scene, tubes)
     return [f"(not drawn: {textwrap.shorten(words, _TITLE_WIDTH, placeholder=' ...')})"] if words else []
 
 

@@ -120,9 +120,10 @@ def _span(everywhere, marks):
     return span
 
 
-def without_sign(scene):
-    """Words for the loads that are not drawn."""
-    return ", ".join(dict.fromkeys(describe(load) for load in scene.loads if not has_sign(load, scene)))
+def without_sign(scene, tubes):
+    """Words for the loads that are not drawn; tubes: whether tubes around rods are."""
+    left_out = [load for load in scene.loads if not has_sign(load, scene) and not (tubes and load.tube() is not None)]
+    return ", ".join(dict.fromkeys(map(describe, left_out)))
 
 
 def _acting(scene, shapes):

@@ -124,6 +124,11 @@ class Action:
         """
         return ()
 
+    def tube(self):
+        """For pictures, of an action that keeps a rod inside a tube: (n, 3) points of the tube's axis, m, and (n,) how
+        far the rod may move from there, m; else None."""
+        return None
+
     def companions(self, scene):
         """Actions that it adds to a scene, such as the weight of its point masses."""
         return ()

@@ -13,7 +13,9 @@ compression: N, positive. All functions take arrays.
   this load. X. He & A. Kyllingstad, SPE Drilling & Completion 10 (1995) 10, doi:10.2118/25370-PA.
 - Lubinski: vertical hole, 1.94 (EI w^2)^(1/3). A. Lubinski, Drilling and Production Practice (1950) 178, API-50-178.
 - Wu, Juvkam-Wold & Lu: helical, vertical hole, 5.55 (EI w^2)^(1/3) at the lower end when the first turn of a helix
-  appears there, at whose top the compression is 0.14 (EI w^2)^(1/3). Oil & Gas J. 91 (1993) no. 33, 76.
+  appears there, at whose top the compression is 0.14 (EI w^2)^(1/3). Oil & Gas J. 91 (1993) no. 33, 76. With the energy
+  of the straight string a turn of length L bears 4 pi^2 EI/L^2 + w L/2 at its lower end, at least 4.05 (EI w^2)^(1/3),
+  and half a sine wave 2.55: 4.05 is the mean of 2.55 and 5.55, and 0.14 is w L less than 5.55, L^3 = 16 pi^2 EI/w.
 
 The state of a string is told by the compression at each place: a snake above the greater of He-Kyllingstad's and
 Lubinski's loads, a helix above the greater of sqrt(2) He-Kyllingstad's and 5.55 (EI w^2)^(1/3). A helix adds

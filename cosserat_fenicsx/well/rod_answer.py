@@ -6,6 +6,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from cosserat_fenicsx.annotations import File
 from cosserat_fenicsx.well import criteria
 from cosserat_fenicsx.well.answer import TorqueAndDrag, scales_of, share
 from cosserat_fenicsx.well.contacts import WallContact, name_of_side
@@ -19,8 +20,9 @@ _VERTICAL = 1e-9
 class RodInContact(TorqueAndDrag):
     """What a string in its hole carries as an exact rod in contact; the places of the arrays are the rod's nodes.
 
-    `error` is relative to hook load and surface torque themselves, the latter only where the string turns. `solved` is
-    the `InHole`, whose `path` has all that the package tells of a rod. `md` is the measured depth of the
+    `error` is relative to hook load and surface torque themselves, the latter only where the string turns;
+    `model_error` is not estimated (NaN), but of a string that would buckle what that may change. `solved` is the
+    `InHole`, whose `path` has all that the package tells of a rod. `md` is the measured depth of the
     closest point of the hole's axis. A stabiliser touches in the middle of its length, and the bit at its lower end:
     there `clearance`, `standoff` and `contact_side` are those of blades and bit, elsewhere those of the body. Forces of
     the wall at points are in `contacts`. `side_force` has those of stabilisers and bit not at all, and those where the
@@ -45,7 +47,7 @@ class RodInContact(TorqueAndDrag):
         changed = {
             "model": "rod",
             "error": solved.error,
-            "model_error": np.nan,
+            "model_error": _of_buckling(flexible, solved, differences),
             "differences": differences,
             "solved": solved,
         }
@@ -142,6 +144,21 @@ class RodInContact(TorqueAndDrag):
         return [WallContact(float(a), float(b), x.force, name_of_side(x.side if leaning else np.nan))
                 for (a, b), x, leaning in zip(depths, self.solved.contacts, leans, strict=True)]  # fmt: skip
 
+    def plot_from_side(self, file: File | None = None, length: float | None = None):
+        """Draw the lower end of the string in its hole from the side, with the forces of the wall; across the hole
+        lengths are enlarged.
+
+        Args:
+            file: .png, .pdf or another format of matplotlib (rank 0 writes); None returns the Figure.
+            length: of the string that is drawn, from its lower end, m; None for all of it.
+
+        Raises:
+            SceneError: matplotlib is missing, or the ending is unknown.
+        """
+        from cosserat_fenicsx.well.side_view import draw_from_side
+
+        return draw_from_side(self, file, length)
+
     @cached_property
     def helical(self):
         """True at `md` where the criteria tell a helix: the rod's wall force is that of whatever shape it has."""
@@ -149,6 +166,17 @@ class RodInContact(TorqueAndDrag):
 
     def _integral(self, values):
         return float(values @ self.solved.node_length)
+
+
+def _of_buckling(flexible, solved, differences):
+    """Of an equilibrium that would buckle: how far it is from the buckled soft string where that has a helix, else what
+    a snake and all that a soft string leaves out may change. NaN of a stable one."""
+    if solved.negative_modes == 0:
+        return np.nan
+    if not flexible.helical.any():
+        return flexible.model_error
+    scales = scales_of(flexible.solved, flexible.pieces)
+    return max(share(abs(x), scale) for x, scale in zip(differences[flexible.model], scales, strict=True))
 
 
 def _found(flexible, solved, differences):

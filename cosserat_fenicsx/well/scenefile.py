@@ -143,8 +143,11 @@ def read_well(file: File) -> WellScene:
     Raises:
         SceneError: the file is missing or not TOML, a key, a type or a unit is unknown, or a value is refused.
     """
-    file = Path(file)
-    tables = tables_of(file)
+    return well_in(tables_of(file), Path(file))
+
+
+def well_in(tables, file):
+    """The `WellScene` in the tables of a file, a Path; see `read_well`."""
     try:
         return _scene(tables, file.parent)
     except SceneError as problem:

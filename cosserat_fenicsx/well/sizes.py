@@ -1,8 +1,9 @@
 """Standard sizes of drill pipe, heavy-weight pipe and drill collars by name, from standard_sizes.csv.
 
-Dimensions of drill pipe and collars: API Spec 5DP and 7-1 (ISO 11961 and 10424-1); tool joints and weights of drill
-pipe with them: API RP 7G, of grade E75, which other grades and connections exceed by up to a tenth. Heavy-weight pipe:
-Drilco's Hevi-Wate. A weight of None: that of the plain section.
+Drill pipe: bodies of API Spec 5DP (ISO 11961); tool joints and weights with them of API RP 7G, for new grade E75 pipe
+with the connection named, which other grades and connections exceed by up to a tenth. Drill collars: number, outer
+diameter and bore of API Spec 7-1 (ISO 10424-1); of those with two bores the larger one. Heavy-weight pipe: Drilco's
+Hevi-Wate; other makes differ by about 1 %. A weight of None: that of the plain section.
 """
 
 import csv

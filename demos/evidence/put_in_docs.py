@@ -1,7 +1,7 @@
 """Put into the documentation what the measurements and the gallery have left in out/.
 
     python demos/evidence/put_in_docs.py accuracy orders      these tables and their pictures
-    python demos/evidence/put_in_docs.py gallery              the pictures of the gallery
+    python demos/evidence/put_in_docs.py gallery wells        the pictures of the gallery and of strings in wells
 
 A table replaces what stands between <!-- name --> and <!-- /name --> in a page of docs/; one that is too long for that
 has a page of its own in docs/tables/. Pictures are cut to what is drawn, reduced to few colours and put in
@@ -39,6 +39,15 @@ ALONE = {
 }
 #: The pictures of the gallery, by the files of the scenes.
 GALLERY = [f"{file.stem}.png" for file in sorted((ROOT / "demos").glob("**/*.toml"))]
+#: Those of strings in wells, by their names in the documentation: files in out/wells/.
+WELLS = {
+    "volve_f12_broomstick.png": "volve_f12/depth_sweep.png",
+    "volve_f12_stiff_and_soft.png": "volve_f12/stiff_and_soft.png",
+    "well_p_rod.png": "well_p_rod/trip_out_3d.png",
+    "assembly.png": "assembly/assembly.png",
+    "helix.png": "helix/static_3d.png",
+    "cable_in_conduit.png": "cable_in_conduit/cable.png",
+}
 WIDTH, COLOURS, MARGIN = 1100, 256, 12  # pixels, number, pixels
 
 
@@ -58,9 +67,12 @@ def main(names, out="out", docs=ROOT / "docs"):
     for name in names:
         page, *pictures = PAGES.get(name, (None,))
         title, *more = ALONE.get(name, (None,))
-        for picture in GALLERY if name == "gallery" else pictures + more:
-            if (out / picture).exists():
-                kept(out / picture, docs / "pictures" / picture)
+        drawn = {picture: picture for picture in (GALLERY if name == "gallery" else pictures + more)}
+        if name == "wells":
+            drawn = {picture: f"wells/{file}" for picture, file in WELLS.items()}
+        for picture, file in drawn.items():
+            if (out / file).exists():
+                kept(out / file, docs / "pictures" / picture)
         if not (out / f"{name}.md").exists():
             continue
         found = (out / f"{name}.md").read_text(encoding="utf-8").strip()
@@ -77,5 +89,5 @@ def main(names, out="out", docs=ROOT / "docs"):
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("names", nargs="+", choices=sorted({*PAGES, *ALONE, "gallery"}), metavar="NAME")
+    parser.add_argument("names", nargs="+", choices=sorted({*PAGES, *ALONE, "gallery", "wells"}), metavar="NAME")
     main(parser.parse_args().names)
