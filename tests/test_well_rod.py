@@ -2,6 +2,7 @@
 
 import json
 import math
+import types
 from pathlib import Path
 
 import numpy as np
@@ -95,6 +96,36 @@ def test_a_build_section_against_its_strong_form(case):
     section = cf.HoleSection(path.length, 2 * (0.06 + given["r"]), given["mu"])
     found = cf.torque_and_drag(cf.Borehole(path, section), string, operation, depth=case["rod_length"], model="rod")
     assert found.hook_load == pytest.approx(case["hook_load_vertical"], rel=2e-4)
+
+
+def test_a_string_that_would_buckle_is_not_enough():
+    """In a vertical hole it stays straight on the axis, far beyond the load at which it buckles."""
+    path = cf.WellPath.from_survey([0, 600], [0, 0], [0, 0])
+    found = cf.torque_and_drag(hole(path), STRING, cf.RotaryDrilling(30e3, 2e3), model="rod")
+    assert found.error < 1e-9 and found.solved.negative_modes > 0
+    assert not found.enough and found.model_error > 0 and "NOT STABLE without friction" in str(found)
+
+
+def test_of_several_equilibria_the_stable_one_is_taken(monkeypatch):
+    """The starts differ: each is tried until one has no negative modes; if there is none, the fewest count."""
+    for modes, taken in (([2, 0], 0), ([2, -1, 1], 1), ([0], 0)):
+        answers = [types.SimpleNamespace(negative_modes=x, error=0.0, of_stiffness=0.0) for x in [*modes, 9]]
+        given = iter(answers)
+        starts = []
+
+        def on_mesh(string, layout, *args, given=given, starts=starts):
+            starts.append(args)
+            answer = next(given)
+            answer.path = types.SimpleNamespace(layout=layout)
+            answer.element_pressures = np.ones((sum(layout.counts), 4))
+            return answer
+
+        monkeypatch.setattr(rod_in_hole, "_on_mesh", on_mesh)
+        section = {"radius": 0.1, "friction": 0.2, "slip": (1.0, 0.0)}
+        last = rod_in_hole.solve_in_hole(build(), [400.0], STIFF, 241.13, 0.0635, elements=8, **section)
+        assert last.negative_modes == 9 and len(starts) == len(answers)
+        before = [x for x in starts[-1] if isinstance(x, types.SimpleNamespace)]
+        assert before[0].negative_modes == taken
 
 
 class Asked(Exception):

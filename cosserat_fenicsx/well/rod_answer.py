@@ -39,7 +39,8 @@ class RodInContact(TorqueAndDrag):
         changed = {
             "model": "rod",
             "error": solved.error,
-            "model_error": 0.0,
+            # a string that buckles, or buckles otherwise, is not farther off than a soft one
+            "model_error": flexible.model_error if solved.negative_modes else 0.0,
             "differences": differences,
             "solved": solved,
         }
@@ -144,8 +145,10 @@ def _found(flexible, solved, differences):
         most = max(share(abs(value), scale) for value, scale in zip(apart, scales, strict=True))
         if name == flexible.model and most > flexible.model_error + flexible.error + solved.error:
             yield f"this is MORE than was estimated for the {name} string, {flexible.model_error:.1e}: look at both"
-    if solved.negative_modes > 0:
+    if solved.negative_modes:
+        count = solved.negative_modes
+        told = "singular" if count < 0 else "one negative eigenvalue" if count == 1 else f"{count} negative eigenvalues"
         yield (
-            f"without friction it would buckle, or buckle otherwise: {solved.negative_modes} negative eigenvalues of "
-            "the second variation"
+            f"NOT STABLE without friction (second variation: {told}): it would buckle, or buckle otherwise, and what "
+            f"it bears then may differ as much as was estimated for the {flexible.model} string"
         )

@@ -33,6 +33,8 @@ _BY_WALL = 1.25
 _KNOWN = 0.1
 # Starts in turn, see `stages_from`.
 _STARTS = ("fast", "gentle", "relaxed")
+# More negative modes than there ever are, in place of -1 where the second variation is singular.
+_SINGULAR = 1 << 30
 # Rounding of the residual of a node, over that of its position times the stiffness of its piece of wall.
 _ROUNDED = 20.0
 # Largest difference between the reaction and the balance of all forces, over the sum of the wall's forces.
@@ -153,12 +155,17 @@ def _finer(string, count, degree, before, tol, bar, comm):
                 return _on_mesh(string, layout, degree, stages, before, before, bar, comm)
     pieces = Layout.of(string.scene, 1)
     layout = _divided(string, pieces, np.diff(pieces.breaks[0]), count)
+    found = []
     for way in _STARTS:
         try:
             stages = stages_from(string.spring, way)
-            return _on_mesh(string, layout, degree, stages, None, before, bar, comm)
+            found.append(_on_mesh(string, layout, degree, stages, None, before, bar, comm))
         except NotConverged as failed:
             reason = failed
+        if found and not found[-1].negative_modes:
+            break
+    if found:  # the one in which the string would buckle in the fewest ways
+        return min(found, key=lambda answer: answer.negative_modes % _SINGULAR)
     raise NotConverged(
         f"solve_in_hole: no equilibrium was found on {count} elements: {reason}. A string that is compressed beyond "
         "its buckling load may have many: expected more elements, a softer wall, or less compression"
