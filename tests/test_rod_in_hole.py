@@ -150,6 +150,14 @@ def test_whole_wells(name, way):
         assert answer.surface_torque == pytest.approx(15290.84, rel=6e-3)
 
 
+def test_slender_strings_are_solved():
+    """Beside the wall their pivots are zero to rounding; with less bending stiffness the hook load tends to a limit."""
+    path = cf.WellPath.from_survey([0, 100, 300, 500], [0, 0, 40, 40], [20] * 4)
+    given = {"radius": 0.108, "friction": 0.25, "slip": SLIP["out"], "elements": 256}
+    stiffer, soft = (solve_in_hole(path, [500.0], rigid(EI), 241.13, 0.0635, **given).hook_load for EI in (1e3, 100.0))
+    assert soft == pytest.approx(stiffer, rel=1e-6)
+
+
 def test_drilling_with_weight_on_a_centred_bit():
     """The soft string's hook load and torque are 661 189 N and 9548 N m; the clearance takes 3.4 % of the torque."""
     path = cf.WellPath.from_survey(*np.transpose(WELLS["F-12"]["stations_md_inc_azi"]))
