@@ -35,7 +35,7 @@ _KNOWN = 0.1
 _STARTS = ("fast", "gentle", "relaxed")
 # More negative modes than there ever are, in place of -1 where the second variation is singular.
 _SINGULAR = 1 << 30
-# Rounding of the residual of a node, over that of its position times the stiffness of its piece of wall.
+# Rounding of the residual of a node, over that of its position times the stiffness of its piece of wall, or ring.
 _ROUNDED = 20.0
 # Largest difference between the reaction and the balance of all forces, over the sum of the wall's forces.
 _UNBALANCED = 1e-5
@@ -214,7 +214,8 @@ def _on_mesh(string, layout, degree, stages, start, before, bar, comm):
             if k == len(stages) - 2:
                 softer.append(record_of(problem, 1.0, 0, 0, 0))
 
-        stiffest = string.wall.stiffness * float(layout.sizes(scene).max())
+        of_wall = string.wall.stiffness * float(layout.sizes(scene).max())
+        stiffest = max([of_wall, *(ring.stiffness for ring in string.rings)])
         rounding = _ROUNDED * np.finfo(float).eps * stiffest * scales.length / scales.force
         steps = settle(problem, string.stages, string.clearance / scales.length, rounding, stages,
                        careful=[len(stages) - 2], on_stage=on_stage)  # fmt: skip
