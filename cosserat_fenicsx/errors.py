@@ -57,9 +57,9 @@ class Interrupted(KeyboardInterrupt):
         path: the result up to the last converged point.
     """
 
-    def __init__(self, path):
+    def __init__(self, path, kept=""):
         plural = "" if len(path) == 1 else "s"
-        super().__init__(f"interrupted after {len(path)} {path.axis}{plural}, which the exception's `path` holds")
+        super().__init__(f"interrupted after {len(path)} {path.axis}{plural}, which the exception's `path` holds{kept}")
         self.path = path
 
 

@@ -2,10 +2,10 @@
 
 As a script: python tests/random_wells.py [how many] [first seed] (make random-wells).
 
-10 to 40 stations over 1 to 6 km, doglegs to 8 degrees per 30 m, inclination to 100 degrees, friction 0 to 0.5, pipe from
-2 3/8 to 6 5/8 in, a bit and stabilisers in every third string; three of the eight operations each. What the rod answers
-is compared with the same rod solved from the start on four times the elements, in a wall of 1e10 N/m^2; what the soft
-string answers with the rod.
+10 to 40 stations over 1 to 6 km, doglegs to 8 degrees per 30 m, inclination to 100 degrees, friction 0 to 0.5, pipe
+from 2 3/8 to 6 5/8 in, a bit and stabilisers in every third string; three of the eight operations each. What the rod
+answers is compared with the same rod solved from the start on four times the elements, in a wall of 1e10 N/m^2; what
+the soft string answers with the rod.
 """
 
 import math

@@ -18,7 +18,9 @@ from cosserat_fenicsx.models.rodmesh import Layout
 from cosserat_fenicsx.models.traits import found_traits, traits_of
 from cosserat_fenicsx.statics.settling import settle, stages_from
 from cosserat_fenicsx.statics.solvers import solvers_of
-from cosserat_fenicsx.well.rod_in_hole import on_axis, solve_in_hole
+from cosserat_fenicsx.well.rod_in_hole import solve_in_hole
+from cosserat_fenicsx.well.smoothed import apart_mostly
+from cosserat_fenicsx.well.starts import on_axis
 
 pytestmark = pytest.mark.few_ranks
 FOLDER = Path(__file__).parent / "reference"
@@ -258,3 +260,22 @@ def test_a_string_of_several_rods_is_the_same():
             found = model.snapshot()[0][:, :3] * model.scales.length + start
         lines.append(np.delete(found, 91, axis=0) if len(rods) > 1 else found)
     assert np.abs(lines[0] - lines[1]).max() < 1e-9
+
+
+def test_side_force_and_moment_on_a_coarse_mesh():
+    """They are near to those of a fine mesh, which the wall's forces at the nodes are not, and the estimates are above
+    their errors."""
+    path = cf.WellPath.from_survey([0, 300, 900, 1500], [0, 0, 40, 40], [20, 20, 20, 20])
+    given = path, [1500], PIPE, 241.13, 0.0635
+    coarse, fine = (solve_in_hole(*given, radius=0.108, friction=0.25, slip=(1.0, 0.0), wall_stiffness=1e9, elements=n)
+                    for n in (64, 512))  # fmt: skip
+
+    def apart(values, name):
+        return apart_mostly(values, np.interp(coarse.s, fine.s, getattr(fine, name)), coarse.node_length)
+
+    at_nodes = coarse.node_force / coarse.node_length
+    assert 10 * apart(coarse.side_force, "side_force") < apart(at_nodes, "side_force")
+    for name, scale in (("side_force", 200.0), ("bending_moment", 1500.0)):
+        error = apart(getattr(coarse, name), name)
+        assert error < min(0.05 * scale, coarse.errors_along[name])
+    assert coarse.side_force @ coarse.node_length == pytest.approx(coarse.node_force.sum(), rel=1e-3)

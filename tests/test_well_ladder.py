@@ -41,7 +41,7 @@ def test_the_difference_of_whole_wells_is_covered(name, operation, clearance, di
     told = answer.model_error * abs(answer.tension).max()
     assert abs(differs) <= told
     if operation.slip[0]:
-        assert told < 5 * abs(differs)  # and not by far too much
+        assert told < 6 * abs(differs)  # and not by far too much
 
 
 @pytest.mark.parametrize(("radius", "angle", "below", "pull", "operation", "mu", "stiff", "flexible"), PLANE)

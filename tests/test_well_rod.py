@@ -3,6 +3,7 @@
 import json
 import math
 import types
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -35,7 +36,7 @@ def out():
 
 
 def test_auto_goes_on_to_the_rod_and_says_why(out):
-    assert out.model == "rod" and out.enough and out.error <= 1e-4 and out.model_error == 0
+    assert out.model == "rod" and out.enough and out.error <= 1e-4 and math.isnan(out.model_error)
     soft = cf.torque_and_drag(hole(build()), STRING, cf.TripOut(weight=-50e3), model="soft")
     apart = out.hook_load - soft.hook_load
     assert out.differences["soft"] == pytest.approx((apart, 0.0), abs=50) and out.differences["soft"][0] == apart
@@ -57,6 +58,8 @@ def test_what_the_answer_of_the_rod_tells(out):
     assert out.drag == pytest.approx(out.hook_load - 50e3 - 241.13 * np.ptp(out.position[:, 2]), rel=1e-6)
     in_arc = (out.md > 150) & (out.md < 250)
     assert out.bending_moment[in_arc] == pytest.approx(EI * math.radians(40) / 200, rel=0.02)
+    errors = out.errors_along
+    assert 0 < errors["side_force"] < 20 and f"side force to {errors['side_force']:.2g} N/m" in str(out)
     # out of the hole the pipe is pulled to the high side of the build section, and lies on the low side below it
     sides = {side: sum(force for _, _, force, name in out.contacts if name == side) for side in ("high", "low")}
     assert {name for *_, name in out.contacts} == {"high", "low"} and min(sides.values()) > 1e3
@@ -116,6 +119,7 @@ def test_of_several_equilibria_the_stable_one_is_taken(monkeypatch):
         def on_mesh(string, layout, *args, given=given, starts=starts):
             starts.append(args)
             answer = next(given)
+            answer.factor, answer.estimates = 1.0, types.SimpleNamespace(ratio=0.0)
             answer.path = types.SimpleNamespace(layout=layout)
             answer.element_pressures = np.ones((sum(layout.counts), 4))
             return answer
@@ -126,6 +130,73 @@ def test_of_several_equilibria_the_stable_one_is_taken(monkeypatch):
         assert last.negative_modes == 9 and len(starts) == len(answers)
         before = [x for x in starts[-1] if isinstance(x, types.SimpleNamespace)]
         assert before[0].negative_modes == taken
+
+
+def test_a_rigid_wall_is_approached_as_closely_as_the_accuracy_needs(tmp_path):
+    """Beside a stabiliser with little clearance a wall of 1e8 N/m^2 is too soft for a hook load to 1e-4."""
+    sections = cf.HoleSection(500.0, 0.2159, 0.25)
+    near_gauge = cf.Stabiliser(1.5, 0.2143, 0.165, 0.07)
+    string = cf.DrillString([cf.Bit(0.2159), near_gauge, cf.Collar(60, "NC46-65"), STRING.components[-1]])
+    given = {"depth": 400.0, "model": "rod"}
+    rigid = cf.torque_and_drag(cf.Borehole(build(), sections), string, cf.TripOut(), mud=MUD, **given)
+    assert rigid.enough and rigid.solved.wall_stiffness >= 1e9
+    # at its blades and at the bit the clearance is theirs
+    for s, clearance, contact in zip((398.95, 400.0), (0.0008, 0.0), rigid.contacts[-2:], strict=True):
+        at = int(np.abs(rigid.solved.s - s).argmin())
+        assert rigid.clearance[at] == pytest.approx(clearance, abs=1e-12) and abs(rigid.standoff[at]) < 0.01
+        assert contact.at_point and contact.top == rigid.md[at] and np.isfinite(rigid.contact_side[at])
+    told = str(rigid)
+    assert f"{rigid.contacts[-1].force / 1e3:.3f} │ {rigid.contacts[-1].side}" in told and "not estimated" in told
+    # of the bit, along the hole, to which the string is a little inclined
+    assert rigid.tension[-1] == pytest.approx(0.25 * rigid.contacts[-1].force, rel=5e-3)
+    assert f"adds {rigid.tension[-1] / 1e3:+.3f} kN" in told
+    rigid.write(tmp_path / "out.csv")
+    rows = (tmp_path / "out_contacts.csv").read_text(encoding="utf-8").splitlines()
+    assert rows[-1].endswith(",bit") and float(rows[-1].split(",")[2]) == pytest.approx(rigid.contacts[-1].force)
+    with pytest.raises(cf.NotConverged, match="stiffer wall") as refused:
+        cf.torque_and_drag(cf.Borehole(build(), sections, wall_stiffness=1e8), string, cf.TripOut(), mud=MUD, **given)
+    soft = refused.value.answer
+    assert soft.wall_stiffness == 1e8 and soft.of_stiffness > 1e-4
+    for name in ("hook_load", "wall_force"):
+        apart = abs(getattr(soft, name) - getattr(rigid.solved, name))
+        assert 0.02 * soft.errors[name] < apart < soft.errors[name]
+
+
+@pytest.mark.parametrize("operation", [cf.RotaryDrilling(80e3, 5e3), cf.Sliding(50e3), cf.TripOut()], ids=str)
+def test_a_soft_string_knows_that_bit_and_stabilisers_pry(operation):
+    """A stabiliser near the bit: the span above it presses it down, and the bit up."""
+    near_bit, upper = cf.Stabiliser(1.5, 0.2127, 0.165, 0.07), cf.Stabiliser(1.5, 0.2096, 0.165, 0.07)
+    collars = cf.Collar(18, "NC46-65"), cf.Collar(60, "NC46-65")
+    string = cf.DrillString([cf.Bit(0.2159), near_bit, collars[0], upper, collars[1], STRING.components[-1]])
+    where = cf.Borehole(build(), cf.HoleSection(500.0, 0.2159, 0.25))
+    soft, rod = (cf.torque_and_drag(where, string, operation, mud=MUD, model=model) for model in ("soft", "rod"))
+    sides = {side for start, end, force, side in rod.contacts if start == end > 495 and force > 9e3}
+    assert sides == {"low", "high"}
+    for name, scale in (
+        ("hook_load", np.abs(soft.tension).max()),
+        ("surface_torque", np.abs(soft.torque).max() or 1.0),
+    ):
+        if scale > 1.0:
+            assert abs(getattr(rod, name) - getattr(soft, name)) < soft.model_error * scale
+
+
+def test_many_pieces_are_solved_on_two_meshes():
+    """A string of more components than the first mesh has elements: as of one component."""
+    joints = cf.DrillString([*(replace(STRING.components[-1], length=1.0) for _ in range(300)), STRING.components[-1]])
+    whole, cut = (cf.torque_and_drag(hole(build()), x, cf.TripOut(-50e3), model="rod") for x in (STRING, joints))
+    assert abs(whole.hook_load - cut.hook_load) < cut.error * cut.hook_load < 1e-4 * cut.hook_load
+    assert cut.solved.path.elements[0] > 512
+
+
+def test_the_survey_below_the_string_changes_nothing():
+    md, inc = [0, 100, 300, 500], [10, 10, 60, 60]
+    sections = [cf.HoleSection(250.0, 0.25, 0.2), cf.HoleSection(400.0, 0.2, 0.4)]
+    loads = []
+    for more in (1.0, 10_000.0):
+        path = cf.WellPath.from_survey([*md, 500 + more], [*inc, 60], [0] * 5)
+        where = cf.Borehole(path, [*sections, cf.HoleSection(path.length, 0.22, 0.3)])
+        loads.append(cf.torque_and_drag(where, STRING, cf.TripOut(), depth=500.0, model="rod").hook_load)
+    assert loads[0] == pytest.approx(loads[1], rel=1e-9)
 
 
 class Asked(Exception):
@@ -164,7 +235,7 @@ def test_what_cannot_be_a_rod(monkeypatch):
     soft = cf.DrillString([cf.Component(None, None, 241.13, 0.0635)])
     tight = hole(path, 0.0)
     for where, string, words in ((hole(path), soft, "stiffness = None: expected a Stiffness"),
-                                 (tight, STRING, "contact_radius = 0.0635: expected less")):  # fmt: skip
+                                 (tight, STRING, "pipe: its body is 0.127 m wide in a hole of 0.127 m")):  # fmt: skip
         with pytest.raises(cf.SceneError, match=words):
             cf.torque_and_drag(where, string, cf.TripOut(), model="rod")
     settings = {"model": "rod", "torque_convention": "johancsik"}
@@ -180,17 +251,11 @@ def test_what_cannot_be_a_rod(monkeypatch):
     monkeypatch.setattr(rod_in_hole, "solve_in_hole", fails)
     instead = cf.torque_and_drag(hole(path), STRING, cf.TripOut())
     assert not instead.enough and "not solved: the contact alternates" in str(instead)
-    with pytest.raises(cf.NotConverged, match="alternates"):
+    with pytest.raises(cf.NotConverged, match="alternates$"):
         cf.torque_and_drag(hole(path), STRING, cf.TripOut(), model="rod")
-    with pytest.raises(cf.NotConverged, match="trip out, bit at 400 m: the contact") as stop:
-        cf.depth_sweep(hole(path), STRING, cf.TripOut(), [400.0, 500.0], model="rod")
-    assert len(stop.value.path) == 0
-
-
-def test_a_sweep_by_the_rod(out):
-    found = cf.depth_sweep(hole(build()), STRING, cf.TripOut(weight=-50e3), [300.0, 500.0], model="rod")
-    assert found.hook_load[0, 0, 1] == pytest.approx(out.hook_load, rel=2e-4) and len(found) == 2
-    assert (found.values["model_error"] == 0).all() and (found.values["error"] <= 1e-4).all()
+    flat = cf.WellPath.from_survey([0, 20000], [90, 90], [0, 0])
+    with pytest.raises(cf.NotConverged, match=r"alternates; WITH THE WALL FORCE OF A HELIX IT LOCKS UP: .* md = "):
+        cf.torque_and_drag(hole(flat), STRING, cf.TripIn(), model="rod")
 
 
 def test_charts_and_the_picture_show_points_and_places(out, tmp_path_all):
@@ -216,3 +281,16 @@ def test_whole_wells(name, operation, load):
     found = cf.torque_and_drag(hole(well(name)), STRING, operation)
     assert found.model == "rod" and found.enough and found.hook_load == pytest.approx(load, rel=5e-5)
     assert not any("MORE" in line for line in found.why)  # the soft string's estimate covers the difference
+
+
+def test_a_string_in_a_vertical_hole_is_a_helix_and_not_straight():
+    path = cf.WellPath.from_survey([0, 310], [0, 0], [0, 0])
+    string = cf.DrillString([cf.Bit(0.2159), cf.DrillPipe(size="5 in 19.50 lb/ft")])
+    given = {"mud": MUD, "depth": 300.0, "model": "rod", "tol": 1e-3}
+    answer = cf.torque_and_drag(cf.Borehole(path, cf.HoleSection(310, 0.2159, 0.0)), string, cf.Static(75e3), **given)
+    assert "begun as a helix: from the axis an equilibrium was found that would buckle" in "\n".join(answer.why)
+    assert answer.solved.negative_modes == 0 and 0 < answer.neutral_point < 40
+    wound = (answer.md > 100) & (answer.md < 240)
+    rate = np.gradient(np.unwrap(answer.solved.side), answer.solved.s)[wound]
+    EI = string.components[1].stiffness.bending[0]
+    assert rate == pytest.approx(np.sqrt(-answer.tension[wound] / (2 * EI)), rel=5e-3)

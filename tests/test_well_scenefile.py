@@ -1,5 +1,6 @@
 """Scene files of strings in wells: what they say, units, refusals, the command line, the demos."""
 
+import re
 import sys
 from pathlib import Path
 
@@ -101,9 +102,9 @@ def test_the_command_line(tmp_path, capsys):
     assert main(["run", str(VOLVE), "-o", str(tmp_path), "--no-picture", "--tol", "1e-3", "--model", "soft"]) == 0
     told = capsys.readouterr().out
     assert "asked for 0.001: NOT ENOUGH" in told and "rotary drilling, friction" not in told.splitlines()[0]
-    assert {file.name for file in tmp_path.iterdir()} == {
-        "trip_out.csv", "trip_in.csv", "rotary_drilling.csv", "depth_sweep.csv"
-    }  # fmt: skip
+    names = {"depth_sweep.csv", *(f"{name}{end}.csv" for name in ("trip_out", "trip_in", "rotary_drilling")
+                                  for end in ("", "_contacts"))}  # fmt: skip
+    assert {file.name for file in tmp_path.iterdir()} == names == set(re.findall(r"\w+\.csv", told))
     rows = (tmp_path / "trip_out.csv").read_text(encoding="utf-8").splitlines()
     assert rows[0].startswith("md (m),north (m)") and rows[-1].startswith("3438,-346.4")
     assert main(["run", str(VOLVE), "--elements", "4"]) == 2

@@ -1,10 +1,15 @@
 """Sweeps over depths, that are kept and gone on with; friction from measurements; charts."""
 
+import contextlib
+import os
+import signal
+
 import numpy as np
 import pytest
 
 import cosserat_fenicsx as cf
 from cosserat_fenicsx.well import depth_sweep as module
+from cosserat_fenicsx.well import rod_in_hole
 
 pytestmark = pytest.mark.serial
 PATH = cf.WellPath.from_survey([0, 600, 1200, 1800, 2500], [0, 0, 50, 60, 85], [0, 0, 120, 150, 150])
@@ -54,6 +59,63 @@ def test_a_sweep_goes_on_where_it_was_broken_off(tmp_path, monkeypatch):
     assert (sweep(file=file).surface_torque == again.surface_torque).all() and not asked
     with pytest.raises(cf.SceneError, match="holds another sweep"):
         sweep(file=file, tol=1e-3)
+
+
+def test_a_depth_without_an_answer_is_a_row_that_says_so(monkeypatch, tmp_path):
+    """No equilibrium leaves no number; one that is not as accurate as asked leaves its number and its error."""
+    pytest.importorskip("matplotlib")
+    solve, calls = rod_in_hole.solve_in_hole, []
+
+    def fails(path, lengths, *args, **named):
+        calls.append(round(sum(lengths)))
+        if calls[-1] == 800:
+            raise cf.NotConverged("the contact alternates")
+        found = solve(path, lengths, *args, **{**named, "tol": 1e-3})
+        if calls[-1] == 1200:
+            raise rod_in_hole.NotAccurate(found, 1e-4)
+        return found
+
+    monkeypatch.setattr(rod_in_hole, "solve_in_hole", fails)
+    given = HOLE, STRING, cf.TripOut(), [800.0, 1200.0, 1600.0]
+    for _ in range(2):  # solved, and read from the file
+        found = cf.depth_sweep(*given, mud=MUD, model="rod", file=tmp_path / "sweep.jsonl")
+        assert calls == [800, 1200, 1600] and len(found) == 3 and found.done.all()
+        assert np.isnan(found.hook_load[0, 0]).tolist() == [True, False, False] and sorted(found.notes) == [
+            (0, 0, 0), (0, 0, 1)]  # fmt: skip
+        assert "trip out, bit at 800 m: the contact alternates" in str(found)
+        assert f"the estimated error of the rod in contact is {found.values['error'][0, 0, 1]:.1e}" in found.noted(1)[0]
+    found.write(tmp_path / "sweep.csv")
+    rows = (tmp_path / "sweep.csv").read_text(encoding="utf-8").splitlines()
+    assert rows[1].endswith('nan,nan,"trip out, bit at 800 m: the contact alternates"') and rows[3].endswith(',""')
+    assert [line.get_label() for line in found.plot().axes[0].lines] == ["trip out", "trip out: no answer"]
+    either = cf.depth_sweep(*given[:3], [800.0], mud=MUD)
+    assert np.isfinite(either.hook_load).all() and "soft string; NOT ENOUGH for tol = 0.0001 in the" in str(either)
+    assert "and not solved: the contact alternates" in str(either)
+
+
+def test_a_sweep_by_the_rod_is_stopped_and_goes_on(monkeypatch, tmp_path):
+    """The signal comes while C asks for the wall's data in a Newton step, as most of them do."""
+    given = HOLE, STRING, cf.TripOut(), [800.0, 1200.0, 1600.0]
+    file, nearest, calls = tmp_path / "sweep.jsonl", cf.WellPath.nearest, []
+
+    def stops(self, *args):
+        if file.read_text(encoding="utf-8").count("\n") == 2:  # its head, and the first answer
+            calls.append(1)
+            if len(calls) == 60:
+                os.kill(os.getpid(), signal.SIGINT)
+        return nearest(self, *args)
+
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)  # not that of the command line
+    with monkeypatch.context() as patch, contextlib.ExitStack() as stack:
+        stack.callback(signal.signal, signal.SIGINT, before)
+        patch.setattr(cf.WellPath, "nearest", stops)
+        with pytest.raises(cf.Interrupted, match="after 1 answer, which .* they are kept in .*sweep.jsonl") as stop:
+            cf.depth_sweep(*given, mud=MUD, model="rod", file=file)
+    assert np.isfinite(stop.value.path.hook_load[0, 0]).tolist() == [True, False, False]
+    found = cf.depth_sweep(*given, mud=MUD, model="rod", file=file)
+    assert (found.hook_load == cf.depth_sweep(*given, mud=MUD, model="rod").hook_load).all()
+    assert not found.notes
+    assert np.isnan(found.values["model_error"]).all() and (found.values["error"] <= 1e-4).all()
 
 
 def test_depths_that_do_not_fit_are_refused_first():
@@ -133,6 +195,8 @@ def test_charts(tmp_path):
     assert [axes.get_xlabel() for axes in figure.axes] == ["hook load (kN)", "surface torque (kN m)"]
     assert len(figure.axes[0].lines) == 6 and figure.axes[0].get_ylim() == pytest.approx((2585, 715))
     answer = cf.torque_and_drag(HOLE, STRING, cf.Sliding(1e5), mud=MUD, model="soft, buckled")
+    with pytest.raises(cf.SceneError, match="ends in .csv"):
+        answer.write(tmp_path / "answer.xlsx")
     answer.plot(tmp_path / "answer.png")
     assert (tmp_path / "answer.png").stat().st_size > 20000
     with pytest.raises(cf.SceneError, match="expected a name that ends in"):

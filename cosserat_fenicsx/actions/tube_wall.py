@@ -11,17 +11,19 @@ from cosserat_fenicsx.scene import action
 from cosserat_fenicsx.scene.action import LineAction, PointAction
 from cosserat_fenicsx.scene.rod import Rod, RodOrName, Station, StationOrName, is_known
 
-# Half the length over which sizes and coefficients of the tube change at a jump, over the length of its axis.
-_RAMP = 1e-4
+# Half the length over which sizes and coefficients of the tube change at a jump, over its smallest radius; and over the
+# shortest piece, at most.
+_RAMP, _OF_PIECE = 0.05, 0.25
 
 
 @dataclass
 class Stage:
-    """What solvers change of a wall for a while: its stiffness, and that of a spring, both over the wall's own
-    stiffness; and the part of the friction that acts. The spring leads to the axis, or to where the rod was when it was
-    anchored."""
+    """What solvers change of a wall for a while: its stiffness, `most` at most, and that of a spring, both over the
+    wall's own stiffness; and the part of the friction that acts. The spring leads to the axis, or to where the rod was
+    when it was anchored."""
 
     wall: float = 1.0
+    most: float = np.inf
     spring: float = 0.0
     friction: float = 1.0
     anchor: np.ndarray | None = None
@@ -61,7 +63,7 @@ class _Confined:
             action.vector(near.tangent, "1"),
             action.vector(near.curvature, "1/m"),
             action.scalar(clearance, "m"),
-            action.scalar(stage.wall * kp, self.unit),
+            action.scalar(min(stage.wall, stage.most) * kp, self.unit),
             action.scalar(stage.spring * kp, self.unit),
             action.vector(near.position if stage.anchor is None else stage.anchor, "m from origin"),
             action.scalar(slip[:, 0] * friction, "1"),
@@ -147,7 +149,8 @@ class TubeWall(_Confined, LineAction):
         """(n,) values of `pieces` along the axis, linear over a short length at a jump: the contact there would
         alternate."""
         ends, values = np.array([end for end, _ in given[:-1]]), np.array([value for _, value in given])
-        half = _RAMP * self.path.length
+        half = _RAMP * min(radius for _, radius in self.radius)
+        half = min(half, _OF_PIECE * np.diff(ends, prepend=0.0).min(initial=np.inf))
         knots = np.ravel(np.column_stack([ends - half, ends + half]))
         return np.interp(md, knots, np.repeat(values, 2)[1:-1]) if len(ends) else np.full(len(md), values[0])
 

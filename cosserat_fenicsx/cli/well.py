@@ -58,7 +58,7 @@ def run_well(options):
         sweep = scene.depth_sweep(out / "depth_sweep.jsonl" if out is not None else None)
     except Interrupted as stop:
         sweep, code = stop.path, INTERRUPTED
-        say(f"cosserat: {stop}" + ("; the same command goes on from there" if out is not None else ""))
+        say(f"cosserat: {stop}")
     if sweep is not None:
         say(str(sweep), file=sys.stdout)
         if out is not None:
@@ -87,7 +87,7 @@ def _write(answer, out, stem, pictures):
         files |= {f"{stem}.png": answer.plot, f"{stem}_3d.png": answer.plot_3d}
     for name, write in files.items():
         write(out / name)
-    return list(files)
+    return [f"{stem}_contacts.csv", *files]  # which `TorqueAndDrag.write` writes too
 
 
 def explain_well(options):

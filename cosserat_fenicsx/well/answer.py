@@ -8,19 +8,20 @@ import numpy as np
 
 from cosserat_fenicsx.annotations import File
 from cosserat_fenicsx.well import criteria, loaded
-from cosserat_fenicsx.well.contacts import contacts_of, side_force_up_to, sides_of
+from cosserat_fenicsx.well.contacts import WallContact, contacts_of, side_force_up_to, sides_of
 from cosserat_fenicsx.well.hole import Borehole
 from cosserat_fenicsx.well.mud import Mud
 from cosserat_fenicsx.well.operations import Operation
 from cosserat_fenicsx.well.softstring import UP_TO
 from cosserat_fenicsx.well.string import DrillString
+from cosserat_fenicsx.well.tabular import Tabular
 
 # A torque below this share of the largest tension times the contact radius is nothing that errors are compared with.
 _LITTLE = 1e-2
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class TorqueAndDrag:
+class TorqueAndDrag(Tabular):
     """What a string in its hole carries, from `torque_and_drag`. SI units; depths are measured depths.
 
     Arrays run down the hole along `md`, which repeats a depth where something jumps: the value above it, then that
@@ -33,15 +34,17 @@ class TorqueAndDrag:
         error: estimated error of hook load and surface torque as solutions of the model's equations, over the largest
             tension and torque along the string (over 1 % of that tension times the contact radius where this is more).
         model_error: estimate, likewise relative, of how far those of the rod in contact may be, which is stiff and has
-            a clearance: the error of the model, not of its solution.
-        enough: whether both are within `tol`; False warns that the model does not suffice for the accuracy asked for.
+            a clearance: the error of the model, not of its solution. NaN: not estimated, of the rod itself.
+        enough: whether both are within `tol`, as far as they are estimated, of hook load and surface torque alone;
+            False warns that the model does not suffice for the accuracy asked for.
         torque_convention: "coulomb" or "johancsik", see `torque_and_drag`.
         laid, pieces: the string in its place, and cut where anything jumps; solved: what was found on it.
     """
 
-    #: What was solved, and which bending moment it has, in words.
-    words = property(lambda self: f"{self.model} string")
-    moment_words: ClassVar[str] = "EI times the hole's curvature"
+    words = property(lambda self: f"{self.model} string", doc="What was solved, for titles.")
+    # Which bending moment it has; and what the model leaves out for all that is estimated.
+    _moment_words: ClassVar[str] = "EI times the hole's curvature"
+    _leaves_out: ClassVar[str] = ""
 
     hole: Borehole
     string: DrillString
@@ -61,8 +64,8 @@ class TorqueAndDrag:
 
     @property
     def enough(self) -> bool:
-        """Whether the errors of solution and model are within `tol`."""
-        return self.error + self.model_error <= self.tol
+        """Whether the errors of solution and model are within `tol`: those of hook load and surface torque."""
+        return self.error + float(np.nan_to_num(self.model_error, nan=0.0, posinf=np.inf)) <= self.tol
 
     @property
     def hook_load(self) -> float:
@@ -140,6 +143,11 @@ class TorqueAndDrag:
         return self.hole.path.inclination_at(self.md)
 
     @cached_property
+    def azimuth(self) -> np.ndarray:
+        """rad from 0 to 2 pi; without meaning where the hole is vertical."""
+        return self.hole.path.azimuth_at(self.md)
+
+    @cached_property
     def dogleg_severity(self) -> np.ndarray:
         """Curvature of the hole, rad/m."""
         return self._of_piece(self.pieces.curvature)
@@ -178,9 +186,8 @@ class TorqueAndDrag:
         return self.hole.path.position(self.md) + self.offset
 
     @cached_property
-    def contacts(self) -> list[tuple[float, float, float, str]]:
-        """(from, to, force, side): measured depths (m), the force on the wall (N) and "high", "right", "low" or "left",
-        looking down the hole ("wall" where it is vertical), of each stretch on one side."""
+    def contacts(self) -> list[WallContact]:
+        """From the surface down (top, bottom, force, side) of each stretch on one side, see `WallContact`."""
         return contacts_of(self.md, self.side_force, self.contact_side, -self._down(side_force_up_to(self.solved)))
 
     @cached_property
@@ -274,31 +281,15 @@ class TorqueAndDrag:
         Raises:
             SceneError: an unknown name.
         """
-        from cosserat_fenicsx.checks import refuse
+        weight, (k, across, along) = self._of_piece(self.pieces.weight), self._loads()
+        return criteria.load_of(
+            criterion, self._sections.EI, self.clearance, weight, self.inclination, along, across, k
+        )
 
-        EI, weight = self._sections.EI, self._of_piece(self.pieces.weight)
-        loose = np.where(self.clearance > 1e-9, self.clearance, np.nan)
-        straight = {"Dawson-Paslay": criteria.dawson_paslay, "Chen": criteria.chen, "Wu": criteria.wu}
-        if criterion in straight:
-            return straight[criterion](EI, loose, weight, self.inclination)
-        if criterion == "Lubinski":
-            return criteria.lubinski(EI, weight)
-        if criterion != "He-Kyllingstad":
-            refuse(self, "critical_load", criterion, f"{', '.join(straight)}, He-Kyllingstad or Lubinski")
-        k, across, b = self._loads()
-        found, known = np.full(len(k), np.nan), ~np.isnan(EI * loose)
-        found[known] = criteria.he_kyllingstad(*(x[known] for x in (EI, loose, b, across, k)))
-        return found
+    def _tables(self):
+        from cosserat_fenicsx.well.tables import answer_columns, contact_columns
 
-    def write(self, file: File) -> None:
-        """Write the arrays along the string as a .csv file, one row a place. Rank 0 writes.
-
-        Raises:
-            OSError: it cannot be written.
-        """
-        from cosserat_fenicsx.well.tables import write_answer
-
-        write_answer(self, file)
+        return {"": answer_columns(self), "_contacts": contact_columns(self)}
 
     def plot(self, file: File | None = None):
         """Draw tension with the loads of buckling, torque, and side force along the string, depth downwards.

@@ -97,13 +97,18 @@ def _at_points(axes, points):
 
 def sweep_figure(sweep):
     """Hook load and surface torque over the depth of the bit."""
-    turns = np.nanmax(np.abs(sweep.surface_torque), initial=0.0) > 0
+    turns = any(operation.direction(1.0)[1] for operation in sweep.operations)
     figure, axes = _axes(1 + bool(turns), 6.5 * (1 + bool(turns)))
     for i, operation in enumerate(sweep.operations):
         for j in range(len(sweep.friction)):
             look = {"color": _COLOURS[i % len(_COLOURS)], "linestyle": _STYLES[j % len(_STYLES)]}
             look |= {"label": sweep.label(i, j), "marker": "." if len(sweep.depths) < 30 else None}
             axes[0].plot(sweep.hook_load[i, j] / 1e3, sweep.depths, **look)
+            without = sweep.depths[sweep.done[i, j] & np.isnan(sweep.hook_load[i, j])]
+            if len(without):  # at the left, every line in its own column
+                at = np.full(len(without), 0.02 * (1 + i * len(sweep.friction) + j)), without
+                cross = {"marker": "x", "linestyle": "none", "transform": axes[0].get_yaxis_transform()}
+                axes[0].plot(*at, **{**look, **cross, "label": f"{sweep.label(i, j)}: no answer"})
             if turns and operation.direction(1.0)[1]:
                 axes[1].plot(sweep.surface_torque[i, j] / 1e3, sweep.depths, **look)
     axes[0].set(xlabel="hook load (kN)", ylabel="measured depth of the bit (m)")

@@ -1,11 +1,43 @@
 """Where a string touches the wall, and how much each stretch on one side carries."""
 
+from typing import NamedTuple
+
 import numpy as np
 
 from cosserat_fenicsx.well.softstring import UP_TO
 
 _SIDES = ("high", "right", "low", "left")
 _USUAL, _MOSTLY = 1.5, 0.97
+
+
+class WallContact(NamedTuple):
+    """Where a string touches the wall, and how much it bears there.
+
+    Attributes:
+        top, bottom: measured depths, m; equal for a force at a point.
+        force: on the wall, across the hole, N: of the whole stretch.
+        side: "high", "right", "low" or "left", looking down the hole; "wall" where it is vertical.
+    """
+
+    top: float
+    bottom: float
+    force: float
+    side: str
+
+    @property
+    def at_point(self) -> bool:
+        """Whether it is a concentrated force: of a stabiliser or the bit, or where the string leaves the wall."""
+        return self.top == self.bottom
+
+
+def side_in_space(tangents, outward):
+    """(n,) angles of directions across the hole (n, 3), rad clockwise from its high side, looking down it; from the
+    first axis, north, where it is vertical. tangents: (n, 3) of the hole's axis."""
+    high = tangents[:, 2:] * tangents - (0.0, 0.0, 1.0)
+    vertical = np.linalg.norm(high, axis=1) < 1e-9
+    high[vertical] = np.array([1.0, 0.0, 0.0]) - tangents[vertical, :1] * tangents[vertical]
+    right = np.cross(tangents, high)
+    return np.arctan2((outward * right).sum(axis=1), (outward * high).sum(axis=1))
 
 
 def sides_of(pieces, solved, climbing):
@@ -43,7 +75,7 @@ def side_force_up_to(solved):
 
 
 def contacts_of(md, side_force, side, up_to):
-    """[(from, to, force, side)], see `TorqueAndDrag.contacts`.
+    """The `WallContact`s, see `TorqueAndDrag.contacts`.
 
     Args:
         up_to: (n,) integral of the side force over the depth, from anywhere, N.
@@ -62,5 +94,5 @@ def contacts_of(md, side_force, side, up_to):
         force = up_to[points[-1]] - up_to[points[0]]
         if kind < 5 and md[points[-1]] > md[points[0]]:
             name = (*_SIDES, "wall")[kind]
-            found.append((float(md[points[0]]), float(md[points[-1]]), float(force), name))
+            found.append(WallContact(float(md[points[0]]), float(md[points[-1]]), float(force), name))
     return found

@@ -27,6 +27,8 @@ as early as one is known to be possible, `earliest_helix_load`.
 
 import numpy as np
 
+from cosserat_fenicsx.checks import refuse
+
 _CHEN, _WU = np.sqrt(2.0), 2 * np.sqrt(2.0) - 1
 _LUBINSKI, _VERTICAL_HELIX, _VERTICAL_TOP = 1.94, 5.55, 0.14
 #: States of a string, and their names.
@@ -77,6 +79,25 @@ def he_kyllingstad(EI, clearance, along, across, curvature):
     roots = np.linalg.eigvals(companion)
     real = (np.abs(roots.imag) < 1e-7 * np.abs(roots)) & (roots.real > 0)
     return f * np.where(real, roots.real, np.inf).min(axis=-1)
+
+
+def load_of(name, EI, clearance, weight, inclination, along, across, curvature):
+    """N: by the criterion of a name, see the functions above; NaN where EI or a clearance is missing.
+
+    Raises:
+        SceneError: an unknown name.
+    """
+    loose = np.where(clearance > 1e-9, clearance, np.nan)
+    straight = {"Dawson-Paslay": dawson_paslay, "Chen": chen, "Wu": wu}
+    if name in straight:
+        return straight[name](EI, loose, weight, inclination)
+    if name == "Lubinski":
+        return lubinski(EI, weight)
+    if name != "He-Kyllingstad":
+        refuse("TorqueAndDrag", "critical_load", name, f"{', '.join(straight)}, He-Kyllingstad or Lubinski")
+    found, known = np.full(len(EI), np.nan), ~np.isnan(EI * loose)
+    found[known] = he_kyllingstad(*(x[known] for x in (EI, loose, along, across, curvature)))
+    return found
 
 
 def snake_load(EI, clearance, weight, side):

@@ -1,11 +1,16 @@
-"""Torque and drag over many depths of the bit, for several operations and coefficients of friction."""
+"""Torque and drag over many depths of the bit, for several operations and coefficients of friction.
+
+Every depth is solved on its own, the rod too. From the state at a neighbouring depth or friction Newton's method needs
+as many steps as from the start by springs, since they go into finding which nodes of the mesh touch the wall; and an
+answer does not depend on those before it, nor on where a sweep was broken off.
+"""
 
 import hashlib
 import itertools
 import json
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -21,10 +26,12 @@ from cosserat_fenicsx.well.mud import Mud
 from cosserat_fenicsx.well.operations import Operation
 from cosserat_fenicsx.well.pieces import pieces_of
 from cosserat_fenicsx.well.string import DrillString
-from cosserat_fenicsx.well.torque_and_drag import torque_and_drag
+from cosserat_fenicsx.well.torque_and_drag import AUTO, ROD, torque_and_drag
 
-#: What is kept of an answer; `locked` is where the string locks up, m, or NaN.
+#: Numbers that are kept of an answer; `locked` is where the string locks up, m, or NaN.
 KEPT = ("hook_load", "surface_torque", "error", "model_error", "locked")
+# Of the form of files, which are gone on with.
+_VERSION = 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,12 +43,15 @@ class DepthSweep:
         values: {name: array (operations, friction, depths)} of "hook_load" (N), "surface_torque" (N m), "error" and
             "model_error" (see `TorqueAndDrag`) and "locked" (m): where the string locks up, which leaves the others
             NaN. What is not computed yet is NaN.
+        notes: {(operation, friction, depth): text}, by indices, of the answers to look at: why there is none (the
+            string locks up, no equilibrium was found), or why it is not as accurate as asked.
     """
 
     operations: tuple[Operation, ...]
     depths: np.ndarray
     friction: tuple
     values: dict[str, np.ndarray]
+    notes: dict[tuple[int, int, int], str] = field(default_factory=dict)
 
     #: For messages.
     axis = "answer"
@@ -51,8 +61,11 @@ class DepthSweep:
 
     @property
     def done(self) -> np.ndarray:
-        """(operations, friction, depths) whether it is computed."""
-        return ~(np.isnan(self.hook_load) & np.isnan(self.values["locked"]))
+        """(operations, friction, depths) whether it is computed, or was found to have no answer."""
+        found = ~np.isnan(self.hook_load)
+        for index in self.notes:
+            found[index] = True
+        return found
 
     def __len__(self):
         return int(self.done.sum())
@@ -65,16 +78,25 @@ class DepthSweep:
         told = f"{friction:g}" if np.ndim(friction) == 0 else ", ".join(f"{x:g}" for x in friction)
         return f"{self.operations[i].name}, friction {told}"
 
+    def noted(self, k: int | None = None) -> list[str]:
+        """The notes in words, with operation, friction and depth; those of depth k alone where it is given."""
+        return [
+            f"{self.label(*index[:2])}, bit at {self.depths[index[2]]:g} m: {note}"
+            for index, note in sorted(self.notes.items())
+            if k in (None, index[2])
+        ]
+
     def write(self, file: File) -> None:
-        """Write a .csv file, one row a depth. Rank 0 writes.
+        """Write a .csv file, one row a depth, with the notes on it. Rank 0 writes.
 
         Raises:
             OSError: it cannot be written.
         """
-        lines = ["depth_m," + ",".join(f'"{label}: {what}"' for label, what, _ in self._columns())]
+        lines = ["depth_m," + ",".join(f'"{label}: {what}"' for label, what, _ in self._columns()) + ",notes"]
         columns = [values for *_, values in self._columns()]
         for k, depth in enumerate(self.depths):
-            lines.append(",".join([f"{depth:.9g}", *(f"{values[k]:.9g}" for values in columns)]))
+            notes = "; ".join(self.noted(k)).replace('"', "'")
+            lines.append(",".join([f"{depth:.9g}", *(f"{values[k]:.9g}" for values in columns), f'"{notes}"']))
         on_first(world(), lambda: Path(file).write_text("\n".join(lines) + "\n", encoding="utf-8"))
 
     def _columns(self):
@@ -130,11 +152,10 @@ def depth_sweep(
         hole, string, mud, model, tol, torque_convention: see `torque_and_drag`.
 
     Returns:
-        a `DepthSweep`. Where a string locks up, its loads are NaN.
+        a `DepthSweep`. Where a string locks up, or no equilibrium is found, its loads are NaN, and its `notes` say so.
 
     Raises:
         SceneError: see `torque_and_drag`; a file of another sweep.
-        NotConverged: see `torque_and_drag`; its `path` is the sweep so far.
         OSError: the file cannot be written.
         Interrupted: by Ctrl-C; its `path` is the sweep so far.
     """
@@ -155,44 +176,52 @@ def depth_sweep(
     shape = (len(operations), len(friction), len(depths))
     values = {name: np.full(shape, np.nan) for name in KEPT}
     sweep = DepthSweep(operations, depths, friction, values)
-    store = _Store(file, _mark(hole, string, operations, depths, friction, settings), values)
+    store = _Store(file, _mark(hole, string, operations, depths, friction, settings), sweep)
     missing = np.argwhere(~sweep.done)
     try:
         with Progress([len(missing)], progress, world(), "answer") as bar:
             bar.start("depth sweep")
             for number, (i, j, k) in enumerate(missing, start=1):
-                store.keep((i, j, k), _answer(holes[j], string, operations[i], float(depths[k]), settings))
+                store.keep((i, j, k), *_answer(holes[j], string, operations[i], float(depths[k]), settings))
                 bar.reached(number)
     except KeyboardInterrupt:
-        raise Interrupted(sweep) from None
-    except NotConverged as failed:
-        where = f"{sweep.label(i, j)}, bit at {depths[k]:g} m"
-        raise NotConverged(f"depth_sweep: {where}: {failed}; the exception's `path` has the {len(sweep)} before", sweep)
+        kept = "" if file is None else f"; they are kept in {os.fspath(file)}, from where the same call goes on"
+        raise Interrupted(sweep, kept) from None
     finally:
         store.close()
     return sweep
 
 
 def _answer(hole, string, operation, depth, settings):
-    """The numbers of `KEPT`."""
+    """The numbers of `KEPT`, and a note, "" where there is nothing to say."""
     try:
         answer = torque_and_drag(hole, string, operation, depth=depth, progress=False, **settings)
     except LockUp as locked:
-        return (np.nan, np.nan, np.nan, np.nan, locked.md)
-    return answer.hook_load, answer.surface_torque, answer.error, answer.model_error, np.nan
+        return (np.nan, np.nan, np.nan, np.nan, locked.md), f"locks up at md = {locked.md:.5g} m"
+    except NotConverged as failed:
+        # an equilibrium that is not as accurate as asked is one
+        found, none = getattr(failed, "answer", None), (np.nan,) * len(KEPT)
+        numbers = none if found is None else (found.hook_load, found.surface_torque, found.error, 0.0, np.nan)
+        return numbers, str(failed)
+    note = ""
+    if settings["model"] == AUTO and not answer.enough:
+        why = [line for line in answer.why if line.startswith("NOT ENOUGH")]
+        why += [] if answer.model == ROD else answer.why[-1:]  # why it is not the rod
+        note = "; ".join([answer.words, *why])
+    return (answer.hook_load, answer.surface_torque, answer.error, answer.model_error, np.nan), note
 
 
 class _Store:
-    """The answers of a sweep in a file, one a line: indices, then `KEPT`."""
+    """The answers of a sweep in a file, one a line: indices, then `KEPT`, then the note."""
 
-    def __init__(self, file, mark, values):
-        self._values, self._stream = values, None
+    def __init__(self, file, mark, sweep):
+        self._sweep, self._stream = sweep, None
         if file is None:
             return
         comm, rows = world(), []
         on_first(comm, lambda: rows.extend(self._open(Path(file), mark)))
-        for index, numbers in comm.bcast(rows):
-            self._set(index, numbers)
+        for *row, note in comm.bcast(rows):
+            self._set(row[:3], row[3:], note)
 
     def _open(self, file, mark):
         """Open the file for more rows, and return those that are there."""
@@ -221,17 +250,20 @@ class _Store:
                 f"depth_sweep.file = {str(file)!r}: it holds another sweep (hole, string, depths or settings "
                 "differ): expected the same call, or another file"
             )
-        return [(row[:3], row[3:]) for row in rows]
+        return rows
 
-    def keep(self, index, numbers):
+    def keep(self, index, numbers, note):
         """Take an answer, and write it."""
-        self._set(index, numbers)
+        self._set(index, numbers, note)
         if self._stream is not None:
-            self._write([*(int(i) for i in index), *numbers])
+            self._write([*(int(i) for i in index), *numbers, note])
 
-    def _set(self, index, numbers):
+    def _set(self, index, numbers, note):
+        index = tuple(int(i) for i in index)
         for name, number in zip(KEPT, numbers, strict=True):
-            self._values[name][tuple(index)] = number
+            self._sweep.values[name][index] = number
+        if note:
+            self._sweep.notes[index] = note
 
     def _write(self, row):
         self._stream.write(json.dumps(row) + "\n")
@@ -246,5 +278,7 @@ def _mark(hole, string, operations, depths, friction, settings):
     """A hash of everything that a sweep's numbers follow from."""
     path = hole.path
     survey = [array.tolist() for array in (path.md, path.inclination, path.azimuth)]
-    told = repr((survey, hole.sections, string, operations, depths.tolist(), [np.array(x).tolist() for x in friction]))
+    told = repr(
+        (_VERSION, survey, hole.sections, string, operations, depths.tolist(), [np.array(x).tolist() for x in friction])
+    )
     return hashlib.sha256((told + repr(settings)).encode()).hexdigest()[:16]

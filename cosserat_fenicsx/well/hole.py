@@ -48,8 +48,9 @@ class Borehole:
     Args:
         path: a `WellPath`.
         sections: those of the hole, each a `HoleSection`, from the surface down.
-        wall_stiffness: pressure per length over penetration, N/m^2; rock and steel have 1e9 and more. Only the rod in
-            contact needs it.
+        wall_stiffness: pressure per length over penetration, N/m^2; rock and steel have 1e9 and more. None for a rigid
+            wall, which the rod in contact approaches by stiffer ones until what is left is small beside the accuracy
+            asked for. Only the rod in contact needs it.
 
     Raises:
         SceneError: sections that do not follow each other downwards.
@@ -57,12 +58,14 @@ class Borehole:
 
     path: WellPath
     sections: tuple[HoleSection, ...]
-    wall_stiffness: float = 1e9
+    wall_stiffness: float | None = None
 
     def __post_init__(self):
         instance(self, "path", self.path, WellPath, "a WellPath")
         given = (self.sections,) if isinstance(self.sections, HoleSection) else tuple(self.sections)
-        store(self, sections=given, wall_stiffness=positive(self, "wall_stiffness", self.wall_stiffness, "N/m^2"))
+        store(self, sections=given)
+        if self.wall_stiffness is not None:
+            store(self, wall_stiffness=positive(self, "wall_stiffness", self.wall_stiffness, "N/m^2"))
         if not given:
             refuse(self, "sections", given, "at least one HoleSection")
         above = 0.0

@@ -8,7 +8,8 @@ import numpy as np
 
 from cosserat_fenicsx.well import criteria
 from cosserat_fenicsx.well.answer import TorqueAndDrag, scales_of, share
-from cosserat_fenicsx.well.contacts import name_of_side
+from cosserat_fenicsx.well.contacts import WallContact, name_of_side
+from cosserat_fenicsx.well.smoothed import MOSTLY
 
 # Inclinations (rad) below this have no high side.
 _VERTICAL = 1e-9
@@ -20,15 +21,20 @@ class RodInContact(TorqueAndDrag):
 
     `error` is relative to hook load and surface torque themselves, the latter only where the string turns. `solved` is
     the `InHole`, whose `path` has all that the package tells of a rod. `md` is the measured depth of the
-    closest point of the hole's axis. Forces at points, such as those of stabilisers, are in `contacts`, which has their
-    resultants; in `side_force` they are narrow peaks, as wide as the wall's stiffness makes them.
+    closest point of the hole's axis. A stabiliser touches in the middle of its length, and the bit at its lower end:
+    there `clearance`, `standoff` and `contact_side` are those of blades and bit, elsewhere those of the body. Forces of
+    the wall at points are in `contacts`. `side_force` has those of stabilisers and bit not at all, and those where the
+    string leaves the wall as narrow peaks, as wide as the wall's stiffness makes them.
     """
 
     words: ClassVar[str] = "exact rod in contact"
-    moment_words: ClassVar[str] = "of the rod"
+    _moment_words: ClassVar[str] = "of the rod"
+    _leaves_out: ClassVar[str] = (
+        "how the string is held at the surface, tool joints that carry the pipe between them, moving and warm mud"
+    )
 
     @classmethod
-    def of(cls, flexible, solved, decided):
+    def _of(cls, flexible, solved, decided):
         """From the answer of the soft string, the `InHole`, and sentences on what decided for it."""
         given = {field.name: getattr(flexible, field.name) for field in fields(TorqueAndDrag)}
         here = solved.hook_load, solved.surface_torque
@@ -40,7 +46,7 @@ class RodInContact(TorqueAndDrag):
             "model": "rod",
             "error": solved.error,
             # a string that buckles, or buckles otherwise, is not farther off than a soft one
-            "model_error": flexible.model_error if solved.negative_modes else 0.0,
+            "model_error": flexible.model_error if solved.negative_modes else np.nan,
             "differences": differences,
             "solved": solved,
         }
@@ -87,9 +93,21 @@ class RodInContact(TorqueAndDrag):
         return self.solved.side_force
 
     @property
+    def clearance(self):
+        """Radius of the hole less that of the string where it is solved: of the blades in the middle of a stabiliser,
+        of the bit at its lower end, else of the body or the tool joints, m."""
+        return self.solved.clearance
+
+    @property
     def bending_moment(self):
         """N m: of the rod itself."""
         return self.solved.bending_moment
+
+    @property
+    def errors_along(self):
+        """{"side_force": N/m, "bending_moment": N m}: their estimated errors on 95 % of the string's length; beside
+        forces at points they may be larger. `error` and `enough` are about hook load and surface torque alone."""
+        return self.solved.errors_along
 
     @property
     def standoff(self):
@@ -109,15 +127,15 @@ class RodInContact(TorqueAndDrag):
     @cached_property
     def contact_side(self):
         """The side of the hole that the string touches, rad clockwise from its high side; NaN where it touches none."""
-        known = (self.side_force > 0) & (self.inclination > _VERTICAL)
+        known = self.solved.touches & (self.inclination > _VERTICAL)
         return np.where(known, self.solved.side % (2 * np.pi), np.nan)
 
     @cached_property
     def contacts(self):
-        """(from, to, force, side), see `TorqueAndDrag`; a force at a point has from = to."""
+        """See `TorqueAndDrag`: forces at points, and what lies on the wall between them."""
         depths = [np.interp([x.start, x.end], self.solved.s, self.md) for x in self.solved.contacts]
         leans = [self.hole.path.inclination_at(ends.mean()) > _VERTICAL for ends in depths]
-        return [(float(a), float(b), x.force, name_of_side(x.side if leaning else np.nan))
+        return [WallContact(float(a), float(b), x.force, name_of_side(x.side if leaning else np.nan))
                 for (a, b), x, leaning in zip(depths, self.solved.contacts, leans, strict=True)]  # fmt: skip
 
     @cached_property
@@ -134,6 +152,11 @@ def _found(flexible, solved, differences):
     yield (
         f"the exact rod in contact, {solved.path.elements[0]} elements, {solved.steps} Newton steps: hook load to "
         f"{solved.errors['hook_load']:.2g} N, surface torque to {solved.errors['surface_torque']:.2g} N m"
+    )
+    yield (
+        f"side force to {solved.errors_along['side_force']:.2g} N/m and bending moment to "
+        f"{solved.errors_along['bending_moment']:.2g} N m on {100 * MOSTLY:g} % of the string, which do not count in "
+        "what is enough"
     )
     scales = scales_of(flexible.solved, flexible.pieces)
     for name, apart in differences.items():

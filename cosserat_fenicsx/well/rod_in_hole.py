@@ -1,7 +1,9 @@
 """The exact rod in its hole: a string of several sections, at rest against the hole's wall or slipping along it."""
 
 import contextlib
+import math
 import numbers
+from typing import NamedTuple
 
 import numpy as np
 from mpi4py import MPI
@@ -10,14 +12,15 @@ from cosserat_fenicsx.checks import number, refuse
 from cosserat_fenicsx.errors import NotConverged
 from cosserat_fenicsx.models.rodmesh import Layout
 from cosserat_fenicsx.progress import Progress
-from cosserat_fenicsx.quaternions import product_conjugate
 from cosserat_fenicsx.results.accuracy import on_mesh
 from cosserat_fenicsx.results.path import Path
 from cosserat_fenicsx.statics.circulatory import conservative_along
 from cosserat_fenicsx.statics.path.recorder import record_of
-from cosserat_fenicsx.statics.settling import BACK, LAST, LAST_TWO, settle, stages_from
+from cosserat_fenicsx.statics.settling import BACK, DECADES, LAST, LAST_TWO, settle, stages_from
 from cosserat_fenicsx.statics.solvers import solvers_of
 from cosserat_fenicsx.well.in_hole import InHole
+from cosserat_fenicsx.well.rod_errors import values_of
+from cosserat_fenicsx.well.starts import in_helix, on_axis
 from cosserat_fenicsx.well.string_scene import string_in
 
 # Degree of the elements where none is asked for: lift-off forces limit the regularity, higher degrees gain nothing.
@@ -25,16 +28,27 @@ _DEGREE = 3
 # Elements of the first mesh and the most, where none are asked for; factor from one mesh to the next. Where a number is
 # asked for, the mesh before it has this part of it.
 _FIRST, _MOST, _FINER, _BEFORE = 256, 8192, 2, 4
+# Elements of the first mesh over the pieces of the string, at least.
+_OF_PIECES = 1.5
 # A finer mesh has shorter elements where the pressure changes: bounds of their number, over that of equal ones.
 _FEWEST, _DENSEST = 0.3, 2.4
 # An error below this times that by the wall's stiffness is hardly one of the mesh.
 _BY_WALL = 1.25
-# Part of the accuracy asked for below which the effect of the wall's stiffness is not found again on a finer mesh.
-_KNOWN = 0.1
-# Starts in turn, see `stages_from`.
-_STARTS = ("fast", "gentle", "relaxed")
+# Ratio of the changes by the wall's stiffness above which it is found again on a finer mesh.
+_REGULAR = 0.3
+# Part of the accuracy asked for below which the effect of the wall's stiffness is not found again on a finer mesh; and
+# the part above which a rigid wall is approached by one that is stiffer by ten, up to the stiffest one, over the first.
+_KNOWN, _TOO_SOFT, _STIFFEST = 0.1, 0.25, 1e3
+# Stiffness of the first wall in place of a rigid one, N/m^2.
+_FIRST_WALL = 1e9
+# Starts on the axis in turn, see `stages_from`; and the one from a helix, which begins as in a viscous fluid.
+_STARTS, _FROM_HELIX = ("fast", "gentle", "relaxed"), ("helix",)
 # More negative modes than there ever are, in place of -1 where the second variation is singular.
 _SINGULAR = 1 << 30
+# Springs that hold a helix, see `settle`.
+_HOLD = 1e-10
+# Elements of the first mesh that a helix is looked for on, at most.
+_FINE = 1024
 # Rounding of the residual of a node, over that of its position times the stiffness of its piece of wall, or ring.
 _ROUNDED = 20.0
 # Largest difference between the reaction and the balance of all forces, over the sum of the wall's forces.
@@ -54,10 +68,11 @@ def solve_in_hole(
     bottom_tension=0.0,
     bottom_torque=0.0,
     rings=(),
-    wall_stiffness=1e9,
+    wall_stiffness=None,
     hinge=None,
     extensible=False,
     has_arm=True,
+    helix=False,
     tol=1e-4,
     elements=None,
     degree=_DEGREE,
@@ -88,11 +103,14 @@ def solve_in_hole(
         bottom_torque: torque on bit, N m, against the rotation.
         rings: [(s, clearance, radius)] of stabilisers and bits: stations (m from the top) that stay within a clearance
             (m) of the hole's axis; 0 centres the string there.
-        wall_stiffness: N/m^2; of rings N/m.
+        wall_stiffness: N/m^2; None for a rigid wall, which is approached by stiffer ones until what is left is small
+            beside `tol`. Errors are those from a rigid wall in both cases.
         hinge: None; or the direction about which the top turns freely, in place of a clamp.
         extensible: whether the axial stiffness counts in the equilibrium; the lengths are then those of the
             unstretched string.
         has_arm: whether friction acts on the surface; False: on the centreline.
+        helix: whether to begin as a helix along the wall where the string is compressed beyond its buckling load, see
+            `in_helix`; False: on the axis. Where there are several equilibria, the start decides which one is found.
         tol: relative accuracy of hook load and torque.
         elements: their number, which fixes the mesh; the estimate is then that of a mesh of a quarter of them.
         degree: of the elements, 2 to 4.
@@ -105,15 +123,22 @@ def solve_in_hole(
         SceneError: numbers that are not what was expected.
         NotConverged: no equilibrium was found, or, as a `NotAccurate`, not as accurately as asked.
     """
+    first = _FIRST_WALL if wall_stiffness is None else wall_stiffness
     string = string_in(path, lengths, stiffness, weight, contact_radius, radius, friction, slip, bottom_tension,
-                       bottom_torque, rings, wall_stiffness, hinge, extensible, has_arm)  # fmt: skip
+                       bottom_torque, rings, first, hinge, extensible, has_arm)  # fmt: skip
     tol = number("solve_in_hole", "tol", tol, "a number from 1e-12 to below 1", lambda x: 1e-12 <= x < 1)
-    comm, counts = comm or MPI.COMM_WORLD, _counts(elements)
+    comm, counts = comm or MPI.COMM_WORLD, _counts(elements, len(Layout.of(string.scene, 1).breaks[0]) - 1)
     with Progress([float(len(stages_from(string.spring)))], progress, comm, "stage") as bar:
+        job = _Job(degree, bool(helix), tol, _STIFFEST if wall_stiffness is None else 1.0, bar, comm)
         answer = None
         for count in counts:
-            answer = _finer(string, count, degree, answer, tol, bar, comm)
-            # finer meshes change nothing of what the wall's stiffness does
+            try:
+                answer = _finer(string, count, answer, job)
+            except NotConverged:
+                if answer is not None or not helix or count >= min(_FINE, counts[-1]):
+                    raise
+                continue  # too few elements for its turns
+            # finer meshes change nothing of what is left of the wall's softness
             if elements is None and answer.error <= max(tol, _BY_WALL * answer.of_stiffness):
                 break
     if elements is None and answer.error > tol:
@@ -130,36 +155,55 @@ class NotAccurate(NotConverged):
 
     def __init__(self, answer, tol):
         super().__init__(
-            f"solve_in_hole: the estimated error is {answer.error:.1e} on {answer.path.elements[0]} elements, of which "
-            f"the wall's stiffness makes {answer.of_stiffness:.1e}: expected a tol above it, not {tol:g}, or a stiffer "
-            "wall"
+            f"the estimated error of the rod in contact is {answer.error:.1e} on {answer.path.elements[0]} elements, "
+            f"of which the wall's softness makes {answer.of_stiffness:.1e}: expected a tol above it, not {tol:g}, or a "
+            "stiffer wall"
         )
         self.answer = answer
 
 
-def _counts(elements):
-    """Elements of the meshes in turn."""
+def _counts(elements, pieces):
+    """Elements of the meshes in turn, for a string of so many pieces, each of which has at least one."""
     if elements is None:
-        return [_FIRST * _FINER**k for k in range(1 + int(np.log2(_MOST / _FIRST)))]
+        first = _FIRST * _FINER ** max(0, math.ceil(math.log(_OF_PIECES * pieces / _FIRST, _FINER)))
+        most = max(_MOST, first * _FINER**2)
+        return [first * _FINER**k for k in range(1 + int(np.log2(most / first)))]
     if isinstance(elements, bool) or not isinstance(elements, numbers.Integral) or elements < 1:
         refuse("solve_in_hole", "elements", elements, "a whole number above zero")
+    if elements < pieces:
+        refuse("solve_in_hole", "elements", elements, f"at least one for each of the {pieces} pieces of the string")
     return [max(1, int(elements) // _BEFORE), int(elements)]
 
 
-def _finer(string, count, degree, before, tol, bar, comm):
+class _Job(NamedTuple):
+    """What all meshes share: the degree of the elements, whether the start is a helix, the accuracy asked for, the
+    stiffest wall that may be taken for it (over the first one), the progress, and the ranks."""
+
+    degree: int
+    helix: bool
+    tol: float
+    stiffest: float
+    bar: Progress
+    comm: MPI.Comm
+
+
+def _finer(string, count, before, job):
     """The `InHole` on a mesh of so many elements, from that on the mesh before, or from the start in stages."""
     if before is not None:
         layout = _divided(string, before.path.layout, _wanted(before), count)
-        for stages in (LAST if before.of_stiffness <= _KNOWN * tol else LAST_TWO, BACK):
-            with contextlib.suppress(NotConverged):  # the contact on the coarse mesh may be too far off
-                return _on_mesh(string, layout, degree, stages, before, before, bar, comm)
+        near = LAST_TWO if before.estimates.ratio <= _REGULAR else DECADES
+        near = LAST if before.of_stiffness <= _KNOWN * job.tol else near
+        # the contact on the coarse mesh may be too far off, or the wall too stiff for this one
+        for stages, factor in ((near, before.factor), (BACK, before.factor), (BACK, 1.0)):
+            with contextlib.suppress(NotConverged):
+                return _on_mesh(string, layout, stages, factor, before, before, job)
     pieces = Layout.of(string.scene, 1)
     layout = _divided(string, pieces, np.diff(pieces.breaks[0]), count)
     found = []
-    for way in _STARTS:
+    for way in _FROM_HELIX if job.helix else _STARTS:
         try:
             stages = stages_from(string.spring, way)
-            found.append(_on_mesh(string, layout, degree, stages, None, before, bar, comm))
+            found.append(_on_mesh(string, layout, stages, 1.0, None, before, job))
         except NotConverged as failed:
             reason = failed
         if found and not found[-1].negative_modes:
@@ -167,8 +211,9 @@ def _finer(string, count, degree, before, tol, bar, comm):
     if found:  # the one in which the string would buckle in the fewest ways
         return min(found, key=lambda answer: answer.negative_modes % _SINGULAR)
     raise NotConverged(
-        f"solve_in_hole: no equilibrium was found on {count} elements: {reason}. A string that is compressed beyond "
-        "its buckling load may have many: expected more elements, a softer wall, or less compression"
+        f"no equilibrium of the rod in contact was found on {count} elements: {reason}. A string that is compressed "
+        "beyond its buckling load may have many, or none where it locks up: expected less compression or friction, or "
+        "a softer wall (wall_stiffness)"
     )
 
 
@@ -199,40 +244,62 @@ def _divided(string, layout, wanted, count):
     return Layout((np.append(np.concatenate(found), 1.0),))
 
 
-def _on_mesh(string, layout, degree, stages, start, before, bar, comm):
-    """The `InHole` on one mesh, from that on another mesh or from the axis, with errors by that on the mesh before."""
-    scene = string.scene
-    with solvers_of(scene, layout, degree=degree, comm=comm) as (problem, _, stability):
-        model, scales = problem.model, problem.model.scales
+def _on_mesh(string, layout, stages, factor, start, before, job):
+    """The `InHole` on one mesh, in a wall stiffer by a factor or more, from that on another mesh, a helix or the axis,
+    with errors by that on the mesh before."""
+    with solvers_of(string.scene, layout, degree=job.degree, comm=job.comm) as (problem, _, stability):
         problem.set_load_factor(1.0)
-        _begin(problem, string, layout, start)
-        bar.start(f"rod in its hole, {model.unknowns} unknowns")
-        softer = []
+        _begin(problem, string, layout, start, job.helix)
+        job.bar.start(f"rod in its hole, {problem.model.unknowns} unknowns")
+        steps, values, answer = 0, {}, None
+        while True:
+            try:
+                *softer, found = _in_walls(string, problem, stability, stages, factor, steps, job)
+            except NotConverged:
+                if answer is None:
+                    raise
+                for stage in string.stages:
+                    stage.wall = answer.factor
+                return answer  # in the wall before
+            answer, steps = found, found.steps
+            values |= {each.factor: values_of(each) for each in (*softer, answer)}
+            answer.estimate(values, before)
+            if answer.of_stiffness <= _TOO_SOFT * job.tol or factor >= job.stiffest:
+                return answer
+            stages, factor = LAST, 10.0 * factor
 
-        def on_stage(k):
-            bar.reached(float(k + 1))
-            if k == len(stages) - 2:
-                softer.append(record_of(problem, 1.0, 0, 0, 0))
 
-        of_wall = string.wall.stiffness * float(layout.sizes(scene).max())
-        stiffest = max([of_wall, *(ring.stiffness for ring in string.rings)])
-        rounding = _ROUNDED * np.finfo(float).eps * stiffest * scales.length / scales.force
-        steps = settle(problem, string.stages, string.clearance / scales.length, rounding, stages,
-                       careful=[len(stages) - 2], on_stage=on_stage)  # fmt: skip
-        answers = []
-        last = record_of(problem, 1.0, _negative_modes(string, problem, stability), steps, steps)
-        for record in (*softer, last):
-            why = [f"{string.words}; {model.signature.formulation.words}"]
-            path = Path.of(model, why, conservative_along)
-            path.append(record)
-            answers.append(InHole(string, path))
-    answer = answers[-1]
-    if not answer.balance <= _UNBALANCED * answer.scale:
+def _in_walls(string, problem, stability, stages, factor, steps, job):
+    """[`InHole`] of the stages that are solved precisely, in walls of stiffnesses times a factor, after so many Newton
+    steps on this mesh."""
+    model, records = problem.model, {}
+    decades = [k for k, stage in enumerate(stages[:-1]) if stage in DECADES]
+    # a helix is almost free to turn as a whole, and must be found before the wall is made stiffer
+    careful = range(len(stages) - 1) if job.helix else decades
+
+    def on_stage(k):
+        job.bar.reached(float(k + 1))
+        if k in decades:
+            records[factor * stages[k][0]] = record_of(problem, 1.0, 0, 0, 0)
+
+    of_wall = string.wall.stiffness * float(model.layout.sizes(model.scene).max())
+    stiffest = factor * max([of_wall, *(ring.stiffness for ring in string.rings)])
+    rounding = _ROUNDED * np.finfo(float).eps * stiffest
+    steps += settle(problem, string.stages, string.clearance / model.scales.length,
+                    rounding * model.scales.length / model.scales.force,
+                    [(factor * wall, factor * spring, viscous) for wall, spring, viscous in stages],
+                    careful, on_stage, _HOLD if job.helix else 0.0)  # fmt: skip
+    records[factor] = record_of(problem, 1.0, _negative_modes(string, problem, stability), steps, steps)
+    answers = []
+    for stiffness, record in records.items():
+        path = Path.of(model, [f"{string.words}; {model.signature.formulation.words}"], conservative_along)
+        path.append(record)
+        answers.append(InHole(string, path, stiffness))
+    if not answers[-1].balance <= _UNBALANCED * answers[-1].scale:
         raise NotConverged(
-            f"the contact alternates: the reaction and all other forces differ by {answer.balance:.3g} N"
+            f"the contact alternates: the reaction and all other forces differ by {answers[-1].balance:.3g} N"
         )
-    answer.compare(before, answers[0] if softer else None)
-    return answer
+    return answers
 
 
 def _negative_modes(string, problem, stability):
@@ -246,30 +313,15 @@ def _negative_modes(string, problem, stability):
     return found
 
 
-def _begin(problem, string, layout, before):
-    """Set the state: that of another mesh, or on the axis without contact force."""
+def _begin(problem, string, layout, before, helix):
+    """Set the state: that of another mesh, or a helix or on the axis, without contact force."""
     model = problem.model
     if before is not None:
         rq, n = on_mesh(before.path, layout)
         problem.begin_at(model.unknowns_of(rq[0]), n[0], before.path._records[0].reactions)
         return
-    rod = string.rod
-    rq = on_axis(rod, string.path, layout.node_s(model.nodes)[0] * rod.length)
+    rod, s = string.rod, layout.node_s(model.nodes)[0] * string.rod.length
+    rq = in_helix(string, s) if helix else on_axis(rod, string.path, s)
     rq[:, :3] = (rq[:, :3] - string.scene.origin(rod)) / model.scales.length
     n = np.zeros((sum(layout.counts), len(model.forms.gauss), 3))
     problem.begin_at(model.unknowns_of(rq), n, np.zeros_like(problem.multipliers()))
-
-
-def on_axis(rod, path, s):
-    """(r, q) (n, 7) of a rod that lies on the axis without twist, at ascending arc lengths s (n,), from the path's
-    start; q is the rotation from the rod's straight reference, without a jump of sign."""
-    near = path.nearest(None, s)
-    before = np.concatenate([rod.curve.frame(np.zeros(1))[:, :, 2], near.tangent[:-1]])
-    cos = np.einsum("ni,ni->n", before, near.tangent)
-    q = np.column_stack([1 + cos, np.cross(before, near.tangent)])
-    q /= np.linalg.norm(q, axis=1, keepdims=True)
-    done = 1  # products of the small rotations of 1, 2, 4, .. nodes
-    while done < len(q):
-        q[done:] = product_conjugate(q[done:], q[:-done] * (1.0, -1.0, -1.0, -1.0))
-        done *= 2
-    return np.column_stack([near.position, q / np.linalg.norm(q, axis=1, keepdims=True)])

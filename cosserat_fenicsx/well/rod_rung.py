@@ -5,9 +5,13 @@ A stabiliser touches with its blades in the middle of its length, a bit at the l
 Their bodies, and all other components, touch with their contact radius along their whole length.
 """
 
+import contextlib
+
 from cosserat_fenicsx.checks import refuse
-from cosserat_fenicsx.errors import SceneError
-from cosserat_fenicsx.well.components import Bit, Stabiliser, weight_in_mud
+from cosserat_fenicsx.errors import NotConverged, SceneError
+from cosserat_fenicsx.well.components import weight_in_mud
+from cosserat_fenicsx.well.criteria import HELIX
+from cosserat_fenicsx.well.rings import is_ring, ring_of
 from cosserat_fenicsx.well.rod_answer import RodInContact
 
 
@@ -30,34 +34,53 @@ def rod_in_contact(flexible, decided, progress=None, exact=True):
         refuse("torque_and_drag", "torque_convention", flexible.torque_convention,
                "'coulomb', the law that the rod in contact follows")  # fmt: skip
     laid = flexible.laid[::-1]  # from the top down
-    for place in laid:
-        _check(place.component, flexible.mud)
     hole, operation = flexible.hole, flexible.operation
-    try:
-        solved = solve_in_hole(
-            hole.path,
-            [place.bottom - place.top for place in laid],
-            [place.component.stiffness for place in laid],
-            [weight_in_mud(place.component, flexible.mud) for place in laid],
-            [_body_radius(place.component) for place in laid],
-            radius=_along(hole, flexible.depth, lambda section: section.diameter / 2),
-            friction=_along(hole, flexible.depth, lambda section: section.friction),
-            slip=[operation.direction(place.component.contact_radius) for place in laid],
-            bottom_tension=-operation.weight,
-            bottom_torque=operation.torque,
-            rings=[_ring(place, hole) for place in laid if _is_ring(place.component)],
-            wall_stiffness=hole.wall_stiffness,
-            tol=flexible.tol,
-            progress=progress,
-        )
-    except NotAccurate as short:
-        if exact:
-            raise
-        solved, decided = short.answer, (*decided, f"NOT ENOUGH for tol = {flexible.tol:g}: {short}")
-    return RodInContact.of(flexible, solved, decided)
+    for place in laid:
+        _check(place, hole, flexible.mud)
+
+    def solve(helix):
+        """The `InHole`, and what it is short of accuracy in words, or None."""
+        try:
+            return solve_in_hole(
+                hole.path,
+                [place.bottom - place.top for place in laid],
+                [place.component.stiffness for place in laid],
+                [weight_in_mud(place.component, flexible.mud) for place in laid],
+                [_body_radius(place.component) for place in laid],
+                radius=_along(hole, flexible.depth, lambda section: section.diameter / 2),
+                friction=_along(hole, flexible.depth, lambda section: section.friction),
+                slip=[operation.direction(place.component.contact_radius) for place in laid],
+                bottom_tension=-operation.weight,
+                bottom_torque=operation.torque,
+                rings=[ring_of(place, hole)[:3] for place in laid if is_ring(place.component)],
+                wall_stiffness=hole.wall_stiffness,
+                helix=helix,
+                tol=flexible.tol,
+                progress=progress,
+            ), None
+        except NotAccurate as short:
+            if exact:
+                raise
+            return short.answer, short
+
+    solved, short = solve(helix=False)
+    if solved.negative_modes > 0 and (flexible.buckling == HELIX).any():
+        with contextlib.suppress(NotConverged):
+            helix, shorter = solve(helix=True)
+            if helix.negative_modes == 0:
+                decided = (
+                    *decided,
+                    "begun as a helix: from the axis an equilibrium was found that would buckle, "
+                    f"{solved.negative_modes} negative eigenvalues of the second variation",
+                )
+                solved, short = helix, shorter
+    if short is not None:
+        decided = (*decided, f"NOT ENOUGH for tol = {flexible.tol:g}: {short}")
+    return RodInContact._of(flexible, solved, decided)
 
 
-def _check(component, mud):
+def _check(place, hole, mud):
+    component = place.component
     if component.stiffness is None:
         raise SceneError(
             f"{component.name}: stiffness = None: expected a Stiffness for model = 'rod', the rod in contact"
@@ -66,6 +89,13 @@ def _check(component, mud):
     if not weight > 0:
         raise SceneError(
             f"{component.name}: it weighs {weight:g} N/m in mud: expected a positive weight for model = 'rod'"
+        )
+    inside = [x.to for x in hole.sections if place.top < x.to < place.bottom]
+    narrowest, wide = float(hole.at([*inside, place.bottom], "diameter").min()), 2 * _body_radius(component)
+    if not wide < narrowest:
+        raise SceneError(
+            f"{component.name}: its body is {wide:g} m wide in a hole of {narrowest:g} m: expected a clearance for "
+            "model = 'rod'"
         )
 
 
@@ -79,17 +109,6 @@ def _along(hole, depth, value):
     return found
 
 
-def _is_ring(component):
-    return isinstance(component, Bit | Stabiliser)
-
-
 def _body_radius(component):
     """m; of what touches along its whole length."""
-    return component.outer_diameter / 2 if _is_ring(component) else component.contact_radius
-
-
-def _ring(place, hole):
-    """(s, clearance, radius), see `solve_in_hole`."""
-    s = place.bottom if isinstance(place.component, Bit) else (place.top + place.bottom) / 2
-    radius = place.component.contact_radius
-    return s, max(0.0, float(hole.at(s, "diameter")) / 2 - radius), radius
+    return component.outer_diameter / 2 if is_ring(component) else component.contact_radius

@@ -22,6 +22,8 @@ _STIFFER = 1e4
 # Stiffness of the wall at a ring (N/m) over that along the string (N/m^2), since a ring digs in less; but where it is
 # larger than that, not more than so many EI/L^3, for rounding.
 _OF_RINGS, _STIFFEST = 100.0, 1e13
+# Largest stiffness of a ring where the wall is made stiffer, N/m: its deformation has to exceed rounding.
+_STIFFEST_RING = 1e11
 # Points at which the load across the hole is sampled, the part of them that it is not larger at, and its smallest value
 # over the weight.
 _SAMPLES, _TYPICAL, _LEAST = 257, 0.9, 0.1
@@ -55,19 +57,35 @@ class StringScene:
     turns: bool
     words: str
 
+    def section_at(self, s):
+        """(n,) indices of the sections at arc lengths s (n,)."""
+        return np.searchsorted(self.ends[:-1], s)
+
+    @cached_property
+    def bending(self):
+        """Bending stiffness of the sections, N m^2."""
+        return np.array([bending_of(section) for section in self.sections])
+
+    def tension(self, s):
+        """(n,) N at arc lengths s (n,) on the axis, without friction."""
+        ends = np.append(0.0, self.ends)
+        z, at = (self.path.nearest(None, x).position[:, 2] for x in (ends, s))
+        above = np.append(0.0, np.cumsum(self.weight * np.diff(z)))
+        part = self.section_at(s)
+        along = self.bottom @ self.path.nearest(None, self.ends[-1:]).tangent[0]
+        return along + above[-1] - (above[part] + self.weight[part] * (at - z[part]))
+
     @cached_property
     def spring(self):
         """Stiffness of a spring to the axis in which the loads, and the string's resistance to the axis's curvature k,
         move it by about twice the clearance c, and in which its compression F does not buckle it; over that of the
         wall. The moment EI k acts within the length sqrt(8 c/k), which gives EI k^2/(16 c^2); F^2/(4 EI) buckles."""
         s = np.linspace(0.0, self.ends[-1], _SAMPLES)
-        near, at = self.path.nearest(None, s), np.searchsorted(self.ends[:-1], s)[1:]
-        fall = np.diff(near.position[:, 2]) * self.weight[at]
-        tension = self.bottom @ near.tangent[-1] + np.cumsum(fall[::-1])[::-1]
+        near, at, tension = self.path.nearest(None, s), self.section_at(s)[1:], self.tension(s)[:-1]
         down = np.array([0.0, 0.0, 1.0]) - near.tangent[:, 2:] * near.tangent
         load = tension[:, None] * near.curvature[1:] + self.weight[at, None] * down[1:]
         typical = max(np.quantile(np.linalg.norm(load, axis=1), _TYPICAL), _LEAST * self.weight.max())
-        EI = np.array([bending_of(section) for section in self.sections])[at]
+        EI = self.bending[at]
         buckles = (np.minimum(tension, 0.0) ** 2 / (4 * EI)).max()
         bends = (EI * (near.curvature[1:] ** 2).sum(axis=1)).max() / (16 * self.clearance**2)
         return float(max(typical / (2 * self.clearance), bends, _SAFE * buckles) / self.wall.stiffness)
@@ -122,6 +140,8 @@ def string_in(path, lengths, stiffness, weight, contact_radius, radius, friction
         TubeRing(rod.at(s), path, clearance, ring_radius, ring_stiffness, *_friction_at(wall, s))
         for s, clearance, ring_radius in rings
     )
+    for ring in around:
+        ring.stage.most = max(1.0, _STIFFEST_RING / ring.stiffness)
     support = Clamp(rod.start) if hinge is None else Hinge(rod.start, hinge)
     words = "the string's lengths are those under load" if not extensible else "the string stretches"
     turns = bool(torque or any(across for _, (_, across) in wall.slip))

@@ -1,14 +1,16 @@
-"""Answers, sweeps and fits as tables: for the screen, and as .csv."""
+"""Answers, sweeps and fits as tables: for the screen, and the columns of files."""
 
 import math
-from pathlib import Path
 
 import numpy as np
 from rich.table import Table
 
-from cosserat_fenicsx.ranks import on_first, world
 from cosserat_fenicsx.results.tables import as_text
 from cosserat_fenicsx.well import criteria
+from cosserat_fenicsx.well.components import DrillPipe
+
+# Notes of a sweep that are shown; more are counted.
+_NOTES = 12
 
 
 def answer_table(answer):
@@ -17,7 +19,7 @@ def answer_table(answer):
     table = Table(
         title=f"{operation.name}, bit at {answer.depth:g} m, {answer.words}",
         caption="md, inclination: of the hole. tension: effective. side force: of the wall, per length.\n"
-        f"moment: {answer.moment_words}. state: buckling, by criteria.",
+        f"moment: {answer._moment_words}. state: buckling, by criteria.",
     )
     for heading in ("md (m)", "component", "inclination (deg)", "tension (kN)", "torque (kN m)", "side force (N/m)",
                     "moment (N m)", "von Mises (MPa)", "state"):  # fmt: skip
@@ -32,7 +34,29 @@ def answer_table(answer):
             _known(answer.bending_moment[i], 1, ".0f"), _known(answer.von_mises[i], 1e-6, ".1f"),
             criteria.STATES[states[i]],
         )  # fmt: skip
-    return "\n".join([as_text(table), *summary(answer)])
+    return "\n".join([as_text(table), *_at_the_lower_end(answer), *summary(answer)])
+
+
+def _at_the_lower_end(answer):
+    """Text: the contacts of the bottom-hole assembly, all that is below the drill pipe, where they were solved for."""
+    pipes = [i for i, place in enumerate(answer.laid) if isinstance(place.component, DrillPipe)]
+    top = answer.laid[min([*pipes, len(answer.laid) - 1])].bottom
+    contacts = [contact for contact in answer.contacts if contact.bottom > top]
+    if top == answer.depth or not any(contact.at_point for contact in contacts):
+        return
+    table = Table(title=f"where the string touches the wall below md = {top:.6g} m")
+    for heading in ("from md (m)", "to md (m)", "force (kN)", "side", "component"):
+        table.add_column(heading, justify="left" if heading in ("side", "component") else "right")
+    for contact in contacts:
+        below = "at this point" if contact.at_point else f"{contact.bottom:.6g}"
+        table.add_row(f"{contact.top:.6g}", below, f"{contact.force / 1e3:.3f}", contact.side, _parts(answer, contact))
+    yield as_text(table)
+
+
+def _parts(answer, contact):
+    """The names of the components at a contact, from the top down."""
+    at = np.searchsorted(answer.md, [contact.top, contact.bottom]).clip(max=len(answer.md) - 1)
+    return " to ".join(dict.fromkeys(answer.string.components[i].name for i in answer.component[at]))
 
 
 def _shown(answer):
@@ -51,9 +75,10 @@ def summary(answer):
     lines = [
         f"hook load {answer.hook_load / 1e3:.3f} kN ({friction}), surface torque "
         f"{round(answer.surface_torque / 1e3, 3) + 0.0:.3f} kN m (convention: {answer.torque_convention})",
-        f"estimated relative errors: of the solution {answer.error:.0e}, of the model {answer.model_error:.0e}; asked "
-        f"for {answer.tol:g}: {'enough' if answer.enough else 'NOT ENOUGH'}",
+        f"estimated relative errors of these: of the solution {answer.error:.0e}, of the model {_estimate(answer)}; "
+        f"asked for {answer.tol:g}: {'enough' if answer.enough else 'NOT ENOUGH'}",
     ]
+    lines += _on_bit(answer)
     more = [f"{name} {value:.4g} {unit}" for name, value, unit in (
         ("stretch", answer.stretch, "m"), ("twist", answer.twist / (2 * math.pi), "turns"),
         ("neutral point at", answer.neutral_point, "m")) if math.isfinite(value)]  # fmt: skip
@@ -61,9 +86,9 @@ def summary(answer):
         lines.append(", ".join(more))
     if answer.hook_load < 0:
         lines.append("the string does not go down by its own weight: a negative hook load is a push at the surface")
-    at_points = [contact for contact in answer.contacts if contact[0] == contact[1]]
+    at_points = [contact for contact in answer.contacts if contact.at_point]
     if at_points:
-        md, _, force, side = max(at_points, key=lambda contact: contact[2])
+        md, _, force, side = max(at_points, key=lambda contact: contact.force)
         lines.append(
             f"{len(at_points)} forces of the wall at points (contacts), the largest {force / 1e3:.3f} kN at {md:.5g} m "
             f"({side} side)"
@@ -82,24 +107,45 @@ def _known(value, factor, form):
     return "-" if math.isnan(value) else format(value * factor, form)
 
 
-def write_answer(answer, file):
-    """The .csv file of an answer; angles in degrees."""
+def _estimate(answer):
+    """The estimated error of the model in words."""
+    left_out = f" (it leaves out {answer._leaves_out})" if answer._leaves_out else ""
+    return f"not estimated{left_out}" if math.isnan(answer.model_error) else f"{answer.model_error:.0e}"
+
+
+def _on_bit(answer):
+    """A sentence where the bit's own friction makes weight and torque in the string other than those on bit."""
+    weight, torque = answer.operation.weight, answer.operation.torque
+    more = answer.tension[-1] + weight, answer.torque[-1] - torque
+    if any(abs(x) > 1e-3 * np.abs(y).max() for x, y in zip(more, (answer.tension, answer.torque), strict=True)):
+        yield (
+            f"on the bit {weight / 1e3:.3f} kN and {torque / 1e3:.3f} kN m, as asked; the bit's own friction on the "
+            f"wall adds {more[0] / 1e3:+.3f} kN to the tension and {more[1] / 1e3:+.3f} kN m to the torque above it"
+        )
+
+
+def answer_columns(answer):
+    """{heading: (n,)} along the string; angles in degrees."""
     position = answer.hole.path.position(answer.md)
     columns = {
         "md (m)": answer.md, "north (m)": position[:, 0], "east (m)": position[:, 1], "down (m)": position[:, 2],
-        "inclination (deg)": np.degrees(answer.inclination), "effective tension (N)": answer.tension,
+        "inclination (deg)": np.degrees(answer.inclination), "azimuth (deg)": np.degrees(answer.azimuth),
+        "effective tension (N)": answer.tension,
         "true tension (N)": answer.true_tension, "torque (N m)": answer.torque, "side force (N/m)": answer.side_force,
         "contact side (deg from high side)": np.degrees(answer.contact_side), "stand-off": answer.standoff,
+        "clearance (m)": answer.clearance,
         "bending moment (N m)": answer.bending_moment, "von Mises (Pa)": answer.von_mises,
     }  # fmt: skip
-    rows = np.stack(list(columns.values()), axis=1)
     names = [part.name for part in answer.string.components]
-    lines = [",".join([*columns, "state", "component"])]
-    for row, state, part in zip(rows, answer.buckling, answer.component, strict=True):
-        numbers = ("" if math.isnan(x) else f"{x:.9g}" for x in row)
-        lines.append(",".join([*numbers, criteria.STATES[state], names[part]]))
-    text = "\n".join(lines) + "\n"
-    on_first(world(), lambda: Path(file).write_text(text, encoding="utf-8"))
+    columns["state"] = [criteria.STATES[state] for state in answer.buckling]
+    return columns | {"component": [names[part] for part in answer.component]}
+
+
+def contact_columns(answer):
+    """{heading: (contacts,)} of the forces on the wall."""
+    names = {"top": "from md (m)", "bottom": "to md (m)", "force": "force (N)", "side": "side"}
+    columns = {heading: [getattr(x, name) for x in answer.contacts] for name, heading in names.items()}
+    return columns | {"component": [_parts(answer, x) for x in answer.contacts]}
 
 
 def sweep_table(sweep):
@@ -117,10 +163,10 @@ def sweep_table(sweep):
     for k, depth in enumerate(sweep.depths):
         table.add_row(f"{depth:.6g}", *(_known(values[k], 1, ".3f") for values in columns))
     lines = [as_text(table)]
-    locked = np.argwhere(~np.isnan(sweep.values["locked"]))
-    for i, j, k in locked:
-        at = sweep.values["locked"][i, j, k]
-        lines.append(f"{sweep.label(i, j)}: locks up at md = {at:.5g} m with the bit at {sweep.depths[k]:.5g} m")
+    notes = sweep.noted()
+    lines += notes[:_NOTES]
+    if len(notes) > _NOTES:
+        lines.append(f"and {len(notes) - _NOTES} more, see `notes`")
     if len(sweep):
         worst = np.nanmax(sweep.values["model_error"], initial=0.0)
         lines.append(f"largest estimated relative error of the model {worst:.0e}")

@@ -12,6 +12,7 @@ from cosserat_fenicsx.well.loaded import sections_of
 from cosserat_fenicsx.well.mud import Mud
 from cosserat_fenicsx.well.operations import Operation
 from cosserat_fenicsx.well.pieces import pieces_of
+from cosserat_fenicsx.well.rings import is_ring, ring_of
 from cosserat_fenicsx.well.rod_rung import rod_in_contact
 from cosserat_fenicsx.well.softstring import chain_of, soft_string
 from cosserat_fenicsx.well.string import DrillString
@@ -19,6 +20,7 @@ from cosserat_fenicsx.well.string import DrillString
 AUTO, SOFT, BUCKLED, ROD = "auto", "soft", "soft, buckled", "rod"
 MODELS = (AUTO, SOFT, BUCKLED, ROD)
 CONVENTIONS = ("coulomb", "johancsik")
+_LOCKS_UP = "WITH THE WALL FORCE OF A HELIX IT LOCKS UP"
 _NO_ROD = (
     "the exact rod in contact is not tried: of the many equilibria of a string that is buckled beyond the load of a "
     "helix it need not find the one that is there; model='rod' looks for one"
@@ -92,6 +94,8 @@ def torque_and_drag(
         return rod_in_contact(flexible, why, progress, exact=model == ROD)
     except (SceneError, NotConverged, InstallationError) as problem:
         if model == ROD:
+            if isinstance(problem, NotConverged):
+                problem.args = ("; ".join([str(problem), *(line for line in why if line.startswith(_LOCKS_UP))]),)
             raise
         failed = f"the exact rod in contact was tried, and not solved: {problem}"
         return replace(flexible, why=(*flexible.why, failed))
@@ -102,6 +106,7 @@ def _flexible(given, model, tol, torque_convention, pieces, laid):
     why it is not the answer where it is not."""
     path, operation = given[0].path, given[2]
     sections = sections_of([place.component for place in laid])
+    rings = [ring_of(place, given[0]) for place in laid if is_ring(place.component)]
     soft = soft_string(chain_of(pieces, torque_convention == "coulomb"), -operation.weight, operation.torque, tol)
     buckled, why = None, []
     if model != SOFT:
@@ -110,9 +115,9 @@ def _flexible(given, model, tol, torque_convention, pieces, laid):
         except LockUp as stuck:
             if model != ROD:
                 raise
-            why.append(f"WITH THE WALL FORCE OF A HELIX IT LOCKS UP: {stuck}")
+            why.append(f"{_LOCKS_UP}: {stuck}")
     solved, used = buckled or soft, BUCKLED if buckled or model == BUCKLED else SOFT
-    left_out, scales = model_errors(path, pieces, soft, solved, sections), scales_of(solved, pieces)
+    left_out, scales = model_errors(path, pieces, soft, solved, sections, rings), scales_of(solved, pieces)
     error = max(map(share, (solved.error, solved.torque_error), scales))
     model_error = max(share(parts.total, scale) for parts, scale in zip(left_out, scales, strict=True))
     why = [*reasons(used, model, soft, solved, sections, left_out, scales), *why]

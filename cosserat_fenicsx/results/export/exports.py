@@ -68,7 +68,7 @@ class Exports(OnNodes):
             InstallationError: pandas is missing.
             SceneError: an empty result, no such rod or station, or a station beside k or rod.
         """
-        pandas = _import("pandas", "to_dataframe")
+        pandas = import_library("pandas", "to_dataframe")
         _refuse_empty(self, "to_dataframe")
         along = k is not None or rod is not None
         return pandas.DataFrame(columns.table(self, k, rod, station)).rename_axis("node" if along else "point")
@@ -87,7 +87,7 @@ class Exports(OnNodes):
             InstallationError: xarray is missing, or older than 2024.10.
             SceneError: an empty result.
         """
-        xarray = _import("xarray", "to_xarray", "DataTree")
+        xarray = import_library("xarray", "to_xarray", "DataTree")
         _refuse_empty(self, "to_xarray")
         states = contents.of_states(self)
         axis = dict([next(iter(states.items()))])
@@ -120,7 +120,7 @@ def _refuse_empty(result, method):
         raise SceneError(f"{method}: expected a result with at least one {result.axis}, this one is empty")
 
 
-def _import(library, method, needed=None):
+def import_library(library, method, needed=None):
     """A library, which may be missing or too old to have the name `needed`."""
     try:
         found = __import__(library)
