@@ -199,6 +199,30 @@ def test_the_survey_below_the_string_changes_nothing():
     assert loads[0] == pytest.approx(loads[1], rel=1e-9)
 
 
+def test_what_is_lost_on_a_finer_mesh_is_looked_for_or_told(monkeypatch):
+    """A mesh that is too coarse for a snake is not the last; an answer is not lost where a finer mesh has none."""
+
+    def on_mesh(string, layout, *args):
+        count = sum(layout.counts)
+        if count not in solved:
+            raise cf.NotConverged("lost")
+        given = {"negative_modes": 0, "of_stiffness": 0.0, "factor": 1.0, "element_pressures": np.ones((count, 4))}
+        path, estimates = types.SimpleNamespace(layout=layout, elements=[count]), types.SimpleNamespace(ratio=0.0)
+        return types.SimpleNamespace(error=solved[count], path=path, estimates=estimates, **given)
+
+    monkeypatch.setattr(rod_in_hole, "_on_mesh", on_mesh)
+    given = (build(), [400.0], STIFF, 241.13, 0.0635)
+    solved = {512: math.inf, 1024: 1e-5}
+    assert rod_in_hole.solve_in_hole(*given, radius=0.1).path.elements == [1024]
+    solved = {256: math.inf, 512: 1e-3}
+    with pytest.raises(rod_in_hole.NotAccurate, match="1.0e-03 on 512 elements") as short:
+        rod_in_hole.solve_in_hole(*given, radius=0.1)
+    assert short.value.answer.error == 1e-3
+    for solved in ({}, {256: math.inf}):
+        with pytest.raises(cf.NotConverged, match="lost"):
+            rod_in_hole.solve_in_hole(*given, radius=0.1)
+
+
 class Asked(Exception):
     """With what `solve_in_hole` was asked for."""
 

@@ -47,7 +47,7 @@ _STARTS, _FROM_HELIX = ("fast", "gentle", "relaxed"), ("helix",)
 _SINGULAR = 1 << 30
 # Springs that hold a helix, see `settle`.
 _HOLD = 1e-10
-# Elements of the first mesh that a helix is looked for on, at most.
+# Elements of the first mesh that a string is looked for on, at most: snakes and helices need more than others.
 _FINE = 1024
 # Rounding of the residual of a node, over that of its position times the stiffness of its piece of wall, or ring.
 _ROUNDED = 20.0
@@ -135,9 +135,11 @@ def solve_in_hole(
             try:
                 answer = _finer(string, count, answer, job)
             except NotConverged:
-                if answer is not None or not helix or count >= min(_FINE, counts[-1]):
+                if answer is not None and elements is None and answer.error < np.inf:
+                    break  # not as accurately as asked
+                if answer is not None or count >= min(_FINE, counts[-1]):
                     raise
-                continue  # too few elements for its turns
+                continue  # too few elements for its turns, or for a snake
             # finer meshes change nothing of what is left of the wall's softness
             if elements is None and answer.error <= max(tol, _BY_WALL * answer.of_stiffness):
                 break
