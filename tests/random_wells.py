@@ -93,8 +93,8 @@ def draw(seed):
     operations = [known[i] for i in rng.choice(len(known), OPERATIONS, replace=False)]
     depth = path.length * (1.0 if rng.random() < 0.5 else rng.uniform(0.5, 1.0))
     told = f"{name} in{', assembly' if len(parts) > 1 else ''}, {depth:.0f} m, {len(path.md)} stations"
-    return Drawn(told, cf.Borehole(path, sections), cf.DrillString([*parts, pipe]), cf.Mud(rng.uniform(0, 2000)), depth,
-                 operations)  # fmt: skip
+    mud = cf.Mud(rng.uniform(900, 2000))
+    return Drawn(told, cf.Borehole(path, sections), cf.DrillString([*parts, pipe]), mud, depth, operations)
 
 
 def compare(drawn, operation):

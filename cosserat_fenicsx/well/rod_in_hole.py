@@ -19,7 +19,7 @@ from cosserat_fenicsx.statics.path.recorder import record_of
 from cosserat_fenicsx.statics.settling import BACK, DECADES, LAST, LAST_TWO, settle, stages_from
 from cosserat_fenicsx.statics.solvers import solvers_of
 from cosserat_fenicsx.well.in_hole import InHole
-from cosserat_fenicsx.well.rod_errors import values_of
+from cosserat_fenicsx.well.rod_errors import UNSEEN, values_of
 from cosserat_fenicsx.well.starts import in_helix, on_axis
 from cosserat_fenicsx.well.string_scene import string_in
 
@@ -194,7 +194,7 @@ def _finer(string, count, before, job):
     if before is not None:
         layout = _divided(string, before.path.layout, _wanted(before), count)
         near = LAST_TWO if before.estimates.ratio <= _REGULAR else DECADES
-        near = LAST if before.of_stiffness <= _KNOWN * job.tol else near
+        near = LAST if max(before.of_stiffness, UNSEEN) <= _KNOWN * job.tol else near
         # the contact on the coarse mesh may be too far off, or the wall too stiff for this one
         for stages, factor in ((near, before.factor), (BACK, before.factor), (BACK, 1.0)):
             with contextlib.suppress(NotConverged):
