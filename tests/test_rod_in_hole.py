@@ -18,6 +18,7 @@ from cosserat_fenicsx.models.rodmesh import Layout
 from cosserat_fenicsx.models.traits import found_traits, traits_of
 from cosserat_fenicsx.statics.settling import settle, stages_from
 from cosserat_fenicsx.statics.solvers import solvers_of
+from cosserat_fenicsx.well.rod_errors import NAMES, UNSEEN, RodErrors
 from cosserat_fenicsx.well.rod_in_hole import solve_in_hole
 from cosserat_fenicsx.well.smoothed import apart_mostly
 from cosserat_fenicsx.well.starts import on_axis
@@ -152,6 +153,14 @@ def test_whole_wells(name, way):
         assert answer.surface_torque == pytest.approx(15290.84, rel=6e-3)
 
 
+def test_slender_strings_are_solved():
+    """Beside the wall their pivots are zero to rounding; with less bending stiffness the hook load tends to a limit."""
+    path = cf.WellPath.from_survey([0, 100, 300, 500], [0, 0, 40, 40], [20] * 4)
+    given = {"radius": 0.108, "friction": 0.25, "slip": SLIP["out"], "elements": 256}
+    stiffer, soft = (solve_in_hole(path, [500.0], rigid(EI), 241.13, 0.0635, **given).hook_load for EI in (1e3, 100.0))
+    assert soft == pytest.approx(stiffer, rel=1e-6)
+
+
 def test_drilling_with_weight_on_a_centred_bit():
     """The soft string's hook load and torque are 661 189 N and 9548 N m; the clearance takes 3.4 % of the torque."""
     path = cf.WellPath.from_survey(*np.transpose(WELLS["F-12"]["stations_md_inc_azi"]))
@@ -271,3 +280,13 @@ def test_side_force_and_moment_on_a_coarse_mesh():
         error = apart(getattr(coarse, name), name)
         assert error < min(0.05 * scale, coarse.errors_along[name])
     assert coarse.side_force @ coarse.node_length == pytest.approx(coarse.node_force.sum(), rel=1e-3)
+
+
+def test_changes_that_are_small_by_chance_are_not_believed():
+    """Three meshes: the last change is 1e-9, the one before 1e-4; the wall's softness is known from the first one."""
+    scales, rounding = dict.fromkeys(NAMES, 2.0), dict.fromkeys(NAMES, 0.0)
+    known = None
+    for value, walls in ((2.0, (0.01, 0.1, 1.0)), (2.0002, (1.0,)), (2.0002 + 2e-9, (1.0,))):
+        known = RodErrors({wall: dict.fromkeys(NAMES, value) for wall in walls}, scales, rounding, NAMES[:1], known)
+    assert known.of_stiffness == pytest.approx(UNSEEN)
+    assert known.error == pytest.approx(3e-4 / 32 + UNSEEN)

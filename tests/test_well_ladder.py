@@ -3,6 +3,7 @@
 import math
 
 import pytest
+import random_wells
 from reference_wells import well
 
 import cosserat_fenicsx as cf
@@ -114,3 +115,11 @@ def test_tension_beyond_what_a_pipe_carries_is_told():
     for weight, told in ((-6e6, False), (-8e6, True)):
         answer = cf.torque_and_drag(hole, STRING, cf.TripOut(weight=weight), model="soft")
         assert ("BEYOND WHAT ANY PIPE CARRIES" in str(answer)) == told
+
+
+def test_a_random_well():
+    """`make random-wells` compares 100 of them; here the rod's answers in one."""
+    drawn = random_wells.draw(2)
+    for operation in drawn.operations[:2]:
+        said, _, _, errors = random_wells.compare(drawn, operation)
+        assert said == "rod" and len(errors) == 3 and all(true <= told for told, true in errors.values())

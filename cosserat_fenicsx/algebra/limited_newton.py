@@ -1,6 +1,8 @@
 """Newton's method with steps of limited length, for states far from the solution, such as a rod pressed against a wall.
 
-The contact force that is carried at the Gauss points takes the same share of its step as the motion.
+The contact force that is carried at the Gauss points takes the same share of its step as the motion. A tangent that is
+singular to rounding is solved with all the same: beside a stiff wall the pivots of a slender rod are as small, and
+whoever takes the steps tests what is found by its balance.
 """
 
 import math
@@ -8,6 +10,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from mpi4py import MPI
+
+# Smallest pivots beside a stiff wall, over those that are zero to rounding.
+_SMALLER = 1e-2
 
 
 @dataclass(frozen=True)
@@ -41,7 +46,7 @@ class LimitedNewton:
         """Take one step, or a share of it; None where the tangent is singular or the residual is not a number."""
         problem, x = self._problem, self._problem.x
         self._residual()
-        problem.factor()
+        self._factor()
         if not problem.solve(problem.b, self._change):
             return None
         moved, turned = self._size(self._change.array_r)
@@ -68,6 +73,15 @@ class LimitedNewton:
         forces = model.motion_in(self._problem.b.array_r).reshape(-1, model.components - model.multipliers)
         local = np.abs(forces[:, : model.moves]).max(initial=0.0)
         return float(model.comm.allreduce(local, op=MPI.MAX)) if model.comm.size > 1 else float(local)
+
+    def _factor(self):
+        """Factors of the tangent; where it is singular to rounding, with smaller pivots."""
+        problem, chain = self._problem, self._problem.elimination.c
+        problem.factor()
+        if problem.c.singular:
+            usual, chain.zero_pivot = chain.zero_pivot, _SMALLER * chain.zero_pivot
+            problem.factor()
+            chain.zero_pivot = usual
 
     def _residual(self):
         self._problem.function(self._problem.x, self._problem.b)

@@ -200,8 +200,10 @@ def _found(flexible, solved, differences):
         most = max(share(abs(value), scale) for value, scale in zip(apart, scales, strict=True))
         if name == flexible.model and most > flexible.model_error + flexible.error + solved.error:
             yield f"this is MORE than was estimated for the {name} string, {flexible.model_error:.1e}: look at both"
-    if solved.negative_modes > 0:
+    if solved.negative_modes:
+        count = solved.negative_modes
+        told = "singular" if count < 0 else "one negative eigenvalue" if count == 1 else f"{count} negative eigenvalues"
         yield (
-            f"without friction it would buckle, or buckle otherwise: {solved.negative_modes} negative eigenvalues of "
-            "the second variation"
+            f"NOT STABLE without friction (second variation: {told}): it would buckle, or buckle otherwise, and what "
+            f"it bears then may differ as much as was estimated for the {flexible.model} string"
         )

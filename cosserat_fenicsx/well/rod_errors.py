@@ -17,6 +17,12 @@ _OF_CHANGE = {"hook_load": 3.0, "surface_torque": 4.0, "wall_force": 6.0}
 _LEAST_LOAD, _LEAST_TORQUE = 1e-3, 1e-3
 # Caution over what is left of the wall's softness; bounds of the ratio of changes; the ratio where it is not known.
 _CAUTION, _RATIOS, _UNKNOWN = 2.0, (0.1, 0.9), 0.5
+#: What is left of the wall's softness on a finer mesh where it was found on a coarser one, which may not resolve the
+#: layer in the wall and then tells a part of it: at least this, relative, the largest one of 150 strings.
+UNSEEN = 9e-6
+# A change by the mesh that is smaller than this part of the change before it is small by chance: changes fall to a
+# twentieth (the median, from equal elements to others) or a seventh (later).
+_FALLS = 1 / 32
 
 
 class RodErrors:
@@ -24,7 +30,7 @@ class RodErrors:
 
     Attributes:
         values: {factor: {name: value}} at walls so many times stiffer than the scene's, ascending; ratio: of their last
-            two changes.
+            two changes; changes: {name: relative change from the mesh before}, infinite without one.
         errors: {name: error} in N and N m; error: the largest relative one of hook load and torque, that of the torque
             only where the string turns; of_stiffness: the part of it that is left of the wall's softness.
     """
@@ -42,6 +48,10 @@ class RodErrors:
         if common:
             factor = max(common)
             changes = _changes(before.values[factor], self.values[factor], scales, counted)
+        if before is not None:
+            known = {name: x for name, x in before.changes.items() if np.isfinite(x)}
+            changes |= {name: max(changes[name], _FALLS * x) for name, x in known.items()}
+        self.changes = changes
         of_mesh = {name: _OF_CHANGE[name] * changes[name] * scales[name] for name in NAMES}
         self.errors = {name: of_mesh[name] + self._by_stiffness[name] + rounding[name] for name in NAMES}
         self.error = max(self.errors[name] / scales[name] for name in counted)
@@ -51,7 +61,10 @@ class RodErrors:
         """{name: what a rigid wall would change}, and the ratio of changes."""
         walls = list(self.values.values())
         if len(walls) < 2:
-            return (before._by_stiffness, before.ratio) if before else (dict.fromkeys(NAMES, np.inf), _UNKNOWN)
+            if before is None:
+                return dict.fromkeys(NAMES, np.inf), _UNKNOWN
+            unseen = UNSEEN * min(1.0, walls[0]["wall_force"] / scales["wall_force"])  # none without contact
+            return {name: max(x, unseen * scales[name]) for name, x in before._by_stiffness.items()}, before.ratio
         changes = [_changes(a, b, scales, counted) for a, b in zip(walls, walls[1:], strict=False)]
         ratio = before.ratio if before else _UNKNOWN
         if len(changes) > 1:

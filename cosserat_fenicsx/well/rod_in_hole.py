@@ -19,7 +19,7 @@ from cosserat_fenicsx.statics.path.recorder import record_of
 from cosserat_fenicsx.statics.settling import BACK, DECADES, LAST, LAST_TWO, settle, stages_from
 from cosserat_fenicsx.statics.solvers import solvers_of
 from cosserat_fenicsx.well.in_hole import InHole
-from cosserat_fenicsx.well.rod_errors import values_of
+from cosserat_fenicsx.well.rod_errors import UNSEEN, values_of
 from cosserat_fenicsx.well.starts import in_helix, on_axis
 from cosserat_fenicsx.well.string_scene import string_in
 
@@ -43,11 +43,13 @@ _KNOWN, _TOO_SOFT, _STIFFEST = 0.1, 0.25, 1e3
 _FIRST_WALL = 1e9
 # Starts on the axis in turn, see `stages_from`; and the one from a helix, which begins as in a viscous fluid.
 _STARTS, _FROM_HELIX = ("fast", "gentle", "relaxed"), ("helix",)
+# More negative modes than there ever are, in place of -1 where the second variation is singular.
+_SINGULAR = 1 << 30
 # Springs that hold a helix, see `settle`.
 _HOLD = 1e-10
-# Elements of the first mesh that a helix is looked for on, at most.
+# Elements of the first mesh that a string is looked for on, at most: snakes and helices need more than others.
 _FINE = 1024
-# Rounding of the residual of a node, over that of its position times the stiffness of its piece of wall.
+# Rounding of the residual of a node, over that of its position times the stiffness of its piece of wall, or ring.
 _ROUNDED = 20.0
 # Largest difference between the reaction and the balance of all forces, over the sum of the wall's forces.
 _UNBALANCED = 1e-5
@@ -133,9 +135,11 @@ def solve_in_hole(
             try:
                 answer = _finer(string, count, answer, job)
             except NotConverged:
-                if answer is not None or not helix or count >= min(_FINE, counts[-1]):
+                if answer is not None and elements is None and answer.error < np.inf:
+                    break  # not as accurately as asked
+                if answer is not None or count >= min(_FINE, counts[-1]):
                     raise
-                continue  # too few elements for its turns
+                continue  # too few elements for its turns, or for a snake
             # finer meshes change nothing of what is left of the wall's softness
             if elements is None and answer.error <= max(tol, _BY_WALL * answer.of_stiffness):
                 break
@@ -190,19 +194,24 @@ def _finer(string, count, before, job):
     if before is not None:
         layout = _divided(string, before.path.layout, _wanted(before), count)
         near = LAST_TWO if before.estimates.ratio <= _REGULAR else DECADES
-        near = LAST if before.of_stiffness <= _KNOWN * job.tol else near
+        near = LAST if max(before.of_stiffness, UNSEEN) <= _KNOWN * job.tol else near
         # the contact on the coarse mesh may be too far off, or the wall too stiff for this one
         for stages, factor in ((near, before.factor), (BACK, before.factor), (BACK, 1.0)):
             with contextlib.suppress(NotConverged):
                 return _on_mesh(string, layout, stages, factor, before, before, job)
     pieces = Layout.of(string.scene, 1)
     layout = _divided(string, pieces, np.diff(pieces.breaks[0]), count)
+    found = []
     for way in _FROM_HELIX if job.helix else _STARTS:
         try:
             stages = stages_from(string.spring, way)
-            return _on_mesh(string, layout, stages, 1.0, None, before, job)
+            found.append(_on_mesh(string, layout, stages, 1.0, None, before, job))
         except NotConverged as failed:
             reason = failed
+        if found and not found[-1].negative_modes:
+            break
+    if found:  # the one in which the string would buckle in the fewest ways
+        return min(found, key=lambda answer: answer.negative_modes % _SINGULAR)
     raise NotConverged(
         f"no equilibrium of the rod in contact was found on {count} elements: {reason}. A string that is compressed "
         "beyond its buckling load may have many, or none where it locks up: expected less compression or friction, or "
@@ -275,8 +284,9 @@ def _in_walls(string, problem, stability, stages, factor, steps, job):
         if k in decades:
             records[factor * stages[k][0]] = record_of(problem, 1.0, 0, 0, 0)
 
-    largest = float(model.layout.sizes(model.scene).max())
-    rounding = _ROUNDED * np.finfo(float).eps * factor * string.wall.stiffness * largest
+    of_wall = string.wall.stiffness * float(model.layout.sizes(model.scene).max())
+    stiffest = factor * max([of_wall, *(ring.stiffness for ring in string.rings)])
+    rounding = _ROUNDED * np.finfo(float).eps * stiffest
     steps += settle(problem, string.stages, string.clearance / model.scales.length,
                     rounding * model.scales.length / model.scales.force,
                     [(factor * wall, factor * spring, viscous) for wall, spring, viscous in stages],
