@@ -1,4 +1,4 @@
-"""What a soft string tells that it leaves out, against the exact rod in contact: bits and stabilisers, clamps, bends."""
+"""What a soft string tells that it leaves out, against the exact rod: bits and stabilisers, clamps, sharp bends."""
 
 import numpy as np
 import pytest
