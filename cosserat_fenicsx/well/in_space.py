@@ -1,4 +1,4 @@
-"""A string in its hole in space, by pyvista, with the clearance enlarged."""
+"""A string in its hole in space, by pyvista, with radii and clearance enlarged."""
 
 import math
 from pathlib import Path
