@@ -276,10 +276,11 @@ def test_side_force_and_moment_on_a_coarse_mesh():
 
     at_nodes = coarse.node_force / coarse.node_length
     assert 10 * apart(coarse.side_force, "side_force") < apart(at_nodes, "side_force")
+    assert 10 * apart(coarse.distributed_force, "distributed_force") < apart(at_nodes, "distributed_force")
     for name, scale in (("side_force", 200.0), ("bending_moment", 1500.0)):
         error = apart(getattr(coarse, name), name)
         assert error < min(0.05 * scale, coarse.errors_along[name])
-    assert coarse.side_force @ coarse.node_length == pytest.approx(coarse.node_force.sum(), rel=1e-3)
+    assert coarse.side_force @ coarse.node_length == pytest.approx(coarse.node_force.sum(), rel=1e-12)
 
 
 def test_changes_that_are_small_by_chance_are_not_believed():

@@ -1,4 +1,4 @@
-"""A string in its hole in space, by pyvista, with the clearance enlarged."""
+"""A string in its hole in space, by pyvista, with radii and clearance enlarged."""
 
 import math
 from pathlib import Path
@@ -24,7 +24,7 @@ from cosserat_fenicsx.well.shown import (
 # (title) and below (names of axes).
 _HEIGHT, _WIDTHS, _MARGINS = 1000, (560, 1300), (240, 230, 130, 130)
 # Radius of the hole in the picture, over the extent of what is shown: of the whole string, and of a part.
-_HOLE, _HOLE_OF_PART = 0.015, 0.03
+_HOLE, _HOLE_OF_PART = 0.015, 0.045
 # Smallest extent of the box along any axis, over the largest one; most intervals of numbers along the longest axis, and
 # at least along the others; of the colour bar.
 _THIN, _INTERVALS, _BAR = 0.15, (6, 3), 8

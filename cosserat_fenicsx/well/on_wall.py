@@ -40,8 +40,12 @@ class OnWall:
     @cached_property
     def side_force(self):
         """(n,) N/m."""
+        return self._smoothed(self.element_pressures)
+
+    def _smoothed(self, pressures):
+        """(n,) N/m, from pressures (elements, nodes), see `side_force`."""
         sizes = self._of_nodes.sum(axis=1)
-        means = (self.element_pressures * self._of_nodes).sum(axis=1) / sizes
+        means = (pressures * self._of_nodes).sum(axis=1) / sizes
         return self._averaged(along_elements(means, sizes, self.path.rule.nodes)[..., None])[:, 0]
 
     def _summed(self, values):
@@ -52,8 +56,9 @@ class OnWall:
         return found
 
     def _averaged(self, values):
-        """(n, k) from values of each element at its nodes (elements, nodes, k): means where two elements meet."""
-        return self._summed(values) / self._summed(np.ones((*values.shape[:2], 1)))
+        """(n, k) from values of each element at its nodes (elements, nodes, k): where two elements meet, means by the
+        lengths that the node stands for in them, so that integrals stay what they are."""
+        return self._summed(values * self._of_nodes[..., None]) / self.node_length[:, None]
 
     @cached_property
     def node_length(self):
@@ -118,4 +123,4 @@ class OnWall:
     @cached_property
     def distributed_force(self):
         """(n,) N/m."""
-        return self._summed(self._resultants[1] * self._of_nodes) / self.node_length
+        return self._smoothed(self._resultants[1])

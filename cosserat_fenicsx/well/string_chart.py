@@ -215,5 +215,5 @@ def _at_points(panel, answer, _):
                    bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.3})  # fmt: skip
     panel.set_xlim(0.0, 2.5 * most)
     panel.set_xticks(np.arange(0.0, most, round_step(most, 3)))
-    more = f", the {_LABELS} largest numbered" if len(points) > _LABELS else ""
+    more = f"\nthe {_LABELS} largest numbered" if len(points) > _LABELS else ""
     panel.set_xlabel(f"forces at points (kN){more}")
