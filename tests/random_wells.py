@@ -19,7 +19,7 @@ import numpy as np
 
 import cosserat_fenicsx as cf
 from cosserat_fenicsx.units import inch
-from cosserat_fenicsx.well import rod_in_hole
+from cosserat_fenicsx.well.rod import rod_in_hole
 
 #: Outer and inner diameter, tool joint (in), mass (kg/m), smallest and largest hole (in).
 PIPES = {

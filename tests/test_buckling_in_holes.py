@@ -17,8 +17,8 @@ from cosserat_fenicsx.models.rodmesh import Layout
 from cosserat_fenicsx.scene import action
 from cosserat_fenicsx.statics.settling import BACK, settle
 from cosserat_fenicsx.statics.solvers import solvers_of
-from cosserat_fenicsx.well.rod_in_hole import solve_in_hole
-from cosserat_fenicsx.well.string_scene import string_in
+from cosserat_fenicsx.well.rod.rod_in_hole import solve_in_hole
+from cosserat_fenicsx.well.rod.string_scene import string_in
 
 pytestmark = pytest.mark.serial
 EI, W, R, KP = 1228200.0, 241.13, 0.04445, 1e9

@@ -12,7 +12,7 @@ import pytest
 
 import cosserat_fenicsx as cf
 from cosserat_fenicsx.element import lobatto_weights
-from cosserat_fenicsx.well.resultants import contacts_along
+from cosserat_fenicsx.well.rod.resultants import contacts_along
 
 pytestmark = pytest.mark.serial
 KNOWN = json.loads((Path(__file__).parent / "reference" / "rod_in_hole.json").read_text(encoding="utf-8"))

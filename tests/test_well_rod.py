@@ -11,7 +11,7 @@ import pytest
 from reference_wells import well
 
 import cosserat_fenicsx as cf
-from cosserat_fenicsx.well import rod_in_hole
+from cosserat_fenicsx.well.rod import rod_in_hole
 
 pytestmark = pytest.mark.few_ranks
 KNOWN = json.loads((Path(__file__).parent / "reference" / "rod_in_hole.json").read_text(encoding="utf-8"))

@@ -9,7 +9,7 @@ import pytest
 
 import cosserat_fenicsx as cf
 from cosserat_fenicsx.well import depth_sweep as module
-from cosserat_fenicsx.well import rod_in_hole
+from cosserat_fenicsx.well.rod import rod_in_hole
 
 pytestmark = pytest.mark.serial
 PATH = cf.WellPath.from_survey([0, 600, 1200, 1800, 2500], [0, 0, 50, 60, 85], [0, 0, 120, 150, 150])

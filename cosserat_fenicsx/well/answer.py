@@ -12,7 +12,7 @@ from cosserat_fenicsx.well.contacts import WallContact, contacts_of, side_force_
 from cosserat_fenicsx.well.hole import Borehole
 from cosserat_fenicsx.well.mud import Mud
 from cosserat_fenicsx.well.operations import Operation
-from cosserat_fenicsx.well.shown import high_side
+from cosserat_fenicsx.well.pictures.shown import high_side
 from cosserat_fenicsx.well.softstring import UP_TO
 from cosserat_fenicsx.well.string import DrillString
 from cosserat_fenicsx.well.tabular import Tabular
@@ -300,7 +300,7 @@ class TorqueAndDrag(Tabular):
         Raises:
             SceneError: matplotlib is missing, or the ending is unknown; depths that the string has not.
         """
-        from cosserat_fenicsx.well.string_chart import draw_answer
+        from cosserat_fenicsx.well.pictures.string_chart import draw_answer
 
         return draw_answer(self, file, between)
 
@@ -315,7 +315,7 @@ class TorqueAndDrag(Tabular):
         Raises:
             SceneError: pyvista is missing, or the name does not end in .png; depths that the string has not.
         """
-        from cosserat_fenicsx.well.in_space import draw_in_space
+        from cosserat_fenicsx.well.pictures.in_space import draw_in_space
 
         draw_in_space(self, file, enlarge, between)
 

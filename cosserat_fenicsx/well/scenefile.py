@@ -63,7 +63,7 @@ from cosserat_fenicsx.well.mud import Mud
 from cosserat_fenicsx.well.operations import OPERATIONS, Operation
 from cosserat_fenicsx.well.path import WellPath
 from cosserat_fenicsx.well.pieces import pieces_of
-from cosserat_fenicsx.well.rod_rung import check_rod
+from cosserat_fenicsx.well.rod.rod_rung import check_rod
 from cosserat_fenicsx.well.string import DrillString
 from cosserat_fenicsx.well.torque_and_drag import CONVENTIONS, ROD, check_settings, torque_and_drag
 

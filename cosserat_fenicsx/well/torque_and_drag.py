@@ -13,7 +13,7 @@ from cosserat_fenicsx.well.mud import Mud
 from cosserat_fenicsx.well.operations import Operation
 from cosserat_fenicsx.well.pieces import pieces_of
 from cosserat_fenicsx.well.rings import is_ring, ring_of
-from cosserat_fenicsx.well.rod_rung import rod_in_contact
+from cosserat_fenicsx.well.rod.rod_rung import rod_in_contact
 from cosserat_fenicsx.well.softstring import chain_of, soft_string
 from cosserat_fenicsx.well.string import DrillString
 

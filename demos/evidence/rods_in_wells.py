@@ -23,7 +23,7 @@ from scipy.linalg import solve_banded
 from written import write
 
 import cosserat_fenicsx as cf
-from cosserat_fenicsx.well.rod_in_hole import solve_in_hole
+from cosserat_fenicsx.well.rod.rod_in_hole import solve_in_hole
 
 SURVEYS = Path(__file__).resolve().parents[2] / "tests" / "reference" / "wells.json"
 WELLS = ("P", "F-12", "ISCWSA 2")

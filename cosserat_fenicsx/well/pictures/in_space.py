@@ -12,7 +12,7 @@ from cosserat_fenicsx.pictures.drawing import load_pyvista
 from cosserat_fenicsx.pictures.labels import Labels
 from cosserat_fenicsx.pictures.view import View
 from cosserat_fenicsx.ranks import on_first, world
-from cosserat_fenicsx.well.shown import (
+from cosserat_fenicsx.well.pictures.shown import (
     SIDES,
     depths_between,
     points_between,

@@ -10,7 +10,7 @@ from cosserat_fenicsx.annotations import File
 from cosserat_fenicsx.well import criteria
 from cosserat_fenicsx.well.answer import TorqueAndDrag, scales_of, share
 from cosserat_fenicsx.well.contacts import WallContact, name_of_side
-from cosserat_fenicsx.well.smoothed import MOSTLY
+from cosserat_fenicsx.well.rod.smoothed import MOSTLY
 
 # Inclinations (rad) below this have no high side.
 _VERTICAL = 1e-9
@@ -155,7 +155,7 @@ class RodInContact(TorqueAndDrag):
         Raises:
             SceneError: matplotlib is missing, or the ending is unknown.
         """
-        from cosserat_fenicsx.well.side_view import draw_from_side
+        from cosserat_fenicsx.well.pictures.side_view import draw_from_side
 
         return draw_from_side(self, file, length)
 

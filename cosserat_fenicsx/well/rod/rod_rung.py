@@ -12,7 +12,7 @@ from cosserat_fenicsx.errors import NotConverged, SceneError
 from cosserat_fenicsx.well.components import weight_in_mud
 from cosserat_fenicsx.well.criteria import HELIX
 from cosserat_fenicsx.well.rings import is_ring, ring_of
-from cosserat_fenicsx.well.rod_answer import RodInContact
+from cosserat_fenicsx.well.rod.rod_answer import RodInContact
 
 
 def rod_in_contact(flexible, decided, progress=None, exact=True):
@@ -28,7 +28,7 @@ def rod_in_contact(flexible, decided, progress=None, exact=True):
         NotConverged: no equilibrium was found, or not as accurately as asked.
     """
     # imported here, since it needs dolfinx, which the soft string does not
-    from cosserat_fenicsx.well.rod_in_hole import NotAccurate, solve_in_hole
+    from cosserat_fenicsx.well.rod.rod_in_hole import NotAccurate, solve_in_hole
 
     laid = flexible.laid[::-1]  # from the top down
     hole, operation = flexible.hole, flexible.operation

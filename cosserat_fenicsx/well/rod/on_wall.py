@@ -4,9 +4,9 @@ from functools import cached_property
 
 import numpy as np
 
-from cosserat_fenicsx.well.resultants import contacts_along
-from cosserat_fenicsx.well.smoothed import along_elements
-from cosserat_fenicsx.well.string_scene import bending_of
+from cosserat_fenicsx.well.rod.resultants import contacts_along
+from cosserat_fenicsx.well.rod.smoothed import along_elements
+from cosserat_fenicsx.well.rod.string_scene import bending_of
 
 # Elements of up to so many lengths of the layer in the wall resolve a concentrated force: forces on longer ones were
 # found to be off by a factor of up to three, most of those on shorter ones by less than 5 %.

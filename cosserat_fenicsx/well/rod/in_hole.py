@@ -7,10 +7,10 @@ import numpy as np
 from cosserat_fenicsx.quaternions import directors
 from cosserat_fenicsx.results.recovery import at_nodes
 from cosserat_fenicsx.well.contacts import side_in_space
-from cosserat_fenicsx.well.on_wall import OnWall
-from cosserat_fenicsx.well.rod_errors import errors_of
-from cosserat_fenicsx.well.smoothed import apart_mostly
-from cosserat_fenicsx.well.string_scene import is_round
+from cosserat_fenicsx.well.rod.on_wall import OnWall
+from cosserat_fenicsx.well.rod.rod_errors import errors_of
+from cosserat_fenicsx.well.rod.smoothed import apart_mostly
+from cosserat_fenicsx.well.rod.string_scene import is_round
 
 # Distances from the axis below this share of the clearance have no direction.
 _CENTRED = 1e-9

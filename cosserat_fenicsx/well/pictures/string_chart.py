@@ -6,8 +6,8 @@ from cosserat_fenicsx.pictures.axes import round_step
 from cosserat_fenicsx.pictures.figures import draw_chart
 from cosserat_fenicsx.ranks import world
 from cosserat_fenicsx.well import criteria
-from cosserat_fenicsx.well.charts import depth_axes
-from cosserat_fenicsx.well.shown import (
+from cosserat_fenicsx.well.pictures.charts import depth_axes
+from cosserat_fenicsx.well.pictures.shown import (
     SIDES,
     VERTICAL,
     depths_between,

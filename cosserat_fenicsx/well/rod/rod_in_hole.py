@@ -18,10 +18,10 @@ from cosserat_fenicsx.statics.circulatory import conservative_along
 from cosserat_fenicsx.statics.path.recorder import record_of
 from cosserat_fenicsx.statics.settling import BACK, DECADES, LAST, LAST_TWO, settle, stages_from
 from cosserat_fenicsx.statics.solvers import solvers_of
-from cosserat_fenicsx.well.in_hole import InHole
-from cosserat_fenicsx.well.rod_errors import UNSEEN, values_of
-from cosserat_fenicsx.well.starts import in_helix, on_axis
-from cosserat_fenicsx.well.string_scene import string_in
+from cosserat_fenicsx.well.rod.in_hole import InHole
+from cosserat_fenicsx.well.rod.rod_errors import UNSEEN, values_of
+from cosserat_fenicsx.well.rod.starts import in_helix, on_axis
+from cosserat_fenicsx.well.rod.string_scene import string_in
 
 # Degree of the elements where none is asked for: lift-off forces limit the regularity, higher degrees gain nothing.
 _DEGREE = 3

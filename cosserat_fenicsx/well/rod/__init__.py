@@ -1,0 +1,1 @@
+"""The exact rod in contact with the wall of its hole."""
