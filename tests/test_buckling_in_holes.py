@@ -178,3 +178,14 @@ def test_a_string_that_is_pressed_on_its_bit_is_a_helix():
     assert pressure == pytest.approx((R * F**2 / (4 * EI))[wound], rel=2e-2)
     s, z = answer.s[wound], answer.position[wound, 2]
     assert np.ptp(s) - np.ptp(z) == pytest.approx(np.trapz((R**2 * F / (4 * EI))[wound], s), rel=1e-3)
+
+
+@pytest.mark.parametrize(("inclination", "operation"), [(45, cf.Static(250e3)), (60, cf.Sliding(240e3))])
+def test_a_string_in_a_plane_hole_leaves_the_plane_where_it_would_buckle(inclination, operation):
+    """Straight, and beyond the load of a snake: in the plane Newton's method keeps the symmetry."""
+    path = cf.WellPath.from_survey([0, 300, 650], [inclination] * 3, [0, 0, 0])
+    hole = cf.Borehole(path, cf.HoleSection(650.0, 0.2159, 0.2))
+    string = cf.DrillString([cf.DrillPipe(size="5 in 19.50 lb/ft")])
+    found = cf.torque_and_drag(hole, string, operation, mud=cf.Mud(1200.0), depth=600.0, model="rod")
+    assert found.solved.negative_modes == 0 and found.enough and any("begun as a helix" in line for line in found.why)
+    assert np.abs(found.offset[:, 1]).max() > 0.01

@@ -54,6 +54,11 @@ class RodInContact(TorqueAndDrag):
         return cls(**{**given, **changed, "why": (*decided, *_found(flexible, solved, differences))})
 
     @property
+    def enough(self):
+        """Whether the rod is stable, and its errors of hook load and surface torque are within `tol`."""
+        return super().enough and self.solved.negative_modes == 0
+
+    @property
     def hook_load(self):
         """Force along the hole on the held end, N, without block and sheaves."""
         return self.solved.hook_load

@@ -10,7 +10,6 @@ import contextlib
 from cosserat_fenicsx.checks import refuse
 from cosserat_fenicsx.errors import NotConverged, SceneError
 from cosserat_fenicsx.well.components import weight_in_mud
-from cosserat_fenicsx.well.criteria import HELIX
 from cosserat_fenicsx.well.rings import is_ring, ring_of
 from cosserat_fenicsx.well.rod.rod_answer import RodInContact
 
@@ -60,7 +59,7 @@ def rod_in_contact(flexible, decided, progress=None, exact=True):
             return short.answer, short
 
     solved, short = solve(helix=False)
-    if solved.negative_modes > 0 and (flexible.buckling == HELIX).any():
+    if solved.negative_modes:
         with contextlib.suppress(NotConverged):
             helix, shorter = solve(helix=True)
             if helix.negative_modes == 0:
