@@ -8,7 +8,7 @@ import ufl
 
 # Below this fraction of the tube's radius the distance from the axis counts as that: on the axis the radial direction
 # is undefined. Only a ring without clearance, which is held there elastically, touches something so close to it.
-_ON_AXIS = 1e-8
+_ON_AXIS = 1e-10
 
 
 def wall_work(point, test, c0, t0, k0, clearance, stiffness, spring, anchor, along, across, arm):

@@ -7,6 +7,7 @@ hole between without touching it; the friction that is missed there is mu times
   side, at a distance d, after that angle. On a build section of radius R it is T sqrt(4 r/R) for a clearance r.
 - (2 d q T)^(1/2) below the surface, where the rod hangs on the axis, and comes to the wall farther down; and as much as
   it spans there by its bending stiffness.
+- the load on the span with which it bridges a wider part of the hole, times the difference of friction there.
 - (6 d T)^(2/3) q'^(1/3) where the load changes its sign within a bend, with the rate q': the span on which it moves
   the string by d.
 
@@ -73,6 +74,7 @@ def model_errors(path, pieces, soft, solved, sections, rings=()):
     missed[groups] = _turns(chain, solved, groups, clearance[groups])
     jumps, stiffer = _jumps(path, pieces, solved.tension[groups[1:], 0], EI[groups])
     missed[groups[1:]] += jumps
+    missed[groups] += _edges(pieces, solved, groups, EI[groups])
     missed[groups[-1]] += _hung(chain, solved, clearance[-1], EI[-1])
     missed *= _CAUTION
     stiff[groups[1:]] = stiffer
@@ -179,6 +181,23 @@ def _hung(chain, solved, clearance, EI):
     return min(np.sqrt(2 * clearance * q * T) + bent, q * chain.length.sum())
 
 
+def _edges(pieces, solved, groups, EI):
+    """Wall force (N) that is missed in pieces, from below, where friction changes with the diameter: the string spans a
+    part of what is wider, and loads the edge, on the friction there."""
+    found, up = np.zeros(len(groups)), slice(None, None, -1)
+    mu, hole = pieces.friction[up], pieces.hole[up]
+    length, q = (pieces.bottom - pieces.top)[up], solved.side[groups].max(axis=1) * solved.chain.climb[groups]
+    T = np.abs(solved.tension[groups, 0])
+    for j in np.flatnonzero((mu[1:] != mu[:-1]) & (hole[1:] != hole[:-1])):
+        wide = j if hole[j] > hole[j + 1] else j + 1
+        more, less = max(mu[j], mu[j + 1]), min(mu[j], mu[j + 1])
+        if q[wide] > 0:
+            d = abs(hole[j] - hole[j + 1])
+            span = min(length[wide], (_SPAN * EI[wide] * d / q[wide]) ** 0.25 + np.sqrt(2 * d * T[wide] / q[wide]))
+            found[j if mu[j] == more else j + 1] += q[wide] * span * (1 - less / more)
+    return found
+
+
 def _levers(path, pieces, solved, groups, EI, clearance):
     """Wall force (N) that is missed at the lower ends of pieces, from below, where EI k jumps: the string takes the
     moment by a pair of forces at a distance of sqrt(8 d/k), where they exceed the load there."""
@@ -190,7 +209,7 @@ def _levers(path, pieces, solved, groups, EI, clearance):
     known = (moment > 0) & (EI > 0)
     moment, stiff = np.where(known, moment, 0.0), np.where(known, EI, 1.0)
     apart = np.maximum(np.sqrt(8 * clearance * stiff / np.where(known, moment, 1.0)), _NEAREST)
-    return np.maximum(moment / apart - solved.side[groups, 0] * solved.chain.climb[groups] * apart, 0.0)
+    return np.maximum(2 * moment / apart - solved.side[groups, 0] * solved.chain.climb[groups] * apart, 0.0)
 
 
 def _jumps(path, pieces, tension, EI):

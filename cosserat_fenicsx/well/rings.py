@@ -19,8 +19,8 @@ _Span = namedtuple("_Span", "length load moment angle carried")
 
 # A beam under its load q that is clamped at a ring, and touches the wall, lower by d, with no curvature: it spans
 # (72 EI d/q)^(1/4) = l and bends with q l^2/6 at the ring, which carries 2/3 of q l. With a hinge at the ring it turns
-# there by q l^3/(12 EI), on a span that is shorter by 3^(1/4).
-_SPAN, _MOMENT, _CARRIED, _TURN = 72.0, 1 / 6, 2 / 3, 1 / 12
+# there by less than q l^3/(24 EI), which is that of a beam between two hinges.
+_SPAN, _MOMENT, _CARRIED, _TURN = 72.0, 1 / 6, 2 / 3, 1 / 24
 # Caution over moments, which are sums of sizes; the most by which compression enlarges bending; distance from a ring up
 # to which the string matters to it, m.
 _CAUTION, _ENLARGED, _REACH = 1.5, 5.0, 60.0
@@ -77,7 +77,7 @@ def _span(length, largest, clearance):
     free = (_SPAN * EI * (room + clearance) / q) ** 0.25
     short = min(length, free)
     larger = min(1 / max(1 - compression * short**2 / (np.pi**2 * EI), 1e-9), _ENLARGED)
-    angle = larger * q * short**3 * _TURN / (3**0.75 * EI) + curvature * short / 2
+    angle = larger * q * short**3 * _TURN / EI + curvature * short / 2
     return _Span(
         length, q, larger * q * short**2 * _MOMENT + EI * curvature, angle, q * min(length / 2, _CARRIED * free)
     )

@@ -35,13 +35,15 @@ class RodErrors:
             only where the string turns; of_stiffness: the part of it that is left of the wall's softness.
     """
 
-    def __init__(self, values, scales, rounding, counted, before=None):
+    def __init__(self, values, scales, rounding, counted, before=None, capped=np.inf):
         """
         Args:
             values: see there. scales: {name: size that an error is relative to}. rounding: {name: error}. counted:
-                names of those in `error`. before: the `RodErrors` on the mesh before.
+                names of those in `error`. before: the `RodErrors` on the mesh before. capped: factor above which rings
+                are not made stiffer, so that changes tell nothing of theirs.
         """
-        self.values = dict(sorted(values.items()))
+        self.values, self._capped = dict(sorted(values.items())), capped
+        self._of_rings = before._of_rings if before else dict.fromkeys(NAMES, 0.0)
         self._by_stiffness, self.ratio = self._left_of_softness(scales, counted, before)
         changes = dict.fromkeys(NAMES, np.inf)
         common = set(self.values) & set(before.values if before else ())
@@ -70,8 +72,16 @@ class RodErrors:
         if len(changes) > 1:
             sizes = [max(change.values()) for change in changes[-2:]]
             ratio = float(np.clip(sizes[1] / sizes[0], *_RATIOS)) if sizes[0] > 0 else _UNKNOWN
+            changes[-1] = {name: max(x, _RATIOS[0] * changes[-2][name]) for name, x in changes[-1].items()}
         share = _CAUTION * ratio / (1 - ratio)
-        return {name: share * changes[-1][name] * scales[name] for name in NAMES}, ratio
+        factors = list(self.values)
+        if factors[-1] > self._capped:  # what is left of rings is known from walls in which they were stiffer, too
+            known = [pair for pair in zip(changes, factors[1:], strict=True) if pair[1] <= self._capped]
+            if known:
+                change, factor = known[-1]
+                softer = share * factor / self._capped  # a ring's effect is as its softness
+                self._of_rings = {name: softer * x * scales[name] for name, x in change.items()}
+        return {name: max(share * x * scales[name], self._of_rings[name]) for name, x in changes[-1].items()}, ratio
 
 
 def _changes(there, here, scales, counted):
@@ -100,7 +110,7 @@ def errors_of(answer, values, before=None):
     }
     rounding = {name: answer.balance * (arm if name == "surface_torque" else 1.0) for name in NAMES}
     counted = ("hook_load", "surface_torque") if string.turns else ("hook_load",)
-    return RodErrors(values, scales, rounding, counted, before)
+    return RodErrors(values, scales, rounding, counted, before, string.stiffest_rings)
 
 
 def values_of(answer):

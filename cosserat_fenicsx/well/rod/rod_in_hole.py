@@ -143,6 +143,7 @@ def solve_in_hole(
             # finer meshes change nothing of what is left of the wall's softness
             if elements is None and answer.error <= max(tol, _BY_WALL * answer.of_stiffness):
                 break
+    string.leave(answer.factor)
     if elements is None and answer.error > tol:
         raise NotAccurate(answer, tol)
     return answer
@@ -260,8 +261,6 @@ def _on_mesh(string, layout, stages, factor, start, before, job):
             except NotConverged:
                 if answer is None:
                     raise
-                for stage in string.stages:
-                    stage.wall = answer.factor
                 return answer  # in the wall before
             answer, steps = found, found.steps
             values |= {each.factor: values_of(each) for each in (*softer, answer)}
@@ -306,13 +305,15 @@ def _in_walls(string, problem, stability, stages, factor, steps, job):
 
 def _negative_modes(string, problem, stability):
     """The number of negative eigenvalues of the second variation without friction, which has no potential."""
-    for friction in (0.0, 1.0):
+    try:
         for stage in string.stages:
-            stage.friction = friction
+            stage.friction = 0.0
         problem.model.actions.refresh()
-        if not friction:
-            found = stability.count()
-    return found
+        return stability.count()
+    finally:
+        for stage in string.stages:
+            stage.friction = 1.0
+        problem.model.actions.refresh()
 
 
 def _begin(problem, string, layout, before, helix):

@@ -22,8 +22,8 @@ _STIFFER = 1e4
 # Stiffness of the wall at a ring (N/m) over that along the string (N/m^2), since a ring digs in less; but where it is
 # larger than that, not more than so many EI/L^3, for rounding.
 _OF_RINGS, _STIFFEST = 100.0, 1e13
-# Largest stiffness of a ring where the wall is made stiffer, N/m: its deformation has to exceed rounding.
-_STIFFEST_RING = 1e11
+# Where the wall is made stiffer, largest stiffness of a ring, N/m, and of its force by the rounding of positions, N.
+_STIFFEST_RING, _ROUNDED = 1e13, 1.0
 # Points at which the load across the hole is sampled, the part of them that it is not larger at, and its smallest value
 # over the weight.
 _SAMPLES, _TYPICAL, _LEAST = 257, 0.9, 0.1
@@ -91,6 +91,16 @@ class StringScene:
         return float(max(typical / (2 * self.clearance), bends, _SAFE * buckles) / self.wall.stiffness)
 
     @property
+    def stiffest_rings(self):
+        """Factor of the wall's stiffness from which on some ring is not made stiffer."""
+        return min((ring.stage.most for ring in self.rings), default=np.inf)
+
+    def leave(self, factor):
+        """Leave the walls in the state of an answer: so many times stiffer, without springs."""
+        for stage in self.stages:
+            stage.wall, stage.spring, stage.friction, stage.anchor = factor, 0.0, 1.0, None
+
+    @property
     def stages(self):
         """The `Stage`s of the wall and of the rings."""
         return [wall.stage for wall in (self.wall, *self.rings)]
@@ -141,7 +151,7 @@ def string_in(path, lengths, stiffness, weight, contact_radius, radius, friction
         for s, clearance, ring_radius in rings
     )
     for ring in around:
-        ring.stage.most = max(1.0, _STIFFEST_RING / ring.stiffness)
+        ring.stage.most = max(1.0, min(_STIFFEST_RING, _ROUNDED / (np.finfo(float).eps * length)) / ring.stiffness)
     support = Clamp(rod.start) if hinge is None else Hinge(rod.start, hinge)
     words = "the string's lengths are those under load" if not extensible else "the string stretches"
     turns = bool(torque or any(across for _, (_, across) in wall.slip))
