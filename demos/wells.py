@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 from known_numbers import Check, chosen, report, verdict
 from mpi4py import MPI
+from scipy.integrate import trapezoid
 from stiff_and_soft import stiff_and_soft
 
 import cosserat_fenicsx as cf
@@ -81,11 +82,11 @@ def helix(scene, answers, sweep, folder):
     s, F, r = solved.s[inside], -solved.tension[inside], answer.clearance[inside]
     source = "Lubinski et al. (1962)"
     turns = np.ptp(np.unwrap(solved.side[inside])) / (2 * np.pi)
-    yield Check("turns", turns, np.trapz(np.sqrt(F / (2 * EI)), s) / (2 * np.pi), 2e-3, f"{source}: sqrt(F/(2 EI))")
-    wall = np.trapz(solved.side_force[inside], s)
-    yield Check("wall force (N)", wall, np.trapz(r * F**2 / (4 * EI), s), 10.0, f"{source}: r F^2/(4 EI)")
+    yield Check("turns", turns, trapezoid(np.sqrt(F / (2 * EI)), s) / (2 * np.pi), 2e-3, f"{source}: sqrt(F/(2 EI))")
+    wall = trapezoid(solved.side_force[inside], s)
+    yield Check("wall force (N)", wall, trapezoid(r * F**2 / (4 * EI), s), 10.0, f"{source}: r F^2/(4 EI)")
     shorter = 1e3 * (np.ptp(s) - np.ptp(solved.position[inside, 2]))
-    yield Check("shortening (mm)", shorter, 1e3 * np.trapz(r**2 * F / (4 * EI), s), 3e-3, f"{source}: r^2 F/(4 EI)")
+    yield Check("shortening (mm)", shorter, 1e3 * trapezoid(r**2 * F / (4 * EI), s), 3e-3, f"{source}: r^2 F/(4 EI)")
     yield Check("negative modes", solved.negative_modes, 0, 0, "a helix is stable")
 
 

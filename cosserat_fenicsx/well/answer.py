@@ -7,6 +7,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from cosserat_fenicsx.annotations import File
+from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.well import criteria, loaded
 from cosserat_fenicsx.well.contacts import WallContact, contacts_of, side_force_up_to, sides_of
 from cosserat_fenicsx.well.hole import Borehole
@@ -303,6 +304,10 @@ class TorqueAndDrag(Tabular):
         from cosserat_fenicsx.well.pictures.string_chart import draw_answer
 
         return draw_answer(self, file, between)
+
+    def plot_from_side(self, file: File | None = None, length: float | None = None):
+        """See `RodInContact.plot_from_side`; a soft string has no shape of its own, and raises a SceneError."""
+        raise SceneError(f"plot_from_side: a {self.words} lies on the axis: expected an answer of model = 'rod'")
 
     def plot_3d(self, file: File, enlarge: float | None = None, between: tuple[float, float] | None = None) -> None:
         """Draw the string in its hole in space, coloured by the side force.

@@ -48,7 +48,7 @@ class ModelError(NamedTuple):
 
     clearance: float
     bending: float
-    rings: float
+    blades_and_bit: float
     snake: float
 
     @property
@@ -255,7 +255,8 @@ def reasons(used, asked, soft, solved, sections, left_out, scales):
         if np.isinf(share):
             yield f"{what} of the {used} string: it may lock up: with a helix from the load of a snake on, it does"
         elif share > 1e-9:
-            of = [f"{name} {value:.3g}" for name, value in parts._asdict().items() if value > 1e-3 * parts.total]
+            sizes = parts._asdict().items()
+            of = [f"{name.replace('_', ' ')} {value:.3g}" for name, value in sizes if value > 1e-3 * parts.total]
             yield (
                 f"{what} of the {used} string: the rod in contact may differ by {parts.total:.3g} {unit}, {share:.1e} "
                 f"({', '.join(of)})"

@@ -12,6 +12,8 @@ from cosserat_fenicsx.well.pictures.shown import stretches
 
 # Notes of a sweep that are shown; more are counted.
 _NOTES = 12
+# Places of rough forces that are told.
+_PLACES = 8
 
 
 def answer_table(answer):
@@ -97,9 +99,11 @@ def summary(answer):
         )
         rough = getattr(answer.solved, "rough", ())
         if rough:
+            places = ", ".join(f"{np.interp(x.start, answer.solved.s, answer.md):.5g}" for x in rough[:_PLACES])
+            more = f" and {len(rough) - _PLACES} more" if len(rough) > _PLACES else ""
             lines.append(
-                f"{len(rough)} of them are ROUGH, some off by a factor of three: the mesh is fine enough for tol, not "
-                "for them, and a smaller tol makes it finer"
+                f"of these forces, those at md = {places}{more} m are ROUGH, some off by a factor of three: the mesh "
+                "is fine enough for tol, not for them, and a smaller tol makes it finer"
             )
     states = answer.buckling
     for state in (criteria.SNAKE, criteria.HELIX):

@@ -155,10 +155,14 @@ def _tension(panel, answer, rows):
     inclined = (answer.inclination > VERTICAL) | (answer.dogleg_severity > 0)  # without a wall force: Lubinski's alone
     in_hole = np.where(inclined, answer.critical_load("He-Kyllingstad"), 0.0)
     critical = -np.maximum(in_hole, answer.critical_load("Lubinski"))[rows]
-    critical = np.where(critical > low, critical, np.nan)  # a picture of what is near
+    far = critical <= low
+    critical = np.where(far, np.nan, critical)  # a picture of what is near
     if np.isfinite(critical).any():
         label = "tension at which it buckles (He-Kyllingstad, Lubinski)"
-        panel.plot(critical / 1e3, md, color="tab:orange", label=label.replace(" (", "\n("))
+        label += ", elsewhere it is farther left" if far.any() else ""
+        panel.plot(
+            critical / 1e3, md, color="tab:orange", label=label.replace(" (", "\n(").replace(", else", ",\nelse")
+        )
     panel.axvline(0.0, color="black", linewidth=0.6)
     panel.set_xlabel("tension (kN)")
 

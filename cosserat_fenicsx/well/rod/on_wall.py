@@ -11,6 +11,8 @@ from cosserat_fenicsx.well.rod.string_scene import bending_of
 # Elements of up to so many lengths of the layer in the wall resolve a concentrated force: forces on longer ones were
 # found to be off by a factor of up to three, most of those on shorter ones by less than 5 %.
 _RESOLVES = 10.0
+# Forces below this part of the largest one are none.
+_ROUNDING = 1e-10
 
 
 class OnWall:
@@ -109,8 +111,9 @@ class OnWall:
 
     @property
     def contacts(self):
-        """[`Contact`]."""
-        return self._resultants[0]
+        """[`Contact`], without those of rounding size."""
+        largest = max((x.force for x in self._resultants[0]), default=0.0)
+        return [x for x in self._resultants[0] if x.force > _ROUNDING * largest]
 
     @property
     def rough(self):
