@@ -132,7 +132,7 @@ def test_of_several_equilibria_the_stable_one_is_taken(monkeypatch):
         assert before[0].negative_modes == taken
 
 
-def test_a_rigid_wall_is_approached_as_closely_as_the_accuracy_needs(tmp_path):
+def test_a_rigid_wall_is_approached_as_closely_as_the_accuracy_needs(tmp_path_all):
     """Beside a stabiliser with little clearance a wall of 1e8 N/m^2 is too soft for a hook load to 1e-4."""
     sections = cf.HoleSection(500.0, 0.2159, 0.25)
     near_gauge = cf.Stabiliser(1.5, 0.2143, 0.165, 0.07)
@@ -150,8 +150,8 @@ def test_a_rigid_wall_is_approached_as_closely_as_the_accuracy_needs(tmp_path):
     # of the bit, along the hole, to which the string is a little inclined
     assert rigid.tension[-1] == pytest.approx(0.25 * rigid.contacts[-1].force, rel=5e-3)
     assert f"adds {rigid.tension[-1] / 1e3:+.3f} kN" in told
-    rigid.write(tmp_path / "out.csv")
-    rows = (tmp_path / "out_contacts.csv").read_text(encoding="utf-8").splitlines()
+    rigid.write(tmp_path_all / "out.csv")
+    rows = (tmp_path_all / "out_contacts.csv").read_text(encoding="utf-8").splitlines()
     assert rows[-1].endswith(",bit") and float(rows[-1].split(",")[2]) == pytest.approx(rigid.contacts[-1].force)
     with pytest.raises(cf.NotConverged, match="stiffer wall") as refused:
         cf.torque_and_drag(cf.Borehole(build(), sections, wall_stiffness=1e8), string, cf.TripOut(), mud=MUD, **given)
@@ -330,7 +330,7 @@ def test_a_string_that_stays_straight_where_there_is_a_helix_is_not_enough():
     assert answer.model_error == pytest.approx(abs(apart) / 90e3, rel=1e-3)
 
 
-def test_the_view_from_the_side(out, tmp_path):
+def test_the_view_from_the_side(out, tmp_path_all):
     """The lower 60 m in the hole: its wall, the low side that the string lies on, and what it presses there with."""
     axes = out.plot_from_side(length=60.0).axes[0]
     assert axes.get_xlim()[0] > 435 and axes.get_ylabel().endswith("high side (mm)")
@@ -338,7 +338,7 @@ def test_the_view_from_the_side(out, tmp_path):
     assert wall == pytest.approx(1e3 * (0.0635 + 0.04445))
     lying = [force for start, end, force, side in out.contacts if end > 440 and side == "low" and end > start]
     assert lying and any(f"{lying[-1] / 1e3:.3g} kN from" in text.get_text() for text in axes.texts)
-    out.plot_from_side(tmp_path / "side.png")
-    assert (tmp_path / "side.png").stat().st_size > 10_000
+    out.plot_from_side(tmp_path_all / "side.png")
+    assert (tmp_path_all / "side.png").stat().st_size > 10_000
     with pytest.raises(cf.SceneError, match="length"):
         out.plot_from_side(length=-1.0)
