@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from reference_wells import in_build_section
 
 import cosserat_fenicsx as cf
 from cosserat_fenicsx.element import lobatto_weights
@@ -33,14 +34,7 @@ def is_balanced(answer):
 
 @pytest.mark.parametrize("case", KNOWN["stiff build"], ids=lambda case: case["name"])
 def test_a_build_section_through_the_public_face(case):
-    given, alpha = case["input"], case["input"]["alpha"]
-    md = np.cumsum([0, given["h"], given["R"] * math.radians(alpha), given["D"] + 50.0])
-    path = cf.WellPath.from_survey(md, [0, 0, alpha, alpha], [0, 0, 0, 0])
-    stiff = cf.Stiffness((1e12, 1e12), 1e12, (given["EI"],) * 2, given["EI"])
-    string = cf.DrillString([cf.Component(None, stiff, given["w"], 0.06)])
-    operation = {1: cf.TripOut, -1: cf.TripIn, 0: cf.Static}[given["c"]](weight=-given["T0"])
-    section = cf.HoleSection(path.length, 2 * (0.06 + given["r"]), given["mu"])
-    found = cf.torque_and_drag(cf.Borehole(path, section), string, operation, depth=case["rod_length"], model="rod")
+    given, alpha, found = case["input"], case["input"]["alpha"], in_build_section(case)
     lift = case["rod_length"] - given["D"] + case["lift_off_d_below_arc_end"]
     points = points_of(found)
     assert [md for md, *_ in points] == pytest.approx([case["free_span_2"], lift - case["free_span_1"], lift], abs=0.06)

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from reference_wells import well
+from reference_wells import in_build_section, well
 
 import cosserat_fenicsx as cf
 from cosserat_fenicsx.well.rod import rod_in_hole
@@ -90,14 +90,7 @@ def test_a_rotating_string_climbs_and_has_torque():
 @pytest.mark.parametrize("case", KNOWN["stiff build"][:2], ids=lambda case: case["name"])
 def test_a_build_section_against_its_strong_form(case):
     """There the upper end turns freely and friction acts on the centreline: a difference of 31 and 18 N."""
-    given, alpha = case["input"], case["input"]["alpha"]
-    md = np.cumsum([0, given["h"], given["R"] * math.radians(alpha), given["D"] + 50.0])
-    path = cf.WellPath.from_survey(md, [0, 0, alpha, alpha], [0, 0, 0, 0])
-    stiff = cf.Stiffness((1e12, 1e12), 1e12, (given["EI"],) * 2, given["EI"])
-    string = cf.DrillString([cf.Component(None, stiff, given["w"], 0.06)])
-    operation = {1: cf.TripOut, -1: cf.TripIn, 0: cf.Static}[given["c"]](weight=-given["T0"])
-    section = cf.HoleSection(path.length, 2 * (0.06 + given["r"]), given["mu"])
-    found = cf.torque_and_drag(cf.Borehole(path, section), string, operation, depth=case["rod_length"], model="rod")
+    found = in_build_section(case)
     assert found.hook_load == pytest.approx(case["hook_load_vertical"], rel=2e-4)
 
 

@@ -9,11 +9,10 @@ import numpy as np
 from cosserat_fenicsx.annotations import File
 from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.well import criteria, loaded
-from cosserat_fenicsx.well.contacts import WallContact, contacts_of, side_force_up_to, sides_of
+from cosserat_fenicsx.well.contacts import WallContact, contacts_of, high_side, side_force_up_to, sides_of
 from cosserat_fenicsx.well.hole import Borehole
 from cosserat_fenicsx.well.mud import Mud
 from cosserat_fenicsx.well.operations import Operation
-from cosserat_fenicsx.well.pictures.shown import high_side
 from cosserat_fenicsx.well.softstring import UP_TO
 from cosserat_fenicsx.well.string import DrillString
 from cosserat_fenicsx.well.tabular import Tabular
@@ -175,7 +174,7 @@ class TorqueAndDrag(Tabular):
     def offset(self) -> np.ndarray:
         """(n, 3) from the hole's axis to the string, across the hole, m. The soft string, which has no place of its
         own: to the wall where it loads it; zero where the side is not known."""
-        high, side = high_side(self.hole.path, self.md), self.contact_side[:, None]
+        high, side = high_side(self.hole.path.tangent(self.md)), self.contact_side[:, None]
         right = np.cross(self.hole.path.tangent(self.md), high)
         return self.clearance[:, None] * np.nan_to_num(np.cos(side) * high + np.sin(side) * right)
 

@@ -32,11 +32,24 @@ class WallContact(NamedTuple):
 def side_in_space(tangents, outward):
     """(n,) angles of directions across the hole (n, 3), rad clockwise from its high side, looking down it; from the
     first axis, north, where it is vertical. tangents: (n, 3) of the hole's axis."""
-    high = tangents[:, 2:] * tangents - (0.0, 0.0, 1.0)
-    vertical = np.linalg.norm(high, axis=1) < 1e-9
+    high = high_side(tangents)
+    vertical = ~high.any(axis=1)
     high[vertical] = np.array([1.0, 0.0, 0.0]) - tangents[vertical, :1] * tangents[vertical]
     right = np.cross(tangents, high)
     return np.arctan2((outward * right).sum(axis=1), (outward * high).sum(axis=1))
+
+
+def high_side(tangents):
+    """(n, 3) unit vectors to the high side of a hole with tangents (n, 3), zero where it is vertical."""
+    high = tangents * tangents[:, 2:] - (0.0, 0.0, 1.0)
+    size = np.linalg.norm(high, axis=1, keepdims=True)
+    return np.where(size > 1e-9, high / np.where(size > 1e-9, size, 1.0), 0.0)
+
+
+def stretches(md, where):
+    """[(from, to)] depths of the stretches on which a condition (n,) holds, without those of no length."""
+    ends = np.flatnonzero(np.diff(where, prepend=False, append=False)).reshape(-1, 2) - (0, 1)
+    return [(float(md[a]), float(md[b])) for a, b in ends if md[b] > md[a]]
 
 
 def sides_of(pieces, solved, climbing):

@@ -28,15 +28,13 @@ import numpy as np
 
 from cosserat_fenicsx.well import criteria
 from cosserat_fenicsx.well.buckled import LockUp, earliest_helix, growth
-from cosserat_fenicsx.well.rings import prying
+from cosserat_fenicsx.well.rings import free_span, prying
 
 # Caution over what the clearance changes: the difference from the rod was up to 1.2 times its sum of sizes, on 240
 # random strings.
 _CAUTION = 1.25
 # Places on a piece where a snake is looked for.
 _FINE = 512
-# As of a beam that is clamped and touches the wall, see `rings`.
-_SPAN = 72.0
 # Length of components whose own bending stiffness does not count, and the shortest distance of a pair of forces, m.
 _SHORT, _NEAREST = 3.0, 0.3
 # Strain beyond what any pipe carries.
@@ -81,7 +79,7 @@ def model_errors(path, pieces, soft, solved, sections, rings=()):
     stiff[groups] += _levers(path, pieces, solved, groups, EI[groups], clearance[groups])
     extra = _snakes(chain, solved, EI, clearance)
     grown = growth(solved, pieces, sections)
-    pried, arms = _at_rings(chain, solved, pieces, sections, rings)
+    pried, arms = _at_rings(chain, solved, pieces.bottom[-1], clearance, EI, rings)
     parts = (missed, stiff, pried, extra)
     hook, torque = ([float(share @ (part * grown)) for part in parts] for share in (load, turn))
     hook[0] += _lower(pieces) + _at_ends(pieces, solved, sections)
@@ -106,26 +104,25 @@ def _snakes(chain, solved, EI, clearance):
     the load across of the helices, since the mean wall force of a helix with gravity is r F^2/(4 EI) alone."""
     extra = np.zeros(len(EI))
     fine = (np.arange(_FINE) + 0.5) / _FINE
-    for i in np.flatnonzero((solved.tension.min(axis=1) < 0) & ~solved.helical & (clearance > 1e-9) & (EI > 0)):
+    compressed = (solved.tension.min(axis=1) < 0) & (clearance > 1e-9) & (EI > 0)
+    for i in np.flatnonzero(compressed | solved.helical):
         F = np.maximum(-np.interp(fine, solved.at, solved.tension[i]), 0.0)
         side = np.interp(fine, solved.at, solved.side[i]) * chain.climb[i]
-        snakes = F > criteria.snake_load(EI[i], clearance[i], chain.weight[i], side)
-        extra[i] = np.mean(np.where(snakes, criteria.helix_side(EI[i], clearance[i], F) / 2, 0.0)) * chain.length[i]
-    for i in np.flatnonzero(solved.helical):
-        compressions = np.maximum(-np.interp(fine, solved.at, solved.tension[i]), 0.0)
-        both = np.interp(fine, solved.at, solved.side[i]) * chain.climb[i]
-        extra[i] = np.mean(both - criteria.helix_side(EI[i], clearance[i], compressions)) * chain.length[i]
+        helix = criteria.helix_side(EI[i], clearance[i], F)
+        if solved.helical[i]:
+            more = side - helix
+        else:
+            more = np.where(F > criteria.snake_load(EI[i], clearance[i], chain.weight[i], side), helix / 2, 0.0)
+        extra[i] = np.mean(more) * chain.length[i]
     return extra
 
 
-def _at_rings(chain, solved, pieces, sections, rings):
+def _at_rings(chain, solved, depth, clearance, EI, rings):
     """Wall force (N) of bits and stabilisers that pry; and (N) by what the larger radius on which they bear the load of
     their spans multiplies the torque."""
-    depth = pieces.bottom[-1]
     ends = depth - np.append(0.0, np.cumsum(chain.length))  # measured depths, from the lower end up
     largest = np.array([solved.side.max(axis=1) * chain.climb, np.maximum(-solved.tension.min(axis=1), 0.0),
-                        chain.curvature, (pieces.hole - pieces.radius)[chain.origin],
-                        np.nan_to_num(sections.EI[pieces.component[chain.origin]])])  # fmt: skip
+                        chain.curvature, clearance, EI])  # fmt: skip
 
     def along(a, b):
         return largest[:, (ends[:-1] > a + 1e-9) & (ends[1:] < b - 1e-9)].max(axis=1, initial=0.0)
@@ -173,12 +170,17 @@ def _turns(chain, solved, groups, clearance):
     return np.where(way > 1, (6 * way * clearance * T) ** (2 / 3) * rate ** (1 / 3), 0.0)  # others slide along the wall
 
 
+def _spanned(q, T, d, EI, length):
+    """The load (N) on the span by which a string under a load q (N/m) comes to a wall at a distance d (m), by its
+    tension T (N) and its bending stiffness; at most that on the length (m) there is."""
+    return min(np.sqrt(2 * d * q * T) + q * free_span(EI, d, q), q * length)
+
+
 def _hung(chain, solved, clearance, EI):
     """Wall force (N) that is missed below the surface, where the rod hangs on the axis and comes to the wall farther
     down."""
     q, T = solved.side[-1, -1] * chain.climb[-1], max(solved.tension[-1, -1], 0.0)
-    bent = (_SPAN * EI * clearance * q**3) ** 0.25
-    return min(np.sqrt(2 * clearance * q * T) + bent, q * chain.length.sum())
+    return _spanned(q, T, clearance, EI, chain.length.sum())
 
 
 def _edges(pieces, solved, groups, EI):
@@ -189,12 +191,10 @@ def _edges(pieces, solved, groups, EI):
     length, q = (pieces.bottom - pieces.top)[up], solved.side[groups].max(axis=1) * solved.chain.climb[groups]
     T = np.abs(solved.tension[groups, 0])
     for j in np.flatnonzero((mu[1:] != mu[:-1]) & (hole[1:] != hole[:-1])):
-        wide = j if hole[j] > hole[j + 1] else j + 1
-        more, less = max(mu[j], mu[j + 1]), min(mu[j], mu[j + 1])
-        if q[wide] > 0:
-            d = abs(hole[j] - hole[j + 1])
-            span = min(length[wide], (_SPAN * EI[wide] * d / q[wide]) ** 0.25 + np.sqrt(2 * d * T[wide] / q[wide]))
-            found[j if mu[j] == more else j + 1] += q[wide] * span * (1 - less / more)
+        wide, more = (max(j, j + 1, key=of.__getitem__) for of in (hole, mu))
+        less = min(mu[j], mu[j + 1])
+        load = _spanned(q[wide], T[wide], abs(hole[j] - hole[j + 1]), EI[wide], length[wide])
+        found[more] += load * (1 - less / mu[more])
     return found
 
 

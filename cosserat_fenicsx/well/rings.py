@@ -6,6 +6,7 @@ the high side, where a longer span beside them bends the string between them.
 """
 
 from collections import namedtuple
+from itertools import pairwise
 
 import numpy as np
 
@@ -24,6 +25,8 @@ _SPAN, _MOMENT, _CARRIED, _TURN = 72.0, 1 / 6, 2 / 3, 1 / 24
 # Caution over moments, which are sums of sizes; the most by which compression enlarges bending; distance from a ring up
 # to which the string matters to it, m.
 _CAUTION, _ENLARGED, _REACH = 1.5, 5.0, 60.0
+# Length of a span that there is none, m.
+_NONE = 1e-9
 
 
 def is_ring(component):
@@ -37,6 +40,12 @@ def ring_of(place, hole):
     radius = place.component.contact_radius
     clearance = max(0.0, float(hole.at(s, "diameter")) / 2 - radius)
     return Ring(s, clearance, radius, place.component.outer_diameter / 2)
+
+
+def free_span(EI, d, q):
+    """Length (m) that a beam of bending stiffness EI (N m^2) under a load q (N/m) spans from where it is clamped to a
+    wall that is lower by d (m); 0 without a load."""
+    return (_SPAN * EI * d / q) ** 0.25 if q > 0 else 0.0
 
 
 def prying(rings, depth, along):
@@ -54,12 +63,9 @@ def prying(rings, depth, along):
         return np.zeros(0), np.zeros(0)
     places = [depth, *(ring.s for ring in rings), 0.0]
     clear = [0.0, *(ring.clearance for ring in rings), 0.0]
-    spans = [_span(a - b, along(max(b, a - _REACH), a), max(pair)) if a - b > 1e-9 else _Span(0.0, 0.0, 0.0, 0.0, 0.0)
-             for a, b, pair in zip(places, places[1:], zip(clear, clear[1:], strict=False), strict=False)]  # fmt: skip
-    pries, carries = (
-        np.zeros(len(rings)),
-        np.array([a.carried + b.carried for a, b in zip(spans, spans[1:], strict=False)]),
-    )
+    spans = [_span(a - b, along(max(b, a - _REACH), a), max(pair))
+             for (a, b), pair in zip(pairwise(places), pairwise(clear), strict=True)]  # fmt: skip
+    pries, carries = np.zeros(len(rings)), np.array([a.carried + b.carried for a, b in pairwise(spans)])
     for i, (below, here, above) in enumerate(zip(spans, spans[1:-1], spans[2:], strict=False)):
         angle = max(below.angle, above.angle)
         free = (rings[i].clearance + rings[i + 1].clearance) / here.length  # the angle that the clearances leave
@@ -72,9 +78,9 @@ def prying(rings, depth, along):
 def _span(length, largest, clearance):
     """The `_Span` of so much string beside a ring with a clearance."""
     q, compression, curvature, room, EI = largest
-    if not EI > 0 or not q > 0:
+    if not EI > 0 or not q > 0 or length < _NONE:
         return _Span(length, q, 0.0, 0.0, q * length / 2)
-    free = (_SPAN * EI * (room + clearance) / q) ** 0.25
+    free = free_span(EI, room + clearance, q)
     short = min(length, free)
     larger = min(1 / max(1 - compression * short**2 / (np.pi**2 * EI), 1e-9), _ENLARGED)
     angle = larger * q * short**3 * _TURN / EI + curvature * short / 2

@@ -8,7 +8,7 @@ from rich.table import Table
 from cosserat_fenicsx.results.tables import as_text
 from cosserat_fenicsx.well import criteria
 from cosserat_fenicsx.well.components import DrillPipe
-from cosserat_fenicsx.well.pictures.shown import stretches
+from cosserat_fenicsx.well.contacts import stretches
 
 # Notes of a sweep that are shown; more are counted.
 _NOTES = 12

@@ -1,4 +1,4 @@
-"""What pictures of a string in its hole share: the depths that they show, sides and their colours, stretches."""
+"""What pictures of a string in its hole share: the depths that they show, sides and their colours, forces."""
 
 import numpy as np
 
@@ -39,20 +39,6 @@ def sides_along(answer):
     names = np.array([name_of_side(side) for side in answer.contact_side])
     vertical = (answer.inclination < VERTICAL) & (answer.side_force > 0)
     return np.where(np.isfinite(answer.contact_side) | vertical, names, "")
-
-
-def high_side(path, md):
-    """(n, 3) unit vectors to the high side of a hole, zero where it is vertical."""
-    t = path.tangent(md)
-    high = t * t[:, 2:] - (0.0, 0.0, 1.0)
-    size = np.linalg.norm(high, axis=1, keepdims=True)
-    return np.where(size > 1e-9, high / np.where(size > 1e-9, size, 1.0), 0.0)
-
-
-def stretches(md, where):
-    """[(from, to)] depths of the stretches on which a condition (n,) holds, without those of no length."""
-    ends = np.flatnonzero(np.diff(where, prepend=False, append=False)).reshape(-1, 2) - (0, 1)
-    return [(float(md[a]), float(md[b])) for a, b in ends if md[b] > md[a]]
 
 
 def points_between(answer, top, bottom):

@@ -7,6 +7,7 @@ from cosserat_fenicsx.checks import positive
 from cosserat_fenicsx.pictures.figures import draw_chart, empty_figure
 from cosserat_fenicsx.ranks import world
 from cosserat_fenicsx.well.components import Bit, Stabiliser
+from cosserat_fenicsx.well.contacts import high_side
 
 _ROCK, _BODY, _BLADES, _BIT, _FORCE = "#e4d3bd", "#9db4cc", "#5f7f9f", "#4d5b6b", "tab:red"
 # Length of the longest arrow, heights of the names, in turn, and of the picture's edges, over the width of the hole.
@@ -52,11 +53,9 @@ def side_figure(answer, length=None):
 
 def _towards_high_side(answer):
     """(n,) distance of the string from the hole's axis towards the high side (north, where there is none), m."""
-    t = answer.hole.path.tangent(answer.md)
-    high = t * t[:, 2:] - (0.0, 0.0, 1.0)
-    size = np.linalg.norm(high, axis=1)
-    high[size < 1e-9] = (1.0, 0.0, 0.0)
-    return (answer.offset * high).sum(axis=1) / np.where(size < 1e-9, 1.0, size)
+    high = high_side(answer.hole.path.tangent(answer.md))
+    high[~high.any(axis=1)] = (1.0, 0.0, 0.0)
+    return (answer.offset * high).sum(axis=1)
 
 
 def _draw_component(axes, place, md, high, name):

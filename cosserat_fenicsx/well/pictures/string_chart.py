@@ -6,16 +6,15 @@ from cosserat_fenicsx.pictures.axes import round_step
 from cosserat_fenicsx.pictures.figures import draw_chart
 from cosserat_fenicsx.ranks import world
 from cosserat_fenicsx.well import criteria
+from cosserat_fenicsx.well.contacts import high_side, stretches
 from cosserat_fenicsx.well.pictures.charts import depth_axes
 from cosserat_fenicsx.well.pictures.shown import (
     SIDES,
     VERTICAL,
     depths_between,
-    high_side,
     points_between,
     rows_between,
     sides_along,
-    stretches,
     usual_side_force,
 )
 
@@ -102,7 +101,7 @@ def _legend(axes):
 def _string(panel, answer, rows):
     """The string in the hole, seen across its plane of high and low side, or across north where it is vertical."""
     md, hole = answer.md[rows], answer.hole.at(answer.md[rows], "diameter") / 2
-    high = high_side(answer.hole.path, md)
+    high = high_side(answer.hole.path.tangent(md))
     vertical = not high.any()
     across = answer.offset[rows][:, 0] if vertical else (answer.offset[rows] * high).sum(axis=1)
     panel.fill_betweenx(md, -1e3 * hole, 1e3 * hole, color="bisque", linewidth=0)
