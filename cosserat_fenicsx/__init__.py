@@ -103,6 +103,21 @@ _HOME = {
     "read_well": "well.scenefile",
     "WellScene": "well.scenefile",
     "WellPath": "well.path",
+    "BitOnRock": "drilling.bit_laws",
+    "Cutting": "drilling.bit_laws",
+    "Discs": "drilling.discs",
+    "Drilling": "drilling.scene",
+    "Hook": "drilling.hook",
+    "Lobes": "drilling.bit_laws",
+    "Matched": "drilling.top_drive",
+    "Motor": "drilling.top_drive",
+    "PI": "drilling.top_drive",
+    "Stiff": "drilling.top_drive",
+    "Stribeck": "drilling.bit_laws",
+    "TopDrive": "drilling.top_drive",
+    "ViscousDrag": "drilling.wall_friction",
+    "WallFriction": "drilling.wall_friction",
+    "Wear": "drilling.bit_laws",
     "euler_load": "scene.rod",
     "read_motion": "scene.scenefile",
     "read_path": "statics.reading",
@@ -132,6 +147,21 @@ if TYPE_CHECKING:  # the same names, for editors and type checkers
     from cosserat_fenicsx.actions.tube_wall import TubeRing as TubeRing
     from cosserat_fenicsx.actions.tube_wall import TubeWall as TubeWall
     from cosserat_fenicsx.actions.wall import Wall as Wall
+    from cosserat_fenicsx.drilling.bit_laws import BitOnRock as BitOnRock
+    from cosserat_fenicsx.drilling.bit_laws import Cutting as Cutting
+    from cosserat_fenicsx.drilling.bit_laws import Lobes as Lobes
+    from cosserat_fenicsx.drilling.bit_laws import Stribeck as Stribeck
+    from cosserat_fenicsx.drilling.bit_laws import Wear as Wear
+    from cosserat_fenicsx.drilling.discs import Discs as Discs
+    from cosserat_fenicsx.drilling.hook import Hook as Hook
+    from cosserat_fenicsx.drilling.scene import Drilling as Drilling
+    from cosserat_fenicsx.drilling.top_drive import Matched as Matched
+    from cosserat_fenicsx.drilling.top_drive import Motor as Motor
+    from cosserat_fenicsx.drilling.top_drive import PI as PI
+    from cosserat_fenicsx.drilling.top_drive import Stiff as Stiff
+    from cosserat_fenicsx.drilling.top_drive import TopDrive as TopDrive
+    from cosserat_fenicsx.drilling.wall_friction import ViscousDrag as ViscousDrag
+    from cosserat_fenicsx.drilling.wall_friction import WallFriction as WallFriction
     from cosserat_fenicsx.dynamics.natural_modes import modes as modes
     from cosserat_fenicsx.dynamics.resuming import read_history as read_history
     from cosserat_fenicsx.dynamics.resuming import resume as resume

@@ -70,7 +70,8 @@ ROOMS = {
     "statics": {"scene", "models", "algebra", "results"},
     "dynamics": {"scene", "models", "algebra", "results", "storage", "statics"},
     "well": {"actions", "scene", "models", "statics", "results", "pictures"},
-    "cli": {"well", "scene", "models", "statics", "dynamics", "results", "storage", "pictures"},
+    "drilling": {"well", "scene", "results", "storage", "pictures", "algebra"},
+    "cli": {"drilling", "well", "scene", "models", "statics", "dynamics", "results", "storage", "pictures"},
 }
 #: Files that combine scenes, models, solvers and results; all other solver files import none of scene, models and
 #: results.

@@ -1,0 +1,168 @@
+"""What acts between bit and rock.
+
+`Stribeck`: a torque that falls with the speed, set-valued at rest. `Cutting`: the depth of cut of Richard, Germay &
+Detournay, J. Sound Vib. 305 (2007) 432, doi:10.1016/j.jsv.2007.04.015, with the delay of the part of a revolution from
+blade to blade. `Lobes`: a rock whose face is wavy.
+"""
+
+import math
+from dataclasses import dataclass
+
+from cosserat_fenicsx.checks import instance, number, positive, refuse, store
+
+
+def _not_negative(owner, field, unit):
+    value = number(owner, field, getattr(owner, field), f"a number ({unit}), not negative", lambda x: 0 <= x < math.inf)
+    store(owner, **{field: value})
+
+
+@dataclass(frozen=True)
+class Stribeck:
+    """Torque on bit T = T_d + (T_s - T_d) exp(-|om|/speed) against the rotation, anything up to T_s at rest.
+
+    Args:
+        static, dynamic: T_s and T_d, N m; with a `radius` coefficients of friction: then the torque is coefficient
+            times weight on bit times radius.
+        speed: decay of the static part, rad/s; None where static and dynamic are the same, or for a torque that drops
+            to the dynamic one at once (Coulomb).
+        radius: m, see above.
+
+    Raises:
+        SceneError: numbers that are negative, a static torque below the dynamic one.
+    """
+
+    static: float
+    dynamic: float
+    speed: float | None = None
+    radius: float | None = None
+
+    def __post_init__(self):
+        for field in ("static", "dynamic"):
+            _not_negative(self, field, "N m, or a coefficient where there is a radius")
+        if self.static < self.dynamic:
+            refuse(self, "static", self.static, f"at least the dynamic one, {self.dynamic:g}")
+        for field, unit in (("speed", "rad/s"), ("radius", "m")):
+            if getattr(self, field) is not None:
+                store(self, **{field: positive(self, field, getattr(self, field), unit)})
+
+    def torques(self, weight: float) -> tuple[float, float]:
+        """Static and dynamic torque (N m) under a weight on bit (N)."""
+        factor = 1.0 if self.radius is None else weight * self.radius
+        return self.static * factor, self.dynamic * factor
+
+
+@dataclass(frozen=True)
+class Wear:
+    """Wear flats of a bit: they rub while the bit is pressed on the rock.
+
+    Args:
+        stress: contact stress below the flats, Pa. length: of the flats of all blades together, m.
+        friction: coefficient. geometry: gamma, which distributes the flats over the radius; 1 is uniform.
+
+    Raises:
+        SceneError: numbers that are not positive.
+    """
+
+    stress: float
+    length: float
+    friction: float
+    geometry: float = 1.0
+
+    def __post_init__(self):
+        for field, unit in (("stress", "Pa"), ("length", "m"), ("friction", "coefficient"), ("geometry", "number")):
+            store(self, **{field: positive(self, field, getattr(self, field), unit)})
+
+
+@dataclass(frozen=True)
+class Cutting:
+    """A drag bit that cuts: weight n zeta epsilon a d and torque n epsilon a^2 d/2 for the depth of cut d of a blade.
+
+    d = U(t) - U(t - tau), U the depth of the bit; within the delay tau the bit turns by 2 pi/n. Wear flats add the
+    weight a l sigma and the torque gamma mu a/2 times that weight.
+
+    Args:
+        a: radius of the bit, m. epsilon: intrinsic specific energy, Pa. zeta: ratio of vertical to horizontal force.
+        blades: n. wear: a `Wear`, or None for a sharp bit.
+
+    Raises:
+        SceneError: numbers that are not positive.
+    """
+
+    a: float
+    epsilon: float
+    zeta: float
+    blades: int
+    wear: Wear | None = None
+
+    def __post_init__(self):
+        for field, unit in (("a", "m"), ("epsilon", "Pa"), ("zeta", "number")):
+            store(self, **{field: positive(self, field, getattr(self, field), unit)})
+        number(self, "blades", self.blades, "a number of blades from 1", lambda x: x >= 1 and x == int(x))
+        store(self, blades=int(self.blades))
+        if self.wear is not None:
+            instance(self, "wear", self.wear, Wear, "a Wear or None")
+
+    @property
+    def axial_stiffness(self) -> float:
+        """Weight on bit per depth of cut of a blade, n zeta epsilon a, N/m."""
+        return self.blades * self.zeta * self.epsilon * self.a
+
+    @property
+    def torsional_stiffness(self) -> float:
+        """Torque on bit per depth of cut of a blade, n epsilon a^2/2, N."""
+        return self.blades * self.epsilon * self.a**2 / 2
+
+
+@dataclass(frozen=True)
+class Lobes:
+    """A face of the rock that lifts a roller-cone bit: by amplitude sin(count theta), theta the angle of the bit.
+
+    Args:
+        count: lobes in a revolution; three for tricone bits. amplitude: m.
+        law: torque on bit, a `Stribeck`, or None.
+
+    Raises:
+        SceneError: numbers that are not positive.
+    """
+
+    count: int
+    amplitude: float
+    law: Stribeck | None = None
+
+    def __post_init__(self):
+        number(self, "count", self.count, "a number of lobes from 1", lambda x: x >= 1 and x == int(x))
+        store(self, count=int(self.count), amplitude=positive(self, "amplitude", self.amplitude, "m"))
+        if self.law is not None:
+            instance(self, "law", self.law, Stribeck, "a Stribeck or None")
+
+
+LAWS = (Stribeck, Cutting, Lobes)
+
+
+@dataclass(frozen=True)
+class BitOnRock:
+    """The bit at work, at the lower end of the string.
+
+    Args:
+        law: `Stribeck(...)`, `Cutting(...)` or `Lobes(...)`.
+        weight: static weight on bit, N. None where the law needs none, or where the speed of drilling decides it.
+        inertia: of the bit and what turns with it beyond the string's sections, kg m^2.
+        mass: the same for axial motion, kg.
+
+    Raises:
+        SceneError: an unknown law, a weight that is missing, or a negative number.
+    """
+
+    law: Stribeck | Cutting | Lobes
+    weight: float | None = None
+    inertia: float = 0.0
+    mass: float = 0.0
+
+    def __post_init__(self):
+        instance(self, "law", self.law, LAWS, "Stribeck(...), Cutting(...) or Lobes(...)")
+        for field, unit in (("inertia", "kg m^2"), ("mass", "kg")):
+            _not_negative(self, field, unit)
+        if self.weight is not None:
+            store(self, weight=positive(self, "weight", self.weight, "N"))
+        elif isinstance(self.law, Lobes) or getattr(self.law, "radius", None) is not None:
+            refuse(self, "weight", None, "the weight on bit (N), which the law needs")

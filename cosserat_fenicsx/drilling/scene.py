@@ -1,0 +1,100 @@
+"""A drill-string in motion: string, hole, drive, hook, bit, mud and friction."""
+
+import math
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+from cosserat_fenicsx.checks import instance, positive, refuse, store
+from cosserat_fenicsx.drilling.bit_laws import BitOnRock
+from cosserat_fenicsx.drilling.discs import Discs
+from cosserat_fenicsx.drilling.hook import Hook
+from cosserat_fenicsx.drilling.segments import Segment, segment_of
+from cosserat_fenicsx.drilling.top_drive import TopDrive
+from cosserat_fenicsx.drilling.wall_friction import ViscousDrag, WallFriction
+from cosserat_fenicsx.well.components import weight_in_mud
+from cosserat_fenicsx.well.hole import Borehole
+from cosserat_fenicsx.well.mud import Mud
+from cosserat_fenicsx.well.string import DrillString
+
+
+@dataclass(frozen=True)
+class Drilling:
+    """A drill-string with what turns it, holds it and brakes it. It starts at rest, untwisted, hanging in its weight.
+
+    Args:
+        string: a `DrillString`, or `Discs`.
+        drive: a `TopDrive`.
+        bit: a `BitOnRock`; None where the lower end is free.
+        hole: a `Borehole`; None for a string without walls, as in a straight vertical hole.
+        hook: a `Hook`; None for a rigid one at rest.
+        mud: a `Mud`; None where all components have their weight in mud, or where there is no hole: in air.
+        friction: `WallFriction`; None for that of the hole, the same at rest and in motion.
+        drag: `ViscousDrag`; None for none.
+        depth: measured depth of the bit, m; None for the bottom of the hole, or the string's length without one.
+
+    Raises:
+        SceneError: parts that are missing or do not fit each other.
+    """
+
+    string: DrillString | Discs
+    drive: TopDrive
+    bit: BitOnRock | None = None
+    hole: Borehole | None = None
+    hook: Hook | None = None
+    mud: Mud | None = None
+    friction: WallFriction | None = None
+    drag: ViscousDrag | None = None
+    depth: float | None = None
+
+    def __post_init__(self):
+        parts = {
+            "string": (DrillString, Discs), "drive": TopDrive, "bit": BitOnRock, "hole": Borehole, "hook": Hook,
+            "mud": Mud, "friction": WallFriction, "drag": ViscousDrag,
+        }  # fmt: skip
+        for field, kinds in parts.items():
+            value = getattr(self, field)
+            if value is not None or field in ("string", "drive"):
+                names = " or ".join(x.__name__ for x in (kinds if isinstance(kinds, tuple) else (kinds,)))
+                instance(self, field, value, kinds, f"{names}(...)")
+        if isinstance(self.string, Discs):
+            for field in ("hole", "hook", "mud", "friction", "drag", "depth"):
+                if getattr(self, field) is not None:
+                    refuse(self, field, getattr(self, field), "None for Discs, which turn alone; drags are theirs")
+            return
+        if self.friction is not None and self.hole is None:
+            refuse(self, "hole", None, "a Borehole, where there is friction at its wall")
+        if self.depth is not None:
+            store(self, depth=positive(self, "depth", self.depth, "m"))
+        elif self.hole is None and self.string.components[-1].length is None:
+            refuse(self.string.components[-1], "length", None, "a length (m), where there is neither hole nor depth")
+        _ = self.segments
+
+    @cached_property
+    def bit_depth(self) -> float:
+        """Measured depth of the lower end, m."""
+        if self.depth is not None:
+            return self.depth
+        return self.hole.length if self.hole else math.fsum(part.length for part in self.string.components)
+
+    @cached_property
+    def laid(self) -> list:
+        """The components in their places, from the bit up."""
+        return self.string.laid(self.bit_depth)
+
+    @cached_property
+    def segments(self) -> tuple[Segment, ...]:
+        """The uniform parts of the string, from the top down."""
+        mud = self.mud if self.mud is not None or self.hole is not None else Mud(0.0)
+        return tuple(segment_of(place, weight_in_mud(place.component, mud)) for place in reversed(self.laid))
+
+    def with_case(self, speed: float | None = None, weight: float | None = None) -> "Drilling":
+        """The same scene at another speed of the drive (rad/s) or another static weight on bit (N).
+
+        Raises:
+            SceneError: a weight where there is no bit.
+        """
+        drive = self.drive if speed is None else replace(self.drive, speed=speed)
+        if weight is not None and self.bit is None:
+            refuse(self, "bit", None, "a BitOnRock, whose weight is to change")
+        bit = self.bit if weight is None else replace(self.bit, weight=weight)
+        return replace(self, drive=drive, bit=bit)
