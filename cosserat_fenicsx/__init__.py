@@ -108,6 +108,7 @@ _HOME = {
     "Discs": "drilling.discs",
     "Drilling": "drilling.scene",
     "DrillingHistory": "drilling.history",
+    "DrillingScene": "drilling.scenefile",
     "Hook": "drilling.hook",
     "Lobes": "drilling.bit_laws",
     "Matched": "drilling.top_drive",
@@ -117,6 +118,7 @@ _HOME = {
     "Stribeck": "drilling.bit_laws",
     "TopDrive": "drilling.top_drive",
     "read_drilling": "drilling.simulate",
+    "read_drilling_scene": "drilling.scenefile",
     "resume_drilling": "drilling.simulate",
     "simulate_drilling": "drilling.simulate",
     "StickSlip": "drilling.stick_slip",
@@ -161,6 +163,8 @@ if TYPE_CHECKING:  # the same names, for editors and type checkers
     from cosserat_fenicsx.drilling.history import DrillingHistory as DrillingHistory
     from cosserat_fenicsx.drilling.hook import Hook as Hook
     from cosserat_fenicsx.drilling.scene import Drilling as Drilling
+    from cosserat_fenicsx.drilling.scenefile import DrillingScene as DrillingScene
+    from cosserat_fenicsx.drilling.scenefile import read_drilling_scene as read_drilling_scene
     from cosserat_fenicsx.drilling.simulate import read_drilling as read_drilling
     from cosserat_fenicsx.drilling.simulate import resume_drilling as resume_drilling
     from cosserat_fenicsx.drilling.simulate import simulate_drilling as simulate_drilling
