@@ -43,8 +43,9 @@ def step_errors(model, rows, since=0.0):
     """Errors of the `Cycle` of a motion by its step, from a run with twice the step, which takes a quarter to a half
     of the time.
 
-    The difference of the two runs is returned. It is at least the error of the finer one where halving the step halves
-    the error or better; a motion that is not periodic, or whether a bit sticks just so, may depend on any step.
+    Twice the difference of the two runs is returned: twice the error of the finer one where that is of the first order
+    in the step, six times where it is of the second. A motion that is not periodic, or a bit that sticks just so, may
+    depend on any step.
 
     Args:
         model: a `StringModel` with `coarser()`, such as `TorsionWaves`, which has computed the motion.
@@ -55,4 +56,4 @@ def step_errors(model, rows, since=0.0):
     """
     other = model.coarser()
     coarse = other.advance(int(np.ceil(rows[-1, 0] / other.dt - 1e-6)))
-    return Cycle(*(abs(a - b) for a, b in zip(cycle_of(rows, since), cycle_of(coarse, since), strict=True)))
+    return Cycle(*(2 * abs(a - b) for a, b in zip(cycle_of(rows, since), cycle_of(coarse, since), strict=True)))

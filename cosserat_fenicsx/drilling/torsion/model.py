@@ -39,7 +39,7 @@ _CHANGING = ("down", "up", "down_kept", "up_kept", "speed", "angle", "torque", "
 # metres, and at least so many cells.
 _CELLS, _LONGEST, _FEWEST = 300, 5.0, 40
 _NARROWER = 0.9  # of the longest step for which a law of friction has one answer
-_TRIALS = 20
+_MOST = 1e5  # cells
 _TOLD = 0.01  # steps; smaller misfits of travel times are no matter
 
 
@@ -74,16 +74,17 @@ class TorsionWaves(Pointers):
         if elements is not None:
             dt = min(time / positive("TorsionWaves", "elements", elements, "cells"), dt or math.inf)
         asked = dt = dt or time / min(max(scene.bit_depth / _LONGEST, _FEWEST), _CELLS)
-        for _ in range(_TRIALS):
+        if time / dt > _MOST:
+            refuse("TorsionWaves", "dt", dt, f"at least {1 / _MOST:g} of the travel time of the string, {time:.4g} s")
+        factor = 1.0
+        while factor >= 1:
+            if time / dt > _MOST:
+                refuse("TorsionWaves", "scene.friction", scene.friction, "a friction that decays more slowly with the "
+                       f"speed: with {_MOST:g} cells the speed at every place is not determined")  # fmt: skip
             self.cells = cells = cells_of(scene.segments, dt)
             self._set_nodes(drag)
             factor = self._steepness()
-            if factor < 1:
-                break
-            dt = cells.dt * min(_NARROWER / factor, _NARROWER)
-        else:
-            refuse("TorsionWaves", "scene.friction", scene.friction, "a friction that decays more slowly with the "
-                   "speed: no step is short enough for the speed at every place to be determined")  # fmt: skip
+            dt = cells.dt * min(_NARROWER / factor if factor else 1.0, _NARROWER)
         self.dt, self.depths = cells.dt, cells.depths
         self.signal = MeanSpeeds(scene.drive.signal(), self.dt)
         self.why = tuple(self._reasons(asked))
