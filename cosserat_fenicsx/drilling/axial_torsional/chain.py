@@ -14,7 +14,7 @@ from cosserat_fenicsx.drilling.discs import Discs
 from cosserat_fenicsx.well.operations import RotateOffBottom
 from cosserat_fenicsx.well.pieces import pieces_of
 
-_LEAST, _MOST = 1 / 12, 1 / 6
+_LEAST, _MOST = 1 / 12, 0.235
 
 
 @dataclass(frozen=True)

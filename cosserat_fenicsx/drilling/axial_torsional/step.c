@@ -130,7 +130,6 @@ static void commit(model *m, double h, const double *signal)
         }
     }
     const double *w = m->w + (size_t)last * n;
-    m->bit.weight = m->bit.torque = 0;
     double force[2];
     for (int d = 2 - n; d < 2; d++) {
         force[d] = m->bit.force[d];
