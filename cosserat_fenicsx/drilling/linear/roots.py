@@ -35,6 +35,10 @@ class Box:
         """Which of the roots of Im s >= 0 are inside."""
         return (s.real > self.left) & (s.real < self.right) & (s.imag >= self.bottom) & (s.imag < self.top)
 
+    def near(self, s, margin):
+        """Whether a root is inside, or not farther outside than a margin."""
+        return (self.left - margin < s.real < self.right + margin) and s.imag < self.top + margin
+
     def halves(self, share):
         """Both parts, cut across the longer side."""
         if self.top - self.bottom >= self.right - self.left:
@@ -111,29 +115,33 @@ def count(f, box, spacing):
     return round(whole)
 
 
-def newton(f, starts, stride):
+def each(f, starts, stride):
     """Newton's method from many points at once, with steps of at most `stride`.
 
     Returns:
-        The points where it has settled, (n,) complex of Im s >= 0, each once.
+        (n,) complex, NaN where it has not settled.
     """
     s = np.array(starts, dtype=complex)
-    best = np.full(len(s), np.inf)
-    for _ in range(_STEPS):
+    size = np.full(len(s), np.inf)
+    for _ in range(_STEPS if len(s) else 0):
         with np.errstate(all="ignore"):
             value, derivative = f(s)
-            step = -value / derivative
-            step = np.where(np.isfinite(step), step, 0.3 * stride)
-            size = np.abs(step)
-            step *= np.minimum(1.0, stride / np.maximum(size, 1e-300))
-        s = s + step
-        best = np.where(value == 0, 0.0, size)
-        if (best <= _SETTLED * np.abs(s)).all():
+            step = np.where(value == 0, 0.0, -value / derivative)
+        step = np.where(np.isfinite(step), step, 0.3 * stride)
+        size = np.abs(step)
+        s = s + step * np.minimum(1.0, stride / np.maximum(size, 1e-300))
+        if (size <= _SETTLED * np.abs(s)).all():
             break
-    done = s[best <= 1e-11 * np.maximum(np.abs(s), stride * 1e-3)]
+    return np.where(size <= 1e-11 * np.maximum(np.abs(s), stride * 1e-3), s, np.nan)
+
+
+def newton(f, starts, stride):
+    """The roots that Newton's method finds from many starts, each once: (n,) complex of Im s >= 0."""
+    done = each(f, starts, stride)
+    done = done[np.isfinite(done)]
     done = np.where(done.imag < 0, done.conj(), done)
-    done = np.where(np.abs(done.imag) < 1e-11 * np.maximum(np.abs(done), stride * 1e-3), done.real + 0j, done)
-    return distinct(done)
+    real = np.abs(done.imag) < 1e-11 * np.maximum(np.abs(done), stride * 1e-3)
+    return distinct(np.where(real, done.real + 0j, done))
 
 
 def distinct(roots):
