@@ -13,7 +13,7 @@ from mpi4py import MPI
 import cosserat_fenicsx as cf
 
 ROOT = Path(__file__).parent.parent
-LIMIT, CALLS, STOPS = 3, [], []
+LIMIT, CALLS, STOPS, MUD = 3, [], [], cf.Mud(1200.0)
 CASES = {"i": range(12)}
 PROGRAM = """
 import sys, time
@@ -126,6 +126,14 @@ def fourth(i):
     return i / 4
 
 
+def pressure(depth):
+    return heaviness() * depth
+
+
+def heaviness():
+    return 9.81 * MUD.density
+
+
 def test_another_study_is_refused(tmp_path_all, monkeypatch):
     cf.study(third, CASES, folder=tmp_path_all)
     COMM.barrier()
@@ -141,10 +149,21 @@ def test_another_study_is_refused(tmp_path_all, monkeypatch):
     refused(third, {"i": [*range(11), 0.5]}, r'whose case 11 is {"dict": .*11.*, not .*0\.5.*')
     with monkeypatch.context() as changed:
         changed.setattr(sys.modules[__name__], "LIMIT", 5)
-        refused(third, CASES, "of the task .*third as it was before its code, or a number that it uses, was changed")
+        refused(third, CASES, "of the task .*third as it was before its code, or something that it uses, was changed")
         changed.setattr(fourth, "__qualname__", "third")
         refused(fourth, CASES, "of the task .*third as it was before its code, or .* changed")
     assert len(cf.study(third, CASES, folder=tmp_path_all)) == 12
+
+
+def test_what_a_task_uses_is_compared(tmp_path_all, monkeypatch):
+    cf.study(pressure, {"depth": [1.0]}, folder=tmp_path_all)
+    COMM.barrier()
+    here = sys.modules[__name__]
+    for name, other in (("MUD", cf.Mud(1300.0)), ("heaviness", lambda: 9.80665 * MUD.density)):
+        with monkeypatch.context() as changed, pytest.raises(cf.SceneError, match="or something that it uses"):
+            changed.setattr(here, name, other)
+            cf.study(pressure, {"depth": [1.0]}, folder=tmp_path_all)
+    assert cf.study(pressure, {"depth": [1.0]}, folder=tmp_path_all).results == [9.81 * 1200.0]
 
 
 def test_what_cannot_be_compared_is_refused_with_a_folder_alone(tmp_path_all):

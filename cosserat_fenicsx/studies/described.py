@@ -49,7 +49,7 @@ def described(value):
 
 
 def task_described(task):
-    """A function as data: its name, and a hash of its code and of the numbers and texts that it uses.
+    """A function as data: its name, and a hash of its code and of the objects that it uses.
 
     Raises:
         NotDescribed: an object whose state is not known.
@@ -74,22 +74,22 @@ def _hash(data):
 
 
 def _code(function, seen):
-    """What a function does, as nested tuples: its instructions, and the constants and the functions of its own module
+    """What a function does, as nested tuples: its instructions, and the functions of its own module and the objects
     that these name. Other modules, and objects that may change while it runs, are left out."""
     if function in seen:
         return function.__qualname__
     seen.add(function)
     known = {**function.__globals__, **_enclosed(function)}
-    defaults = [*(function.__defaults__ or ()), *(function.__kwdefaults__ or {}).items()]
+    given = [*(function.__defaults__ or ()), *(function.__kwdefaults__ or {}).items()]
     instructions, names = _instructions(function.__code__, function.__doc__)
-    used = []
+    used = [_of_fixed(value) for value in given]
     for name in sorted(names):
         value = known.get(name)
         if isinstance(value, types.FunctionType) and value.__module__ == function.__module__:
             used.append((name, _code(value, seen)))
-        elif _constant(value):
-            used.append((name, value))
-    return instructions, [value for value in defaults if _constant(value)], used
+        else:
+            used.append((name, _of_fixed(value)))
+    return instructions, used
 
 
 def _enclosed(function):
@@ -118,7 +118,17 @@ def _instructions(code, doc=None):
     return (code.co_code, code.co_names, constants), names - assigned
 
 
-def _constant(value):
+def _of_fixed(value):
+    """The description of an object that cannot change; None for others."""
+    try:
+        return described(value) if _is_fixed(value) else None
+    except NotDescribed:
+        return None
+
+
+def _is_fixed(value):
     if isinstance(value, tuple):
-        return all(map(_constant, value))
-    return isinstance(value, (*_PLAIN[1:], complex, np.generic))
+        return all(map(_is_fixed, value))
+    if dataclasses.is_dataclass(value) and not isinstance(value, type):
+        return type(value).__dataclass_params__.frozen
+    return isinstance(value, (*_PLAIN, complex, np.generic))

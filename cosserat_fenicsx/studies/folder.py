@@ -89,7 +89,7 @@ class StudyFolder:
         if names[0] != names[1]:
             self._refuse(f"of the task {names[0]}, not of {names[1]}")
         if not _same(old_task, task):
-            self._refuse(f"of the task {names[0]} as it was before its code, or a number that it uses, was changed")
+            self._refuse(f"of the task {names[0]} as it was before its code, or something that it uses, was changed")
         if len(old_cases) != len(cases):
             self._refuse(f"of {len(old_cases)} cases, not of {len(cases)}")
         for i, (old, new) in enumerate(zip(old_cases, cases, strict=True)):

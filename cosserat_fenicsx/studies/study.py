@@ -14,6 +14,7 @@ from mpi4py import MPI
 from cosserat_fenicsx.annotations import File
 from cosserat_fenicsx.checks import instance
 from cosserat_fenicsx.errors import CosseratError, InstallationError, Interrupted, NotStored, SceneError
+from cosserat_fenicsx.interrupts import obey
 from cosserat_fenicsx.progress import CaseProgress
 from cosserat_fenicsx.ranks import apart, communicator
 from cosserat_fenicsx.studies.cases import cases_of, check_task
@@ -61,8 +62,8 @@ def study(
 
     Raises:
         SceneError: cases that are none, or whose names are not the task's arguments; a folder that holds another
-            study: other cases, or a task of another name, of other code, or with other constants. What the task
-            calls in other modules is not compared.
+            study: other cases, or a task of another name, of other code, or that uses other constants. What the task
+            calls in other modules is not compared, nor are lists, dicts and arrays that are made outside it.
         Interrupted: Ctrl-C; `.path` is the Study so far.
         NotStored: the folder can no longer be written to; `.path` is the Study so far.
         InstallationError: a case needs what is not installed.
@@ -153,6 +154,7 @@ class _Run:
 
     def _work(self, pool, own):
         for k in pool:
+            obey()
             i = self._missing[k]
             row = {"case": i, "attempt": self._rows.get(i, {}).get("attempt", 0) + 1, **self._computed(i)}
             own.append(row)
