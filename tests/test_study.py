@@ -1,5 +1,6 @@
 """Studies: every case alone on its rank, the same results on any number of ranks, kept as they come."""
 
+import io
 import os
 import time
 from fractions import Fraction
@@ -10,6 +11,7 @@ from conftest import COMM, column
 from mpi4py import MPI
 
 import cosserat_fenicsx as cf
+from cosserat_fenicsx import progress as module
 
 FACTOR = 3.0
 
@@ -164,6 +166,19 @@ def test_the_study_alone_shows_progress(capsys):
     said = capsys.readouterr().err
     assert ("study: 3 of 3 cases, " in said) == (COMM.rank == 0)
     assert "load factor" not in said
+
+
+def test_a_bar_in_a_terminal(monkeypatch):
+    class Terminal(io.StringIO):
+        def isatty(self):
+            return True
+
+    screen = Terminal()
+    monkeypatch.setattr(module.sys, "stderr", screen)
+    monkeypatch.setattr(module, "_PATIENCE", 0.0)
+    monkeypatch.setattr(module, "_REDRAWN", 0.01)
+    cf.study(lambda i: time.sleep(0.05), {"i": range(4 * COMM.size)})
+    assert (f" of {4 * COMM.size} cases" in screen.getvalue()) == (COMM.rank == 0)
 
 
 def test_an_interrupt_of_one_rank_ends_all_and_says_how_to_go_on(tmp_path_all):
