@@ -107,6 +107,8 @@ _HOME = {
     "Cutting": "drilling.bit_laws",
     "Discs": "drilling.discs",
     "Drilling": "drilling.scene",
+    "DrillingHistory": "drilling.history",
+    "DrillingScene": "drilling.scenefile",
     "Hook": "drilling.hook",
     "Lobes": "drilling.bit_laws",
     "Matched": "drilling.top_drive",
@@ -115,6 +117,11 @@ _HOME = {
     "Stiff": "drilling.top_drive",
     "Stribeck": "drilling.bit_laws",
     "TopDrive": "drilling.top_drive",
+    "read_drilling": "drilling.simulate",
+    "read_drilling_scene": "drilling.scenefile",
+    "resume_drilling": "drilling.simulate",
+    "simulate_drilling": "drilling.simulate",
+    "StickSlip": "drilling.stick_slip",
     "ViscousDrag": "drilling.wall_friction",
     "WallFriction": "drilling.wall_friction",
     "Wear": "drilling.bit_laws",
@@ -134,6 +141,8 @@ _HOME = {
     "read_history": "dynamics.resuming",
     "resume": "dynamics.resuming",
     "solve": "statics.solve",
+    "Study": "studies.outcome",
+    "study": "studies.study",
 }
 
 if TYPE_CHECKING:  # the same names, for editors and type checkers
@@ -153,11 +162,18 @@ if TYPE_CHECKING:  # the same names, for editors and type checkers
     from cosserat_fenicsx.drilling.bit_laws import Stribeck as Stribeck
     from cosserat_fenicsx.drilling.bit_laws import Wear as Wear
     from cosserat_fenicsx.drilling.discs import Discs as Discs
+    from cosserat_fenicsx.drilling.history import DrillingHistory as DrillingHistory
     from cosserat_fenicsx.drilling.hook import Hook as Hook
     from cosserat_fenicsx.drilling.scene import Drilling as Drilling
+    from cosserat_fenicsx.drilling.scenefile import DrillingScene as DrillingScene
+    from cosserat_fenicsx.drilling.scenefile import read_drilling_scene as read_drilling_scene
+    from cosserat_fenicsx.drilling.simulate import read_drilling as read_drilling
+    from cosserat_fenicsx.drilling.simulate import resume_drilling as resume_drilling
+    from cosserat_fenicsx.drilling.simulate import simulate_drilling as simulate_drilling
+    from cosserat_fenicsx.drilling.stick_slip import StickSlip as StickSlip
+    from cosserat_fenicsx.drilling.top_drive import PI as PI
     from cosserat_fenicsx.drilling.top_drive import Matched as Matched
     from cosserat_fenicsx.drilling.top_drive import Motor as Motor
-    from cosserat_fenicsx.drilling.top_drive import PI as PI
     from cosserat_fenicsx.drilling.top_drive import Stiff as Stiff
     from cosserat_fenicsx.drilling.top_drive import TopDrive as TopDrive
     from cosserat_fenicsx.drilling.wall_friction import ViscousDrag as ViscousDrag
@@ -226,6 +242,8 @@ if TYPE_CHECKING:  # the same names, for editors and type checkers
     from cosserat_fenicsx.statics.path.load_control import StepControl as StepControl
     from cosserat_fenicsx.statics.reading import read_path as read_path
     from cosserat_fenicsx.statics.solve import solve as solve
+    from cosserat_fenicsx.studies.outcome import Study as Study
+    from cosserat_fenicsx.studies.study import study as study
     from cosserat_fenicsx.well.answer import TorqueAndDrag as TorqueAndDrag
     from cosserat_fenicsx.well.calibrate import FrictionFit as FrictionFit
     from cosserat_fenicsx.well.calibrate import RigMeasurement as RigMeasurement

@@ -69,6 +69,7 @@ ROOMS = {
     "pictures": {"scene", "results"},
     "statics": {"scene", "models", "algebra", "results"},
     "dynamics": {"scene", "models", "algebra", "results", "storage", "statics"},
+    "studies": {"results", "storage"},
     "well": {"actions", "scene", "models", "statics", "results", "pictures"},
     "drilling": {"well", "scene", "results", "storage", "pictures", "algebra"},
     "cli": {"drilling", "well", "scene", "models", "statics", "dynamics", "results", "storage", "pictures"},

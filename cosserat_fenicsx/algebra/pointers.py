@@ -6,10 +6,10 @@ from cosserat_fenicsx.algebra.building import module
 
 
 class Pointers:
-    """Base of what gives C pointers to arrays: these are kept as long as the object."""
+    """Base of what gives C pointers to arrays: these are kept as long as the object. `sources`: see `module`."""
 
-    def __init__(self):
-        self._ffi, self._lib = module()
+    def __init__(self, *sources):
+        self._ffi, self._lib = module(*sources)
         self._arrays = []
 
     def doubles(self, array):

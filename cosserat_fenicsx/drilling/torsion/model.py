@@ -1,0 +1,221 @@
+"""Torsion alone of a string in its hole, by its waves.
+
+In a uniform part with the impedance Z the waves P = M + Z om and Q = M - Z om travel unchanged, P down and Q up (M
+torque, om speed of rotation). All cells take one step dt, in which every wave is constant: a cell holds one of each. At
+a node the waves P from above and Q from below meet what acts there, with the mean speed om over the step:
+
+    P - Q - (Z_above + Z_below) om = drag om + T(om) + I om',    T(om) the law of friction of wall or bit
+
+which is one equation with one answer where the slope of T is nowhere steeper than the impedances; drive and bit have
+inertias, by the implicit midpoint rule. Waves, inertias and works fulfil the balance of energy to rounding. Cells are
+exact; drag and friction are gathered at nodes, of the second order in dt where nothing begins to stick or to slip.
+Waves of even and of odd steps meet at inertias alone: speeds and torques that are told are means over two steps.
+"""
+
+import math
+from pathlib import Path
+
+import numpy as np
+
+from cosserat_fenicsx.algebra.pointers import Pointers
+from cosserat_fenicsx.checks import instance, positive, refuse
+from cosserat_fenicsx.drilling.bit_laws import Stribeck
+from cosserat_fenicsx.drilling.protocol import LEDGER, PROFILE, SERIES
+from cosserat_fenicsx.drilling.scene import Drilling
+from cosserat_fenicsx.drilling.single_valued import check_bit
+from cosserat_fenicsx.drilling.top_drive import PI, Matched, Motor, Stiff
+from cosserat_fenicsx.drilling.torsion.cells import cells_of
+from cosserat_fenicsx.drilling.torsion.mean_speeds import MeanSpeeds
+from cosserat_fenicsx.drilling.torsion.wall import wall_of
+from cosserat_fenicsx.errors import NotConverged
+from cosserat_fenicsx.well.string import DrillString
+
+_SOURCE = Path(__file__).with_name("waves.c")
+_WIDTH = 1 + len(SERIES) + len(LEDGER)
+# Numbers and arrays of C that change in a step.
+_NUMBERS = ("drive_speed", "integral", "bit_speed", "last_on_bit", "work", "at_bit", "at_wall", "in_mud", "iterations")
+_CHANGING = ("down", "up", "down_kept", "up_kept", "speed", "angle", "torque", "moment", "last_speed", "last_moment")
+# Without a step that is asked for: a cell of the length of the string over the first number, but at least of so many
+# metres, and at least so many cells.
+_CELLS, _LONGEST, _FEWEST = 300, 5.0, 40
+_NARROWER = 0.9  # of the longest step for which a law of friction has one answer
+_MOST = 1e5  # cells
+_TOLD = 0.01  # steps; smaller misfits of travel times are no matter
+
+
+class TorsionWaves(Pointers):
+    """Torsion alone of a `Drilling`, a `StringModel`.
+
+    Speeds and torques that are told are means over the last two steps, but for speeds of drives and bits with inertia.
+
+    Args:
+        scene: a `Drilling` with a `DrillString`; the bit's law a `Stribeck`.
+        dt: longest step, s; None for 300 cells. The step is the longest, from three quarters of it on, for which the
+            travel times of the parts are nearest to whole numbers of steps; shorter where a law of friction needs it.
+        elements: least number of cells, or None.
+        normal_force: wall force per length (N/m) for an array of measured depths (m), in place of that of the soft
+            string without axial motion.
+
+    Raises:
+        SceneError: a scene that needs more than torsion, or a law of the bit that is steeper than the impedance of the
+            string where the bit has no inertia.
+    """
+
+    name = "torsion"
+
+    def __init__(self, scene, dt=None, elements=None, *, normal_force=None):
+        super().__init__(_SOURCE)
+        _check(scene)
+        self.scene, self.normal_force, self.steps = scene, normal_force, 0
+        drag = 0.0 if scene.drag is None else scene.drag.torsion
+        time = math.fsum(x.length / x.torsional_speed for x in scene.segments)
+        if dt is not None:
+            dt = positive("TorsionWaves", "dt", dt, "s")
+        if elements is not None:
+            dt = min(time / positive("TorsionWaves", "elements", elements, "cells"), dt or math.inf)
+        asked = dt = dt or time / min(max(scene.bit_depth / _LONGEST, _FEWEST), _CELLS)
+        if time / dt > _MOST:
+            refuse("TorsionWaves", "dt", dt, f"at least {1 / _MOST:g} of the travel time of the string, {time:.4g} s")
+        factor = 1.0
+        while factor >= 1:
+            if time / dt > _MOST:
+                refuse("TorsionWaves", "scene.friction", scene.friction, "a friction that decays more slowly with the "
+                       f"speed: with {_MOST:g} cells the speed at every place is not determined")  # fmt: skip
+            self.cells = cells = cells_of(scene.segments, dt)
+            self._set_nodes(drag)
+            factor = self._steepness()
+            dt = cells.dt * min(_NARROWER / factor if factor else 1.0, _NARROWER)
+        self.dt, self.depths = cells.dt, cells.depths
+        self.signal = MeanSpeeds(scene.drive.signal(), self.dt)
+        self.why = tuple(self._reasons(asked))
+        self._allocate()
+
+    def _set_nodes(self, drag):
+        """Impedances beside nodes, and what acts at nodes."""
+        Z, half = self.cells.impedance, self.cells.impedance * self.cells.time / 2
+        self._above, self._below = np.concatenate([[0.0], Z]), np.concatenate([Z, [0.0]])
+        self._drag = drag * (np.concatenate([[0.0], half]) + np.concatenate([half, [0.0]]))
+        wall = wall_of(self.scene, self.cells.depths, self.normal_force)
+        self._hold, self._slide, self._decay = (x.copy() for x in wall)
+        if self.scene.bit is not None:
+            law = self.scene.bit.law
+            self._hold[-1], self._slide[-1] = law.torques(self.scene.bit.weight)
+            self._decay[-1] = law.speed or 0.0
+
+    def _steepness(self):
+        """The largest slope of a law of friction over the impedance of its node; laws that drop at once left out."""
+        slope = np.divide(self._hold - self._slide, self._decay, out=np.zeros_like(self._hold), where=self._decay > 0)
+        impedance = self._above + self._below + self._drag
+        if self.scene.bit is not None:
+            impedance[-1] += 2 * self.scene.bit.inertia / self.cells.dt
+        return (slope / impedance).max()
+
+    def _reasons(self, asked):
+        cells, scene = self.cells, self.scene
+        yield (
+            f"torsion alone, by waves in {len(cells.time)} cells of {np.diff(cells.depths).max():.3g} m at most, "
+            f"dt = {cells.dt:.4g} s"
+        )
+        if cells.joined:
+            yield (
+                f"{cells.joined} parts shorter than 1.5 cells are joined with pieces of their neighbours, with the "
+                "same inertia and compliance"
+            )
+        if cells.unfit > _TOLD:
+            yield (
+                f"travel times of parts differ from whole numbers of steps by up to {cells.unfit:.2g} steps: the rest "
+                "is made up by filters that are exact for slow waves; jumps are smeared over some steps"
+            )
+        if cells.dt < asked / 2:
+            yield f"dt is less than the {asked:.4g} s asked for, or the law of friction would have several answers"
+        if scene.hole is not None and self.normal_force is None:
+            yield "wall force of the soft string without axial motion: tension is that of the weight"
+        if scene.hook is not None and (scene.hook.speed != 0 or math.isfinite(scene.hook.stiffness)):
+            yield "the hook is left out: torsion alone knows no axial motion"
+
+    def _allocate(self):
+        cells, scene, n = self.cells, self.scene, len(self.cells.time)
+        filtered = np.flatnonzero(cells.time > 1.25 * cells.dt).astype(np.int32)
+        sizes = {"down": n, "up": n, "down_kept": len(filtered), "up_kept": len(filtered)}
+        self._changing = {name: np.zeros(sizes.get(name, n + 1)) for name in _CHANGING}
+        self.c = c = self._ffi.new("waves *")
+        c.cells, c.filters, c.dt = n, len(filtered), self.dt
+        c.filtered = self.integers(filtered)
+        for name, array in (
+            ("above", self._above), ("below", self._below), ("share", self.dt / (4 * cells.impedance)),
+            ("turn", cells.turn[filtered]), ("drag", self._drag), ("hold", self._hold), ("slide", self._slide),
+            ("decay", self._decay), *self._changing.items(),
+        ):  # fmt: skip
+            setattr(c, name, self.doubles(array))
+        drive, control = scene.drive, scene.drive.control
+        c.stiff, c.bit, c.drive_inertia = isinstance(control, Stiff), scene.bit is not None, drive.inertia
+        c.bit_inertia = 0.0 if scene.bit is None else scene.bit.inertia
+        if isinstance(control, PI):
+            c.Kp, c.Ki = control.Kp, control.Ki
+        elif isinstance(control, Matched):
+            c.Kp = self._below[0] if control.impedance is None else control.impedance
+            c.given = control.torque
+        elif isinstance(control, Motor):
+            c.Kp, c.given = control.drag, control.torque
+
+    @property
+    def time(self):
+        """s."""
+        return self.steps * self.dt
+
+    @property
+    def counts(self):
+        """Iterations of Newton's method, of all nodes together; no step is ever halved."""
+        return {"halved": 0, "iterations": int(self.c.iterations)}
+
+    def advance(self, steps: int) -> np.ndarray:
+        """See `StringModel`."""
+        rows = np.empty((steps, _WIDTH))
+        speeds = self.signal(self.steps, steps)
+        buffer = self._ffi.from_buffer
+        done = self._lib.advance(self.c, steps, buffer("double[]", speeds), self.steps, _WIDTH,
+                                 buffer("double[]", rows, require_writable=True))  # fmt: skip
+        self.steps += done
+        if done < steps:
+            problem = NotConverged(f"torsion: a number was not finite at t = {self.time:.6g} s")
+            problem.rows = rows[:done]
+            raise problem
+        return rows
+
+    def coarser(self) -> "TorsionWaves":
+        """The same scene at rest, with twice the step."""
+        return type(self)(self.scene, 2 * self.dt, normal_force=self.normal_force)
+
+    def profile(self) -> np.ndarray:
+        """See `StringModel`; speeds and torques are means over the last two steps; a bit that sticks counts, too."""
+        found = np.full((len(PROFILE), len(self.depths)), np.nan)
+        now = self._changing
+        speed, torque = ((now[f"last_{name}"] + now[name]) / 2 for name in ("speed", "moment"))
+        sticking = (self._hold > 0) & (now["last_speed"] == 0) & (now["speed"] == 0)
+        for name, values in (("angle", now["angle"]), ("speed", speed), ("torque", torque), ("sticking", sticking)):
+            found[PROFILE.index(name)] = values
+        return found
+
+    def memory(self) -> dict:
+        """See `StringModel`."""
+        return {
+            "steps": self.steps, **{name: getattr(self.c, name) for name in _NUMBERS},
+            **{name: array.copy() for name, array in self._changing.items()},
+        }  # fmt: skip
+
+    def recall(self, memory: dict) -> None:
+        """See `StringModel`."""
+        for name, array in self._changing.items():
+            array[:] = memory[name]
+        for name in _NUMBERS:
+            setattr(self.c, name, memory[name])
+        self.steps = int(memory["steps"])
+
+
+def _check(scene):
+    instance("TorsionWaves", "scene", scene, Drilling, "a Drilling")
+    instance("TorsionWaves", "scene.string", scene.string, DrillString, "a DrillString; discs have no waves")
+    if scene.bit is not None:
+        instance("TorsionWaves", "scene.bit.law", scene.bit.law, Stribeck,
+                 "a Stribeck law: torsion alone knows no depth of cut")  # fmt: skip
+    check_bit(scene)

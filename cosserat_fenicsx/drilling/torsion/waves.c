@@ -1,0 +1,183 @@
+/* Torsional waves of a string, step by step; see model.py for the method. */
+#include <math.h>
+#include "waves.h"
+
+enum { MOST = 100 };
+
+/* The speed om with S om + T(om) = F, T the law of friction: anything up to `hold` at rest, and
+   slide + (hold - slide) exp(-|om|/decay) against the speed. Where several speeds fulfil that, it goes on sliding as
+   before, with the sign of `before`. The left side is convex for om > 0: Newton's method comes down from the right. */
+static double slip(double F, double S, double hold, double slide, double decay, double before, long long *iterations)
+{
+    double size = fabs(F), sign = F < 0 ? -1.0 : 1.0, more = hold - slide;
+    if (size <= hold && !(more > S * decay && before * sign > 0)) return 0.0;
+    double om = (size - slide) / S;
+    if (om <= 0) return 0.0;
+    if (more > 0 && decay > 0) {
+        double enough = 1e-14 * size / S;
+        for (int i = 0; i < MOST; i++) {
+            double e = more * exp(-om / decay), slope = S - e / decay;
+            ++*iterations;
+            if (slope <= 0) return 0.0;
+            double change = (S * om + slide + e - size) / slope;
+            om -= change;
+            if (om <= 0) return 0.0;
+            if (fabs(change) <= enough) break;
+        }
+    }
+    return sign * om;
+}
+
+/* The mean speed of a node with an inertia over a step. A node that would turn round stops. `speed`: at the start of
+   the step, then at its end. */
+static double turned(waves *w, int node, double F, double S, double inertia, double *speed)
+{
+    double before = *speed, rate = 2 * inertia / w->dt, hold = w->hold[node];
+    double om = slip(F + rate * before, S + rate, hold, w->slide[node], w->decay[node], before, &w->iterations);
+    double after = inertia > 0 ? 2 * om - before : om;
+    if (inertia > 0 && hold > 0 && after * before < 0) {
+        double torque = F + rate * before - (S + rate) * before / 2;
+        if (torque * before >= 0) {
+            om = before / 2;
+            after = 0.0;
+        }
+    }
+    w->torque[node] = F + rate * before - (S + rate) * om;
+    *speed = after;
+    return om;
+}
+
+/* Book the losses at a node and turn it. */
+static void settle(waves *w, int node, double om, double moment)
+{
+    double dt = w->dt;
+    w->last_speed[node] = w->speed[node];
+    w->last_moment[node] = w->moment[node];
+    w->speed[node] = om;
+    w->moment[node] = moment;
+    w->angle[node] += dt * om;
+    w->in_mud += dt * w->drag[node] * om * om;
+    *(node == w->cells && w->bit ? &w->at_bit : &w->at_wall) += dt * w->torque[node] * om;
+}
+
+/* The drive, at the mean speed asked for. */
+static void drive(waves *w, double asked)
+{
+    double Q = w->up[0], Z = w->below[0], S = Z + w->drag[0], dt = w->dt, om, torque;
+    double I = w->drive_inertia, before = w->drive_speed;
+    if (w->stiff) {
+        double hold = w->hold[0], slide = w->slide[0], decay = w->decay[0], size = fabs(asked);
+        om = asked;
+        if (om == 0) w->torque[0] = fmax(-hold, fmin(hold, -Q));
+        else w->torque[0] = copysign(slide + (decay > 0 ? (hold - slide) * exp(-size / decay) : 0.0), om);
+        torque = Q + S * om + w->torque[0];
+        w->work += dt * torque * om + I * (om * om - before * before) / 2;
+        w->drive_speed = om;
+    } else {
+        double gain = w->Kp + w->Ki * dt / 2, F = w->given + gain * asked + w->Ki * w->integral;
+        om = turned(w, 0, F - Q, S + gain, I, &w->drive_speed);
+        torque = Q + S * om + w->torque[0];
+        w->work += dt * (F - gain * om) * om;
+        w->integral += dt * (asked - om);
+    }
+    settle(w, 0, om, torque);
+}
+
+void energies(const waves *w, double *kinetic, double *strain)
+{
+    double moving = 0.0, held = 0.0, kept = 0.0;
+    for (int c = 0; c < w->cells; c++) {
+        double P = w->down[c], Q = w->up[c], share = w->share[c];
+        moving += share * (P - Q) * (P - Q);
+        held += share * (P + Q) * (P + Q);
+    }
+    for (int f = 0; f < w->filters; f++) {
+        double P = w->down_kept[f], Q = w->up_kept[f], share = w->share[w->filtered[f]];
+        moving += share * (P - Q) * (P - Q);
+        held += share * (P + Q) * (P + Q);
+    }
+    *kinetic = (moving + w->drive_inertia * w->drive_speed * w->drive_speed
+                + w->bit_inertia * w->bit_speed * w->bit_speed) / 2;
+    *strain = held / 2;
+}
+
+/* The bit, or the free end. */
+static void end(waves *w, double P)
+{
+    int n = w->cells;
+    w->last_on_bit = w->torque[n];
+    double om = turned(w, n, P, w->above[n] + w->drag[n], w->bit_inertia, &w->bit_speed);
+    settle(w, n, om, P - w->above[n] * om);
+    w->up[n - 1] = P - 2 * w->above[n] * om;
+}
+
+/* All nodes between drive and end; returns the wave that reaches the end. */
+static double between(waves *w, double P)
+{
+    double *down = w->down, *up = w->up, *speed = w->speed, dt = w->dt, lost = 0.0, braked = 0.0;
+    for (int j = 1; j < w->cells; j++) {
+        double Q = up[j], above = w->above[j], below = w->below[j], drag = w->drag[j], F = P - Q;
+        double S = above + below + drag, om, hold = w->hold[j];
+        if (hold > 0) {
+            om = slip(F, S, hold, w->slide[j], w->decay[j], speed[j], &w->iterations);
+            double torque = F - S * om;
+            w->torque[j] = torque;
+            lost += torque * om;
+        } else om = F / S;
+        braked += drag * om * om;
+        w->last_speed[j] = speed[j];
+        w->last_moment[j] = w->moment[j];
+        speed[j] = om;
+        w->angle[j] += dt * om;
+        w->moment[j] = P - above * om;
+        up[j - 1] = P - 2 * above * om;
+        P = down[j];
+        down[j] = Q + 2 * below * om;
+    }
+    w->at_wall += dt * lost;
+    w->in_mud += dt * braked;
+    return P;
+}
+
+static void pass(double turn, double root, double *wave, double *kept)
+{
+    double x = *wave, s = *kept;
+    *wave = turn * x + root * s;
+    *kept = root * x - turn * s;
+}
+
+/* Do so many steps, the first of them number `first` from 0. Returns how many were done: fewer where a number is not
+   finite. */
+int advance(waves *w, int steps, const double *speeds, double first, int width, double *rows)
+{
+    int n = w->cells;
+    for (int k = 0; k < steps; k++) {
+        double P = w->down[0];
+        drive(w, speeds[k]);
+        w->down[0] = w->up[0] + 2 * w->below[0] * w->speed[0];
+        end(w, between(w, P));
+        for (int f = 0; f < w->filters; f++) {
+            int c = w->filtered[f];
+            double turn = w->turn[f], root = sqrt((1 - turn) * (1 + turn));
+            pass(turn, root, w->down + c, w->down_kept + f);
+            pass(turn, root, w->up + c, w->up_kept + f);
+        }
+        double *row = rows + (long long)k * width;
+        row[0] = (first + k + 1) * w->dt;
+        row[1] = w->stiff || w->drive_inertia > 0 ? w->drive_speed : (w->last_speed[0] + w->speed[0]) / 2;
+        row[2] = w->angle[0];
+        row[3] = (w->last_moment[0] + w->moment[0]) / 2;
+        row[4] = w->bit_inertia > 0 ? w->bit_speed : (w->last_speed[n] + w->speed[n]) / 2;
+        row[5] = w->angle[n];
+        row[6] = w->bit ? (w->last_on_bit + w->torque[n]) / 2 : 0.0;
+        for (int i = 7; i < 11; i++) row[i] = NAN;
+        energies(w, row + 11, row + 12);
+        row[13] = w->work;
+        row[14] = row[15] = 0.0;
+        row[16] = w->at_bit;
+        row[17] = w->at_wall;
+        row[18] = w->in_mud;
+        if (!isfinite(row[11] + row[12])) return k;
+    }
+    return steps;
+}

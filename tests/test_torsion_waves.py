@@ -1,0 +1,269 @@
+"""Torsion alone by waves: closed forms, the numbers of an independent computation, energy, memory, refusals."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from torsion_scenes import (
+    COLUMN,
+    DENSITY,
+    LAW,
+    PIPE,
+    SOFT,
+    SPEED,
+    imbalance,
+    lying,
+    off_bottom,
+    part,
+    run,
+    stick_slip,
+)
+from torsion_scenes import string as string_of
+
+import cosserat_fenicsx as cf
+from cosserat_fenicsx.drilling.protocol import PROFILE
+from cosserat_fenicsx.drilling.step_errors import cycle_of, step_errors
+from cosserat_fenicsx.drilling.torsion.cells import cells_of
+from cosserat_fenicsx.drilling.torsion.model import TorsionWaves
+
+pytestmark = pytest.mark.serial
+PIPE_IMPEDANCE = 296.3752962822167
+ANGLE, STICKING = PROFILE.index("angle"), PROFILE.index("sticking")
+
+
+@pytest.mark.parametrize(("speed", "dt"), [(np.pi, 20 / SPEED), (2 * np.pi, 7.3 / SPEED)])
+def test_the_staircase_of_a_torque_that_drops_at_once(speed, dt):
+    """Bit without inertia, stiff drive: each 2L/c the wave 2 Z Om is added, and a bit that slips takes all but T_d."""
+    scene = cf.Drilling(string_of((2000.0, *PIPE[1:])), cf.TopDrive(speed), cf.BitOnRock(cf.Stribeck(8000.0, 5000.0)))
+    model = TorsionWaves(scene, dt)
+    travel, Z = 2000 / SPEED, PIPE_IMPEDANCE
+    t, rows = run(model, 40 * travel)
+    up, angle, slips, found = 0.0, 0.0, False, []
+    for k in range(19):
+        down = up + 2 * Z * speed
+        slips = down > (5000 if slips else 8000)
+        om = (down - 5000) / Z if slips else 0.0
+        up, angle = down - 2 * Z * om, angle + 2 * travel * om
+        start = (2 * k + 1) * travel
+        within = (t > start + 2.5 * model.dt) & (t < start + 2 * travel - model.dt / 2)
+        assert np.abs(rows[within, COLUMN["bit_speed"]] - om).max() < 1e-9 * speed
+        assert np.abs(rows[within, COLUMN["torque_on_bit"]] - (5000 if slips else down)).max() < 1e-6
+        assert np.interp(start + 2 * travel, t, rows[:, COLUMN["bit_angle"]]) == pytest.approx(angle, abs=1e-8)
+        found.append(om)
+    if speed > 4:
+        assert found[2] == pytest.approx(20.828609939845805, abs=1e-9)  # of the independent computation
+    assert max(found) > 0 and imbalance(rows) < 1e-12
+
+
+def test_pipe_and_collars_without_damping():
+    t, rows = run(TorsionWaves(stick_slip(drag=0.0, of_bit=0.0), 20 / SPEED), 120)
+    at = np.searchsorted(t, [10.0, 30.0, 45.0, 60.0])
+    assert rows[at, COLUMN["bit_speed"]] == pytest.approx([16.10024677861, 5.24684264009, 0, 2.77614354453], abs=1e-9)
+    angles = np.interp([10.0, 30.0, 45.0, 60.0], t, rows[:, COLUMN["bit_angle"]])
+    assert angles == pytest.approx([49.37336037702614, 174.95888640943636, 271.9243799244091, 363.5605967335269])
+    late = cycle_of(rows, 60)
+    assert late[1:] == pytest.approx((16.178322295485245, -1943.8216062767813, 10531.01339814296), rel=1e-8)
+    assert imbalance(rows) < 1e-12
+
+
+def test_stick_slip_at_60_rpm():
+    model = TorsionWaves(stick_slip(), 10 / SPEED)
+    _, rows = run(model, 120)
+    late, errors = cycle_of(rows, 60), step_errors(model, rows, 60)
+    exact = 6.0428, 15.079233719173985, 2062.8594693619634, 8571.096531955363
+    assert late.period == pytest.approx(exact[0], abs=1e-3)
+    assert late[1:] == pytest.approx(exact[1:], rel=2e-3)
+    assert np.all(np.abs(np.subtract(late, exact)[1:]) < errors[1:]), "the estimate of the error holds"
+    assert errors.period < 1e-3 and imbalance(rows) < 1e-11
+
+
+def test_a_soft_drive_calms_it():
+    t, rows = run(TorsionWaves(stick_slip(**SOFT), 10 / SPEED), 120)
+    late = cycle_of(rows, 60)
+    assert np.isnan(late.period)
+    assert late[1:] == pytest.approx((6.627654032865599, 4879.782470503436, 5106.509919651566), rel=1e-4)
+    drive = rows[t >= 60, COLUMN["drive_speed"]]
+    assert (drive.min(), drive.max()) == pytest.approx((6.227606627970457, 6.347672726001818), rel=1e-4)
+    assert imbalance(rows) < 1e-11
+
+
+@pytest.mark.parametrize(("drive", "sticks", "turns"), [({}, 97.0, 100.0), (SOFT, 50.0, 52.5)])
+def test_speed_above_which_the_bit_never_sticks(drive, sticks, turns):
+    for rpm, stuck in ((sticks, True), (turns, False)):
+        t, rows = run(TorsionWaves(stick_slip(rpm * cf.units.rpm, **drive), 20 / SPEED), 200)
+        assert (rows[t > 170, COLUMN["bit_speed"]] == 0).any() == stuck
+
+
+def test_a_front_in_a_lying_pipe():
+    """Speed Om - m x/(2 Z) behind the front, which stops by itself where that is zero."""
+    m, Om = 3.52427441057226, 2 * np.pi
+    model = TorsionWaves(lying(cf.TopDrive(Om)), 2 / SPEED)
+    model.advance(round(0.2 / model.dt))
+    x, (speed, torque) = model.depths, model.profile()[1:3]
+    behind = (x > 4) & (x < 0.19 * SPEED)
+    assert speed[behind] == pytest.approx(Om - m * x[behind] / 2 / PIPE_IMPEDANCE, rel=1e-3)
+    told = PIPE_IMPEDANCE * Om + m * (SPEED * 0.2 / 2 - x[behind])
+    assert torque[behind] == pytest.approx(told, rel=2e-3)
+    model.advance(round(0.1335 / model.dt))
+    profile = model.profile()
+    assert x[profile[ANGLE] > 0].max() == pytest.approx(1056.7740703874679, rel=5e-3)
+    assert profile[STICKING, x > 1060].all() and not profile[STICKING, x < 1000].any()
+    t, rows = run(TorsionWaves(lying(cf.TopDrive(Om)), 10 / SPEED), 9)
+    assert t[np.flatnonzero(rows[:, COLUMN["bit_angle"]])[0]] == pytest.approx(2.725, rel=2e-3)
+    assert rows[:, COLUMN["surface_torque"]].max() == pytest.approx(12432.4, rel=1e-3)
+    assert rows[:, COLUMN["bit_speed"]].max() == pytest.approx(12.565, rel=2e-3)
+    assert imbalance(rows) < 1e-11
+
+
+class Turn:
+    """Slowly to an angle within a time, and then back by another angle within the same time."""
+
+    def __init__(self, there, back, within):
+        self.there, self.back, self.within = there, back, within
+        self.jumps = (within, 2 * within)
+
+    def __call__(self, t):
+        angle = self.there if t < self.within else -self.back if t < 2 * self.within else 0.0
+        return angle / self.within * (1 - np.cos(2 * np.pi * t / self.within))
+
+
+def test_a_pipe_turned_slowly_and_back():
+    """The parabola of a string on its wall: l = sqrt(2 GJ phi/m), M = m l; back by dphi to sqrt(GJ dphi/m)."""
+    m, GJ = 3.52427441057226, 941984.5211067691
+    model = TorsionWaves(lying(cf.TopDrive(Turn(2 * np.pi, np.pi / 2, 60.0))), 4 / SPEED)
+    _, rows = run(model, 60)
+    x, angle = model.depths, model.profile()[ANGLE]
+    slope, end = np.polyfit(x[x < 1700], np.sqrt(angle[x < 1700]), 1)
+    assert -end / slope == pytest.approx(1832.702435380757, rel=1e-3)
+    assert x[angle > 0].max() == pytest.approx(1832.702435380757, rel=4e-3)  # of nodes 4 m apart
+    assert rows[-1, COLUMN["surface_torque"]] == pytest.approx(6458.946295205862, rel=2e-3)
+    assert angle == pytest.approx(m / 2 / GJ * np.maximum(1832.7024 - x, 0) ** 2, abs=2e-3)
+    _, rows = run(model, 60)
+    l2 = np.sqrt(GJ * np.pi / 2 / m)
+    assert rows[-1, COLUMN["surface_torque"]] == pytest.approx(6458.9463 - 2 * m * l2, abs=10)
+    assert x[model.profile()[ANGLE] < angle - 1e-6].max() == pytest.approx(l2, abs=4)
+
+
+def test_starts_off_bottom():
+    scene, wall_force = off_bottom()
+    model = TorsionWaves(scene, 10.0001 / 2787.5976461718205, normal_force=wall_force)
+    assert model._hold.sum() == pytest.approx(18077.89943213615, rel=1e-6)
+    t, rows = run(model, 24)
+    om, resting, starts = rows[:, COLUMN["bit_speed"]], True, []
+    for k in range(len(t)):
+        if om[k] <= 0:
+            resting = True
+        elif resting and om[k] > 20 * cf.units.rpm:
+            resting = False
+            starts.append(t[k])
+    assert starts == pytest.approx([5.408, 10.78, 16.61, 22.49], rel=3e-3)
+    assert imbalance(rows) < 1e-11
+
+
+def test_a_wave_goes_through_parts_of_any_length():
+    """Parts of the same impedance whose travel times fit no step, between a drive without reflection and a free end:
+    the end turns as the drive was asked to turn a travel time before."""
+    lengths, speeds = np.array([700.3, 0.2, 1001.7, 13.1, 303.13]), np.array([3100.0, 2000.0, 2900.0, 3300.0, 3000.0])
+    parts = [
+        cf.Component(
+            length, cf.Stiffness((1e9, 1e9), 1e9, (1e6, 1e6), 300 * c, 20.0, inertia=(0.1, 0.1, 300 / c)), 1, 0.1
+        )
+        for length, c in zip(lengths, speeds, strict=True)
+    ]
+    travel = (lengths / speeds).sum()
+
+    def asked(t):
+        return 1 - np.cos(4 * t)
+
+    errors = []
+    for dt in (0.02, 0.01):
+        model = TorsionWaves(cf.Drilling(cf.DrillString(parts, order="top down"),
+                                         cf.TopDrive(asked, control=cf.Matched(300.0))), dt)  # fmt: skip
+        t, rows = run(model, 5)
+        s = np.maximum(t - travel, 0)
+        errors.append(np.abs(rows[:, COLUMN["bit_angle"]] - (s - np.sin(4 * s) / 4)).max())
+        assert "parts shorter than 1.5 cells" in " ".join(model.why) and "no whole" not in " ".join(model.why)
+        assert imbalance(rows) < 1e-12
+    assert errors[0] < 1e-5 and errors[1] < errors[0] / 2
+
+
+def test_cells_keep_travel_time_inertia_and_compliance():
+    parts = [(2513.0, *PIPE[1:]), (0.3, 0.2, 0.05), (111.7, 0.1651, 0.05715), (18.0, 0.127, 0.1), (3.1, 0.2, 0.1)]
+    segments = cf.Drilling(string_of(*parts), cf.TopDrive(1.0)).segments
+    found = cells_of(segments, 10 / SPEED)
+    assert found.dt <= 10 / SPEED and found.joined == 2 and found.depths[-1] == pytest.approx(2646.1)
+    assert (found.impedance * found.time).sum() == pytest.approx(sum(x.rhoJ * x.length for x in segments), rel=1e-12)
+    assert (found.time / found.impedance).sum() == pytest.approx(sum(x.length / x.GJ for x in segments), rel=1e-12)
+    times = found.time / found.dt
+    assert np.all((np.abs(times - 1) < 1e-9) | ((times >= 1.5 - 1e-9) & (times < 2.5)))
+    whole = cells_of(cf.Drilling(string_of(PIPE, (200.0, 0.1651, 0.05715)), cf.TopDrive(1.0)).segments, 10.5 / SPEED)
+    assert len(whole.time) == 320 and whole.unfit < 1e-9
+
+
+def test_drag_is_of_the_second_order():
+    angles = []
+    for cells in (40, 80, 160):
+        scene = cf.Drilling(string_of(PIPE), cf.TopDrive(lambda t: 1 - np.cos(3 * t), 2900.0, cf.PI(2e3, 5e3)),
+                            drag=cf.ViscousDrag(1.0))  # fmt: skip
+        angles.append(run(TorsionWaves(scene, elements=cells), 160 * 3000 / SPEED / 40)[1][-1, COLUMN["bit_angle"]])
+    assert 3.7 < (angles[0] - angles[1]) / (angles[1] - angles[2]) < 4.3
+
+
+def test_a_motor_and_a_wave_of_the_drag():
+    """The steady speed of a given torque: over the drags of its bearings and of the mud."""
+    drag = 5.0 * DENSITY * 1.1878745537285865e-05 * 3000
+    scene = cf.Drilling(string_of(PIPE), cf.TopDrive(inertia=1000.0, control=cf.Motor(3000.0, 100.0)),
+                        drag=cf.ViscousDrag(5.0))  # fmt: skip
+    _, rows = run(TorsionWaves(scene), 200)
+    for name in ("drive_speed", "bit_speed"):
+        assert rows[-1, COLUMN[name]] == pytest.approx(3000 / (100 + drag), rel=1e-6)
+    assert rows[-1, COLUMN["surface_torque"]] == pytest.approx(3000 / (1 + 100 / drag), rel=1e-6)
+    assert imbalance(rows) < 1e-11
+
+
+def test_the_same_digits_after_recall():
+    scene, wall_force = off_bottom()
+    drive = cf.TopDrive(Turn(30.0, 5.0, 7.03), 2900.0, cf.PI(38e3, 100e3))
+    scene = replace(scene, drive=drive, bit=cf.BitOnRock(LAW, inertia=50.0))
+    first, second = (TorsionWaves(scene, 0.0071, normal_force=wall_force) for _ in range(2))
+    assert np.any(first.cells.turn)
+    first.advance(700)
+    second.recall(first.memory())
+    np.testing.assert_array_equal(second.advance(400), np.concatenate([first.advance(150), first.advance(250)]))
+    np.testing.assert_array_equal(second.profile(), first.profile())
+    assert second.time == first.time and second.counts == first.counts
+
+
+def test_wall_force_of_the_soft_string():
+    """The kinetic torque is that of torque and drag where the string rotates off bottom."""
+    path = cf.WellPath.from_survey([0, 400, 900, 1300, 2200], [0, 0, 40, 70, 70], [20, 20, 20, 80, 80], degrees=True)
+    hole = cf.Borehole(path, [cf.HoleSection(1000, 0.25, 0.2), cf.HoleSection(2200, 0.2159, 0.3)])
+    string = cf.DrillString([part(200.0, 0.1651, 0.05715, weight=1000.0), part(None, *PIPE[1:], weight=250.0)])
+    told = cf.torque_and_drag(hole, string, cf.RotateOffBottom(), model="soft", torque_convention="johancsik", tol=1e-6)
+    friction = cf.WallFriction(1.5, 1.0, 0.1, of_hole=True)
+    model = TorsionWaves(cf.Drilling(string, cf.TopDrive(1.0), hole=hole, friction=friction))
+    assert model._slide.sum() == pytest.approx(told.surface_torque, rel=1e-5)
+    assert model._hold.sum() == pytest.approx(1.5 * told.surface_torque, rel=1e-5)
+    assert model._decay[-1] == pytest.approx(0.1 / (0.1651 / 2))
+    assert np.interp(1500, model.depths, model._decay) == pytest.approx(0.1 / 0.0635)
+
+
+def test_what_is_told_and_refused():
+    steep = cf.WallFriction(0.5, 0.1, 0.02, of_rotation=True)
+    scene, wall_force = off_bottom()
+    model = TorsionWaves(replace(scene, friction=steep), 20 / SPEED, normal_force=wall_force)
+    assert model.dt < 5 / SPEED and any("would have several answers" in line for line in model.why)
+    sudden = cf.WallFriction(0.5, 0.1, 1e-9, of_rotation=True)
+    with pytest.raises(cf.SceneError, match="TorsionWaves.scene.friction = .*decays more slowly"):
+        TorsionWaves(replace(scene, friction=sudden))
+    law = cf.Stribeck(6000.0, 2000.0, 1.0)
+    with pytest.raises(cf.SceneError, match="impedance of the string at the bit is 1793.82"):
+        TorsionWaves(cf.Drilling(string_of(PIPE, (200.0, 0.1651, 0.05715)), cf.TopDrive(1.0), cf.BitOnRock(law)))
+    with pytest.raises(cf.SceneError, match="expected a DrillString; discs have no waves"):
+        TorsionWaves(cf.Drilling(cf.Discs((1.0, 1.0), (1.0,)), cf.TopDrive(1.0)))
+    with pytest.raises(cf.SceneError, match="TorsionWaves.scene.bit.law = .*knows no depth of cut"):
+        cutting = cf.BitOnRock(cf.Cutting(0.1, 60e6, 0.6, 4))
+        TorsionWaves(cf.Drilling(string_of(PIPE), cf.TopDrive(1.0), cutting))
+    for dt, words in ((-1, "a positive number"), (1e-9, "at least 1e-05 of the travel time")):
+        with pytest.raises(cf.SceneError, match=f"TorsionWaves.dt = {dt}: expected {words}"):
+            TorsionWaves(scene, dt)
