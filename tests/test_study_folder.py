@@ -13,7 +13,7 @@ from mpi4py import MPI
 import cosserat_fenicsx as cf
 
 ROOT = Path(__file__).parent.parent
-LIMIT, CALLS, STOPS, MUD = 3, [], [], cf.Mud(1200.0)
+LIMIT, CALLS, STOPS, COUNT, MUD = 3, [], [], 0, cf.Mud(1200.0)
 CASES = {"i": range(12)}
 PROGRAM = """
 import sys, time
@@ -153,6 +153,22 @@ def test_another_study_is_refused(tmp_path_all, monkeypatch):
         changed.setattr(fourth, "__qualname__", "third")
         refused(fourth, CASES, "of the task .*third as it was before its code, or .* changed")
     assert len(cf.study(third, CASES, folder=tmp_path_all)) == 12
+
+
+def test_what_a_task_does_not_use_is_not_compared(tmp_path_all, monkeypatch):
+    """Numbers that have the name of an attribute, or that the task itself counts with, may be others at every call."""
+    here = sys.modules[__name__]
+    for number in (1, 2):
+        monkeypatch.setattr(here, "real", number + COMM.rank, raising=False)
+        assert cf.study(counted, CASES, folder=tmp_path_all / "counted").results == list(range(12))
+        monkeypatch.setattr(here, "LIMIT", 3 + COMM.rank)  # each rank may have its own: that of rank 0 is kept
+        assert len(cf.study(third, CASES, folder=tmp_path_all / "third")) == 12
+
+
+def counted(i):
+    global COUNT
+    COUNT += 1
+    return i.real
 
 
 def test_what_a_task_uses_is_compared(tmp_path_all, monkeypatch):

@@ -11,6 +11,9 @@ import numpy as np
 
 # Arrays with more entries than this are described by a hash.
 _LONGEST = 64
+# Python's instructions with names of objects outside the function.
+_READS = ("LOAD_GLOBAL", "LOAD_NAME", "LOAD_DEREF", "LOAD_CLASSDEREF", "LOAD_FROM_DICT_OR_GLOBALS")
+_ASSIGNS = ("STORE_GLOBAL", "STORE_DEREF")
 _PLAIN = (type(None), bool, int, float, str)
 
 
@@ -104,15 +107,17 @@ def _enclosed(function):
 
 def _instructions(code, doc=None):
     """(instructions and constants of a code object and of those in it, names that it reads and does not assign)."""
-    constants, names, assigned = [], {*code.co_names, *code.co_freevars}, set()
+    constants, names, assigned = [], set(), set()
     for step in dis.get_instructions(code):
-        if step.opname in ("STORE_GLOBAL", "STORE_DEREF"):
+        if step.opname in _READS:
+            names.add(step.argval)
+        elif step.opname in _ASSIGNS:
             assigned.add(step.argval)
     for constant in code.co_consts:
         if isinstance(constant, types.CodeType):
             inner, inner_names = _instructions(constant)
             constants.append(inner)
-            names |= inner_names
+            names |= inner_names - {*code.co_cellvars}
         elif constant != doc or doc is None:
             constants.append(sorted(map(repr, constant)) if isinstance(constant, frozenset) else constant)
     return (code.co_code, code.co_names, constants), names - assigned

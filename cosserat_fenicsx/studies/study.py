@@ -73,12 +73,12 @@ def study(
     check_task(task, cases)
     instance("study", "retry", retry, bool, "True or False")
     told = _told(task, cases, strictly=folder is not None)
-    if len(set(comm.allgather(told))) > 1:
-        raise SceneError("study.cases: they differ between ranks: expected the same task and cases on every rank")
+    if len(set(comm.allgather(json.dumps(told[1])))) > 1:
+        raise SceneError("study.cases: they differ between ranks: expected the same cases on every rank")
     if comm.size > 1:
         gc.collect()  # what ranks must free together is not left for times at which they are apart
     kept = None if folder is None else StudyFolder(folder, comm)
-    rows = {} if kept is None else _latest(kept.open(*json.loads(told)))
+    rows = {} if kept is None else _latest(kept.open(*told))
     run = _Run(task, cases, rows, retry, kept, comm)
     try:
         rows, troubles = run.over(progress)
@@ -91,7 +91,7 @@ def study(
 
 
 def _told(task, cases, *, strictly):
-    """Text: the descriptions of task and cases, by which they are compared with those of a folder and of other ranks.
+    """The descriptions of task and cases, by which they are compared with those of a folder, and cases between ranks.
 
     Raises:
         SceneError: something cannot be compared, and `strictly` is true.
@@ -108,8 +108,7 @@ def _told(task, cases, *, strictly):
                 ) from None
             return str(problem)
 
-    return json.dumps([of("task", task_described, task),
-                       [of(f"cases[{i}]", described, case) for i, case in enumerate(cases)]])  # fmt: skip
+    return of("task", task_described, task), [of(f"cases[{i}]", described, case) for i, case in enumerate(cases)]
 
 
 class _Run:
