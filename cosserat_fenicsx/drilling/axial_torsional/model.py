@@ -1,0 +1,274 @@
+"""The model of a string by elements: torsion alone, axial and torsional motion together, or discs.
+
+Method: linear elements, the implicit midpoint rule, and set-valued laws of wall and bit, which hold or slip within a
+step: Newton's method on their proximal maps with the mean velocities of the step as unknowns (`laws.c`). Friction at the
+wall is a vector against the slip (V, r om), of a normal force per length by the soft string, |T k n + w (e - (e.t) t)|,
+with the tension at the begin of the step. What is held in a step is at rest at its end. Steps that fail are halved.
+Energies and works close to rounding, since the rule keeps quadratic energies and works are those of the step's own
+forces; only the tolerance of Newton's method is left.
+"""
+
+from pathlib import Path
+
+import numpy as np
+
+from cosserat_fenicsx.algebra.building import module
+from cosserat_fenicsx.checks import number, positive, refuse
+from cosserat_fenicsx.drilling.axial_torsional.chain import chain_of_discs, chain_of_string
+from cosserat_fenicsx.drilling.axial_torsional.intervals import intervals
+from cosserat_fenicsx.drilling.bit_laws import Stribeck
+from cosserat_fenicsx.drilling.discs import Discs
+from cosserat_fenicsx.drilling.protocol import LEDGER, SERIES
+from cosserat_fenicsx.drilling.signals import ScalarSignal
+from cosserat_fenicsx.drilling.top_drive import PI, Matched, Motor, Stiff
+from cosserat_fenicsx.errors import NotConverged, SceneError
+
+SOURCES = tuple(Path(__file__).with_name(name) for name in ("model.c", "laws.c", "step.c"))
+_STATE = ("x", "v", "w", "force")
+_SUMS = ("drive", "hook", "bit", "wall", "mud")
+
+
+class AxialTorsional:
+    """A string with axial and torsional motion, or with torsion alone; a `StringModel`.
+
+    The string starts at rest in the tension of its weight in mud along the hole, without friction. A bit with a weight
+    stands on a rock that does not give way, with the hook lowered until it bears that weight; without one the string
+    hangs off bottom. The rock pushes the bit but does not pull it; the torque of a bit whose law has a `radius` follows
+    the weight on bit of the step before. Forces and torques that are recorded are means over the last step.
+
+    Args:
+        drilling: a `Drilling`.
+        dt: time step, s.
+        elements: about how many along the string; each component has one at least.
+        axial: False for torsion alone.
+
+    Attributes:
+        end: None, or what acts on the bit beside its `Stribeck` law: an object whose `begin(model, h)` returns a force
+            (weight on bit, N, torque, N m) and its derivative (2, 2) with respect to the mean velocities of the bit in
+            the coming step of the length h (m/s downwards, rad/s), and whose `commit(model)` is called after it. This
+            is where bits that cut with a delay plug in; a drilling whose bit has another law than `Stribeck` needs it.
+
+    Raises:
+        SceneError: a bit law steeper than the impedance of the string without inertia at the bit; a step too long for a
+            falling law of friction; a scene that the model has no equations for.
+    """
+
+    def __init__(self, drilling, dt: float = 0.01, elements: int = 250, axial: bool = True, end=None):
+        discs = isinstance(drilling.string, Discs)
+        self.dt = positive(self, "dt", dt, "s")
+        elements = number(self, "elements", elements, "a number of elements from 2", lambda x: x >= 2 and x == int(x))
+        self._axial, self.end = axial and not discs, end
+        self.name = "discs" if discs else "axial and torsional" if axial else "torsion"
+        self._chain = chain_of_discs(drilling.string) if discs else chain_of_string(drilling, dt, int(elements), axial)
+        self.depths, self.steps = self._chain.depths, 0
+        self._ffi, self._lib = module(*SOURCES)
+        self._m = self._ffi.new("model *")
+        self._kept, self._dofs = {}, 1 + self._axial
+        self._set_chain()
+        self._set_wall(drilling.friction)
+        self._set_bit(drilling.bit)
+        self._signals = self._axial * [self._set_hook(drilling.hook)] + [self._set_drive(drilling.drive, drilling)]
+        self._lib.limits(self._m)
+        if not discs:
+            self._check_slopes(drilling)
+        self.why = self._reasons(drilling)
+
+    # -- what C sees ----------------------------------------------------------------------------------------------------
+
+    def _array(self, name, values):
+        """Give C an array under a name of its struct."""
+        array = np.ascontiguousarray(values, dtype=np.int32 if np.asarray(values).dtype.kind in "ib" else float)
+        if array.size and array is values:
+            array = array.copy()
+        self._kept[name] = array
+        kind = "int *" if array.dtype == np.int32 else "double *"
+        setattr(self._m, name, self._ffi.cast(kind, array.ctypes.data))
+        return array
+
+    def _set_chain(self):
+        m, chain, n = self._m, self._chain, self._dofs
+        nodes = len(chain.depths)
+        m.nodes, m.dofs, m.hanging_top = nodes, n, chain.hanging_top
+        for name in ("mass", "mass_off", "drag", "drag_off", "spring", "hanging"):
+            self._array(name, getattr(chain, name))
+        for name in (*_STATE, "a", "o", "rho", "b", "y", "c"):
+            self._array(name, np.zeros((nodes, n)))
+        for name, width in (("limit", 3), ("q", 4), ("d", 3), ("guess", 2 * n)):
+            self._array(name, np.zeros((nodes, width)))
+        for name in ("mask", "broken"):
+            self._array(name, np.zeros(nodes, dtype=np.int32))
+        self._array("held", np.full(nodes, 3 if n == 2 else 2, dtype=np.int32))
+
+    def _set_wall(self, friction):
+        m, wall = self._m, self._chain.wall
+        m.pieces, m.fixed = len(wall.element), self._dofs == 1
+        for name, values in vars(wall).items():
+            self._array(name, values)
+        if friction is not None and friction.decays:
+            m.decay, m.of_rotation = friction.speed or 0.0, friction.of_rotation
+
+    def _set_bit(self, bit):
+        m = self._m.bit
+        if bit is None:
+            return
+        mass = self._kept["mass"][-1]
+        mass[-1] += bit.inertia
+        if self._axial:
+            mass[0] += bit.mass
+            m.hanging = bit.weight or 0.0
+        m.weight = bit.weight or 0.0
+        if isinstance(bit.law, Stribeck):
+            m.law, m.weighs, m.rock = 1, bit.law.radius is not None, self._axial and bit.weight is not None
+            (m.still, m.slipping), m.decay = bit.law.torques(1.0), bit.law.speed or 0.0
+        elif self.end is None:
+            refuse("BitOnRock", "law", bit.law, "a Stribeck, or an `end` of the model, which does what the law says")
+
+    def _set_hook(self, hook):
+        top = self._m.top[0]
+        top.rigid = hook is None or np.isinf(hook.stiffness)
+        if not top.rigid:
+            top.integral = hook.stiffness
+        return ScalarSignal("Hook", "speed", 0.0, "m/s") if hook is None else hook.signal()
+
+    def _set_drive(self, drive, drilling):
+        top, control = self._m.top[self._dofs - 1], drive.control
+        top.inertia, top.rigid = drive.inertia, isinstance(control, Stiff)
+        self._kept["mass"][0, -1] += drive.inertia
+        if isinstance(control, PI):
+            top.proportional, top.integral = control.Kp, control.Ki
+        elif isinstance(control, Matched):
+            top.constant, top.proportional = control.torque, control.impedance or self._impedance(drilling)
+        elif isinstance(control, Motor):
+            top.constant, top.proportional = control.torque, control.drag
+        return drive.signal()
+
+    @staticmethod
+    def _impedance(drilling):
+        if isinstance(drilling.string, Discs):
+            refuse("Matched", "impedance", None, "an impedance (N m s/rad): Discs have none")
+        return drilling.segments[0].torsional_impedance
+
+    # -- checks ---------------------------------------------------------------------------------------------------------
+
+    def _check_slopes(self, drilling):
+        bit, lib = drilling.bit, self._lib
+        if bit is not None and isinstance(bit.law, Stribeck) and bit.law.speed and bit.inertia == 0:
+            still, slipping = bit.law.torques(bit.weight or 0.0)
+            slope, impedance = (still - slipping) / bit.law.speed, drilling.segments[-1].torsional_impedance
+            if slope > impedance:
+                raise SceneError(
+                    f"BitOnRock.inertia = 0: expected an inertia (kg m^2): the bit law falls by {slope:.4g} N m s/rad at "
+                    f"rest, steeper than the impedance of {drilling.segments[-1].name}, {impedance:.4g} N m s/rad, and "
+                    "without inertia at the bit its speed is not determined"
+                )
+        if lib.steepest(self._m, self.dt) <= 0:
+            shorter = self.dt
+            for _ in range(60):
+                shorter /= 2
+                if lib.steepest(self._m, shorter) > 0:
+                    break
+            raise SceneError(
+                f"{type(self).__name__}.dt = {self.dt:g} s: expected at most about {shorter:.3g} s: in longer steps the "
+                "law of friction or of the bit falls more steeply than inertia and string allow, and the speed at the "
+                "end of a step is not determined"
+            )
+
+    def _reasons(self, drilling):
+        told = [f"{len(self.depths) - 1} linear elements, implicit midpoint rule with steps of {self.dt:g} s"]
+        if self._axial:
+            told.append("friction at the wall against axial and rotary slip together, normal force by the soft string "
+                        "from the tension of the step before")  # fmt: skip
+            bit = drilling.bit
+            if bit is not None and bit.weight is not None:
+                told.append(f"starts with {bit.weight:g} N on bit, without friction; the rock does not give way")
+            else:
+                told.append("starts hanging off bottom, without friction")
+        elif self._m.pieces:
+            told.append("friction at the wall by the tension at rest")
+        return tuple(told)
+
+    # -- the protocol of string models ------------------------------------------------------------------------------------
+
+    @property
+    def time(self) -> float:
+        """s."""
+        return self.steps * self.dt
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """Steps that were halved, iterations of Newton's method, and most of them in a step."""
+        return {"halved": self._m.halved, "iterations": self._m.iterations, "most_iterations": self._m.most}
+
+    def advance(self, steps: int) -> np.ndarray:
+        """See `StringModel.advance`."""
+        rows = intervals(self._signals, (self.steps, self.steps + steps), self.dt)
+        if self._axial:
+            rows[:, [1, 3]] *= -1  # the hook's speed is positive upwards
+        records = np.full((steps, len(SERIES) + len(LEDGER)), np.nan)
+        if self.end is None:
+            done = self._advance(rows, records)
+        else:
+            done, record = 0, 0
+            for row in rows:
+                force, tangent = self.end.begin(self, row[0])
+                self._m.bit.force, self._m.bit.tangent = list(force), np.ravel(tangent).tolist()
+                if self._advance(row[None], records[record:]) == 0:
+                    break
+                self.end.commit(self)
+                done, record = done + 1, record + int(row[-1])
+        completed = int(rows[:done, -1].sum())
+        times = (self.steps + 1 + np.arange(completed)) * self.dt
+        self.steps += completed
+        found = np.column_stack([times, records[:completed]])
+        if done < len(rows):
+            problem = NotConverged(
+                f"{self.name}: the step at t = {self.time:g} s does not converge however short it is made: expected a "
+                "smoother signal, or laws that fall less steeply"
+            )
+            problem.rows = found
+            raise problem
+        return found
+
+    def _advance(self, rows, records):
+        cast = self._ffi.cast
+        return self._lib.advance(
+            self._m, len(rows), cast("double *", rows.ctypes.data), cast("double *", records.ctypes.data)
+        )
+
+    def profile(self) -> np.ndarray:
+        """See `StringModel.profile`. The node of the bit sticks where the rock holds it."""
+        m, n, kept = self._m, self._dofs, self._kept
+        x, v = kept["x"], kept["v"]
+        forces = np.diff(x, axis=0) * kept["spring"]
+        at = np.concatenate([forces[:1], (forces[:-1] + forces[1:]) / 2, forces[-1:]])
+        torque, nothing = -at[:, -1], np.full(m.nodes, np.nan)
+        torque[[0, -1]] = m.top[n - 1].force, m.bit.torque
+        sticking = (kept["held"] & 2) / 2
+        if not self._axial:
+            return np.array([x[:, -1], v[:, -1], torque, nothing, nothing, nothing, sticking])
+        hanging = kept["hanging"]
+        tension = at[:, 0] + np.concatenate([hanging[:1], (hanging[:-1] + hanging[1:]) / 2, hanging[-1:]])
+        tension[[0, -1]] = m.hanging_top - m.top[0].force, -m.bit.weight
+        return np.array([x[:, 1], v[:, 1], torque, x[:, 0], v[:, 0], tension, sticking])
+
+    def memory(self) -> dict:
+        """See `StringModel.memory`."""
+        m = self._m
+        found = {name: self._kept[name].copy() for name in (*_STATE, "held")}
+        found["sums"] = np.array([getattr(m.sums, name) for name in _SUMS])
+        found["ends"] = np.array([*((m.top[i].error, m.top[i].force) for i in (0, 1))]).ravel()
+        found["bit"] = np.array([m.bit.weight, m.bit.torque, m.bit.floor])
+        found["counts"] = np.array([self.steps, m.halved, m.iterations, m.most])
+        return found
+
+    def recall(self, memory: dict) -> None:
+        """See `StringModel.recall`."""
+        m = self._m
+        for name in (*_STATE, "held"):
+            self._kept[name][:] = memory[name]
+        for name, value in zip(_SUMS, memory["sums"], strict=True):
+            setattr(m.sums, name, value)
+        for i, (error, force) in enumerate(np.reshape(memory["ends"], (2, 2))):
+            m.top[i].error, m.top[i].force = error, force
+        m.bit.weight, m.bit.torque, m.bit.floor = memory["bit"]
+        self.steps, m.halved, m.iterations, m.most = (int(x) for x in memory["counts"])

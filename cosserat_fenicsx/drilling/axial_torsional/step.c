@@ -1,0 +1,240 @@
+/* A step, its books and its record. */
+
+/* w from (A + D) w = b - c by elimination along the string; held unknowns have given velocities. */
+static inline void eliminate(model *m, const double *given_top, double given_bit, const int n)
+{
+    const int last = m->nodes - 1;
+    for (int i = 0; i <= last; i++) {
+        const double *d = m->d + 3 * (size_t)i, *o = m->o + (size_t)(i - 1) * n;
+        double *q = m->q + 4 * (size_t)i, *y = m->y + (size_t)i * n;
+        int mask = m->mask[i];
+        double p[2][2] = {{0}}, r[2] = {0}, given[2] = {0};
+        for (int k = 0; k < n; k++) {
+            p[k][k] = m->a[i * n + k] + d[2 * (k + 2 - n)];
+            r[k] = m->b[i * n + k] - m->c[i * n + k] * (k == n - 1 && m->limit[3 * i] > 0 ? m->limit[3 * i + 2] : 1);
+        }
+        if (n == 2) p[0][1] = p[1][0] = d[1];
+        if (i) {
+            const double *before = q - 4;
+            for (int k = 0; k < n; k++) {
+                for (int l = 0; l < n; l++) p[k][l] -= o[k] * before[2 * k + l] * o[l];
+                r[k] -= o[k] * y[k - n];
+            }
+        } else
+            for (int k = 0; k < n; k++)
+                if (m->top[k].rigid) mask |= bit_of(m, k), given[k] = given_top[k];
+        if (i == last) {
+            if (mask & AXIAL && m->bit.rock) given[0] = given_bit;
+            for (int k = 0; k < n; k++)
+                for (int l = 0; l < n; l++) p[k][l] += m->bit.tangent[2 * (k + 2 - n) + l + 2 - n];
+        }
+        q[0] = q[1] = q[2] = q[3] = 0;
+        if (n == 1) {
+            q[0] = mask ? 0 : 1 / p[0][0];
+            y[0] = mask ? given[0] : r[0] * q[0];
+        } else if (mask == 0) {
+            const double det = 1 / (p[0][0] * p[1][1] - p[0][1] * p[1][0]);
+            q[0] = p[1][1] * det, q[1] = -p[0][1] * det, q[2] = -p[1][0] * det, q[3] = p[0][0] * det;
+            y[0] = q[0] * r[0] + q[1] * r[1], y[1] = q[2] * r[0] + q[3] * r[1];
+        } else {
+            for (int k = 0; k < 2; k++)
+                if (mask & 1 << k)
+                    y[k] = given[k];
+                else {
+                    q[3 * k] = 1 / p[k][k];
+                    y[k] = q[3 * k] * (r[k] - (mask & 1 << (1 - k) ? p[k][1 - k] * given[1 - k] : 0));
+                }
+        }
+    }
+    for (int k = 0; k < n; k++) m->w[last * n + k] = m->y[last * n + k];
+    for (int i = last - 1; i >= 0; i--) {
+        const double *o = m->o + (size_t)i * n, *q = m->q + 4 * (size_t)i, *y = m->y + (size_t)i * n;
+        double *w = m->w + (size_t)i * n, s[2];
+        for (int k = 0; k < n; k++) s[k] = o[k] * w[n + k];
+        for (int k = 0; k < n; k++) {
+            w[k] = y[k];
+            for (int l = 0; l < n; l++) w[k] -= q[2 * k + l] * s[l];
+        }
+    }
+}
+
+/* The mean velocities w and the forces of the laws in a step; 0 where Newton's method does not converge. */
+static int solve(model *m, double h, const double *signal)
+{
+    const double gap = m->bit.rock ? (m->bit.floor - m->x[2 * m->nodes - 2]) / h : 0;
+    memset(m->broken, 0, m->nodes * sizeof *m->broken);
+    loads(m, h, signal);
+    for (int i = 0;; i++) {
+        double scale;
+        const double error = foretell(m, h, &scale);
+        if (i && error <= 1e-10 * scale + 1e-11) {
+            m->iterations += i;
+            if (i > m->most) m->most = i;
+            return 1;
+        }
+        if (i == ITERATIONS || !isfinite(error)) {
+            m->iterations += i;
+            return 0;
+        }
+        if (m->dofs == 1)
+            eliminate(m, signal, gap, 1);
+        else
+            eliminate(m, signal, gap, 2);
+        take_forces(m);
+    }
+}
+
+/* v of an unknown changes at once: the kinetic energy that this adds. */
+static double set_velocity(model *m, int i, int d, double v)
+{
+    const int n = m->dofs, j = i * n + d;
+    double p = m->mass[j] * (m->v[j] + v) / 2;
+    if (i) p += m->mass_off[j - n] * m->v[j - n];
+    if (i < m->nodes - 1) p += m->mass_off[j] * m->v[j + n];
+    const double added = p * (v - m->v[j]);
+    m->v[j] = v;
+    return added;
+}
+
+/* Take a step that has converged. */
+static void commit(model *m, double h, const double *signal)
+{
+    const int n = m->dofs, last = m->nodes - 1, turn = n - 1;
+    books *sums = &m->sums;
+    for (int d = 0; d < n; d++) {
+        upper *top = m->top + d;
+        const double w = m->w[d], stretched = top->error + h / 2 * (signal[d] - w);
+        if (top->rigid)
+            top->force = -missing(m, 0, d);
+        else {
+            top->force = top->constant + top->proportional * (signal[d] - w) + top->integral * stretched;
+            top->error += h * (signal[d] - w);
+        }
+        /* a hook's spring keeps what it takes; of a drive the torque itself does the work */
+        if (d == turn)
+            sums->drive += h * top->force * w;
+        else
+            sums->hook += h * (top->force - m->hanging_top) * signal[d];
+        top->force -= top->inertia * 2 * (w - m->v[d]) / h;
+    }
+    for (int i = 0; i <= last; i++) {
+        const double *F = m->force + (size_t)i * n, *w = m->w + (size_t)i * n;
+        const double *limit = m->limit + 3 * (size_t)i;
+        if (limit[0] > 0) sums->wall += h * (F[turn] * limit[2] * w[turn] + (n == 2 ? F[0] * w[0] : 0));
+        for (int d = 0; d < n; d++) {
+            const int j = i * n + d;
+            double lost = m->drag[j] * w[d];
+            if (i) lost += m->drag_off[j - n] * w[d - n];
+            if (i < last) lost += m->drag_off[j] * w[d + n];
+            sums->mud += h * lost * w[d];
+        }
+    }
+    const double *w = m->w + (size_t)last * n;
+    double force[2];
+    for (int d = 2 - n; d < 2; d++) {
+        force[d] = m->bit.force[d];
+        for (int k = 0; k < n; k++) force[d] += m->bit.tangent[2 * d + k + 2 - n] * w[k];
+        if (d ? m->bit.law : m->bit.rock) force[d] += m->force[last * n + d + n - 2];
+        sums->bit += h * force[d] * w[d + n - 2];
+    }
+    if (n == 2) m->bit.weight = force[0];
+    m->bit.torque = force[1];
+    for (int j = 0; j < m->nodes * n; j++) {
+        m->x[j] += h * m->w[j];
+        m->v[j] = 2 * m->w[j] - m->v[j];
+    }
+    /* what is held in a step is at rest at its end */
+    for (int i = 0; i <= last; i++) {
+        m->held[i] = m->mask[i];
+        double *lost = i == last && (m->bit.law || m->bit.rock) ? &sums->bit : &sums->wall;
+        for (int d = 0; d < n; d++)
+            if (m->mask[i] & bit_of(m, d)) *lost -= set_velocity(m, i, d, 0);
+    }
+}
+
+static int step(model *m, double h, const double *from, const double *to)
+{
+    double signal[2];
+    const size_t size = (size_t)m->nodes * m->dofs * sizeof(double);
+    for (int d = 0; d < m->dofs; d++) signal[d] = (from[d] + to[d]) / 2;
+    if (!build(m, h)) return 0;
+    if (!m->fixed) limits(m);
+    m->bit.factor = m->bit.weighs ? fmax(m->bit.weight, 0) : !m->bit.rock || m->bit.weight > 0;
+    /* a step that fails leaves the guess as it was */
+    memcpy(m->guess, m->w, size);
+    memcpy(m->guess + (size_t)m->nodes * m->dofs, m->force, size);
+    if (solve(m, h, signal)) {
+        commit(m, h, signal);
+        return 1;
+    }
+    memcpy(m->w, m->guess, size);
+    memcpy(m->force, m->guess + (size_t)m->nodes * m->dofs, size);
+    return 0;
+}
+
+static void write_record(const model *m, double *row)
+{
+    const int n = m->dofs, last = m->nodes - 1, turn = n - 1;
+    const double *x = m->x, *v = m->v;
+    double kinetic = 0, strain = 0, weight = 0;
+    for (int i = 0; i <= last; i++)
+        for (int d = 0; d < n; d++) {
+            const int j = i * n + d;
+            kinetic += m->mass[j] * v[j] * v[j] / 2;
+            if (i < last) {
+                const double stretch = x[j + n] - x[j];
+                kinetic += m->mass_off[j] * v[j] * v[j + n];
+                strain += m->spring[j] * stretch * stretch / 2;
+                if (d < turn) strain += m->hanging[i] * stretch;
+            }
+            if (d < turn)
+                weight += ((i ? m->hanging[i - 1] : m->hanging_top) - (i < last ? m->hanging[i] : -m->bit.hanging)) * x[j];
+        }
+    if (n == 2 && !m->top[0].rigid) {
+        const double error = m->top[0].error;
+        strain += m->top[0].integral * error * error / 2 - m->hanging_top * error;
+    }
+    const double drive = m->top[turn].force, hook = n == 2 ? m->hanging_top - m->top[0].force : NAN;
+    const double series[] = {v[turn], x[turn], drive, v[last * n + turn], x[last * n + turn], m->bit.torque, hook,
+                             n == 2 ? v[2 * last] : NAN, n == 2 ? x[2 * last] : NAN, n == 2 ? m->bit.weight : NAN,
+                             kinetic, strain, m->sums.drive, m->sums.hook, weight, m->sums.bit, m->sums.wall,
+                             m->sums.mud};
+    memcpy(row, series, sizeof series);
+}
+
+/* Do intervals, rows (h, velocities asked for at the begin, at the end, whether a record is written). Returns how many
+   were done; of one that fails nothing, or its first parts, have been done, which nobody may use. */
+int advance(model *m, int intervals, const double *interval, double *record)
+{
+    const int n = m->dofs;
+    for (int i = 0; i < intervals; i++, interval += 2 + 2 * n) {
+        const double h = interval[0], *from = interval + 1, *to = from + n;
+        for (int d = 0; d < n; d++)
+            if (m->top[d].rigid && m->v[d] != from[d]) {
+                double *work = d == n - 1 ? &m->sums.drive : &m->sums.hook;
+                *work += set_velocity(m, 0, d, from[d]);
+            }
+        double done = 0, size = 1;
+        while (done < 1) {
+            double begin[2], end[2];
+            for (int d = 0; d < n; d++) {
+                begin[d] = from[d] + done * (to[d] - from[d]);
+                end[d] = from[d] + (done + size) * (to[d] - from[d]);
+            }
+            if (step(m, size * h, begin, end)) {
+                done += size;
+                /* parts begin at multiples of their length */
+                if (size < 1 && fmod(done, 2 * size) == 0) size *= 2;
+            } else {
+                m->halved++;
+                size /= 2;
+                if (size < 1.0 / (1 << HALVINGS)) return i;
+            }
+        }
+        if (interval[1 + 2 * n] != 0) {
+            write_record(m, record);
+            record += 18;
+        }
+    }
+    return intervals;
+}
