@@ -91,8 +91,8 @@ class Regenerative:
         decayed = np.exp(-y)
         value = np.where(small, 1 - x / 2 * (1 - x / 3 * (1 - x / 4 * (1 - x / 5 * (1 - x / 6 * (1 - x / 7))))),
                          (1 - decayed) / y)  # fmt: skip
-        slope = np.where(small, -1 / 2 + x / 3 * (1 - 3 * x / 8 * (1 - 4 * x / 15 * (1 - 5 * x / 24 * (1 - 6 * x / 35)))),
-                         (decayed * (1 + y) - 1) / y**2)  # fmt: skip
+        series = -1 / 2 + x / 3 * (1 - 3 * x / 8 * (1 - 4 * x / 15 * (1 - 5 * x / 24 * (1 - 6 * x / 35))))
+        slope = np.where(small, series, (decayed * (1 + y) - 1) / y**2)
         return tau * value, tau**2 * slope
 
     def __call__(self, s):

@@ -64,7 +64,7 @@ def _hook(scene):
 
 
 def phase(guide: Guide, w: float, fixed: bool, top) -> float:
-    """The angle at the lower end less the one that its condition asks for, rad; natural where it is a multiple of pi."""
+    """The angle at the lower end less the one that its condition asks for, rad; in a mode a multiple of pi."""
     first = guide.parts[0].impedance
     psi = math.atan2(*top(w, first))
     for part, following in zip(guide.parts, (*guide.parts[1:], None), strict=True):

@@ -8,8 +8,8 @@ both downwards, which is minus the tension. Along a uniform part of length L, wi
     w(L) = cosh(g L) w(0) - s/K sinh(g L)/g P(0)
     P(L) = cosh(g L) P(0) - mu (s + d) sinh(g L)/g w(0)
 
-which are entire functions of s. States are scaled by positive factors, such that nothing overflows however large s L is:
-phases, ratios and logarithmic derivatives are exact, sizes are not.
+which are entire functions of s. States are scaled by positive factors, such that nothing overflows however large s L
+is: phases, ratios and logarithmic derivatives are exact, sizes are not.
 """
 
 from dataclasses import dataclass
@@ -80,7 +80,6 @@ class Uniform:
             C * dw + a * S * dP + dC * turn * w + (a * dS * turn - S / self.stiffness) * P,
             C * dP + b * S * dw + dC * turn * P + (b * dS * turn - self.inertia * S) * w,
         )
-
 
     def decay(self, s, length):
         """Re(g length)."""

@@ -1,4 +1,4 @@
-"""Limits of stability: the slope of the bit's torque, the speed and the weight at which the first mode begins to grow."""
+"""Limits of stability: slope of the bit's torque, speed and weight at which a first mode begins to grow."""
 
 import math
 
@@ -56,7 +56,7 @@ def critical_slopes(scene, up_to: float = 10.0) -> tuple[np.ndarray, np.ndarray]
 
 
 def _real_roots(f, a, b, depth=0):
-    """All real roots of a smooth function in [a, b), by interpolation with a polynomial, of which they are all found."""
+    """All real roots of a smooth function in [a, b), as those of a polynomial that interpolates it."""
     series = chebyshev.chebinterpolate(lambda x: f((a + b) / 2 + (b - a) / 2 * x), _DEGREE)
     size = np.abs(series).max()
     if size == 0.0:

@@ -1,7 +1,7 @@
 """All roots of an analytic function in a box of the complex plane, counted by the argument principle.
 
-Functions are real on the real axis: their roots are real or pairs, of which those with Im s >= 0 are returned. They take
-s (n,) and return (f, f') scaled by any positive factors (n,): phases and f'/f are what is used.
+Functions are real on the real axis: their roots are real or pairs, of which those with Im s >= 0 are returned. They
+take s (n,) and return (f, f') scaled by any positive factors (n,): phases and f'/f are what is used.
 """
 
 import math
@@ -20,7 +20,7 @@ _STEPS, _SETTLED = 60, 1e-13
 
 @dataclass(frozen=True)
 class Box:
-    """left < Re s < right, bottom < Im s < top (1/s, rad/s); bottom = 0 stands for the symmetric box -top < Im s < top."""
+    """left < Re s < right, bottom < Im s < top, 1/s; bottom = 0 stands for the symmetric box -top < Im s < top."""
 
     left: float
     right: float

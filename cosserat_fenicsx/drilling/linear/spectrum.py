@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from cosserat_fenicsx.checks import refuse
+from cosserat_fenicsx.drilling.bit_laws import Cutting
 from cosserat_fenicsx.drilling.linear.drives import growth_with
 from cosserat_fenicsx.drilling.linear.shapes import shape_of
 from cosserat_fenicsx.drilling.linear.spectrum_table import stability_table
@@ -39,6 +40,18 @@ class Stability(Tabular):
     def frequency(self) -> np.ndarray:
         """(n, m, k) Hz."""
         return np.where(np.isfinite(self.growth), self.roots.imag / (2 * np.pi), np.nan)
+
+    @property
+    def cautions(self) -> list[str]:
+        """What the result leaves out, in sentences."""
+        friction, hole, left_out = self.scene.friction, self.scene.hole, []
+        if friction is not None and friction.decays:
+            left_out.append(
+                "friction at the wall falls with the slip, which drives torsional modes, too: left out here"
+            )
+        if isinstance(getattr(self.scene.bit, "law", None), Cutting) and hole is not None:
+            left_out.append("friction at the wall damps axial motion of a string that rotates: left out here")
+        return left_out
 
     @property
     def unstable_modes(self) -> np.ndarray:
@@ -92,7 +105,7 @@ class Stability(Tabular):
             SceneError: matplotlib is missing, there is no such mode, or the file's ending is unknown.
             OSError: the file cannot be written.
         """
-        from cosserat_fenicsx.drilling.pictures.maps import draw_stability
+        from cosserat_fenicsx.drilling.pictures.stability_charts import draw_stability
 
         if mode is not None:
             self._known(mode)

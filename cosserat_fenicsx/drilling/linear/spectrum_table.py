@@ -15,7 +15,7 @@ def stability_table(answer):
     """Text: every mode that grows, where it moves, in how many cases, and what other drives make of it."""
     grows = [k for k in range(answer.roots.shape[2]) if (answer.growth[:, :, k] > 0).any()]
     cases = answer.growth.shape[0] * answer.growth.shape[1]
-    lines = [f"{_range(answer)}, all modes up to {answer.up_to:.4g} Hz."]
+    lines = [f"{_range(answer)}, all modes up to {answer.up_to:.4g} Hz.", *(f"{x}." for x in answer.cautions)]
     if not grows:
         k = int(np.nanargmax(np.nanmax(answer.growth, axis=(0, 1))))
         i, j = answer.worst(k)
@@ -32,14 +32,14 @@ def stability_table(answer):
         rows.append((k, i, j, drives))
     names = list(rows[0][3])
     table = Table(
-        caption="growth: in 1/s. fastest: the largest of all cases. at: the middle one of those in which the mode grows, "
-        "its frequency and its growth there, with the drive of the scene and with others."
+        caption="growth: in 1/s. fastest: the largest of all cases. at: the middle one of those in which the mode "
+        "grows, its frequency and its growth there, with the drive of the scene; to the right the growth with other drives."
     )
-    for heading in ("mode", "grows in", "fastest", "at", "frequency (Hz)", "growth", *(f"{x} drive" for x in names)):
+    for heading in ("mode", "grows in", "fastest", "at rpm", "kN", "frequency (Hz)", "growth", *names):
         table.add_column(heading, justify="right")
     for k, i, j, drives in rows:
         share = f"{int((answer.growth[:, :, k] > 0).sum())} of {cases}"
-        told = [share, f"{np.nanmax(answer.growth[:, :, k]):.4f}", _case(answer, i, j)]
+        told = [share, f"{np.nanmax(answer.growth[:, :, k]):.4f}", *_numbers(answer, i, j)]
         here = f"{answer.frequency[i, j, k]:.4f}", f"{answer.growth[i, j, k]:.4f}"
         table.add_row(str(k), *told, *here, *("gone" if math.isnan(x) else f"{x:.4f}" for x in drives.values()))
     lines += [as_text(table), *places]
@@ -71,10 +71,15 @@ def _frequencies(answer, rows):
     return ", ".join(f"{answer.frequency[i, j, k]:.3g}" for k, i, j, _ in sorted(rows)) + " Hz"
 
 
-def _case(answer, i, j):
+def _numbers(answer, i, j):
+    """Speed in rpm and weight in kN of a case, "" without one."""
     weight = answer.weights[j]
-    speed = f"{answer.speeds[i] * 30 / math.pi:.4g} rpm"
-    return speed if math.isnan(weight) else f"{speed}, {weight / 1e3:.4g} kN"
+    return f"{answer.speeds[i] * 30 / math.pi:.4g}", "" if math.isnan(weight) else f"{weight / 1e3:.4g}"
+
+
+def _case(answer, i, j):
+    speed, weight = _numbers(answer, i, j)
+    return f"{speed} rpm" + (f", {weight} kN" if weight else "")
 
 
 def _range(answer):

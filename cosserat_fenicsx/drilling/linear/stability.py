@@ -19,10 +19,9 @@ def stability(scene, speeds, weights=None, *, modes: int | None = None, up_to: f
     The string rotates at the speed that is asked for, and drills; its small motions about that grow or decay like
     exp(s t). Where the law of the bit is a torque against speed, they are torsional, with the slope of the torque at
     the speed and weight of the case, and with the string's distributed drag. Where the bit cuts (`Cutting`), torsion
-    and axial motion are coupled by the depth of cut with its delay, and the weight sets the rate of penetration; without
-    a weight the speed of the hook does. All roots of the transcendental equation up to a frequency are found; their
-    number is that of the argument principle. Friction at the wall acts on neither while its coefficient does not
-    depend on the slip.
+    and axial motion are coupled by the depth of cut with its delay, and the weight sets the rate of penetration;
+    without a weight the speed of the hook does. All roots of the transcendental equation up to a frequency are found;
+    their number is that of the argument principle. Friction at the wall is left out, see `Stability.cautions`.
 
     Args:
         scene: a `Drilling`; the speed of its drive and its weight on bit are replaced by those of the cases.
@@ -58,7 +57,7 @@ def stability(scene, speeds, weights=None, *, modes: int | None = None, up_to: f
 
 
 def _heights(found, cuts):
-    """What modes are numbered by: the frequency without the bit's slope; with a bit that cuts, that of the middle case."""
+    """What modes are numbered by: the frequency without the bit's slope; for a bit that cuts that of the middle case."""
     columns = [column[np.isfinite(column)].imag for column in found.T]
     return [float(np.median(column)) if cuts else float(column[0]) for column in columns]
 
@@ -70,4 +69,3 @@ def highest(scene, modes, up_to):
     count = int(number("stability", "modes", modes, "a number from 1", lambda x: x >= 1 and x == int(x)))
     lowest = natural_frequencies(scene, count + 1)
     return float(lowest[count - 1 :].mean()) if len(lowest) > count else 1.5 * float(lowest[-1])
-
