@@ -224,10 +224,9 @@ def _search(f, box, spacing, total, known, depth=0):
 
 def _net(box, spacing):
     """Starts for Newton's method: near the imaginary axis, and to its left and right as far as the box goes."""
-    heights = np.arange(box.bottom, box.top, min(spacing / 3, (box.top - box.bottom) / 3))
-    wide = box.right - box.left
-    columns = np.clip([0.0, -0.15 * spacing, 0.15 * spacing, -0.6 * spacing, 0.6 * spacing],
-                      box.left + 0.05 * wide, box.right - 0.05 * wide)  # fmt: skip
-    grid = np.unique(columns)[:, None] + 1j * (heights[None, :] + spacing / 7)
+    wide, high = box.right - box.left, box.top - box.bottom
+    heights = box.bottom + high * (np.arange(n := 2 + math.ceil(3 * high / spacing)) + 0.43) / n
+    columns = np.array([0.0, -0.15, 0.15, -0.6, 0.6]) * spacing
+    columns = np.unique(np.clip(columns, box.left + 0.05 * wide, box.right - 0.05 * wide))
     axis = np.linspace(box.left, box.right, 12) + 0j if box.bottom == 0 else np.array([])
-    return np.concatenate([grid.ravel(), axis])
+    return np.concatenate([(columns[:, None] + 1j * heights[None, :]).ravel(), axis])
