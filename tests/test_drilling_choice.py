@@ -34,7 +34,8 @@ def bit():
         ({"bit": None, "hook": cf.Hook(speed=0.3)}, BOTH, "the hook moves"),
         ({"bit": None, "hook": cf.Hook(speed=cf.Ramp((0.3,)))}, BOTH, "the hook moves"),
         ({"hook": cf.Hook(stiffness=5e6)}, TORSION, "nothing moves along the axis"),
-        ({"string": cf.Discs((9.0, 4.0), (7.0,))}, TORSION, "discs turn alone"),
+        ({"string": cf.Discs((9.0, 4.0), (7.0,))}, TORSION, "turn alone"),
+        ({"string": cf.Discs((9.0, 4.0), (7.0,), masses=(1.0, 1.0), axial_stiffnesses=(1.0,))}, BOTH, "have masses"),
     ],
 )
 def test_the_cheapest_model_that_is_asked_for(changed, model, words):
@@ -49,7 +50,7 @@ def test_what_is_asked_for_is_taken_and_told():
     assert chosen(moving, TORSION)[1][1].startswith("APPROXIMATE: torsion alone leaves out what moves along the axis")
     with pytest.raises(cf.SceneError, match="expected 'axial and torsional' or 'auto', since the torque of Cutting"):
         chosen(scene(bit=cf.BitOnRock(cf.Cutting(0.1, 60e6, 0.6, 4))), TORSION)
-    with pytest.raises(cf.SceneError, match="expected 'torsion' or 'auto' for Discs, which turn alone"):
+    with pytest.raises(cf.SceneError, match="expected 'torsion' or 'auto': discs without masses turn alone"):
         chosen(scene(string=cf.Discs((9.0, 4.0), (7.0,))), BOTH)
 
 

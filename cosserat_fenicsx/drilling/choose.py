@@ -22,11 +22,11 @@ def chosen(scene, model="auto"):
     if not isinstance(model, str) or model not in MODELS:
         raise SceneError(f"simulate_drilling.model = {model!r}: {nearest(model, MODELS)}")
     if isinstance(scene.string, Discs):
-        if model == BOTH:
-            raise SceneError(
-                f"simulate_drilling.model = '{BOTH}': expected '{TORSION}' or 'auto' for Discs, which turn alone"
-            )
-        return TORSION, ["torsion: discs turn alone"]
+        fits = TORSION if scene.string.masses is None else BOTH
+        what = "discs without masses turn alone" if fits == TORSION else "the discs have masses"
+        if model not in ("auto", fits):
+            raise SceneError(f"simulate_drilling.model = '{model}': expected '{fits}' or 'auto': {what}")
+        return fits, [f"{fits}: {what}"]
     asks = _asks_for_axial(scene)
     if model == "auto":
         name = BOTH if asks else TORSION

@@ -19,7 +19,7 @@ from cosserat_fenicsx.well.string import DrillString
 
 @dataclass(frozen=True)
 class Drilling:
-    """A drill-string with what turns it, holds it and brakes it. It starts at rest, untwisted, hanging in its weight.
+    """A drill-string with what turns it, holds it and brakes it.
 
     Args:
         string: a `DrillString`, or `Discs`.
@@ -31,6 +31,8 @@ class Drilling:
         friction: `WallFriction`; None for that of the hole, the same at rest and in motion.
         drag: `ViscousDrag`; None for none.
         depth: measured depth of the bit, m; None for the bottom of the hole, or the string's length without one.
+        start: "rest": untwisted, hanging in its weight, with the static weight on bit; or "steady": all of it turns at
+            the drive's speed and moves at the hook's, twisted by what brakes it.
 
     Raises:
         SceneError: parts that are missing or do not fit each other.
@@ -45,6 +47,7 @@ class Drilling:
     friction: WallFriction | None = None
     drag: ViscousDrag | None = None
     depth: float | None = None
+    start: str = "rest"
 
     def __post_init__(self):
         parts = {
@@ -56,10 +59,14 @@ class Drilling:
             if value is not None or field in ("string", "drive"):
                 names = " or ".join(x.__name__ for x in (kinds if isinstance(kinds, tuple) else (kinds,)))
                 instance(self, field, value, kinds, f"{names}(...)")
+        if self.start not in ("rest", "steady"):
+            refuse(self, "start", self.start, "'rest' or 'steady'")
         if isinstance(self.string, Discs):
-            for field in ("hole", "hook", "mud", "friction", "drag", "depth"):
+            for field in ("hole", "mud", "friction", "drag", "depth"):
                 if getattr(self, field) is not None:
-                    refuse(self, field, getattr(self, field), "None for Discs, which turn alone; drags are theirs")
+                    refuse(self, field, getattr(self, field), "None for Discs, whose drags are their own")
+            if self.hook is not None and self.string.masses is None:
+                refuse(self, "hook", self.hook, "None for Discs without masses, which turn alone")
             return
         if self.friction is not None and self.hole is None:
             refuse(self, "hole", None, "a Borehole, where there is friction at its wall")

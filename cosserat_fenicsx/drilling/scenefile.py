@@ -79,7 +79,8 @@ KEYS = {
     "simulate": ("duration", "model", "dt", "elements", "save_every", "profile_every"),
     "stability": ("speeds", "weights"),
 }
-_TABLES = ("title", "well", "string", "discs", "mud", "drive", "bit", "hook", "wall_friction", "drag", "depth", *KEYS)
+_TABLES = ("title", "well", "string", "discs", "mud", "drive", "bit", "hook", "wall_friction", "drag", "depth", "start",
+           *KEYS)  # fmt: skip
 _TUNED = {"SoftTorque": SoftTorque, "SoftSpeed": SoftSpeed}
 
 
@@ -142,6 +143,8 @@ def _scene(tables, folder):
         given["hole"] = hole_in(table("well", tables["well"]), folder)
     if "depth" in tables:
         given["depth"] = in_si("depth", tables["depth"], "length")
+    if "start" in tables:
+        given["start"] = tables["start"]
     if "bit" in tables:
         given["bit"] = _made("bit", tables["bit"], (BitOnRock,))
     if "wall_friction" in tables:

@@ -72,9 +72,12 @@ class Wall:
 def usual_step(scene, elements: int | None) -> float:
     """The time step (s) of a `Drilling` for so many elements, where none is asked for."""
     if isinstance(scene.string, Discs):
-        inertias, springs = np.array(scene.string.inertias), np.array(scene.string.stiffnesses)
-        around = np.append(springs, 0.0) + np.append(0.0, springs)
-        return min(_LONGEST, _SHARE * float(np.sqrt(inertias / around).min()))
+        discs, shortest = scene.string, math.inf
+        for inertias, springs in ((discs.inertias, discs.stiffnesses), (discs.masses, discs.axial_stiffnesses)):
+            if inertias is not None:
+                around = np.append(springs, 0.0) + np.append(0.0, springs)
+                shortest = min(shortest, float(np.sqrt(np.array(inertias) / around).min()))
+        return min(_LONGEST, _SHARE * shortest)
     return min(_LONGEST, _travel_time(scene) / (elements or _USUAL))
 
 
@@ -85,22 +88,26 @@ def _travel_time(scene):
 def chain_of(scene, dt: float, elements: int | None, axial: bool) -> Chain:
     """The `Chain` of a `Drilling` for steps of `dt` (s), of about so many elements, or None for the usual number."""
     if isinstance(scene.string, Discs):
-        return _chain_of_discs(scene.string)
+        return _chain_of_discs(scene.string, axial, _static_weight(scene) if axial else 0.0)
     if elements is None:
         elements = min(max(_travel_time(scene) / dt, _FEWEST), _MOST_ELEMENTS)
     return _chain_of_string(scene, dt, elements, axial)
 
 
-def _chain_of_discs(discs):
-    between = np.array(discs.dampings)
-    drag = np.array(discs.drags)
-    drag[:-1] += between
-    drag[1:] += between
-    n = len(discs.inertias)
-    columns = (np.array(discs.inertias), np.zeros(n - 1), drag, -between, np.array(discs.stiffnesses))
+def _chain_of_discs(discs, axial, weight):
+    """A static weight on bit (N) compresses all springs."""
+    turning = discs.inertias, discs.stiffnesses, discs.dampings, discs.drags
+    moving = discs.masses, discs.axial_stiffnesses, discs.axial_dampings, discs.axial_drags
+    n, columns = len(discs.inertias), []
+    for inertia, spring, between, drag in ([moving] if axial else []) + [turning]:
+        diagonal = np.array(drag)
+        diagonal[:-1] += between
+        diagonal[1:] += between
+        columns.append((np.array(inertia), np.zeros(n - 1), diagonal, -np.array(between), np.array(spring)))
     nothing = np.zeros(0)
     wall = Wall(*[np.zeros(0, dtype=np.int32)] * 3, *[nothing] * 9)
-    return Chain(np.arange(n, dtype=float), *(column[:, None].copy() for column in columns), np.zeros(n - 1), 0.0, wall)
+    arrays = [np.ascontiguousarray(np.stack(parts, axis=1)) for parts in zip(*columns, strict=True)]
+    return Chain(np.arange(n, dtype=float), *arrays, np.full(n - 1, -weight), -weight, wall)
 
 
 def _chain_of_string(drilling, dt, elements, axial):

@@ -97,6 +97,20 @@ static double rest(model *m, double h)
     return fabs(m->force[2 * i] / m->rho[2 * i]);
 }
 
+/* The flats of a worn bit, which bear between nothing and twice their mean force: all where the bit moves down, nothing
+   where it moves up. The mean is a part of the given force. */
+static double rub(model *m)
+{
+    const int i = m->nodes - 1;
+    const double tau = m->force[2 * i] + m->rho[2 * i] * m->w[2 * i];
+    if (fabs(tau) <= m->bit.flat) {
+        m->mask[i] |= AXIAL;
+        return fabs(m->w[2 * i]);
+    }
+    m->c[2 * i] = copysign(m->bit.flat, tau);
+    return fabs(m->force[2 * i] - m->c[2 * i]) / m->rho[2 * i];
+}
+
 /* What all laws foretell from the state of the iteration, as masks of held unknowns and as linear laws c + d w.
    Returns the largest difference to its slips, m/s or rad/s; the largest slip into *scale. */
 static double foretell(model *m, double h, double *scale)
@@ -120,6 +134,10 @@ static double foretell(model *m, double h, double *scale)
         largest = fmax(largest, fabs(m->w[last * n + n - 1]));
     }
     if (m->bit.rock) error = fmax(error, rest(m, h));
+    if (m->bit.flat > 0) {
+        error = fmax(error, rub(m));
+        largest = fmax(largest, fabs(m->w[2 * last]));
+    }
     *scale = largest;
     return error;
 }
@@ -147,5 +165,5 @@ static void take_forces(model *m)
     double *F = m->force + (size_t)i * n;
     if (m->bit.law)
         F[n - 1] = m->mask[i] & TURN ? missing(m, i, n - 1) : m->c[i * n + n - 1] + m->d[3 * i + 2] * m->w[i * n + n - 1];
-    if (m->bit.rock) F[0] = m->mask[i] & AXIAL ? missing(m, i, 0) : 0;
+    if (pushed(m)) F[0] = m->mask[i] & AXIAL ? missing(m, i, 0) : m->c[2 * i];
 }

@@ -10,6 +10,9 @@ enum { AXIAL = 1, TURN = 2 }; /* bits of masks; of one unknown alone only the se
 
 static inline int bit_of(const model *m, int d) { return m->dofs == 1 ? TURN : 1 << d; }
 
+/* Whether a set-valued law acts on the bit along the axis. */
+static inline int pushed(const model *m) { return m->bit.rock || m->bit.flat > 0; }
+
 /* Largest friction forces at the nodes from the tension now: the normal force of the soft string,
    |T k n + w (e - (e.t) t)|. */
 void limits(model *m)

@@ -19,9 +19,11 @@ typedef struct {
     int law, weighs, rock;          /* whether there is a Stribeck law, whether its torques are per weight on bit, whether
                                        the bit rests on a rigid rock */
     double still, slipping, decay;  /* torques of the law, or per weight, and speed; 0: it drops at once */
+    double flat;                    /* half the largest force of the flats of a worn bit; 0: none */
     double force[2], tangent[4];    /* given from Python before a step, for other laws: weight on bit and torque */
     double hanging;                 /* static weight on bit, with which the string hangs */
-    double weight, torque, floor;   /* of the last step; place of the rock */
+    double weight, torque, floor;   /* of the last step; place of the rock at the end of the next one */
+    double rising;                  /* velocity of the rock at the end of the next step, downwards */
     double factor;                  /* of the next step, on the law's torques */
 } lower;
 

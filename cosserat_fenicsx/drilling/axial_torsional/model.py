@@ -14,13 +14,16 @@ import numpy as np
 
 from cosserat_fenicsx.algebra.pointers import Pointers
 from cosserat_fenicsx.checks import number, positive, refuse
+from cosserat_fenicsx.drilling.axial_torsional.bits import end_of, forces_of
 from cosserat_fenicsx.drilling.axial_torsional.chain import chain_of, usual_step
 from cosserat_fenicsx.drilling.axial_torsional.intervals import intervals
-from cosserat_fenicsx.drilling.bit_laws import Stribeck
+from cosserat_fenicsx.drilling.axial_torsional.steady import steady_state
+from cosserat_fenicsx.drilling.bit_laws import Lobes, Stribeck
 from cosserat_fenicsx.drilling.discs import Discs
 from cosserat_fenicsx.drilling.protocol import LEDGER, SERIES
 from cosserat_fenicsx.drilling.signals import ScalarSignal
-from cosserat_fenicsx.drilling.single_valued import check_bit
+from cosserat_fenicsx.drilling.single_valued import check_bit, stribeck_of
+from cosserat_fenicsx.drilling.steady_start import check_steady, steady_velocities
 from cosserat_fenicsx.drilling.top_drive import PI, Matched, Motor, Stiff
 from cosserat_fenicsx.errors import NotConverged, SceneError
 
@@ -33,9 +36,9 @@ _SUMS = ("drive", "hook", "bit", "wall", "mud")
 class AxialTorsional(Pointers):
     """A string with axial and torsional motion, or with torsion alone; a `StringModel`.
 
-    The string starts at rest in the tension of its weight in mud along the hole, without friction. A bit with a weight
-    stands on a rock that does not give way, with the hook lowered until it bears that weight; without one the string
-    hangs off bottom. The rock pushes the bit but does not pull it; the torque of a bit whose law has a `radius` follows
+    A string that starts at rest is in the tension of its weight in mud along the hole, without friction. A bit with a
+    weight stands on a rock that does not give way, with the hook lowered until it bears that weight; without one the
+    string hangs off bottom. The rock pushes the bit but does not pull it; the torque of a bit whose law has a `radius` follows
     the weight on bit of the step before. Speeds, forces and torques that are told are means over the last step.
 
     Args:
@@ -45,19 +48,19 @@ class AxialTorsional(Pointers):
         elements: about how many along the string, each component has one at least; None for as many as waves of torsion
             pass in a step, within 40 to 400, or 250 without a step.
         axial: False for torsion alone.
-        end: None, or what acts on the bit in place of a `Stribeck` law, see `EndCondition`.
+        end: None for what the law of the bit says; or another `EndCondition`.
 
     Raises:
         SceneError: a bit law steeper than the impedance of the string without inertia at the bit; a step too long for a
-            falling law of friction; a bit whose law needs an `end`.
+            falling law of friction; a steady start that the drive does not have; torsion alone of a bit that cuts.
     """
 
     def __init__(self, scene, dt: float | None = None, elements: int | None = None, *, axial: bool = True, end=None):
         super().__init__(*SOURCES)
         check_bit(scene)
         discs = isinstance(scene.string, Discs)
-        self.scene, self.end, self.steps = scene, end, 0
-        self._asked, self._axial = elements, axial and not discs
+        self.scene, self._given_end, self.steps = scene, end, 0
+        self._asked, self._axial = elements, axial and not (discs and scene.string.masses is None)
         self.name = "axial and torsional" if self._axial else "torsion"
         if dt is not None:
             dt = positive("AxialTorsional", "dt", dt, "s")
@@ -71,6 +74,7 @@ class AxialTorsional(Pointers):
             if dt is not None:
                 self._refuse_step()
             self.dt /= 2
+        self._start()
         self.why = self._reasons()
 
     def _set(self, elements):
@@ -126,11 +130,12 @@ class AxialTorsional(Pointers):
             mass[0] += bit.mass
             m.hanging = bit.weight or 0.0
         m.weight = bit.weight or 0.0
-        if isinstance(bit.law, Stribeck):
-            m.law, m.weighs, m.rock = 1, bit.law.radius is not None, self._axial and bit.weight is not None
-            (m.still, m.slipping), m.decay = bit.law.torques(1.0), bit.law.speed or 0.0
-        elif self.end is None:
-            refuse("BitOnRock", "law", bit.law, "a Stribeck, or an `end` of the model, which does what the law says")
+        if isinstance(bit.law, Lobes) or (isinstance(bit.law, Stribeck) and bit.weight is not None):
+            m.rock = self._axial
+        law = stribeck_of(bit.law)
+        if law is not None:
+            m.law, m.weighs = 1, law.radius is not None
+            (m.still, m.slipping), m.decay = law.torques(1.0), law.speed or 0.0
 
     def _set_hook(self, hook):
         top = self._m.top[0]
@@ -155,6 +160,39 @@ class AxialTorsional(Pointers):
         if isinstance(self.scene.string, Discs):
             refuse("Matched", "impedance", None, "an impedance (N m s/rad): Discs have none")
         return self.scene.segments[0].torsional_impedance
+
+    # -- the start -----------------------------------------------------------------------------------------------------
+
+    def _start(self):
+        """The state at the time 0, and what acts on the bit beside a Stribeck law."""
+        scene, axial, motion = self.scene, self._axial, np.zeros(2)
+        self.end = self._given_end or end_of(scene.bit, self._kept["x"][-1], motion, axial)
+        if scene.start == "steady":
+            check_steady(scene)
+            motion[1 - axial :] = steady_velocities(scene)[1 - axial :]
+            self._set_steady(motion)
+            self.end = self._given_end or end_of(scene.bit, self._kept["x"][-1], motion, axial)
+
+    def _set_steady(self, motion):
+        """All turns and moves as asked for, see `steady`."""
+        m, kept, unknowns = self._m, self._kept, slice(2 - self._dofs, 2)
+
+        def limits(x):
+            kept["x"][:] = x
+            if not m.fixed:
+                self._lib.limits(m)
+            return kept["limit"]
+
+        bears = forces_of(self.scene.bit, motion)
+        extra = (bears - [m.bit.hanging, 0.0])[unknowns]
+        x, above = steady_state(motion[unknowns], self._chain, limits, (m.decay, m.of_rotation), extra)
+        kept["x"][:], kept["v"][:], kept["w"][:], kept["held"][:] = x, motion[unknowns], motion[unknowns], 0
+        m.bit.weight, m.bit.torque = bears
+        for i, force in enumerate(above):
+            top = m.top[i]
+            top.force = force
+            if not top.rigid and top.integral:
+                top.error = force / top.integral
 
     # -- words ---------------------------------------------------------------------------------------------------------
 
@@ -223,18 +261,26 @@ class AxialTorsional(Pointers):
     def _advance_with_end(self, rows, records):
         start = self.steps
         for i, row in enumerate(rows):
-            force, tangent = self.end.begin(self, row[0])
-            self._m.bit.force, self._m.bit.tangent = list(force), np.ravel(tangent).tolist()
+            self._take(self.end.begin(self, row[0]))
             if self._advance(row[None], records[self.steps - start :]) == 0:
                 return i
             self.steps += int(row[-1])
             self.end.commit(self, row[0])
         return len(rows)
 
+    def _take(self, given):
+        """The `EndForce` of the coming step."""
+        bit = self._m.bit
+        bit.force, bit.tangent, bit.flat = list(given.force), np.ravel(given.tangent).tolist(), given.flats
+        if given.torque is not None:
+            bit.law, bit.still, bit.slipping = given.torque > 0, given.torque, given.torque
+        if given.rock is not None:
+            bit.floor, bit.rising = given.rock
+
     def coarser(self) -> "AxialTorsional":
         """The same scene at rest, with twice the step and half the elements."""
         fewer = None if self._asked is None else max(2, self._asked // 2)
-        return type(self)(self.scene, 2 * self.dt, fewer, axial=self._axial, end=self.end)
+        return type(self)(self.scene, 2 * self.dt, fewer, axial=self._axial, end=self._given_end)
 
     def bit_state(self) -> np.ndarray:
         """(2, 2) of the bit at the end of the last step: place (m downwards, rad) and velocity; NaN where axial motion
@@ -242,6 +288,11 @@ class AxialTorsional(Pointers):
         found = np.full((2, 2), np.nan)
         found[:, 2 - self._dofs :] = self._kept["x"][-1], self._kept["v"][-1]
         return found
+
+    @property
+    def weight_on_bit(self) -> float:
+        """In the last step, N."""
+        return self._m.bit.weight
 
     def profile(self) -> np.ndarray:
         """See `StringModel.profile`. The node of the bit sticks where the rock holds it."""

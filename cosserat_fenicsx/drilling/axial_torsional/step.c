@@ -137,7 +137,7 @@ static void commit(model *m, double h, const double *signal)
     for (int d = 2 - n; d < 2; d++) {
         force[d] = m->bit.force[d];
         for (int k = 0; k < n; k++) force[d] += m->bit.tangent[2 * d + k + 2 - n] * w[k];
-        if (d ? m->bit.law : m->bit.rock) force[d] += m->force[last * n + d + n - 2];
+        if (d ? m->bit.law : pushed(m)) force[d] += m->force[last * n + d + n - 2];
         sums->bit += h * force[d] * w[d + n - 2];
     }
     if (n == 2) m->bit.weight = force[0];
@@ -149,9 +149,10 @@ static void commit(model *m, double h, const double *signal)
     /* what is held in a step is at rest at its end */
     for (int i = 0; i <= last; i++) {
         m->held[i] = m->mask[i];
-        double *lost = i == last && (m->bit.law || m->bit.rock) ? &sums->bit : &sums->wall;
+        double *lost = i == last && (m->bit.law || pushed(m)) ? &sums->bit : &sums->wall;
         for (int d = 0; d < n; d++)
-            if (m->mask[i] & bit_of(m, d)) *lost -= set_velocity(m, i, d, 0);
+            if (m->mask[i] & bit_of(m, d))
+                *lost -= set_velocity(m, i, d, i == last && d < turn && m->bit.rock ? m->bit.rising : 0);
     }
 }
 

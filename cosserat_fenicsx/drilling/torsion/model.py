@@ -23,6 +23,7 @@ from cosserat_fenicsx.drilling.bit_laws import Lobes, Stribeck
 from cosserat_fenicsx.drilling.protocol import LEDGER, PROFILE, SERIES
 from cosserat_fenicsx.drilling.scene import Drilling
 from cosserat_fenicsx.drilling.single_valued import check_bit, stribeck_of
+from cosserat_fenicsx.drilling.steady_start import check_steady, steady_velocities
 from cosserat_fenicsx.drilling.top_drive import PI, Matched, Motor, Stiff
 from cosserat_fenicsx.drilling.torsion.cells import cells_of
 from cosserat_fenicsx.drilling.torsion.mean_speeds import MeanSpeeds
@@ -89,6 +90,9 @@ class TorsionWaves(Pointers):
         self.signal = MeanSpeeds(scene.drive.signal(), self.dt)
         self.why = tuple(self._reasons(asked))
         self._allocate()
+        if scene.start == "steady":
+            check_steady(scene)
+            self._set_steady(float(steady_velocities(scene)[1]))
 
     def _set_nodes(self, drag):
         """Impedances beside nodes, and what acts at nodes."""
@@ -135,7 +139,7 @@ class TorsionWaves(Pointers):
 
     def _allocate(self):
         cells, scene, n = self.cells, self.scene, len(self.cells.time)
-        filtered = np.flatnonzero(cells.time > 1.25 * cells.dt).astype(np.int32)
+        self._filtered = filtered = np.flatnonzero(cells.time > 1.25 * cells.dt).astype(np.int32)
         sizes = {"down": n, "up": n, "down_kept": len(filtered), "up_kept": len(filtered)}
         self._changing = {name: np.zeros(sizes.get(name, n + 1)) for name in _CHANGING}
         self.c = c = self._ffi.new("waves *")
@@ -157,6 +161,25 @@ class TorsionWaves(Pointers):
             c.given = control.torque
         elif isinstance(control, Motor):
             c.Kp, c.given = control.drag, control.torque
+
+    def _set_steady(self, speed):
+        """All turns at the drive's speed (rad/s), twisted by what brakes it."""
+        cells, now, c = self.cells, self._changing, self.c
+        more, decay = self._hold - self._slide, self._decay
+        falling = np.exp(-np.divide(speed, decay, out=np.full_like(decay, np.inf), where=decay > 0))
+        law = np.where(self._hold > 0, self._slide + more * falling, 0.0)
+        above = np.cumsum((law + self._drag * speed)[::-1])[::-1]  # handed down to the nodes
+        torque, Z = above[1:], cells.impedance
+        now["down"][:], now["up"][:] = torque + Z * speed, torque - Z * speed
+        filtered = self._filtered
+        kept = np.sqrt((1 - cells.turn) / (1 + cells.turn))[filtered]  # of what passes a filter unchanged
+        now["down_kept"][:], now["up_kept"][:] = kept * now["down"][filtered], kept * now["up"][filtered]
+        now["speed"][:] = now["last_speed"][:] = speed
+        now["torque"][:], now["moment"][:], now["last_moment"][:] = law, above, above
+        now["angle"][1:] = -np.cumsum(torque * cells.time / Z)
+        c.drive_speed = c.bit_speed = speed
+        c.last_on_bit = law[-1]
+        c.integral = above[0] / c.Ki if c.Ki else 0.0
 
     @property
     def time(self):

@@ -1,0 +1,52 @@
+"""Strings that start in steady rotation: nothing changes, and the torque is that of torque and drag."""
+
+import numpy as np
+import pytest
+from axial_scenes import column
+
+import cosserat_fenicsx as cf
+from cosserat_fenicsx.drilling.axial_torsional.model import AxialTorsional
+from cosserat_fenicsx.drilling.torsion.model import TorsionWaves
+
+pytestmark = pytest.mark.serial
+LAW = cf.Stribeck(6000.0, 4000.0, 3.0)
+SPEED = 100 * cf.units.rpm
+
+
+def drilling(drive=None, start="steady", **more):
+    path = cf.WellPath.from_survey([0, 500, 1100, 2600], [0, 0, 40, 40], [30, 30, 30, 30])
+    hole = cf.Borehole(path, cf.HoleSection(2600.0, 0.2159, 0.25))
+    string = cf.DrillString([cf.Collar(90.0, "NC46-65"), cf.DrillPipe(size="5 in 19.50 lb/ft")])
+    drive = drive or cf.TopDrive(SPEED, 2900.0, cf.PI(38e3, 1e5))
+    return cf.Drilling(string, drive, hole=hole, mud=cf.Mud(1200.0), start=start, **more)
+
+
+@pytest.mark.parametrize("drive", [None, cf.TopDrive(SPEED)], ids=["PI", "stiff"])
+@pytest.mark.parametrize("model", [lambda x: TorsionWaves(x, 0.011), lambda x: AxialTorsional(x, 0.01, 100),
+                                   lambda x: AxialTorsional(x, 0.01, 100, axial=False)])  # fmt: skip
+def test_nothing_changes(model, drive):
+    scene = drilling(
+        drive, bit=cf.BitOnRock(LAW, weight=50e3, inertia=50.0), drag=cf.ViscousDrag(0.3, 0.3),
+        friction=cf.WallFriction(0.25, 0.2, 0.5),
+    )  # fmt: skip
+    rows = model(scene).advance(300)
+    for name in ("bit_speed", "drive_speed", "surface_torque", "torque_on_bit"):
+        assert np.abs(column(rows, name) / column(rows, name)[0] - 1).max() < 1e-8, name
+    assert column(rows, "bit_speed")[0] == pytest.approx(SPEED, rel=1e-9)
+    assert column(rows, "torque_on_bit")[0] == pytest.approx(4000 + 2000 * np.exp(-SPEED / 3), rel=1e-9)
+
+
+@pytest.mark.parametrize("model", [lambda x: TorsionWaves(x, 0.002), lambda x: AxialTorsional(x, 0.002, 600)])
+def test_surface_torque_is_that_of_torque_and_drag(model):
+    scene = drilling()
+    soft = cf.torque_and_drag(scene.hole, scene.string, cf.RotateOffBottom(), mud=scene.mud, model="soft", tol=1e-8,
+                              torque_convention="johancsik")  # fmt: skip
+    assert column(model(scene).advance(1), "surface_torque")[0] == pytest.approx(soft.surface_torque, rel=2e-3)
+
+
+@pytest.mark.parametrize("drive", [cf.TopDrive(control=cf.Motor(5e3)), cf.TopDrive(SPEED, 0.0, cf.Matched()),
+                                   cf.TopDrive(0.0), cf.TopDrive(cf.RunUp((SPEED,), end=5.0))])  # fmt: skip
+@pytest.mark.parametrize("model", [TorsionWaves, AxialTorsional])
+def test_a_drive_without_a_steady_speed_is_refused(model, drive):
+    with pytest.raises(cf.SceneError, match="Drilling.start = 'steady': expected 'rest'"):
+        model(drilling(drive))
