@@ -168,6 +168,38 @@ def test_other_laws_of_the_bit_plug_in_as_end_conditions():
     assert end.steps == 1000
 
 
+class Wavy(Swallow):
+    """A rock whose face goes up and down under the bit."""
+
+    def __init__(self, amplitude, rate):
+        super().__init__(0.0, 0.0)
+        self.amplitude, self.rate = amplitude, rate
+
+    def begin(self, model, h):
+        phase = self.rate * (model.time + h)
+        model.set_rock(self.amplitude * np.sin(phase), self.amplitude * self.rate * np.cos(phase))
+        return np.zeros(2), self.tangent
+
+
+@pytest.mark.parametrize(("rpm", "amplitude"), [(60, 31767.361251313883), (100, 36070.57264496292)])
+def test_a_bit_on_lobes(rpm, amplitude):
+    """Three lobes of 2 mm: the weight on bit of forced vibration; where it exceeds the static one, the bit leaves."""
+    rate, drag = 3 * rpm * cf.units.rpm, cf.ViscousDrag(0.2, 0.2)
+    bit = cf.BitOnRock(cf.Stribeck(0.0, 0.0), 80e3)
+    scene = hanging(cf.Hook(5e6), cf.TopDrive(0.0), bit, drag=drag)
+    model = AxialTorsional(scene, 0.002, 300, end=Wavy(0.002, rate))
+    rows = model.advance(40000)
+    rows = rows[rows[:, 0] > 60]
+    phase = rate * (rows[:, 0] - model.dt / 2)
+    parts = np.column_stack([np.sin(phase), np.cos(phase), np.ones(len(phase))])
+    sine, cosine, mean = np.linalg.lstsq(parts, column(rows, "weight_on_bit"), rcond=None)[0]
+    assert np.hypot(sine, cosine) == pytest.approx(amplitude, rel=1e-3) and mean == pytest.approx(80e3, rel=1e-3)
+    assert column(rows, "weight_on_bit").min() > 0 and unbalanced(rows) < 1e-11
+    high = AxialTorsional(scene, 0.004, 150, end=Wavy(0.02, rate)).advance(5000)
+    assert column(high, "weight_on_bit").min() == 0 and column(high, "bit_advance").min() < -0.0205
+    assert unbalanced(high) < 1e-11
+
+
 def test_the_same_digits_after_recall():
     bit = cf.BitOnRock(cf.Stribeck(0.6, 0.3, 3.0, radius=0.1), 80e3, inertia=50.0, mass=300.0)
     scene = hanging(cf.Hook(5e6, -0.001), cf.TopDrive(6.0, **SOFT), bit, 300.0, drag=cf.ViscousDrag(0.2, 0.1))

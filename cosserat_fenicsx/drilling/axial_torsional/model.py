@@ -236,6 +236,11 @@ class AxialTorsional(Pointers):
         fewer = None if self._asked is None else max(2, self._asked // 2)
         return type(self)(self.scene, 2 * self.dt, fewer, axial=self._axial, end=self.end)
 
+    def set_rock(self, place: float, velocity: float) -> None:
+        """A rigid rock under the bit, which pushes but does not pull, for the `begin` of an end condition: its face at
+        the end of the coming step, in m below that at the start, and its velocity there, m/s downwards."""
+        self._m.bit.rock, self._m.bit.floor, self._m.bit.sinking = self._axial, place, velocity
+
     def bit_state(self) -> np.ndarray:
         """(2, 2) of the bit at the end of the last step: place (m downwards, rad) and velocity; NaN where axial motion
         is left out."""
@@ -265,7 +270,7 @@ class AxialTorsional(Pointers):
         found = {name: self._kept[name].copy() for name in (*_STATE, "held")}
         found["sums"] = np.array([getattr(m.sums, name) for name in _SUMS])
         found["ends"] = np.array([*((m.top[i].error, m.top[i].force) for i in (0, 1))]).ravel()
-        found["bit"] = np.array([m.bit.weight, m.bit.torque, m.bit.floor])
+        found["bit"] = np.array([m.bit.weight, m.bit.torque, m.bit.floor, m.bit.sinking])
         found["counts"] = np.array([self.steps, m.halved, m.iterations, m.most])
         if self.end is not None:
             found["end"] = self.end.memory()
@@ -280,7 +285,7 @@ class AxialTorsional(Pointers):
             setattr(m.sums, name, value)
         for i, (error, force) in enumerate(np.reshape(memory["ends"], (2, 2))):
             m.top[i].error, m.top[i].force = error, force
-        m.bit.weight, m.bit.torque, m.bit.floor = memory["bit"]
+        m.bit.weight, m.bit.torque, m.bit.floor, m.bit.sinking = memory["bit"]
         self.steps, m.halved, m.iterations, m.most = (int(x) for x in memory["counts"])
         if self.end is not None:
             self.end.recall(memory["end"])

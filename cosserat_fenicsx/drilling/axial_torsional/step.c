@@ -146,12 +146,13 @@ static void commit(model *m, double h, const double *signal)
         m->x[j] += h * m->w[j];
         m->v[j] = 2 * m->w[j] - m->v[j];
     }
-    /* what is held in a step is at rest at its end */
+    /* what is held in a step ends it at rest, or with the rock */
     for (int i = 0; i <= last; i++) {
         m->held[i] = m->mask[i];
-        double *lost = i == last && (m->bit.law || m->bit.rock) ? &sums->bit : &sums->wall;
+        const int bit = i == last && (m->bit.law || m->bit.rock);
         for (int d = 0; d < n; d++)
-            if (m->mask[i] & bit_of(m, d)) *lost -= set_velocity(m, i, d, 0);
+            if (m->mask[i] & bit_of(m, d))
+                *(bit ? &sums->bit : &sums->wall) -= set_velocity(m, i, d, bit && d < turn ? m->bit.sinking : 0);
     }
 }
 
