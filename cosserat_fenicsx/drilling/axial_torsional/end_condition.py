@@ -14,7 +14,8 @@ class EndForce(NamedTuple):
         torque: N m, against the rotation, and anything up to that at rest; None for that of the bit's Stribeck law.
         flats: N, half of what wear flats bear: their force is flats above the given one where the bit moves down, flats
             below it where it moves up, and anything between at rest.
-        rock: None, or place (m, downwards) and velocity (m/s) of a rigid rock at the end of the step.
+        rock: None, or place (m below that at the start) and velocity (m/s, downwards) at the end of the step of the face
+            of a rigid rock, which pushes but does not pull.
     """
 
     force: np.ndarray
@@ -27,8 +28,8 @@ class EndForce(NamedTuple):
 class EndCondition(Protocol):
     """The force of the rock on the bit, told at the begin of every step.
 
-    A step that does not converge is done in halves with the same numbers. `memory` and `recall` as of `StringModel`;
-    the model calls them with its own.
+    A step that does not converge is done in halves with the same numbers. The model calls `memory` and `recall` with
+    its own.
     """
 
     def begin(self, model, h: float) -> EndForce:

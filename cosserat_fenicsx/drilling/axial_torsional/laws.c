@@ -89,7 +89,7 @@ static double cut(model *m)
 static double rest(model *m, double h)
 {
     const int i = m->nodes - 1;
-    const double gap = (m->bit.floor - m->x[2 * i]) / h, s = m->w[2 * i] - gap;
+    const double gap = (m->bit.face - m->x[2 * i]) / h, s = m->w[2 * i] - gap;
     if (m->force[2 * i] + m->rho[2 * i] * s > 0) {
         m->mask[i] |= AXIAL;
         return fabs(s);
@@ -161,9 +161,7 @@ static void take_forces(model *m)
             }
         }
     }
-    const int i = last;
-    double *F = m->force + (size_t)i * n;
-    if (m->bit.law)
-        F[n - 1] = m->mask[i] & TURN ? missing(m, i, n - 1) : m->c[i * n + n - 1] + m->d[3 * i + 2] * m->w[i * n + n - 1];
-    if (pushed(m)) F[0] = m->mask[i] & AXIAL ? missing(m, i, 0) : m->c[2 * i];
+    const int j = last * n + n - 1, mask = m->mask[last];
+    if (m->bit.law) m->force[j] = mask & TURN ? missing(m, last, n - 1) : m->c[j] + m->d[3 * last + 2] * m->w[j];
+    if (pushed(m)) m->force[2 * last] = mask & AXIAL ? missing(m, last, 0) : m->c[2 * last];
 }

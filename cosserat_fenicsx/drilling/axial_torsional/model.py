@@ -89,6 +89,9 @@ class AxialTorsional(Pointers):
         self._set_bit(scene.bit)
         self._signals = self._axial * [self._set_hook(scene.hook)] + [self._set_drive(scene.drive)]
         self._lib.limits(self._m)
+        m, held = self._m, self._kept["held"]
+        held[self._kept["limit"][:, 0] > 0] = 3 if self._axial else 2
+        held[-1] |= 2 * m.bit.law + m.bit.rock
 
     # -- what C sees ---------------------------------------------------------------------------------------------------
 
@@ -110,7 +113,7 @@ class AxialTorsional(Pointers):
             self._array(name, np.zeros((nodes, width)))
         for name in ("mask", "broken"):
             self._array(name, np.zeros(nodes, dtype=np.int32))
-        self._array("held", np.full(nodes, 3 if n == 2 else 2, dtype=np.int32))
+        self._array("held", np.zeros(nodes, dtype=np.int32))
 
     def _set_wall(self, friction):
         m, wall = self._m, self._chain.wall
@@ -275,7 +278,7 @@ class AxialTorsional(Pointers):
         if given.torque is not None:
             bit.law, bit.still, bit.slipping = given.torque > 0, given.torque, given.torque
         if given.rock is not None:
-            bit.floor, bit.rising = given.rock
+            bit.rock, (bit.floor, bit.sinking) = 1, given.rock
 
     def coarser(self) -> "AxialTorsional":
         """The same scene at rest, with twice the step and half the elements."""
@@ -316,7 +319,7 @@ class AxialTorsional(Pointers):
         found = {name: self._kept[name].copy() for name in (*_STATE, "held")}
         found["sums"] = np.array([getattr(m.sums, name) for name in _SUMS])
         found["ends"] = np.array([*((m.top[i].error, m.top[i].force) for i in (0, 1))]).ravel()
-        found["bit"] = np.array([m.bit.weight, m.bit.torque, m.bit.floor])
+        found["bit"] = np.array([m.bit.weight, m.bit.torque, m.bit.floor, m.bit.sinking, m.bit.face])
         found["counts"] = np.array([self.steps, m.halved, m.iterations, m.most])
         if self.end is not None:
             found["end"] = self.end.memory()
@@ -331,7 +334,7 @@ class AxialTorsional(Pointers):
             setattr(m.sums, name, value)
         for i, (error, force) in enumerate(np.reshape(memory["ends"], (2, 2))):
             m.top[i].error, m.top[i].force = error, force
-        m.bit.weight, m.bit.torque, m.bit.floor = memory["bit"]
+        m.bit.weight, m.bit.torque, m.bit.floor, m.bit.sinking, m.bit.face = memory["bit"]
         self.steps, m.halved, m.iterations, m.most = (int(x) for x in memory["counts"])
         if self.end is not None:
             self.end.recall(memory["end"])

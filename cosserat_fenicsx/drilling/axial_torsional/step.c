@@ -6,7 +6,7 @@ static inline double eliminate(model *m, const double *given_top, double given_b
 {
     const int last = m->nodes - 1;
     for (int i = 0; i <= last; i++) {
-        const double *d = m->d + 3 * (size_t)i, *o = m->o + (size_t)(i - 1) * n;
+        const double *d = m->d + 3 * (size_t)i, *o = i ? m->o + (size_t)(i - 1) * n : 0;
         double *q = m->q + 4 * (size_t)i, *y = m->y + (size_t)i * n;
         int mask = m->mask[i];
         double p[2][2] = {{0}}, r[2] = {0}, given[2] = {0};
@@ -65,7 +65,7 @@ static inline double eliminate(model *m, const double *given_top, double given_b
 /* The mean velocities w and the forces of the laws in a step; 0 where Newton's method does not converge. */
 static int solve(model *m, double h, const double *signal)
 {
-    const double gap = m->bit.rock ? (m->bit.floor - m->x[2 * m->nodes - 2]) / h : 0;
+    const double gap = m->bit.rock ? (m->bit.face - m->x[2 * m->nodes - 2]) / h : 0;
     memset(m->broken, 0, m->nodes * sizeof *m->broken);
     loads(m, h, signal);
     m->ease = 1;
@@ -146,13 +146,14 @@ static void commit(model *m, double h, const double *signal)
         m->x[j] += h * m->w[j];
         m->v[j] = 2 * m->w[j] - m->v[j];
     }
-    /* what is held in a step is at rest at its end */
+    /* what is held in a step ends it at rest, or with the rock */
     for (int i = 0; i <= last; i++) {
         m->held[i] = m->mask[i];
-        double *lost = i == last && (m->bit.law || pushed(m)) ? &sums->bit : &sums->wall;
+        const int bit = i == last && (m->bit.law || pushed(m));
         for (int d = 0; d < n; d++)
             if (m->mask[i] & bit_of(m, d))
-                *lost -= set_velocity(m, i, d, i == last && d < turn && m->bit.rock ? m->bit.rising : 0);
+                *(bit ? &sums->bit : &sums->wall) -=
+                    set_velocity(m, i, d, bit && d < turn && m->bit.rock ? m->bit.sinking : 0);
     }
 }
 
@@ -191,8 +192,8 @@ static void write_record(const model *m, double *row)
                 strain += m->spring[j] * stretch * stretch / 2;
                 if (d < turn) strain += m->hanging[i] * stretch;
             }
-            if (d < turn)
-                weight += ((i ? m->hanging[i - 1] : m->hanging_top) - (i < last ? m->hanging[i] : -m->bit.hanging)) * x[j];
+            const double above = i ? m->hanging[i - 1] : m->hanging_top;
+            if (d < turn) weight += (above - (i < last ? m->hanging[i] : -m->bit.hanging)) * x[j];
         }
     if (n == 2 && !m->top[0].rigid) {
         const double error = m->top[0].error;
@@ -218,6 +219,7 @@ int advance(model *m, int intervals, const double *interval, double *record)
                 double *work = d == n - 1 ? &m->sums.drive : &m->sums.hook;
                 *work += set_velocity(m, 0, d, from[d]);
             }
+        const double face = m->bit.face, sinks = m->bit.floor - face;
         double done = 0, size = 1;
         while (done < 1) {
             double begin[2], end[2];
@@ -225,6 +227,7 @@ int advance(model *m, int intervals, const double *interval, double *record)
                 begin[d] = from[d] + done * (to[d] - from[d]);
                 end[d] = from[d] + (done + size) * (to[d] - from[d]);
             }
+            m->bit.face = face + (done + size) * sinks;
             if (step(m, size * h, begin, end)) {
                 done += size;
                 /* parts begin at multiples of their length */
