@@ -154,6 +154,21 @@ def test_soft_strings_of_this_package():
     assert "| cosserat_fenicsx | tol = 1e-12 |" in soft_string.table(rows, silent)
 
 
+def test_stick_slip_of_waves_elements_and_upwind(tmp_path):
+    """Errors are those of the methods' orders; times are not tested."""
+    import work_precision_string
+
+    found = {row[:2]: row[2] for row in work_precision_string.main(out=tmp_path, quick=True)}
+    bounds = {
+        work_precision_string.WAVES: 2e-4,
+        work_precision_string.ELEMENTS: 2e-3,
+        work_precision_string.UPWIND: 3e-3,
+    }
+    assert all(max(off.values()) < bounds[method] for (method, _), off in found.items())
+    assert found[work_precision_string.UPWIND, 500]["peak"] < found[work_precision_string.UPWIND, 250]["peak"] / 2
+    assert (tmp_path / "work_precision_string_quick.png").stat().st_size > 20000
+
+
 def test_rods_in_wells_quick(tmp_path):
     """Errors are within their estimates; steps and times are not tested."""
     import rods_in_wells

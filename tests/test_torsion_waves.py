@@ -267,3 +267,9 @@ def test_what_is_told_and_refused():
     for dt, words in ((-1, "a positive number"), (1e-9, "at least 1e-05 of the travel time")):
         with pytest.raises(cf.SceneError, match=f"TorsionWaves.dt = {dt}: expected {words}"):
             TorsionWaves(scene, dt)
+
+
+def test_lobes_give_their_torque_alone():
+    lobes = replace(stick_slip(), bit=cf.BitOnRock(cf.Lobes(3, 2e-3, law=LAW), weight=80e3, inertia=50.0))
+    lobed, plain = (TorsionWaves(scene, 40 / SPEED).advance(500) for scene in (lobes, stick_slip()))
+    np.testing.assert_array_equal(lobed, plain)

@@ -29,6 +29,7 @@ PAGES = {
     "overhead": ("speed.md",),
     "work_precision": ("speed.md", "work_precision_sweep.png"),
     "work_precision_motion": ("speed.md", "work_precision_motion.png"),
+    "work_precision_string": ("speed.md", "work_precision_string.png"),
     "soft_string": ("wells.md", "soft_string.png"),
     "rods_in_wells": ("wells.md",),
 }

@@ -1,8 +1,9 @@
 """What a string is for the equations of motion: elements with mass, drag and stiffness, and the pieces that touch the wall.
 
 Elements are linear. Their mass matrices are m [[1/2 - s, s], [s, 1/2 - s]] with the share s = 1/12 + (c dt/l)^2/6, which
-makes waves of the speed c exact to fourth order in space and time together under the implicit midpoint rule, and at most
-1/6, the consistent matrix; 1/12 is the mean of the lumped and the consistent one.
+makes waves of the speed c exact to fourth order in space and time together under the implicit midpoint rule: 1/12, for
+short steps, is the mean of the lumped and the consistent matrix; with 1/4, where a wave passes an element in a step, the
+rule is exact, but the matrix of highest frequencies vanishes, so that the share stays a little below.
 """
 
 import math
@@ -11,10 +12,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from cosserat_fenicsx.drilling.discs import Discs
-from cosserat_fenicsx.well.operations import RotateOffBottom
-from cosserat_fenicsx.well.pieces import pieces_of
+from cosserat_fenicsx.drilling.torsion.wall import scene_pieces
 
+# Shares of the mass that couples neighbours.
 _LEAST, _MOST = 1 / 12, 0.235
+# Without a step, or a number of elements, that is asked for.
+_LONGEST, _USUAL = 0.01, 250
+_FEWEST, _MOST_ELEMENTS = 40, 400
+_SHARE = 0.1  # of 1/omega of the discs
 
 
 @dataclass(frozen=True)
@@ -64,8 +69,29 @@ class Wall:
     radius: np.ndarray
 
 
-def chain_of_discs(discs: Discs) -> Chain:
-    """The `Chain` of `Discs`, which have torsion alone."""
+def usual_step(scene, elements: int | None) -> float:
+    """The time step (s) of a `Drilling` for so many elements, where none is asked for."""
+    if isinstance(scene.string, Discs):
+        inertias, springs = np.array(scene.string.inertias), np.array(scene.string.stiffnesses)
+        around = np.append(springs, 0.0) + np.append(0.0, springs)
+        return min(_LONGEST, _SHARE * float(np.sqrt(inertias / around).min()))
+    return min(_LONGEST, _travel_time(scene) / (elements or _USUAL))
+
+
+def _travel_time(scene):
+    return math.fsum(s.length / s.torsional_speed for s in scene.segments)
+
+
+def chain_of(scene, dt: float, elements: int | None, axial: bool) -> Chain:
+    """The `Chain` of a `Drilling` for steps of `dt` (s), of about so many elements, or None for the usual number."""
+    if isinstance(scene.string, Discs):
+        return _chain_of_discs(scene.string)
+    if elements is None:
+        elements = min(max(_travel_time(scene) / dt, _FEWEST), _MOST_ELEMENTS)
+    return _chain_of_string(scene, dt, elements, axial)
+
+
+def _chain_of_discs(discs):
     between = np.array(discs.dampings)
     drag = np.array(discs.drags)
     drag[:-1] += between
@@ -77,8 +103,7 @@ def chain_of_discs(discs: Discs) -> Chain:
     return Chain(np.arange(n, dtype=float), *(column[:, None].copy() for column in columns), np.zeros(n - 1), 0.0, wall)
 
 
-def chain_of_string(drilling, dt: float, elements: int, axial: bool) -> Chain:
-    """The `Chain` of the string of a `Drilling`, of about so many elements, for steps of `dt` (s)."""
+def _chain_of_string(drilling, dt, elements, axial):
     segments = drilling.segments
     times = np.array([s.length / s.torsional_speed for s in segments])
     counts = np.maximum(np.rint(elements * times / times.sum()), 1).astype(int)
@@ -117,7 +142,7 @@ def _against_the_wall(drilling, depths):
         nothing = np.zeros(0)
         wall = Wall(*[np.zeros(0, dtype=np.int32)] * 3, *[nothing] * 9)
         return (below[:-1] + below[1:]) / 2, below[0], wall
-    pieces, _ = pieces_of(drilling.hole, drilling.string, RotateOffBottom(), drilling.mud, drilling.bit_depth)
+    pieces = scene_pieces(drilling)
     cuts = np.union1d(np.concatenate([[0.0], pieces.bottom]), depths)
     cuts = np.concatenate([[0.0], cuts[1:-1][np.diff(cuts[:-1]) > 1e-9 * cuts[-1]], [drilling.bit_depth]])
     middle, length = (cuts[:-1] + cuts[1:]) / 2, np.diff(cuts)
@@ -151,8 +176,3 @@ def _coefficients(friction, of_hole):
     factor = of_hole if friction.of_hole else np.ones_like(of_hole)
     return friction.static * factor, friction.kinetic * factor
 
-
-def shortest_time(chain: Chain) -> float:
-    """The time in which a wave passes the shortest element, s."""
-    lumped = chain.mass[:-1] + chain.mass_off
-    return float(np.sqrt(lumped / chain.spring).min()) if math.prod(chain.spring.shape) else math.inf

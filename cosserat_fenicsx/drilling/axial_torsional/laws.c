@@ -36,7 +36,8 @@ static double wall(model *m, int i)
     const double s[2] = {n == 2 ? m->w[2 * i] : 0, r * m->w[i * n + n - 1]};
     const double *F = m->force + (size_t)i * n;
     double rho = m->rho[i * n + n - 1] / (r * r), *d = m->d + 3 * (size_t)i, *c = m->c + (size_t)i * n;
-    if (n == 2) rho = sqrt(rho * m->rho[2 * i]);
+    if (n == 2) rho = fmin(rho, m->rho[2 * i]);
+    rho *= m->ease;
     if (decay > 0) rho = fmax(rho, 2 * (limit[0] - limit[1]) / decay);
     const double tau[2] = {n == 2 ? F[0] + rho * s[0] : 0, F[n - 1] + rho * s[1]};
     const double size = length(tau[0], tau[1]);
@@ -65,7 +66,7 @@ static double cut(model *m)
     const int n = m->dofs, i = m->nodes - 1, j = i * n + n - 1;
     const double still = m->bit.factor * m->bit.still, slipping = m->bit.factor * m->bit.slipping;
     const double decay = m->bit.decay, s = m->w[j];
-    double rho = m->rho[j];
+    double rho = m->ease * m->rho[j];
     if (decay > 0) rho = fmax(rho, 2 * (still - slipping) / decay);
     const double tau = m->force[j] + rho * s;
     if (fabs(tau) <= threshold(m, i, TURN, still, slipping, decay)) {

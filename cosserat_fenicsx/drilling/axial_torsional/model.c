@@ -5,7 +5,7 @@
 #include <math.h>
 #include <string.h>
 
-enum { ITERATIONS = 40, HALVINGS = 12 };
+enum { ITERATIONS = 60, PATIENCE = 15, HALVINGS = 12 };
 enum { AXIAL = 1, TURN = 2 }; /* bits of masks; of one unknown alone only the second */
 
 static inline int bit_of(const model *m, int d) { return m->dofs == 1 ? TURN : 1 << d; }

@@ -51,7 +51,7 @@ typedef struct {
     lower bit;
     books sums;
     double *a, *o, *rho;            /* (nodes, dofs) x 3: matrix of a step of the length h, and factors of the laws */
-    double h;
+    double h, ease;                 /* length of that step; share of the factors that is taken */
     double *b, *q, *y, *d, *c, *guess; /* work space: (nodes, dofs), (nodes, 4), (nodes, dofs), (nodes, 3), (nodes, dofs),
                                        (2, nodes, dofs) */
     int *mask, *broken;             /* (nodes,) */

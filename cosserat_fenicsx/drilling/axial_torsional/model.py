@@ -12,78 +12,87 @@ from pathlib import Path
 
 import numpy as np
 
-from cosserat_fenicsx.algebra.building import module
+from cosserat_fenicsx.algebra.pointers import Pointers
 from cosserat_fenicsx.checks import number, positive, refuse
-from cosserat_fenicsx.drilling.axial_torsional.chain import chain_of_discs, chain_of_string
+from cosserat_fenicsx.drilling.axial_torsional.chain import chain_of, usual_step
 from cosserat_fenicsx.drilling.axial_torsional.intervals import intervals
 from cosserat_fenicsx.drilling.bit_laws import Stribeck
 from cosserat_fenicsx.drilling.discs import Discs
 from cosserat_fenicsx.drilling.protocol import LEDGER, SERIES
 from cosserat_fenicsx.drilling.signals import ScalarSignal
+from cosserat_fenicsx.drilling.single_valued import check_bit
 from cosserat_fenicsx.drilling.top_drive import PI, Matched, Motor, Stiff
 from cosserat_fenicsx.errors import NotConverged, SceneError
 
 SOURCES = tuple(Path(__file__).with_name(name) for name in ("model.c", "laws.c", "step.c"))
 _STATE = ("x", "v", "w", "force")
+_TRIALS = 30
 _SUMS = ("drive", "hook", "bit", "wall", "mud")
 
 
-class AxialTorsional:
+class AxialTorsional(Pointers):
     """A string with axial and torsional motion, or with torsion alone; a `StringModel`.
 
     The string starts at rest in the tension of its weight in mud along the hole, without friction. A bit with a weight
     stands on a rock that does not give way, with the hook lowered until it bears that weight; without one the string
     hangs off bottom. The rock pushes the bit but does not pull it; the torque of a bit whose law has a `radius` follows
-    the weight on bit of the step before. Forces and torques that are recorded are means over the last step.
+    the weight on bit of the step before. Speeds, forces and torques that are told are means over the last step.
 
     Args:
-        drilling: a `Drilling`.
-        dt: time step, s.
-        elements: about how many along the string; each component has one at least.
+        scene: a `Drilling`.
+        dt: step, s; None for the time in which a wave of torsion passes an element, at most 0.01 s, and shorter where
+            a falling law needs it; of discs a part of their shortest period.
+        elements: about how many along the string, each component has one at least; None for as many as waves of torsion
+            pass in a step, within 40 to 400, or 250 without a step.
         axial: False for torsion alone.
-
-    Attributes:
-        end: None, or what acts on the bit beside its `Stribeck` law: an object whose `begin(model, h)` returns a force
-            (weight on bit, N, torque, N m) and its derivative (2, 2) with respect to the mean velocities of the bit in
-            the coming step of the length h (m/s downwards, rad/s), and whose `commit(model)` is called after it. This
-            is where bits that cut with a delay plug in; a drilling whose bit has another law than `Stribeck` needs it.
+        end: None, or what acts on the bit in place of a `Stribeck` law, see `EndCondition`.
 
     Raises:
         SceneError: a bit law steeper than the impedance of the string without inertia at the bit; a step too long for a
-            falling law of friction; a scene that the model has no equations for.
+            falling law of friction; a bit whose law needs an `end`.
     """
 
-    def __init__(self, drilling, dt: float = 0.01, elements: int = 250, axial: bool = True, end=None):
-        discs = isinstance(drilling.string, Discs)
-        self.dt = positive(self, "dt", dt, "s")
-        elements = number(self, "elements", elements, "a number of elements from 2", lambda x: x >= 2 and x == int(x))
-        self._axial, self.end = axial and not discs, end
-        self.name = "discs" if discs else "axial and torsional" if axial else "torsion"
-        self._chain = chain_of_discs(drilling.string) if discs else chain_of_string(drilling, dt, int(elements), axial)
-        self.depths, self.steps = self._chain.depths, 0
-        self._ffi, self._lib = module(*SOURCES)
+    def __init__(self, scene, dt: float | None = None, elements: int | None = None, *, axial: bool = True, end=None):
+        super().__init__(*SOURCES)
+        check_bit(scene)
+        discs = isinstance(scene.string, Discs)
+        self.scene, self.end, self.steps = scene, end, 0
+        self._asked, self._axial = elements, axial and not discs
+        self.name = "axial and torsional" if self._axial else "torsion"
+        if dt is not None:
+            dt = positive("AxialTorsional", "dt", dt, "s")
+        if elements is not None:
+            number("AxialTorsional", "elements", elements, "a number of elements from 2", lambda x: x >= 2)
+        self.dt = dt or usual_step(scene, elements)
+        for _ in range(_TRIALS):
+            self._set(elements)
+            if discs or self._lib.steepest(self._m, self.dt) > 0:
+                break
+            if dt is not None:
+                self._refuse_step()
+            self.dt /= 2
+        self.why = self._reasons()
+
+    def _set(self, elements):
+        """All that C needs."""
+        scene = self.scene
+        self._chain = chain_of(scene, self.dt, elements, self._axial)
+        self.depths = self._chain.depths
         self._m = self._ffi.new("model *")
         self._kept, self._dofs = {}, 1 + self._axial
         self._set_chain()
-        self._set_wall(drilling.friction)
-        self._set_bit(drilling.bit)
-        self._signals = self._axial * [self._set_hook(drilling.hook)] + [self._set_drive(drilling.drive, drilling)]
+        self._set_wall(scene.friction)
+        self._set_bit(scene.bit)
+        self._signals = self._axial * [self._set_hook(scene.hook)] + [self._set_drive(scene.drive)]
         self._lib.limits(self._m)
-        if not discs:
-            self._check_slopes(drilling)
-        self.why = self._reasons(drilling)
 
-    # -- what C sees ----------------------------------------------------------------------------------------------------
+    # -- what C sees ---------------------------------------------------------------------------------------------------
 
     def _array(self, name, values):
         """Give C an array under a name of its struct."""
-        array = np.ascontiguousarray(values, dtype=np.int32 if np.asarray(values).dtype.kind in "ib" else float)
-        if array.size and array is values:
-            array = array.copy()
-        self._kept[name] = array
-        kind = "int *" if array.dtype == np.int32 else "double *"
-        setattr(self._m, name, self._ffi.cast(kind, array.ctypes.data))
-        return array
+        whole = np.asarray(values).dtype.kind in "ib"
+        array = self._kept[name] = np.array(values, dtype=np.int32 if whole else float, order="C")
+        setattr(self._m, name, (self.integers if whole else self.doubles)(array))
 
     def _set_chain(self):
         m, chain, n = self._m, self._chain, self._dofs
@@ -130,55 +139,41 @@ class AxialTorsional:
             top.integral = hook.stiffness
         return ScalarSignal("Hook", "speed", 0.0, "m/s") if hook is None else hook.signal()
 
-    def _set_drive(self, drive, drilling):
+    def _set_drive(self, drive):
         top, control = self._m.top[self._dofs - 1], drive.control
         top.inertia, top.rigid = drive.inertia, isinstance(control, Stiff)
         self._kept["mass"][0, -1] += drive.inertia
         if isinstance(control, PI):
             top.proportional, top.integral = control.Kp, control.Ki
         elif isinstance(control, Matched):
-            top.constant, top.proportional = control.torque, control.impedance or self._impedance(drilling)
+            top.constant, top.proportional = control.torque, control.impedance or self._impedance()
         elif isinstance(control, Motor):
             top.constant, top.proportional = control.torque, control.drag
         return drive.signal()
 
-    @staticmethod
-    def _impedance(drilling):
-        if isinstance(drilling.string, Discs):
+    def _impedance(self):
+        if isinstance(self.scene.string, Discs):
             refuse("Matched", "impedance", None, "an impedance (N m s/rad): Discs have none")
-        return drilling.segments[0].torsional_impedance
+        return self.scene.segments[0].torsional_impedance
 
-    # -- checks ---------------------------------------------------------------------------------------------------------
+    # -- words ---------------------------------------------------------------------------------------------------------
 
-    def _check_slopes(self, drilling):
-        bit, lib = drilling.bit, self._lib
-        if bit is not None and isinstance(bit.law, Stribeck) and bit.law.speed and bit.inertia == 0:
-            still, slipping = bit.law.torques(bit.weight or 0.0)
-            slope, impedance = (still - slipping) / bit.law.speed, drilling.segments[-1].torsional_impedance
-            if slope > impedance:
-                raise SceneError(
-                    f"BitOnRock.inertia = 0: expected an inertia (kg m^2): the bit law falls by {slope:.4g} N m s/rad at "
-                    f"rest, steeper than the impedance of {drilling.segments[-1].name}, {impedance:.4g} N m s/rad, and "
-                    "without inertia at the bit its speed is not determined"
-                )
-        if lib.steepest(self._m, self.dt) <= 0:
-            shorter = self.dt
-            for _ in range(60):
-                shorter /= 2
-                if lib.steepest(self._m, shorter) > 0:
-                    break
-            raise SceneError(
-                f"{type(self).__name__}.dt = {self.dt:g} s: expected at most about {shorter:.3g} s: in longer steps the "
-                "law of friction or of the bit falls more steeply than inertia and string allow, and the speed at the "
-                "end of a step is not determined"
-            )
+    def _refuse_step(self):
+        shorter = self.dt / 2
+        while self._lib.steepest(self._m, shorter) <= 0 and shorter > self.dt * 2.0**-_TRIALS:
+            shorter /= 2
+        raise SceneError(
+            f"AxialTorsional.dt = {self.dt:g} s: expected at most about {shorter:.3g} s: in longer steps the law of "
+            "friction or of the bit falls more steeply than inertia and string allow, and the speed at the end of a "
+            "step is not determined"
+        )
 
-    def _reasons(self, drilling):
-        told = [f"{len(self.depths) - 1} linear elements, implicit midpoint rule with steps of {self.dt:g} s"]
+    def _reasons(self):
+        told = [f"{len(self.depths) - 1} elements, steps of {self.dt:.3g} s"]
         if self._axial:
             told.append("friction at the wall against axial and rotary slip together, normal force by the soft string "
                         "from the tension of the step before")  # fmt: skip
-            bit = drilling.bit
+            bit = self.scene.bit
             if bit is not None and bit.weight is not None:
                 told.append(f"starts with {bit.weight:g} N on bit, without friction; the rock does not give way")
             else:
@@ -214,7 +209,7 @@ class AxialTorsional:
                 self._m.bit.force, self._m.bit.tangent = list(force), np.ravel(tangent).tolist()
                 if self._advance(row[None], records[record:]) == 0:
                     break
-                self.end.commit(self)
+                self.end.commit(self, row[0])
                 done, record = done + 1, record + int(row[-1])
         completed = int(rows[:done, -1].sum())
         times = (self.steps + 1 + np.arange(completed)) * self.dt
@@ -235,10 +230,22 @@ class AxialTorsional:
             self._m, len(rows), cast("double *", rows.ctypes.data), cast("double *", records.ctypes.data)
         )
 
+    def coarser(self) -> "AxialTorsional":
+        """The same scene at rest, with twice the step and half the elements."""
+        fewer = None if self._asked is None else max(2, self._asked // 2)
+        return type(self)(self.scene, 2 * self.dt, fewer, axial=self._axial, end=self.end)
+
+    def bit_state(self) -> np.ndarray:
+        """(2, 2) of the bit at the end of the last step: place (m downwards, rad) and velocity; NaN where axial motion
+        is left out."""
+        found = np.full((2, 2), np.nan)
+        found[:, 2 - self._dofs :] = self._kept["x"][-1], self._kept["v"][-1]
+        return found
+
     def profile(self) -> np.ndarray:
         """See `StringModel.profile`. The node of the bit sticks where the rock holds it."""
         m, n, kept = self._m, self._dofs, self._kept
-        x, v = kept["x"], kept["v"]
+        x, v = kept["x"], kept["w"]
         forces = np.diff(x, axis=0) * kept["spring"]
         at = np.concatenate([forces[:1], (forces[:-1] + forces[1:]) / 2, forces[-1:]])
         torque, nothing = -at[:, -1], np.full(m.nodes, np.nan)
@@ -259,6 +266,8 @@ class AxialTorsional:
         found["ends"] = np.array([*((m.top[i].error, m.top[i].force) for i in (0, 1))]).ravel()
         found["bit"] = np.array([m.bit.weight, m.bit.torque, m.bit.floor])
         found["counts"] = np.array([self.steps, m.halved, m.iterations, m.most])
+        if self.end is not None:
+            found["end"] = self.end.memory()
         return found
 
     def recall(self, memory: dict) -> None:
@@ -272,3 +281,5 @@ class AxialTorsional:
             m.top[i].error, m.top[i].force = error, force
         m.bit.weight, m.bit.torque, m.bit.floor = memory["bit"]
         self.steps, m.halved, m.iterations, m.most = (int(x) for x in memory["counts"])
+        if self.end is not None:
+            self.end.recall(memory["end"])

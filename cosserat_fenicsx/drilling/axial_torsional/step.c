@@ -64,8 +64,10 @@ static int solve(model *m, double h, const double *signal)
     const double gap = m->bit.rock ? (m->bit.floor - m->x[2 * m->nodes - 2]) / h : 0;
     memset(m->broken, 0, m->nodes * sizeof *m->broken);
     loads(m, h, signal);
+    m->ease = 1;
     for (int i = 0;; i++) {
         double scale;
+        if (i && i % PATIENCE == 0) m->ease *= 0.5; /* nodes that flip to and fro settle with smaller factors */
         const double error = foretell(m, h, &scale);
         if (i && error <= 1e-10 * scale + 1e-11) {
             m->iterations += i;
@@ -175,7 +177,7 @@ static int step(model *m, double h, const double *from, const double *to)
 static void write_record(const model *m, double *row)
 {
     const int n = m->dofs, last = m->nodes - 1, turn = n - 1;
-    const double *x = m->x, *v = m->v;
+    const double *x = m->x, *v = m->v, *w = m->w;
     double kinetic = 0, strain = 0, weight = 0;
     for (int i = 0; i <= last; i++)
         for (int d = 0; d < n; d++) {
@@ -195,8 +197,8 @@ static void write_record(const model *m, double *row)
         strain += m->top[0].integral * error * error / 2 - m->hanging_top * error;
     }
     const double drive = m->top[turn].force, hook = n == 2 ? m->hanging_top - m->top[0].force : NAN;
-    const double series[] = {v[turn], x[turn], drive, v[last * n + turn], x[last * n + turn], m->bit.torque, hook,
-                             n == 2 ? v[2 * last] : NAN, n == 2 ? x[2 * last] : NAN, n == 2 ? m->bit.weight : NAN,
+    const double series[] = {w[turn], x[turn], drive, w[last * n + turn], x[last * n + turn], m->bit.torque, hook,
+                             n == 2 ? w[2 * last] : NAN, n == 2 ? x[2 * last] : NAN, n == 2 ? m->bit.weight : NAN,
                              kinetic, strain, m->sums.drive, m->sums.hook, weight, m->sums.bit, m->sums.wall,
                              m->sums.mud};
     memcpy(row, series, sizeof series);

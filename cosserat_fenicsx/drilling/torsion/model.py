@@ -19,10 +19,10 @@ import numpy as np
 
 from cosserat_fenicsx.algebra.pointers import Pointers
 from cosserat_fenicsx.checks import instance, positive, refuse
-from cosserat_fenicsx.drilling.bit_laws import Stribeck
+from cosserat_fenicsx.drilling.bit_laws import Lobes, Stribeck
 from cosserat_fenicsx.drilling.protocol import LEDGER, PROFILE, SERIES
 from cosserat_fenicsx.drilling.scene import Drilling
-from cosserat_fenicsx.drilling.single_valued import check_bit
+from cosserat_fenicsx.drilling.single_valued import check_bit, stribeck_of
 from cosserat_fenicsx.drilling.top_drive import PI, Matched, Motor, Stiff
 from cosserat_fenicsx.drilling.torsion.cells import cells_of
 from cosserat_fenicsx.drilling.torsion.mean_speeds import MeanSpeeds
@@ -49,7 +49,7 @@ class TorsionWaves(Pointers):
     Speeds and torques that are told are means over the last two steps, but for speeds of drives and bits with inertia.
 
     Args:
-        scene: a `Drilling` with a `DrillString`; the bit's law a `Stribeck`.
+        scene: a `Drilling` with a `DrillString`; the bit's law a `Stribeck`, or `Lobes`, of which it takes the torque.
         dt: longest step, s; None for 300 cells. The step is the longest, from three quarters of it on, for which the
             travel times of the parts are nearest to whole numbers of steps; shorter where a law of friction needs it.
         elements: least number of cells, or None.
@@ -97,8 +97,8 @@ class TorsionWaves(Pointers):
         self._drag = drag * (np.concatenate([[0.0], half]) + np.concatenate([half, [0.0]]))
         wall = wall_of(self.scene, self.cells.depths, self.normal_force)
         self._hold, self._slide, self._decay = (x.copy() for x in wall)
-        if self.scene.bit is not None:
-            law = self.scene.bit.law
+        law = None if self.scene.bit is None else stribeck_of(self.scene.bit.law)
+        if law is not None:
             self._hold[-1], self._slide[-1] = law.torques(self.scene.bit.weight)
             self._decay[-1] = law.speed or 0.0
 
@@ -216,6 +216,6 @@ def _check(scene):
     instance("TorsionWaves", "scene", scene, Drilling, "a Drilling")
     instance("TorsionWaves", "scene.string", scene.string, DrillString, "a DrillString; discs have no waves")
     if scene.bit is not None:
-        instance("TorsionWaves", "scene.bit.law", scene.bit.law, Stribeck,
-                 "a Stribeck law: torsion alone knows no depth of cut")  # fmt: skip
+        instance("TorsionWaves", "scene.bit.law", scene.bit.law, (Stribeck, Lobes),
+                 "a Stribeck law, or Lobes with one: torsion alone knows no depth of cut")  # fmt: skip
     check_bit(scene)

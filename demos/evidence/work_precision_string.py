@@ -1,0 +1,142 @@
+"""Speed against accuracy of stick-slip: waves and elements of this package beside a first-order upwind scheme.
+
+    python demos/evidence/work_precision_string.py           a quarter of a minute
+    python demos/evidence/work_precision_string.py --quick   one sample of the coarser ones
+
+Writes to out/: work_precision_string.md (the table), work_precision_string.png (the chart).
+
+3000 m of pipe and 200 m of collars under a stiff drive at 60 rpm, drag 0.3 1/s, and a bit of 50 kg m^2 whose torque
+falls from 6000 to 4000 N m: the limit cycle after 120 s from rest. The truth is that of an independent computation, by
+characteristics on three meshes. The upwind scheme is that of the open literature, see peers/upwind_torsion.py. Times
+are processor times of a whole computation, in C all three, on one thread: medians of 5.
+"""
+
+import argparse
+import statistics
+import time
+from pathlib import Path
+
+import numpy as np
+from machine import in_words, record
+from peers import upwind_torsion
+from written import write
+
+import cosserat_fenicsx as cf
+from cosserat_fenicsx.drilling.axial_torsional.model import AxialTorsional
+from cosserat_fenicsx.drilling.protocol import SERIES
+from cosserat_fenicsx.drilling.torsion.model import TorsionWaves
+
+#: Mean of the last four periods (s), largest speed of the bit after 60 s (rad/s); and how far these may be wrong, as
+#: relative errors: the differences of meshes, and of the levels at which a period is measured.
+TRUTH = {"period": 6.042747520, "peak": 15.079233719}
+KNOWN = {"period": 1e-5, "peak": 2.4e-6}
+DURATION, FROM, SAMPLES = 120.0, 60.0, 5
+WAVES, ELEMENTS, UPWIND = "waves (characteristics)", "elements (P1, implicit)", "upwind, first order"
+#: Cells; steps are those that the models choose for them.
+CASES = {WAVES: (32, 64, 160, 320, 640), ELEMENTS: (64, 128, 256, 512), UPWIND: (250, 500, 1000, 2000)}
+QUICK = {WAVES: (64, 160), ELEMENTS: (128,), UPWIND: (250, 500)}
+
+
+def scene():
+    """The string."""
+    material = cf.Material(E=206e9, nu=206e9 / 2 / 79.3e9 - 1, density=7850.0)
+    parts = [
+        cf.Component(length, cf.Tube(outer, inner).stiffness(material), weight=1.0, contact_radius=outer / 2)
+        for length, outer, inner in ((3000.0, 0.127, 0.10861), (200.0, 0.1651, 0.05715))
+    ]
+    bit = cf.BitOnRock(cf.Stribeck(6000.0, 4000.0, 3.0), inertia=50.0)
+    return cf.Drilling(cf.DrillString(parts, order="top down"), cf.TopDrive(60 * cf.units.rpm), bit,
+                       drag=cf.ViscousDrag(0.3))  # fmt: skip
+
+
+def solved(drilling, method, cells):
+    """Times and speeds of the bit, (n,) each, s and rad/s."""
+    if method == UPWIND:
+        return upwind_torsion.run(drilling, cells, DURATION)[:2]
+    if method == WAVES:
+        model = TorsionWaves(drilling, elements=cells)
+    else:
+        model = AxialTorsional(drilling, None, cells, axial=False)
+    rows = model.advance(int(np.ceil(DURATION / model.dt)))
+    return rows[:, 0], rows[:, 1 + SERIES.index("bit_speed")]
+
+
+def errors(times, speed):
+    """Relative errors of the limit cycle; a period is from one start to the next, at half the speed of the drive."""
+    level = 30 * cf.units.rpm
+    k = np.flatnonzero((speed[:-1] < level) & (speed[1:] >= level))
+    starts = times[k] + (level - speed[k]) / (speed[k + 1] - speed[k]) * (times[k + 1] - times[k])
+    found = {"period": np.diff(starts)[-4:].mean(), "peak": speed[times > FROM].max()}
+    return {name: abs(found[name] / truth - 1) for name, truth in TRUTH.items()}
+
+
+def measure(cases, samples):
+    """[(method, cells, errors, s)]."""
+    drilling, rows = scene(), []
+    for method, counts in cases.items():
+        solved(drilling, method, counts[0])  # what is compiled at first use
+        for cells in counts:
+            seconds = []
+            for _ in range(samples):
+                began = time.process_time()
+                found = solved(drilling, method, cells)
+                seconds.append(time.process_time() - began)
+            rows.append((method, cells, errors(*found), statistics.median(seconds)))
+    return rows
+
+
+def table(rows):
+    """Markdown lines: errors and times."""
+    lines = ["| method | cells | error of the period | error of the bit's largest speed | processor time (ms) |",
+             "|---|---:|---:|---:|---:|"]  # fmt: skip
+    for method, cells, off, seconds in rows:
+        lines.append(f"| {method} | {cells} | {off['period']:.1e} | {off['peak']:.1e} | {1e3 * seconds:.1f} |")
+    return [*lines, "", f"{in_words(record())}. The truth is known to {KNOWN['period']:.0e} (period) and "
+            f"{KNOWN['peak']:.1e} (speed); smaller errors are chance."]  # fmt: skip
+
+
+def chart(rows, file):
+    """Errors over time, one panel for the period and one for the largest speed."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(12, 5.2), layout="constrained")
+    FigureCanvasAgg(figure)
+    colours = dict(zip(CASES, ("#08519c", "#31a354", "#d95f02"), strict=True))
+    titles = {"period": "period of stick-slip", "peak": "largest speed of the bit"}
+    for panel, (name, title) in zip(figure.subplots(1, 2), titles.items(), strict=True):
+        panel.axhspan(KNOWN[name] / 100, KNOWN[name], color="0.9", zorder=0)
+        panel.text(0.99, KNOWN[name] * 0.9, "not known better ", transform=panel.get_yaxis_transform(), fontsize=8,
+                   color="0.4", ha="right", va="top")  # fmt: skip
+        for method, colour in colours.items():
+            here = [(cells, off[name], seconds) for by, cells, off, seconds in rows if by == method]
+            cells, off, seconds = zip(*here, strict=True)
+            shown = np.maximum(off, KNOWN[name] / 5)
+            panel.loglog(1e3 * np.array(seconds), shown, "o-", color=colour, label=method)
+            for x, y, n in zip(seconds, shown, cells, strict=True):
+                panel.annotate(f"{n}", (1e3 * x, y), xytext=(4, 4), textcoords="offset points", fontsize=8,
+                               color=colour)  # fmt: skip
+        panel.set(
+            xlabel="processor time of 120 s of motion (ms), one thread", title=title, ylim=(KNOWN[name] / 8, 5e-3)
+        )
+        panel.margins(x=0.12)
+        panel.grid(alpha=0.3)
+    figure.axes[0].set_ylabel("relative error")
+    figure.axes[1].legend()
+    figure.suptitle("Stick-slip of 3200 m at 60 rpm: speed against accuracy (numbers of cells at the points)")
+    figure.savefig(file, dpi=110)
+
+
+def main(out="out", quick=False):
+    """Measure, write table and chart; returns the rows."""
+    rows = measure(QUICK if quick else CASES, 1 if quick else SAMPLES)
+    stem = "work_precision_string_quick" if quick else "work_precision_string"
+    print(write(stem, table(rows), out))
+    chart(rows, Path(out) / f"{stem}.png")
+    return rows
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--quick", action="store_true", help="one sample of the coarser ones")
+    main(quick=parser.parse_args().quick)
