@@ -21,7 +21,8 @@ typedef struct {
     double still, slipping, decay;  /* torques of the law, or per weight, and speed; 0: it drops at once */
     double force[2], tangent[4];    /* given from Python before a step, for other laws: weight on bit and torque */
     double hanging;                 /* static weight on bit, with which the string hangs */
-    double weight, torque, floor;   /* of the last step; place of the rock */
+    double weight, torque;          /* of the last step */
+    double floor, sinking;           /* place of the rock's face at the end of the step, and its velocity downwards */
     double factor;                  /* of the next step, on the law's torques */
 } lower;
 

@@ -1,7 +1,8 @@
 /* A step, its books and its record. */
 
-/* w from (A + D) w = b - c by elimination along the string; held unknowns have given velocities. */
-static inline void eliminate(model *m, const double *given_top, double given_bit, const int n)
+/* w from (A + D) w = b - c by elimination along the string; held unknowns have given velocities. Returns a sum that is
+   finite if all numbers are. */
+static inline double eliminate(model *m, const double *given_top, double given_bit, const int n)
 {
     const int last = m->nodes - 1;
     for (int i = 0; i <= last; i++) {
@@ -46,7 +47,8 @@ static inline void eliminate(model *m, const double *given_top, double given_bit
                 }
         }
     }
-    for (int k = 0; k < n; k++) m->w[last * n + k] = m->y[last * n + k];
+    double sum = 0;
+    for (int k = 0; k < n; k++) sum += m->w[last * n + k] = m->y[last * n + k];
     for (int i = last - 1; i >= 0; i--) {
         const double *o = m->o + (size_t)i * n, *q = m->q + 4 * (size_t)i, *y = m->y + (size_t)i * n;
         double *w = m->w + (size_t)i * n, s[2];
@@ -54,8 +56,10 @@ static inline void eliminate(model *m, const double *given_top, double given_bit
         for (int k = 0; k < n; k++) {
             w[k] = y[k];
             for (int l = 0; l < n; l++) w[k] -= q[2 * k + l] * s[l];
+            sum += w[k];
         }
     }
+    return sum;
 }
 
 /* The mean velocities w and the forces of the laws in a step; 0 where Newton's method does not converge. */
@@ -74,14 +78,11 @@ static int solve(model *m, double h, const double *signal)
             if (i > m->most) m->most = i;
             return 1;
         }
-        if (i == ITERATIONS || !isfinite(error)) {
+        const double sum = m->dofs == 1 ? eliminate(m, signal, gap, 1) : eliminate(m, signal, gap, 2);
+        if (i == ITERATIONS || !isfinite(sum)) {
             m->iterations += i;
             return 0;
         }
-        if (m->dofs == 1)
-            eliminate(m, signal, gap, 1);
-        else
-            eliminate(m, signal, gap, 2);
         take_forces(m);
     }
 }
@@ -145,12 +146,13 @@ static void commit(model *m, double h, const double *signal)
         m->x[j] += h * m->w[j];
         m->v[j] = 2 * m->w[j] - m->v[j];
     }
-    /* what is held in a step is at rest at its end */
+    /* what is held in a step ends it at rest, or with the rock */
     for (int i = 0; i <= last; i++) {
         m->held[i] = m->mask[i];
-        double *lost = i == last && (m->bit.law || m->bit.rock) ? &sums->bit : &sums->wall;
+        const int bit = i == last && (m->bit.law || m->bit.rock);
         for (int d = 0; d < n; d++)
-            if (m->mask[i] & bit_of(m, d)) *lost -= set_velocity(m, i, d, 0);
+            if (m->mask[i] & bit_of(m, d))
+                *(bit ? &sums->bit : &sums->wall) -= set_velocity(m, i, d, bit && d < turn ? m->bit.sinking : 0);
     }
 }
 
