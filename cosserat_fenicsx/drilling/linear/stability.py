@@ -57,9 +57,10 @@ def stability(scene, speeds, weights=None, *, modes: int | None = None, up_to: f
 
 
 def _heights(found, cuts):
-    """What modes are numbered by: the frequency without the bit's slope; for a bit that cuts that of the middle case."""
-    columns = [column[np.isfinite(column)].imag for column in found.T]
-    return [float(np.median(column)) if cuts else float(column[0]) for column in columns]
+    """What modes are numbered by: frequency without the bit's slope, later ones last; or that of the middle case."""
+    if cuts:
+        return [float(np.median(column[np.isfinite(column)].imag)) for column in found.T]
+    return np.where(np.isfinite(found[0]), found[0].imag, np.inf)
 
 
 def highest(scene, modes, up_to):
