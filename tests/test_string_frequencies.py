@@ -37,9 +37,10 @@ def test_a_pipe_with_an_inertia_at_its_end():
 def many_parts(count, drive):
     """A string of parts that differ by orders of magnitude."""
     draw = np.random.default_rng(4)
+    lengths, masses = draw.uniform(1, 100, count), draw.uniform(20, 300, count)
+    axial, torsional = 10 ** draw.uniform(8, 10, count), 10 ** draw.uniform(5, 8, count)
     parts = []
-    for length, EA, GJ, mass in zip(draw.uniform(1, 100, count), 10 ** draw.uniform(8, 10, count),
-                                    10 ** draw.uniform(5, 8, count), draw.uniform(20, 300, count), strict=True):  # fmt: skip
+    for length, EA, GJ, mass in zip(lengths, axial, torsional, masses, strict=True):
         stiff = cf.Stiffness((1e9, 1e9), EA, (1e6, 1e6), GJ, mass=mass, inertia=(mass / 1e3, mass / 1e3, mass / 5e2))
         parts.append(cf.Component(float(length), stiff, 100.0, 0.08))
     bit = cf.BitOnRock(cf.Stribeck(0, 0), inertia=30.0, mass=500.0)

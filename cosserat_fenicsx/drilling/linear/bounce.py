@@ -74,9 +74,9 @@ class BitBounce(Tabular):
 def bit_bounce(scene, speeds) -> BitBounce:
     """Forced axial vibration of a string whose bit follows the lobes of the rock.
 
-    The bit moves by amplitude sin(count theta); the weight on bit shakes by the modulus of i w Z(i w) - m w^2, times the
-    amplitude, with w = count Om, the axial impedance Z of the string below its hook and the mass m of the bit. It is
-    linear: it holds while the weight shakes by less than the static one.
+    The bit moves by amplitude sin(count theta); the weight on bit shakes by the modulus of i w Z(i w) - m w^2, times
+    the amplitude, with w = count Om, the axial impedance Z of the string below its hook and the mass m of the bit. It
+    is linear: it holds while the weight shakes by less than the static one.
 
     Args:
         scene: a `Drilling` whose bit has the law `Lobes`.

@@ -9,18 +9,20 @@ from cosserat_fenicsx.drilling.linear.roots import all_roots
 from cosserat_fenicsx.drilling.linear.stability_box import box_up_to
 from cosserat_fenicsx.drilling.linear.steady import Steady, or_none
 from cosserat_fenicsx.drilling.linear.tuned import SoftSpeed, SoftTorque
-from cosserat_fenicsx.drilling.top_drive import Matched, TopDrive
+from cosserat_fenicsx.drilling.top_drive import Matched, Stiff, TopDrive
 
 
 def usual_drives(scene):
-    """{name: TopDrive} to compare with: those that need an inertia where the drive of the scene has one."""
-    inertia, drives = scene.drive.inertia, {"stiff": TopDrive(0.0)}
+    """{name: TopDrive} to compare with, others than that of the scene; those with an inertia where that has one."""
+    inertia, own = scene.drive.inertia, scene.drive.control
+    drives = {} if isinstance(own, Stiff) else {"stiff": TopDrive(0.0)}
     if isinstance(scene.string, Discs):
         return drives
     if inertia:
         for name, choose in (("SoftTorque", SoftTorque), ("SoftSpeed", SoftSpeed)):
             drives[name] = TopDrive(0.0, inertia, choose(scene, inertia))
-    return drives | {"matched": TopDrive(0.0, control=Matched())}
+    drives["matched"] = TopDrive(0.0, control=Matched())
+    return {name: drive for name, drive in drives.items() if drive.control != own}
 
 
 def growth_with(answer, i, j, drives=None):

@@ -15,7 +15,8 @@ from cosserat_fenicsx.errors import NotConverged
 _TURN, _MISMATCH = 1.0, 0.3
 #: A contour that comes as near to a root as this share of its size is moved.
 _NEAR = 1e-9
-_STEPS, _SETTLED = 60, 1e-13
+#: Newton's method stops at steps below the second number, or below the third where they no longer fall; relative.
+_STEPS, _SETTLED, _ROUNDING = 60, 1e-14, 1e-11
 
 
 @dataclass(frozen=True)
@@ -122,17 +123,23 @@ def each(f, starts, stride):
         (n,) complex, NaN where it has not settled.
     """
     s = np.array(starts, dtype=complex)
-    size = np.full(len(s), np.inf)
-    for _ in range(_STEPS if len(s) else 0):
+    size, open_ = np.full(len(s), np.inf), np.arange(len(s))
+    for _ in range(_STEPS):
+        if not open_.size:
+            break
+        here = s[open_]
         with np.errstate(all="ignore"):
-            value, derivative = f(s)
+            value, derivative = f(here)
             step = np.where(value == 0, 0.0, -value / derivative)
         step = np.where(np.isfinite(step), step, 0.3 * stride)
-        size = np.abs(step)
-        s = s + step * np.minimum(1.0, stride / np.maximum(size, 1e-300))
-        if (size <= _SETTLED * np.abs(s)).all():
-            break
-    return np.where(size <= 1e-11 * np.maximum(np.abs(s), stride * 1e-3), s, np.nan)
+        longest = np.maximum(stride, np.abs(here.real) / 4)  # far from the imaginary axis roots are far apart
+        length, before = np.abs(step), size[open_]
+        s[open_] = here + step * np.minimum(1.0, longest / np.maximum(length, 1e-300))
+        size[open_] = length
+        scale = np.maximum(np.abs(here), stride * 1e-3)
+        done = (length <= _SETTLED * scale) | ((length <= _ROUNDING * scale) & (length >= before / 4))
+        open_ = open_[~done]
+    return np.where(size <= _ROUNDING * np.maximum(np.abs(s), stride * 1e-3), s, np.nan)
 
 
 def newton(f, starts, stride):

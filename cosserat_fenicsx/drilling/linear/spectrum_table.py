@@ -33,7 +33,7 @@ def stability_table(answer):
     names = list(rows[0][3])
     table = Table(
         caption="growth: in 1/s. fastest: the largest of all cases. at: the middle one of those in which the mode "
-        "grows, its frequency and its growth there, with the drive of the scene; to the right the growth with other drives."
+        "grows, its frequency and growth there, with the drive of the scene; to the right the growth with other drives."
     )
     for heading in ("mode", "grows in", "fastest", "at rpm", "kN", "frequency (Hz)", "growth", *names):
         table.add_column(heading, justify="right")

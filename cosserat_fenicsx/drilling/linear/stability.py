@@ -12,6 +12,9 @@ from cosserat_fenicsx.drilling.linear.steady import Steady, or_none, speeds_and_
 from cosserat_fenicsx.drilling.linear.tracking import follow
 from cosserat_fenicsx.drilling.scene import Drilling
 
+#: A growth below this share of the root is rounding: a mode without losses.
+_NEUTRAL = 1e-11
+
 
 def stability(scene, speeds, weights=None, *, modes: int | None = None, up_to: float = 10.0) -> Stability:
     """Growth rates and frequencies of all modes of steady rotations.
@@ -41,25 +44,30 @@ def stability(scene, speeds, weights=None, *, modes: int | None = None, up_to: f
     speeds, weights = speeds_and_weights("stability", scene, speeds, weights)
     top = 2 * math.pi * highest(scene, modes, up_to)
     steady = Steady(scene)
-    order = [(i, j) for j in range(len(weights)) for i in range(len(speeds))[:: 1 if j % 2 else -1]]
+    order = [(i, j) for j in range(len(weights)) for i in np.argsort(-speeds, kind="stable")]
     points = np.array([steady.parameters(speeds[i], or_none(weights[j])) for i, j in order])
-    if not steady.cuts:  # the slope alone decides
+    n = len(speeds)
+    if steady.cuts:  # from the next higher speed, and from the same speed at the weight before
+        parents = [[k - 1] * (k % n > 0) + [k - n] * (k >= n) for k in range(len(order))]
+    else:  # the slope alone decides; modes are counted from that of a torque that does not fall
         by_slope = np.argsort(-points[:, 0], kind="stable")
-        order, points = [order[k] for k in by_slope], points[by_slope]
-    first = np.zeros_like(points[:1]) if not steady.cuts else points[:1]  # modes are counted without the bit's slope
-    spacing = steady.equation(first[0]).spacing
-    found = follow(steady.equation, np.concatenate([first, points]), box_up_to(steady, top), spacing)
+        order, points = [order[k] for k in by_slope], np.concatenate([np.zeros((1, 1)), points[by_slope]])
+        parents = [[k - 1] * (k > 0) for k in range(len(points))]
+    spacing = steady.equation(points[0]).spacing
+    found = follow(steady.equation, points, parents, box_up_to(steady, top), spacing)
+    found = np.where(np.abs(found.real) < _NEUTRAL * np.maximum(np.abs(found), spacing), 1j * found.imag, found)
     columns = np.argsort(_heights(found, steady.cuts), kind="stable")
     roots = np.full((len(speeds), len(weights), len(columns)), np.nan + 0j)
-    for (i, j), row in zip(order, found[1:], strict=True):
+    for (i, j), row in zip(order, found[-len(order) :], strict=True):
         roots[i, j] = row[columns]
     return Stability(scene, speeds, weights, roots[:, :, np.isfinite(roots).any(axis=(0, 1))], top / (2 * math.pi))
 
 
 def _heights(found, cuts):
-    """What modes are numbered by: the frequency without the bit's slope; for a bit that cuts that of the middle case."""
-    columns = [column[np.isfinite(column)].imag for column in found.T]
-    return [float(np.median(column)) if cuts else float(column[0]) for column in columns]
+    """What modes are numbered by: frequency without the bit's slope, later ones last; or that of the middle case."""
+    if cuts:
+        return [float(np.median(column[np.isfinite(column)].imag)) for column in found.T]
+    return np.where(np.isfinite(found[0]), found[0].imag, np.inf)
 
 
 def highest(scene, modes, up_to):

@@ -46,16 +46,19 @@ def _named(answer, k):
 
 
 def _maps(answer, modes):
+    from matplotlib.colors import SymLogNorm
+
     columns = min(3, len(modes))
     rows = math.ceil(len(modes) / columns)
     figure = empty_figure(1.0 + 3.4 * columns, 0.9 + 2.7 * rows)
     axes = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
     speeds, weights = np.argsort(answer.speeds), np.argsort(answer.weights)
     largest = max(float(np.nanmax(np.abs(answer.growth[:, :, modes]))), 1e-12)
+    scale = SymLogNorm(largest / 30, vmin=-largest, vmax=largest)  # so that the sign is seen near the limit
     for panel, k in zip(axes.flat, modes, strict=False):
         growth = answer.growth[np.ix_(speeds, weights, [k])][:, :, 0].T
         x, y = answer.speeds[speeds] * _RPM, answer.weights[weights] / _KILO
-        drawn = panel.pcolormesh(x, y, growth, cmap="coolwarm", vmin=-largest, vmax=largest, shading="nearest")
+        drawn = panel.pcolormesh(x, y, growth, cmap="coolwarm", norm=scale, shading="nearest")
         known = np.nan_to_num(growth, nan=-largest)
         if (known > 0).any() and (known < 0).any():
             panel.contour(x, y, known, levels=[0.0], colors="black", linewidths=1.2)
