@@ -18,8 +18,9 @@ from cosserat_fenicsx.forms import law
 from cosserat_fenicsx.forms.equilibrium import balance, frame, strains
 from cosserat_fenicsx.forms.rotation import conjugate_product, directors
 
-#: rho A, and I_R as a matrix, at the points where inertia is integrated.
-Inertia = namedtuple("Inertia", "mass I_R")
+#: At the points where inertia is integrated: rho A, I_R about the mass centre as a matrix, and the mass centre a from
+#: the axis in reference components, None on the axis (forms/eccentric.py).
+Inertia = namedtuple("Inertia", "mass I_R offset", defaults=(None,))
 
 
 def angular_velocity(q, q_t):

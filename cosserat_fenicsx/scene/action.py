@@ -32,6 +32,7 @@ _UNITS = {
     "N m s/rad": (1, 1, 1, True),
     "N s/m^2": (1, -2, 1, False),
     "N s^2/m^3": (1, -3, 2, False),
+    "kg/m": (1, -2, 2, False),
 }
 #: The units that data may have.
 UNITS = tuple(_UNITS)
@@ -114,6 +115,11 @@ class Action:
 
     def inertia(self, rod):
         """Mass (kg) and moments of inertia about d_1, d_2, d_3 (kg m^2, (3,)) that it adds at its station; or None."""
+        return None
+
+    def added_mass(self, rod, s):
+        """Of a distributed action: masses (n,) that move with the axis of a rod at arc lengths s (n,), m, in kg/m; or
+        None."""
         return None
 
     def holds(self, scene):
