@@ -12,6 +12,7 @@ from collections import namedtuple
 
 import ufl
 from cosserat_fenicsx.forms import law
+from cosserat_fenicsx.forms.inertia import lateral
 from cosserat_fenicsx.forms.rotation import conjugate_product, directors
 
 #: r', q and q' of a configuration.
@@ -67,7 +68,8 @@ def of_mass_centre(rate, W, inertia):
 def kinetic_energy(r_t, W, inertia):
     """Kinetic energy per unit length."""
     y_t = of_mass_centre(r_t, W, inertia)
-    return (inertia.mass * ufl.dot(y_t, y_t) + ufl.inner(W * euler_tensor(inertia.I_R), W)) / 2
+    turning = ufl.inner(W * euler_tensor(inertia.I_R), W)
+    return (inertia.mass * ufl.dot(y_t, y_t) + turning + lateral(inertia.lateral, r_t, r_t)) / 2
 
 
 def rate_work(rate, W_rate, q_m, inertia, test):
@@ -76,7 +78,7 @@ def rate_work(rate, W_rate, q_m, inertia, test):
     dR = turned(q_m, test.q)
     turning = ufl.inner(W_rate * euler_tensor(inertia.I_R), dR)
     moved = (of_mass_centre(a, B, inertia) for a, B in ((rate, W_rate), (test.r, dR)))
-    return inertia.mass * ufl.dot(*moved) + turning
+    return inertia.mass * ufl.dot(*moved) + turning + lateral(inertia.lateral, rate, test.r)
 
 
 def angular_momentum(q, W, inertia):

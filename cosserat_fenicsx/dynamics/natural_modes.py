@@ -14,7 +14,7 @@ from cosserat_fenicsx.algebra.pencil import Pencil
 from cosserat_fenicsx.checks import instance, number, refuse
 from cosserat_fenicsx.element import lobatto_weights
 from cosserat_fenicsx.errors import NotConverged
-from cosserat_fenicsx.models.rod_data import check_inertia, nodal_inertia, nodal_offsets
+from cosserat_fenicsx.models.nodal_inertia import check_inertia, nodal_inertia, nodal_offsets, nodal_lateral
 from cosserat_fenicsx.progress import MeshProgress
 from cosserat_fenicsx.quaternions import directors
 from cosserat_fenicsx.results.modes import Modes
@@ -222,8 +222,10 @@ def _mass(model, rows, size, unit):
     block = np.zeros((*slots.shape, 6, 6))
     block[..., [0, 1, 2], [0, 1, 2]] = (w * mass)[..., None]
     block[..., 3:, 3:] = np.einsum("...ik,...k,...jk->...ij", T, J * (w / scales.length**2)[..., None], T)
+    lateral = nodal_lateral(scene, layout, model.nodes) * np.sqrt(w)[..., None]
     if model.signature.eccentric:
         _off_axis(block, nodal_offsets(scene, layout, model.nodes, mass), T @ frames.swapaxes(2, 3), w, scales.length)
+    block[..., :3, :3] -= lateral[..., :, None] * lateral[..., None, :]
     of_node = rows[slots]
     i, j = (np.broadcast_to(x, block.shape).ravel() for x in (of_node[..., :, None], of_node[..., None, :]))
     free = (i >= 0) & (j >= 0)

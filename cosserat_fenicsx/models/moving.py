@@ -11,14 +11,8 @@ from cosserat_fenicsx import compat
 from cosserat_fenicsx.models.connections import ties_of
 from cosserat_fenicsx.models.laws import law_data, viscous_values
 from cosserat_fenicsx.models.moving_forms import SpatialStep, compile_momentum
-from cosserat_fenicsx.models.rod_data import (
-    check_inertia,
-    gauss_function,
-    joined,
-    nodal_inertia,
-    nodal_offsets,
-    rod_data,
-)
+from cosserat_fenicsx.models.nodal_inertia import check_inertia, nodal_inertia, nodal_lateral, nodal_offsets
+from cosserat_fenicsx.models.rod_data import gauss_function, joined, rod_data
 from cosserat_fenicsx.models.scales import Scales
 from cosserat_fenicsx.models.spatial import SpatialModel
 from cosserat_fenicsx.quaternions import cross, small_rotations
@@ -39,6 +33,7 @@ class Moving:
         damped: whether any rod has damping.
         offset: Function, the mass centre from the axis, along the inertial axes at rest; None in a scene without
             eccentric rods.
+        lateral: Function, see `nodal_inertia.nodal_lateral`; None in a scene all of whose masses move along the rods too.
         viscosity: the Functions of the law of the strain rates, as `laws.law_of` takes them.
     """
 
@@ -56,6 +51,7 @@ class Moving:
         self.mass, self.drag = self._at_element_nodes(1), self._at_element_nodes(1)
         self.inertia = self._at_element_nodes(self.inertia_size)
         self.offset = self._at_element_nodes(3) if self.signature.eccentric else None
+        self.lateral = self._at_element_nodes(self.moves) if self.signature.lateral else None
         coupled = self.signature.coupled
         Kt, Jt = (gauss_function(mesh, points, 9 if coupled else 3) for _ in range(2))
         self.viscosity = Kt, None, Jt, gauss_function(mesh, points, 9) if coupled else None
@@ -87,6 +83,9 @@ class Moving:
             self._fill_nodes(self.offset, offset / scales.length)
             inertia = inertia + six_of(more / (heaviest * scales.length**2))
         self._fill_nodes(self.inertia, inertia)
+        if self.lateral is not None:
+            directions = nodal_lateral(scene, layout, self.nodes) / math.sqrt(heaviest)
+            self._fill_nodes(self.lateral, directions @ self.axes[: self.moves].T)
         self._fill_nodes(self.drag, np.repeat(drags, layout.counts)[:, None, None] * np.ones((1, len(self.nodes), 1)))
         self.start.x.array[:] = self.state.x.array
         self.velocity.x.array[:] = 0.0

@@ -60,7 +60,7 @@ class SpatialData:
         I_R = ufl.as_matrix([[I[0], I[1], I[2]], [I[1], I[3], I[4]], [I[2], I[4], I[5]]])
         law = law_of(data.K, data.K_inv, data.J, data.G)
         section = equilibrium.Section(law, as_matrix(data.R_R), data.v_R)
-        return cls(section, law_of(*model.viscosity), inertia.Inertia(model.mass[0], I_R, model.offset))
+        return cls(section, law_of(*model.viscosity), inertia.Inertia(model.mass[0], I_R, model.offset, model.lateral))
 
 
 def along(w):

@@ -42,6 +42,7 @@ class Signature:
             algebra/newton.c.
         coupled: whether a section couples strains, so that the law is one of full matrices.
         eccentric: whether a rod's mass centre lies off its axis, which changes the inertia terms of a motion.
+        lateral: whether a mass moves across a rod alone (`Action.lateral`), which adds to them.
     """
 
     model: str
@@ -54,7 +55,8 @@ class Signature:
     connections: Connections
     slender: bool
     coupled: bool
-    eccentric: bool = False
+    eccentric: bool
+    lateral: bool
 
     @classmethod
     def of(cls, scene, layout, *, formulation, degree, points=None, model="spatial"):
@@ -88,7 +90,7 @@ class Signature:
         coupled = any(rod.profile.coupled for rod in scene.rods)
         return cls(
             model, plane is not None, counts, degree, formulation, points or degree, terms, connections, slender,
-            coupled, any(rod.mass_centre for rod in scene.rods),
+            coupled, any(rod.mass_centre for rod in scene.rods), any(load.lateral for load in scene.loads),
         )  # fmt: skip
 
     @property

@@ -32,7 +32,10 @@ _UNITS = {
     "N m s/rad": (1, 1, 1, True),
     "N s/m^2": (1, -2, 1, False),
     "N s^2/m^3": (1, -3, 2, False),
+    "kg": (1, -1, 2, False),
     "kg/m": (1, -2, 2, False),
+    "kg m": (1, 0, 2, False),
+    "kg m^2": (1, 1, 2, False),
 }
 #: The units that data may have.
 UNITS = tuple(_UNITS)
@@ -85,10 +88,20 @@ class Action:
         memory: internal variables, kept from one accepted state to the next: a `Datum` each, its initial value, passed
             to `work` after `data`.
         evolve: a static method ``(point, *data, *memory)`` -> a list of UFL expressions, the new values of the memory.
+        lateral: whether its `added_mass` along a rod is smaller than that across.
         traits: None; or a dict of the fields of `models.traits.Traits`, where it takes long to find them from `work`.
     """
 
-    at_nodes, scaled, permanent, follows, memory, evolve, traits = False, True, False, False, (), None, None
+    at_nodes, scaled, permanent, follows, memory, evolve, traits, lateral = (
+        False,
+        True,
+        False,
+        False,
+        (),
+        None,
+        None,
+        False,
+    )
 
     def acts_on(self, rod):
         """Whether it acts along a rod."""
@@ -117,9 +130,9 @@ class Action:
         """Mass (kg) and moments of inertia about d_1, d_2, d_3 (kg m^2, (3,)) that it adds at its station; or None."""
         return None
 
-    def added_mass(self, rod, s):
-        """Of a distributed action: masses (n,) that move with the axis of a rod at arc lengths s (n,), m, in kg/m; or
-        None."""
+    def added_mass(self, rod, s, side):
+        """Of a distributed action: masses per length that move with the axis of a rod at arc lengths s (...), m: (those
+        across it, those along its tangent at rest), (...) each, kg/m; or None. `side` as for `Rod.stiffness_at`."""
         return None
 
     def holds(self, scene):
