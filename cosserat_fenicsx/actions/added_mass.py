@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cosserat_fenicsx.checks import instance, positive, refuse, store
+from cosserat_fenicsx.checks import instance, number, positive, refuse, store
 from cosserat_fenicsx.scene.action import LineAction
 from cosserat_fenicsx.scene.pieces import checked_pieces
 from cosserat_fenicsx.scene.rod import Rod, RodOrName, is_known
@@ -28,7 +28,8 @@ class AddedMass(LineAction):
         axial: whether it moves in all directions.
 
     Raises:
-        SceneError: not a rod, a mass that is not positive, or pieces that do not ascend to the rod's length.
+        SceneError: not a rod, a mass that is not positive (of a piece: negative), or pieces that do not ascend to the
+            rod's length.
     """
 
     rod: RodOrName
@@ -42,12 +43,15 @@ class AddedMass(LineAction):
         instance(self, "axial", self.axial, bool, "True or False")
         if not isinstance(self.mass, list | tuple):
             store(self, mass=positive(self, "mass", self.mass, "kg/m"))
-        elif not self.mass:
+            return
+        if not self.mass:
             refuse(self, "mass", self.mass, "at least one piece (s_end, kg/m)")
-        elif known:  # `Scene` looks a name up, and makes it again
+        if known:  # `Scene` looks a name up, and makes it again
             pieces = checked_pieces("AddedMass", "mass", self.mass, self.rod.length, "kg/m")
-            masses = [positive(self, f"mass[{i}]", m, "kg/m") for i, (_, m) in enumerate(pieces)]
-            store(self, mass=tuple((s, m) for (s, _), m in zip(pieces, masses, strict=True)))
+            store(self, mass=tuple((s, self._checked(i, mass)) for i, (s, mass) in enumerate(pieces)))
+
+    def _checked(self, i, mass):
+        return number(self, f"mass[{i}]", mass, "a mass from 0 on (kg/m)", lambda x: 0 <= x < np.inf)
 
     @property
     def lateral(self):

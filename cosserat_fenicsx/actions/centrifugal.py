@@ -18,12 +18,12 @@ class Centrifugal(LineAction):
     """The inertia of a rotation at a constant rate about a fixed axis, on all rods and masses of a scene, for `solve`.
 
     Equilibria are relative ones: the rods rotate about the axis without changing their shape, such as a shaft in
-    synchronous forward whirl. A motion without this action keeps that rotation if it starts there: `simulate(start=path)`
-    with `velocities`. Supports and loads must be the same in every position of that rotation.
+    synchronous forward whirl. A motion without this action keeps that rotation if it starts there, by
+    `simulate(start=path)` and `velocities`. Supports and loads must be the same in every position of that rotation.
 
-    It acts in full, except for the unbalance of eccentric rods, which the load factor multiplies: a straight shaft on the
-    axis is thus led to its whirl above critical speeds, too. There some modes are negative: the rotating frame has a
-    potential that does not show stability by gyroscopic moments.
+    It acts in full, except for the unbalance of eccentric rods, which the load factor multiplies: a straight shaft on
+    the axis is thus led to its whirl above critical speeds, too. There some modes are negative, since the potential of
+    the rotating frame does not show stability by gyroscopic moments.
 
     Args:
         rate: the angular velocity, rad/s, inertial, along the axis.

@@ -33,7 +33,7 @@ class Moving:
         damped: whether any rod has damping.
         offset: Function, the mass centre from the axis, along the inertial axes at rest; None in a scene without
             eccentric rods.
-        lateral: Function, see `nodal_inertia.nodal_lateral`; None in a scene all of whose masses move along the rods too.
+        lateral: Function, see `nodal_inertia.nodal_lateral`; None in a scene without such masses.
         viscosity: the Functions of the law of the strain rates, as `laws.law_of` takes them.
     """
 
