@@ -87,6 +87,20 @@ def test_drag_slows_the_mass_centre_alone():
         assert abs(history.balance[-1]) < 1e-3 * history.energy[0]
 
 
+def test_a_prescribed_rotation_does_work():
+    """The root turns with up to 1 turn per second, whose rate jumps: the energy is the work of the support, to h^2."""
+    rod, gaps = cf.Rod(cf.Line((0, 0, 0), (2, 0, 0)), SOFT, eccentricity=OFFSET), []
+
+    def turn(t):
+        return (0, 0, 2 * np.pi * max(t - 0.5, 0.0))
+
+    for dt in (0.01, 0.005):
+        driven = cf.Prescribed(rod.start, displacement=(0, 0, 0), rotation=turn, jumps=(0.5,))
+        history = cf.simulate(cf.Scene([rod], [driven]), 2, dt=dt, elements=4, degree=2)
+        gaps.append(np.abs(history.balance).max() / history.energy[-1])
+    assert gaps[1] < 1e-3 and gaps[0] / gaps[1] == pytest.approx(4, rel=0.1)
+
+
 def test_weight_acts_at_the_mass_centre():
     """Sideways it twists: the torque at the clamp is rho A g a L, in pieces that of each; upwards it does not."""
     section = cf.Stiffness((1e8, 1e8), 1e8, (1e7, 1e7), 1e6, mass=3.0)

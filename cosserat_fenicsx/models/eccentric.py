@@ -1,10 +1,12 @@
 """The spatial model in motion with mass centres off the axis, with the momentum-conserving scheme."""
 
+import numpy as np
 import ufl
 
+from cosserat_fenicsx import quaternions
 from cosserat_fenicsx.forms import eccentric, inertia
 from cosserat_fenicsx.forms.rotation import directors
-from cosserat_fenicsx.models.moving import MovingSpatial
+from cosserat_fenicsx.models.moving import MovingSpatial, turned_by
 from cosserat_fenicsx.models.moving_forms import SpatialStep, compile_momentum, parts_of
 from cosserat_fenicsx.models.turning import Turning
 
@@ -70,3 +72,12 @@ class EccentricSpatial(Turning, MovingSpatial):
     def _compile(self, spaces):
         self._motion_fields()
         return compile_momentum(EccentricStep(self))
+
+    def set_velocity(self, linear, angular):
+        """See `Moving`: the rates of the directors change with the angular velocities, which differ from theirs by the
+        error of the scheme, so that momenta stay the same where these do."""
+        places, W = self._nodal[:, 3:], self.turning.x.array.reshape(-1, 3, 3).copy()
+        q = self.state.x.array[places]
+        change = angular[self._slots] - turned_by(self.velocity.x.array[places], q)
+        super().set_velocity(linear, angular)
+        self.turning.x.array[:] = (W + np.cross(change[:, :, None], quaternions.directors(q), axis=1)).ravel()

@@ -13,9 +13,9 @@ from cosserat_fenicsx.checks import instance, refuse, store, vector
 from cosserat_fenicsx.scene import action
 from cosserat_fenicsx.scene.action import LineAction, PointAction
 from cosserat_fenicsx.scene.along import FunctionAlong, along_or_vector, breaks_of, kinks_of, values_of
-from cosserat_fenicsx.scene.offset_weight import OffsetWeight
 from cosserat_fenicsx.scene.rod import Rod, RodOrName, Station, StationOrName, is_known
 from cosserat_fenicsx.scene.signals import vector_or_signal
+from cosserat_fenicsx.scene.weight_off_axis import WeightOffAxis
 
 
 class Load:
@@ -233,7 +233,7 @@ class Weight(Load, LineAction):
             if found is not None
         )
         offset = [rod for rod in scene.rods if rod.mass_centre]
-        return (*weights, *(OffsetWeight(rod, self.gravity, self.permanent) for rod in offset))
+        return (*weights, *(WeightOffAxis(rod, self.gravity, self.permanent) for rod in offset))
 
 
 class LineLoad(Load, LineAction):

@@ -10,7 +10,7 @@ from cosserat_fenicsx.scene.rod import Rod
 
 
 @dataclass(frozen=True)
-class OffsetWeight(LineAction):
+class WeightOffAxis(LineAction):
     """The moment R a x rho A g per unit of reference length about the axis of an eccentric rod; `Weight` adds it.
 
     Args:
