@@ -7,6 +7,7 @@ from scipy.optimize import brentq
 from whirling_collar import AMPLITUDES, CLEARANCE, FIRST_CONTACT, Collar
 
 import cosserat_fenicsx as cf
+from cosserat_fenicsx.actions.added_mass import AddedMass
 from cosserat_fenicsx.actions.centrifugal import Centrifugal
 
 pytestmark = pytest.mark.serial
@@ -58,5 +59,23 @@ def test_a_rod_about_one_end():
             expected = w**2 * (2.0 * (L**2 - s**2) / 2 + 0.5 * L)
             assert path.force(rod.at(s))[-1, 0] == pytest.approx(expected, rel=1e-4)
         assert path.model == ("planar" if model == "auto" else "spatial")
+
+
+def test_what_is_refused():
+    collar = Collar()
+    turning = Centrifugal((0, 0, 3.0))
+    scene = cf.Scene([collar.rod], [cf.Clamp(collar.rod.start)], [turning])
+    for asked in (lambda: cf.simulate(scene, 1.0, dt=0.1), lambda: cf.modes(scene)):
+        with pytest.raises(cf.SceneError, match=r"loads\[0\] \(Centrifugal\) stands for the inertia of a motion"):
+            asked()
+    tilted = cf.Scene([collar.rod], [cf.Clamp(collar.rod.start)],
+                      [Centrifugal((1.0, 0, 3.0)), AddedMass(collar.rod, 1.0)])  # fmt: skip
+    with pytest.raises(cf.SceneError, match=r"expected one along rod 'collar', or AddedMass\(axial=True\)"):
+        cf.solve(tilted, [1.0])
+    bare = cf.Rod(cf.Line((0, 0, 0), (0, 0, 1)), cf.Stiffness((1, 1), 1, (1, 1), 1, mass=1.0), name="bare")
+    with pytest.raises(
+        cf.SceneError, match="Rod 'bare': Stiffness.inertia = None: expected a value, which Centrifugal"
+    ):
+        cf.Scene([bare], loads=[turning])
     with pytest.raises(cf.SceneError, match="Centrifugal.rate = .*expected an angular velocity that is not zero"):
         Centrifugal((0, 0, 0))

@@ -12,6 +12,9 @@ from cosserat_fenicsx.scene.action import LineAction, PointAction
 from cosserat_fenicsx.scene.initial import InitialVelocity
 from cosserat_fenicsx.scene.rod import Rod, Station
 
+# Samples along a rod, and the sine of the angle below which it has the direction of the axis.
+_SAMPLES, _SAME = 33, 1e-6
+
 
 @dataclass(frozen=True)
 class Centrifugal(LineAction):
@@ -30,13 +33,14 @@ class Centrifugal(LineAction):
         through: a point of the axis, m.
 
     Raises:
-        SceneError: not three finite numbers, or no rotation.
+        SceneError: not three finite numbers, or no rotation; a rod without mass or inertia (raised by `Scene`); a rod
+            across the axis with an `AddedMass` that is not `axial` (raised by `solve`).
     """
 
     rate: Numbers
     through: Numbers = (0.0, 0.0, 0.0)
 
-    rod, work, scaled = None, None, False
+    rod, work, scaled, of_inertia = None, None, False, True
 
     def __post_init__(self):
         store(self, rate=vector(self, "rate", self.rate, "rad/s"), through=vector(self, "through", self.through, "m"))
@@ -47,6 +51,14 @@ class Centrifugal(LineAction):
         """All rods rotate."""
         return True
 
+    def check_rod(self, rod):
+        """Refuse a rod without mass or inertia."""
+        low = rod.profile.range[0]
+        for name in ("mass", "inertia"):
+            if getattr(low, name) is None:
+                owner, field = ("Stiffness", name) if rod.material is None else ("Material", "density")
+                refuse(f"Rod '{rod.name}': {owner}", field, None, "a value, which Centrifugal needs")
+
     def velocities(self, rods):
         """The velocities of the rotation, an `InitialVelocity` for each of the rods."""
         return tuple(InitialVelocity(rod, angular=self.rate, about=self.through) for rod in rods)
@@ -54,10 +66,18 @@ class Centrifugal(LineAction):
     def companions(self, scene):
         """What it does to each rod, to their unbalance, and to point masses."""
         along = [x for x in scene.loads if x.station is None]
+        for load in along:
+            if load.lateral and not self._is_along(load.rod):
+                refuse("Centrifugal", "rate", self.rate, f"one along rod '{load.rod.name}', or AddedMass(axial=True)")
         rods = [_OfRod(rod, self, tuple(x for x in along if x.acts_on(rod))) for rod in scene.rods]
         unbalance = [_OfUnbalance(rod, self) for rod in scene.rods if rod.mass_centre]
         fixed = [x for x in scene.loads if x.station is not None and x.inertia(x.station.rod) is not None]
         return *rods, *unbalance, *(_OfPoint(x.station, self, x) for x in fixed)
+
+    def _is_along(self, rod):
+        tangents = rod.curve.frame(np.linspace(0, rod.length, _SAMPLES))[..., 2]
+        across = np.linalg.norm(np.cross(tangents, self.rate), axis=1)
+        return across.max() <= _SAME * np.linalg.norm(self.rate)
 
 
 def turning(point, test, mass, J1, J2, J3, rate, through):

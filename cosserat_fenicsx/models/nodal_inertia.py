@@ -5,14 +5,21 @@ import numpy as np
 
 from cosserat_fenicsx.checks import refuse
 from cosserat_fenicsx.element import lobatto_weights
+from cosserat_fenicsx.errors import SceneError
 
 
 def check_inertia(scene):
-    """Raise an error for a rod without inertia.
+    """Raise an error for a rod without inertia, or for an action that stands for inertia.
 
     Raises:
-        SceneError: a rod without mass or inertia.
+        SceneError: a rod without mass or inertia, or such an action.
     """
+    for i, load in enumerate(scene.loads):
+        if load.of_inertia:
+            raise SceneError(
+                f"Scene.loads[{i}] ({type(load).__name__}) stands for the inertia of a motion: expected a scene "
+                "without it, which may start from an equilibrium with it (simulate(start=path), Scene.velocities)"
+            )
     for rod in scene.rods:
         low = rod.profile.range[0]
         for field, value in (("mass", low.mass), ("inertia", low.inertia)):

@@ -88,20 +88,13 @@ class Action:
         memory: internal variables, kept from one accepted state to the next: a `Datum` each, its initial value, passed
             to `work` after `data`.
         evolve: a static method ``(point, *data, *memory)`` -> a list of UFL expressions, the new values of the memory.
+        of_inertia: whether it stands for the inertia of a motion, so that motions and modes refuse it.
         lateral: whether its `added_mass` along a rod is smaller than that across.
         traits: None; or a dict of the fields of `models.traits.Traits`, where it takes long to find them from `work`.
     """
 
-    at_nodes, scaled, permanent, follows, memory, evolve, traits, lateral = (
-        False,
-        True,
-        False,
-        False,
-        (),
-        None,
-        None,
-        False,
-    )
+    at_nodes, scaled, permanent, follows, memory, evolve, traits = False, True, False, False, (), None, None
+    of_inertia, lateral = False, False
 
     def acts_on(self, rod):
         """Whether it acts along a rod."""
