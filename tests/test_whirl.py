@@ -23,6 +23,13 @@ def test_amplitudes_of_the_steady_whirl(compression):
         assert path.stable[-1] == (expected > 0)  # in the rotating frame, without gyroscopic moments
 
 
+def test_small_amplitudes_of_the_steady_whirl():
+    """A hundredth of the eccentricity, where deflections do not stiffen the collar: the linear beam."""
+    collar = Collar(share=0.01)
+    for rpm, expected in AMPLITUDES[0.0].items():
+        assert collar.deflection(collar.whirl(rpm, elements=16)) == pytest.approx(0.01 * expected, rel=1.5e-5)
+
+
 def test_the_speed_of_first_contact():
     collar = Collar()
     found = brentq(lambda rpm: collar.deflection(collar.whirl(rpm)) - CLEARANCE, 105.0, 112.0, xtol=1e-2)

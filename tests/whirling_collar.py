@@ -30,17 +30,18 @@ FIRST_CONTACT = 108.11340683050571
 
 
 class Collar:
-    """The collar under an axial compression (N).
+    """The collar under an axial compression (N), with a share of the eccentricity.
 
     Attributes:
         rod, middle: the rod, and its station in the middle.
     """
 
-    def __init__(self, compression=0.0):
+    def __init__(self, compression=0.0, share=1.0):
         area, I = np.pi / 4 * (OUTER**2 - INNER**2), np.pi / 64 * (OUTER**4 - INNER**4)
         section = cf.Stiffness((SHEAR, SHEAR), E * area, (E * I, E * I), 2 * G * I, mass=DENSITY * area,
                                inertia=(DENSITY * I, DENSITY * I, 2 * DENSITY * I))  # fmt: skip
-        self.rod = cf.Rod(cf.Line((0, 0, 0), (0, 0, LENGTH)), section, name="collar", eccentricity=(ECCENTRICITY, 0))
+        self.rod = cf.Rod(cf.Line((0, 0, 0), (0, 0, LENGTH)), section, name="collar",
+                          eccentricity=(share * ECCENTRICITY, 0))  # fmt: skip
         self.middle = self.rod.at(LENGTH / 2)
         self._supports = [cf.Pin(self.rod.start), *(cf.Roller(self.rod.end, a) for a in ((1, 0, 0), (0, 1, 0)))]
         mud = np.pi / 4 * MUD * (ADDED * OUTER**2 + INNER**2)

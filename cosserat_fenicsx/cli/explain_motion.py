@@ -51,8 +51,7 @@ def explain_motion(scene, settings):
 def _inertia(rod):
     low, high = rod.profile.range
     mass = f"{low.mass:.4g}" + (f" to {high.mass:.4g}" if high.mass > low.mass else "")
-    centre = f", its centre up to {rod.mass_centre.largest:.4g} m off the axis" if rod.mass_centre else ""
-    return f"Rod '{rod.name}': mass {mass} kg/m{centre}; {_damping(rod.damping)}."
+    return f"Rod '{rod.name}': mass {mass} kg/m; {_damping(rod.damping)}."
 
 
 def _damping(damping):
