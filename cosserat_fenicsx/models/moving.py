@@ -147,14 +147,14 @@ class Moving:
         return self._slots
 
     @property
-    def ends(self):
-        """The Functions of a step that forms depend on; only the first, the state, changes within it."""
-        return self.state, self.start, self.velocity
-
-    @property
     def rate_arrays(self):
         """The arrays of the rates of the state."""
         return (self._arrays[2],)
+
+    @property
+    def ends(self):
+        """The Functions of a step that forms depend on; only the first, the state, changes within it."""
+        return self.state, self.start, self.velocity
 
     def accept(self, h):
         """Update the rates to those of `state` after a step of length h, by the trapezoidal rule."""

@@ -88,13 +88,10 @@ class Action:
         memory: internal variables, kept from one accepted state to the next: a `Datum` each, its initial value, passed
             to `work` after `data`.
         evolve: a static method ``(point, *data, *memory)`` -> a list of UFL expressions, the new values of the memory.
-        of_inertia: whether it stands for the inertia of a motion, so that motions and modes refuse it.
-        lateral: whether its `added_mass` along a rod is smaller than that across.
         traits: None; or a dict of the fields of `models.traits.Traits`, where it takes long to find them from `work`.
     """
 
     at_nodes, scaled, permanent, follows, memory, evolve, traits = False, True, False, False, (), None, None
-    of_inertia, lateral = False, False
 
     def acts_on(self, rod):
         """Whether it acts along a rod."""
@@ -149,6 +146,10 @@ class Action:
     #: (rod, s (n,), r (n, 3)) -> the `Datum`s of `data` for a rod whose points are at r (m, inertial). It is evaluated
     #: in every Newton iteration; its derivative by r is not in the tangent.
     refreshed = None
+    #: Whether its `added_mass` along a rod is smaller than that across.
+    lateral = False
+    #: Whether it stands for the inertia of a motion, so that motions and natural modes refuse it.
+    of_inertia = False
 
 
 class PointAction(Action):
