@@ -9,6 +9,7 @@ from whirling_collar import AMPLITUDES, CLEARANCE, FIRST_CONTACT, Collar
 import cosserat_fenicsx as cf
 from cosserat_fenicsx.actions.added_mass import AddedMass
 from cosserat_fenicsx.actions.centrifugal import Centrifugal
+from cosserat_fenicsx.actions.linear_drag import LinearDrag
 
 pytestmark = pytest.mark.serial
 
@@ -52,6 +53,21 @@ def test_a_motion_keeps_the_steady_whirl(rpm, scheme, dt):
     exact = 1e-4 if scheme == "generalised-alpha" else 1e-9
     assert drift(history.angular_momentum[:, 2:]) < exact
     assert np.abs(history.balance).max() < 10 * exact * history.energy[0]
+
+
+@pytest.mark.parametrize("scheme", ["momentum", "energy", "generalised-alpha"])
+def test_drag_acts_on_the_axis(scheme):
+    """From the whirl on it takes the torque c w (integral of the squared deflection), and w times that of energy."""
+    collar, rpm, c = Collar(), 93.88469896083186, 283.1
+    rate = rpm * np.pi / 30
+    s, weights = np.polynomial.legendre.leggauss(8)
+    path = collar.whirl(rpm)
+    squares = [path.displacement(collar.rod.at(6 * (1 + x)))[-1, 0] ** 2 for x in s]
+    history = collar.motion(rpm, 0.004, 2e-4, scheme, more=[LinearDrag(collar.rod, c)])
+    torque, slower = c * rate * 6 * weights @ squares, 0.004 * c / collar.mass
+    taken = -np.diff(history.angular_momentum[[0, -1], 2])[0] / 0.004
+    assert taken == pytest.approx(torque * (1 - slower / 2), rel=3e-4)
+    assert -history.work[-1] / 0.004 == pytest.approx(torque * rate * (1 - slower), rel=3e-4)
 
 
 def test_a_rod_about_one_end():

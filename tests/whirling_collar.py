@@ -33,7 +33,7 @@ class Collar:
     """The collar under an axial compression (N), with a share of the eccentricity.
 
     Attributes:
-        rod, middle: the rod, and its station in the middle.
+        rod, middle: the rod, and its station in the middle; mass: with the mud, kg/m.
     """
 
     def __init__(self, compression=0.0, share=1.0):
@@ -45,7 +45,7 @@ class Collar:
         self.middle = self.rod.at(LENGTH / 2)
         self._supports = [cf.Pin(self.rod.start), *(cf.Roller(self.rod.end, a) for a in ((1, 0, 0), (0, 1, 0)))]
         mud = np.pi / 4 * MUD * (ADDED * OUTER**2 + INNER**2)
-        self._loads = [AddedMass(self.rod, mud)]
+        self._loads, self.mass = [AddedMass(self.rod, mud)], DENSITY * area + mud
         if compression:
             self._loads.append(cf.Force(self.rod.end, (0, 0, -compression), permanent=True))
 
@@ -59,10 +59,10 @@ class Collar:
         """That in the middle of a whirl's path, m, positive towards the heavy side."""
         return path.displacement(self.middle)[-1, 0]
 
-    def motion(self, rpm, duration, dt, scheme="momentum", elements=8):
-        """History from the steady whirl on."""
+    def motion(self, rpm, duration, dt, scheme="momentum", elements=8, more=()):
+        """History from the steady whirl on, with more actions from then on."""
         moving = Centrifugal((0, 0, rpm * np.pi / 30)).velocities([self.rod])
-        scene = cf.Scene([self.rod], self._supports, self._loads, velocities=moving)
+        scene = cf.Scene([self.rod], self._supports, [*self._loads, *more], velocities=moving)
         start = self.whirl(rpm, elements)
         return cf.simulate(scene, duration, dt=dt, scheme=scheme, start=start, elements=elements, degree=2)
 
