@@ -138,6 +138,9 @@ _HOME = {
     "campbell": "drilling.linear.campbell",
     "Campbell": "drilling.linear.campbell",
     "LumpedCutting": "drilling.linear.lumped",
+    "AddedMass": "actions.added_mass",
+    "Centrifugal": "actions.centrifugal",
+    "LinearDrag": "actions.linear_drag",
     "euler_load": "scene.rod",
     "read_motion": "scene.scenefile",
     "read_path": "statics.reading",
@@ -161,9 +164,12 @@ _HOME = {
 if TYPE_CHECKING:  # the same names, for editors and type checkers
     from cosserat_fenicsx import analytic as analytic
     from cosserat_fenicsx import units as units
+    from cosserat_fenicsx.actions.added_mass import AddedMass as AddedMass
+    from cosserat_fenicsx.actions.centrifugal import Centrifugal as Centrifugal
     from cosserat_fenicsx.actions.dashpot import Dashpot as Dashpot
     from cosserat_fenicsx.actions.drag import Drag as Drag
     from cosserat_fenicsx.actions.foundation import Foundation as Foundation
+    from cosserat_fenicsx.actions.linear_drag import LinearDrag as LinearDrag
     from cosserat_fenicsx.actions.point_mass import PointMass as PointMass
     from cosserat_fenicsx.actions.spring import Spring as Spring
     from cosserat_fenicsx.actions.tube_wall import TubeRing as TubeRing

@@ -12,6 +12,7 @@ from collections import namedtuple
 
 import ufl
 from cosserat_fenicsx.forms import law
+from cosserat_fenicsx.forms.inertia import lateral
 from cosserat_fenicsx.forms.rotation import conjugate_product, directors
 
 #: r', q and q' of a configuration.
@@ -59,15 +60,25 @@ def euler_tensor(I_R):
     return ufl.tr(I_R) / 2 * ufl.Identity(3) - I_R
 
 
+def of_mass_centre(rate, W, inertia):
+    """The rate of y = r + R a for rates of r and R; that of r where a = 0."""
+    return rate if inertia.offset is None else rate + W * inertia.offset
+
+
 def kinetic_energy(r_t, W, inertia):
     """Kinetic energy per unit length."""
-    return (inertia.mass * ufl.dot(r_t, r_t) + ufl.inner(W * euler_tensor(inertia.I_R), W)) / 2
+    y_t = of_mass_centre(r_t, W, inertia)
+    turning = ufl.inner(W * euler_tensor(inertia.I_R), W)
+    return (inertia.mass * ufl.dot(y_t, y_t) + turning + lateral(inertia.lateral, r_t, r_t)) / 2
 
 
 def rate_work(rate, W_rate, q_m, inertia, test):
-    """Virtual work rho A rate . delta r + (W_rate E) : delta R of accelerations, or of velocities for drag."""
-    turning = ufl.inner(W_rate * euler_tensor(inertia.I_R), turned(q_m, test.q))
-    return inertia.mass * ufl.dot(rate, test.r) + turning
+    """Virtual work rho A rate . delta y + (W_rate E) : delta R of accelerations, or of velocities for drag; y is the
+    mass centre, whose rate is that of r and R."""
+    dR = turned(q_m, test.q)
+    turning = ufl.inner(W_rate * euler_tensor(inertia.I_R), dR)
+    moved = (of_mass_centre(a, B, inertia) for a, B in ((rate, W_rate), (test.r, dR)))
+    return inertia.mass * ufl.dot(*moved) + turning + lateral(inertia.lateral, rate, test.r)
 
 
 def angular_momentum(q, W, inertia):

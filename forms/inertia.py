@@ -18,8 +18,15 @@ from cosserat_fenicsx.forms import law
 from cosserat_fenicsx.forms.equilibrium import balance, frame, strains
 from cosserat_fenicsx.forms.rotation import conjugate_product, directors
 
-#: rho A, and I_R as a matrix, at the points where inertia is integrated.
-Inertia = namedtuple("Inertia", "mass I_R")
+#: At the points where inertia is integrated: rho A; I_R about the mass centre as a matrix; the mass centre a from the
+#: axis in reference components, None on the axis (forms/eccentric.py); and the tangent at rest times the square root of
+#: a mass that is part of rho A and does not move along it, None without one.
+Inertia = namedtuple("Inertia", "mass I_R offset lateral", defaults=(None, None))
+
+
+def lateral(direction, a, b):
+    """What the virtual work mass a . b lacks for a mass that does not move along a fixed `direction`, see `Inertia`."""
+    return 0 if direction is None else -ufl.dot(direction, a) * ufl.dot(direction, b)
 
 
 def angular_velocity(q, q_t):
@@ -34,12 +41,14 @@ def angular_momentum(q, q_t, inertia):
 
 def momentum(r_t, kappa, inertia, test):
     """Momenta times test functions, per unit length: rho A r_t . phi_r + kappa . phi."""
-    return inertia.mass * ufl.dot(r_t, test.phi_r) + ufl.dot(kappa, test.phi)
+    return (
+        inertia.mass * ufl.dot(r_t, test.phi_r) + ufl.dot(kappa, test.phi) + lateral(inertia.lateral, r_t, test.phi_r)
+    )
 
 
 def kinetic_energy(r_t, Om, inertia):
     """Kinetic energy per unit length."""
-    return (inertia.mass * ufl.dot(r_t, r_t) + ufl.dot(Om, inertia.I_R * Om)) / 2
+    return (inertia.mass * ufl.dot(r_t, r_t) + ufl.dot(Om, inertia.I_R * Om) + lateral(inertia.lateral, r_t, r_t)) / 2
 
 
 def strain_energy(motion, section):

@@ -24,6 +24,11 @@ def eccentric_force(point, test, F, arm):
     return ufl.dot(F, test.phi_r) + ufl.dot(ufl.cross(point.R * arm, F), test.phi)
 
 
+def moment_on_arm(point, test, F, arm):
+    """The moment of the force of `eccentric_force` about the axis, without the force."""
+    return ufl.dot(ufl.cross(point.R * arm, F), test.phi)
+
+
 def follower_force(point, test, F):
     """Force that turns with the section; F is inertial, at rest."""
     return ufl.dot(point.R * F, test.phi_r)

@@ -5,7 +5,7 @@ import signal
 
 import numpy as np
 import pytest
-from moving_scenes import flying_in_a_plane, flying_in_space
+from moving_scenes import flying_in_a_plane, flying_in_space, flying_off_axis
 from test_schemes import everything
 
 import cosserat_fenicsx as cf
@@ -20,6 +20,7 @@ CASES = {
     "plane, adaptive": (flying_in_a_plane, 1, {"tol": 1e-2, "save_every": 0.1}),
     "energy": (flying_in_space, 5, {"tol": 1e-1, "scheme": "energy"}),
     "triple-jump": (flying_in_space, 2, {"dt": 0.05, "scheme": "triple-jump"}),
+    "eccentric": (flying_off_axis, 2, {"dt": 0.05}),
     "ties and damping": (everything, 0.5, {"dt": 0.01}),
 }
 

@@ -1,5 +1,7 @@
 """Motions from the literature: the flying spaghetti in space and in a plane, the right-angle cantilever."""
 
+from dataclasses import replace
+
 import numpy as np
 
 import cosserat_fenicsx as cf
@@ -19,6 +21,13 @@ def flying_in_space():
         lambda rod: cf.Force(rod.start, cf.Triangle((20, 0, 0), 0, 2.5, 5)),
         lambda rod: cf.Moment(rod.start, cf.Triangle((0, -200, -100), 0, 2.5, 5)),
     )
+
+
+def flying_off_axis():
+    """The same with its mass centre off the axis."""
+    _, scene = flying_in_space()
+    rod = cf.Rod(scene.rods[0].curve, SPAGHETTI, name="spaghetti", eccentricity=(0.3, -0.2))
+    return rod, cf.Scene([rod], loads=[replace(load, station=rod.start) for load in scene.loads])
 
 
 def flying_in_a_plane():

@@ -87,7 +87,7 @@ def of_the_scene(scene):
     for rod in scene.rods:
         lines.append(
             f"Rod '{rod.name}': {_curve(rod.curve)}, length {rod.length:g} m, {_sections(rod)}; "
-            f"{_stiffnesses(rod)}. {_directions(rod)}"
+            f"{_stiffnesses(rod)}. {_directions(rod)}{_mass_centre(rod)}"
         )
     lines.append(
         f"{len(scene.supports)} support(s): {', '.join(describe(x) for x in scene.supports) or 'none'}. "
@@ -95,6 +95,13 @@ def of_the_scene(scene):
         + "".join(f" {joint.first} is joined to {joint.second}{_release(joint)}." for joint in scene.joints)
     )
     return lines
+
+
+def _mass_centre(rod):
+    """Where the mass centre of a rod is, if not on its axis."""
+    if not rod.mass_centre:
+        return ""
+    return f" Its mass centre is up to {rod.mass_centre.largest:.4g} m off the axis."
 
 
 def _curve(curve):

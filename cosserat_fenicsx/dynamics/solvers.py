@@ -9,12 +9,14 @@ from cosserat_fenicsx.errors import NotConverged, SceneError, nearest
 from cosserat_fenicsx.models.choose import not_flat
 from cosserat_fenicsx.models.collocated import CollocatedPlanar, CollocatedSpatial
 from cosserat_fenicsx.models.conserving import ConservingSpatial
+from cosserat_fenicsx.models.eccentric import EccentricSpatial
 from cosserat_fenicsx.models.moving import MovingSpatial
 from cosserat_fenicsx.models.moving_planar import MovingPlanar
 from cosserat_fenicsx.models.signature import Signature
 
 _MODELS = {
     ("momentum", "spatial"): MovingSpatial,
+    ("momentum", "eccentric"): EccentricSpatial,
     ("momentum", "planar"): MovingPlanar,
     ("energy", "spatial"): ConservingSpatial,
     ("collocation", "spatial"): CollocatedSpatial,
@@ -38,6 +40,8 @@ def chosen_model(scene, model, scheme, start=None):
         return model, "the spatial model was requested"
     plane, reason = scene.plane, not_flat(scene)
     plane = None if reason else plane
+    if plane is not None and any(rod.mass_centre for rod in scene.rods):
+        plane, reason = None, "the planar model has no mass centre off the axis (Rod.eccentricity)"
     if plane is not None and not starts_in(scene, plane, start):
         plane, reason = None, "the start leaves the plane of the rods"
     if plane is not None and not flat:
@@ -64,5 +68,8 @@ def solvers_of(scene, layout, degree, scheme, load_factor, comm, model):
 def _make(comm, signature, scheme):
     """Problem and stepper of a signature."""
     stepper = SCHEMES[scheme]
-    problem = stepper.problem_class(_MODELS[stepper.forms, signature.model](comm, signature))
+    model = _MODELS[stepper.forms, signature.model]
+    if signature.eccentric:
+        model = _MODELS.get((stepper.forms, "eccentric"), model)
+    problem = stepper.problem_class(model(comm, signature))
     return problem, stepper(problem)

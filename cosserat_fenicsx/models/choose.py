@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from cosserat_fenicsx.errors import SceneError, nearest
 from cosserat_fenicsx.models.traits import traits_of
 from cosserat_fenicsx.remember import per_scene
+from cosserat_fenicsx.scene.describe import describe
 
 #: The models from the cheapest to the most general.
 RUNGS = ("determinate", "planar", "spatial")
@@ -122,7 +123,8 @@ def _live(scene):
         known = traits.dead or (traits.known_force and load.station is not None)
         if not known or load.refreshed is not None:
             how = "turns with the rod" if load.follows else "depends on the motion"
-            load_and_why = f"load {i + 1}, a {type(load).__name__}, {how}"
+            added = i >= len(scene.loads)  # `Action.companions`
+            load_and_why = f"{describe(load) if added else f'load {i + 1}, a {type(load).__name__},'} {how}"
             return f"{load_and_why}, so that statics alone does not give the contact force"
     return ""
 

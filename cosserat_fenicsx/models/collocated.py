@@ -4,7 +4,12 @@ import numpy as np
 from dolfinx import fem
 
 from cosserat_fenicsx import compat
-from cosserat_fenicsx.models.collocated_forms import PlanarCollocation, SpatialCollocation, compile_collocated
+from cosserat_fenicsx.models.collocated_forms import (
+    EccentricCollocation,
+    PlanarCollocation,
+    SpatialCollocation,
+    compile_collocated,
+)
 from cosserat_fenicsx.models.moving import MovingSpatial
 from cosserat_fenicsx.models.moving_planar import MovingPlanar
 from cosserat_fenicsx.models.rod_data import gauss_function
@@ -59,9 +64,9 @@ class Collocated:
         return self.velocity.x.array, *self._node_rates, *self._strain_rates
 
     @property
-    def known(self):
-        """The Functions, other than the state, that change from step to step."""
-        return self.known_velocity, self.known_acceleration, self.known_strain_rate
+    def ends(self):
+        """See `Moving`."""
+        return *super().ends, self.known_velocity, self.known_acceleration, self.known_strain_rate
 
     def begin_rates(self):
         """Set the strain rates from the state and its velocity; accelerations are set to zero until they are known."""
@@ -128,7 +133,8 @@ class CollocatedSpatial(Collocated, MovingSpatial):
 
     def _compile(self, spaces):
         self._motion_fields()
-        return self._compile_collocated(SpatialCollocation(self))
+        step = EccentricCollocation if self.signature.eccentric else SpatialCollocation
+        return self._compile_collocated(step(self))
 
     def _increments(self):
         now, before = (f.x.array[self._nodal] for f in (self.state, self.start))

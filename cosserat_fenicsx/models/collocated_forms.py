@@ -3,8 +3,9 @@
 import ufl
 
 from cosserat_fenicsx import compat
-from cosserat_fenicsx.forms import collocation, spatial
+from cosserat_fenicsx.forms import collocation, eccentric, spatial
 from cosserat_fenicsx.forms.rotation import rotation_matrix
+from cosserat_fenicsx.models.eccentric import EccentricMomenta
 from cosserat_fenicsx.models.moving_forms import SpatialStep, along, parts_of, virtual_work_of_step
 from cosserat_fenicsx.models.moving_planar import PlanarStep
 
@@ -32,6 +33,22 @@ class SpatialCollocation(SpatialStep):
         r_t, Om = _halves(v)
         omega = rotation_matrix(parts_of(w)[1]) * Om
         return spatial.point_of(w, along(w), rest=rest, frame=frame, r_t=r_t, omega=omega)
+
+
+class EccentricCollocation(EccentricMomenta, SpatialCollocation):
+    """A `SpatialCollocation` with mass centres off the axis."""
+
+    def rate_of_momentum(self, v, a):
+        """See `SpatialCollocation`."""
+        (_, Om), (r_tt, Om_t) = _halves(v), _halves(a)
+        R = rotation_matrix(parts_of(self.nodal)[1])
+        return eccentric.rate_of_momentum(r_tt, Om, Om_t, R, self.body, self.test)
+
+    def momentum_by(self, v):
+        """See `SpatialCollocation`."""
+        (r_t, Om), R, body = _halves(v), rotation_matrix(parts_of(self.nodal)[1]), self.body
+        z, z_t = R * body.offset, R * ufl.cross(Om, body.offset)
+        return eccentric.momentum(r_t, z, z_t, R * (body.I_R * Om), body, self.test)
 
 
 class PlanarCollocation(PlanarStep):

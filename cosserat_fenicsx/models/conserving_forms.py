@@ -3,7 +3,7 @@
 import ufl
 
 from cosserat_fenicsx import compat
-from cosserat_fenicsx.forms import energy, inertia
+from cosserat_fenicsx.forms import eccentric, energy, inertia
 from cosserat_fenicsx.forms import spatial as eq
 from cosserat_fenicsx.forms.rotation import small_rotation
 from cosserat_fenicsx.models.compiled import action_work, derivative_in, measures
@@ -68,11 +68,15 @@ def compile_conserving(model):
     live_tangent = None if live is None else derivative(live)  # 0 where only data or memory see the state
     state = eq.state_of(U, along(U), U)
     n, m = inertia.contact(state, section, viscosity, lambda a: ufl.derivative(a, U, V))
-    kappa = energy.angular_momentum(q1, spin, body)
+    tests, kappa = eq.tests_of(phi, along(phi)), energy.angular_momentum(q1, spin, body)
+    if body.offset is None:
+        momentum = inertia.momentum(r_t, kappa, body, tests)
+    else:
+        momentum = eccentric.momentum(r_t, eccentric.arm(q1, body), spin * body.offset, kappa, body, tests)
     lost = energy.viscous_loss(before, after, section, viscosity, h) * dx.gauss
     lost += 2 * h * model.drag[0] * energy.kinetic_energy(moved, turned, body) * dx.nodes
     others = {
-        "momentum": inertia.momentum(r_t, kappa, body, eq.tests_of(phi, along(phi))) * dx.nodes,
+        "momentum": momentum * dx.nodes,
         "live": live,
         "live_tangent": live_tangent if isinstance(live_tangent, ufl.Form) else None,
         "kinetic": energy.kinetic_energy(r_t, spin, body) * dx.nodes,

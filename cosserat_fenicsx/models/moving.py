@@ -11,7 +11,8 @@ from cosserat_fenicsx import compat
 from cosserat_fenicsx.models.connections import ties_of
 from cosserat_fenicsx.models.laws import law_data, viscous_values
 from cosserat_fenicsx.models.moving_forms import SpatialStep, compile_momentum
-from cosserat_fenicsx.models.rod_data import check_inertia, gauss_function, joined, nodal_inertia, rod_data
+from cosserat_fenicsx.models.nodal_inertia import check_inertia, nodal_inertia, nodal_lateral, nodal_offsets
+from cosserat_fenicsx.models.rod_data import gauss_function, joined, rod_data
 from cosserat_fenicsx.models.scales import Scales
 from cosserat_fenicsx.models.spatial import SpatialModel
 from cosserat_fenicsx.quaternions import cross, small_rotations
@@ -30,6 +31,9 @@ class Moving:
         h: the Constant h, the length of the step.
         time: unit of time, s.
         damped: whether any rod has damping.
+        offset: Function, the mass centre from the axis, along the inertial axes at rest; None in a scene without
+            eccentric rods.
+        lateral: Function, see `nodal_inertia.nodal_lateral`; None in a scene without such masses.
         viscosity: the Functions of the law of the strain rates, as `laws.law_of` takes them.
     """
 
@@ -46,6 +50,8 @@ class Moving:
         self.h = fem.Constant(mesh, np.float64(1))
         self.mass, self.drag = self._at_element_nodes(1), self._at_element_nodes(1)
         self.inertia = self._at_element_nodes(self.inertia_size)
+        self.offset = self._at_element_nodes(3) if self.signature.eccentric else None
+        self.lateral = self._at_element_nodes(self.moves) if self.signature.lateral else None
         coupled = self.signature.coupled
         Kt, Jt = (gauss_function(mesh, points, 9 if coupled else 3) for _ in range(2))
         self.viscosity = Kt, None, Jt, gauss_function(mesh, points, 9) if coupled else None
@@ -71,7 +77,15 @@ class Moving:
         mass, J, frames = nodal_inertia(scene, layout, self.nodes)
         drags = [rod.damping.drag * self.time if rod.damping else 0.0 for rod in scene.rods]
         self._fill_nodes(self.mass, mass[..., None] / heaviest)
-        self._fill_nodes(self.inertia, self._section_inertia(J / (heaviest * scales.length**2), frames))
+        inertia = self._section_inertia(J / (heaviest * scales.length**2), frames)
+        if self.offset is not None:
+            offset, more = nodal_offsets(scene, layout, self.nodes, mass)
+            self._fill_nodes(self.offset, offset / scales.length)
+            inertia = inertia + six_of(more / (heaviest * scales.length**2))
+        self._fill_nodes(self.inertia, inertia)
+        if self.lateral is not None:
+            directions = nodal_lateral(scene, layout, self.nodes) / math.sqrt(heaviest)
+            self._fill_nodes(self.lateral, directions @ self.axes[: self.moves].T)
         self._fill_nodes(self.drag, np.repeat(drags, layout.counts)[:, None, None] * np.ones((1, len(self.nodes), 1)))
         self.start.x.array[:] = self.state.x.array
         self.velocity.x.array[:] = 0.0
@@ -137,6 +151,11 @@ class Moving:
         """The arrays of the rates of the state."""
         return (self._arrays[2],)
 
+    @property
+    def ends(self):
+        """The Functions of a step that forms depend on; only the first, the state, changes within it."""
+        return self.state, self.start, self.velocity
+
     def accept(self, h):
         """Update the rates to those of `state` after a step of length h, by the trapezoidal rule."""
         now, before, rates = self._arrays
@@ -190,8 +209,7 @@ class MovingSpatial(Moving, SpatialModel):
         return compile_momentum(SpatialStep(self))
 
     def _section_inertia(self, J, frames):
-        I_R = np.einsum("...ij,...j,...kj->...ik", frames, J, frames)
-        return I_R[..., [0, 0, 0, 1, 1, 2], [0, 1, 2, 1, 2, 2]]
+        return six_of(np.einsum("...ij,...j,...kj->...ik", frames, J, frames))
 
     def passed(self):
         """See `Moving`."""
@@ -219,6 +237,11 @@ class MovingSpatial(Moving, SpatialModel):
 
     def _momenta_of(self, p):
         return p[:, :3], p[:, 4:]
+
+
+def six_of(I):
+    """(.., 6) components of symmetric matrices (.., 3, 3), row by row from the diagonal on."""
+    return I[..., [0, 0, 0, 1, 1, 2], [0, 1, 2, 1, 2, 2]]
 
 
 def spun(q, omega):

@@ -60,7 +60,7 @@ class SpatialData:
         I_R = ufl.as_matrix([[I[0], I[1], I[2]], [I[1], I[3], I[4]], [I[2], I[4], I[5]]])
         law = law_of(data.K, data.K_inv, data.J, data.G)
         section = equilibrium.Section(law, as_matrix(data.R_R), data.v_R)
-        return cls(section, law_of(*model.viscosity), inertia.Inertia(model.mass[0], I_R))
+        return cls(section, law_of(*model.viscosity), inertia.Inertia(model.mass[0], I_R, model.offset, model.lateral))
 
 
 def along(w):
@@ -122,6 +122,22 @@ class StepForms:
         """Kinetic energy per length."""
         raise NotImplementedError
 
+    def momentum_before(self):
+        """`momentum` at the state with `velocity`, before it is the start of a step."""
+        return self.momentum(self.nodal, self.rates)
+
+    def kinetic_before(self):
+        """`kinetic` likewise."""
+        return self.kinetic(self.nodal, self.rates)
+
+    def momentum_after(self):
+        """`momentum` at the end of the step, by the trapezoidal rule."""
+        return self.momentum(self.nodal, 2 * self.passed - self.rates)
+
+    def of_moving_axis(self):
+        """What the balances have per length besides the rates of `momentum`; or None."""
+        return None
+
     def constraint(self):
         """Terms of the residual in addition to the balances, or 0."""
         return 0
@@ -159,9 +175,9 @@ class StepForms:
         lost = inertia.viscous_loss(self.before, self.after, section, viscosity, h) * dx.gauss
         lost += 2 * h * model.drag[0] * self.kinetic(self.halfway, self.passed) * dx.nodes
         others = {
-            "momentum": self.momentum(self.nodal, self.rates) * dx.nodes,
+            "momentum": self.momentum_before() * dx.nodes,
             "live": booked(working),
-            "kinetic": self.kinetic(self.nodal, self.rates) * dx.nodes,
+            "kinetic": self.kinetic_before() * dx.nodes,
             "strain": inertia.strain_energy(self.after, section) * dx.gauss,
             "dissipated": lost,
         }
@@ -171,7 +187,10 @@ class StepForms:
 def compile_momentum(step, stress=inertia.averaged_stress):
     """The `MotionForms` of the momentum-conserving scheme; `stress` gives the virtual work of the stress."""
     model, dx, h = step.model, step.dx, step.model.h
-    residual = 1 / h * step.momentum(step.nodal, 2 * step.passed - step.rates) * dx.nodes
+    residual = 1 / h * step.momentum_after() * dx.nodes
+    besides = step.of_moving_axis()
+    if besides is not None:
+        residual += besides * dx.nodes
 
     def of_stress(test):
         return stress(step.before, step.after, step.middle, step.section, step.viscosity, h, test)

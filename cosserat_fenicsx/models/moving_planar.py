@@ -4,6 +4,7 @@ import numpy as np
 import ufl
 
 from cosserat_fenicsx.errors import SceneError
+from cosserat_fenicsx.forms import inertia
 from cosserat_fenicsx.forms import planar as eq
 from cosserat_fenicsx.models.laws import law_of
 from cosserat_fenicsx.models.moving import Moving
@@ -122,12 +123,20 @@ class PlanarStep(StepForms):
     def momentum(self, w, w_t):
         """See `StepForms`."""
         test, mass, J = self.test, self.model.mass[0], self.model.inertia[0]
-        return mass * (w_t[0] * test.phi_r[0] + w_t[1] * test.phi_r[1]) + J * w_t[2] * test.phi[2]
+        both = mass * (w_t[0] * test.phi_r[0] + w_t[1] * test.phi_r[1]) + J * w_t[2] * test.phi[2]
+        return both + _lateral(self.model, w_t, test.phi_r)
 
     def kinetic(self, w, w_t):
         """See `StepForms`."""
-        return (self.model.mass[0] * (w_t[0] ** 2 + w_t[1] ** 2) + self.model.inertia[0] * w_t[2] ** 2) / 2
+        both = self.model.mass[0] * (w_t[0] ** 2 + w_t[1] ** 2) + self.model.inertia[0] * w_t[2] ** 2
+        return (both + _lateral(self.model, w_t, w_t)) / 2
 
     def fields(self, n, m):
         """See `StepForms`."""
         return ufl.as_vector([n[0], n[1], m[2], self.after.r_s[0], self.after.r_s[1]])
+
+
+def _lateral(model, *pair):
+    """`inertia.lateral` in the plane."""
+    direction = None if model.lateral is None else eq.in_plane(model.lateral)
+    return inertia.lateral(direction, *map(eq.in_plane, pair))

@@ -6,8 +6,6 @@ import numpy as np
 from dolfinx import fem
 
 from cosserat_fenicsx import compat
-from cosserat_fenicsx.checks import refuse
-from cosserat_fenicsx.element import lobatto_weights
 from cosserat_fenicsx.models.laws import LawData, field_values, law_data
 
 # EA and GA are bounded in the second variation, of which only the signs of the eigenvalues matter: with larger values,
@@ -100,40 +98,3 @@ def fill_fields(fields, rods, data, stiff):
     for function, array in zip(fields, (*field_values(data, stiff), data.R_R, data.v_R), strict=True):
         if function is not None:
             rods.fill(function, array)
-
-
-def check_inertia(scene):
-    """Raise an error for a rod without inertia.
-
-    Raises:
-        SceneError: a rod without mass or inertia.
-    """
-    for rod in scene.rods:
-        low = rod.profile.range[0]
-        for field, value in (("mass", low.mass), ("inertia", low.inertia)):
-            if value is None:
-                owner, name = ("Stiffness", field) if rod.material is None else ("Material", "density")
-                refuse(f"Rod '{rod.name}': {owner}", name, None, "a value, which a motion needs")
-
-
-def nodal_inertia(scene, layout, nodes):
-    """At the nodes of every element, in the scene's order: mass (elements, p + 1), kg/m, Jrho about d_1, d_2, d_3
-    (elements, p + 1, 3), kg m, and frames at rest (elements, p + 1, 3, 3). At a jump each element has the value of its
-    side. Point masses are added to one of the adjacent elements."""
-    parts, weights = [], lobatto_weights(nodes)
-    for i, (rod, x) in enumerate(zip(scene.rods, layout.inside(nodes), strict=True)):
-        s = x * rod.length
-        after, before = rod.stiffness_at(s, "right"), rod.stiffness_at(s, "left")
-        first = np.arange(s.shape[1]) == 0
-        mass, J = np.where(first, after.mass, before.mass), np.where(first[:, None], after.inertia, before.inertia)
-        for action in scene.loads:
-            body = action.inertia(rod) if action.station is not None and action.station.rod is rod else None
-            if body is not None:  # divided by the node's quadrature weight, which multiplies it again
-                vertex = layout.vertex(scene, action.station)[1]
-                cell = min(vertex, layout.counts[i] - 1)
-                at = cell, -1 if vertex > cell else 0
-                length = weights[at[1]] * (layout.breaks[i][cell + 1] - layout.breaks[i][cell]) * rod.length
-                mass[at] += body[0] / length
-                J[at] += body[1] / length
-        parts.append((mass, J, rod.curve.frame(s.ravel()).reshape(*s.shape, 3, 3)))
-    return tuple(np.concatenate(part) for part in zip(*parts, strict=True))

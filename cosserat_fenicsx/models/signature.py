@@ -41,6 +41,8 @@ class Signature:
         slender: whether rounding makes Newton's tangent inexact for motions of low stiffness, see `error_is_small` in
             algebra/newton.c.
         coupled: whether a section couples strains, so that the law is one of full matrices.
+        eccentric: whether a rod's mass centre lies off its axis, which changes the inertia terms of a motion.
+        lateral: whether a mass moves across a rod alone (`Action.lateral`), which adds to them.
     """
 
     model: str
@@ -53,6 +55,8 @@ class Signature:
     connections: Connections
     slender: bool
     coupled: bool
+    eccentric: bool
+    lateral: bool
 
     @classmethod
     def of(cls, scene, layout, *, formulation, degree, points=None, model="spatial"):
@@ -86,7 +90,7 @@ class Signature:
         coupled = any(rod.profile.coupled for rod in scene.rods)
         return cls(
             model, plane is not None, counts, degree, formulation, points or degree, terms, connections, slender,
-            coupled,
+            coupled, any(rod.mass_centre for rod in scene.rods), any(load.lateral for load in scene.loads),
         )  # fmt: skip
 
     @property

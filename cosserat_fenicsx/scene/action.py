@@ -32,6 +32,10 @@ _UNITS = {
     "N m s/rad": (1, 1, 1, True),
     "N s/m^2": (1, -2, 1, False),
     "N s^2/m^3": (1, -3, 2, False),
+    "kg": (1, -1, 2, False),
+    "kg/m": (1, -2, 2, False),
+    "kg m": (1, 0, 2, False),
+    "kg m^2": (1, 1, 2, False),
 }
 #: The units that data may have.
 UNITS = tuple(_UNITS)
@@ -116,6 +120,11 @@ class Action:
         """Mass (kg) and moments of inertia about d_1, d_2, d_3 (kg m^2, (3,)) that it adds at its station; or None."""
         return None
 
+    def added_mass(self, rod, s, side):
+        """Of a distributed action: masses per length that move with the axis of a rod at arc lengths s (...), m: (those
+        across it, those along its tangent at rest), (...) each, kg/m; or None. `side` as for `Rod.stiffness_at`."""
+        return None
+
     def holds(self, scene):
         """The rigid motions that it resists elastically, so that they are no mechanism.
 
@@ -137,6 +146,10 @@ class Action:
     #: (rod, s (n,), r (n, 3)) -> the `Datum`s of `data` for a rod whose points are at r (m, inertial). It is evaluated
     #: in every Newton iteration; its derivative by r is not in the tangent.
     refreshed = None
+    #: Whether its `added_mass` along a rod is smaller than that across.
+    lateral = False
+    #: Whether it stands for the inertia of a motion, so that motions and natural modes refuse it.
+    of_inertia = False
 
 
 class PointAction(Action):

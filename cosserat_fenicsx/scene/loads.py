@@ -15,6 +15,7 @@ from cosserat_fenicsx.scene.action import LineAction, PointAction
 from cosserat_fenicsx.scene.along import FunctionAlong, along_or_vector, breaks_of, kinks_of, values_of
 from cosserat_fenicsx.scene.rod import Rod, RodOrName, Station, StationOrName, is_known
 from cosserat_fenicsx.scene.signals import vector_or_signal
+from cosserat_fenicsx.scene.weight_off_axis import WeightOffAxis
 
 
 class Load:
@@ -189,7 +190,8 @@ class FollowerMoment(PointLoad):
 
 @dataclass(frozen=True)
 class Weight(Load, LineAction):
-    """The weight of all rods and point masses of the scene; of a rod, rho A g per unit of reference length.
+    """The weight of all rods and point masses of the scene; of a rod, rho A g per unit of reference length, which acts
+    at its mass centre (`Rod.eccentricity`).
 
     Args:
         gravity: m/s^2, inertial.
@@ -223,13 +225,15 @@ class Weight(Load, LineAction):
         return (action.vector(rod.stiffness_at(s).mass[..., None] * np.asarray(self.gravity), "N/m"),)
 
     def companions(self, scene):
-        """The weights of the point masses."""
+        """The weights of the point masses, and the moments of that of eccentric rods about their axes."""
         masses = [(x, x.inertia(x.station.rod)) for x in scene.loads if x.station is not None]
-        return tuple(
+        weights = tuple(
             Force(x.station, tuple(found[0] * g for g in self.gravity), permanent=self.permanent)
             for x, found in masses
             if found is not None
         )
+        offset = [rod for rod in scene.rods if rod.mass_centre]
+        return (*weights, *(WeightOffAxis(rod, self.gravity, self.permanent) for rod in offset))
 
 
 class LineLoad(Load, LineAction):

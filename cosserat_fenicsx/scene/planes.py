@@ -103,6 +103,10 @@ def _find(scene):
             raise _Leaves(f"load {i + 1} ({_words(load)}) {what} the plane of the rods")
     for rod, (s, frames) in zip(scene.rods, tangents, strict=True):
         _check_section(rod, s, frames, normal)
+        if rod.mass_centre:
+            offsets = np.concatenate([_offsets(rod, s, frames, side) for side in ("left", "right")])
+            if np.abs(offsets @ normal).max() > _SMALLEST_ANGLE * rod.mass_centre.largest:
+                raise _Leaves(f"the mass centre of rod '{rod.name}' lies off the plane (Rod.eccentricity)")
     e1 = np.cross(normal, np.eye(3)[np.argmin(np.abs(normal))])
     e1 /= np.linalg.norm(e1)
     plane = Plane(tuple(map(tuple, (e1, np.cross(normal, e1), normal))))
@@ -110,9 +114,14 @@ def _find(scene):
     return plane
 
 
+def _offsets(rod, s, frames, side):
+    """(n, 3) offsets of the mass centre from the axis, inertial, m."""
+    return np.einsum("nij,nj->ni", frames, rod.mass_centre.at(s, side))
+
+
 def _sample(rod):
     """Arc lengths (n,), m, and frames (n, 3, 3) at samples of a rod."""
-    if isinstance(rod.curve, Line) and rod.profile.constant:
+    if isinstance(rod.curve, Line) and rod.profile.constant and not rod.mass_centre:
         s = np.zeros(1)
     else:
         inside = rod.length * (np.arange(1, _SAMPLES) * _GOLDEN % 1.0)

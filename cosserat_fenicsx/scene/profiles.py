@@ -7,9 +7,10 @@ from functools import cached_property
 
 import numpy as np
 
-from cosserat_fenicsx.checks import instance, number, refuse, store
+from cosserat_fenicsx.checks import instance, refuse, store
 from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.scene.materials import Material
+from cosserat_fenicsx.scene.pieces import checked_pieces
 from cosserat_fenicsx.scene.rolled import Profile
 from cosserat_fenicsx.scene.sections import Circle, Rectangle, Stiffness, Tube, inverse, representative
 from cosserat_fenicsx.scene.stresses import Stress
@@ -112,28 +113,14 @@ class Sections:
         store(self, range=tuple(_split(bound(rows[:, :_DIAGONAL], axis=0), False) for bound in (np.min, np.max)))
 
     def _check_pieces(self, given):
-        L, where = self.owner.length, f"Rod '{self.owner.name}'"
-        pieces, before = [], 0.0
+        where = f"Rod '{self.owner.name}'"
         if not given:
             refuse(where, "section", given, "at least one piece (s_end, section)")
-        for i, piece in enumerate(given):
-            if not isinstance(piece, list | tuple) or len(piece) != 2:
-                refuse(where, f"section[{i}]", piece, "a piece (s_end, section)")
-            end, section = piece
-            last = i == len(given) - 1
-            if last and end is not None:
-                number(where, f"section[{i}].to", end, f"the rod's length {L:.12g} m, or None for it",
-                       lambda end: abs(end - L) <= 1e-9 * L)  # fmt: skip
-            if last:
-                end = L
-            least = before + 1e-9 * L
-            end = number(where, f"section[{i}].to", end, f"an arc length above {before:g} and up to {L:g} m",
-                         lambda end, least=least: least < end <= L)  # fmt: skip
+        pieces = checked_pieces(where, "section", given, self.owner.length, "section")
+        for i, (_, section) in enumerate(pieces):
             if not _is_law(section):
                 field = "section" if len(given) == 1 else f"section[{i}]"
                 instance("Rod", field, section, SECTIONS, "a section such as Circle(diameter), or a function of s")
-            pieces.append((end, section))
-            before = end
         return tuple(pieces)
 
     @property

@@ -13,6 +13,7 @@ from cosserat_fenicsx.errors import SceneError, nearest
 from cosserat_fenicsx.quadrature import gauss
 from cosserat_fenicsx.scene.curves import CURVES, Curve
 from cosserat_fenicsx.scene.damping import Damping
+from cosserat_fenicsx.scene.eccentricity import MassCentre, Offset, mass_centre_of
 from cosserat_fenicsx.scene.materials import Material
 from cosserat_fenicsx.scene.profiles import Section, SectionOfLength, Sections, Stiffnesses
 from cosserat_fenicsx.scene.sections import Stiffness
@@ -34,10 +35,14 @@ class Rod:
         material: a `Material`; not needed with `Stiffness`.
         name: its name in messages, results and scene files.
         damping: a `Damping`, for motions; None for none.
+        eccentricity: the mass centre of the sections off the axis, for motions, natural modes and `Weight`: (a1, a2)
+            along d_1 and d_2, m; pieces (s_end, (a1, a2)) or a function, as for the section; None on the axis. The
+            inertia of a section is about its mass centre.
 
     Attributes:
         stiffness: the `Stiffness` at s = 0, which is that of the whole rod where `profile.constant`.
         profile: the `Sections` along it.
+        mass_centre: the `MassCentre` of an eccentric rod, else None.
 
     Raises:
         SceneError: a part of the wrong kind, a missing material, or pieces that do not ascend to the length.
@@ -48,8 +53,10 @@ class Rod:
     material: Material | None = None
     name: str | None = None
     damping: Damping | None = None
+    eccentricity: Offset | None = None
     stiffness: Stiffness = field(init=False, repr=False)
     profile: Sections = field(init=False, repr=False)
+    mass_centre: MassCentre | None = field(init=False, repr=False)
 
     def __post_init__(self):
         if self.name is None:
@@ -64,6 +71,8 @@ class Rod:
             instance(self, "damping", self.damping, Damping, "a Damping")
         store(self, profile=Sections(self, self.section, self.material))
         store(self, stiffness=self.profile.start)
+        store(self, mass_centre=mass_centre_of(self))
+        store(self, eccentricity=self.mass_centre and self.mass_centre.given)
 
     def __repr__(self):
         return f"<Rod '{self.name}': {type(self.curve).__name__}, length {self.length:g} m>"
@@ -76,8 +85,8 @@ class Rod:
     @property
     def breaks(self) -> tuple[float, ...]:
         """Arc lengths inside the rod where its curve is not smooth or its section may jump, ascending, m."""
-        breaks = []
-        for s in sorted({*self.curve.breaks, *self.profile.breaks}):
+        breaks, offsets = [], self.mass_centre.breaks if self.mass_centre else ()
+        for s in sorted({*self.curve.breaks, *self.profile.breaks, *offsets}):
             if s - (breaks[-1] if breaks else 0.0) > 1e-9 * self.length:
                 breaks.append(s)
         return tuple(breaks)

@@ -6,6 +6,7 @@ curve = { type = "Line", start = [0, 0, 0], end = [0, 0, 20] }
 section = { type = "Circle", diameter = 0.2 }
 material = { E = 210e9, nu = 0.3 }
 # a section that jumps: section = [{ to = 5.0, type = "Circle", diameter = 0.2 }, { type = "Circle", diameter = 0.1 }]
+# mass off the axis: eccentricity = [0.01, 0.0], or [{ to = 5.0, offset = [0.01, 0.0] }, { offset = [0.0, 0.0] }]
 # a curve from a file beside this one: curve = { type = "Spline", points = "survey.csv" }
 
 [[supports]]
@@ -197,7 +198,7 @@ def _settings(name, tables, keys):
 
 
 def _rod(where, entry, materials, folder):
-    _known_keys(where, entry, {"name", "curve", "section", "material", "damping"})
+    _known_keys(where, entry, {"name", "curve", "section", "material", "damping", "eccentricity"})
     for key in ("curve", "section"):
         if key not in entry:
             raise SceneError(f"{where}: '{key}' is missing: expected a table with a type")
@@ -215,6 +216,8 @@ def _rod(where, entry, materials, folder):
     more = {"name": entry["name"]} if "name" in entry else {}
     if "damping" in entry:
         more["damping"] = _damping(f"{where}.damping", entry["damping"])
+    if "eccentricity" in entry:
+        more["eccentricity"] = _eccentricity(f"{where}.eccentricity", entry["eccentricity"])
     try:
         return Rod(curve, section, material, **more)
     except SceneError as problem:
@@ -232,6 +235,20 @@ def _damping(where, entry):
         return Damping.ratio(**entry)
     except SceneError as problem:
         raise SceneError(f"{where}: {problem}") from None
+
+
+def _eccentricity(where, entry):
+    """(a1, a2), or the pieces (s_end, (a1, a2)) from an array of tables, the last with or without `to`."""
+    if not isinstance(entry, list) or not any(isinstance(piece, dict) for piece in entry):
+        return entry
+    for i, piece in enumerate(entry):
+        _known_keys(f"{where}[{i}]", _table(f"{where}[{i}]", piece), {"to", "offset"})
+        for key in ("offset",) if i == len(entry) - 1 else ("to", "offset"):
+            if key not in piece:
+                raise SceneError(
+                    f"{where}[{i}]: '{key}' is missing: expected where this piece ends, and its offset (m)"
+                )
+    return [(piece.get("to"), piece["offset"]) for piece in entry]
 
 
 def _section(where, entry):

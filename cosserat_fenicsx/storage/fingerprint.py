@@ -86,6 +86,8 @@ def _of_rod(where, rod):
             if name == "matrix" and values is None:
                 continue  # motions stored before sections had matrices lack this entry
             found[f"{where}: {name} {at}"] = None if values is None else np.asarray(values)[k].tolist()
+        if rod.mass_centre:  # motions stored before rods had eccentricities lack this entry
+            found[f"{where}: eccentricity {at}"] = rod.mass_centre.at(x).tolist()
     return found
 
 

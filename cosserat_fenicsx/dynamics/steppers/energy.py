@@ -29,9 +29,6 @@ class TurnedStepProblem(StepProblem):
         self.numbering.to_local(self._vector, meeting)
         self._share = 1 / np.maximum(1.0, meeting[self._q_of_elements[..., :1]])
 
-    def _ends(self):
-        return (*super()._ends(), self.model.turning)
-
     def _pack(self):
         super()._pack()
         self._live_tangent = self._pack_form(self.model.forms.live_tangent)

@@ -103,9 +103,6 @@ class CollocationProblem(StepProblem):
 
     ties_class, acting_share = EndTies, 1.0
 
-    def _ends(self):
-        return (*super()._ends(), *self.model.known)
-
     def begin_step(self, t, h):
         """See `StepProblem`."""
         model = self.model

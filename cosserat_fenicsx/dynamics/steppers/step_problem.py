@@ -36,10 +36,6 @@ class StepProblem(Equations):
         self.load_factor, self.fresh = 1.0, True
         self._pack()
 
-    def _ends(self):
-        """The Functions that change from step to step; only the first, the state, changes within a step."""
-        return self.model.state, self.model.start, self.model.velocity
-
     def load(self, scene, layout, load_factor=1.0):
         """Load the data of a scene; the state becomes its reference configuration, at rest, at the time 0."""
         model = self.model
@@ -64,7 +60,7 @@ class StepProblem(Equations):
         if form is None:
             return None
         model, actions = self.model, self.model.actions
-        moving = (*self._ends(), *actions.data, *actions.memory_functions)
+        moving = (*model.ends, *actions.data, *actions.memory_functions)
         self._packed.append(Packed(form, moving, model.constants))
         return self._packed[-1]
 
