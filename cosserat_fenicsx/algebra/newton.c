@@ -5,7 +5,7 @@
 #include <math.h>
 #include <string.h>
 
-enum { STATE = 1, RESIDUAL = 2, TANGENT = 4, INTERFACE = 8, ADD_UP = 16, SUM = 32, MATRICES = 64 };
+enum { STATE = 1, RESIDUAL = 2, TANGENT = 4, INTERFACE = 8, ADD_UP = 16, SUM = 32, MATRICES = 64, CONTACT = 256 };
 enum { FAILED = 1 };
 
 static int python_hook(void *self, int what, double *a, double *b);
@@ -127,9 +127,11 @@ int iterate(stepping *s)
         if (residual(p, s->x, s->b)) return FAILED;
         if (s->fresh) {
             if (tangent(p)) return FAILED;
+            if (hook(p, CONTACT, 0, 0)) return FAILED;
             s->fresh = 0, s->spent = s->price, s->served = 0;
         }
         if (solve(p, s->b, s->change)) return FAILED;
+        if (!p->singular && hook(p, CONTACT, s->x, s->change)) return FAILED;
         if (p->singular) {
             s->outcome = SINGULAR;
             break;
