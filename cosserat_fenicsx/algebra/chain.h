@@ -101,7 +101,6 @@ typedef struct {
     const double *clearance, *stiffness, *friction, *damping, *arm; /* (nodes,); arm: radius of the rod's surface */
     double h, share, smallest;      /* the step; changes that end the sweeps, of the first one and of all */
     const double *tangent, *start;  /* (nodes, 3) of the tube; from its axis to the rod at the start, across it */
-    const double *shift;            /* (nodes, 6) subtracted from the motion for the slip */
     const double *compliance;       /* (nodes, 2 reach + 1, 6, 6) motion of the neighbours, and of the node itself in the
                                        middle, by its force and moment */
     double *moved;                  /* (nodes, 6) displacement and rotation in the step with the forces */

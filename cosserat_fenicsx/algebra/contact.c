@@ -140,7 +140,7 @@ static double settle_node(contact *c, int i)
     double T[2] = {0, 0};
     if (c->friction[i] > 0 && N > 0) {
         respond(W, across, by[1]), respond(W, along, by[2]);
-        for (int k = 0; k < 6; k++) slip[k] = moved[k] - c->shift[6 * i + k] + by[0][k] * (N - law[0]);
+        for (int k = 0; k < 6; k++) slip[k] = moved[k] + by[0][k] * (N - law[0]);
         const double A[3] = {dot6(across, by[1]), (dot6(across, by[2]) + dot6(along, by[1])) / 2, dot6(along, by[2])};
         const double b[2] = {dot6(across, slip) - A[0] * law[1] - A[1] * law[2],
                              dot6(along, slip) - A[1] * law[1] - A[2] * law[2]};

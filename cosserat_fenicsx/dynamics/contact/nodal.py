@@ -44,7 +44,7 @@ class NodalContact(Pointers):
         units = {"stiffness": scales.force / scales.length, "damping": model.time / scales.length}
         for name in ("stiffness", "damping"):
             self._numbers[name][:] = np.concatenate([getattr(p, name) for p in touched])[order] / units[name]
-        sizes = {"tangent": 3, "start": 3, "shift": 6, "moved": 6, "force": 6, "law": 3}
+        sizes = {"tangent": 3, "start": 3, "moved": 6, "force": 6, "law": 3}
         self._vectors = {name: np.zeros((n, size)) for name, size in sizes.items()}
         self._compliance = np.zeros((n, 2 * reach + 1, 6, 6))
         self._begun, self._law_begun = (self._vectors[name].copy() for name in ("force", "law"))
@@ -58,12 +58,8 @@ class NodalContact(Pointers):
 
     # -- a step ------------------------------------------------------------------------------------------------------
 
-    def begin(self, h, velocities):
-        """Begin a step of length h (dimensionless) at the problem's state.
-
-        Args:
-            velocities: see `shift`.
-        """
+    def begin(self, h):
+        """Begin a step of length h (dimensionless) at the problem's state."""
         self._before = now = self._nodes.of_local(self._problem.state)
         scales = self._problem.model.scales
         points = now[:, :3] * scales.length + self._origin
@@ -78,7 +74,6 @@ class NodalContact(Pointers):
             numbers["friction"][at] = tube.friction
         self.c.h = h
         self._begun[:], self._law_begun[:] = vectors["force"], vectors["law"]
-        vectors["shift"][:] = 0.0 if velocities is None else velocities
 
     @property
     def _ends(self):

@@ -120,7 +120,7 @@ class CollocationProblem(StepProblem):
         if self.ties:
             self.ties.begin(model.ties_at(t + h))
         if self.contact:
-            self.contact.begin(self.h, None)
+            self.contact.begin(self.h)
 
     def work(self):
         """See `StepProblem`: by loads at mid-step, and the mean of the reactions at both ends."""

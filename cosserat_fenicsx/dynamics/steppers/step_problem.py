@@ -117,7 +117,7 @@ class StepProblem(Equations):
         if self.ties:
             self.ties.begin(model.ties_at(t + h))
         if self.contact:
-            self.contact.begin(self.h, None)
+            self.contact.begin(self.h)
 
     def _change_residual(self, x, b):
         super()._change_residual(x, b)
