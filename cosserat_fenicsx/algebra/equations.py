@@ -196,7 +196,7 @@ class Equations(Called):
         elif what == SUM:
             self._array(a, 1)[0] = numbering.comm.allreduce(float(a[0]))
         elif what == CONTACT:
-            self._touch(*(self._array(x, numbering.size) for x in (a, b) if x))
+            self._touch(self._array(a, numbering.size), self._array(b, numbering.size))
         else:
             self._change_matrices()
 
@@ -211,8 +211,8 @@ class Equations(Called):
         if self.ties:
             self.ties.add_residual(b, self.eta)
 
-    def _touch(self, *step):
-        """Where nodes may touch: the tangent is new, without arguments; or change Newton's step (x, change)."""
+    def _touch(self, x, change):
+        """Where nodes may touch: change Newton's step, which is subtracted from x; arrays of this rank's unknowns."""
 
     def _change_matrices(self):
         """Change `matrices`, of the elements."""

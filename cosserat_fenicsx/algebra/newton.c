@@ -127,7 +127,6 @@ int iterate(stepping *s)
         if (residual(p, s->x, s->b)) return FAILED;
         if (s->fresh) {
             if (tangent(p)) return FAILED;
-            if (hook(p, CONTACT, 0, 0)) return FAILED;
             s->fresh = 0, s->spent = s->price, s->served = 0;
         }
         if (solve(p, s->b, s->change)) return FAILED;

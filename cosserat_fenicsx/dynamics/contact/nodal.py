@@ -16,6 +16,9 @@ from cosserat_fenicsx.quaternions import small_rotations
 
 # Up to so many nodes the compliance of all by all is taken; of more, that of so many neighbours on each side.
 _FEW, _NEIGHBOURS = 16, 6
+# The compliance is found again where it misses more than this share of a response, unless the response (dimensionless)
+# is as small as the second number, which may be rounding. It differs little from step to step.
+_MISSED, _ROUNDING = 1e-3, 1e-9
 # Sweeps over the nodes, and changes of the motion that end them: over the first one, and dimensionless.
 _MOST, _SHARE, _SMALLEST = 200, 1e-6, 1e-16
 
@@ -53,7 +56,7 @@ class NodalContact(Pointers):
         contact.most, contact.share, contact.smallest = _MOST, _SHARE, _SMALLEST
         for name, array in {**self._numbers, **self._vectors, "compliance": self._compliance}.items():
             setattr(contact, name, self.doubles(array))
-        self._along = np.zeros(n)
+        self._known_for = np.nan  # length of the steps that the compliance is of
         self._load, self._response = problem.numbering.vector(), problem.numbering.vector()
 
     # -- a step ------------------------------------------------------------------------------------------------------
@@ -73,6 +76,8 @@ class NodalContact(Pointers):
             numbers["clearance"][at], numbers["arm"][at] = tube.clearance / scales.length, tube.arm / scales.length
             numbers["friction"][at] = tube.friction
         self.c.h = h
+        if abs(h - self._known_for) > 1e-9 * h:
+            self._known_for = np.nan
         self._begun[:], self._law_begun[:] = vectors["force"], vectors["law"]
 
     @property
@@ -90,7 +95,9 @@ class NodalContact(Pointers):
     def meet(self, x, change):
         """Change Newton's step by that of the forces: arrays of this rank's unknowns; `change` is subtracted from x."""
         vectors = self._vectors
-        vectors["moved"][:] = motion_between(self._before, self._nodes.unknowns(x, change))
+        if np.isnan(self._known_for):
+            self._find_compliance()
+        vectors["moved"][:] = free = motion_between(self._before, self._nodes.unknowns(x, change))
         before = vectors["force"].copy()
         self._lib.settle(self.c)
         if (before == vectors["force"]).all():
@@ -100,9 +107,14 @@ class NodalContact(Pointers):
         self._nodes.subtract(vectors["force"] - before, load.array_w)
         self._problem.solve(load, self._response)
         change += self._response.array_r
+        foretold = vectors["moved"][:, :3] - free[:, :3]
+        size, missed = np.abs(foretold), np.abs(foretold + self._nodes.of_vector(self._response.array_r)[:, :3])
+        if missed.max() > _MISSED * size.max() > _MISSED * _ROUNDING:
+            self._known_for = np.nan
 
-    def take_tangent(self):
-        """Find the compliance by the tangent, which is new."""
+    def _find_compliance(self):
+        """Find the compliance by the current tangent."""
+        self._known_for = self.c.h
         nodes, problem = self._nodes, self._problem
         n, reach = self.c.nodes, self.c.reach
         turning = small_rotations(nodes.of_local(problem.state)[:, 3:])
@@ -134,16 +146,16 @@ class NodalContact(Pointers):
         return gained, -float(np.vdot(force, vectors["moved"])) - gained
 
     def memory(self):
-        """What later steps depend on; the compliance belongs to the tangent."""
-        names = ("force", "law")
+        """What later steps depend on."""
+        kept = {name: self._vectors[name].copy() for name in ("force", "law")}
         md = np.concatenate([place.md for place in self._walls])
-        return {**{name: self._vectors[name].copy() for name in names}, "compliance": self._compliance.copy(), "md": md}
+        return {**kept, "md": md, "compliance": self._compliance.copy(), "known_for": self._known_for}
 
     def recall(self, memory):
         """Restore what `memory` returned."""
         for name in ("force", "law"):
             self._vectors[name][:] = memory[name]
-        self._compliance[:] = memory["compliance"]
+        self._compliance[:], self._known_for = memory["compliance"], float(memory["known_for"])
         for place, md in zip(self._walls, np.split(memory["md"], self._ends), strict=True):
             place.md = md
 

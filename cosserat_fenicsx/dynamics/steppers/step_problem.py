@@ -124,11 +124,8 @@ class StepProblem(Equations):
         if self.contact:
             self.contact.add_forces(b)
 
-    def _touch(self, *step):
-        if step:
-            self.contact.meet(*step)
-        else:
-            self.contact.take_tangent()
+    def _touch(self, x, change):
+        self.contact.meet(x, change)
 
     def _take_loads(self, t):
         """Evaluate the loads at the time t (s)."""
