@@ -16,9 +16,10 @@ from cosserat_fenicsx.quaternions import small_rotations
 
 # Up to so many nodes the compliance of all by all is taken; of more, that of so many neighbours on each side.
 _FEW, _NEIGHBOURS = 16, 6
-# The compliance is found again where it misses more than this share of a response, unless the response (dimensionless)
-# is as small as the second number, which may be rounding. It differs little from step to step.
-_MISSED, _ROUNDING = 1e-3, 1e-9
+# The compliance, which differs little from step to step, is found again where it misses this many times the share of a
+# response that it has missed at best, or more than the second number. Smaller responses than the third number
+# (dimensionless) may be rounding.
+_WORSE, _MISSED, _ROUNDING = 10.0, 1e-3, 1e-9
 # Sweeps over the nodes, and changes of the motion that end them: over the first one, and dimensionless.
 _MOST, _SHARE, _SMALLEST = 200, 1e-6, 1e-16
 
@@ -56,6 +57,7 @@ class NodalContact(Pointers):
         contact.most, contact.share, contact.smallest = _MOST, _SHARE, _SMALLEST
         for name, array in {**self._numbers, **self._vectors, "compliance": self._compliance}.items():
             setattr(contact, name, self.doubles(array))
+        self._usual = np.inf
         self._known_for = np.nan  # length of the steps that the compliance is of
         self._load, self._response = problem.numbering.vector(), problem.numbering.vector()
 
@@ -109,12 +111,15 @@ class NodalContact(Pointers):
         change += self._response.array_r
         foretold = vectors["moved"][:, :3] - free[:, :3]
         size, missed = np.abs(foretold), np.abs(foretold + self._nodes.of_vector(self._response.array_r)[:, :3])
-        if missed.max() > _MISSED * size.max() > _MISSED * _ROUNDING:
-            self._known_for = np.nan
+        if size.max() > _ROUNDING:
+            share = missed.max() / size.max()
+            self._usual = min(self._usual, max(share, _MISSED))
+            if share > _WORSE * self._usual:
+                self._known_for = np.nan
 
     def _find_compliance(self):
         """Find the compliance by the current tangent."""
-        self._known_for = self.c.h
+        self._known_for, self._usual = self.c.h, np.inf
         nodes, problem = self._nodes, self._problem
         n, reach = self.c.nodes, self.c.reach
         turning = small_rotations(nodes.of_local(problem.state)[:, 3:])
@@ -149,13 +154,15 @@ class NodalContact(Pointers):
         """What later steps depend on."""
         kept = {name: self._vectors[name].copy() for name in ("force", "law")}
         md = np.concatenate([place.md for place in self._walls])
-        return {**kept, "md": md, "compliance": self._compliance.copy(), "known_for": self._known_for}
+        return {**kept, "md": md, "compliance": self._compliance.copy(), "known_for": self._known_for,
+                "usual": self._usual}  # fmt: skip
 
     def recall(self, memory):
         """Restore what `memory` returned."""
         for name in ("force", "law"):
             self._vectors[name][:] = memory[name]
-        self._compliance[:], self._known_for = memory["compliance"], float(memory["known_for"])
+        self._compliance[:] = memory["compliance"]
+        self._known_for, self._usual = float(memory["known_for"]), float(memory["usual"])
         for place, md in zip(self._walls, np.split(memory["md"], self._ends), strict=True):
             place.md = md
 
