@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 from conftest import COMM
-from mpi4py import MPI
 from moving_scenes import drift
+from mpi4py import MPI
 
 import cosserat_fenicsx as cf
 from cosserat_fenicsx.actions.hole_wall import HoleRing, HoleWall

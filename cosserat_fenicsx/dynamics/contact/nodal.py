@@ -195,7 +195,7 @@ def _places(model, walls):
 
 
 def _shares(breaks, nodes):
-    """The part of a rod's length that belongs to every node: weights of the quadrature rule with the nodes as points."""
+    """The share of a rod's length that belongs to each node: weights of the quadrature rule with these points."""
     moments = 1 / np.arange(1, len(nodes) + 1)
     weights = np.linalg.solve(np.vander(nodes, increasing=True).T, moments)
     sizes, p = np.diff(breaks), len(nodes) - 1

@@ -19,8 +19,8 @@ from cosserat_fenicsx.algebra.newton import Solved
 #: and momenta; or below the second, the rounding of positions. The rounding of a stiff rod may be larger: increments
 #: below the third that no longer shrink have converged, too.
 INCREMENT, SMALLEST, ROUNDING = 1e-12, 2e-16, 1e-10
-# Times the first two where nodes touch walls: the errors that are left there do not cancel over many steps, and would add
-# up to 1e-8 of the energy in 10 000.
+# Times the first two where nodes may touch walls: the errors that are left there do not cancel from step to step, and
+# would add up to 1e-8 of the energy in 10 000.
 _WITH_CONTACT = 0.03
 # Contraction of increments with a new tangent, as measured.
 _NEW_TANGENT_RATE = 3e-4
