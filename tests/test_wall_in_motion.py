@@ -211,3 +211,21 @@ def test_equilibria_and_other_schemes_refuse_it():
         cf.simulate(scene, 0.1, dt=0.01, scheme="triple-jump")
     with pytest.raises(cf.SceneError, match="HoleWall"):
         cf.simulate(scene, 0.1, dt=0.01, model="planar")
+
+
+def test_forces_of_walls_are_told(tmp_path_all):
+    """The weight of a rod that slides, and friction against it; from memory, a folder and a file alike."""
+    mu, v = 0.3, 0.2
+    rod, scene, _ = resting(HORIZONTAL, 1e8, linear=(v, 0, 0), friction=mu)
+    wall, weight = scene.loads[0], thick_rod(HORIZONTAL)[1] * G
+    history = cf.simulate(scene, 0.02, dt=5e-4, **SMALL)
+    found = history.wall_forces(wall)
+    assert found.normal.shape == (41, 5) and np.isnan(found.normal[0]).all()
+    np.testing.assert_allclose(found.s, [0, 0.25, 0.5, 0.75, 1])
+    assert found.normal[1:].sum(axis=1) == pytest.approx(weight, rel=1e-3)
+    np.testing.assert_allclose(found.along[1:], -mu * found.normal[1:], rtol=1e-6)
+    assert np.abs(found.around[1:]).max() < 1e-3 * weight
+    stored = cf.simulate(scene, 0.02, dt=5e-4, **SMALL, folder=tmp_path_all / "motion")
+    np.testing.assert_allclose(stored.wall_forces(wall).along, found.along, rtol=1e-9)
+    with pytest.raises(cf.SceneError, match="a wall of the scene"):
+        history.wall_forces(scene.loads[1])

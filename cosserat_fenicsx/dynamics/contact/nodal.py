@@ -150,6 +150,15 @@ class NodalContact(Pointers):
         force = (vectors["force"] + self._begun) / 2 if self.c.at_end else vectors["force"]
         return gained, -float(np.vdot(force, vectors["moved"])) - gained
 
+    @property
+    def count(self):
+        """Number of nodes that may touch, once for each wall."""
+        return self.c.nodes
+
+    def of_step(self):
+        """(count, 3) normal force, friction round and along the axis in the last step, wall by wall."""
+        return self._vectors["law"][self._slots]
+
     def memory(self):
         """What later steps depend on."""
         kept = {name: self._vectors[name].copy() for name in ("force", "law")}
