@@ -178,6 +178,7 @@ int iterate(stepping *s);
 int attach(petsc *functions, newton *n, void *snes, void *vector, void *matrix, void *pc);
 
 int settle(contact *c);
+int broken(const contact *c);
 double stored(const contact *c, int at_start);
 
 int negative_modes(second_variation *v, int *sideways);

@@ -179,6 +179,21 @@ int settle(contact *c)
     return c->most;
 }
 
+/* Whether the normal forces are other than those of the motion, which is given, or a node has crossed the axis while it
+   touches: an iteration may settle on a motion that is none. */
+int broken(const contact *c)
+{
+    for (int i = 0; i < c->nodes; i++) {
+        const double *law = c->law + 3 * i;
+        double slope;
+        const place p = place_of(c, i);
+        const double off = fabs(normal_force(c, i, p.R0, p.R, &slope) - law[0]);
+        if (!(off <= 1e-6 * law[0] + 1e-10 * c->stiffness[i]) || (law[0] > 0 && c->clearance[i] > 0 && dot3(p.x, c->start + 3 * i) <= 0))
+            return 1;
+    }
+    return 0;
+}
+
 /* Stored energy at the end of the step minus that at its start, over all nodes; the motion is given. */
 double stored(const contact *c, int at_start)
 {

@@ -117,6 +117,12 @@ class NodalContact(Pointers):
             if share > _WORSE * self._usual:
                 self._known_for = np.nan
 
+    @property
+    def broken(self):
+        """Whether forces do not follow from the motion at the problem's state, so that this is none."""
+        self._vectors["moved"][:] = motion_between(self._before, self._nodes.of_local(self._problem.state))
+        return bool(self._lib.broken(self.c))
+
     def _find_compliance(self):
         """Find the compliance by the current tangent."""
         self._known_for, self._usual = self.c.h, np.inf

@@ -97,6 +97,8 @@ class StepNewton:
         converged, found = c.outcome == _CONVERGED, _OUTCOMES[c.outcome]
         if converged and problem.model.turned_over():
             converged, found = False, "a section turned by half a turn or more in one step"
+        if converged and problem.contact and problem.contact.broken:
+            converged, found = False, "the forces of a wall do not follow from the motion"
         iterations = c.iterations
         self._spent, self._served = c.spent + iterations, c.served + 1
         if self._served == 1 and lived == 1 and not began_fresh:  # the last tangent served for one step only
