@@ -147,6 +147,16 @@ class Moving:
         return self._slots
 
     @property
+    def owned_nodes(self):
+        """Number of the local nodes that this rank owns; they come first."""
+        return self._owned_nodes
+
+    @property
+    def dofs_of_nodes(self):
+        """(n, components) local degrees of freedom of the local nodes."""
+        return self._nodal
+
+    @property
     def rate_arrays(self):
         """The arrays of the rates of the state."""
         return (self._arrays[2],)

@@ -62,7 +62,7 @@ class OneStep:
         if not solved.converged:
             self._guesses = None
             self._state[:] = self._start
-            problem.begin()
+            problem.begin_again()
             return solved
         self._past = [
             *self._past[1 - 3 * _STRIDE :],
@@ -120,7 +120,7 @@ class OneStep:
         self._state[:] = state
         for now, before in zip(self._rates, rates, strict=True):
             now[:] = before
-        self.problem.begin()
+        self.problem.begin_again()
 
     def memory(self):
         """See `Stepper`."""
