@@ -141,6 +141,8 @@ _HOME = {
     "AddedMass": "actions.added_mass",
     "Centrifugal": "actions.centrifugal",
     "LinearDrag": "actions.linear_drag",
+    "HoleWall": "actions.hole_wall",
+    "HoleRing": "actions.hole_wall",
     "euler_load": "scene.rod",
     "read_motion": "scene.scenefile",
     "read_path": "statics.reading",
@@ -169,6 +171,8 @@ if TYPE_CHECKING:  # the same names, for editors and type checkers
     from cosserat_fenicsx.actions.dashpot import Dashpot as Dashpot
     from cosserat_fenicsx.actions.drag import Drag as Drag
     from cosserat_fenicsx.actions.foundation import Foundation as Foundation
+    from cosserat_fenicsx.actions.hole_wall import HoleRing as HoleRing
+    from cosserat_fenicsx.actions.hole_wall import HoleWall as HoleWall
     from cosserat_fenicsx.actions.linear_drag import LinearDrag as LinearDrag
     from cosserat_fenicsx.actions.point_mass import PointMass as PointMass
     from cosserat_fenicsx.actions.spring import Spring as Spring
