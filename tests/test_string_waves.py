@@ -235,7 +235,7 @@ def test_what_is_refused():
     with pytest.raises(cf.SceneError, match=r"dt = 0.01 s: expected at most about 0.00\d+ s"):
         AxialTorsional(hard, 0.01, 50)
     assert AxialTorsional(hard, elements=50).dt < 0.005
-    for arguments, told in (({"dt": 0.0}, "dt"), ({"elements": 1}, "elements")):
+    for arguments, told in (({"dt": 0.0}, "dt"), ({"elements": 1}, "elements"), ({"elements": 20.5}, "elements")):
         with pytest.raises(cf.SceneError, match=told):
             AxialTorsional(hard, **arguments)
     discs = cf.Discs((100.0, 100.0), (500.0,))

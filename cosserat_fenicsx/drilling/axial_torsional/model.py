@@ -27,6 +27,7 @@ from cosserat_fenicsx.errors import NotConverged, SceneError
 SOURCES = tuple(Path(__file__).with_name(name) for name in ("model.c", "laws.c", "step.c"))
 _STATE = ("x", "v", "w", "force")
 _TRIALS = 30
+_ELEMENTS = 1_000_000
 _SUMS = ("drive", "hook", "bit", "wall", "mud")
 
 
@@ -62,7 +63,8 @@ class AxialTorsional(Pointers):
         if dt is not None:
             dt = positive("AxialTorsional", "dt", dt, "s")
         if elements is not None:
-            number("AxialTorsional", "elements", elements, "a number of elements from 2", lambda x: x >= 2)
+            expected = f"a number of elements from 2 to {_ELEMENTS}"
+            number("AxialTorsional", "elements", elements, expected, lambda x: 2 <= x <= _ELEMENTS and x == int(x))
         self.dt = dt or usual_step(scene, elements)
         for _ in range(_TRIALS):
             self._set(elements)
