@@ -68,7 +68,7 @@ class AxialTorsional(Pointers):
         self.dt = dt or usual_step(scene, elements)
         for _ in range(_TRIALS):
             self._set(elements)
-            if discs or self._lib.steepest(self._m, self.dt) > 0:
+            if self._lib.steepest(self._m, self.dt) > 0:
                 break
             if dt is not None:
                 self._refuse_step()
