@@ -152,6 +152,8 @@ class Swallow:
 def test_other_laws_of_the_bit_plug_in_as_end_conditions():
     scene = cf.Drilling(string(PIPE), cf.TopDrive(1.0), cf.BitOnRock(cf.Cutting(0.1, 60e6, 0.6, 4)),
                         hook=cf.Hook(speed=-0.1))  # fmt: skip
+    lobes = cf.Drilling(scene.string, scene.drive, cf.BitOnRock(cf.Lobes(3, 0.002, LAW), 80e3, inertia=50.0))
+    assert column(AxialTorsional(lobes, 0.01, 50, axial=False).advance(100), "torque_on_bit").max() > 0
     Z = IMPEDANCE[0], 296.3752962822167
     end = Swallow(*Z)
     model = AxialTorsional(scene, 0.004, 200, end=end)
@@ -202,7 +204,7 @@ def test_what_is_refused():
     with pytest.raises(cf.SceneError, match=r"dt = 0.01 s: expected at most about 0.00\d+ s"):
         AxialTorsional(hard, 0.01, 50)
     assert AxialTorsional(hard, elements=50).dt < 0.005
-    for arguments, told in (({"dt": 0.0}, "dt"), ({"elements": 1}, "elements")):
+    for arguments, told in (({"dt": 0.0}, "dt"), ({"elements": 1}, "elements"), ({"elements": 20.5}, "elements")):
         with pytest.raises(cf.SceneError, match=told):
             AxialTorsional(hard, **arguments)
     discs = cf.Discs((100.0, 100.0), (500.0,))

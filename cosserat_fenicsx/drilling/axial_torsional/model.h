@@ -55,7 +55,7 @@ typedef struct {
     books sums;
     double *a, *o, *rho;            /* (nodes, dofs) x 3: matrix of a step of the length h, and factors of the laws */
     double h, ease;                 /* length of that step; share of the factors that is taken */
-    double *b, *q, *y, *d, *c;      /* work space: (nodes, dofs), (nodes, 4), (nodes, dofs), (nodes, 3), (nodes, dofs) */
+    double *b, *y, *c, *q, *d;      /* work space: (nodes, dofs) x 3, (nodes, 4), (nodes, 3) */
     double *guess;                  /* (2, nodes, dofs) */
     int *mask, *broken;             /* (nodes,) */
     long halved, iterations, most;  /* counts: steps that were halved, iterations, most of them in a step */

@@ -18,7 +18,7 @@ from cosserat_fenicsx.drilling.axial_torsional.bits import end_of, forces_of
 from cosserat_fenicsx.drilling.axial_torsional.chain import chain_of, usual_step
 from cosserat_fenicsx.drilling.axial_torsional.intervals import intervals
 from cosserat_fenicsx.drilling.axial_torsional.steady import steady_state
-from cosserat_fenicsx.drilling.bit_laws import Lobes, Stribeck
+from cosserat_fenicsx.drilling.bit_laws import Cutting
 from cosserat_fenicsx.drilling.discs import Discs
 from cosserat_fenicsx.drilling.protocol import LEDGER, SERIES
 from cosserat_fenicsx.drilling.signals import ScalarSignal
@@ -30,6 +30,7 @@ from cosserat_fenicsx.errors import NotConverged, SceneError
 SOURCES = tuple(Path(__file__).with_name(name) for name in ("model.c", "laws.c", "step.c"))
 _STATE = ("x", "v", "w", "force")
 _TRIALS = 30
+_ELEMENTS = 1_000_000
 _SUMS = ("drive", "hook", "bit", "wall", "mud")
 
 
@@ -65,11 +66,12 @@ class AxialTorsional(Pointers):
         if dt is not None:
             dt = positive("AxialTorsional", "dt", dt, "s")
         if elements is not None:
-            number("AxialTorsional", "elements", elements, "a number of elements from 2", lambda x: x >= 2)
+            expected = f"a number of elements from 2 to {_ELEMENTS}"
+            number("AxialTorsional", "elements", elements, expected, lambda x: 2 <= x <= _ELEMENTS and x == int(x))
         self.dt = dt or usual_step(scene, elements)
         for _ in range(_TRIALS):
             self._set(elements)
-            if discs or self._lib.steepest(self._m, self.dt) > 0:
+            if self._lib.steepest(self._m, self.dt) > 0:
                 break
             if dt is not None:
                 self._refuse_step()
@@ -133,12 +135,11 @@ class AxialTorsional(Pointers):
             mass[0] += bit.mass
             m.hanging = bit.weight or 0.0
         m.weight = bit.weight or 0.0
-        if isinstance(bit.law, Lobes) or (isinstance(bit.law, Stribeck) and bit.weight is not None):
-            m.rock = self._axial
+        m.rock = self._axial and bit.weight is not None and not isinstance(bit.law, Cutting)
         law = stribeck_of(bit.law)
         if law is not None:
-            m.law, m.weighs = 1, law.radius is not None
-            (m.still, m.slipping), m.decay = law.torques(1.0), law.speed or 0.0
+            m.law, m.weighs, m.decay = 1, law.radius is not None, law.speed or 0.0
+            m.still, m.slipping = law.torques(1.0)
 
     def _set_hook(self, hook):
         top = self._m.top[0]

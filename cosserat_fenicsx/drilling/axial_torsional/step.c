@@ -99,6 +99,47 @@ static double set_velocity(model *m, int i, int d, double v)
     return added;
 }
 
+/* Velocities of held nodes in one of the unknowns become 0, that of a bit on a rock the rock's, by impulses on these
+   nodes alone: others go along so that their momentum stays, which loses energy and never brings any. */
+static void settle(model *m, int d)
+{
+    const int n = m->dofs, last = m->nodes - 1, rigid = m->top[d].rigid, mask = bit_of(m, d);
+    double *v = m->v + d, *change = m->y + d, *pivot = m->q + d;
+    const double *mass = m->mass + d, *off = m->mass_off + d;
+    int moves = 0;
+    for (int i = 0; i <= last; i++) {
+        const double sinking = i == last && d < n - 1 && m->bit.rock ? m->bit.sinking : 0;
+        change[i * n] = m->held[i] & mask ? sinking - v[i * n] : 0;
+        moves |= change[i * n] != 0;
+    }
+    if (!moves) return;
+    /* pivots of free nodes; 0 where a node is held */
+    for (int i = 0; i <= last; i++) {
+        pivot[i * n] = 0;
+        if ((i == 0 && rigid) || m->held[i] & mask) continue;
+        pivot[i * n] = mass[i * n];
+        if (!i) continue;
+        const double before = pivot[(i - 1) * n], o = off[(i - 1) * n];
+        if (before) pivot[i * n] -= o * o / before;
+        change[i * n] -= before ? o / before * change[(i - 1) * n] : o * change[(i - 1) * n];
+    }
+    for (int i = last; i >= 0; i--)
+        if (pivot[i * n])
+            change[i * n] = (change[i * n] - (i < last ? off[i * n] * change[(i + 1) * n] : 0)) / pivot[i * n];
+    for (int i = 0; i <= last; i++)
+        if (!pivot[i * n]) {
+            double impulse = mass[i * n] * change[i * n];
+            if (i) impulse += off[(i - 1) * n] * change[(i - 1) * n];
+            if (i < last) impulse += off[i * n] * change[(i + 1) * n];
+            const double work = impulse * (v[i * n] + change[i * n] / 2);
+            if (i == 0)
+                *(d == n - 1 ? &m->sums.drive : &m->sums.hook) += work;
+            else
+                *(i == last && (m->bit.law || pushed(m)) ? &m->sums.bit : &m->sums.wall) -= work;
+        }
+    for (int i = 0; i <= last; i++) v[i * n] += change[i * n];
+}
+
 /* Take a step that has converged. */
 static void commit(model *m, double h, const double *signal)
 {
@@ -146,15 +187,9 @@ static void commit(model *m, double h, const double *signal)
         m->x[j] += h * m->w[j];
         m->v[j] = 2 * m->w[j] - m->v[j];
     }
+    for (int i = 0; i <= last; i++) m->held[i] = m->mask[i];
     /* what is held in a step ends it at rest, or with the rock */
-    for (int i = 0; i <= last; i++) {
-        m->held[i] = m->mask[i];
-        const int bit = i == last && (m->bit.law || pushed(m));
-        for (int d = 0; d < n; d++)
-            if (m->mask[i] & bit_of(m, d))
-                *(bit ? &sums->bit : &sums->wall) -=
-                    set_velocity(m, i, d, bit && d < turn && m->bit.rock ? m->bit.sinking : 0);
-    }
+    for (int d = 0; d < n; d++) settle(m, d);
 }
 
 static int step(model *m, double h, const double *from, const double *to)
