@@ -42,6 +42,17 @@ def test_reference_limits(case):
         assert cf.limit_speed(scene, weights["180"], up_to=BAND) == pytest.approx(180 * RPM, rel=1e-9)
 
 
+def test_a_string_without_losses():
+    """Any falling torque makes it grow; none leaves it as it is."""
+    scene = pipe_and_collars(drag=0.0)
+    assert math.isinf(cf.limit_speed(scene)) and cf.limit_weight(scene, 6.0) == 0.0
+    assert cf.limit_speed(scene, up_to=0.05) == 0.0 and math.isinf(cf.limit_weight(scene, 6.0, up_to=0.05))  # no mode
+    assert cf.stability(scene, [6.0], [1e3], modes=6).unstable_modes.tolist() == [[6]]
+    free = cf.stability(replace(scene, bit=None), [6.0], modes=6)
+    assert free.unstable_modes.tolist() == [[0]] and (free.growth == 0).all()
+    assert free.frequency[0, 0] == pytest.approx(cf.natural_frequencies(scene, 6), rel=1e-12)
+
+
 def test_a_matched_drive_gives_way_at_its_impedance():
     Z = pipe_and_collars().segments[0].torsional_impedance
     w, kappa = cf.critical_slopes(pipe_and_collars("matched", 0.0, 50.0), BAND)

@@ -1,7 +1,8 @@
 """All roots of an analytic function in a box of the complex plane, counted by the argument principle.
 
 Functions are real on the real axis: their roots are real or pairs, of which those with Im s >= 0 are returned. They
-take s (n,) and return (f, f') scaled by any positive factors (n,): phases and f'/f are what is used.
+take s (n,) and return (f, f') scaled by any positive factors (n,): phases and f'/f are what is used. Where they grow
+like exp(a s) to the left and exp(b s) to the right, they say so by an attribute `exponents` = (a, b), s.
 """
 
 import math
@@ -130,7 +131,7 @@ def each(f, starts, stride):
         here = s[open_]
         with np.errstate(all="ignore"):
             value, derivative = f(here)
-            step = np.where(value == 0, 0.0, -value / derivative)
+            step = np.where(value == 0, 0.0, -value / (derivative - _rate(f, here) * value))
         step = np.where(np.isfinite(step), step, 0.3 * stride)
         longest = np.maximum(stride, np.abs(here.real) / 4)  # far from the imaginary axis roots are far apart
         length, before = np.abs(step), size[open_]
@@ -140,6 +141,13 @@ def each(f, starts, stride):
         done = (length <= _SETTLED * scale) | ((length <= _ROUNDING * scale) & (length >= before / 4))
         open_ = open_[~done]
     return np.where(size <= _ROUNDING * np.maximum(np.abs(s), stride * 1e-3), s, np.nan)
+
+
+def _rate(f, s):
+    """The rate at which f grows like exp(rate s) on either side, which Newton's method is relieved of."""
+    left, right = getattr(f, "exponents", (0.0, 0.0))
+    rate = np.where(s.real < 0, left, right)
+    return rate * np.tanh(np.abs(s.real * rate))
 
 
 def newton(f, starts, stride):
