@@ -6,10 +6,12 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import brentq
 
+from cosserat_fenicsx.annotations import File, Numbers
 from cosserat_fenicsx.checks import refuse
 from cosserat_fenicsx.drilling.bit_laws import Lobes
 from cosserat_fenicsx.drilling.linear.impedances import axial
 from cosserat_fenicsx.drilling.linear.steady import speeds_and_weights
+from cosserat_fenicsx.drilling.scene import Drilling
 from cosserat_fenicsx.well.tabular import Tabular
 
 
@@ -22,7 +24,7 @@ class BitBounce(Tabular):
             weight on bit about the static one, while bit and rock stay in touch.
     """
 
-    scene: object
+    scene: Drilling
     speeds: np.ndarray
     frequency: np.ndarray
     amplitude: np.ndarray
@@ -47,7 +49,7 @@ class BitBounce(Tabular):
         changes = np.flatnonzero(above[1:] != above[:-1])
         return np.array([brentq(excess, speeds[k], speeds[k + 1], xtol=1e-12) for k in changes])
 
-    def plot(self, file=None):
+    def plot(self, file: File | None = None):
         """Amplitude over speed beside the static weight. With a file it is written, otherwise the Figure is returned.
 
         Raises:
@@ -71,7 +73,7 @@ class BitBounce(Tabular):
         }}  # fmt: skip
 
 
-def bit_bounce(scene, speeds) -> BitBounce:
+def bit_bounce(scene: Drilling, speeds: Numbers) -> BitBounce:
     """Forced axial vibration of a string whose bit follows the lobes of the rock.
 
     The bit moves by amplitude sin(count theta); the weight on bit shakes by the modulus of i w Z(i w) - m w^2, times

@@ -5,10 +5,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cosserat_fenicsx.annotations import File
 from cosserat_fenicsx.checks import number, positive, refuse
 from cosserat_fenicsx.drilling.bit_laws import Cutting, Lobes
 from cosserat_fenicsx.drilling.discs import Discs
 from cosserat_fenicsx.drilling.linear.frequencies import natural_frequencies
+from cosserat_fenicsx.drilling.scene import Drilling
 from cosserat_fenicsx.well.tabular import Tabular
 
 
@@ -35,7 +37,7 @@ class Campbell(Tabular):
                 found[kind, name] = speeds[speeds <= self.fastest]
         return found
 
-    def plot(self, file=None):
+    def plot(self, file: File | None = None):
         """Frequencies as lines, excitations as rays. With a file it is written, otherwise the Figure is returned.
 
         Raises:
@@ -63,7 +65,13 @@ class Campbell(Tabular):
 
 
 def campbell(
-    scene, fastest: float, *, up_to: float = 10.0, torsion: str = "free", axial: str = "fixed", excitations=None
+    scene: Drilling,
+    fastest: float,
+    *,
+    up_to: float = 10.0,
+    torsion: str = "free",
+    axial: str = "fixed",
+    excitations: dict[str, float] | None = None,
 ) -> Campbell:
     """Natural frequencies of torsion and axial motion, and the speeds at which rotation excites them.
 

@@ -38,6 +38,11 @@ class FallingTorque:
         return math.pi / self.torsion.travel
 
     @property
+    def exponents(self):
+        """See roots.py."""
+        return -self.torsion.travel, self.torsion.travel
+
+    @property
     def fastest(self):
         """A growth rate that no root reaches, 1/s.
 
@@ -113,6 +118,12 @@ class Regenerative:
     def spacing(self):
         """Typical distance of roots along the imaginary axis, rad/s."""
         return 2 * math.pi / (2 * self.torsion.travel + 2 * self.axial.travel + self.delay)
+
+    @property
+    def exponents(self):
+        """See roots.py."""
+        travel = self.torsion.travel + self.axial.travel
+        return -travel - self.delay, travel
 
     @property
     def fastest(self):

@@ -17,10 +17,11 @@ from cosserat_fenicsx.checks import number, refuse
 from cosserat_fenicsx.drilling.discs import Discs
 from cosserat_fenicsx.drilling.hook import Hook
 from cosserat_fenicsx.drilling.linear.impedances import Guide, axial, torsional
+from cosserat_fenicsx.drilling.scene import Drilling
 from cosserat_fenicsx.drilling.top_drive import Motor
 
 
-def natural_frequencies(scene, count: int, bit: str = "free", kind: str = "torsion") -> np.ndarray:
+def natural_frequencies(scene: Drilling, count: int, bit: str = "free", kind: str = "torsion") -> np.ndarray:
     """Natural frequencies of a string without drag, the lowest ones.
 
     The top drive stands still, whatever its control (`stability` takes the control into account), but for a `Motor`,

@@ -11,6 +11,7 @@ from cosserat_fenicsx.drilling.linear.impedances import torsional
 from cosserat_fenicsx.drilling.linear.roots import all_roots
 from cosserat_fenicsx.drilling.linear.stability_box import box_up_to
 from cosserat_fenicsx.drilling.linear.steady import Steady
+from cosserat_fenicsx.drilling.scene import Drilling
 from cosserat_fenicsx.drilling.single_valued import slope, stribeck_of
 from cosserat_fenicsx.errors import NotConverged
 
@@ -18,7 +19,7 @@ from cosserat_fenicsx.errors import NotConverged
 _DEGREE, _RESOLVED = 24, 1e-11
 
 
-def critical_slopes(scene, up_to: float = 10.0) -> tuple[np.ndarray, np.ndarray]:
+def critical_slopes(scene: Drilling, up_to: float = 10.0) -> tuple[np.ndarray, np.ndarray]:
     """All slopes of the bit's torque at which some mode neither grows nor decays.
 
     Those of falling torque and of rising torque, where Im(Jb s + Z(s)) = 0 at s = i w: kappa = -Re Z.
@@ -79,17 +80,22 @@ def _real_roots(f, a, b, depth=0):
     return found
 
 
-def critical_slope(scene, up_to: float = 10.0) -> tuple[float, float]:
+def critical_slope(scene: Drilling, up_to: float = 10.0) -> tuple[float, float]:
     """(kappa, w): the largest critical slope (N m s/rad) and its circular frequency (rad/s), see `critical_slopes`.
 
-    A law whose torque falls less steeply leaves all modes up to that frequency decaying.
+    A law whose torque falls less steeply leaves all modes up to that frequency decaying. Minus infinity where no slope
+    is critical up to there.
     """
     frequencies, slopes = critical_slopes(scene, up_to)
+    if not len(slopes):  # nothing to lose in so narrow a band
+        return -math.inf, math.nan
     first = int(slopes.argmax())
-    return float(slopes[first]), float(frequencies[first])
+    # a string without losses: what is left of 0 is rounding
+    lost = abs(slopes[first]) < _RESOLVED * torsional(scene).impedance
+    return 0.0 if lost else float(slopes[first]), float(frequencies[first])
 
 
-def limit_weight(scene, speed: float, *, up_to: float = 10.0) -> float:
+def limit_weight(scene: Drilling, speed: float, *, up_to: float = 10.0) -> float:
     """The weight on bit up to which all modes decay at a speed.
 
     Args:
@@ -98,7 +104,7 @@ def limit_weight(scene, speed: float, *, up_to: float = 10.0) -> float:
         up_to: highest frequency of modes, Hz.
 
     Returns:
-        N; infinite where the torque does not fall.
+        N; infinite where the torque does not fall, 0 where the string has no losses.
 
     Raises:
         SceneError: a law whose torque does not depend on the weight.
@@ -109,10 +115,17 @@ def limit_weight(scene, speed: float, *, up_to: float = 10.0) -> float:
         refuse("limit_weight", "scene", scene.bit, "a bit with a Stribeck law and a radius")
     per_newton = slope(law, speed, 1.0)
     kappa, _ = critical_slope(scene, up_to)
-    return kappa / per_newton if per_newton else math.inf
+    return abs(kappa / per_newton) if per_newton else math.inf
 
 
-def limit_speed(scene, weight: float | None = None, *, up_to: float = 10.0, between=(0.5, 50.0), points=60) -> float:
+def limit_speed(
+    scene: Drilling,
+    weight: float | None = None,
+    *,
+    up_to: float = 10.0,
+    between: tuple[float, float] = (0.5, 50.0),
+    points: int = 60,
+) -> float:
     """The lowest speed from which on all modes decay, up to a frequency.
 
     Args:
@@ -122,8 +135,8 @@ def limit_speed(scene, weight: float | None = None, *, up_to: float = 10.0, betw
             range of growth that lies between two of them is missed.
 
     Returns:
-        rad/s; 0 where all modes decay at every speed. With a bit that cuts: infinite where some mode grows at the
-        highest of the speeds, 0 where none does at any.
+        rad/s; 0 where all modes decay at every speed, infinite where the string has no losses. With a bit that cuts:
+        infinite where some mode grows at the highest of the speeds, 0 where none does at any.
 
     Raises:
         SceneError: numbers that are not positive, or a bit without a law.
@@ -144,9 +157,9 @@ def limit_speed(scene, weight: float | None = None, *, up_to: float = 10.0, betw
         return 0.0
     steepest = slope(law, 0.0, weight)
     kappa, _ = critical_slope(scene, up_to)
-    if kappa >= 0:
-        return math.inf if steepest < 0 else 0.0
-    return max(0.0, law.speed * math.log(steepest / kappa)) if steepest < 0 else 0.0
+    if steepest >= kappa:
+        return 0.0
+    return math.inf if kappa >= 0 else law.speed * math.log(steepest / kappa)
 
 
 def _limit_of_cutting(steady, weight, up_to, between, points):

@@ -4,12 +4,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cosserat_fenicsx.annotations import File
 from cosserat_fenicsx.checks import refuse
 from cosserat_fenicsx.drilling.bit_laws import Cutting
 from cosserat_fenicsx.drilling.linear.drives import growth_with
-from cosserat_fenicsx.drilling.linear.shapes import shape_of
+from cosserat_fenicsx.drilling.linear.shapes import ModeShape, shape_of
 from cosserat_fenicsx.drilling.linear.spectrum_table import stability_table
 from cosserat_fenicsx.drilling.linear.steady import Steady, or_none
+from cosserat_fenicsx.drilling.scene import Drilling
 from cosserat_fenicsx.well.tabular import Tabular
 
 
@@ -25,7 +27,7 @@ class Stability(Tabular):
             that a wave takes down the string are not listed.
     """
 
-    scene: object
+    scene: Drilling
     speeds: np.ndarray
     weights: np.ndarray
     roots: np.ndarray
@@ -69,7 +71,7 @@ class Stability(Tabular):
         i, j = np.unravel_index(np.nanargmax(self.growth[:, :, k]), self.growth.shape[:2])
         return int(i), int(j)
 
-    def shape(self, k: int, i: int | None = None, j: int = 0):
+    def shape(self, k: int, i: int | None = None, j: int = 0) -> ModeShape:
         """The `ModeShape` of mode k at `speeds[i]` and `weights[j]`, or where it grows fastest.
 
         Raises:
@@ -97,7 +99,7 @@ class Stability(Tabular):
         """
         return growth_with(self, i, j, drives)
 
-    def plot(self, file=None, mode: int | None = None):
+    def plot(self, file: File | None = None, mode: int | None = None):
         """Maps of the growth over speed and weight, of each mode that grows somewhere, or of one; over the speed alone
         where there is a single weight. With a file it is written, otherwise the Figure is returned.
 

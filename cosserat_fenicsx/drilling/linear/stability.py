@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 
+from cosserat_fenicsx.annotations import Numbers
 from cosserat_fenicsx.checks import number, positive, refuse
 from cosserat_fenicsx.drilling.linear.frequencies import natural_frequencies
 from cosserat_fenicsx.drilling.linear.spectrum import Stability
@@ -16,7 +17,14 @@ from cosserat_fenicsx.drilling.scene import Drilling
 _NEUTRAL = 1e-11
 
 
-def stability(scene, speeds, weights=None, *, modes: int | None = None, up_to: float = 10.0) -> Stability:
+def stability(
+    scene: Drilling,
+    speeds: Numbers,
+    weights: Numbers | None = None,
+    *,
+    modes: int | None = None,
+    up_to: float = 10.0,
+) -> Stability:
     """Growth rates and frequencies of all modes of steady rotations.
 
     The string rotates at the speed that is asked for, and drills; its small motions about that grow or decay like

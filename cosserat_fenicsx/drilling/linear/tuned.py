@@ -10,6 +10,7 @@ Both names stand for rules of choice, not for the settings of any product.
 
 import math
 from dataclasses import replace
+from typing import Any
 
 from cosserat_fenicsx.checks import instance, positive, refuse
 from cosserat_fenicsx.drilling.discs import Discs
@@ -19,7 +20,7 @@ from cosserat_fenicsx.drilling.top_drive import PI, TopDrive
 from cosserat_fenicsx.well.string import DrillString
 
 
-def SoftTorque(string, inertia: float, depth: float | None = None) -> PI:
+def SoftTorque(string: DrillString | Drilling | Any, inertia: float, depth: float | None = None) -> PI:
     """A control that takes all of the first mode: Kp = Z, Ki = I w1^2.
 
     Usage: `TopDrive(speed, inertia=2900.0, control=SoftTorque(string, inertia=2900.0))`.
@@ -40,7 +41,7 @@ def SoftTorque(string, inertia: float, depth: float | None = None) -> PI:
     return _matched("SoftTorque", 1.0, string, inertia, depth)
 
 
-def SoftSpeed(string, inertia: float, depth: float | None = None) -> PI:
+def SoftSpeed(string: DrillString | Drilling | Any, inertia: float, depth: float | None = None) -> PI:
     """A stiffer control, which follows the speed asked for more closely: Kp = 4 Z, Ki = I w1^2.
 
     It reflects 0.6 of a wave at the frequency of the first mode. Arguments, result and errors are those of
