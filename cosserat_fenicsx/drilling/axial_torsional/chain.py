@@ -1,9 +1,9 @@
-"""What a string is for the equations of motion: elements with mass, drag and stiffness, and the pieces that touch the wall.
+"""What a string is for the equations of motion: elements with mass, drag and stiffness, and pieces that touch the wall.
 
-Elements are linear. Their mass matrices are m [[1/2 - s, s], [s, 1/2 - s]] with the share s = 1/12 + (c dt/l)^2/6, which
-makes waves of the speed c exact to fourth order in space and time together under the implicit midpoint rule: 1/12, for
-short steps, is the mean of the lumped and the consistent matrix; with 1/4, where a wave passes an element in a step, the
-rule is exact, but the matrix of highest frequencies vanishes, so that the share stays a little below.
+Elements are linear. Their mass matrices are m [[1/2 - s, s], [s, 1/2 - s]] with the share s = 1/12 + (c dt/l)^2/6,
+which makes waves of the speed c exact to fourth order in space and time together under the implicit midpoint rule:
+1/12, for short steps, is the mean of the lumped and the consistent matrix; with 1/4, where a wave passes an element in
+a step, the rule is exact, but the mass of the highest mode vanishes, so that the share stays a little below.
 """
 
 import math
@@ -28,8 +28,8 @@ class Chain:
 
     Attributes:
         depths: (nodes,) measured depth, m; for discs their numbers.
-        mass, mass_off: (nodes, dofs), (nodes - 1, dofs), kg and kg m^2: mass matrix. drag, drag_off: the same of what is
-            proportional to velocities. spring: (nodes - 1, dofs), N/m and N m/rad.
+        mass, mass_off: (nodes, dofs), (nodes - 1, dofs), kg and kg m^2: mass matrix. drag, drag_off: the same of what
+            is proportional to velocities. spring: (nodes - 1, dofs), N/m and N m/rad.
         hanging: (nodes - 1,) tension of elements at rest, N; hanging_top: at the top.
         wall: the `Wall`.
     """
@@ -175,4 +175,3 @@ def _coefficients(friction, of_hole):
         return of_hole.copy(), of_hole.copy()
     factor = of_hole if friction.of_hole else np.ones_like(of_hole)
     return friction.static * factor, friction.kinetic * factor
-

@@ -8,8 +8,8 @@ import numpy as np
 class EndCondition(Protocol):
     """The force of the rock on the bit, given at the begin of every step and linear in the bit's mean velocities in it.
 
-    A step that does not converge is done in halves with the same numbers. `memory` and `recall` as of `StringModel`;
-    the model calls them with its own.
+    Beside the force, the bit may stand on a rigid rock: `begin` then calls `model.set_rock`. A step that does not
+    converge is done in halves with the same numbers. The model calls `memory` and `recall` with its own.
     """
 
     def begin(self, model, h: float) -> tuple[np.ndarray, np.ndarray]:

@@ -6,19 +6,23 @@
 
 static inline double length(double x, double y) { return sqrt(x * x + y * y); }
 
-/* The slip of a law R(s) = slipping + (still - slipping) exp(-s/decay) with R(s) + rho s = tau > still. The function is
-   convex, and Newton's method descends to its root. */
-static double foretold(double tau, double still, double slipping, double decay, double rho)
+/* The slip of a law R(s) = slipping + (still - slipping) exp(-s/decay) with R(s) + rho s = tau > still, R and its slope
+   there. The function is convex, and Newton's method descends to its root. */
+static double foretold(double tau, double still, double slipping, double decay, double rho, double *R, double *slope)
 {
-    double s = (tau - slipping) / rho;
-    if (still > slipping && decay > 0)
+    double s = (tau - slipping) / rho, falling = 0;
+    if (still > slipping && decay > 0) {
         for (int i = 0; i < 50; i++) {
-            const double falling = (still - slipping) * exp(-s / decay);
+            falling = (still - slipping) * exp(-s / decay);
             const double step = (slipping + falling + rho * s - tau) / (rho - falling / decay);
-            s -= step;
-            if (fabs(step) <= 1e-14 * fabs(s)) break;
+            s = fmax(s - step, 0);
+            if (fabs(step) <= 1e-14 * s) break;
         }
-    return fmax(s, 0);
+        *slope = -falling / decay;
+    } else
+        *slope = 0;
+    *R = slipping + falling;
+    return s;
 }
 
 /* Where the law of friction drops at once, a node is held by the static limit only while it has not slipped. */
@@ -47,8 +51,8 @@ static double wall(model *m, int i)
         return length(s[0], s[1]);
     }
     m->broken[i] = 1;
-    const double sigma = foretold(size, limit[0], limit[1], decay, rho), R = size - rho * sigma;
-    const double falling = limit[0] > limit[1] && decay > 0 ? -(R - limit[1]) / decay : 0;
+    double R, falling;
+    const double sigma = foretold(size, limit[0], limit[1], decay, rho, &R, &falling);
     const double turning = n == 2 ? R / fmax(sigma, 1e-300) : 0, e[2] = {tau[0] / size, tau[1] / size};
     d[0] = turning + (falling - turning) * e[0] * e[0];
     d[1] = (falling - turning) * e[0] * e[1];
@@ -74,8 +78,8 @@ static double cut(model *m)
         return fabs(s);
     }
     m->broken[i] = 1;
-    const double sigma = foretold(fabs(tau), still, slipping, decay, rho), R = fabs(tau) - rho * sigma;
-    const double falling = still > slipping && decay > 0 ? -(R - slipping) / decay : 0;
+    double R, falling;
+    const double sigma = foretold(fabs(tau), still, slipping, decay, rho, &R, &falling);
     m->d[3 * i + 2] = falling;
     m->c[j] = copysign(R - falling * sigma, tau);
     return fabs(s - copysign(sigma, tau));
@@ -85,7 +89,7 @@ static double cut(model *m)
 static double rest(model *m, double h)
 {
     const int i = m->nodes - 1;
-    const double gap = (m->bit.floor - m->x[2 * i]) / h, s = m->w[2 * i] - gap;
+    const double gap = (m->bit.face - m->x[2 * i]) / h, s = m->w[2 * i] - gap;
     if (m->force[2 * i] + m->rho[2 * i] * s > 0) {
         m->mask[i] |= AXIAL;
         return fabs(s);
@@ -139,9 +143,7 @@ static void take_forces(model *m)
             }
         }
     }
-    const int i = last;
-    double *F = m->force + (size_t)i * n;
-    if (m->bit.law)
-        F[n - 1] = m->mask[i] & TURN ? missing(m, i, n - 1) : m->c[i * n + n - 1] + m->d[3 * i + 2] * m->w[i * n + n - 1];
-    if (m->bit.rock) F[0] = m->mask[i] & AXIAL ? missing(m, i, 0) : 0;
+    const int j = last * n + n - 1, mask = m->mask[last];
+    if (m->bit.law) m->force[j] = mask & TURN ? missing(m, last, n - 1) : m->c[j] + m->d[3 * last + 2] * m->w[j];
+    if (m->bit.rock) m->force[2 * last] = mask & AXIAL ? missing(m, last, 0) : 0;
 }

@@ -71,26 +71,25 @@ int build(model *m, double h)
 }
 
 /* Whether all laws are single-valued in steps of the length h: with the steepest slopes of all falling laws at once the
-   matrix of torsion stays positive. Returns the smallest pivot over the diagonal; the node of the bit alone decides
-   where the wall does not fall. */
+   matrices stay positive. Returns the smallest pivot over its diagonal. */
 double steepest(model *m, double h)
 {
     const int n = m->dofs, last = m->nodes - 1, turn = n - 1;
+    double smallest = 1;
     if (!build(m, h)) return -1;
-    double pivot = INFINITY, smallest = 1;
-    for (int i = m->top[turn].rigid; i <= last; i++) {
-        const int j = i * n + turn;
-        const double *limit = m->limit + 3 * (size_t)i;
-        double slope = 0;
-        if (m->decay > 0) {
-            slope = (limit[0] - limit[1]) / m->decay * limit[2];
-            if (!m->of_rotation) slope *= limit[2];
+    for (int d = 0; d < n; d++) {
+        double pivot = INFINITY;
+        for (int i = m->top[d].rigid; i <= last; i++) {
+            const int j = i * n + d;
+            const double *limit = m->limit + 3 * (size_t)i, r = limit[2];
+            const double decay = m->of_rotation ? m->decay * r : m->decay;
+            double slope = decay > 0 ? (limit[0] - limit[1]) / decay * (d == turn ? r * r : 1) : 0;
+            if (i == last && d == turn && m->bit.law && m->bit.decay > 0)
+                slope += (m->bit.still - m->bit.slipping) * (m->bit.weighs ? m->bit.weight : 1) / m->bit.decay;
+            pivot = m->a[j] - slope - (i ? m->o[j - n] * m->o[j - n] / pivot : 0);
+            smallest = fmin(smallest, pivot / m->a[j]);
+            if (!(pivot > 0)) return smallest;
         }
-        if (i == last && m->bit.law && m->bit.decay > 0)
-            slope += (m->bit.still - m->bit.slipping) * (m->bit.weighs ? m->bit.hanging : 1) / m->bit.decay;
-        pivot = m->a[j] - slope - (i ? m->o[j - n] * m->o[j - n] / pivot : 0);
-        smallest = fmin(smallest, pivot / m->a[j]);
-        if (!(pivot > 0)) return smallest;
     }
     return smallest;
 }

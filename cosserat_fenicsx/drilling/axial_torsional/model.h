@@ -1,6 +1,6 @@
-/* What Python sees of the C code of this folder; read by cffi too, so declarations alone. SI units. A string is a row of
-   nodes, from the top drive down, with one unknown each (the angle), or two (the displacement downwards, the angle); of
-   two the axial one comes first. Arrays belong to numpy. */
+/* What Python sees of the C code of this folder; read by cffi too, so declarations alone. SI units. A string is a row
+   of nodes, from the top drive down, with one unknown each (the angle), or two (the displacement downwards, the angle);
+   of two the axial one comes first. Arrays belong to numpy. */
 
 #ifndef AXIAL_TORSIONAL_H
 #define AXIAL_TORSIONAL_H
@@ -16,12 +16,14 @@ typedef struct {
 
 /* The lower end. Its force against the motion of the last node is force + tangent w + the law. */
 typedef struct {
-    int law, weighs, rock;          /* whether there is a Stribeck law, whether its torques are per weight on bit, whether
-                                       the bit rests on a rigid rock */
+    int law, weighs, rock;          /* whether there is a Stribeck law, whether its torques are per weight on bit,
+                                       whether the bit rests on a rigid rock */
     double still, slipping, decay;  /* torques of the law, or per weight, and speed; 0: it drops at once */
     double force[2], tangent[4];    /* given from Python before a step, for other laws: weight on bit and torque */
     double hanging;                 /* static weight on bit, with which the string hangs */
-    double weight, torque, floor;   /* of the last step; place of the rock */
+    double weight, torque;          /* of the last step */
+    double floor, sinking;          /* place of the rock's face at the end of the step, and its velocity downwards */
+    double face;                    /* its place at the end of the part of a step that is being done */
     double factor;                  /* of the next step, on the law's torques */
 } lower;
 
@@ -52,8 +54,8 @@ typedef struct {
     books sums;
     double *a, *o, *rho;            /* (nodes, dofs) x 3: matrix of a step of the length h, and factors of the laws */
     double h, ease;                 /* length of that step; share of the factors that is taken */
-    double *b, *q, *y, *d, *c, *guess; /* work space: (nodes, dofs), (nodes, 4), (nodes, dofs), (nodes, 3), (nodes, dofs),
-                                       (2, nodes, dofs) */
+    double *b, *y, *c, *q, *d;      /* work space: (nodes, dofs) x 3, (nodes, 4), (nodes, 3) */
+    double *guess;                  /* (2, nodes, dofs) */
     int *mask, *broken;             /* (nodes,) */
     long halved, iterations, most;  /* counts: steps that were halved, iterations, most of them in a step */
 } model;

@@ -1,11 +1,11 @@
 """The model of a string by elements: torsion alone, axial and torsional motion together, or discs.
 
 Method: linear elements, the implicit midpoint rule, and set-valued laws of wall and bit, which hold or slip within a
-step: Newton's method on their proximal maps with the mean velocities of the step as unknowns (`laws.c`). Friction at the
-wall is a vector against the slip (V, r om), of a normal force per length by the soft string, |T k n + w (e - (e.t) t)|,
-with the tension at the begin of the step. What is held in a step is at rest at its end. Steps that fail are halved.
-Energies and works close to rounding, since the rule keeps quadratic energies and works are those of the step's own
-forces; only the tolerance of Newton's method is left.
+step: Newton's method on their proximal maps with the mean velocities of the step as unknowns (laws.c). Friction at
+the wall is a vector against the slip (V, r om), of a normal force per length by the soft string, the norm of
+T k n + w (e - (e.t) t), with the tension at the begin of the step. What is held in a step is at rest at its end. Steps
+that fail are halved. Energies and works balance to rounding and to the tolerance of Newton's method: the rule keeps
+quadratic energies, and works are those of the step's own forces.
 """
 
 from pathlib import Path
@@ -27,6 +27,7 @@ from cosserat_fenicsx.errors import NotConverged, SceneError
 SOURCES = tuple(Path(__file__).with_name(name) for name in ("model.c", "laws.c", "step.c"))
 _STATE = ("x", "v", "w", "force")
 _TRIALS = 30
+_ELEMENTS = 1_000_000
 _SUMS = ("drive", "hook", "bit", "wall", "mud")
 
 
@@ -62,7 +63,8 @@ class AxialTorsional(Pointers):
         if dt is not None:
             dt = positive("AxialTorsional", "dt", dt, "s")
         if elements is not None:
-            number("AxialTorsional", "elements", elements, "a number of elements from 2", lambda x: x >= 2)
+            expected = f"a number of elements from 2 to {_ELEMENTS}"
+            number("AxialTorsional", "elements", elements, expected, lambda x: 2 <= x <= _ELEMENTS and x == int(x))
         self.dt = dt or usual_step(scene, elements)
         for _ in range(_TRIALS):
             self._set(elements)
@@ -85,6 +87,9 @@ class AxialTorsional(Pointers):
         self._set_bit(scene.bit)
         self._signals = self._axial * [self._set_hook(scene.hook)] + [self._set_drive(scene.drive)]
         self._lib.limits(self._m)
+        m, held = self._m, self._kept["held"]
+        held[self._kept["limit"][:, 0] > 0] = 3 if self._axial else 2
+        held[-1] |= 2 * m.bit.law + m.bit.rock
 
     # -- what C sees ---------------------------------------------------------------------------------------------------
 
@@ -106,7 +111,7 @@ class AxialTorsional(Pointers):
             self._array(name, np.zeros((nodes, width)))
         for name in ("mask", "broken"):
             self._array(name, np.zeros(nodes, dtype=np.int32))
-        self._array("held", np.full(nodes, 3 if n == 2 else 2, dtype=np.int32))
+        self._array("held", np.zeros(nodes, dtype=np.int32))
 
     def _set_wall(self, friction):
         m, wall = self._m, self._chain.wall
@@ -182,7 +187,7 @@ class AxialTorsional(Pointers):
             told.append("friction at the wall by the tension at rest")
         return tuple(told)
 
-    # -- the protocol of string models ------------------------------------------------------------------------------------
+    # -- the protocol of string models ---------------------------------------------------------------------------------
 
     @property
     def time(self) -> float:
@@ -200,21 +205,11 @@ class AxialTorsional(Pointers):
         if self._axial:
             rows[:, [1, 3]] *= -1  # the hook's speed is positive upwards
         records = np.full((steps, len(SERIES) + len(LEDGER)), np.nan)
-        if self.end is None:
-            done = self._advance(rows, records)
-        else:
-            done, record = 0, 0
-            for row in rows:
-                force, tangent = self.end.begin(self, row[0])
-                self._m.bit.force, self._m.bit.tangent = list(force), np.ravel(tangent).tolist()
-                if self._advance(row[None], records[record:]) == 0:
-                    break
-                self.end.commit(self, row[0])
-                done, record = done + 1, record + int(row[-1])
-        completed = int(rows[:done, -1].sum())
-        times = (self.steps + 1 + np.arange(completed)) * self.dt
-        self.steps += completed
-        found = np.column_stack([times, records[:completed]])
+        start = self.steps
+        done = self._advance(rows, records) if self.end is None else self._advance_with_end(rows, records)
+        self.steps = start + int(rows[:done, -1].sum())
+        times = np.arange(start + 1, self.steps + 1) * self.dt
+        found = np.column_stack([times, records[: len(times)]])
         if done < len(rows):
             problem = NotConverged(
                 f"{self.name}: the step at t = {self.time:g} s does not converge however short it is made: expected a "
@@ -230,10 +225,26 @@ class AxialTorsional(Pointers):
             self._m, len(rows), cast("double *", rows.ctypes.data), cast("double *", records.ctypes.data)
         )
 
+    def _advance_with_end(self, rows, records):
+        start = self.steps
+        for i, row in enumerate(rows):
+            force, tangent = self.end.begin(self, row[0])
+            self._m.bit.force, self._m.bit.tangent = list(force), np.ravel(tangent).tolist()
+            if self._advance(row[None], records[self.steps - start :]) == 0:
+                return i
+            self.steps += int(row[-1])
+            self.end.commit(self, row[0])
+        return len(rows)
+
     def coarser(self) -> "AxialTorsional":
         """The same scene at rest, with twice the step and half the elements."""
         fewer = None if self._asked is None else max(2, self._asked // 2)
         return type(self)(self.scene, 2 * self.dt, fewer, axial=self._axial, end=self.end)
+
+    def set_rock(self, place: float, velocity: float) -> None:
+        """A rigid rock under the bit, which pushes but does not pull, for the `begin` of an end condition: its face at
+        the end of the coming step, in m below that at the start, and its velocity there, m/s downwards."""
+        self._m.bit.rock, self._m.bit.floor, self._m.bit.sinking = self._axial, place, velocity
 
     def bit_state(self) -> np.ndarray:
         """(2, 2) of the bit at the end of the last step: place (m downwards, rad) and velocity; NaN where axial motion
@@ -264,7 +275,7 @@ class AxialTorsional(Pointers):
         found = {name: self._kept[name].copy() for name in (*_STATE, "held")}
         found["sums"] = np.array([getattr(m.sums, name) for name in _SUMS])
         found["ends"] = np.array([*((m.top[i].error, m.top[i].force) for i in (0, 1))]).ravel()
-        found["bit"] = np.array([m.bit.weight, m.bit.torque, m.bit.floor])
+        found["bit"] = np.array([m.bit.weight, m.bit.torque, m.bit.floor, m.bit.sinking, m.bit.face])
         found["counts"] = np.array([self.steps, m.halved, m.iterations, m.most])
         if self.end is not None:
             found["end"] = self.end.memory()
@@ -279,7 +290,7 @@ class AxialTorsional(Pointers):
             setattr(m.sums, name, value)
         for i, (error, force) in enumerate(np.reshape(memory["ends"], (2, 2))):
             m.top[i].error, m.top[i].force = error, force
-        m.bit.weight, m.bit.torque, m.bit.floor = memory["bit"]
+        m.bit.weight, m.bit.torque, m.bit.floor, m.bit.sinking, m.bit.face = memory["bit"]
         self.steps, m.halved, m.iterations, m.most = (int(x) for x in memory["counts"])
         if self.end is not None:
             self.end.recall(memory["end"])

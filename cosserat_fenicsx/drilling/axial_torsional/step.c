@@ -1,11 +1,12 @@
 /* A step, its books and its record. */
 
-/* w from (A + D) w = b - c by elimination along the string; held unknowns have given velocities. */
-static inline void eliminate(model *m, const double *given_top, double given_bit, const int n)
+/* w from (A + D) w = b - c by elimination along the string; held unknowns have given velocities. Returns a sum that is
+   finite if all numbers are. */
+static inline double eliminate(model *m, const double *given_top, double given_bit, const int n)
 {
     const int last = m->nodes - 1;
     for (int i = 0; i <= last; i++) {
-        const double *d = m->d + 3 * (size_t)i, *o = m->o + (size_t)(i - 1) * n;
+        const double *d = m->d + 3 * (size_t)i, *o = i ? m->o + (size_t)(i - 1) * n : 0;
         double *q = m->q + 4 * (size_t)i, *y = m->y + (size_t)i * n;
         int mask = m->mask[i];
         double p[2][2] = {{0}}, r[2] = {0}, given[2] = {0};
@@ -46,7 +47,8 @@ static inline void eliminate(model *m, const double *given_top, double given_bit
                 }
         }
     }
-    for (int k = 0; k < n; k++) m->w[last * n + k] = m->y[last * n + k];
+    double sum = 0;
+    for (int k = 0; k < n; k++) sum += m->w[last * n + k] = m->y[last * n + k];
     for (int i = last - 1; i >= 0; i--) {
         const double *o = m->o + (size_t)i * n, *q = m->q + 4 * (size_t)i, *y = m->y + (size_t)i * n;
         double *w = m->w + (size_t)i * n, s[2];
@@ -54,14 +56,16 @@ static inline void eliminate(model *m, const double *given_top, double given_bit
         for (int k = 0; k < n; k++) {
             w[k] = y[k];
             for (int l = 0; l < n; l++) w[k] -= q[2 * k + l] * s[l];
+            sum += w[k];
         }
     }
+    return sum;
 }
 
 /* The mean velocities w and the forces of the laws in a step; 0 where Newton's method does not converge. */
 static int solve(model *m, double h, const double *signal)
 {
-    const double gap = m->bit.rock ? (m->bit.floor - m->x[2 * m->nodes - 2]) / h : 0;
+    const double gap = m->bit.rock ? (m->bit.face - m->x[2 * m->nodes - 2]) / h : 0;
     memset(m->broken, 0, m->nodes * sizeof *m->broken);
     loads(m, h, signal);
     m->ease = 1;
@@ -74,14 +78,11 @@ static int solve(model *m, double h, const double *signal)
             if (i > m->most) m->most = i;
             return 1;
         }
-        if (i == ITERATIONS || !isfinite(error)) {
+        const double sum = m->dofs == 1 ? eliminate(m, signal, gap, 1) : eliminate(m, signal, gap, 2);
+        if (i == ITERATIONS || !isfinite(sum)) {
             m->iterations += i;
             return 0;
         }
-        if (m->dofs == 1)
-            eliminate(m, signal, gap, 1);
-        else
-            eliminate(m, signal, gap, 2);
         take_forces(m);
     }
 }
@@ -96,6 +97,47 @@ static double set_velocity(model *m, int i, int d, double v)
     const double added = p * (v - m->v[j]);
     m->v[j] = v;
     return added;
+}
+
+/* Velocities of held nodes in one of the unknowns become 0, that of a bit on a rock the rock's, by impulses on these
+   nodes alone: others go along so that their momentum stays, which loses energy and never brings any. */
+static void settle(model *m, int d)
+{
+    const int n = m->dofs, last = m->nodes - 1, rigid = m->top[d].rigid, mask = bit_of(m, d);
+    double *v = m->v + d, *change = m->y + d, *pivot = m->q + d;
+    const double *mass = m->mass + d, *off = m->mass_off + d;
+    int moves = 0;
+    for (int i = 0; i <= last; i++) {
+        const double sinking = i == last && d < n - 1 && m->bit.rock ? m->bit.sinking : 0;
+        change[i * n] = m->held[i] & mask ? sinking - v[i * n] : 0;
+        moves |= change[i * n] != 0;
+    }
+    if (!moves) return;
+    /* pivots of free nodes; 0 where a node is held */
+    for (int i = 0; i <= last; i++) {
+        pivot[i * n] = 0;
+        if ((i == 0 && rigid) || m->held[i] & mask) continue;
+        pivot[i * n] = mass[i * n];
+        if (!i) continue;
+        const double before = pivot[(i - 1) * n], o = off[(i - 1) * n];
+        if (before) pivot[i * n] -= o * o / before;
+        change[i * n] -= before ? o / before * change[(i - 1) * n] : o * change[(i - 1) * n];
+    }
+    for (int i = last; i >= 0; i--)
+        if (pivot[i * n])
+            change[i * n] = (change[i * n] - (i < last ? off[i * n] * change[(i + 1) * n] : 0)) / pivot[i * n];
+    for (int i = 0; i <= last; i++)
+        if (!pivot[i * n]) {
+            double impulse = mass[i * n] * change[i * n];
+            if (i) impulse += off[(i - 1) * n] * change[(i - 1) * n];
+            if (i < last) impulse += off[i * n] * change[(i + 1) * n];
+            const double work = impulse * (v[i * n] + change[i * n] / 2);
+            if (i == 0)
+                *(d == n - 1 ? &m->sums.drive : &m->sums.hook) += work;
+            else
+                *(i == last && (m->bit.law || m->bit.rock) ? &m->sums.bit : &m->sums.wall) -= work;
+        }
+    for (int i = 0; i <= last; i++) v[i * n] += change[i * n];
 }
 
 /* Take a step that has converged. */
@@ -145,13 +187,9 @@ static void commit(model *m, double h, const double *signal)
         m->x[j] += h * m->w[j];
         m->v[j] = 2 * m->w[j] - m->v[j];
     }
-    /* what is held in a step is at rest at its end */
-    for (int i = 0; i <= last; i++) {
-        m->held[i] = m->mask[i];
-        double *lost = i == last && (m->bit.law || m->bit.rock) ? &sums->bit : &sums->wall;
-        for (int d = 0; d < n; d++)
-            if (m->mask[i] & bit_of(m, d)) *lost -= set_velocity(m, i, d, 0);
-    }
+    for (int i = 0; i <= last; i++) m->held[i] = m->mask[i];
+    /* what is held in a step ends it at rest, or with the rock */
+    for (int d = 0; d < n; d++) settle(m, d);
 }
 
 static int step(model *m, double h, const double *from, const double *to)
@@ -189,8 +227,8 @@ static void write_record(const model *m, double *row)
                 strain += m->spring[j] * stretch * stretch / 2;
                 if (d < turn) strain += m->hanging[i] * stretch;
             }
-            if (d < turn)
-                weight += ((i ? m->hanging[i - 1] : m->hanging_top) - (i < last ? m->hanging[i] : -m->bit.hanging)) * x[j];
+            const double above = i ? m->hanging[i - 1] : m->hanging_top;
+            if (d < turn) weight += (above - (i < last ? m->hanging[i] : -m->bit.hanging)) * x[j];
         }
     if (n == 2 && !m->top[0].rigid) {
         const double error = m->top[0].error;
@@ -216,6 +254,7 @@ int advance(model *m, int intervals, const double *interval, double *record)
                 double *work = d == n - 1 ? &m->sums.drive : &m->sums.hook;
                 *work += set_velocity(m, 0, d, from[d]);
             }
+        const double face = m->bit.face, sinks = m->bit.floor - face;
         double done = 0, size = 1;
         while (done < 1) {
             double begin[2], end[2];
@@ -223,6 +262,7 @@ int advance(model *m, int intervals, const double *interval, double *record)
                 begin[d] = from[d] + done * (to[d] - from[d]);
                 end[d] = from[d] + (done + size) * (to[d] - from[d]);
             }
+            m->bit.face = face + (done + size) * sinks;
             if (step(m, size * h, begin, end)) {
                 done += size;
                 /* parts begin at multiples of their length */
