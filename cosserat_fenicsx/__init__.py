@@ -118,6 +118,19 @@ _HOME = {
     "ViscousDrag": "drilling.wall_friction",
     "WallFriction": "drilling.wall_friction",
     "Wear": "drilling.bit_laws",
+    "SoftTorque": "drilling.linear.tuned",
+    "SoftSpeed": "drilling.linear.tuned",
+    "natural_frequencies": "drilling.linear.frequencies",
+    "stability": "drilling.linear.stability",
+    "Stability": "drilling.linear.spectrum",
+    "critical_slopes": "drilling.linear.limits",
+    "limit_speed": "drilling.linear.limits",
+    "limit_weight": "drilling.linear.limits",
+    "bit_bounce": "drilling.linear.bounce",
+    "BitBounce": "drilling.linear.bounce",
+    "campbell": "drilling.linear.campbell",
+    "Campbell": "drilling.linear.campbell",
+    "LumpedCutting": "drilling.linear.lumped",
     "euler_load": "scene.rod",
     "read_motion": "scene.scenefile",
     "read_path": "statics.reading",
@@ -154,10 +167,23 @@ if TYPE_CHECKING:  # the same names, for editors and type checkers
     from cosserat_fenicsx.drilling.bit_laws import Wear as Wear
     from cosserat_fenicsx.drilling.discs import Discs as Discs
     from cosserat_fenicsx.drilling.hook import Hook as Hook
+    from cosserat_fenicsx.drilling.linear.bounce import BitBounce as BitBounce
+    from cosserat_fenicsx.drilling.linear.bounce import bit_bounce as bit_bounce
+    from cosserat_fenicsx.drilling.linear.campbell import Campbell as Campbell
+    from cosserat_fenicsx.drilling.linear.campbell import campbell as campbell
+    from cosserat_fenicsx.drilling.linear.frequencies import natural_frequencies as natural_frequencies
+    from cosserat_fenicsx.drilling.linear.limits import critical_slopes as critical_slopes
+    from cosserat_fenicsx.drilling.linear.limits import limit_speed as limit_speed
+    from cosserat_fenicsx.drilling.linear.limits import limit_weight as limit_weight
+    from cosserat_fenicsx.drilling.linear.lumped import LumpedCutting as LumpedCutting
+    from cosserat_fenicsx.drilling.linear.spectrum import Stability as Stability
+    from cosserat_fenicsx.drilling.linear.stability import stability as stability
+    from cosserat_fenicsx.drilling.linear.tuned import SoftSpeed as SoftSpeed
+    from cosserat_fenicsx.drilling.linear.tuned import SoftTorque as SoftTorque
     from cosserat_fenicsx.drilling.scene import Drilling as Drilling
+    from cosserat_fenicsx.drilling.top_drive import PI as PI
     from cosserat_fenicsx.drilling.top_drive import Matched as Matched
     from cosserat_fenicsx.drilling.top_drive import Motor as Motor
-    from cosserat_fenicsx.drilling.top_drive import PI as PI
     from cosserat_fenicsx.drilling.top_drive import Stiff as Stiff
     from cosserat_fenicsx.drilling.top_drive import TopDrive as TopDrive
     from cosserat_fenicsx.drilling.wall_friction import ViscousDrag as ViscousDrag

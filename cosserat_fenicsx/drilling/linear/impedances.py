@@ -8,8 +8,8 @@ both downwards, which is minus the tension. Along a uniform part of length L, wi
     w(L) = cosh(g L) w(0) - s/K sinh(g L)/g P(0)
     P(L) = cosh(g L) P(0) - mu (s + d) sinh(g L)/g w(0)
 
-which are entire functions of s. States are scaled by positive factors, such that nothing overflows however large s L is:
-phases, ratios and logarithmic derivatives are exact, sizes are not.
+which are entire functions of s. States are scaled by positive factors, such that nothing overflows however large s L
+is: phases, ratios and logarithmic derivatives are exact, sizes are not.
 """
 
 from dataclasses import dataclass
@@ -63,9 +63,12 @@ class Uniform:
         """Time that a wave takes, s."""
         return self.length * np.sqrt(self.inertia / self.stiffness)
 
-    def down(self, s, state, length=None):
-        """The state at the lower end, or at a length (m) below the upper one."""
-        length = self.length if length is None else length
+    def down(self, s, state):
+        """The state at the lower end."""
+        return self.through(s, state, self.length).scaled(self.impedance)
+
+    def through(self, s, state, length):
+        """The state at a length (m) below the upper end, times exp(-Re(g length))."""
         square = self.inertia / self.stiffness * s * (s + self.drag)
         C, S, dC, dS = _hyperbolic(square, length)
         turn = self.inertia / self.stiffness * (2 * s + self.drag)  # derivative of the square
@@ -76,7 +79,11 @@ class Uniform:
             C * P + b * S * w,
             C * dw + a * S * dP + dC * turn * w + (a * dS * turn - S / self.stiffness) * P,
             C * dP + b * S * dw + dC * turn * P + (b * dS * turn - self.inertia * S) * w,
-        ).scaled(self.impedance)
+        )
+
+    def decay(self, s, length):
+        """Re(g length)."""
+        return (np.sqrt(self.inertia / self.stiffness * s * (s + self.drag)) * length).real
 
 
 def _hyperbolic(square, length):
@@ -115,6 +122,10 @@ class Disc:
 
     def down(self, s, state):
         """The state at the next disc, above it."""
+        return self.through(s, state).scaled(self.impedance)
+
+    def through(self, s, state):
+        """The same in its own size."""
         own = self.inertia * s + self.drag
         P, dP = state.P - own * state.w, state.dP - own * state.dw - self.inertia * state.w
         if self.spring is None:
@@ -125,7 +136,7 @@ class Disc:
             give * P,
             dgive * state.w + give * state.dw - (P + s * dP) / self.spring,
             dgive * P + give * dP,
-        ).scaled(self.impedance)
+        )
 
 
 @dataclass(frozen=True)

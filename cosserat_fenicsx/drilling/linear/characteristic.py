@@ -1,0 +1,160 @@
+"""Characteristic equations of a string that drills steadily: their roots s are growth rates and frequencies.
+
+Where the torque on bit depends on its speed alone, with the slope kappa = dT/dom:
+
+    Jb s + kappa + Z(s) = 0,        Z the torsional impedance of string and drive from the bit up.
+
+Where the bit cuts, at the rotation Om and the rate of penetration V, with n blades and the delay tau = 2 pi/(n Om):
+
+    (s Za(s) + ka E) (s Zt(s) - kt rho E) + ka kt rho E^2 = 0,   E = 1 - exp(-s tau),  rho = V/Om,
+
+Za and Zt with the mass and the inertia of the bit, ka and kt weight and torque per depth of cut. Both are written
+without denominators, as entire functions of s.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import brentq
+
+from cosserat_fenicsx.drilling.linear.impedances import Guide
+
+
+@dataclass(frozen=True)
+class FallingTorque:
+    """The function B + kappa om at the bit; kappa in N m s/rad, negative where the torque falls with the speed."""
+
+    torsion: Guide
+    kappa: float
+
+    def __call__(self, s):
+        om, B, dom, dB = self.torsion.bit(s)
+        return B + self.kappa * om, dB + self.kappa * dom
+
+    @property
+    def spacing(self):
+        """Typical distance of roots along the imaginary axis, rad/s."""
+        return math.pi / self.torsion.travel
+
+    @property
+    def exponents(self):
+        """See roots.py."""
+        return -self.torsion.travel, self.torsion.travel
+
+    @property
+    def fastest(self):
+        """A growth rate that no root reaches, 1/s.
+
+        Drive and string only take energy: Re Z > 0 for Re s > 0. So x Jb < -kappa for the growth x; and Re Z is at
+        least Z tanh(x T), Z and T impedance and travel time of the lowest part, whatever is above it.
+        """
+        fall, last = max(-self.kappa, 0.0), self.torsion.parts[-1]
+        inertia = self.torsion.inertia + (last.inertia if last.travel == 0 else 0.0)
+        bounds = [fall / inertia] if inertia else []
+        if last.travel and fall < last.impedance:
+            bounds.append(math.atanh(fall / last.impedance) / last.travel)
+        return 1.5 * min(bounds) + self.spacing / 2
+
+    @property
+    def guides(self):
+        """Which strings move."""
+        return (self.torsion,)
+
+    def motion(self, s):
+        """Relative motion of the bit in each guide: (1,)."""
+        return (1.0 + 0j,)
+
+
+@dataclass(frozen=True)
+class Regenerative:
+    """The function of a bit that cuts: rotation Om (rad/s), rate of penetration V (m/s), see the head of this file.
+
+    Attributes:
+        ka: N/m; kt: N; blades: n.
+    """
+
+    torsion: Guide
+    axial: Guide
+    ka: float
+    kt: float
+    blades: int
+    speed: float
+    penetration: float
+
+    @property
+    def delay(self):
+        """s."""
+        return 2 * math.pi / (self.blades * self.speed)
+
+    def _memory(self, s):
+        """E/s and its derivative."""
+        tau = self.delay
+        x = s * tau
+        small = np.abs(x) < 1e-2
+        y = np.where(small, 1.0, x)
+        decayed = np.exp(-y)
+        value = np.where(small, 1 - x / 2 * (1 - x / 3 * (1 - x / 4 * (1 - x / 5 * (1 - x / 6 * (1 - x / 7))))),
+                         (1 - decayed) / y)  # fmt: skip
+        series = -1 / 2 + x / 3 * (1 - 3 * x / 8 * (1 - 4 * x / 15 * (1 - 5 * x / 24 * (1 - 6 * x / 35))))
+        slope = np.where(small, series, (decayed * (1 + y) - 1) / y**2)
+        return tau * value, tau**2 * slope
+
+    def __call__(self, s):
+        om, T, dom, dT = self.torsion.bit(s)
+        v, A, dv, dA = self.axial.bit(s)
+        e, de = self._memory(s)
+        rho = self.penetration / self.speed
+        first, second = A + self.ka * e * v, T - self.kt * rho * e * om
+        dfirst = dA + self.ka * (de * v + e * dv)
+        dsecond = dT - self.kt * rho * (de * om + e * dom)
+        k = self.ka * self.kt * rho
+        return (
+            first * second + k * e**2 * v * om,
+            dfirst * second + first * dsecond + k * (2 * e * de * v * om + e**2 * (dv * om + v * dom)),
+        )
+
+    @property
+    def spacing(self):
+        """Typical distance of roots along the imaginary axis, rad/s."""
+        return 2 * math.pi / (2 * self.torsion.travel + 2 * self.axial.travel + self.delay)
+
+    @property
+    def exponents(self):
+        """See roots.py."""
+        travel = self.torsion.travel + self.axial.travel
+        return -travel - self.delay, travel
+
+    @property
+    def fastest(self):
+        """A growth rate that no root reaches, 1/s.
+
+        The equation says s = -E (ka/Za - kt rho/Zt), where E is below 2 and Za and Zt, for a growth x, are at least
+        Z tanh(x T) + m x, see `FallingTorque.fastest`.
+        """
+        rho = self.penetration / self.speed
+
+        def excess(x):
+            least = [y.impedance * math.tanh(x * y.parts[-1].travel) + y.inertia * x for y in self.guides]
+            return x - 2 * (self.kt * rho / least[0] + self.ka / least[1])
+
+        low, high = 1e-6 * self.spacing, self.spacing
+        while excess(high) < 0:
+            low, high = high, 2 * high
+        return 1.2 * brentq(excess, low, high)
+
+    @property
+    def guides(self):
+        """Which strings move."""
+        return self.torsion, self.axial
+
+    def motion(self, s):
+        """Relative motion of the bit in each guide: rotation and axial velocity, (2,)."""
+        at = np.array([s], dtype=complex)
+        (om, T, *_), (v, A, *_), (e, _) = self.torsion.bit(at), self.axial.bit(at), self._memory(at)
+        rho = self.penetration / self.speed
+        # per unit of rotation, from the equation that is the better conditioned one of both
+        axial, torsional = A / v + self.ka * e, T / om - self.kt * rho * e
+        if abs(axial[0]) > abs(self.ka * e[0]) * 1e-6:
+            return 1.0 + 0j, complex(self.ka * e[0] * rho / axial[0])
+        return 1.0 + 0j, complex(-torsional[0] / (self.kt * e[0]))

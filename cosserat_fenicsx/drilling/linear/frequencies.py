@@ -1,0 +1,112 @@
+"""Natural frequencies of a string without losses, none of which can be missed.
+
+In a uniform part the angle psi of the vector (Z w theta, -M) grows by w L/c, w the circular frequency: it counts all
+half waves, however short they are. Where the impedance changes, tan psi changes by their ratio and the half waves stay.
+At the lower end psi less the angle that its condition asks for grows with w, as Sturm's theory says; the k-th natural
+frequency is where that is k pi. Each is enclosed by itself, so that the count is exact for any number of parts: the
+phase is the integer of Wittrick & Williams, Q. J. Mech. Appl. Math. 24 (1971) 263, doi:10.1093/qjmam/24.3.263.
+"""
+
+import math
+
+import numpy as np
+from scipy.linalg import eigh
+from scipy.optimize import brentq
+
+from cosserat_fenicsx.checks import number, refuse
+from cosserat_fenicsx.drilling.discs import Discs
+from cosserat_fenicsx.drilling.hook import Hook
+from cosserat_fenicsx.drilling.linear.impedances import Guide, axial, torsional
+from cosserat_fenicsx.drilling.scene import Drilling
+from cosserat_fenicsx.drilling.top_drive import Motor
+
+
+def natural_frequencies(scene: Drilling, count: int, bit: str = "free", kind: str = "torsion") -> np.ndarray:
+    """Natural frequencies of a string without drag, the lowest ones.
+
+    The top drive stands still, whatever its control (`stability` takes the control into account), but for a `Motor`,
+    which turns freely with its inertia; axially the top hangs in the stiffness of the hook. A rotation of the whole
+    string is not listed.
+
+    Args:
+        scene: a `Drilling`.
+        count: how many.
+        bit: "free", with the inertia or mass of the scene's bit, or "fixed".
+        kind: "torsion" or "axial".
+
+    Returns:
+        (count,) Hz, ascending; fewer for `Discs` that have fewer.
+
+    Raises:
+        SceneError: a count below one, an unknown end or kind, or axial waves of discs.
+    """
+    count = int(number("natural_frequencies", "count", count, "a number from 1", lambda x: x >= 1 and x == int(x)))
+    if bit not in ("free", "fixed"):
+        refuse("natural_frequencies", "bit", bit, "'free' or 'fixed'")
+    if kind not in ("torsion", "axial"):
+        refuse("natural_frequencies", "kind", kind, "'torsion' or 'axial'")
+    if kind == "torsion" and isinstance(scene.string, Discs):
+        return _of_discs(scene, bit)[:count]
+    guide, top = (axial(scene), _hook(scene)) if kind == "axial" else (torsional(scene), _drive(scene))
+    found = _circular(guide, count, bit == "fixed", top) / (2 * math.pi)
+    return found
+
+
+def _drive(scene):
+    """tan psi at the top as (numerator, denominator) of w and the impedance."""
+    if isinstance(scene.drive.control, Motor):
+        return lambda w, Z: (Z, -scene.drive.inertia * w)
+    return lambda w, Z: (0.0, 1.0)
+
+
+def _hook(scene):
+    stiffness = (scene.hook or Hook()).stiffness
+    return lambda w, Z: (0.0, 1.0) if math.isinf(stiffness) else (Z * w, stiffness)
+
+
+def phase(guide: Guide, w: float, fixed: bool, top) -> float:
+    """The angle at the lower end less the one that its condition asks for, rad; in a mode a multiple of pi."""
+    first = guide.parts[0].impedance
+    psi = math.atan2(*top(w, first))
+    for part, following in zip(guide.parts, (*guide.parts[1:], None), strict=True):
+        psi += w * part.travel
+        if following is not None:
+            half, rest = divmod(psi + math.pi / 2, math.pi)  # rest is psi - half pi, beyond -pi/2
+            rest -= math.pi / 2
+            psi = half * math.pi + math.atan2(following.impedance * math.sin(rest), part.impedance * math.cos(rest))
+    return psi if fixed else psi - math.atan2(guide.parts[-1].impedance, guide.inertia * w)
+
+
+def _circular(guide, count, fixed, top):
+    """(count,) rad/s."""
+    scale = math.pi / guide.travel
+
+    def at(w):
+        return phase(guide, w, fixed, top)
+
+    # at the frequency 0 the phase is a multiple of pi where the whole string moves, or where nothing does: not a mode
+    first = math.floor(at(1e-9 * scale) / math.pi + 1e-6) + 1
+    found, low = [], 1e-9 * scale
+    for k in range(first, first + count):
+        high = low + scale
+        while at(high) < k * math.pi:
+            high += scale
+        low = brentq(lambda w, k=k: at(w) - k * math.pi, low, high, xtol=1e-15 * scale, rtol=1e-15, maxiter=200)
+        found.append(low)
+    return np.array(found)
+
+
+def _of_discs(scene, bit):
+    """Hz, of rotations that are not those of the whole string."""
+    string = scene.string
+    inertias = np.array(string.inertias)
+    inertias[0] += scene.drive.inertia
+    inertias[-1] += scene.bit.inertia if scene.bit else 0.0
+    k = np.array(string.stiffnesses)
+    stiffness = np.diag(np.append(k, 0.0) + np.append(0.0, k)) - np.diag(k, 1) - np.diag(k, -1)
+    kept = slice(0 if isinstance(scene.drive.control, Motor) else 1, len(inertias) - (bit == "fixed"))
+    if kept.start == kept.stop:
+        return np.array([])
+    squares = eigh(stiffness[kept, kept], np.diag(inertias[kept]), eigvals_only=True)
+    turns = kept.start == 0 and bit == "free"  # as a whole
+    return np.sqrt(squares[int(turns):]) / (2 * math.pi)  # fmt: skip

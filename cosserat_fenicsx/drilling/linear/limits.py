@@ -1,0 +1,179 @@
+"""Limits of stability: slope of the bit's torque, speed and weight at which a first mode begins to grow."""
+
+import math
+
+import numpy as np
+from numpy.polynomial import chebyshev
+from scipy.optimize import brentq
+
+from cosserat_fenicsx.checks import number, positive, refuse
+from cosserat_fenicsx.drilling.linear.impedances import torsional
+from cosserat_fenicsx.drilling.linear.roots import all_roots
+from cosserat_fenicsx.drilling.linear.stability_box import box_up_to
+from cosserat_fenicsx.drilling.linear.steady import Steady
+from cosserat_fenicsx.drilling.scene import Drilling
+from cosserat_fenicsx.drilling.single_valued import slope, stribeck_of
+from cosserat_fenicsx.errors import NotConverged
+
+#: Degree of the polynomials that a piece of the imaginary axis is interpolated by, and how well they must do.
+_DEGREE, _RESOLVED = 24, 1e-11
+
+
+def critical_slopes(scene: Drilling, up_to: float = 10.0) -> tuple[np.ndarray, np.ndarray]:
+    """All slopes of the bit's torque at which some mode neither grows nor decays.
+
+    Those of falling torque and of rising torque, where Im(Jb s + Z(s)) = 0 at s = i w: kappa = -Re Z.
+
+    Args:
+        scene: a `Drilling`; its bit gives the inertia alone.
+        up_to: highest frequency, Hz.
+
+    Returns:
+        circular frequencies w (n,), rad/s, ascending, and slopes kappa = dT/dom (n,), N m s/rad, negative for a torque
+        that falls with the speed. The largest one is where the first mode begins to grow. The slope at w = 0 where a
+        drive without an integral part gives way is the first of them; there the speed itself runs away.
+
+    Raises:
+        SceneError: a frequency that is not positive.
+        NotConverged: the impedance could not be resolved.
+    """
+    guide = torsional(scene)
+    top = 2 * math.pi * positive("critical_slopes", "up_to", up_to, "Hz")
+
+    def parts(w):
+        om, B, *_ = guide.bit(1j * np.asarray(w))
+        return B * np.conj(om), np.abs(om) ** 2
+
+    width = math.pi / (2 * guide.travel)
+    edges = np.linspace(0.0, top, 1 + max(1, math.ceil(top / width)))
+    found = []
+    for a, b in zip(edges[:-1], edges[1:], strict=True):
+        found += _real_roots(lambda w: parts(w)[0].imag, a, b)
+    # at rest: both are 0 by symmetry; the slope is a limit unless the drive holds the string there
+    at = np.array([w for w in found if w > 1e-9 * width])
+    ends, sizes = parts(np.append(0.0, at))
+    keep = sizes > 1e-24 * np.abs(ends)
+    return np.append(0.0, at)[keep], -(ends.real[keep] / sizes[keep])
+
+
+def _real_roots(f, a, b, depth=0):
+    """All real roots of a smooth function in [a, b), as those of a polynomial that interpolates it."""
+    series = chebyshev.chebinterpolate(lambda x: f((a + b) / 2 + (b - a) / 2 * x), _DEGREE)
+    size = np.abs(series).max()
+    if size == 0.0:
+        return []
+    if np.abs(series[-3:]).max() > _RESOLVED * size:
+        if depth > 30:
+            raise NotConverged(f"the impedance from {a:.6g} to {b:.6g} rad/s could not be resolved")
+        middle = (a + b) / 2
+        return _real_roots(f, a, middle, depth + 1) + _real_roots(f, middle, b, depth + 1)
+    roots = chebyshev.chebroots(chebyshev.chebtrim(series, 1e-15 * size))
+    roots = np.sort(roots.real[(np.abs(roots.imag) < 1e-7) & (roots.real >= -1) & (roots.real < 1)])
+    found = []
+    for x in roots:
+        w, h = (a + b) / 2 + (b - a) / 2 * x, 1e-6 * (b - a)
+        low, high = f(np.array([w - h, w + h]))
+        polished = brentq(lambda z: float(f(np.array([z]))[0]), w - h, w + h, xtol=1e-15 * b, rtol=1e-15) if (
+            low * high < 0) else w  # fmt: skip
+        if not found or polished - found[-1] > 1e-12 * b:
+            found.append(polished)
+    return found
+
+
+def critical_slope(scene: Drilling, up_to: float = 10.0) -> tuple[float, float]:
+    """(kappa, w): the largest critical slope (N m s/rad) and its circular frequency (rad/s), see `critical_slopes`.
+
+    A law whose torque falls less steeply leaves all modes up to that frequency decaying. Minus infinity where no slope
+    is critical up to there.
+    """
+    frequencies, slopes = critical_slopes(scene, up_to)
+    if not len(slopes):  # nothing to lose in so narrow a band
+        return -math.inf, math.nan
+    first = int(slopes.argmax())
+    # a string without losses: what is left of 0 is rounding
+    lost = abs(slopes[first]) < _RESOLVED * torsional(scene).impedance
+    return 0.0 if lost else float(slopes[first]), float(frequencies[first])
+
+
+def limit_weight(scene: Drilling, speed: float, *, up_to: float = 10.0) -> float:
+    """The weight on bit up to which all modes decay at a speed.
+
+    Args:
+        scene: a `Drilling` whose bit has a `Stribeck` law with a radius.
+        speed: rotation, rad/s.
+        up_to: highest frequency of modes, Hz.
+
+    Returns:
+        N; infinite where the torque does not fall, 0 where the string has no losses.
+
+    Raises:
+        SceneError: a law whose torque does not depend on the weight.
+    """
+    speed = positive("limit_weight", "speed", speed, "rad/s")
+    law = stribeck_of(scene.bit.law) if scene.bit else None
+    if law is None or law.radius is None:
+        refuse("limit_weight", "scene", scene.bit, "a bit with a Stribeck law and a radius")
+    per_newton = slope(law, speed, 1.0)
+    kappa, _ = critical_slope(scene, up_to)
+    return abs(kappa / per_newton) if per_newton else math.inf
+
+
+def limit_speed(
+    scene: Drilling,
+    weight: float | None = None,
+    *,
+    up_to: float = 10.0,
+    between: tuple[float, float] = (0.5, 50.0),
+    points: int = 60,
+) -> float:
+    """The lowest speed from which on all modes decay, up to a frequency.
+
+    Args:
+        scene: a `Drilling`. weight: on bit, N; None for that of the scene.
+        up_to: highest frequency of modes, Hz.
+        between, points: with a bit that cuts, the speeds (rad/s) between which it is looked for, and at how many; a
+            range of growth that lies between two of them is missed.
+
+    Returns:
+        rad/s; 0 where all modes decay at every speed, infinite where the string has no losses. With a bit that cuts:
+        infinite where some mode grows at the highest of the speeds, 0 where none does at any.
+
+    Raises:
+        SceneError: numbers that are not positive, or a bit without a law.
+        NotConverged: the roots that were found are fewer than those counted.
+    """
+    up_to = positive("limit_speed", "up_to", up_to, "Hz")
+    if scene.bit is None:
+        refuse(scene, "bit", None, "a BitOnRock with a law")
+    if weight is None:
+        weight = scene.bit.weight
+    else:
+        weight = positive("limit_speed", "weight", weight, "N")
+    steady = Steady(scene)
+    if steady.cuts:
+        return _limit_of_cutting(steady, weight, up_to, between, points)
+    law = stribeck_of(scene.bit.law)
+    if law is None or law.speed is None:
+        return 0.0
+    steepest = slope(law, 0.0, weight)
+    kappa, _ = critical_slope(scene, up_to)
+    if steepest >= kappa:
+        return 0.0
+    return math.inf if kappa >= 0 else law.speed * math.log(steepest / kappa)
+
+
+def _limit_of_cutting(steady, weight, up_to, between, points):
+    number("limit_speed", "points", points, "a number from 2", lambda x: x >= 2 and x == int(x))
+    low, high = (positive("limit_speed", "between", x, "rad/s") for x in between)
+    box = box_up_to(steady, 2 * math.pi * up_to)
+
+    def growth(speed):
+        f = steady.equation(steady.parameters(speed, weight))
+        roots, _ = all_roots(f, box(f), f.spacing)
+        return float(roots.real.max(initial=box(f).left))
+
+    speeds = np.geomspace(high, low, int(points))
+    for k, speed in enumerate(speeds):
+        if growth(speed) > 0:
+            return math.inf if k == 0 else brentq(growth, speed, speeds[k - 1], xtol=1e-12, rtol=1e-10)
+    return 0.0

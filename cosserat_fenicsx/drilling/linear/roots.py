@@ -1,0 +1,247 @@
+"""All roots of an analytic function in a box of the complex plane, counted by the argument principle.
+
+Functions are real on the real axis: their roots are real or pairs, of which those with Im s >= 0 are returned. They
+take s (n,) and return (f, f') scaled by any positive factors (n,): phases and f'/f are what is used. Where they grow
+like exp(a s) to the left and exp(b s) to the right, they say so by an attribute `exponents` = (a, b), s.
+"""
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from cosserat_fenicsx.errors import NotConverged
+
+#: Largest change of phase from point to point of a contour, rad, and how far it may be from that of the derivatives.
+_TURN, _MISMATCH = 1.0, 0.3
+#: A contour that comes as near to a root as this share of its size is moved.
+_NEAR = 1e-9
+#: Newton's method stops at steps below the second number, or below the third where they no longer fall; relative.
+_STEPS, _SETTLED, _ROUNDING = 60, 1e-14, 1e-11
+
+
+@dataclass(frozen=True)
+class Box:
+    """left < Re s < right, bottom < Im s < top, 1/s; bottom = 0 stands for the symmetric box -top < Im s < top."""
+
+    left: float
+    right: float
+    bottom: float
+    top: float
+
+    @property
+    def size(self):
+        return max(self.right - self.left, self.top - self.bottom)
+
+    def holds(self, s):
+        """Which of the roots of Im s >= 0 are inside."""
+        return (s.real > self.left) & (s.real < self.right) & (s.imag >= self.bottom) & (s.imag < self.top)
+
+    def near(self, s, margin):
+        """Whether a root is inside, or not farther outside than a margin."""
+        return (self.left - margin < s.real < self.right + margin) and s.imag < self.top + margin
+
+    def halves(self, share):
+        """Both parts, cut across the longer side."""
+        if self.top - self.bottom >= self.right - self.left:
+            cut = self.bottom + share * (self.top - self.bottom)
+            return replace(self, top=cut), replace(self, bottom=cut)
+        cut = self.left + share * (self.right - self.left)
+        return replace(self, right=cut), replace(self, left=cut)
+
+
+class OnContour(Exception):
+    """A root lies on the contour, or too near to it."""
+
+
+def turns(f, corners, spacing):
+    """Change of the phase of f along straight lines from corner to corner, rad.
+
+    Intervals are halved until the phase turns by less than `_TURN` in each, as the derivatives at both ends foretell:
+    a change by 2 pi that goes unseen would differ from what they say.
+
+    Raises:
+        OnContour: no interval is short enough.
+    """
+    total = 0.0
+    for a, b in zip(corners[:-1], corners[1:], strict=True):
+        s = a + (b - a) * _shares(a, b, spacing)
+        value, derivative = f(s)
+        least = _NEAR * max(abs(x - y) for x in corners for y in corners)
+        while True:
+            if not np.all(value != 0):
+                raise OnContour
+            change = np.angle(value[1:] / value[:-1])
+            log = derivative / value
+            step = np.diff(s)
+            foretold = ((log[1:] + log[:-1]) / 2 * step).imag
+            # near a root both logarithmic derivatives are large: the size of the change has to be seen there, too
+            rough = (np.abs(change) > _TURN) | (np.abs(change - foretold) > _MISMATCH)
+            if not rough.any():
+                break
+            where = np.flatnonzero(rough)
+            middle = (s[where] + s[where + 1]) / 2
+            if np.abs(step[where]).min() < least:
+                raise OnContour
+            new_value, new_derivative = f(middle)
+            s = np.insert(s, where + 1, middle)
+            value, derivative = np.insert(value, where + 1, new_value), np.insert(derivative, where + 1, new_derivative)
+        total += float(change.sum())
+    return total
+
+
+def _shares(a, b, spacing):
+    """Where a straight contour begins to be sampled, from 0 to 1: evenly, but coarser far from the imaginary axis."""
+    if a.imag != b.imag or max(abs(a.real), abs(b.real)) < 20 * spacing:
+        return np.linspace(0.0, 1.0, 2 + math.ceil(abs(b - a) / spacing))
+    low, high = np.arcsinh(np.array([a.real, b.real]) / (10 * spacing))
+    x = 10 * spacing * np.sinh(np.linspace(low, high, 2 + math.ceil(10 * abs(high - low))))
+    shares = (x - a.real) / (b.real - a.real)
+    shares[[0, -1]] = 0.0, 1.0
+    return shares
+
+
+def count(f, box, spacing):
+    """Number of roots in a box with multiplicity; in a symmetric one pairs count twice.
+
+    Raises:
+        OnContour: see `turns`.
+    """
+    low, high = box.left + 1j * box.bottom, box.right + 1j * box.top
+    a, b, c, d = low, complex(high.real, low.imag), high, complex(low.real, high.imag)
+    whole = turns(f, (b, c, d, a) if box.bottom == 0 else (a, b, c, d, a), spacing) / math.pi
+    if box.bottom != 0:
+        whole /= 2
+    if abs(whole - round(whole)) > 1e-3:
+        raise OnContour
+    return round(whole)
+
+
+def each(f, starts, stride):
+    """Newton's method from many points at once, with steps of at most `stride`.
+
+    Returns:
+        (n,) complex, NaN where it has not settled.
+    """
+    s = np.array(starts, dtype=complex)
+    size, open_ = np.full(len(s), np.inf), np.arange(len(s))
+    for _ in range(_STEPS):
+        if not open_.size:
+            break
+        here = s[open_]
+        with np.errstate(all="ignore"):
+            value, derivative = f(here)
+            step = np.where(value == 0, 0.0, -value / (derivative - _rate(f, here) * value))
+        step = np.where(np.isfinite(step), step, 0.3 * stride)
+        longest = np.maximum(stride, np.abs(here.real) / 4)  # far from the imaginary axis roots are far apart
+        length, before = np.abs(step), size[open_]
+        s[open_] = here + step * np.minimum(1.0, longest / np.maximum(length, 1e-300))
+        size[open_] = length
+        scale = np.maximum(np.abs(here), stride * 1e-3)
+        done = (length <= _SETTLED * scale) | ((length <= _ROUNDING * scale) & (length >= before / 4))
+        open_ = open_[~done]
+    return np.where(size <= _ROUNDING * np.maximum(np.abs(s), stride * 1e-3), s, np.nan)
+
+
+def _rate(f, s):
+    """The rate at which f grows like exp(rate s) on either side, which Newton's method is relieved of."""
+    left, right = getattr(f, "exponents", (0.0, 0.0))
+    rate = np.where(s.real < 0, left, right)
+    return rate * np.tanh(np.abs(s.real * rate))
+
+
+def newton(f, starts, stride):
+    """The roots that Newton's method finds from many starts, each once: (n,) complex of Im s >= 0."""
+    done = each(f, starts, stride)
+    done = done[np.isfinite(done)]
+    done = np.where(done.imag < 0, done.conj(), done)
+    real = np.abs(done.imag) < 1e-11 * np.maximum(np.abs(done), stride * 1e-3)
+    return distinct(np.where(real, done.real + 0j, done))
+
+
+def distinct(roots):
+    """The roots without repetition, by frequency and then by growth."""
+    kept = []
+    for s in roots[np.lexsort((-roots.real, roots.imag))]:
+        if all(abs(s - other) > 1e-8 * max(abs(s), 1e-6) for other in kept):
+            kept.append(s)
+    return np.array(kept, dtype=complex)
+
+
+def number_of(roots, box):
+    """How many roots those of Im s >= 0 stand for."""
+    return len(roots) + (int((roots.imag > 0).sum()) if box.bottom == 0 else 0)
+
+
+def counted(f, box, spacing):
+    """The count of a box, moved a little where a root lies on its contour: (count, box)."""
+    for k in range(6):
+        moved = box if k == 0 else Box(
+            box.left - 1.3e-3 * k * spacing, box.right + 1.7e-3 * k * spacing,
+            box.bottom - 1.1e-3 * k * spacing if box.bottom else 0.0, box.top + 2.3e-3 * k * spacing)  # fmt: skip
+        try:
+            return count(f, moved, spacing / 4), moved
+        except OnContour:
+            continue
+    raise NotConverged(f"the roots in {box} could not be counted: one lies on every contour that was tried")
+
+
+def all_roots(f, box, spacing, known=()):
+    """All roots in a box, as many as the argument principle says.
+
+    Args:
+        f: see above. box: a `Box`. spacing: typical distance of roots, rad/s. known: guesses, (n,).
+
+    Returns:
+        (roots, box): (n,) complex of Im s >= 0, repeated as often as they are multiple; by frequency, then by growth.
+        The box differs by a few thousandths of `spacing` where a root would lie on its contour.
+
+    Raises:
+        NotConverged: the roots found are fewer than those counted.
+    """
+    total, box = counted(f, box, spacing)
+    found = np.array([], dtype=complex)
+    if len(known):
+        found = newton(f, known, spacing / 2)
+        found = found[box.holds(found)]
+    if number_of(found, box) != total:
+        found = _search(f, box, spacing, total, found)
+    return found[np.lexsort((-found.real, found.imag))], box
+
+
+def _search(f, box, spacing, total, known, depth=0):
+    """The roots in a box whose number is known: from a net of starts, then in halves of the box."""
+    if total == 0:
+        return np.array([], dtype=complex)
+    starts = np.concatenate([known[box.holds(known)], _net(box, spacing)])
+    found = newton(f, starts, spacing / 2)
+    found = found[box.holds(found)]
+    if number_of(found, box) == total:
+        return found
+    if box.size < 1e-7 * spacing or depth > 60:
+        if len(found) == 1 and number_of(found, box) < total:  # a multiple root
+            return np.repeat(found, total // number_of(found, box))
+        raise NotConverged(f"{total} roots were counted in {box}, {number_of(found, box)} found")
+    for share in (0.5, 0.4617, 0.5391, 0.4233):
+        parts = box.halves(share)
+        try:
+            totals = [count(f, part, min(spacing / 4, part.size / 8)) for part in parts]
+        except OnContour:
+            continue
+        pairs = 2 if box.bottom == 0 and parts[1].bottom != 0 else 1  # the upper half counts no conjugate roots
+        if totals[0] + pairs * totals[1] == total:
+            break
+    else:
+        raise NotConverged(f"the {total} roots in {box} could not be separated")
+    pieces = [_search(f, part, spacing, n, found, depth + 1) for part, n in zip(parts, totals, strict=True)]
+    return np.concatenate(pieces)
+
+
+def _net(box, spacing):
+    """Starts for Newton's method: near the imaginary axis, and to its left and right as far as the box goes."""
+    wide, high = box.right - box.left, box.top - box.bottom
+    heights = box.bottom + high * (np.arange(n := 2 + math.ceil(3 * high / spacing)) + 0.43) / n
+    columns = np.array([0.0, -0.15, 0.15, -0.6, 0.6]) * spacing
+    columns = np.unique(np.clip(columns, box.left + 0.05 * wide, box.right - 0.05 * wide))
+    axis = np.linspace(box.left, box.right, 12) + 0j if box.bottom == 0 else np.array([])
+    return np.concatenate([(columns[:, None] + 1j * heights[None, :]).ravel(), axis])

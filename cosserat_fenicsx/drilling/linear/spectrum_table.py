@@ -1,0 +1,91 @@
+"""A `Stability` as a table for the screen."""
+
+import math
+
+import numpy as np
+from rich.table import Table
+
+from cosserat_fenicsx.results.tables import as_text
+
+#: Modes that are listed with their places and drives, the fastest ones.
+_LISTED = 12
+
+
+def stability_table(answer):
+    """Text: every mode that grows, where it moves, in how many cases, and what other drives make of it."""
+    grows = [k for k in range(answer.roots.shape[2]) if (answer.growth[:, :, k] > 0).any()]
+    cases = answer.growth.shape[0] * answer.growth.shape[1]
+    lines = [f"{_range(answer)}, all modes up to {answer.up_to:.4g} Hz.", *(f"{x}." for x in answer.cautions)]
+    if not grows:
+        k = int(np.nanargmax(np.nanmax(answer.growth, axis=(0, 1))))
+        i, j = answer.worst(k)
+        least = f"{answer.frequency[i, j, k]:.4g} Hz, which decays by {-answer.growth[i, j, k]:.3g} 1/s"
+        return "\n".join([*lines, f"No mode grows. Least damped: {least} at {_case(answer, i, j)}."])
+    grows.sort(key=lambda k: -np.nanmax(answer.growth[:, :, k]))
+    rows, places, known = [], [], {}
+    for k in grows[:_LISTED]:
+        i, j = _middle(answer, k)
+        if (i, j) not in known:
+            known[i, j] = answer.with_drives(i, j)
+        drives = {name: growth[k] for name, growth in known[i, j].items()}
+        places.append(f"{answer.frequency[i, j, k]:.4g} Hz moves: {answer.shape(k, i, j).where}")
+        rows.append((k, i, j, drives))
+    names = list(rows[0][3])
+    table = Table(
+        caption="growth: in 1/s. fastest: the largest of all cases. at: the middle one of those in which the mode "
+        "grows, its frequency and growth there, with the drive of the scene; to the right the growth with other drives."
+    )
+    for heading in ("mode", "grows in", "fastest", "at rpm", "kN", "frequency (Hz)", "growth", *names):
+        table.add_column(heading, justify="right")
+    for k, i, j, drives in rows:
+        share = f"{int((answer.growth[:, :, k] > 0).sum())} of {cases}"
+        told = [share, f"{np.nanmax(answer.growth[:, :, k]):.4f}", *_numbers(answer, i, j)]
+        here = f"{answer.frequency[i, j, k]:.4f}", f"{answer.growth[i, j, k]:.4f}"
+        table.add_row(str(k), *told, *here, *("gone" if math.isnan(x) else f"{x:.4f}" for x in drives.values()))
+    lines += [as_text(table), *places]
+    if len(grows) > _LISTED:
+        lines.append(f"{len(grows) - _LISTED} more modes grow: to_dataframe() has all.")
+    return "\n".join([*lines, *map("{}.".format, _advice(answer, rows, names))])
+
+
+def _middle(answer, k):
+    """(i, j) of the middle one, by growth, of the cases in which a mode grows."""
+    i, j = np.nonzero(answer.growth[:, :, k] > 0)
+    middle = np.argsort(answer.growth[i, j, k])[len(i) // 2]
+    return int(i[middle]), int(j[middle])
+
+
+def _advice(answer, rows, names):
+    """What each drive calms and what it leaves."""
+    for name in names:
+        calmed = [row for row in rows if not row[3][name] > 0]
+        left = [row for row in rows if row[3][name] > 0]
+        if calmed:
+            told = f"{name} calms {_frequencies(answer, calmed)}"
+            yield told + (f" and leaves {_frequencies(answer, left)} growing" if left else "")
+        else:
+            yield f"{name} calms none of them"
+
+
+def _frequencies(answer, rows):
+    return ", ".join(f"{answer.frequency[i, j, k]:.3g}" for k, i, j, _ in sorted(rows)) + " Hz"
+
+
+def _numbers(answer, i, j):
+    """Speed in rpm and weight in kN of a case, "" without one."""
+    weight = answer.weights[j]
+    return f"{answer.speeds[i] * 30 / math.pi:.4g}", "" if math.isnan(weight) else f"{weight / 1e3:.4g}"
+
+
+def _case(answer, i, j):
+    speed, weight = _numbers(answer, i, j)
+    return f"{speed} rpm" + (f", {weight} kN" if weight else "")
+
+
+def _range(answer):
+    rpm = answer.speeds * 30 / math.pi
+    told = f"{len(rpm)} speeds from {rpm.min():.4g} to {rpm.max():.4g} rpm"
+    if np.isnan(answer.weights).all():
+        return told
+    kN = answer.weights / 1e3
+    return f"{told}, {len(kN)} weights on bit from {kN.min():.4g} to {kN.max():.4g} kN"

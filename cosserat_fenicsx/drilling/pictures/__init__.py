@@ -1,0 +1,1 @@
+"""Charts and films of a drill-string in motion."""
