@@ -147,6 +147,8 @@ _HOME = {
     "read_history": "dynamics.resuming",
     "resume": "dynamics.resuming",
     "solve": "statics.solve",
+    "Study": "studies.outcome",
+    "study": "studies.study",
 }
 
 if TYPE_CHECKING:  # the same names, for editors and type checkers
@@ -252,6 +254,8 @@ if TYPE_CHECKING:  # the same names, for editors and type checkers
     from cosserat_fenicsx.statics.path.load_control import StepControl as StepControl
     from cosserat_fenicsx.statics.reading import read_path as read_path
     from cosserat_fenicsx.statics.solve import solve as solve
+    from cosserat_fenicsx.studies.outcome import Study as Study
+    from cosserat_fenicsx.studies.study import study as study
     from cosserat_fenicsx.well.answer import TorqueAndDrag as TorqueAndDrag
     from cosserat_fenicsx.well.calibrate import FrictionFit as FrictionFit
     from cosserat_fenicsx.well.calibrate import RigMeasurement as RigMeasurement

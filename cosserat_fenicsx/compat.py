@@ -73,6 +73,22 @@ def quiet_compiler():
         logging.disable(before)
 
 
+_JIT_DEFAULTS = getattr(jit, "DOLFINX_DEFAULT_JIT_OPTIONS", None) or jit.DOLFINX_DEFAULT_JIT_PARAMETERS
+
+
+@contextlib.contextmanager
+def waiting_for_compilers(seconds):
+    """Wait so long (whole s) for another process that compiles the same form; None for dolfinx's own 10 s, unless the
+    user has set a time."""
+    before = _JIT_DEFAULTS["timeout"]
+    if seconds is not None:
+        _JIT_DEFAULTS["timeout"] = (seconds, before[1])
+    try:
+        yield
+    finally:
+        _JIT_DEFAULTS["timeout"] = before
+
+
 if _VERSION < (0, 8):
 
     def lagrange(mesh, degree, size, *, discontinuous=False):

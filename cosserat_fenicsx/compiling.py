@@ -6,6 +6,10 @@ from pathlib import Path
 
 from cosserat_fenicsx import compat
 from cosserat_fenicsx.errors import CosseratError, InstallationError
+from cosserat_fenicsx.ranks import are_apart
+
+# Time (s) that a rank within a study waits for another one that compiles the same form.
+_PATIENCE = 60
 
 
 @contextlib.contextmanager
@@ -16,7 +20,7 @@ def compiling():
         InstallationError: the cache cannot be written or read, or there is no C compiler that works.
     """
     try:
-        with compat.quiet_compiler():
+        with compat.quiet_compiler(), compat.waiting_for_compilers(_PATIENCE if are_apart() else None):
             yield
     except CosseratError:
         raise

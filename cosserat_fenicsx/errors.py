@@ -39,10 +39,10 @@ class NotConverged(CosseratError, RuntimeError):
 
 
 class NotStored(CosseratError, OSError):
-    """The folder of a motion can no longer be written to, such as on a full disk.
+    """The folder of a motion or of a study can no longer be written to, such as on a full disk.
 
     Attributes:
-        path: the `History` of the states that are stored in the folder.
+        path: the `History` of the states that are stored in the folder, or the `Study` so far.
     """
 
     def __init__(self, message, path=None):

@@ -5,9 +5,16 @@ import sys
 import threading
 import time
 
+from cosserat_fenicsx.ranks import are_apart
+
 _PATIENCE = 2.0  # s before a bar appears
 _LINE_EVERY = 10.0  # s between plain lines
-_REDRAWN = 0.5  # s between texts of `MeshProgress` in a terminal
+_REDRAWN = 0.5  # s between texts of `_Clocked` in a terminal
+
+
+def _shown(wanted, comm):
+    """Whether this rank shows progress: the cases of a study show none, since the study does."""
+    return comm.rank == 0 and wanted is not False and not are_apart()
 
 
 class Progress:
@@ -22,7 +29,7 @@ class Progress:
 
     def __init__(self, targets, wanted, comm, quantity="load factor"):
         self._quantity = quantity
-        self._show = comm.rank == 0 and wanted is not False
+        self._show = _shown(wanted, comm)
         self._now = wanted is True
         self._terminal = sys.stderr.isatty()
         way = [0.0, *targets]
@@ -76,10 +83,60 @@ class Progress:
             self._bar.stop()
 
 
-class MeshProgress:
+class _Clocked:
+    """Base of what a thread shows, since nothing may be reached for minutes.
+
+    Args:
+        wanted, comm: see `Progress`.
+    """
+
+    def __init__(self, wanted, comm):
+        self._now, self._terminal = wanted is True, sys.stderr.isatty()
+        self._ended = threading.Event()
+        self._thread = threading.Thread(target=self._tell, daemon=True) if _shown(wanted, comm) else None
+
+    def __enter__(self):
+        self._began = time.monotonic()
+        if self._thread:
+            self._thread.start()
+        return self
+
+    def _line(self):
+        """What there is to say, in a line."""
+        raise NotImplementedError
+
+    def _say(self):
+        """Print the line at once, where progress was asked for outside a terminal."""
+        if self._now and self._thread and not self._terminal:
+            print(self._line(), file=sys.stderr, flush=True)
+
+    def _tell(self):
+        if self._terminal:
+            if not self._ended.wait(0.0 if self._now else _PATIENCE):
+                self._draw()
+            return
+        while not self._ended.wait(_LINE_EVERY):
+            print(self._line(), file=sys.stderr, flush=True)
+
+    def _draw(self):
+        """Show it in a terminal until it has ended."""
+        from rich.console import Console
+        from rich.markup import escape
+
+        with Console(stderr=True).status(escape(self._line())) as status:
+            while not self._ended.wait(_REDRAWN):
+                status.update(escape(self._line()))
+
+    def __exit__(self, *exception):
+        self._ended.set()
+        if self._thread:
+            self._thread.join()
+
+
+class MeshProgress(_Clocked):
     """Context manager that says which mesh an eigenproblem is solved on, and for how long it has run.
 
-    The number of meshes is not known in advance, and one may take minutes: a thread tells the time.
+    The number of meshes is not known in advance, and one may take minutes.
 
     Args:
         what: name of the computation; tol: its relative accuracy.
@@ -87,17 +144,8 @@ class MeshProgress:
     """
 
     def __init__(self, what, tol, wanted, comm):
-        self._what, self._tol, self._now = what, tol, wanted is True
-        self._terminal = sys.stderr.isatty()
-        self._text, self._ended = what, threading.Event()
-        show = comm.rank == 0 and wanted is not False
-        self._thread = threading.Thread(target=self._tell, daemon=True) if show else None
-
-    def __enter__(self):
-        self._began = time.monotonic()
-        if self._thread:
-            self._thread.start()
-        return self
+        super().__init__(wanted, comm)
+        self._what, self._tol, self._text = what, tol, what
 
     def on(self, elements, reached):
         """The computation begins on a mesh.
@@ -107,26 +155,38 @@ class MeshProgress:
         """
         error = f", estimated error {reached:.1e} of {self._tol:g}" if math.isfinite(reached) else ""
         self._text = f"{self._what}: {elements} elements per rod{error}"
-        if self._now and self._thread and not self._terminal:
-            print(self._line(), file=sys.stderr, flush=True)
+        self._say()
 
     def _line(self):
         return f"{self._text}, {time.monotonic() - self._began:.0f} s"
 
-    def _tell(self):
-        if self._terminal:
-            if self._ended.wait(0.0 if self._now else _PATIENCE):
-                return
-            from rich.console import Console
 
-            with Console(stderr=True).status(self._line()) as status:
-                while not self._ended.wait(_REDRAWN):
-                    status.update(self._line())
-            return
-        while not self._ended.wait(_LINE_EVERY):
-            print(self._line(), file=sys.stderr, flush=True)
+class CaseProgress(_Clocked):
+    """Context manager that says how many cases of a study are done, on all ranks.
+
+    Args:
+        total: their number; counts: a function that returns how many are done, and how many of these have failed.
+        wanted, comm: see `Progress`.
+    """
+
+    def __init__(self, total, counts, wanted, comm):
+        super().__init__(wanted, comm)
+        self._total, self._counts = total, counts
+
+    def _line(self):
+        done, failed = self._counts()
+        failures = f", {failed} failed" if failed else ""
+        return f"study: {done} of {self._total} cases{failures}, {time.monotonic() - self._began:.0f} s"
+
+    def _draw(self):
+        from rich.console import Console
+        from rich.progress import Progress as Bar
+
+        with Bar(console=Console(stderr=True), transient=True) as bar:
+            task = bar.add_task("study", total=self._total)
+            while not self._ended.wait(_REDRAWN):
+                bar.update(task, completed=self._counts()[0], description=self._line())
 
     def __exit__(self, *exception):
-        self._ended.set()
-        if self._thread:
-            self._thread.join()
+        super().__exit__(*exception)
+        self._say()

@@ -1,7 +1,12 @@
-"""Work that one MPI rank does for all: files and pictures."""
+"""Which MPI ranks work together, and work that one of them does for all: files and pictures."""
 
+import contextlib
 import os
 import pickle
+
+from cosserat_fenicsx.errors import SceneError
+
+_apart = False
 
 
 class Alone:
@@ -22,13 +27,42 @@ def launched():
     return 0, 1
 
 
-def world():
-    """The communicator of all ranks; MPI is loaded where there are others alone."""
-    if launched()[1] == 1:
-        return Alone
+@contextlib.contextmanager
+def apart():
+    """Context manager in which this rank computes without the others, as in a case of a study: what takes no
+    communicator gets that of this process alone."""
+    global _apart
+    before, _apart = _apart, True
+    try:
+        yield
+    finally:
+        _apart = before
+
+
+def are_apart():
+    """Whether this rank is within `apart`."""
+    return _apart
+
+
+def communicator(comm=None):
+    """The MPI communicator of a computation: `comm`, or by default that of all ranks; within `apart`, of this one.
+
+    Raises:
+        SceneError: within `apart`, one of several ranks, which would wait for the others for ever.
+    """
     from mpi4py import MPI
 
-    return MPI.COMM_WORLD
+    if _apart and comm is not None and comm.size > 1:
+        raise SceneError(
+            f"comm = a communicator of {comm.size} ranks: expected None or MPI.COMM_SELF within a study, where each "
+            "case is computed by one rank"
+        )
+    return comm or (MPI.COMM_SELF if _apart else MPI.COMM_WORLD)
+
+
+def world():
+    """The communicator of all ranks, within `apart` of this one; MPI is loaded where there are others alone."""
+    return Alone if _apart or launched()[1] == 1 else communicator()
 
 
 def on_first(comm, action):

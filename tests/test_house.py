@@ -69,6 +69,7 @@ ROOMS = {
     "pictures": {"scene", "results"},
     "statics": {"scene", "models", "algebra", "results"},
     "dynamics": {"scene", "models", "algebra", "results", "storage", "statics"},
+    "studies": {"results", "storage"},
     "well": {"actions", "scene", "models", "statics", "results", "pictures"},
     "drilling": {"well", "scene", "results", "storage", "pictures", "algebra"},
     "cli": {"drilling", "well", "scene", "models", "statics", "dynamics", "results", "storage", "pictures"},
@@ -151,6 +152,13 @@ def test_only_compat_asks_for_a_version():
     for file in [*PACKAGE.rglob("*.py"), *(ROOT / "forms").glob("*.py"), *(ROOT / "demos").rglob("*.py")]:
         if file.name not in ("compat.py",):
             assert "dolfinx.__version__" not in file.read_text(encoding="utf-8"), file
+
+
+def test_one_place_says_which_ranks_work_together():
+    """Within a study a rank is alone: what takes all ranks by itself would wait for the others for ever."""
+    for file in PACKAGE.rglob("*.py"):
+        if file.parent.name != "cli" and file.name not in ("ranks.py", "pool.py"):
+            assert "MPI.COMM_WORLD" not in file.read_text(encoding="utf-8"), f"{file}: expected ranks.communicator(comm)"
 
 
 def test_files_stay_small():

@@ -17,6 +17,7 @@ from cosserat_fenicsx.errors import NotConverged
 from cosserat_fenicsx.models.rod_data import check_inertia, nodal_inertia
 from cosserat_fenicsx.progress import MeshProgress
 from cosserat_fenicsx.quaternions import directors
+from cosserat_fenicsx.ranks import communicator
 from cosserat_fenicsx.results.modes import Modes
 from cosserat_fenicsx.results.shapes import Equilibrium
 from cosserat_fenicsx.scene.action import has_permanent
@@ -84,7 +85,7 @@ def modes(
     if load_factor or has_permanent(scene):
         check_arguments(without_mechanism(scene), tol, elements)
         check_magnitudes(scene, load_factor)
-    comm = comm or MPI.COMM_WORLD
+    comm = communicator(comm)
 
     def apart(fine, coarse):
         return np.abs(fine - coarse) / np.where(fine == 0, np.inf, np.abs(fine))

@@ -19,6 +19,7 @@ from cosserat_fenicsx.models.connections import Connections
 from cosserat_fenicsx.models.rodmesh import Layout
 from cosserat_fenicsx.models.scales import Scales
 from cosserat_fenicsx.dynamics.time_loop import TimeLoop
+from cosserat_fenicsx.ranks import communicator
 from cosserat_fenicsx.results.export import saved
 from cosserat_fenicsx.results.history import History
 from cosserat_fenicsx.storage.runfolder import RunFolder
@@ -61,7 +62,7 @@ def resume(
             computes this motion, or no readable checkpoint.
         NotConverged, Interrupted, NotStored: as of `simulate`.
     """
-    comm = comm or MPI.COMM_WORLD
+    comm = communicator(comm)
     if duration is not None:
         positive_time("duration", duration, "resume")
     kept, scene = _open(folder, scene, comm, duration)
@@ -137,7 +138,7 @@ def read_history(folder: File, scene: Scene | None = None, *, comm: MPI.Comm | N
     Raises:
         SceneError: no such folder or file, another scene, or a file that is damaged or of a newer release.
     """
-    comm = comm or MPI.COMM_WORLD
+    comm = communicator(comm)
     if isinstance(folder, str | os.PathLike) and FilePath(folder).is_file():
         if scene is not None:
             refuse("read_history", "scene", scene, f"None, since the file {folder} holds its scene")

@@ -10,6 +10,7 @@ from mpi4py import MPI
 from cosserat_fenicsx.checks import instance, number, refuse
 from cosserat_fenicsx.errors import SceneError, nearest
 from cosserat_fenicsx.annotations import File
+from cosserat_fenicsx.ranks import communicator
 from cosserat_fenicsx.results.history import History
 from cosserat_fenicsx.results.path import Path
 from cosserat_fenicsx.dynamics.marks import marks_of
@@ -97,7 +98,7 @@ def simulate(
         NotStored: the folder can no longer be written to, such as on a full disk; `.path` holds the History up to
             there.
     """
-    comm = comm or MPI.COMM_WORLD
+    comm = communicator(comm)
     instance("simulate", "scene", scene, Scene, "a Scene")
     pace = pace_of(duration, tol=tol, dt=dt, scheme=scheme, save_every=save_every, elements=elements)
     rho_inf = _rho_inf(scheme, rho_inf)

@@ -23,7 +23,7 @@ from cosserat_fenicsx.pictures.drawing import (
 from cosserat_fenicsx.pictures.figures import save
 from cosserat_fenicsx.pictures.labels import Labels, plain
 from cosserat_fenicsx.pictures.signs import Deformed, Resting, signs_of, without_sign
-from cosserat_fenicsx.ranks import on_first
+from cosserat_fenicsx.ranks import communicator, on_first
 from cosserat_fenicsx.results.export.beside import replaced
 
 # Smallest visible displacement as a share of the extent of the drawing.
@@ -75,9 +75,7 @@ def scene(scene, file=None):
         SceneError: a file that is no .png, or pyvista is missing.
         OSError: the file cannot be written.
     """
-    from mpi4py import MPI
-
-    return deliver(MPI.COMM_WORLD, file, lambda: _draw_scene(scene))
+    return deliver(communicator(), file, lambda: _draw_scene(scene))
 
 
 def deliver(comm, file, draw):

@@ -10,6 +10,7 @@ from cosserat_fenicsx.algebra import eigen
 from cosserat_fenicsx.checks import number
 from cosserat_fenicsx.errors import NotConverged, SceneError
 from cosserat_fenicsx.progress import MeshProgress
+from cosserat_fenicsx.ranks import communicator
 from cosserat_fenicsx.results.buckling import Buckling
 from cosserat_fenicsx.results.shapes import Equilibrium
 from cosserat_fenicsx.scene.action import has_permanent
@@ -87,7 +88,7 @@ def buckling(
         raise SceneError(f"count = {count!r}: expected a whole number above zero")
     number("buckling", "load_factor", load_factor, "a finite number", math.isfinite)
     check_magnitudes(scene, max(abs(load_factor), 1.0))
-    comm = comm or MPI.COMM_WORLD
+    comm = communicator(comm)
 
     def apart(fine, coarse):
         return np.abs(fine - coarse) / np.abs(fine - load_factor)

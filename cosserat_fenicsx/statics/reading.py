@@ -8,6 +8,7 @@ from cosserat_fenicsx.annotations import File
 from cosserat_fenicsx.models.connections import Connections
 from cosserat_fenicsx.models.rodmesh import Layout
 from cosserat_fenicsx.models.scales import Scales
+from cosserat_fenicsx.ranks import communicator
 from cosserat_fenicsx.results.export import saved
 from cosserat_fenicsx.results.path import Path
 from cosserat_fenicsx.statics.circulatory import conservative_along
@@ -25,7 +26,7 @@ def read_path(file: File, *, comm: MPI.Comm | None = None) -> Path:
     Raises:
         SceneError: it cannot be read, is damaged, holds something else, or is of a newer release.
     """
-    path = saved.read(file, "Path", assembled, comm or MPI.COMM_WORLD)
+    path = saved.read(file, "Path", assembled, communicator(comm))
     path._potential = conservative_along
     return path
 

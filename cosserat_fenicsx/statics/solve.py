@@ -22,6 +22,7 @@ from cosserat_fenicsx.models.formulations import formulation_of
 from cosserat_fenicsx.models.rodmesh import Layout
 from cosserat_fenicsx.results.path import Path
 from cosserat_fenicsx.progress import Progress
+from cosserat_fenicsx.ranks import communicator
 from cosserat_fenicsx.statics.first_mesh import first_layout, meshes_for
 from cosserat_fenicsx.statics.solvers import solvers_of
 from cosserat_fenicsx.statics.refinement import refine
@@ -88,7 +89,7 @@ def solve(
         NotConverged: the path cannot be continued, or the accuracy is not reached; `.path` holds the points so far.
         Interrupted: Ctrl-C; `.path` holds the points so far.
     """
-    comm = comm or MPI.COMM_WORLD
+    comm = communicator(comm)
     targets, free = _targets(load_factors)
     formulation = formulation_of(formulation)
     degree = formulation.default_degree if degree is None else degree

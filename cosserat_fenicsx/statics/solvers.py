@@ -2,8 +2,6 @@
 
 import contextlib
 
-from mpi4py import MPI
-
 from cosserat_fenicsx.algebra.newton import Newton
 from cosserat_fenicsx.algebra.pool import PROBLEMS
 from cosserat_fenicsx.errors import NotConverged
@@ -11,6 +9,7 @@ from cosserat_fenicsx.models.determinate import DeterminateInPlane, DeterminateI
 from cosserat_fenicsx.models.planar import PlanarModel
 from cosserat_fenicsx.models.signature import Signature
 from cosserat_fenicsx.models.spatial import SpatialModel
+from cosserat_fenicsx.ranks import communicator
 from cosserat_fenicsx.statics.path.recorder import Promoted
 from cosserat_fenicsx.statics.problem import Problem
 from cosserat_fenicsx.statics.stability import NegativeModes
@@ -38,7 +37,7 @@ def solvers_of(scene, layout, *, formulation="mixed", degree=4, points=None, com
 
     No other caller uses them within the context; afterwards another one may, so that results must not refer to them.
     """
-    comm = comm or MPI.COMM_WORLD
+    comm = communicator(comm)
     signature = Signature.of(scene, layout, formulation=formulation, degree=degree, points=points, model=model)
     with PROBLEMS.lend(("equilibrium", signature), comm, lambda: _make(comm, signature), _OUTCOMES) as solvers:
         problem, _, stability = solvers

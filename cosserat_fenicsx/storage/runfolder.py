@@ -6,7 +6,6 @@ instants.npy   the saved states, see `instantfile`
 start.npz, checkpoint.npz   the data of all ranks that the solver continues from: at the start, and the latest
 """
 
-import fcntl
 import json
 import os
 import time
@@ -20,6 +19,7 @@ from cosserat_fenicsx.scene.as_data import NotData, from_data, to_data
 from cosserat_fenicsx.storage import checkpoints
 from cosserat_fenicsx.storage.fingerprint import difference, fingerprint, fingerprint_at, times_ahead
 from cosserat_fenicsx.storage.head import checked
+from cosserat_fenicsx.storage.lock import FolderLock
 
 #: Least time between checkpoints: in s, and as a multiple of the time that it takes to write one.
 APART, SELDOM = 2.0, 50
@@ -44,7 +44,8 @@ class RunFolder:
 
     def __init__(self, place, comm):
         instance("simulate", "folder", place, str | os.PathLike, "the name of a folder")
-        self.place, self.comm, self._lock = Path(place), comm, None
+        self.place, self.comm = Path(place), comm
+        self._lock = FolderLock(self.place, "motion")
 
     def make(self, scene, asked, history):
         """Make the folder for a new motion.
@@ -87,7 +88,7 @@ class RunFolder:
             data = {"missing": str(problem)}
         (place / _SCENE).write_text(_text(data), encoding="utf-8")
         (place / _HEAD).write_text(head, encoding="utf-8")
-        self._hold()
+        self._lock.take()
 
     def open(self):
         """Read an existing folder.
@@ -173,25 +174,11 @@ class RunFolder:
         Raises:
             SceneError: another process has locked it.
         """
-        self._on_first(self._hold)
-
-    def _hold(self):
-        self._lock = os.open(self.place, os.O_RDONLY)  # locks the folder itself, since its files may be replaced
-        try:
-            fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            self.release()
-            raise SceneError(
-                f"{self.place}: another process is at work on this motion: expected it to end first"
-            ) from None
-        except OSError:
-            pass  # a file system without locks
+        self._on_first(self._lock.take)
 
     def release(self):
         """Unlock the folder."""
-        if self._lock is not None:
-            os.close(self._lock)
-            self._lock = None
+        self._lock.release()
 
     @property
     def due(self):

@@ -12,6 +12,7 @@ from cosserat_fenicsx.checks import number, refuse
 from cosserat_fenicsx.errors import NotConverged
 from cosserat_fenicsx.models.rodmesh import Layout
 from cosserat_fenicsx.progress import Progress
+from cosserat_fenicsx.ranks import communicator
 from cosserat_fenicsx.results.accuracy import on_mesh
 from cosserat_fenicsx.results.path import Path
 from cosserat_fenicsx.statics.circulatory import conservative_along
@@ -127,7 +128,7 @@ def solve_in_hole(
     string = string_in(path, lengths, stiffness, weight, contact_radius, radius, friction, slip, bottom_tension,
                        bottom_torque, rings, first, hinge, extensible, has_arm)  # fmt: skip
     tol = number("solve_in_hole", "tol", tol, "a number from 1e-12 to below 1", lambda x: 1e-12 <= x < 1)
-    comm, counts = comm or MPI.COMM_WORLD, _counts(elements, len(Layout.of(string.scene, 1).breaks[0]) - 1)
+    comm, counts = communicator(comm), _counts(elements, len(Layout.of(string.scene, 1).breaks[0]) - 1)
     with Progress([float(len(stages_from(string.spring)))], progress, comm, "stage") as bar:
         job = _Job(degree, bool(helix), tol, _STIFFEST if wall_stiffness is None else 1.0, bar, comm)
         answer = None

@@ -1,0 +1,1 @@
+"""Many independent cases of one task, computed on all ranks."""

@@ -1,0 +1,149 @@
+"""The folder of a study: what was asked for, and the outcomes as they come.
+
+study.json          the task, and the cases
+outcomes.<rank>.jsonl   one line for every case that a rank has computed, appended at once
+
+A line that was not written to its end, as by a process that was killed, is left out.
+"""
+
+import contextlib
+import json
+import os
+from pathlib import Path
+
+from cosserat_fenicsx import __version__
+from cosserat_fenicsx.checks import instance
+from cosserat_fenicsx.errors import SceneError
+from cosserat_fenicsx.ranks import on_first
+from cosserat_fenicsx.storage.lock import FolderLock
+
+_FORMAT = 1
+_HEAD, _OUTCOMES = "study.json", "outcomes.{}.jsonl"
+
+
+class StudyFolder:
+    """A folder that holds the outcomes of a study.
+
+    Args:
+        place: its name; comm: MPI communicator.
+
+    Raises:
+        SceneError: `place` is not a name.
+    """
+
+    def __init__(self, place, comm):
+        instance("study", "folder", place, str | os.PathLike, "the name of a folder")
+        self.place, self._comm, self._stream = Path(place), comm, None
+        self._lock = FolderLock(self.place, "study")
+
+    def open(self, task, cases):
+        """Make the folder, or go on with it. Collective.
+
+        Args:
+            task, cases: their descriptions, data for JSON.
+
+        Returns:
+            the outcomes that it holds, a list of dicts.
+
+        Raises:
+            SceneError: the folder holds another study, another process writes to it, or it cannot be made.
+        """
+        rows = []
+        try:
+            on_first(self._comm, lambda: rows.extend(self._open(task, _as_read(cases))))
+        except OSError as problem:
+            raise SceneError(
+                f"study.folder = {str(self.place)!r}: {problem.strerror or problem}: expected a folder that can be "
+                "written to"
+            ) from None
+        return self._comm.bcast(rows)
+
+    def _open(self, task, cases):
+        self.place.mkdir(parents=True, exist_ok=True)
+        self._lock.take()
+        try:
+            if (self.place / _HEAD).exists():
+                self._compare(_as_read(task), cases)
+                return [
+                    row for file in sorted(self.place.glob(_OUTCOMES.format("*"))) for row in _rows(file, len(cases))
+                ]
+            head = {"format": _FORMAT, "cosserat_fenicsx": __version__, "task": task, "cases": cases}
+            fresh = self.place / f"{_HEAD}.new"
+            fresh.write_text(json.dumps(head), encoding="utf-8")
+            fresh.replace(self.place / _HEAD)
+            return []
+        except BaseException:
+            self._lock.release()
+            raise
+
+    def _compare(self, task, cases):
+        """Raise a SceneError where the folder holds another study."""
+        try:
+            head = json.loads((self.place / _HEAD).read_text(encoding="utf-8"))
+            version, old_task, old_cases = head["format"], head["task"], list(head["cases"])
+            names = [told["function"] for told in (old_task, task)]
+        except (ValueError, KeyError, TypeError):
+            raise SceneError(f"{self.place / _HEAD} is damaged: expected the file that study wrote") from None
+        if version != _FORMAT:
+            raise SceneError(f"{self.place}: its format is {version}: expected {_FORMAT}, that of this release")
+        if names[0] != names[1]:
+            self._refuse(f"of the task {names[0]}, not of {names[1]}")
+        if not _same(old_task, task):
+            self._refuse(f"of the task {names[0]} as it was before its code, or something that it uses, was changed")
+        if len(old_cases) != len(cases):
+            self._refuse(f"of {len(old_cases)} cases, not of {len(cases)}")
+        for i, (old, new) in enumerate(zip(old_cases, cases, strict=True)):
+            if not _same(old, new):
+                self._refuse(f"whose case {i} is {_short(old)}, not {_short(new)}")
+
+    def _refuse(self, how):
+        raise SceneError(
+            f"study.folder = {str(self.place)!r}: it holds a study {how}: expected the same task and cases, or another "
+            "folder"
+        )
+
+    def keep(self, row):
+        """Append an outcome to the file of this rank, where it survives the end of the process.
+
+        Raises:
+            OSError: it cannot be written.
+        """
+        if self._stream is None:
+            file = self.place / _OUTCOMES.format(self._comm.rank)
+            if file.exists():
+                os.truncate(file, file.read_bytes().rfind(b"\n") + 1)
+            self._stream = file.open("ab")
+        self._stream.write(json.dumps(row).encode() + b"\n")
+        self._stream.flush()
+
+    def close(self):
+        """Close the file and unlock the folder."""
+        if self._stream is not None:
+            with contextlib.suppress(OSError):  # `keep` has raised it
+                self._stream.close()
+        self._lock.release()
+
+
+def _rows(file, count):
+    """The outcomes in a file that are whole, of cases below `count`."""
+    for line in file.read_bytes().split(b"\n")[:-1]:
+        try:
+            row = json.loads(line)
+            known = 0 <= row["case"] < count and row["attempt"] >= 1 and row["seconds"] >= 0
+        except (ValueError, KeyError, TypeError):  # such as after a power failure
+            continue
+        if known and ("result" in row) != ("failure" in row):
+            yield row
+
+
+def _as_read(data):
+    return json.loads(json.dumps(data))
+
+
+def _same(a, b):
+    return json.dumps(a, sort_keys=True) == json.dumps(b, sort_keys=True)  # NaN is equal to itself there
+
+
+def _short(told):
+    text = json.dumps(told)
+    return text if len(text) <= 100 else f"{text[:100]}..."

@@ -1,0 +1,240 @@
+"""`study`: a task for many cases, each computed by one rank alone."""
+
+import gc
+import json
+import os
+import time
+import traceback
+from collections.abc import Callable, Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+from mpi4py import MPI
+
+from cosserat_fenicsx.annotations import File
+from cosserat_fenicsx.checks import instance
+from cosserat_fenicsx.errors import CosseratError, InstallationError, Interrupted, NotStored, SceneError
+from cosserat_fenicsx.interrupts import obey
+from cosserat_fenicsx.progress import CaseProgress
+from cosserat_fenicsx.ranks import apart, communicator
+from cosserat_fenicsx.studies.cases import cases_of, check_task
+from cosserat_fenicsx.studies.described import NotDescribed, described, task_described
+from cosserat_fenicsx.studies.folder import StudyFolder
+from cosserat_fenicsx.studies.outcome import Study
+from cosserat_fenicsx.studies.task_pool import TaskPool
+from cosserat_fenicsx.studies.values import from_data, to_data
+
+_COMPARABLE = "numbers, texts, arrays, functions, parts of scenes and of wells, lists and dicts of these"
+
+
+def study(
+    task: Callable[..., Any],
+    cases: Iterable[Mapping[str, Any]] | Mapping[str, Iterable[Any]],
+    *,
+    folder: File | None = None,
+    retry: bool = False,
+    progress: bool | None = None,
+    comm: MPI.Comm | None = None,
+) -> Study:
+    """Call `task(**case)` for every case, on all ranks, and gather what it returns.
+
+    Each case is computed by one rank alone: within the task `solve`, `simulate`, `torque_and_drag` and all other
+    functions of the package use the communicator of that rank by default, whatever the number of ranks. Cases are
+    handed out in their order to ranks as they become free. So results do not depend on the number of ranks.
+
+    A case whose task raises an exception is a failure of that case alone, see `Study.failures`. An
+    `InstallationError` is none: what is missing for one case is missing for all.
+
+    Args:
+        task: a function of the arguments of a case, by name. It returns a number, a text, an array of numbers or of
+            texts, None, or a dict of these by name; where it computes more, it writes that to files of its own.
+        cases: dicts of arguments, in a list or another iterable; or one dict {name: values}, whose product is taken,
+            the last name running fastest: `{"speed": [40, 60], "weight": [50e3, 100e3]}` has four cases.
+        folder: keeps every outcome as it comes, whatever ends the run; the same call goes on from there, on any
+            number of ranks, and computes what is missing. All ranks must see it. None keeps none.
+        retry: whether cases that have failed before, by `folder`, are computed again. By default they remain failures.
+        progress: True, False, or None to show it in runs of more than two seconds. The cases themselves show none.
+        comm: MPI communicator; default all ranks. Every rank calls with the same task and cases, every rank gets the
+            same Study.
+
+    Returns:
+        Study.
+
+    Raises:
+        SceneError: cases that are none, or whose names are not the task's arguments; a folder that holds another
+            study: other cases, or a task of another name, of other code, or that uses other constants. What the task
+            calls in other modules is not compared, nor are lists, dicts and arrays that are made outside it.
+        Interrupted: Ctrl-C; `.path` is the Study so far.
+        NotStored: the folder can no longer be written to; `.path` is the Study so far.
+        InstallationError: a case needs what is not installed.
+    """
+    comm = communicator(comm)
+    cases, grid = cases_of(cases)
+    check_task(task, cases)
+    instance("study", "retry", retry, bool, "True or False")
+    told = _told(task, cases, strictly=folder is not None)
+    if len(set(comm.allgather(json.dumps(told[1])))) > 1:
+        raise SceneError("study.cases: they differ between ranks: expected the same cases on every rank")
+    if comm.size > 1:
+        gc.collect()  # what ranks must free together is not left for times at which they are apart
+    kept = None if folder is None else StudyFolder(folder, comm)
+    rows = {} if kept is None else _latest(kept.open(*told))
+    run = _Run(task, cases, rows, retry, kept, comm)
+    try:
+        rows, troubles = run.over(progress)
+    finally:
+        if kept is not None:
+            kept.close()
+    found = Study(cases, grid, {i: _outcome(row) for i, row in sorted(rows.items())})
+    _raise_first(run.trouble, troubles, found, folder)
+    return found
+
+
+def _told(task, cases, *, strictly):
+    """The descriptions of task and cases, by which they are compared with those of a folder, and cases between ranks.
+
+    Raises:
+        SceneError: something cannot be compared, and `strictly` is true.
+    """
+
+    def of(what, describe, value):
+        try:
+            return describe(value)
+        except NotDescribed as problem:
+            if strictly:
+                raise SceneError(
+                    f"study.{what}: a {problem} cannot be compared with what the folder holds: expected {_COMPARABLE}, "
+                    "or that the task makes the others itself"
+                ) from None
+            return str(problem)
+
+    return of("task", task_described, task), [of(f"cases[{i}]", described, case) for i, case in enumerate(cases)]
+
+
+class _Run:
+    """The computation of the cases that are missing.
+
+    Attributes:
+        trouble: the exception that ended it on this rank, or None.
+    """
+
+    def __init__(self, task, cases, rows, retry, kept, comm):
+        self._task, self._cases, self._rows, self._kept, self._comm = task, cases, rows, kept, comm
+        self._missing = [i for i in range(len(cases)) if i not in rows or (retry and "failure" in rows[i])]
+        self.trouble = None
+
+    def over(self, progress):
+        """Compute them. Collective.
+
+        Returns:
+            ({number of the case: row} of all ranks and of the folder, the kinds of trouble of all ranks).
+        """
+        pool = TaskPool(self._comm, len(self._missing))
+        before = len(self._cases) - len(self._missing)
+        failed = sum("failure" in row for i, row in self._rows.items() if i not in set(self._missing))
+
+        def counts():
+            now = pool.counts()
+            return before + now[0], failed + now[1]
+
+        own = []
+        with CaseProgress(len(self._cases), counts, progress, self._comm):
+            try:
+                self._work(pool, own)
+                pool.meet()
+            except BaseException as problem:  # the other ranks end their case, and learn of it below
+                self.trouble = problem
+                pool.stop()
+                pool.meet()
+        everywhere = self._comm.allgather((own, _kind(self.trouble)))
+        pool.close()
+        found = _latest([*self._rows.values(), *(row for rows, _ in everywhere for row in rows)])
+        return found, [kind for _, kind in everywhere if kind]
+
+    def _work(self, pool, own):
+        for k in pool:
+            obey()
+            i = self._missing[k]
+            row = {"case": i, "attempt": self._rows.get(i, {}).get("attempt", 0) + 1, **self._computed(i)}
+            own.append(row)
+            if self._kept is not None:
+                try:
+                    self._kept.keep(row)
+                except OSError as problem:
+                    raise _CannotKeep(f"{self._kept.place}: {problem.strerror or problem}") from problem
+            pool.tell("failure" in row)
+
+    def _computed(self, i):
+        began = time.monotonic()
+        try:
+            with apart():
+                found = {"result": to_data(self._task(**self._cases[i]))}
+        except InstallationError:
+            raise
+        except (Exception, SystemExit) as problem:
+            found = {"failure": _sentence(problem)}
+        return {**found, "seconds": time.monotonic() - began}
+
+
+class _CannotKeep(Exception):
+    """An outcome cannot be written."""
+
+
+def _sentence(problem):
+    """What was raised; and where, unless it is an error of this package, which says what is wrong."""
+    said = f"{type(problem).__name__}: {problem}" if str(problem) else type(problem).__name__
+    if isinstance(problem, CosseratError):
+        return said
+    place = traceback.extract_tb(problem.__traceback__)[-1]
+    return f"{said} ({Path(place.filename).name}, line {place.lineno})"
+
+
+def _latest(rows):
+    """{number of the case: its row}: a result rather than a failure, else the last attempt."""
+    found = {}
+    for row in rows:
+        old = found.get(row["case"])
+        if old is None or _worth(row) >= _worth(old):
+            found[row["case"]] = row
+    return found
+
+
+def _worth(row):
+    return "result" in row, row["attempt"]
+
+
+def _outcome(row):
+    """(result, why it failed or "", s) of a row."""
+    failed = row.get("failure", "")
+    return None if failed else from_data(row["result"]), failed, row["seconds"]
+
+
+def _kind(trouble):
+    """(exception class to be raised by all ranks, text) of what ended the work on a rank; None for nothing."""
+    if trouble is None:
+        return None
+    for kind in (KeyboardInterrupt, _CannotKeep, InstallationError):
+        if isinstance(trouble, kind):
+            return kind.__name__, str(trouble)
+    return RuntimeError.__name__, f"{type(trouble).__name__}: {trouble}"
+
+
+def _raise_first(own, troubles, found, folder):
+    """Raise what ended the work, the same on all ranks."""
+    if not troubles:
+        return
+    name, text = min(troubles, key=lambda trouble: trouble[0] == KeyboardInterrupt.__name__)
+    kept = (
+        "; with a folder they would be kept there, and the same call would go on from them"
+        if folder is None
+        else f"; they are kept in {os.fspath(folder)}, from where the same call goes on"
+    )
+    if name == KeyboardInterrupt.__name__:
+        raise Interrupted(found, kept) from None
+    if name == _CannotKeep.__name__:
+        raise NotStored(
+            f"study.folder: {text}: {len(found)} cases are computed, which the exception's `path` holds", found
+        )
+    if name == InstallationError.__name__:
+        raise InstallationError(text) from own
+    raise own or RuntimeError(text)
