@@ -107,6 +107,8 @@ _HOME = {
     "Cutting": "drilling.bit_laws",
     "Discs": "drilling.discs",
     "Drilling": "drilling.scene",
+    "DrillingHistory": "drilling.history",
+    "DrillingScene": "drilling.scenefile",
     "Hook": "drilling.hook",
     "Lobes": "drilling.bit_laws",
     "Matched": "drilling.top_drive",
@@ -115,6 +117,11 @@ _HOME = {
     "Stiff": "drilling.top_drive",
     "Stribeck": "drilling.bit_laws",
     "TopDrive": "drilling.top_drive",
+    "read_drilling": "drilling.simulate",
+    "read_drilling_scene": "drilling.scenefile",
+    "resume_drilling": "drilling.simulate",
+    "simulate_drilling": "drilling.simulate",
+    "StickSlip": "drilling.stick_slip",
     "ViscousDrag": "drilling.wall_friction",
     "WallFriction": "drilling.wall_friction",
     "Wear": "drilling.bit_laws",
@@ -168,6 +175,7 @@ if TYPE_CHECKING:  # the same names, for editors and type checkers
     from cosserat_fenicsx.drilling.bit_laws import Stribeck as Stribeck
     from cosserat_fenicsx.drilling.bit_laws import Wear as Wear
     from cosserat_fenicsx.drilling.discs import Discs as Discs
+    from cosserat_fenicsx.drilling.history import DrillingHistory as DrillingHistory
     from cosserat_fenicsx.drilling.hook import Hook as Hook
     from cosserat_fenicsx.drilling.linear.bounce import BitBounce as BitBounce
     from cosserat_fenicsx.drilling.linear.bounce import bit_bounce as bit_bounce
@@ -183,6 +191,12 @@ if TYPE_CHECKING:  # the same names, for editors and type checkers
     from cosserat_fenicsx.drilling.linear.tuned import SoftSpeed as SoftSpeed
     from cosserat_fenicsx.drilling.linear.tuned import SoftTorque as SoftTorque
     from cosserat_fenicsx.drilling.scene import Drilling as Drilling
+    from cosserat_fenicsx.drilling.scenefile import DrillingScene as DrillingScene
+    from cosserat_fenicsx.drilling.scenefile import read_drilling_scene as read_drilling_scene
+    from cosserat_fenicsx.drilling.simulate import read_drilling as read_drilling
+    from cosserat_fenicsx.drilling.simulate import resume_drilling as resume_drilling
+    from cosserat_fenicsx.drilling.simulate import simulate_drilling as simulate_drilling
+    from cosserat_fenicsx.drilling.stick_slip import StickSlip as StickSlip
     from cosserat_fenicsx.drilling.top_drive import PI as PI
     from cosserat_fenicsx.drilling.top_drive import Matched as Matched
     from cosserat_fenicsx.drilling.top_drive import Motor as Motor

@@ -1,0 +1,121 @@
+"""A `Drilling` as plain data, which JSON can hold, and back; and its fingerprint, to tell whether a scene is another.
+
+An object of the package is {"type": its class, field: value, ...}. Reading data calls the constructors of the package's
+classes and nothing else. Functions written in Python and components of the user's own have no such form.
+"""
+
+import dataclasses
+import functools
+
+import numpy as np
+
+from cosserat_fenicsx.drilling.bit_laws import LAWS, BitOnRock, Wear
+from cosserat_fenicsx.drilling.discs import Discs
+from cosserat_fenicsx.drilling.hook import Hook
+from cosserat_fenicsx.drilling.scene import Drilling
+from cosserat_fenicsx.drilling.signals import ScalarSignal
+from cosserat_fenicsx.drilling.top_drive import CONTROLS, TopDrive
+from cosserat_fenicsx.drilling.wall_friction import ViscousDrag, WallFriction
+from cosserat_fenicsx.errors import SceneError
+from cosserat_fenicsx.scene.as_data import NotData
+from cosserat_fenicsx.scene.materials import Material
+from cosserat_fenicsx.scene.sections import Stiffness
+from cosserat_fenicsx.scene.signals import SIGNALS
+from cosserat_fenicsx.well.components import COMPONENTS
+from cosserat_fenicsx.well.hole import Borehole, HoleSection
+from cosserat_fenicsx.well.mud import Mud
+from cosserat_fenicsx.well.path import WellPath
+from cosserat_fenicsx.well.string import DrillString
+
+_OF_DRILLING = (Drilling, Discs, TopDrive, *CONTROLS, Hook, BitOnRock, *LAWS, Wear, WallFriction, ViscousDrag)
+_OF_WELLS = (DrillString, *COMPONENTS, Borehole, HoleSection, WellPath, Mud, Material, Stiffness)
+#: Functions of time, by their owner: the object's class and its field.
+_IN_TIME = {("TopDrive", "speed"): "rad/s", ("Hook", "speed"): "m/s"}
+_SAMPLES = 41
+
+
+@functools.cache
+def _classes():
+    return {kind.__name__: kind for kind in (*_OF_DRILLING, *_OF_WELLS, *SIGNALS)}
+
+
+def to_data(scene):
+    """A dict of lists, numbers, strings and None.
+
+    Raises:
+        NotData: a function written in Python, or a class that is not the package's; its text names the place.
+    """
+    return _value(scene, "Drilling")
+
+
+def from_data(data):
+    """The `Drilling` of `to_data`.
+
+    Raises:
+        SceneError: no data of a drill-string in motion.
+    """
+    try:
+        found = _object(data)
+    except (KeyError, TypeError, ValueError, AttributeError, ArithmeticError, RecursionError) as problem:
+        raise SceneError(f"these are no data of a Drilling ({type(problem).__name__}: {problem})") from None
+    if not isinstance(found, Drilling):
+        raise SceneError(f"these are the data of a {type(found).__name__}: expected those of a Drilling")
+    return found
+
+
+def fingerprint(scene, duration):
+    """{place: number, string, None or list of these} of all that the motion up to a time (s) follows from; functions of
+    time by their values."""
+    times = np.linspace(0.0, duration, _SAMPLES)
+    return dict(_flat(_value(scene, "Drilling", times), "Drilling"))
+
+
+def _value(value, where, times=None):
+    """A value as data; with `times` functions are replaced by their values there."""
+    if value is None or isinstance(value, str | bool | int | float):
+        return value
+    if isinstance(value, np.ndarray | np.generic):
+        return value.tolist()
+    if isinstance(value, list | tuple):
+        return [_value(x, f"{where}[{i}]", times) for i, x in enumerate(value)]
+    kind = type(value)
+    if _classes().get(kind.__name__) is not kind:
+        if times is not None:
+            return kind.__name__  # of the user's own: compared by type alone
+        what = "a function written in Python" if callable(value) else f"a part of the class {kind.__name__}"
+        raise NotData(f"{where}: {what} cannot be stored as data")
+    found = {"type": kind.__name__}
+    for field in dataclasses.fields(kind):
+        if not field.init:
+            continue
+        inner = getattr(value, field.name)
+        if times is not None and callable(inner) and (kind.__name__, field.name) in _IN_TIME:
+            signal = ScalarSignal(value, field.name, inner, _IN_TIME[kind.__name__, field.name])
+            found[field.name] = {"jumps": list(signal.jumps), "values": [signal(t) for t in times]}
+        else:
+            found[field.name] = _value(inner, f"{where}.{field.name}", times)
+    return found
+
+
+def _object(data):
+    if isinstance(data, list):
+        return [_object(x) for x in data]
+    if not isinstance(data, dict):
+        return data
+    kind = _classes()[data["type"]]
+    arguments = {name: _object(value) for name, value in data.items() if name != "type"}
+    if kind is WellPath:
+        arguments = {name: np.array(values, dtype=float) for name, values in arguments.items()}
+    return kind(**arguments)
+
+
+def _flat(value, where):
+    if isinstance(value, dict):
+        for name, inner in value.items():
+            yield from _flat(inner, f"{where}.{name}")
+    elif isinstance(value, list) and any(isinstance(x, dict | list | str) or x is None for x in value):
+        yield f"{where}: number", len(value)
+        for i, inner in enumerate(value):
+            yield from _flat(inner, f"{where}[{i}]")
+    else:
+        yield where, value

@@ -1,0 +1,133 @@
+"""Which model a drill-string in motion takes, why, and what that leaves out."""
+
+import importlib
+
+import numpy as np
+
+from cosserat_fenicsx.drilling.bit_laws import Cutting, Lobes, Stribeck
+from cosserat_fenicsx.drilling.discs import Discs
+from cosserat_fenicsx.errors import NotConverged, SceneError, nearest
+from cosserat_fenicsx.well import criteria
+from cosserat_fenicsx.well.operations import RotaryDrilling, RotateOffBottom, TripIn, TripOut
+from cosserat_fenicsx.well.torque_and_drag import torque_and_drag
+
+TORSION, BOTH = "torsion", "axial-torsional"
+MODELS = ("auto", TORSION, BOTH)
+#: Modules and classes of the models, see `protocol.StringModel`; loaded where they are used.
+_CLASSES = {}
+
+
+def chosen(scene, model="auto"):
+    """(name, [sentence]) of the model, and why.
+
+    Raises:
+        SceneError: an unknown model, or one that does not fit the scene.
+    """
+    if not isinstance(model, str) or model not in MODELS:
+        raise SceneError(f"simulate_drilling.model = {model!r}: {nearest(model, MODELS)}")
+    if isinstance(scene.string, Discs):
+        if model == BOTH:
+            raise SceneError(
+                f"simulate_drilling.model = '{BOTH}': expected '{TORSION}' or 'auto' for Discs, which turn alone"
+            )
+        return TORSION, ["torsion: discs turn alone"]
+    asks = _asks_for_axial(scene)
+    if model == "auto":
+        name = BOTH if asks else TORSION
+        why = asks or [f"nothing moves along the axis{_still(scene)}"]
+        return name, [f"{name}: {'; '.join(why)}", *_left_out(scene, name)]
+    why = [f"{model}: as asked"]
+    if model == TORSION and asks:
+        if isinstance(getattr(scene.bit, "law", None), Cutting):
+            raise SceneError(f"simulate_drilling.model = '{TORSION}': expected '{BOTH}' or 'auto', since the torque of "
+                             "Cutting follows the depth of cut")  # fmt: skip
+        why.append(f"APPROXIMATE: torsion alone leaves out what moves along the axis ({'; '.join(asks)})")
+    return model, [*why, *_left_out(scene, model)]
+
+
+def model_of(scene, name, dt, elements):
+    """A new `StringModel` at rest.
+
+    Args:
+        name: see `chosen`. dt: step, s, or None for the model's own. elements: along the string, or None.
+    """
+    kind = f"{name} of discs" if isinstance(scene.string, Discs) else name
+    module, made = _CLASSES[kind]
+    return getattr(importlib.import_module(f"cosserat_fenicsx.drilling.{module}"), made)(scene, dt, elements)
+
+
+def _asks_for_axial(scene):
+    """What takes the axial motion, in words; empty where nothing does."""
+    law, found = getattr(scene.bit, "law", None), []
+    moves = scene.hook is not None and not (scene.hook.signal().constant and scene.hook.signal()(0.0) == 0.0)
+    if moves:
+        found.append("the hook moves")
+    if isinstance(law, Cutting):
+        found.append("the torque on bit follows the depth of cut")
+    if isinstance(law, Lobes):
+        found.append("the lobes of the rock lift the bit")
+    if isinstance(law, Stribeck) and law.radius is not None and scene.hole is not None:
+        found.append("the torque on bit follows the weight on bit, which friction along the hole changes")
+    return found
+
+
+def _still(scene):
+    law = getattr(scene.bit, "law", None)
+    if isinstance(law, Stribeck) and law.radius is not None:
+        return ", and the weight on bit stays as it is"
+    return ""
+
+
+def _left_out(scene, name):
+    """Sentences on what a string on the axis of the hole leaves out."""
+    return _buckled(scene, name) if scene.hole is not None else []
+
+
+def _buckled(scene, name):
+    """A sentence where the compression is above the load of buckling in the hole."""
+    try:
+        states = [torque_and_drag(_with_friction(scene), scene.string, operation, mud=scene.mud, depth=scene.bit_depth,
+                                  model="soft") for operation in _operations(scene)]  # fmt: skip
+    except NotConverged as problem:
+        return [f"whether the string buckles in the hole was not found out: {problem}"]
+    worst = max(states, key=lambda answer: (answer.buckling > criteria.STRAIGHT).sum())
+    bent = worst.buckling > criteria.STRAIGHT
+    if not bent.any():
+        return []
+    top, bottom = worst.md[bent].min(), worst.md[bent].max()
+    what = criteria.STATES[int(worst.buckling.max())]
+    return [
+        f"APPROXIMATE: the compression between md = {top:.5g} and {bottom:.5g} m is above the load of {what} buckling "
+        f"in the hole ({worst.operation.name}, {-worst.tension[bent].min() / 1e3:.4g} kN): the {name} model stays on the "
+        "axis and leaves out what buckling adds; that takes a rod model"
+    ]
+
+
+def _operations(scene):
+    """What is done, at rest in time: which of these compresses the string most is not known in advance."""
+    weight = (scene.bit.weight or 0.0) if scene.bit is not None else 0.0
+    law = getattr(scene.bit, "law", None)
+    law = law.law if isinstance(law, Lobes) else law
+    torque = law.torques(weight)[1] if isinstance(law, Stribeck) else 0.0
+    yield RotaryDrilling(weight, torque) if weight > 0 else RotateOffBottom()
+    if scene.hook is not None:
+        signal = scene.hook.signal()
+        speeds = [signal(t) for t in (0.0, *signal.jumps)]
+        yield from (kind(weight) for kind, there in ((TripIn, min(speeds) < 0), (TripOut, max(speeds) > 0)) if there)
+
+
+def _with_friction(scene):
+    """The hole with the kinetic friction of the motion."""
+    friction = scene.friction
+    if friction is None:
+        return scene.hole
+    if friction.of_hole:
+        return scene.hole.with_friction([section.friction * friction.kinetic for section in scene.hole.sections])
+    return scene.hole.with_friction(friction.kinetic)
+
+
+def fastest(scene, until):
+    """The largest size of the drive's speed up to a time (s), rad/s; 0 for a motor."""
+    signal = scene.drive.signal()
+    times = np.unique([*np.linspace(0.0, until, 201), *(t for t in signal.jumps if 0 <= t <= until)])
+    return max(abs(signal(t)) for t in ([0.0] if signal.constant else times))

@@ -1,0 +1,237 @@
+"""The folder that a drill-string in motion is written to during the run.
+
+drilling.json    the arguments of `simulate_drilling`, the model and what decided for it, the fingerprint of the scene
+scene.json       the scene as data, where it has that form: no folder can run code
+series.f64, profiles.f64   rows of numbers, 8 bytes each, see `history.COLUMNS`; only complete rows count
+checkpoint.npz   the memory of the model and of the loop, and how many rows there were then
+
+Rows after those that the checkpoint tells of are computed again, to the same digits.
+"""
+
+import json
+import os
+import time
+from pathlib import Path
+
+import numpy as np
+
+from cosserat_fenicsx import __version__
+from cosserat_fenicsx.checks import instance
+from cosserat_fenicsx.drilling.as_data import fingerprint, from_data, to_data
+from cosserat_fenicsx.drilling.history import COLUMNS, DrillingHistory
+from cosserat_fenicsx.drilling.protocol import PROFILE
+from cosserat_fenicsx.errors import NotStored, SceneError
+from cosserat_fenicsx.ranks import on_first, world
+from cosserat_fenicsx.results.export.beside import replaced
+from cosserat_fenicsx.scene.as_data import NotData
+from cosserat_fenicsx.storage import checkpoints
+from cosserat_fenicsx.storage.fingerprint import difference
+
+#: Least time between checkpoints: in s, and as a multiple of the time that it takes to write one.
+APART, SELDOM = 2.0, 20
+_FORMAT = 1
+_HEAD, _SCENE, _LATEST = "drilling.json", "scene.json", "checkpoint.npz"
+_SERIES, _PROFILES = "series.f64", "profiles.f64"
+_TOLD = {"model": str, "why": list, "dt": float, "depths": list, "duration": float}
+
+
+class DrillingFolder:
+    """A folder that holds a drill-string in motion. Rank 0 writes.
+
+    Args:
+        place: its name.
+
+    Raises:
+        SceneError: `place` is no name.
+
+    Attributes:
+        place: a `pathlib.Path`. head: what is in drilling.json.
+    """
+
+    def __init__(self, place):
+        instance("simulate_drilling", "folder", place, str | os.PathLike, "the name of a folder")
+        self.place, self.head, self._last, self._apart = Path(place), None, None, APART
+
+    def make(self, scene, history, asked):
+        """Make the folder for a new motion.
+
+        Args:
+            history: the empty `DrillingHistory`. asked: arguments of `simulate_drilling`, plain values.
+
+        Raises:
+            SceneError: it holds a motion already, or cannot be made.
+        """
+        try:
+            data = to_data(scene)
+        except NotData as problem:
+            data = {"missing": str(problem)}
+        self.head = {
+            "format": _FORMAT, "cosserat_fenicsx": __version__, **asked, "model": history.model,
+            "why": list(history.why), "dt": history.dt, "depths": history.depths.tolist(),
+            "scene": fingerprint(scene, asked["duration"]),
+        }  # fmt: skip
+        history.folder = self.place
+
+        def made():
+            if (self.place / _HEAD).exists():
+                raise SceneError(
+                    f"simulate_drilling.folder = {str(self.place)!r}: it holds a motion already: expected another "
+                    f"name, or that it is removed first; cosserat_fenicsx.resume_drilling({str(self.place)!r}) continues it"
+                )
+            self.place.mkdir(parents=True, exist_ok=True)
+            for name in (_SERIES, _PROFILES):
+                (self.place / name).write_bytes(b"")
+            (self.place / _LATEST).unlink(missing_ok=True)
+            self._put(_SCENE, data)
+            self._put(_HEAD, self.head)  # the last one: without it there is no motion
+
+        self._try(made)
+        return self
+
+    def _put(self, name, data):
+        with replaced(self.place / name) as fresh:
+            fresh.write_text(json.dumps(data, indent=1), encoding="utf-8")
+
+    def _try(self, action):
+        try:
+            on_first(world(), action)
+        except OSError as problem:
+            raise SceneError(
+                f"simulate_drilling.folder = {str(self.place)!r}: {problem.strerror or problem}: expected a folder "
+                "that can be written to"
+            ) from None
+
+    def open(self):
+        """Read what drilling.json says.
+
+        Raises:
+            SceneError: there is no motion, or the file is damaged.
+        """
+        try:
+            head = json.loads((self.place / _HEAD).read_text(encoding="utf-8"))
+        except OSError as problem:
+            raise SceneError(
+                f"{self.place}: no motion of a drill-string was found there ({_HEAD}: {problem.strerror}): expected a "
+                "folder that simulate_drilling(..., folder=...) wrote"
+            ) from None
+        except (ValueError, RecursionError) as problem:
+            raise SceneError(
+                f"{self.place / _HEAD} is damaged ({problem}): expected what simulate_drilling wrote"
+            ) from None
+        for name, kind in {"format": int, "scene": dict, **_TOLD}.items():
+            if not isinstance(head, dict) or not isinstance(head.get(name), kind):
+                raise SceneError(f"{self.place / _HEAD} is damaged ({name}): expected what simulate_drilling wrote")
+        if head["format"] != _FORMAT:
+            raise SceneError(f"{self.place}: its format is {head['format']}: expected {_FORMAT}, that of this release")
+        self.head = head
+        return self
+
+    def scene(self, given=None):
+        """The scene of the motion: the given one, compared with the fingerprint, or the one that is stored.
+
+        Raises:
+            SceneError: it is another one, or there is none.
+        """
+        if given is None:
+            given = self._stored_scene()
+        differs = difference(json.loads(json.dumps(fingerprint(given, self.head["duration"]))), self.head["scene"])
+        if differs:
+            raise SceneError(f"{self.place}: the scene is not the one of the motion: {differs}")
+        return given
+
+    def _stored_scene(self):
+        try:
+            data = json.loads((self.place / _SCENE).read_text(encoding="utf-8"))
+            if "missing" not in data:
+                return from_data(data)
+            why = f"the folder does not hold it: {data['missing']}"
+        except (OSError, ValueError, TypeError, RecursionError) as problem:
+            why = f"the folder's own cannot be read ({problem})"
+        raise SceneError(f"resume_drilling.scene = None: expected the scene of {self.place}, since {why}")
+
+    def history(self, scene, rows=None, profiles=None):
+        """The `DrillingHistory` of the complete rows, or of the first ones where numbers of them are given."""
+        told = self.head
+        series = self._read(_SERIES, len(COLUMNS), rows)
+        along = self._read(_PROFILES, 1 + len(PROFILE) * len(told["depths"]), profiles)
+        return DrillingHistory(scene, told["model"], told["why"], told["dt"], told["depths"], series, along,
+                               folder=self.place)  # fmt: skip
+
+    def _read(self, name, columns, rows):
+        try:
+            numbers = np.fromfile(self.place / name)
+        except OSError as problem:
+            raise SceneError(
+                f"{self.place / name}: cannot be read ({problem.strerror}): expected the rows of a motion"
+            ) from None
+        whole = numbers[: len(numbers) // columns * columns].reshape(-1, columns)
+        return whole if rows is None else whole[:rows].copy()
+
+    def extend(self, duration):
+        """Note a longer duration (s) than the last one."""
+        self.head["duration_asked"] = duration
+        self._try(lambda: self._put(_HEAD, self.head))
+
+    @property
+    def asked(self):
+        """The last duration that was asked for, s."""
+        return self.head.get("duration_asked", self.head["duration"])
+
+    # -- rows and checkpoints ----------------------------------------------------------------------------------------
+
+    def cut(self, rows, profiles):
+        """Leave the first rows alone, before a motion is continued."""
+        sizes = {_SERIES: rows * len(COLUMNS), _PROFILES: profiles * (1 + len(PROFILE) * len(self.head["depths"]))}
+        self._try(lambda: [os.truncate(self.place / name, 8 * size) for name, size in sizes.items()])
+
+    def add(self, history, rows, profiles):
+        """Append rows to the files.
+
+        Raises:
+            NotStored: they cannot be written.
+        """
+
+        def written():
+            for name, numbers in ((_SERIES, rows), (_PROFILES, profiles)):
+                if len(numbers):
+                    with open(self.place / name, "ab", buffering=0) as stream:
+                        stream.write(np.ascontiguousarray(numbers, dtype=float).tobytes())
+
+        self._or_not_stored(history, written)
+
+    @property
+    def due(self):
+        """Whether it is time for a checkpoint; checkpoints do not influence the motion."""
+        return self._last is None or time.monotonic() - self._last > self._apart
+
+    def keep(self, history, memory):
+        """Write a checkpoint, after the rows so far.
+
+        Raises:
+            NotStored: it cannot be written.
+        """
+        began = time.monotonic()
+
+        def written():
+            for name in (_SERIES, _PROFILES):
+                with open(self.place / name, "rb") as stream:
+                    os.fsync(stream.fileno())
+            checkpoints.write(self.place / _LATEST, memory)
+
+        self._or_not_stored(history, written)
+        self._last = time.monotonic()
+        self._apart = max(APART, SELDOM * (self._last - began))
+
+    def memory(self):
+        """What the last checkpoint holds; None where there is none that can be read."""
+        return checkpoints.read(self.place / _LATEST)
+
+    def _or_not_stored(self, history, action):
+        try:
+            on_first(world(), action)
+        except OSError as problem:
+            raise NotStored(
+                f"{self.place}: the motion cannot be written: {problem.strerror or problem}. Make room; "
+                f"cosserat_fenicsx.resume_drilling({str(self.place)!r}) continues it",
+                history,
+            ) from None

@@ -1,0 +1,246 @@
+"""`DrillingHistory`: a drill-string in motion over time."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from cosserat_fenicsx.annotations import File
+from cosserat_fenicsx.checks import number
+from cosserat_fenicsx.drilling.protocol import LEDGER, PROFILE, SERIES
+from cosserat_fenicsx.drilling.quantities import QUANTITIES, heading
+from cosserat_fenicsx.drilling.scene import Drilling
+from cosserat_fenicsx.drilling.stick_slip import StickSlip, stick_slip_of
+from cosserat_fenicsx.errors import SceneError
+from cosserat_fenicsx.ranks import on_first, world
+from cosserat_fenicsx.results.export.beside import replaced
+from cosserat_fenicsx.results.export.exports import import_library
+from cosserat_fenicsx.well.tabular import Tabular
+
+#: Columns of the rows that a `StringModel` gives.
+COLUMNS = ("times", *SERIES, *LEDGER)
+
+
+class DrillingHistory(Tabular):
+    """The motion of a drill-string, from `simulate_drilling`.
+
+    SI units, angles in rad. Angles, speeds and torques are positive in the sense of drilling; displacements, velocities
+    and the advance of the bit are positive downwards, tension and hook load where they pull. A model of torsion alone
+    leaves what is axial NaN.
+
+    Attributes:
+        scene: the `Drilling`.
+        model: "torsion" or "axial-torsional". why: sentences on that choice, and on what the model leaves out.
+        dt: step, s. counts: {name: number} of the solver, such as steps that were halved.
+        times: (n,) s, each at the end of a step.
+        drive_speed, bit_speed: (n,) rad/s. drive_angle, bit_angle: (n,) rad.
+        surface_torque, torque_on_bit: (n,) N m.
+        hook_load, weight_on_bit: (n,) N. bit_velocity: (n,) m/s. bit_advance: (n,) m.
+        kinetic, strain: (n,) energies, J. work_of_drive, work_of_hook, work_of_weight: (n,) done on the string since
+            the start, J. lost_at_bit, lost_at_wall, lost_in_mud: (n,) J.
+        profile_times: (k,) s. depths: (m,) measured depths, m.
+        angle, speed, torque, displacement, velocity, tension: (k, m) along the string at these times, in the same
+            units. sticking: (k, m) True where the wall holds the string.
+        folder: the `pathlib.Path` that it is stored in, or None.
+    """
+
+    #: For messages.
+    axis = "time"
+
+    def __init__(self, scene, model, why, dt, depths, rows=None, profiles=None, counts=None, folder=None):
+        self.scene: Drilling = scene
+        self.model, self.why, self.dt, self.depths = model, tuple(why), float(dt), np.asarray(depths, dtype=float)
+        self.counts: dict[str, int] = dict(counts or {})
+        self.folder = folder
+        self._rows = [np.empty((0, len(COLUMNS))) if rows is None else rows]
+        shape = (0, 1 + len(PROFILE) * len(self.depths))
+        self._profiles = [np.empty(shape) if profiles is None else profiles]
+
+    def append(self, rows):
+        """Add (n, len(COLUMNS)) rows."""
+        self._rows.append(rows)
+
+    def append_profile(self, time, profile):
+        """Add the profile (len(PROFILE), m) at a time (s), and return the row that it is stored as."""
+        row = np.concatenate([[time], np.ravel(profile)])
+        self._profiles.append(row[None])
+        return row
+
+    def __len__(self):
+        return sum(map(len, self._rows))
+
+    def _table(self):
+        """(n, len(COLUMNS)) all rows, joined once."""
+        if len(self._rows) > 1:
+            self._rows = [np.concatenate(self._rows)]
+        return self._rows[0]
+
+    def _along(self):
+        """(k, 1 + len(PROFILE) m) all profiles, joined once."""
+        if len(self._profiles) > 1:
+            self._profiles = [np.concatenate(self._profiles)]
+        return self._profiles[0]
+
+    def __getattr__(self, name):
+        if name in COLUMNS:
+            return self._table()[:, COLUMNS.index(name)]
+        if name == "profile_times":
+            return self._along()[:, 0]
+        if name in PROFILE:
+            k, m = PROFILE.index(name), len(self.depths)
+            values = self._along()[:, 1 + k * m : 1 + (k + 1) * m]
+            return values > 0.5 if name == "sticking" else values
+        raise AttributeError(f"'{type(self).__name__}' object has no attribute '{name}'")
+
+    def __getstate__(self):  # beside __getattr__, for pickles and copies
+        return vars(self)
+
+    def __setstate__(self, state):
+        vars(self).update(state)
+
+    def __dir__(self):
+        return sorted({*super().__dir__(), *COLUMNS, *PROFILE, "profile_times"})
+
+    @property
+    def balance(self) -> np.ndarray:
+        """(n,) what the ledger does not account for, J: energies and losses less works, the loss of the scheme with
+        the sign turned."""
+        ledger = {name: np.nan_to_num(getattr(self, name)) for name in LEDGER}
+        works = sum(values for name, values in ledger.items() if name.startswith("work"))
+        return sum(values for name, values in ledger.items() if not name.startswith("work")) - works
+
+    def stick_slip(self, since: float | None = None) -> StickSlip:
+        """Period, peaks, and when the bit starts and stops.
+
+        Args:
+            since: s; None for the second half.
+
+        Raises:
+            SceneError: fewer than three times from there on.
+        """
+        last = float(self.times[-1]) if len(self) else 0.0
+        since = last / 2 if since is None else number("stick_slip", "since", since, "a time (s)", np.isfinite)
+        if len(self) < 3 or (self.times >= since).sum() < 3:
+            raise SceneError(f"stick_slip.since = {since:g}: expected a time with at least three rows after it, up to "
+                             f"{last:g} s")  # fmt: skip
+        return stick_slip_of(self, since)
+
+    # -- tables ------------------------------------------------------------------------------------------------------
+
+    def _tables(self):
+        named = {heading(name): getattr(self, name) for name in (*SERIES, *LEDGER, "balance")}
+        return {"": {"time (s)": self.times, **{name: x for name, x in named.items() if not np.isnan(x).all()}}}
+
+    def to_xarray(self) -> Any:
+        """An xarray Dataset: series over `time`, and profiles over `profile_time` and `depth`, with their units.
+
+        Raises:
+            InstallationError: xarray is missing.
+        """
+        xarray = import_library("xarray", "to_xarray")
+        data = {name: ("time", getattr(self, name)) for name in (*SERIES, *LEDGER, "balance")}
+        data |= {name: (("profile_time", "depth"), getattr(self, name)) for name in PROFILE}
+        data["sticking"] = (data["sticking"][0], data["sticking"][1].astype(np.int8))
+        given = {name: (*entry, {"long_name": QUANTITIES[name][0], "units": QUANTITIES[name][1]})
+                 for name, entry in data.items()}  # fmt: skip
+        axes = {"time": (self.times, "s"), "profile_time": (self.profile_times, "s"), "depth": (self.depths, "m")}
+        coordinates = {name: (name, values, {"units": unit}) for name, (values, unit) in axes.items()}
+        about = {"model": self.model, "why": "\n".join(self.why), "dt": self.dt}
+        return xarray.Dataset(given, coordinates, about)
+
+    def write(self, file: File) -> None:
+        """Write the series as a .csv file, or all of it as a .nc file (NetCDF 4), in SI. Rank 0 writes.
+
+        Raises:
+            SceneError: another ending, or a motion without times.
+            InstallationError: xarray or h5netcdf is missing, for .nc.
+            OSError: it cannot be written.
+        """
+        file = Path(file)
+        if not len(self):
+            raise SceneError(f"{file}: the motion has no time to write")
+        if file.suffix.lower() == ".csv":
+            super().write(file)
+        elif file.suffix.lower() == ".nc":
+            import_library("h5netcdf", "write")
+            dataset = self.to_xarray()
+
+            def written():
+                with replaced(file) as fresh:
+                    dataset.to_netcdf(fresh, engine="h5netcdf")
+
+            on_first(world(), written)
+        else:
+            raise SceneError(f"{file}: expected a name that ends in .csv or .nc")
+
+    # -- pictures ----------------------------------------------------------------------------------------------------
+
+    def plot(self, file: File | None = None, between: tuple[float, float] | None = None):
+        """Draw the speeds of drive and bit and the torques over time, with hook load and weight on bit where the model
+        has them.
+
+        Args:
+            file: .png, .pdf or another format of matplotlib (rank 0 writes); None returns the Figure.
+            between: times (s) from which to which; None for all.
+
+        Raises:
+            SceneError: matplotlib is missing, an unknown ending, or fewer than two times.
+        """
+        from cosserat_fenicsx.drilling.pictures.charts import draw_over_time
+
+        return draw_over_time(self, file, between)
+
+    def plot_map(self, file: File | None = None, what: str = "speed", between: tuple[float, float] | None = None):
+        """Draw a quantity over time and depth, which runs downwards, and where the wall holds the string.
+
+        Args:
+            what: "speed", "torque", "angle", "tension", "displacement" or "velocity".
+            file, between: see `plot`.
+
+        Raises:
+            SceneError: see `plot`; a quantity that the model does not have.
+        """
+        from cosserat_fenicsx.drilling.pictures.maps import draw_map
+
+        return draw_map(self, file, what, between)
+
+    def plot_phase(self, file: File | None = None, since: float | None = None):
+        """Draw the phase portrait of the bit: its speed over the twist between drive and bit.
+
+        Args:
+            since: s; None for the second half.
+            file: see `plot`.
+        """
+        from cosserat_fenicsx.drilling.pictures.charts import draw_phase
+
+        return draw_phase(self, file, since)
+
+    def plot_energy(self, file: File | None = None):
+        """Draw the ledger of energy, and what it does not account for, over time; `file`: see `plot`."""
+        from cosserat_fenicsx.drilling.pictures.charts import draw_energy
+
+        return draw_energy(self, file)
+
+    def animate(self, file: File, *, speed: float | None = None, fps: float = 25, progress: bool | None = None) -> None:
+        """Write a film of the string that turns: twist and speed of rotation along it.
+
+        Args:
+            file: .gif, or .mp4, which needs ffmpeg (rank 0 writes).
+            speed: seconds of the motion in a second of the film; None for one of at most ten seconds.
+            fps: frames per second, 1 to 100. progress: see `simulate_drilling`.
+
+        Raises:
+            SceneError: matplotlib, Pillow or ffmpeg is missing, another ending, or fewer than two profiles.
+        """
+        from cosserat_fenicsx.drilling.pictures.film import film
+
+        film(self, file, speed, fps, progress)
+
+    def __repr__(self):
+        last = f" up to t = {self.times[-1]:g} s" if len(self) else ""
+        return f"DrillingHistory({self.model}: {len(self)} times{last}, {len(self.profile_times)} profiles)"
+
+    def __str__(self):
+        from cosserat_fenicsx.drilling.tables import history_table
+
+        return history_table(self)

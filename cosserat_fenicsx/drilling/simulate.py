@@ -1,0 +1,178 @@
+"""`simulate_drilling`: a drill-string in motion; `resume_drilling` and `read_drilling`: from the folder of one."""
+
+import math
+import numbers
+
+from cosserat_fenicsx.annotations import File
+from cosserat_fenicsx.checks import instance, number, refuse
+from cosserat_fenicsx.drilling.bit_laws import Cutting, Lobes
+from cosserat_fenicsx.drilling.choose import chosen, fastest, model_of
+from cosserat_fenicsx.drilling.folder import DrillingFolder
+from cosserat_fenicsx.drilling.history import DrillingHistory
+from cosserat_fenicsx.drilling.scene import Drilling
+from cosserat_fenicsx.drilling.time_loop import TimeLoop
+from cosserat_fenicsx.drilling.top_drive import Stiff
+
+#: More steps than these are refused as a mistake; so many profiles are kept where nothing else is asked for.
+MOST_STEPS, PROFILES = 1e8, 400
+# Largest rotation in a step, rad, at three times the speed of the drive, as a bit that slips may have; and the largest
+# part of the angle between two blades or lobes.
+_TURN, _FASTER, _OF_BLADES = 1.0, 3.0, 0.25
+
+
+def simulate_drilling(
+    scene: Drilling,
+    duration: float,
+    *,
+    model: str = "auto",
+    dt: float | None = None,
+    elements: int | None = None,
+    save_every: float | None = None,
+    profile_every: float | None = None,
+    folder: File | None = None,
+    progress: bool | None = None,
+) -> DrillingHistory:
+    """Compute the motion of a drill-string from rest: stick-slip, axial and torsional waves, friction along the hole.
+
+    Args:
+        scene: a `Drilling`.
+        duration: s; the motion ends with the first step that reaches it.
+        model: "torsion", "axial-torsional", or "auto": axial motion only where something asks for it. The history's
+            `why` says what decided, and warns where a string on the axis of the hole leaves something out.
+        dt: step, s; None for that of the model.
+        elements: along the string; None for those of the model.
+        save_every: s between the rows of the history, rounded to steps; None for every step.
+        profile_every: s between profiles along the string; None for 400 of them.
+        folder: to write the motion and checkpoints to during the run: whatever ends it, `resume_drilling(folder)`
+            continues it to the same digits. It must not hold a motion yet.
+        progress: True, False, or None for a bar in runs of more than two seconds.
+
+    Returns:
+        a `DrillingHistory`.
+
+    Raises:
+        SceneError: an argument outside its range, an unknown model, a step that is too long for the rotation in it, or
+            a jump in speed that no drive follows.
+        NotConverged: a step fails however short it is; `.path` holds the history up to there.
+        Interrupted: Ctrl-C; `.path` holds the history up to there.
+        NotStored: the folder can no longer be written to.
+    """
+    instance("simulate_drilling", "scene", scene, Drilling, "a Drilling")
+    check_arguments(scene, duration, dt, elements, save_every, profile_every)
+    name, why = chosen(scene, model)
+    running = model_of(scene, name, dt, elements)
+    check_step(scene, running.dt, duration)
+    history = DrillingHistory(scene, running.name, [*why, *running.why], running.dt, running.depths)
+    apart = {
+        "save_every": max(1, round((save_every or 0.0) / running.dt)),
+        "profile_every": max(1, round((profile_every or duration / PROFILES) / running.dt)),
+    }
+    kept = None
+    if folder is not None:
+        asked = {"duration": float(duration), "asked": {"model": name, "dt": dt, "elements": elements}, "apart": apart}
+        kept = DrillingFolder(folder).make(scene, history, asked)
+    return TimeLoop(running, history, kept, **apart).until(duration, progress)
+
+
+def resume_drilling(
+    folder: File, scene: Drilling | None = None, *, duration: float | None = None, progress: bool | None = None
+) -> DrillingHistory:
+    """Continue a motion from the folder that `simulate_drilling` wrote, to the same digits, whatever ended it.
+
+    Args:
+        folder: its name.
+        scene: the `Drilling`, which is compared with that of the folder; None for the one stored there, which is
+            missing where a speed is a function written in Python.
+        duration: s; None for the last one asked for. A longer one goes on from there.
+        progress: see `simulate_drilling`.
+
+    Returns:
+        the `DrillingHistory` from the start; at once where it is complete.
+
+    Raises:
+        SceneError: no such folder, another scene, or a shorter duration.
+        NotConverged, Interrupted, NotStored: see `simulate_drilling`.
+    """
+    kept = DrillingFolder(folder).open()
+    scene = kept.scene(scene)
+    if duration is None:
+        duration = kept.asked
+    elif _seconds("resume_drilling", "duration", duration) < kept.asked:
+        refuse("resume_drilling", "duration", duration, f"at least {kept.asked:g} s, the last one asked for")
+    asked, apart = kept.head["asked"], kept.head["apart"]
+    check_arguments(scene, duration, asked["dt"], asked["elements"], None, None)
+    running, memory = model_of(scene, asked["model"], asked["dt"], asked["elements"]), kept.memory()
+    rows, profiles = (memory["rows"], memory["profiles"]) if memory else (0, 0)
+    history = kept.history(scene, rows, profiles)
+    if len(history) < rows or len(history.profile_times) < profiles:
+        running, history = model_of(scene, asked["model"], asked["dt"], asked["elements"]), kept.history(scene, 0, 0)
+        memory, rows, profiles = None, 0, 0
+    loop = TimeLoop(running, history, kept, **apart)
+    if memory:
+        loop.recall(memory)
+    if duration > kept.asked:
+        check_step(scene, running.dt, duration)
+        kept.extend(float(duration))
+    kept.cut(rows, profiles)
+    return loop.until(duration, progress)
+
+
+def read_drilling(folder: File, scene: Drilling | None = None) -> DrillingHistory:
+    """The motion that a folder holds so far; another process may still be computing it.
+
+    Args: see `resume_drilling`.
+
+    Raises:
+        SceneError: no such folder, or another scene.
+    """
+    kept = DrillingFolder(folder).open()
+    return kept.history(kept.scene(scene))
+
+
+def check_arguments(scene, duration, dt, elements, save_every, profile_every):
+    """Refuse numbers out of their range, and jumps in speed.
+
+    Raises:
+        SceneError: naming the argument.
+    """
+    where = "simulate_drilling"
+    _seconds(where, "duration", duration)
+    for name, value in (("dt", dt), ("save_every", save_every), ("profile_every", profile_every)):
+        if value is not None and _seconds(where, name, value) > duration:
+            refuse(where, name, value, f"at most the duration, {duration:g} s")
+    whole = isinstance(elements, numbers.Integral) and not isinstance(elements, bool)
+    if elements is not None and not (whole and 1 <= elements <= 1_000_000):
+        refuse(where, "elements", elements, "how many along the string, 1 to 1000000")
+    if dt is not None and duration / dt > MOST_STEPS:
+        refuse(where, "dt", dt, f"at least {duration / MOST_STEPS:g} s: {MOST_STEPS:g} steps in {duration:g} s")
+    signal = scene.drive.signal()
+    if isinstance(scene.drive.control, Stiff) and not signal.constant:
+        for t in signal.jumps:
+            if 0 < t < duration and abs(signal.jump(t)) > 1e-6 * max(1.0, abs(signal(t))):
+                refuse("TopDrive", "speed", scene.drive.speed, f"no jump, such as that of {signal.jump(t):.4g} rad/s "
+                       f"at t = {t:g} s: no drive follows it; a Ramp, or a control with an inertia")  # fmt: skip
+
+
+def check_step(scene, dt, duration):
+    """Refuse a step that is too long for the rotation in it, and too many steps.
+
+    Raises:
+        SceneError: naming the step and what it may be.
+    """
+    where, speed = "simulate_drilling", fastest(scene, duration)
+    if duration / dt > MOST_STEPS:
+        refuse(where, "duration", duration, f"at most {MOST_STEPS:g} steps of {dt:g} s, {MOST_STEPS * dt:g} s")
+    law = getattr(scene.bit, "law", None)
+    parts = law.blades if isinstance(law, Cutting) else law.count if isinstance(law, Lobes) else None
+    most, what = _TURN, f"{_TURN:g} rad in a step at {_FASTER:g} times the speed of the drive"
+    if parts is not None:
+        named = "blades" if isinstance(law, Cutting) else "lobes"
+        most, what = _OF_BLADES * 2 * math.pi / parts, f"{_OF_BLADES:g} of the angle between {named} at that speed"
+        speed /= _FASTER
+    if _FASTER * speed * dt > most:
+        longest = most / (_FASTER * speed)
+        refuse(where, "dt", dt, f"a step of at most {longest:.3g} s, too short for more than {what}")
+
+
+def _seconds(where, field, value):
+    return number(where, field, value, "a positive number (s), from 1e-9 to 1e9", lambda x: 1e-9 <= x <= 1e9)

@@ -1,0 +1,42 @@
+"""Tables of a drill-string in motion for the screen."""
+
+import numpy as np
+from rich.table import Table
+
+from cosserat_fenicsx.results.tables import as_text
+
+# Rows that are shown.
+_ROWS = 16
+_RPM = 30 / np.pi
+#: (heading, attribute, factor).
+_SHOWN = (
+    ("t (s)", "times", 1.0),
+    ("drive (rpm)", "drive_speed", _RPM),
+    ("bit (rpm)", "bit_speed", _RPM),
+    ("surface torque (kN m)", "surface_torque", 1e-3),
+    ("torque on bit (kN m)", "torque_on_bit", 1e-3),
+    ("hook load (kN)", "hook_load", 1e-3),
+    ("weight on bit (kN)", "weight_on_bit", 1e-3),
+    ("bit advance (mm)", "bit_advance", 1e3),
+)
+
+
+def history_table(history):
+    """Text: the state at some times, what the bit does, and what decided for the model."""
+    steps = ", ".join(f"{name} {value}" for name, value in history.counts.items())
+    title = f"{history.model} model, steps of {history.dt:.4g} s" + (f" ({steps})" if steps else "")
+    table = Table(title=title)
+    rows = np.unique(np.linspace(0, len(history) - 1, _ROWS).astype(int)) if len(history) else []
+    columns = [(head, getattr(history, name) * factor) for head, name, factor in _SHOWN]
+    columns = [(head, values) for head, values in columns if head == "t (s)" or not np.isnan(values).all()]
+    for head, _ in columns:
+        table.add_column(head, justify="right")
+    for k in rows:
+        table.add_row(*(f"{round(values[k], 9) + 0.0:.5g}" for _, values in columns))
+    lines = [as_text(table)]
+    if len(history) > 5:
+        lines.append(str(history.stick_slip()))
+        worked = np.nan_to_num(history.work_of_drive[-1])
+        lines.append(f"Energy: work of the drive {worked / 1e3:.5g} kJ; the ledger does not account for "
+                     f"{history.balance[-1] / 1e3:.3g} kJ.")  # fmt: skip
+    return "\n".join([*lines, *history.why])

@@ -1,0 +1,98 @@
+"""The loop over time of a drill-string: chunks of steps, the rows and profiles that are kept, checkpoints."""
+
+import numpy as np
+
+from cosserat_fenicsx.errors import Interrupted, NotConverged
+from cosserat_fenicsx.interrupts import obey
+from cosserat_fenicsx.progress import Progress
+from cosserat_fenicsx.ranks import world
+
+#: Steps that are done before it is looked whether a stop was asked for.
+CHUNK = 256
+# Part of a step by which the end may be missed.
+_NOTHING = 1e-6
+
+
+class TimeLoop:
+    """The computation of a motion.
+
+    Args:
+        model: a `StringModel`. history: the `DrillingHistory` that it is written to.
+        folder: a `DrillingFolder`, or None.
+        save_every, profile_every: steps between rows and between profiles.
+    """
+
+    def __init__(self, model, history, folder, save_every, profile_every):
+        self.model, self.history, self._folder = model, history, folder
+        self._save_every, self._profile_every = save_every, profile_every
+        self._rows, self._profiles = len(history), len(history.profile_times)
+
+    def memory(self):
+        """What it takes to go on from here: that of the model, and the numbers of rows."""
+        return {"rows": self._rows, "profiles": self._profiles, "model": self.model.memory()}
+
+    def recall(self, memory):
+        """Restore what `memory` returned."""
+        self.model.recall(memory["model"])
+
+    def until(self, duration, progress=None):
+        """Advance to a time (s), and return the history.
+
+        Raises:
+            NotConverged, Interrupted, NotStored: with what is done so far as `.path`.
+        """
+        model, history = self.model, self.history
+        end = duration - _NOTHING * model.dt
+        try:
+            with Progress([duration], progress, world(), "t (s) =") as bar:
+                bar.start(f"{model.name}, {len(model.depths)} places")
+                bar.reached(model.time)
+                while model.time < end:
+                    obey()
+                    self._chunk(end)
+                    bar.reached(min(model.time, duration))
+                self._keep()
+        except NotConverged as failure:
+            rows = getattr(failure, "rows", None)
+            if rows is not None:
+                self._add(np.asarray(rows)[self._saved(len(rows))])
+            failure.path = history
+            raise
+        except KeyboardInterrupt as stop:
+            if isinstance(stop, Interrupted):
+                raise
+            place = self._folder and self._folder.place
+            kept = f"; cosserat_fenicsx.resume_drilling({str(place)!r}) goes on from there" if place else ""
+            raise Interrupted(history, kept) from None
+        finally:
+            history.counts = dict(model.counts)
+        return history
+
+    def _chunk(self, end):
+        """Steps up to the next profile, or to the end."""
+        model = self.model
+        to_profile = self._profile_every - model.steps % self._profile_every
+        left = max(1, int(np.ceil((end - model.time) / model.dt - _NOTHING)))
+        rows = np.asarray(model.advance(min(CHUNK, to_profile, left)))
+        if not len(rows):
+            raise NotConverged(f"the {model.name} model does not advance from t = {model.time:g} s")
+        self._add(rows[self._saved(len(rows))], profile=model.steps % self._profile_every == 0)
+        if self._folder and self._folder.due:
+            self._keep()
+
+    def _saved(self, count):
+        """Which of the last `count` steps are kept."""
+        return (np.arange(self.model.steps - count, self.model.steps) + 1) % self._save_every == 0
+
+    def _add(self, rows, profile=False):
+        self.history.append(rows)
+        row = np.empty(0)
+        if profile:
+            row = self.history.append_profile(self.model.time, self.model.profile())
+        if self._folder:
+            self._folder.add(self.history, rows, row)
+        self._rows, self._profiles = self._rows + len(rows), self._profiles + bool(profile)
+
+    def _keep(self):
+        if self._folder:
+            self._folder.keep(self.history, self.memory())

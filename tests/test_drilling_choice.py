@@ -1,0 +1,74 @@
+"""Which model a drill-string in motion takes, and why."""
+
+import re
+
+import numpy as np
+import pytest
+from fake_string import scene
+
+import cosserat_fenicsx as cf
+from cosserat_fenicsx.drilling.choose import BOTH, TORSION, chosen
+
+pytestmark = pytest.mark.serial
+STRAIGHT = cf.WellPath.from_survey([0, 2000], [0, 0], [0, 0])
+BENT = cf.WellPath.from_survey([0, 500, 1100, 3500], [0, 0, 60, 60], [0, 0, 0, 0])
+MUD = cf.Mud(1200.0)
+
+
+def hole(path, friction=0.2):
+    return cf.Borehole(path, [cf.HoleSection(path.length, 0.2159, friction)])
+
+
+def bit():
+    return cf.BitOnRock(cf.Stribeck(0.8, 0.5, 3.0, radius=0.1), weight=80e3)
+
+
+@pytest.mark.parametrize(
+    ("changed", "model", "words"),
+    [
+        ({}, TORSION, "nothing moves along the axis$"),
+        ({"bit": bit()}, TORSION, "nothing moves along the axis, and the weight on bit stays as it is"),
+        ({"bit": bit(), "hole": hole(STRAIGHT), "mud": MUD}, BOTH, "weight on bit, which friction along the hole"),
+        ({"bit": cf.BitOnRock(cf.Cutting(0.1, 60e6, 0.6, 4))}, BOTH, "the torque on bit follows the depth of cut"),
+        ({"bit": cf.BitOnRock(cf.Lobes(3, 2e-3), weight=80e3)}, BOTH, "the lobes of the rock lift the bit"),
+        ({"bit": None, "hook": cf.Hook(speed=0.3)}, BOTH, "the hook moves"),
+        ({"bit": None, "hook": cf.Hook(speed=cf.Ramp((0.3,)))}, BOTH, "the hook moves"),
+        ({"hook": cf.Hook(stiffness=5e6)}, TORSION, "nothing moves along the axis"),
+        ({"string": cf.Discs((9.0, 4.0), (7.0,))}, TORSION, "discs turn alone"),
+    ],
+)
+def test_the_cheapest_model_that_is_asked_for(changed, model, words):
+    found, why = chosen(scene(**changed))
+    assert found == model
+    assert re.search(words, why[0]), why
+
+
+def test_what_is_asked_for_is_taken_and_told():
+    assert chosen(scene(), BOTH) == (BOTH, ["axial-torsional: as asked"])
+    moving = scene(bit=None, hook=cf.Hook(speed=0.3))
+    assert chosen(moving, TORSION)[1][1].startswith("APPROXIMATE: torsion alone leaves out what moves along the axis")
+    with pytest.raises(cf.SceneError, match="expected 'axial-torsional' or 'auto', since the torque of Cutting"):
+        chosen(scene(bit=cf.BitOnRock(cf.Cutting(0.1, 60e6, 0.6, 4))), TORSION)
+    with pytest.raises(cf.SceneError, match="expected 'torsion' or 'auto' for Discs, which turn alone"):
+        chosen(scene(string=cf.Discs((9.0, 4.0), (7.0,))), BOTH)
+
+
+def test_buckling_in_the_hole_is_told():
+    """Pipe in a vertical hole under weight on bit: sinusoidal below the depth where the compression is Lubinski's
+    load."""
+    pipe = cf.DrillString([cf.DrillPipe(size="5 in 19.50 lb/ft")])
+    law, weight = cf.Stribeck(3000.0, 2000.0, 3.0), 20e3
+    loaded = scene(string=pipe, bit=cf.BitOnRock(law, weight=weight), hole=hole(STRAIGHT, 0.0), mud=MUD)
+    why = chosen(loaded)[1]
+    assert len(why) == 2 and why[1].startswith("APPROXIMATE: the compression between md = ")
+    assert "buckling in the hole (rotary drilling, 20 kN)" in why[1] and why[1].endswith("that takes a rod model")
+    segment = loaded.segments[0]
+    EI = loaded.laid[0].component.stiffness.bending[0]
+    critical = 1.94 * np.cbrt(EI * segment.weight**2)
+    top = 2000 - (weight - critical) / segment.weight
+    told = float(why[1].split("md = ")[1].split(" ")[0])
+    assert told == pytest.approx(top, abs=60)  # at the points of the soft string
+    assert len(chosen(scene(string=pipe, hole=hole(BENT), mud=MUD))[1]) == 1  # rotates off bottom, in tension
+    lowered = scene(string=pipe, bit=None, hole=hole(cf.WellPath.from_survey([0, 500, 1100, 3500], [0, 0, 88, 88], [0] * 4),
+                    0.4), mud=MUD, hook=cf.Hook(speed=-0.3))  # fmt: skip
+    assert "(trip in, " in chosen(lowered)[1][1]

@@ -1,0 +1,141 @@
+"""A drill-string in motion: what is refused, the history and what it tells, Ctrl-C and failures."""
+
+import numpy as np
+import pytest
+from fake_string import Pendulum, scene, use
+
+import cosserat_fenicsx as cf
+from cosserat_fenicsx.drilling.protocol import LEDGER, PROFILE, SERIES
+
+pytestmark = pytest.mark.serial
+rpm = cf.units.rpm
+
+
+@pytest.fixture
+def history(monkeypatch):
+    use(monkeypatch)
+    return cf.simulate_drilling(scene(), 60.0)
+
+
+def test_rows_are_those_of_the_model(history):
+    model = Pendulum(scene(), 0.01)
+    rows = model.advance(6000)
+    for i, name in enumerate(("times", *SERIES, *LEDGER)):
+        assert np.array_equal(getattr(history, name), rows[:, i], equal_nan=True), name
+    assert len(history) == 6000 and history.times[-1] == 60.0 and history.model == "torsion"
+    assert history.profile_times == pytest.approx(np.arange(1, 401) * 0.15) and history.speed.shape == (400, 5)
+    assert (history.angle[-1] == model.profile()[0]).all() and history.sticking.dtype == bool
+    assert history.sticking[:, -1].any() and not history.sticking[:, 0].any()
+
+
+def test_rows_are_thinned(history, monkeypatch):
+    coarse = cf.simulate_drilling(scene(), 60.0, save_every=0.05, profile_every=2.0)
+    assert (coarse.bit_speed == history.bit_speed[4::5]).all() and len(coarse.profile_times) == 30
+    assert (coarse.speed[2] == history.speed[39]).all()  # both at 6 s
+
+
+def test_stick_slip(history):
+    """Free swings about the drive's speed between two rests: the period of the pendulum in closed form."""
+    found = history.stick_slip(since=15.0)
+    J, k, Om, drop = 374.0, 473.0, 60 * rpm, 3000.0
+    w = np.sqrt(k / J)
+    a = drop / k  # the twist at release beyond that of the friction in motion
+    swing = (2 * np.pi - 2 * np.arctan2(a * w, Om)) / w  # until the bit comes to rest
+    assert found.period == pytest.approx(swing + 2 * a / Om, rel=1e-3)
+    assert found.peak == pytest.approx(Om + np.hypot(Om, a * w), rel=1e-2)
+    assert found.stuck == pytest.approx(2 * a / Om / found.period, abs=6e-3) and found.sticks
+    reach = k * np.hypot(a, Om / w)
+    assert found.torque == pytest.approx((drop - reach, drop + reach), abs=60) and found.severity > 1
+    assert len(found.starts) == len(found.stops) and np.ptp(found.periods) < 0.03
+    assert "stick-slip: period" in str(history) and "bit (rpm)" in str(history) and "hook load" not in str(history)
+    with pytest.raises(cf.SceneError, match=r"stick_slip.since = 70: expected .* up to 60 s"):
+        history.stick_slip(70.0)
+
+
+def test_starts_and_stops_are_interpolated():
+    from cosserat_fenicsx.drilling.stick_slip import crossings
+
+    starts, stops = crossings(np.arange(6.0), np.array([0.0, 0.0, 2.0, 2.0, 0.0, -4.0]), 0.5)
+    assert starts == pytest.approx([1.25, 4.125]) and stops == pytest.approx([3.75])
+
+
+def test_balance(history):
+    assert np.abs(history.balance).max() < 0.05 * history.work_of_drive[-1] and history.balance[-1] != 0
+
+
+def test_tables_and_files(history, tmp_path):
+    history.write(tmp_path / "out.csv")
+    lines = (tmp_path / "out.csv").read_text(encoding="utf-8").splitlines()
+    assert lines[0].startswith("time (s),drive speed (rad/s),drive angle (rad)") and "hook load" not in lines[0]
+    assert len(lines) == 6001 and lines[-1].startswith("60,6.28318531,")
+    with pytest.raises(cf.SceneError, match=r"ends in .csv or .nc"):
+        history.write(tmp_path / "out.xlsx")
+    pytest.importorskip("pandas")
+    assert history.to_dataframe()["bit speed (rad/s)"].max() == history.bit_speed.max()
+    xarray = pytest.importorskip("xarray")
+    found = history.to_xarray()
+    assert found.speed.dims == ("profile_time", "depth") and found.bit_speed.attrs["units"] == "rad/s"
+    assert set(found) == {*SERIES, *LEDGER, *PROFILE, "balance"}
+    pytest.importorskip("h5netcdf")
+    history.write(tmp_path / "out.nc")
+    again = xarray.open_dataset(tmp_path / "out.nc", engine="h5netcdf")
+    assert (again.bit_angle.values == history.bit_angle).all() and again.attrs["model"] == "torsion"
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ({"duration": -1.0}, r"simulate_drilling.duration = -1.0: expected a positive number \(s\)"),
+        ({"dt": 0.0}, r"simulate_drilling.dt = 0.0: expected a positive number \(s\)"),
+        ({"dt": 100.0}, r"simulate_drilling.dt = 100.0: expected at most the duration, 60 s"),
+        ({"dt": 1e-8}, r"dt = 1e-08: expected at least 6e-07 s: 1e\+08 steps in 60 s"),
+        ({"dt": 0.1}, r"dt = 0.1: expected a step of at most 0.0531 s, .* 1 rad in a step at 3 times the speed"),
+        ({"save_every": 61.0}, r"save_every = 61.0: expected at most the duration"),
+        ({"elements": 0}, r"elements = 0: expected how many along the string"),
+        ({"model": "torsional"}, r"model = 'torsional': did you mean 'torsion'"),
+        ({"scene": 3}, r"scene = 3: expected a Drilling"),
+    ],
+)
+def test_what_is_refused(given, words, monkeypatch):
+    use(monkeypatch)
+    with pytest.raises(cf.SceneError, match=words):
+        cf.simulate_drilling(**{"scene": scene(), "duration": 60.0, **given})
+
+
+def test_jumps_in_speed_need_a_drive_that_follows(monkeypatch):
+    use(monkeypatch)
+    drive = cf.TopDrive(cf.Step((6.0,), start=3.0))
+    with pytest.raises(cf.SceneError, match=r"no jump, such as that of 6 rad/s at t = 3 s: no drive follows it"):
+        cf.simulate_drilling(scene(drive=drive), 10.0)
+    ramp = cf.TopDrive(cf.Ramp((6.0,), start=1.0, end=3.0))
+    assert cf.simulate_drilling(scene(drive=ramp), 10.0).drive_speed[-1] == 6.0
+
+
+def test_a_failing_step_keeps_what_is_done(monkeypatch):
+    use(monkeypatch, fails_at=1000)
+    with pytest.raises(cf.NotConverged, match="the step at t = 10 s fails") as stop:
+        cf.simulate_drilling(scene(), 60.0)
+    assert 900 < len(stop.value.path) <= 1000 and "halved" in stop.value.path.counts
+
+
+def test_ctrl_c_keeps_what_is_done(monkeypatch):
+    use(monkeypatch, stops_at=2000)
+    with pytest.raises(
+        cf.Interrupted, match=r"interrupted after \d+ times, which the exception's `path` holds"
+    ) as stop:
+        cf.simulate_drilling(scene(), 60.0)
+    history = stop.value.path
+    assert 1700 < len(history) <= 2000 and history.stick_slip().sticks
+
+
+def test_progress_is_told(monkeypatch, capsys):
+    use(monkeypatch)
+    cf.simulate_drilling(scene(), 20.0, progress=True)
+    assert "torsion, 5 places: t (s) = " in capsys.readouterr().err
+
+
+def test_histories_can_be_pickled(history):
+    import pickle
+
+    again = pickle.loads(pickle.dumps(history))
+    assert (again.bit_speed == history.bit_speed).all() and repr(again) == repr(history)
