@@ -44,10 +44,10 @@ def test_the_cheapest_model_that_is_asked_for(changed, model, words):
 
 
 def test_what_is_asked_for_is_taken_and_told():
-    assert chosen(scene(), BOTH) == (BOTH, ["axial-torsional: as asked"])
+    assert chosen(scene(), BOTH) == (BOTH, ["axial and torsional: as asked"])
     moving = scene(bit=None, hook=cf.Hook(speed=0.3))
     assert chosen(moving, TORSION)[1][1].startswith("APPROXIMATE: torsion alone leaves out what moves along the axis")
-    with pytest.raises(cf.SceneError, match="expected 'axial-torsional' or 'auto', since the torque of Cutting"):
+    with pytest.raises(cf.SceneError, match="expected 'axial and torsional' or 'auto', since the torque of Cutting"):
         chosen(scene(bit=cf.BitOnRock(cf.Cutting(0.1, 60e6, 0.6, 4))), TORSION)
     with pytest.raises(cf.SceneError, match="expected 'torsion' or 'auto' for Discs, which turn alone"):
         chosen(scene(string=cf.Discs((9.0, 4.0), (7.0,))), BOTH)
@@ -69,6 +69,6 @@ def test_buckling_in_the_hole_is_told():
     told = float(why[1].split("md = ")[1].split(" ")[0])
     assert told == pytest.approx(top, abs=60)  # at the points of the soft string
     assert len(chosen(scene(string=pipe, hole=hole(BENT), mud=MUD))[1]) == 1  # rotates off bottom, in tension
-    lowered = scene(string=pipe, bit=None, hole=hole(cf.WellPath.from_survey([0, 500, 1100, 3500], [0, 0, 88, 88], [0] * 4),
-                    0.4), mud=MUD, hook=cf.Hook(speed=-0.3))  # fmt: skip
+    flat = cf.WellPath.from_survey([0, 500, 1100, 3500], [0, 0, 88, 88], [0, 0, 0, 0])
+    lowered = scene(string=pipe, bit=None, hole=hole(flat, 0.4), mud=MUD, hook=cf.Hook(speed=-0.3))
     assert "(trip in, " in chosen(lowered)[1][1]

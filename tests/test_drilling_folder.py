@@ -99,7 +99,8 @@ def test_scenes_as_data():
     whole = cf.Drilling(
         string, cf.TopDrive(cf.Ramp((4.0,), 0.0, 2.0), 2900.0, cf.PI(38e3, 1e5)),
         cf.BitOnRock(cf.Cutting(0.108, 60e6, 0.6, 4, cf.Wear(60e6, 0.011, 0.6)), inertia=41.0), hole,
-        cf.Hook(5e6, 0.01), cf.Mud(1200.0), cf.WallFriction(0.3, 0.195, 1.5, of_rotation=True), cf.ViscousDrag(0.1, 0.2),
+        cf.Hook(5e6, 0.01), cf.Mud(1200.0), cf.WallFriction(0.3, 0.195, 1.5, of_rotation=True),
+        cf.ViscousDrag(0.1, 0.2),
     )  # fmt: skip
     discs = cf.Drilling(cf.Discs((930.0, 2782.0), (700.0,)), cf.TopDrive(6.0), cf.BitOnRock(cf.Stribeck(3.0, 2.0, 1.0)))
     for given in (whole, discs, scene()):

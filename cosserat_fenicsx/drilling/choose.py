@@ -11,7 +11,7 @@ from cosserat_fenicsx.well import criteria
 from cosserat_fenicsx.well.operations import RotaryDrilling, RotateOffBottom, TripIn, TripOut
 from cosserat_fenicsx.well.torque_and_drag import torque_and_drag
 
-TORSION, BOTH = "torsion", "axial-torsional"
+TORSION, BOTH = "torsion", "axial and torsional"
 MODELS = ("auto", TORSION, BOTH)
 #: Modules and classes of the models, see `protocol.StringModel`; loaded where they are used.
 _CLASSES = {}
@@ -96,10 +96,11 @@ def _buckled(scene, name):
         return []
     top, bottom = worst.md[bent].min(), worst.md[bent].max()
     what = criteria.STATES[int(worst.buckling.max())]
+    where = f"between md = {top:.5g} and {bottom:.5g} m"
+    load = f"{worst.operation.name}, {-worst.tension[bent].min() / 1e3:.4g} kN"
     return [
-        f"APPROXIMATE: the compression between md = {top:.5g} and {bottom:.5g} m is above the load of {what} buckling "
-        f"in the hole ({worst.operation.name}, {-worst.tension[bent].min() / 1e3:.4g} kN): the {name} model stays on the "
-        "axis and leaves out what buckling adds; that takes a rod model"
+        f"APPROXIMATE: the compression {where} is above the load of {what} buckling in the hole ({load}): the {name} "
+        "model stays on the axis and leaves out what buckling adds; that takes a rod model"
     ]
 
 

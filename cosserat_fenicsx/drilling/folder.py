@@ -76,7 +76,8 @@ class DrillingFolder:
             if (self.place / _HEAD).exists():
                 raise SceneError(
                     f"simulate_drilling.folder = {str(self.place)!r}: it holds a motion already: expected another "
-                    f"name, or that it is removed first; cosserat_fenicsx.resume_drilling({str(self.place)!r}) continues it"
+                    "name, or that it is removed first; "
+                    f"cosserat_fenicsx.resume_drilling({str(self.place)!r}) continues it"
                 )
             self.place.mkdir(parents=True, exist_ok=True)
             for name in (_SERIES, _PROFILES):

@@ -30,7 +30,7 @@ class DrillingHistory(Tabular):
 
     Attributes:
         scene: the `Drilling`.
-        model: "torsion" or "axial-torsional". why: sentences on that choice, and on what the model leaves out.
+        model: "torsion" or "axial and torsional". why: sentences on that choice, and on what the model leaves out.
         dt: step, s. counts: {name: number} of the solver, such as steps that were halved.
         times: (n,) s, each at the end of a step.
         drive_speed, bit_speed: (n,) rad/s. drive_angle, bit_angle: (n,) rad.

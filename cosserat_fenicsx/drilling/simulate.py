@@ -37,8 +37,8 @@ def simulate_drilling(
     Args:
         scene: a `Drilling`.
         duration: s; the motion ends with the first step that reaches it.
-        model: "torsion", "axial-torsional", or "auto": axial motion only where something asks for it. The history's
-            `why` says what decided, and warns where a string on the axis of the hole leaves something out.
+        model: "torsion", "axial and torsional", or "auto": axial motion only where something asks for it. The
+            history's `why` says what decided, and warns where a string on the axis of the hole leaves something out.
         dt: step, s; None for that of the model.
         elements: along the string; None for those of the model.
         save_every: s between the rows of the history, rounded to steps; None for every step.

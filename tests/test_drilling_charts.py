@@ -1,0 +1,78 @@
+"""Charts and films of a drill-string in motion: what is drawn, its units, what is refused."""
+
+import numpy as np
+import pytest
+from fake_string import scene, use
+
+import cosserat_fenicsx as cf
+
+pytest.importorskip("matplotlib")
+pytestmark = pytest.mark.serial
+
+
+@pytest.fixture
+def history(monkeypatch):
+    use(monkeypatch)
+    return cf.simulate_drilling(scene(), 30.0)
+
+
+def curve(panel, label):
+    return next(line for line in panel.lines if line.get_label() == label).get_ydata()
+
+
+def test_over_time(history, tmp_path):
+    speeds, torques = history.plot().axes
+    assert curve(speeds, "bit") == pytest.approx(history.bit_speed / cf.units.rpm)
+    assert curve(torques, "at the surface") == pytest.approx(history.surface_torque / 1e3)
+    assert [panel.get_ylabel() for panel in (speeds, torques)] == ["speed (rpm)", "torque (kN m)"]
+    assert torques.get_xlabel() == "time (s)"
+    part = history.plot(between=(10.0, 20.0)).axes[0].lines[0].get_xdata()
+    assert part[0] == pytest.approx(10.0) and part[-1] == pytest.approx(20.0)
+    history.plot(tmp_path / "out.png")
+    assert (tmp_path / "out.png").stat().st_size > 20_000
+
+
+def test_the_map(history):
+    panel, bar = history.plot_map().axes
+    speeds, sticks = panel.collections
+    assert np.asarray(speeds.get_array()).reshape(5, -1) == pytest.approx(history.speed.T / cf.units.rpm)
+    assert np.ma.count(np.ma.masked_invalid(sticks.get_array())) == history.sticking.sum() > 0
+    assert bar.get_ylabel() == "speed of rotation (rpm)" and panel.get_ylabel() == "measured depth (m)"
+    assert panel.get_ylim() == (1000.0, 0.0) and "grey: held by the wall" in panel.get_title()
+    assert history.plot_map(what="angle").axes[1].get_ylabel() == "turns (1)"
+    with pytest.raises(cf.SceneError, match="the torsion model has none: expected model='axial and torsional'"):
+        history.plot_map(what="tension")
+    with pytest.raises(cf.SceneError, match="what = 'speeds': did you mean 'speed'"):
+        history.plot_map(what="speeds")
+
+
+def test_phase_and_energy(history):
+    (panel,) = history.plot_phase(since=10.0).axes
+    assert panel.get_xlabel().endswith("(rad)") and panel.lines[0].get_xdata()[0] == pytest.approx(
+        history.drive_angle[999] - history.bit_angle[999]
+    )
+    above, below = history.plot_energy().axes
+    assert {line.get_label() for line in above.lines} == {"kinetic", "strain", "work of the drive", "lost at the bit"}
+    assert below.lines[0].get_ydata() == pytest.approx(history.balance / 1e3)
+
+
+def test_what_is_refused(history, tmp_path):
+    for between, words in (((3, 1), "two times .s., ascending"), ((40, 50), "which ends at 30 s")):
+        with pytest.raises(cf.SceneError, match=words):
+            history.plot(between=between)
+    with pytest.raises(cf.SceneError, match="since = 40.0: expected a time .s. before the end, 30 s"):
+        history.plot_phase(since=40.0)
+    with pytest.raises(cf.SceneError, match="expected a name that ends in"):
+        history.plot(tmp_path / "out.docx")
+    with pytest.raises(cf.SceneError, match=r"ends in .gif or .mp4"):
+        history.animate(tmp_path / "out.avi")
+    with pytest.raises(cf.SceneError, match="at most 10000 frames"):
+        history.animate(tmp_path / "out.gif", speed=1e-3)
+
+
+@pytest.mark.slow
+def test_a_film(history, tmp_path):
+    image = pytest.importorskip("PIL.Image")
+    history.animate(tmp_path / "out.gif", speed=30.0, fps=5)
+    film = image.open(tmp_path / "out.gif")
+    assert film.n_frames == 6 and film.size == (960, 600)
