@@ -5,6 +5,7 @@ Modules beyond the standard library are imported by the commands that need them,
 
 import sys
 import warnings
+from pathlib import Path
 
 from cosserat_fenicsx import interrupts
 from cosserat_fenicsx.cli.deliver import deliver
@@ -63,6 +64,10 @@ def _run(options):
     from cosserat_fenicsx.scene.toml_tables import tables_of
 
     tables = tables_of(options.scene)
+    if "drive" in tables:
+        from cosserat_fenicsx.cli.drilling import run_drilling
+
+        return run_drilling(options, tables)
     if "well" in tables:
         from cosserat_fenicsx.cli.well import run_well
 
@@ -91,6 +96,10 @@ def _run(options):
 
 
 def _resume(options):
+    if (Path(options.folder) / "drilling.json").exists():
+        from cosserat_fenicsx.cli.drilling import resume_run
+
+        return resume_run(options)
     if options.station:
         from cosserat_fenicsx.dynamics.resuming import read_history
 
@@ -109,6 +118,11 @@ def _explain(options):
     from cosserat_fenicsx.scene.toml_tables import tables_of
 
     tables = tables_of(options.scene)
+    if "drive" in tables:
+        from cosserat_fenicsx.cli.drilling import explain_drilling
+
+        say(explain_drilling(options, tables), file=sys.stdout)
+        return DONE
     if "well" in tables:
         from cosserat_fenicsx.cli.well import explain_well
 

@@ -43,7 +43,7 @@ def _scene(options, tables):
 
 
 @contextmanager
-def _warnings_in_words():
+def warnings_in_words():
     """Say each warning about a scene once, without the place in the code that it comes from."""
     said = set()
 
@@ -60,7 +60,7 @@ def _warnings_in_words():
         yield
 
 
-@_warnings_in_words()
+@warnings_in_words()
 def run_well(options, tables):
     """`cosserat run` of the tables of a scene file; returns the exit code."""
     scene, out = _scene(options, tables), Path(options.output) if options.output else None
@@ -111,7 +111,7 @@ def _write(answer, out, stem, pictures):
     return [f"{stem}_contacts.csv", *files]  # which `TorqueAndDrag.write` writes too
 
 
-@_warnings_in_words()
+@warnings_in_words()
 def explain_well(options, tables):
     """Text of `cosserat explain` of the tables of a scene file."""
     scene = _scene(options, tables)

@@ -100,7 +100,7 @@ def resume_drilling(
     elif _seconds("resume_drilling", "duration", duration) < kept.asked:
         refuse("resume_drilling", "duration", duration, f"at least {kept.asked:g} s, the last one asked for")
     asked, apart = kept.head["asked"], kept.head["apart"]
-    check_arguments(scene, duration, asked["dt"], asked["elements"], None, None)
+    check_arguments(scene, duration, asked["dt"], asked["elements"])
     running, memory = model_of(scene, asked["model"], asked["dt"], asked["elements"]), kept.memory()
     rows, profiles = (memory["rows"], memory["profiles"]) if memory else (0, 0)
     history = kept.history(scene, rows, profiles)
@@ -129,7 +129,7 @@ def read_drilling(folder: File, scene: Drilling | None = None) -> DrillingHistor
     return kept.history(kept.scene(scene))
 
 
-def check_arguments(scene, duration, dt, elements, save_every, profile_every):
+def check_arguments(scene, duration, dt=None, elements=None, save_every=None, profile_every=None):
     """Refuse numbers out of their range, and jumps in speed.
 
     Raises:

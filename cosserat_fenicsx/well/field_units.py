@@ -39,15 +39,19 @@ _FRACTION = re.compile(r"\s*(?:(\d+)(?:\s+|\s*-\s*))?(\d+)/([1-9]\d*)\s*(.*?)\s*
 _TONS = ("t", "ton", "tons", "tonne", "tonnes")
 
 
-def in_si(where, value, dimension):
+def in_si(where, value, dimension, dimensions=None):
     """A number in SI from a number in SI, or from text with a unit of a dimension.
+
+    Args:
+        dimensions: those that are known, as `DIMENSIONS`, which is the default.
 
     Raises:
         SceneError: no number, no unit, or one of another dimension.
     """
     if not isinstance(value, str):
         return value
-    si, known = DIMENSIONS[dimension]
+    dimensions = dimensions or DIMENSIONS
+    si, known = dimensions[dimension]
     found, parts = _NUMBER.match(value), _FRACTION.match(value)
     if not found:
         raise SceneError(f"{where} = {value!r}: expected a number ({si}), or text such as '5 {list(known)[-1]}'")
@@ -59,7 +63,7 @@ def in_si(where, value, dimension):
     if unit in _TONS and dimension == "force":
         raise SceneError(f"{where} = {value!r}: expected tf, 1000 kgf, or kN or klbf: there are several tons")
     if unit not in known:
-        others = [name for name, (_, names) in DIMENSIONS.items() if unit in names]
+        others = [name for name, (_, names) in dimensions.items() if unit in names]
         other = f"{unit} is a unit of {others[0]}, expected one of {dimension}" if others else nearest(unit, known)
         raise SceneError(f"{where} = {value!r}: {other} ({', '.join(known)})")
     return number * known[unit]

@@ -160,22 +160,28 @@ def _scene(tables, folder):
     for name in ("well", "string", "operations"):
         if not tables.get(name):
             raise SceneError(f"[{name}] is missing: expected [well], [string] and [[operations]]")
-    hole = _hole(table("well", tables["well"]), folder)
-    string = dict(table("string", tables["string"]))
-    known_keys("[string]", string, KEYS["string"])
-    parts = [_made(f"string.components[{i}]", entry, COMPONENTS) for i, entry in entries("components", string)]
-    operations = tuple(_made(f"operations[{i}]", entry, OPERATIONS) for i, entry in entries("operations", tables))
-    mud = _made("mud", tables["mud"], (Mud,)) if "mud" in tables else None
+    hole = hole_in(table("well", tables["well"]), folder)
+    string = string_in(tables["string"])
+    operations = tuple(made(f"operations[{i}]", entry, OPERATIONS) for i, entry in entries("operations", tables))
+    mud = made("mud", tables["mud"], (Mud,)) if "mud" in tables else None
     settings = dict(table("torque_and_drag", tables.get("torque_and_drag", {})))
     known_keys("[torque_and_drag]", settings, KEYS["torque_and_drag"])
     if "depth" in settings:
         settings["depth"] = _depth("torque_and_drag", "depth", settings["depth"])
-    whole = DrillString(parts, **{name: string[name] for name in ("order",) if name in string})
     sweep = _sweep(table("depth_sweep", tables["depth_sweep"])) if "depth_sweep" in tables else {}
-    return WellScene(str(tables.get("title", "")), hole, whole, mud, operations, settings, sweep)
+    return WellScene(str(tables.get("title", "")), hole, string, mud, operations, settings, sweep)
 
 
-def _hole(well, folder):
+def string_in(given):
+    """The `DrillString` of a [string] table."""
+    string = dict(table("string", given))
+    known_keys("[string]", string, KEYS["string"])
+    parts = [made(f"string.components[{i}]", entry, COMPONENTS) for i, entry in entries("components", string)]
+    return DrillString(parts, **{name: string[name] for name in ("order",) if name in string})
+
+
+def hole_in(well, folder):
+    """The `Borehole` of a [well] table; names of files in it are beside those in `folder`, a Path."""
     known_keys("[well]", well, KEYS["well"])
     if ("survey" in well) == ("stations" in well):
         raise SceneError("[well]: expected either survey, the name of a .csv file, or stations, rows of md, inc, azi")
@@ -197,7 +203,7 @@ def _hole(well, folder):
                 raise
             raise SceneError("well.stations: expected rows of three numbers: md, inclination, azimuth") from None
         path = WellPath.from_survey(md, inc, azi, degrees)
-    sections = [_made(f"well.sections[{i}]", entry, (HoleSection,)) for i, entry in entries("sections", well)]
+    sections = [made(f"well.sections[{i}]", entry, (HoleSection,)) for i, entry in entries("sections", well)]
     stiff = {name: in_si(f"well.{name}", well[name], "pressure") for name in ("wall_stiffness",) if name in well}
     return Borehole(path, sections, **stiff)
 
@@ -229,7 +235,7 @@ def _depth(table, name, value):
     return number(table, name, value, "a measured depth (m), positive", lambda x: 0 < x < np.inf)
 
 
-def _made(where, entry, classes):
+def made(where, entry, classes):
     """An object from a table whose keys are the arguments of its class."""
     entry, names = dict(table(where, entry)), {cls.__name__: cls for cls in classes}
     kind = classes[0].__name__ if len(classes) == 1 else entry.pop("type", None)
@@ -239,7 +245,7 @@ def _made(where, entry, classes):
     check_arguments(where, cls, entry)
     for name, value in entry.items():
         if name in ("material", "stiffness"):
-            entry[name] = _made(f"{where}.{name}", value, (Material if name == "material" else Stiffness,))
+            entry[name] = made(f"{where}.{name}", value, (Material if name == "material" else Stiffness,))
         elif name == "weight":  # on bit, or in mud
             entry[name] = in_si(f"{where}.{name}", value, "force" if issubclass(cls, Operation) else "force per length")
         elif name in _DIMENSIONS and name in {item.name for item in dataclasses.fields(cls)}:

@@ -1,0 +1,153 @@
+"""Drill-strings in motion on the command line: `cosserat run`, `cosserat explain` and `cosserat resume`."""
+
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+from cosserat_fenicsx import units
+from cosserat_fenicsx.cli.deliver import prepare
+from cosserat_fenicsx.cli.say import BAD_INPUT, DONE, INTERRUPTED, NOT_CONVERGED, say
+from cosserat_fenicsx.cli.well import warnings_in_words
+from cosserat_fenicsx.drilling.choose import chosen, model_of
+from cosserat_fenicsx.drilling.discs import Discs
+from cosserat_fenicsx.drilling.scenefile import drilling_in
+from cosserat_fenicsx.drilling.simulate import check_arguments, resume_drilling
+from cosserat_fenicsx.errors import Interrupted, NotConverged, NotStored, SceneError
+from cosserat_fenicsx.interrupts import obey, patience
+
+_TAKEN = ("duration", "dt", "elements", "model", "save_every")
+# Options of the command line that are for rods alone.
+_OTHERS = ("load_factors", "tol", "degree", "formulation", "control", "branch", "scheme", "start", "station", "at",
+           "color", "magnify")  # fmt: skip
+
+
+def _scene(options, tables):
+    for name in _OTHERS:
+        if getattr(options, name, None) is not None:
+            option = f"--{name.replace('_', '-')}"
+            raise SceneError(f"{option} is for rods, and this scene is a drill-string in motion")
+    found = drilling_in(tables, Path(options.scene))
+    asked = {name: getattr(options, name) for name in _TAKEN if getattr(options, name, None) is not None}
+    return replace(found, settings={**found.settings, **asked})
+
+
+@warnings_in_words()
+def run_drilling(options, tables):
+    """`cosserat run` of the tables of a scene file; returns the exit code."""
+    found = _scene(options, tables)
+    if found.title:
+        say(found.title, file=sys.stdout)
+    return _deliver(lambda: found.simulate(folder=options.folder), options)
+
+
+def resume_run(options):
+    """`cosserat resume` of a folder that holds a drill-string in motion; returns the exit code."""
+    return _deliver(lambda: resume_drilling(options.folder, duration=options.duration), options)
+
+
+def _deliver(compute, options):
+    """Compute, print and write, also what there is after a failure or an interruption; returns the exit code."""
+    out = Path(options.output) if options.output else None
+    if out is not None:
+        prepare(out)
+    film = options.animate
+    if film is not None:
+        from cosserat_fenicsx.pictures.animation import check_name
+
+        if out is None or Path(film).name != film:
+            raise SceneError(f"--animate {film}: expected a name without folders, and -o DIR to write the film to")
+        check_name(film)
+    code, trouble = DONE, None
+    try:
+        with patience():
+            history = compute()
+    except (NotConverged, NotStored) as failure:
+        history, trouble, code = failure.path, failure, NOT_CONVERGED
+    except SceneError as failure:
+        if failure.path is None:
+            raise
+        history, trouble, code = failure.path, failure, BAD_INPUT
+    except Interrupted as stop:
+        history, trouble, code = stop.path, stop, INTERRUPTED
+    if len(history):
+        say(str(history), file=sys.stdout)
+        if out is not None:
+            _write(history, out, not options.no_picture, film if code == DONE else None, options.speed, code == DONE)
+    if trouble is not None:
+        say(f"cosserat: {trouble}")
+        if options.folder and code in (INTERRUPTED, NOT_CONVERGED) and not isinstance(trouble, NotConverged):
+            say(f"cosserat: `cosserat resume {options.folder}` continues from there")
+    return code
+
+
+def _write(history, out, pictures, film, speed, stops):
+    """Write the files of a motion; `stops`: whether a signal ends the writing."""
+    files = {"drilling.csv": history.write}
+    if pictures and len(history) > 1:
+        files |= {"drilling.png": history.plot, "phase.png": history.plot_phase, "energy.png": history.plot_energy}
+        if len(history.profile_times) > 1:
+            files |= {"map.png": history.plot_map}
+    if film and len(history.profile_times) > 1:
+        files[film] = lambda file: history.animate(file, speed=speed)
+    written = []
+    try:
+        for name, write in files.items():
+            if stops:
+                obey()
+            write(out / name)
+            written.append(name)
+    finally:
+        if written:
+            say(f"written to {out}/: {', '.join(written)}", file=sys.stdout)
+
+
+@warnings_in_words()
+def explain_drilling(options, tables):
+    """Text of `cosserat explain` of the tables of a scene file."""
+    found = _scene(options, tables)
+    scene, settings = found.scene, found.settings
+    lines = [found.title] if found.title else []
+    if isinstance(scene.string, Discs):
+        inertias = ", ".join(f"{x:g}" for x in scene.string.inertias)
+        lines.append(f"String: {len(scene.string.inertias)} discs from the drive down, of {inertias} kg m^2.")
+    else:
+        for part in scene.segments:
+            lines.append(
+                f"String, {part.name}: {part.length:g} m, impedance {part.torsional_impedance:.5g} N m s/rad in torsion "
+                f"and {part.axial_impedance:.5g} N s/m along the axis, waves at {part.torsional_speed:.5g} and "
+                f"{part.axial_speed:.5g} m/s, {part.weight:.5g} N/m in mud."
+            )
+    lines.append(f"Drive: {_drive(scene.drive)}.")
+    lines.append(f"Bit: {scene.bit.law}{_at_bit(scene.bit)}." if scene.bit else "Bit: none, the lower end is free.")
+    for name in ("hook", "friction", "drag"):
+        if getattr(scene, name) is not None:
+            lines.append(f"{name.capitalize()}: {getattr(scene, name)}.")
+    name, why = chosen(scene, settings.get("model", "auto"))
+    lines += [f"Model: {line}." for line in why]
+    if "duration" in settings:
+        check_arguments(scene, **{key: value for key, value in settings.items() if key != "model"})
+        model = model_of(scene, name, settings.get("dt"), settings.get("elements"))
+        steps = round(settings["duration"] / model.dt)
+        lines.append(
+            f"Motion: {settings['duration']:g} s in {steps} steps of {model.dt:.4g} s, {len(model.depths)} places along "
+            "the string."
+        )
+        lines += [f"{line}." for line in model.why]
+    if found.speeds:
+        weights = f" and {len(found.weights)} weights on bit" if found.weights else ""
+        lines.append(f"Stability at {len(found.speeds)} speeds{weights}.")
+    return "\n".join(lines)
+
+
+def _drive(drive):
+    signal = drive.signal()
+    asked = f"{signal(0.0) / units.rpm:.5g} rpm" if signal.constant else "a speed that depends on time"
+    asked = asked if drive.speed is not None else "no speed asked for"
+    inertia = f", inertia {drive.inertia:g} kg m^2" if drive.inertia else ""
+    return f"{asked}, {drive.control}{inertia}"
+
+
+def _at_bit(bit):
+    told = [f"{bit.weight / 1e3:g} kN on bit"] if bit.weight else []
+    told += [f"inertia {bit.inertia:g} kg m^2"] if bit.inertia else []
+    return "".join(f", {x}" for x in told)
