@@ -72,3 +72,31 @@ def test_buckling_in_the_hole_is_told():
     flat = cf.WellPath.from_survey([0, 500, 1100, 3500], [0, 0, 88, 88], [0, 0, 0, 0])
     lowered = scene(string=pipe, bit=None, hole=hole(flat, 0.4), mud=MUD, hook=cf.Hook(speed=-0.3))
     assert "(trip in, " in chosen(lowered)[1][1]
+
+
+@pytest.mark.parametrize(
+    ("changed", "settings"),
+    [
+        ({"bit": cf.BitOnRock(cf.Stribeck(6e3, 4e3, 3.0), inertia=50.0)}, {}),
+        ({"bit": None, "hook": cf.Hook(speed=0.2)}, {"elements": 40}),
+        ({"string": cf.Discs((930.0, 2782.0), (700.0,))}, {}),
+    ],
+)
+def test_every_model_moves_and_goes_on(changed, settings, tmp_path):
+    """A longer motion of two parts has the digits of one; halving the step is reflected in the errors."""
+    given = scene(**changed)
+    whole = cf.simulate_drilling(given, 6.0, check=True, **settings)
+    cf.simulate_drilling(given, 3.0, folder=tmp_path / "part", profile_every=6.0 / 400, **settings)
+    again = cf.resume_drilling(tmp_path / "part", duration=6.0)
+    assert np.array_equal(again.rows, whole.rows, equal_nan=True) and np.isfinite(whole.errors.peak)
+    assert np.array_equal(again.angle, whole.angle) and again.sticking.shape == again.speed.shape
+    assert whole.times[-1] == pytest.approx(6.0, abs=whole.dt) and "Estimated errors by the step" in str(whole)
+
+
+def test_elements_and_steps():
+    drilled = scene(bit=cf.BitOnRock(cf.Stribeck(6e3, 4e3, 3.0), inertia=50.0))
+    assert len(cf.simulate_drilling(drilled, 1.0, elements=80).depths) == 81
+    with pytest.raises(cf.SceneError, match="elements = 80: expected None beside dt: waves of torsion"):
+        cf.simulate_drilling(drilled, 1.0, elements=80, dt=0.01)
+    with pytest.raises(cf.SceneError, match="elements = 8: expected None for Discs"):
+        cf.simulate_drilling(scene(string=cf.Discs((9.0, 2.0), (7.0,)), bit=None), 1.0, elements=8)

@@ -55,8 +55,9 @@ def test_stick_slip(history):
 def test_starts_and_stops_are_interpolated():
     from cosserat_fenicsx.drilling.stick_slip import crossings
 
-    starts, stops = crossings(np.arange(6.0), np.array([0.0, 0.0, 2.0, 2.0, 0.0, -4.0]), 0.5)
-    assert starts == pytest.approx([1.25, 4.125]) and stops == pytest.approx([3.75])
+    speed = np.array([0.0, 0.0, 2.0, 2.0, 0.0, 0.6, 0.4, 0.0, -4.0])  # it creeps at 5 s
+    starts, stops = crossings(np.arange(9.0), speed, 0.5, 1.0)
+    assert starts == pytest.approx([1.25, 7.125]) and stops == pytest.approx([3.75])
 
 
 def test_balance(history):

@@ -83,8 +83,8 @@ def test_what_a_file_says(tmp_path):
 
 
 def test_discs(tmp_path):
-    text = "[discs]\ninertias = [930.0, 2782.0]\nstiffnesses = [700.0]\n[drive]\ncontrol = { type = 'Motor', torque = 8e3 }"
-    scene = read(tmp_path, text).scene
+    drive = "[drive]\ncontrol = { type = 'Motor', torque = 8e3 }"
+    scene = read(tmp_path, f"[discs]\ninertias = [930.0, 2782.0]\nstiffnesses = [700.0]\n{drive}").scene
     assert scene.string == cf.Discs((930.0, 2782.0), (700.0,)) and scene.drive == cf.TopDrive(control=cf.Motor(8e3))
 
 

@@ -8,8 +8,9 @@ from cosserat_fenicsx import units
 from cosserat_fenicsx.cli.deliver import prepare
 from cosserat_fenicsx.cli.say import BAD_INPUT, DONE, INTERRUPTED, NOT_CONVERGED, say
 from cosserat_fenicsx.cli.well import warnings_in_words
-from cosserat_fenicsx.drilling.choose import chosen, model_of
+from cosserat_fenicsx.drilling.choose import chosen
 from cosserat_fenicsx.drilling.discs import Discs
+from cosserat_fenicsx.drilling.models import model_of
 from cosserat_fenicsx.drilling.scenefile import drilling_in
 from cosserat_fenicsx.drilling.simulate import check_arguments, resume_drilling
 from cosserat_fenicsx.errors import Interrupted, NotConverged, NotStored, SceneError
@@ -113,8 +114,8 @@ def explain_drilling(options, tables):
     else:
         for part in scene.segments:
             lines.append(
-                f"String, {part.name}: {part.length:g} m, impedance {part.torsional_impedance:.5g} N m s/rad in torsion "
-                f"and {part.axial_impedance:.5g} N s/m along the axis, waves at {part.torsional_speed:.5g} and "
+                f"String, {part.name}: {part.length:g} m, impedance {part.torsional_impedance:.5g} N m s/rad in "
+                f"torsion and {part.axial_impedance:.5g} N s/m along the axis, waves at {part.torsional_speed:.5g} and "
                 f"{part.axial_speed:.5g} m/s, {part.weight:.5g} N/m in mud."
             )
     lines.append(f"Drive: {_drive(scene.drive)}.")
@@ -129,8 +130,8 @@ def explain_drilling(options, tables):
         model = model_of(scene, name, settings.get("dt"), settings.get("elements"))
         steps = round(settings["duration"] / model.dt)
         lines.append(
-            f"Motion: {settings['duration']:g} s in {steps} steps of {model.dt:.4g} s, {len(model.depths)} places along "
-            "the string."
+            f"Motion: {settings['duration']:g} s in {steps} steps of {model.dt:.4g} s, {len(model.depths)} places "
+            "along the string."
         )
         lines += [f"{line}." for line in model.why]
     if found.speeds:

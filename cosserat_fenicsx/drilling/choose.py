@@ -1,7 +1,5 @@
 """Which model a drill-string in motion takes, why, and what that leaves out."""
 
-import importlib
-
 import numpy as np
 
 from cosserat_fenicsx.drilling.bit_laws import Cutting, Lobes, Stribeck
@@ -13,8 +11,6 @@ from cosserat_fenicsx.well.torque_and_drag import torque_and_drag
 
 TORSION, BOTH = "torsion", "axial and torsional"
 MODELS = ("auto", TORSION, BOTH)
-#: Modules and classes of the models, see `protocol.StringModel`; loaded where they are used.
-_CLASSES = {}
 
 
 def chosen(scene, model="auto"):
@@ -43,17 +39,6 @@ def chosen(scene, model="auto"):
                              "Cutting follows the depth of cut")  # fmt: skip
         why.append(f"APPROXIMATE: torsion alone leaves out what moves along the axis ({'; '.join(asks)})")
     return model, [*why, *_left_out(scene, model)]
-
-
-def model_of(scene, name, dt, elements):
-    """A new `StringModel` at rest.
-
-    Args:
-        name: see `chosen`. dt: step, s, or None for the model's own. elements: along the string, or None.
-    """
-    kind = f"{name} of discs" if isinstance(scene.string, Discs) else name
-    module, made = _CLASSES[kind]
-    return getattr(importlib.import_module(f"cosserat_fenicsx.drilling.{module}"), made)(scene, dt, elements)
 
 
 def _asks_for_axial(scene):

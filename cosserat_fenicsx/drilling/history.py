@@ -41,6 +41,8 @@ class DrillingHistory(Tabular):
         profile_times: (k,) s. depths: (m,) measured depths, m.
         angle, speed, torque, displacement, velocity, tension: (k, m) along the string at these times, in the same
             units. sticking: (k, m) True where the wall holds the string.
+        errors: with `check`, estimated errors by the step of the second half: `period` (s) of stick-slip, `peak`
+            (rad/s) of the bit, `least_torque` and `largest_torque` (N m) at the surface; else None.
         folder: the `pathlib.Path` that it is stored in, or None.
     """
 
@@ -51,14 +53,14 @@ class DrillingHistory(Tabular):
         self.scene: Drilling = scene
         self.model, self.why, self.dt, self.depths = model, tuple(why), float(dt), np.asarray(depths, dtype=float)
         self.counts: dict[str, int] = dict(counts or {})
-        self.folder = folder
-        self._rows = [np.empty((0, len(COLUMNS))) if rows is None else rows]
+        self.folder, self.errors = folder, None
+        self._pieces = [np.empty((0, len(COLUMNS))) if rows is None else rows]
         shape = (0, 1 + len(PROFILE) * len(self.depths))
         self._profiles = [np.empty(shape) if profiles is None else profiles]
 
     def append(self, rows):
         """Add (n, len(COLUMNS)) rows."""
-        self._rows.append(rows)
+        self._pieces.append(rows)
 
     def append_profile(self, time, profile):
         """Add the profile (len(PROFILE), m) at a time (s), and return the row that it is stored as."""
@@ -67,13 +69,14 @@ class DrillingHistory(Tabular):
         return row
 
     def __len__(self):
-        return sum(map(len, self._rows))
+        return sum(map(len, self._pieces))
 
-    def _table(self):
-        """(n, len(COLUMNS)) all rows, joined once."""
-        if len(self._rows) > 1:
-            self._rows = [np.concatenate(self._rows)]
-        return self._rows[0]
+    @property
+    def rows(self):
+        """(n, len(COLUMNS)) all columns."""
+        if len(self._pieces) > 1:  # joined once
+            self._pieces = [np.concatenate(self._pieces)]
+        return self._pieces[0]
 
     def _along(self):
         """(k, 1 + len(PROFILE) m) all profiles, joined once."""
@@ -83,7 +86,7 @@ class DrillingHistory(Tabular):
 
     def __getattr__(self, name):
         if name in COLUMNS:
-            return self._table()[:, COLUMNS.index(name)]
+            return self.rows[:, COLUMNS.index(name)]
         if name == "profile_times":
             return self._along()[:, 0]
         if name in PROFILE:

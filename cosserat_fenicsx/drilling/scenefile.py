@@ -209,7 +209,7 @@ def _made(where, entry, classes):
 
 
 def _signal(where, entry, dimension):
-    """A function of time from a table: its `value` or `values` are numbers, which the package's classes have as vectors."""
+    """A function of time from a table: `value` or `values` are numbers there, and vectors in the package's classes."""
     entry, names = dict(entry), {cls.__name__: cls for cls in SIGNALS}
     kind = entry.pop("type", None)
     if kind not in names:

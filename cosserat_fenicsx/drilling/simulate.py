@@ -6,10 +6,12 @@ import numbers
 from cosserat_fenicsx.annotations import File
 from cosserat_fenicsx.checks import instance, number, refuse
 from cosserat_fenicsx.drilling.bit_laws import Cutting, Lobes
-from cosserat_fenicsx.drilling.choose import chosen, fastest, model_of
+from cosserat_fenicsx.drilling.choose import chosen, fastest
 from cosserat_fenicsx.drilling.folder import DrillingFolder
 from cosserat_fenicsx.drilling.history import DrillingHistory
+from cosserat_fenicsx.drilling.models import Coarser, model_of
 from cosserat_fenicsx.drilling.scene import Drilling
+from cosserat_fenicsx.drilling.step_errors import step_errors
 from cosserat_fenicsx.drilling.time_loop import TimeLoop
 from cosserat_fenicsx.drilling.top_drive import Stiff
 
@@ -30,6 +32,7 @@ def simulate_drilling(
     save_every: float | None = None,
     profile_every: float | None = None,
     folder: File | None = None,
+    check: bool = False,
     progress: bool | None = None,
 ) -> DrillingHistory:
     """Compute the motion of a drill-string from rest: stick-slip, axial and torsional waves, friction along the hole.
@@ -45,6 +48,8 @@ def simulate_drilling(
         profile_every: s between profiles along the string; None for 400 of them.
         folder: to write the motion and checkpoints to during the run: whatever ends it, `resume_drilling(folder)`
             continues it to the same digits. It must not hold a motion yet.
+        check: whether the motion is computed once more at twice the step, on a mesh half as fine, for the history's
+            `errors`.
         progress: True, False, or None for a bar in runs of more than two seconds.
 
     Returns:
@@ -71,7 +76,10 @@ def simulate_drilling(
     if folder is not None:
         asked = {"duration": float(duration), "asked": {"model": name, "dt": dt, "elements": elements}, "apart": apart}
         kept = DrillingFolder(folder).make(scene, history, asked)
-    return TimeLoop(running, history, kept, **apart).until(duration, progress)
+    TimeLoop(running, history, kept, **apart).until(duration, progress)
+    if check:
+        history.errors = step_errors(Coarser(scene, name, running), history.rows, duration / 2)
+    return history
 
 
 def resume_drilling(

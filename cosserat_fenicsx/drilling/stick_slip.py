@@ -6,6 +6,8 @@ import numpy as np
 
 #: A bit whose speed is below this share of the drive's mean speed is at rest.
 AT_REST = 1e-3
+#: A bit that has started reaches this share of it.
+FAST = 0.5
 
 
 @dataclass(frozen=True)
@@ -45,6 +47,8 @@ class StickSlip:
         return len(self.starts) > 1 or self.stuck > 0.01
 
     def __str__(self):
+        if max(self.peak, -self.least, abs(self.drive)) == 0:
+            return f"From {self.since:g} to {self.until:g} s neither drive nor bit turns."
         rpm = 30 / np.pi
         speed = f"bit speed {self.least * rpm:.4g} to {self.peak * rpm:.4g} rpm, mean {self.mean * rpm:.4g} rpm"
         if not self.sticks:
@@ -56,21 +60,27 @@ class StickSlip:
         return f"From {self.since:g} to {self.until:g} s: {what}; surface torque {low:.4g} to {high:.4g} kN m."
 
 
-def crossings(times, speed, level):
-    """Times (s) where |speed| rises above a level, and where it falls below it, interpolated.
+def crossings(times, speed, level, fast):
+    """Times (s) where a bit starts from rest, and where it comes to rest, interpolated.
+
+    It rests up to the speed `level`. A start is the last rise above it before the speed `fast` is reached; between two
+    starts it comes to rest: where it creeps, or rises and falls back, there is no start.
 
     Args:
-        times: (n,) s; speed: (n,) rad/s; level: rad/s, positive.
+        times: (n,) s; speed: (n,) rad/s; level, fast: rad/s, positive.
 
     Returns:
-        (starts, stops). A state that begins above the level has no start there.
+        (starts, stops). What begins above the level has no start there.
     """
     size = np.abs(speed)
     above = size > level
     k = np.flatnonzero(above[1:] != above[:-1])
-    share = (level - size[k]) / (size[k + 1] - size[k])
-    at = times[k] + share * (times[k + 1] - times[k])
-    return at[above[k + 1]], at[~above[k + 1]]
+    at = times[k] + (level - size[k]) / (size[k + 1] - size[k]) * (times[k + 1] - times[k])
+    edges = [0, *(k + 1), len(size)]
+    runs = [size[a:b].max() >= fast for a, b in zip(edges[:-1], edges[1:], strict=True)]  # between two crossings
+    begins = [i for i in range(len(k)) if above[k[i] + 1] and runs[i + 1]]
+    ends = [i for i in range(len(k)) if not above[k[i] + 1] and runs[i]]
+    return at[begins], at[ends]
 
 
 def stick_slip_of(history, since):
@@ -79,8 +89,9 @@ def stick_slip_of(history, since):
     t, bit = history.times[rows], history.bit_speed[rows]
     lengths = np.diff(t)
     drive = history.drive_speed[rows]
-    level = AT_REST * max(float(np.abs(drive).mean()), 1e-3)
-    starts, stops = crossings(t, bit, level)
+    usual = max(float(np.abs(drive).mean()), 1e-3)
+    level = AT_REST * usual
+    starts, stops = crossings(t, bit, level, FAST * usual)
     periods = np.diff(starts)
     whole = (t[1:] > starts[0]) & (t[1:] <= starts[-1]) if len(periods) else np.full(len(lengths), True)
     mean_drive, mean = (_mean(values, lengths * whole) for values in (drive, bit))

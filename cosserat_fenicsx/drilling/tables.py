@@ -39,4 +39,9 @@ def history_table(history):
         worked = np.nan_to_num(history.work_of_drive[-1])
         lines.append(f"Energy: work of the drive {worked / 1e3:.5g} kJ; the ledger does not account for "
                      f"{history.balance[-1] / 1e3:.3g} kJ.")  # fmt: skip
+    if history.errors is not None:
+        period, peak, *torques = history.errors
+        told = "" if np.isnan(period) else f"period {period:.2g} s, "
+        lines.append(f"Estimated errors by the step: {told}peak {peak * _RPM:.2g} rpm, surface torque "
+                     f"{max(torques) / 1e3:.2g} kN m.")  # fmt: skip
     return "\n".join([*lines, *history.why])
