@@ -119,3 +119,14 @@ def test_checkpoints_are_seldom(tmp_path, monkeypatch):
     monkeypatch.setattr(time_loop, "CHUNK", 10)
     cf.simulate_drilling(scene(), 10.0, folder=tmp_path / "one")
     assert len(written) == 2  # at the first chunk and at the end
+
+
+def test_one_process_at_a_time(tmp_path, monkeypatch):
+    use(monkeypatch)
+    cf.simulate_drilling(scene(), 1.0, folder=tmp_path / "one")
+    busy = storage.DrillingFolder(tmp_path / "one").open()
+    busy.hold()
+    with pytest.raises(cf.SceneError, match="another process is at work on this motion"):
+        cf.resume_drilling(tmp_path / "one", duration=2.0)
+    busy.release()
+    assert len(cf.resume_drilling(tmp_path / "one", duration=2.0)) == 200

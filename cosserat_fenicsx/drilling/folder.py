@@ -26,6 +26,7 @@ from cosserat_fenicsx.results.export.beside import replaced
 from cosserat_fenicsx.scene.as_data import NotData
 from cosserat_fenicsx.storage import checkpoints
 from cosserat_fenicsx.storage.fingerprint import difference
+from cosserat_fenicsx.storage.lock import FolderLock
 
 #: Least time between checkpoints: in s, and as a multiple of the time that it takes to write one.
 APART, SELDOM = 2.0, 20
@@ -51,6 +52,7 @@ class DrillingFolder:
     def __init__(self, place):
         instance("simulate_drilling", "folder", place, str | os.PathLike, "the name of a folder")
         self.place, self.head, self._last, self._apart = Path(place), None, None, APART
+        self._lock = FolderLock(self.place, "motion")
 
     def make(self, scene, history, asked):
         """Make the folder for a new motion.
@@ -85,6 +87,7 @@ class DrillingFolder:
             (self.place / _LATEST).unlink(missing_ok=True)
             self._put(_SCENE, data)
             self._put(_HEAD, self.head)  # the last one: without it there is no motion
+            self._lock.take()
 
         self._try(made)
         return self
@@ -168,15 +171,27 @@ class DrillingFolder:
         whole = numbers[: len(numbers) // columns * columns].reshape(-1, columns)
         return whole if rows is None else whole[:rows].copy()
 
-    def extend(self, duration):
-        """Note a longer duration (s) than the last one."""
-        self.head["duration_asked"] = duration
+    def extend(self, duration, scene):
+        """Note a longer duration (s) than the last one, with the scene's fingerprint up to there."""
+        self.head |= {"duration": duration, "scene": fingerprint(scene, duration)}
         self._try(lambda: self._put(_HEAD, self.head))
 
     @property
     def asked(self):
         """The last duration that was asked for, s."""
-        return self.head.get("duration_asked", self.head["duration"])
+        return self.head["duration"]
+
+    def hold(self):
+        """Lock the folder, so that no other process writes to it.
+
+        Raises:
+            SceneError: another one does.
+        """
+        self._try(self._lock.take)
+
+    def release(self):
+        """Unlock the folder."""
+        self._lock.release()
 
     # -- rows and checkpoints ----------------------------------------------------------------------------------------
 

@@ -107,21 +107,28 @@ def resume_drilling(
         duration = kept.asked
     elif _seconds("resume_drilling", "duration", duration) < kept.asked:
         refuse("resume_drilling", "duration", duration, f"at least {kept.asked:g} s, the last one asked for")
-    asked, apart = kept.head["asked"], kept.head["apart"]
-    check_arguments(scene, duration, asked["dt"], asked["elements"])
-    running, memory = model_of(scene, asked["model"], asked["dt"], asked["elements"]), kept.memory()
-    rows, profiles = (memory["rows"], memory["profiles"]) if memory else (0, 0)
-    history = kept.history(scene, rows, profiles)
-    if len(history) < rows or len(history.profile_times) < profiles:
-        running, history = model_of(scene, asked["model"], asked["dt"], asked["elements"]), kept.history(scene, 0, 0)
-        memory, rows, profiles = None, 0, 0
-    loop = TimeLoop(running, history, kept, **apart)
-    if memory:
-        loop.recall(memory)
+    check_arguments(scene, duration, kept.head["asked"]["dt"], kept.head["asked"]["elements"])
+    kept.hold()
+    try:
+        return _go_on(kept, scene, float(duration), progress)
+    finally:
+        kept.release()
+
+
+def _go_on(kept, scene, duration, progress):
+    asked, memory = kept.head["asked"], kept.memory()
+    running = model_of(scene, asked["model"], asked["dt"], asked["elements"])
     if duration > kept.asked:
         check_step(scene, running.dt, duration)
-        kept.extend(float(duration))
+        kept.extend(duration, scene)
+    rows, profiles = (memory["rows"], memory["profiles"]) if memory else (0, 0)
+    history = kept.history(scene, rows, profiles)
+    if len(history) < rows or len(history.profile_times) < profiles:  # another file than those of the checkpoint
+        memory, rows, profiles, history = None, 0, 0, kept.history(scene, 0, 0)
     kept.cut(rows, profiles)
+    loop = TimeLoop(running, history, kept, **kept.head["apart"])
+    if memory:
+        loop.recall(memory)
     return loop.until(duration, progress)
 
 

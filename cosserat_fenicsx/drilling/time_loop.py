@@ -66,6 +66,8 @@ class TimeLoop:
             raise Interrupted(history, kept) from None
         finally:
             history.counts = dict(model.counts)
+            if self._folder:
+                self._folder.release()
         return history
 
     def _chunk(self, end):
