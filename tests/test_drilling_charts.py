@@ -38,7 +38,7 @@ def test_the_map(history):
     assert np.asarray(speeds.get_array()).reshape(5, -1) == pytest.approx(history.speed.T / cf.units.rpm)
     assert np.ma.count(np.ma.masked_invalid(sticks.get_array())) == history.sticking.sum() > 0
     assert bar.get_ylabel() == "speed of rotation (rpm)" and panel.get_ylabel() == "measured depth (m)"
-    assert panel.get_ylim() == (1000.0, 0.0) and "grey: held by the wall" in panel.get_title()
+    assert panel.get_ylim() == (1000.0, 0.0) and "grey: held by friction" in panel.get_title()
     assert history.plot_map(what="angle").axes[1].get_ylabel() == "turns (1)"
     with pytest.raises(cf.SceneError, match="the torsion model has none: expected model='axial and torsional'"):
         history.plot_map(what="tension")

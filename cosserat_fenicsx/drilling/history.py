@@ -40,7 +40,7 @@ class DrillingHistory(Tabular):
             the start, J. lost_at_bit, lost_at_wall, lost_in_mud: (n,) J.
         profile_times: (k,) s. depths: (m,) measured depths, m.
         angle, speed, torque, displacement, velocity, tension: (k, m) along the string at these times, in the same
-            units. sticking: (k, m) True where the wall holds the string.
+            units. sticking: (k, m) True where wall or rock hold the string.
         errors: with `check`, estimated errors by the step of the second half: `period` (s) of stick-slip, `peak`
             (rad/s) of the bit, `least_torque` and `largest_torque` (N m) at the surface; else None.
         folder: the `pathlib.Path` that it is stored in, or None.
@@ -193,11 +193,12 @@ class DrillingHistory(Tabular):
 
         return draw_over_time(self, file, between)
 
-    def plot_map(self, file: File | None = None, what: str = "speed", between: tuple[float, float] | None = None):
-        """Draw a quantity over time and depth, which runs downwards, and where the wall holds the string.
+    def plot_map(self, file: File | None = None, what: str | None = None, between: tuple[float, float] | None = None):
+        """Draw a quantity over time and depth, which runs downwards, and where friction holds the string.
 
         Args:
-            what: "speed", "torque", "angle", "tension", "displacement" or "velocity".
+            what: "speed", "torque", "angle", "tension", "displacement" or "velocity"; None for the speed of rotation, or
+                the velocity along the axis where nothing turns.
             file, between: see `plot`.
 
         Raises:

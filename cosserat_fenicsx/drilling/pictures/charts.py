@@ -3,7 +3,7 @@
 import numpy as np
 
 from cosserat_fenicsx.checks import refuse
-from cosserat_fenicsx.drilling.pictures.shown import BIT, DRIVE, GREY, KILO, RPM, times_between, title_of
+from cosserat_fenicsx.drilling.pictures.shown import BIT, DRIVE, GREY, KILO, RPM, times_between, title_of, turns
 from cosserat_fenicsx.drilling.stick_slip import AT_REST
 from cosserat_fenicsx.pictures.figures import draw_chart, empty_figure
 from cosserat_fenicsx.ranks import world
@@ -40,8 +40,8 @@ def _over_time(history, rows):
     t = history.times[rows]
     panels = [(axis, [(getattr(history, name)[rows] * factor, *look) for name, factor, *look in lines])
               for axis, lines in _PANELS]  # fmt: skip
-    panels = [(axis, [line for line in lines if np.isfinite(line[0]).any()]) for axis, lines in panels]
-    panels = [(axis, lines) for axis, lines in panels if lines]
+    panels = [(axis, [line for line in lines if np.nan_to_num(line[0]).any()]) for axis, lines in panels]
+    panels = [(axis, lines) for axis, lines in panels if lines]  # without what stays zero, or is unknown
     figure = empty_figure(10, 1.2 + 2.3 * len(panels))
     axes = figure.subplots(len(panels), 1, sharex=True, squeeze=False)[:, 0]
     for panel, (axis, lines) in zip(axes, panels, strict=True):
@@ -49,9 +49,9 @@ def _over_time(history, rows):
             panel.plot(t, values, color=colour, label=label, linewidth=1.1)
         panel.set_ylabel(axis)
         panel.grid(alpha=0.3)
-        if len(lines) > 1:
+        if len(lines) > 1 or lines[0][1] not in axis:
             panel.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), frameon=False)
-    if history.scene.bit is not None:
+    if history.scene.bit is not None and turns(history):
         _shade_rest(axes[0], t, history.bit_speed[rows], history.drive_speed[rows])
     axes[0].margins(x=0.0)
     axes[-1].set_xlabel("time (s)")
@@ -88,7 +88,7 @@ def _phase(history, since):
     panel.set(xlabel="twist between drive and bit (rad)", ylabel="bit speed (rpm)")
     panel.grid(alpha=0.3)
     panel.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2, frameon=False)
-    figure.suptitle(f"{title_of(history)}\nfrom {since:g} to {history.times[-1]:g} s", fontsize=10)
+    figure.suptitle(f"{title_of(history)}\nfrom {since:.4g} to {history.times[-1]:.4g} s", fontsize=10)
     return figure
 
 

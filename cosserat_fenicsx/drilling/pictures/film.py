@@ -47,7 +47,7 @@ class _Stage:
         string.set(xticks=[], ylabel="measured depth (m)", title="string")
         speeds = history.speed * RPM
         (self._line,) = along.plot(speeds[0], history.depths, color="tab:purple")
-        (self._held,) = along.plot([], [], ".", color="0.6", markersize=4, label="held by the wall")
+        (self._held,) = along.plot([], [], ".", color="0.6", markersize=4, label="held by friction")
         low, high = float(min(np.nanmin(speeds), 0.0)), float(np.nanmax(speeds))
         room = 0.05 * max(high - low, 1.0)
         along.set(xlim=(low - room, high + room), ylim=(bottom, top), xlabel="speed (rpm)", yticklabels=[])

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from cosserat_fenicsx.drilling.pictures.shown import SHOWN, times_between, title_of
+from cosserat_fenicsx.drilling.pictures.shown import SHOWN, times_between, title_of, turns
 from cosserat_fenicsx.errors import SceneError, nearest
 from cosserat_fenicsx.pictures.figures import draw_chart, empty_figure
 from cosserat_fenicsx.ranks import world
@@ -11,8 +11,10 @@ from cosserat_fenicsx.ranks import world
 _DEPTHS, _STICKS = 500, "0.8"
 
 
-def draw_map(history, file, what="speed", between=None):
+def draw_map(history, file, what=None, between=None):
     """See `DrillingHistory.plot_map`."""
+    if what is None:
+        what = "speed" if turns(history) else "velocity"
     if not isinstance(what, str) or what not in SHOWN:
         raise SceneError(f"plot_map.what = {what!r}: {nearest(what, SHOWN)}")
     rows = times_between("plot_map", history.profile_times, between)
@@ -44,7 +46,7 @@ def _map(history, rows, what):
 
         panel.pcolormesh(t, depths, np.where(sticks, 1.0, np.nan), shading="nearest", cmap=ListedColormap([_STICKS]),
                          rasterized=True)  # fmt: skip
-        told = "; grey: held by the wall"
+        told = "; grey: held by friction"
     panel.set(xlabel="time (s)", ylabel="measured depth (m)", ylim=(depths[-1], depths[0]), xlim=(t[0], t[-1]))
     panel.set_title(f"{title_of(history)}{told}", fontsize=11)
     return figure

@@ -38,6 +38,11 @@ def times_between(where, times, between):
     return rows
 
 
+def turns(history):
+    """Whether drive or bit turn."""
+    return bool(np.any(history.drive_speed) or np.any(history.bit_speed))
+
+
 def title_of(history):
     """What moves and how, for titles."""
     drive = history.scene.drive

@@ -1,0 +1,128 @@
+"""The drill-strings in motion of demos/strings/: each is simulated and drawn, and numbers are compared with what must
+come out.
+
+python demos/strings.py                    all of them; writes to out/strings/NAME/
+python demos/strings.py stick_slip         some
+python demos/strings.py --quick            without pictures
+"""
+
+import argparse
+import sys
+from pathlib import Path
+
+import numpy as np
+from known_numbers import Check, chosen, report, verdict
+from mpi4py import MPI
+
+import cosserat_fenicsx as cf
+from cosserat_fenicsx.drilling.torsion.model import TorsionWaves
+from cosserat_fenicsx.progress import Progress
+
+SCENES = Path(__file__).parent / "strings"
+_WAVES = "characteristics, extrapolated"
+
+
+def stick_slip(found, history, folder):
+    """Period, peak of the bit's speed, and extremes of the surface torque of the limit cycle."""
+    cycle = history.stick_slip(since=60.0)
+    yield Check("period (s)", cycle.period, 6.0428, 2e-3, _WAVES)
+    yield Check("peak bit speed (rad/s)", cycle.peak, 15.079234, 0.15, _WAVES)
+    yield Check("surface torque (N m)", cycle.torque, [2062.859, 8571.097], 20.0, _WAVES)
+
+
+def tuned_drive(found, history, folder):
+    """What is left of the oscillation after a minute; no stick-slip."""
+    cycle = history.stick_slip(since=60.0)
+    yield Check("peak bit speed (rad/s)", cycle.peak, 6.627654, 0.02, _WAVES)
+    yield Check("surface torque (N m)", cycle.torque, [4879.782, 5106.510], 5.0, _WAVES)
+    yield Check("at rest (share of time)", cycle.stuck, 0.0, 0.0, "no stick-slip")
+
+
+def off_bottom(found, history, folder):
+    """When the lower end passes half the drive's speed after a rest, with the wall force of the weight alone: without
+    that of the tension in the bend, which the history has; and the mean torque."""
+    parts = found.scene.segments
+    ends = np.cumsum([part.length for part in parts])
+    weights = np.array([part.rhoA for part in parts]) * 9.81
+
+    def across(md):
+        inclination = np.radians(np.interp(md, [0, 500, 1600, 2500], [0, 0, 60, 60]))
+        return weights[np.minimum(np.searchsorted(ends, md), len(parts) - 1)] * np.sin(inclination)
+
+    model = TorsionWaves(found.scene, 1e-3, normal_force=across)
+    rows = model.advance(round(25.0 / model.dt))
+    t, bit, half = rows[:, 0], rows[:, 4], found.scene.drive.speed / 2
+    passes = t[1:][(bit[1:] >= half) & (bit[:-1] < half)]
+    starts = passes[np.diff(passes, prepend=0.0) > 1.0]
+    yield Check("starts of the bit (s)", starts[:4], [5.40788, 10.78348, 16.60839, 22.48980], 0.02, _WAVES)
+    loads = cf.torque_and_drag(found.scene.hole.with_friction(0.195), found.scene.string, cf.RotateOffBottom(),
+                               mud=found.scene.mud, model="soft", torque_convention="johancsik")  # fmt: skip
+    late = history.times > 10.0
+    drag = found.scene.drag.torsion * sum(p.rhoJ * p.length for p in parts) * found.scene.drive.speed
+    mean = float(history.surface_torque[late].mean())
+    steady = loads.surface_torque + drag
+    yield Check("mean torque over that of a steady rotation", mean / steady, 1.0, 0.1, "soft string")
+
+
+def stopped_block(found, history, folder):
+    """What the hook bears beyond the weight: of the wave in the pipe, and with that reflected at the collars."""
+    weight = sum(part.weight * part.length for part in found.scene.segments)
+    t, beyond = history.times, history.hook_load - weight
+    first, second = (beyond[(t > a) & (t < b)].mean() for a, b in ((0.1, 1.1), (1.19, 1.245)))
+    yield Check("hook load beyond the weight (kN)", [first / 1e3, second / 1e3], [136.846523, 326.805338], 1.5,
+                "staircase, exact")  # fmt: skip
+
+
+STRINGS = (stick_slip, tuned_drive, off_bottom, stopped_block)
+
+
+def run(demo, out="out/strings"):
+    """Simulate a scene and draw it.
+
+    Args:
+        demo: a function of `STRINGS`; out: folder for its pictures, or None.
+
+    Returns:
+        (the model's name, [Check]).
+    """
+    folder = None if out is None else Path(out) / demo.__name__
+    found = cf.read_drilling_scene(SCENES / f"{demo.__name__}.toml")
+    history = found.simulate()
+    if folder is not None:
+        folder.mkdir(parents=True, exist_ok=True)
+        history.plot(folder / "drilling.png")
+        history.plot_map(folder / "map.png")
+        history.plot_energy(folder / "energy.png")
+        if found.scene.drive.speed:
+            history.plot_phase(folder / "phase.png")
+    return history.model, list(demo(found, history, folder))
+
+
+def main(names=(), out="out/strings"):
+    """Run demos, and print their numbers and whether all are right.
+
+    Args:
+        names: of demos; none for all.
+        out: folder for pictures, or None.
+
+    Returns:
+        list of `Check`s.
+    """
+    rows, demos = [], chosen("demos/strings.py", "string", STRINGS, names)
+    with Progress([len(demos)], None, MPI.COMM_WORLD, "demo") as bar:
+        bar.start("strings in motion")
+        for i, demo in enumerate(demos):
+            bar.reached(i)
+            model, checks = run(demo, out)
+            rows += [(demo.__name__, model, check) for check in checks]
+    print(report("Drill-strings in motion: what must come out", rows))
+    return [check for *_, check in rows]
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("names", nargs="*", help="; ".join(demo.__name__ for demo in STRINGS))
+    parser.add_argument("--quick", action="store_true", help="without pictures")
+    options = parser.parse_args()
+    checks = main(options.names, None if options.quick else "out/strings")
+    sys.exit(verdict(checks))
