@@ -18,13 +18,14 @@ export VTK_DEFAULT_OPENGL_WINDOW = vtkEGLRenderWindow
 # A numpy in the user's own site directory would hide the distribution's.
 export PYTHONNOUSERSITE = 1
 
-.PHONY: help setup packages demo motion gallery well test docs tables figure3 work-precision failures rods-in-wells random random-wells clean
+.PHONY: help setup packages demo motion gallery well string test docs tables figure3 work-precision failures rods-in-wells random random-wells clean
 
 help:
 	@echo "make demo    solve the eccentric cantilever of the paper on two processes; writes out/"
 	@echo "make motion  seven motions, each a scene file, a picture and a number that must come out; writes out/ (a minute)"
 	@echo "make gallery the scene files of demos/, each with a picture and a number that must come out; writes out/"
 	@echo "make well    strings in wells: torque and drag, each with pictures and a number that must come out; writes out/wells/ (half a minute)"
+	@echo "make string  drill-strings in motion: stick-slip, waves, a map of stability, each with pictures and numbers that must come out; writes out/strings/ (a minute)"
 	@echo "make docs    the documentation as a site that needs no network; writes out/docs/index.html"
 	@echo "make test    all tests on one, two and four processes"
 	@echo "make tables  the tables of accuracy and cost in docs/, measured anew and put there"
@@ -48,6 +49,10 @@ gallery: setup
 
 well: setup
 	$(PYTHON) demos/wells.py
+
+string: setup
+	$(PYTHON) demos/strings.py
+	$(MPIRUN) -n 2 $(PYTHON) demos/strings_map.py
 
 # Warnings are errors. What Sphinx keeps between two builds lies beside the pages.
 docs: setup .venv/.docs

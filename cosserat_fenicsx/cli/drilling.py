@@ -1,5 +1,6 @@
 """Drill-strings in motion on the command line: `cosserat run`, `cosserat explain` and `cosserat resume`."""
 
+import math
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -38,7 +39,30 @@ def run_drilling(options, tables):
     found = _scene(options, tables)
     if found.title:
         say(found.title, file=sys.stdout)
-    return _deliver(lambda: found.simulate(folder=options.folder), options)
+    code = DONE
+    if "duration" in found.settings or not found.speeds:
+        code = _deliver(lambda: found.simulate(folder=options.folder), options)
+    return _stability(found, options) if code == DONE and found.speeds else code
+
+
+def _stability(found, options):
+    """Compute, print and write the map of stability; returns the exit code."""
+    try:
+        with patience():
+            answer = found.stability()
+    except NotConverged as failure:
+        say(f"cosserat: {failure}")
+        return NOT_CONVERGED
+    say(str(answer), file=sys.stdout)
+    if options.output:
+        out, names = Path(options.output), ["stability.csv"]
+        prepare(out)
+        answer.write(out / "stability.csv")
+        if not options.no_picture:
+            answer.plot(out / "stability.png")
+            names.append("stability.png")
+        say(f"written to {out}/: {', '.join(names)}", file=sys.stdout)
+    return DONE
 
 
 def resume_run(options):
@@ -128,7 +152,7 @@ def explain_drilling(options, tables):
     if "duration" in settings:
         check_arguments(scene, **{key: value for key, value in settings.items() if key != "model"})
         model = model_of(scene, name, settings.get("dt"), settings.get("elements"))
-        steps = round(settings["duration"] / model.dt)
+        steps = math.ceil(settings["duration"] / model.dt - 1e-6)
         lines.append(
             f"Motion: {settings['duration']:g} s in {steps} steps of {model.dt:.4g} s, {len(model.depths)} places "
             "along the string."

@@ -27,7 +27,6 @@ duration = 60.0
 Numbers are in SI, or text with a unit (`field_units`).
 """
 
-import dataclasses
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -42,15 +41,17 @@ from cosserat_fenicsx.drilling.choose import chosen
 from cosserat_fenicsx.drilling.discs import Discs
 from cosserat_fenicsx.drilling.history import DrillingHistory
 from cosserat_fenicsx.drilling.hook import Hook
+from cosserat_fenicsx.drilling.linear.spectrum import Stability
+from cosserat_fenicsx.drilling.linear.stability import stability
 from cosserat_fenicsx.drilling.linear.tuned import SoftSpeed, SoftTorque
 from cosserat_fenicsx.drilling.scene import Drilling
 from cosserat_fenicsx.drilling.simulate import check_arguments as check_simulation
 from cosserat_fenicsx.drilling.simulate import simulate_drilling
 from cosserat_fenicsx.drilling.top_drive import CONTROLS, TopDrive
 from cosserat_fenicsx.drilling.wall_friction import ViscousDrag, WallFriction
-from cosserat_fenicsx.errors import SceneError, nearest
+from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.scene.signals import SIGNALS
-from cosserat_fenicsx.scene.toml_tables import check_arguments, known_keys, table, tables_of
+from cosserat_fenicsx.scene.toml_tables import check_arguments, class_named, known_keys, table, tables_of
 from cosserat_fenicsx.well.field_units import DIMENSIONS, in_si
 from cosserat_fenicsx.well.mud import Mud
 from cosserat_fenicsx.well.scenefile import hole_in, made, string_in
@@ -80,7 +81,7 @@ KEYS = {
     "stability": ("speeds", "weights"),
 }
 _TABLES = ("title", "well", "string", "discs", "mud", "drive", "bit", "hook", "wall_friction", "drag", "depth", *KEYS)
-_TUNED = {"SoftTorque": SoftTorque, "SoftSpeed": SoftSpeed}
+_TUNED = (SoftTorque, SoftSpeed)
 
 
 @dataclass(frozen=True)
@@ -108,6 +109,14 @@ class DrillingScene:
         if given.get("duration") is None:
             raise SceneError("simulate.duration = None: expected a positive number (s), in [simulate]")
         return simulate_drilling(self.scene, **given)
+
+    def stability(self) -> Stability | None:
+        """The growth of every mode at the speeds and weights of the file, see `stability`; None where it asks for none.
+
+        Raises:
+            SceneError, NotConverged: see `stability`.
+        """
+        return stability(self.scene, self.speeds, self.weights or None) if self.speeds else None
 
 
 def read_drilling_scene(file: File) -> DrillingScene:
@@ -158,21 +167,18 @@ def _scene(tables, folder):
 def _drive(entry, given):
     """The `TopDrive` of a table; the tuned controls need the rest of the scene, arguments of `Drilling`."""
     control = entry.get("control")
-    kind = control.get("type") if isinstance(control, dict) else control
-    names = {cls.__name__: cls for cls in CONTROLS}
-    if control is not None and kind not in {**names, **_TUNED}:
-        raise SceneError(f"drive.control.type = {kind!r}: {nearest(kind, {**names, **_TUNED})}")
-    if kind in _TUNED:
-        if isinstance(control, dict):
-            known_keys(f"drive.control ({kind})", control, ("type",))
-        inertia = positive("TopDrive", "inertia", entry.get("inertia"), "kg m^2, of the drive")
-        standing = Drilling(drive=TopDrive(0.0), **given)
-        discs = isinstance(standing.string, Discs)  # refused there
-        entry["control"] = _TUNED[kind](
-            *((standing, inertia) if discs else (standing.string, inertia, standing.bit_depth))
-        )
-    elif control is not None:
-        entry["control"] = _made("drive.control", {"type": kind} if isinstance(control, str) else control, CONTROLS)
+    if isinstance(control, str):
+        control = {"type": control}
+    if control is not None:
+        kind = class_named("drive.control", table("drive.control", control).get("type"), (*CONTROLS, *_TUNED))
+        if kind in _TUNED:
+            known_keys(f"drive.control ({kind.__name__})", control, ("type",))
+            inertia = positive("TopDrive", "inertia", entry.get("inertia"), "kg m^2, of the drive")
+            standing = Drilling(drive=TopDrive(0.0), **given)
+            discs = isinstance(standing.string, Discs)  # refused there
+            entry["control"] = kind(*((standing, inertia) if discs else (standing.string, inertia, standing.bit_depth)))
+        else:
+            entry["control"] = _made("drive.control", control, CONTROLS)
     return _made("drive", entry, (TopDrive,))
 
 
@@ -186,13 +192,12 @@ def _friction(entry):
 def _made(where, entry, classes):
     """An object from a table whose keys are the arguments of its class; objects that are made already stay."""
     entry = dict(table(where, entry))
-    names = {cls.__name__: cls for cls in classes}
-    kind = classes[0].__name__ if len(classes) == 1 else entry.pop("type", None)
-    if kind not in names:
-        raise SceneError(f"{where}.type = {kind!r}: {nearest(kind, names)}")
-    cls = names[kind]
+    cls = classes[0] if len(classes) == 1 else class_named(where, entry.pop("type", None), classes)
     check_arguments(where, cls, entry)
-    inner, dimensions = {"law": LAWS if cls is BitOnRock else (Stribeck,), "wear": (Wear,)}, _DIMENSIONS.get(kind, {})
+    inner, dimensions = (
+        {"law": LAWS if cls is BitOnRock else (Stribeck,), "wear": (Wear,)},
+        _DIMENSIONS.get(cls.__name__, {}),
+    )
     for name, value in entry.items():
         if name in inner:
             entry[name] = _made(f"{where}.{name}", value, inner[name])
@@ -210,20 +215,18 @@ def _made(where, entry, classes):
 
 def _signal(where, entry, dimension):
     """A function of time from a table: `value` or `values` are numbers there, and vectors in the package's classes."""
-    entry, names = dict(entry), {cls.__name__: cls for cls in SIGNALS}
-    kind = entry.pop("type", None)
-    if kind not in names:
-        raise SceneError(f"{where}.type = {kind!r}: {nearest(kind, names)}")
-    check_arguments(where, names[kind], entry)
+    entry = dict(entry)
+    cls = class_named(where, entry.pop("type", None), SIGNALS)
+    check_arguments(where, cls, entry)
     if "value" in entry:
         entry["value"] = (in_si(f"{where}.value", entry["value"], dimension, UNITS),)
     if isinstance(entry.get("values"), list):
         entry["values"] = [(in_si(f"{where}.values[{i}]", x, dimension, UNITS),) for i, x in enumerate(entry["values"])]
-    for name in {x.name for x in dataclasses.fields(names[kind])} & set(entry) - {"value", "values", "times"}:
-        if name in ("start", "peak", "end"):
+    for name in ("start", "peak", "end"):
+        if name in entry:
             entry[name] = in_si(f"{where}.{name}", entry[name], "time", UNITS)
     try:
-        return names[kind](**entry)
+        return cls(**entry)
     except SceneError as problem:
         raise SceneError(f"{where}: {problem}") from None
 

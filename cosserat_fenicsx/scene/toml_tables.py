@@ -47,6 +47,18 @@ def known_keys(where, given, known):
             raise SceneError(f"{where}: unknown key '{key}', {nearest(key, known)}")
 
 
+def class_named(where, kind, classes):
+    """The class of a name, among some.
+
+    Raises:
+        SceneError: there is none.
+    """
+    names = {cls.__name__: cls for cls in classes}
+    if not isinstance(kind, str) or kind not in names:
+        raise SceneError(f"{where}.type = {kind!r}: {nearest(kind, names)}")
+    return names[kind]
+
+
 def check_arguments(where, cls, entry):
     """The parameters of a class by name, where a table gives all that it needs and nothing else.
 

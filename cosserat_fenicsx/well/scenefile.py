@@ -50,10 +50,10 @@ import numpy as np
 
 from cosserat_fenicsx.annotations import File
 from cosserat_fenicsx.checks import number, refuse
-from cosserat_fenicsx.errors import SceneError, nearest
+from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.scene.materials import Material
 from cosserat_fenicsx.scene.sections import Stiffness
-from cosserat_fenicsx.scene.toml_tables import check_arguments, entries, known_keys, table, tables_of
+from cosserat_fenicsx.scene.toml_tables import check_arguments, class_named, entries, known_keys, table, tables_of
 from cosserat_fenicsx.well.answer import TorqueAndDrag
 from cosserat_fenicsx.well.components import COMPONENTS
 from cosserat_fenicsx.well.depth_sweep import DepthSweep, depth_sweep
@@ -198,7 +198,7 @@ def hole_in(well, folder):
         try:
             rows = [(_station(i, depth, unit or 1.0), *angles) for i, (depth, *angles) in enumerate(well["stations"])]
             md, inc, azi = np.array(rows, dtype=float).T
-        except (ValueError, TypeError) as problem:
+        except (ValueError, TypeError, OverflowError) as problem:
             if isinstance(problem, SceneError):
                 raise
             raise SceneError("well.stations: expected rows of three numbers: md, inclination, azimuth") from None
@@ -237,11 +237,8 @@ def _depth(table, name, value):
 
 def made(where, entry, classes):
     """An object from a table whose keys are the arguments of its class."""
-    entry, names = dict(table(where, entry)), {cls.__name__: cls for cls in classes}
-    kind = classes[0].__name__ if len(classes) == 1 else entry.pop("type", None)
-    if kind not in names:
-        raise SceneError(f"{where}.type = {kind!r}: {nearest(kind, names)}")
-    cls = names[kind]
+    entry = dict(table(where, entry))
+    cls = classes[0] if len(classes) == 1 else class_named(where, entry.pop("type", None), classes)
     check_arguments(where, cls, entry)
     for name, value in entry.items():
         if name in ("material", "stiffness"):

@@ -1,7 +1,7 @@
 """Put into the documentation what the measurements and the gallery have left in out/.
 
     python demos/evidence/put_in_docs.py accuracy orders      these tables and their pictures
-    python demos/evidence/put_in_docs.py gallery wells        the pictures of the gallery and of strings in wells
+    python demos/evidence/put_in_docs.py gallery wells strings   the pictures of the gallery, of strings in wells and of those in motion
 
 A table replaces what stands between <!-- name --> and <!-- /name --> in a page of docs/; one that is too long for that
 has a page of its own in docs/tables/. Pictures are cut to what is drawn, reduced to few colours and put in
@@ -49,6 +49,13 @@ WELLS = {
     "helix.png": "helix/static_3d.png",
     "cable_in_conduit.png": "cable_in_conduit/cable.png",
 }
+#: Those of drill-strings in motion: files in out/strings/.
+STRINGS = {
+    "stick_slip.png": "stick_slip/drilling.png",
+    "off_bottom_map.png": "off_bottom/map.png",
+    "stopped_block_map.png": "stopped_block/map.png",
+    "stability_map.png": "stability_map.png",
+}
 WIDTH, COLOURS, MARGIN = 1100, 256, 12  # pixels, number, pixels
 
 
@@ -69,8 +76,9 @@ def main(names, out="out", docs=ROOT / "docs"):
         page, *pictures = PAGES.get(name, (None,))
         title, *more = ALONE.get(name, (None,))
         drawn = {picture: picture for picture in (GALLERY if name == "gallery" else pictures + more)}
-        if name == "wells":
-            drawn = {picture: f"wells/{file}" for picture, file in WELLS.items()}
+        for group, files in (("wells", WELLS), ("strings", STRINGS)):
+            if name == group:
+                drawn = {picture: f"{group}/{file}" for picture, file in files.items()}
         for picture, file in drawn.items():
             if (out / file).exists():
                 kept(out / file, docs / "pictures" / picture)
@@ -90,5 +98,7 @@ def main(names, out="out", docs=ROOT / "docs"):
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("names", nargs="+", choices=sorted({*PAGES, *ALONE, "gallery", "wells"}), metavar="NAME")
+    parser.add_argument(
+        "names", nargs="+", choices=sorted({*PAGES, *ALONE, "gallery", "wells", "strings"}), metavar="NAME"
+    )
     main(parser.parse_args().names)
