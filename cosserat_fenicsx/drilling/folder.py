@@ -217,8 +217,8 @@ class DrillingFolder:
 
     @property
     def due(self):
-        """Whether it is time for a checkpoint; checkpoints do not influence the motion."""
-        return self._last is None or time.monotonic() - self._last > self._apart
+        """Whether it is time for a checkpoint, the same on all ranks; checkpoints do not influence the motion."""
+        return world().bcast(self._last is None or time.monotonic() - self._last > self._apart)
 
     def keep(self, history, memory):
         """Write a checkpoint, after the rows so far.
@@ -239,8 +239,9 @@ class DrillingFolder:
         self._apart = max(APART, SELDOM * (self._last - began))
 
     def memory(self):
-        """What the last checkpoint holds; None where there is none that can be read."""
-        return checkpoints.read(self.place / _LATEST)
+        """What the last checkpoint holds, the same on all ranks; None where there is none that can be read."""
+        comm = world()
+        return comm.bcast(checkpoints.read(self.place / _LATEST) if comm.rank == 0 else None)
 
     def _or_not_stored(self, history, action):
         try:

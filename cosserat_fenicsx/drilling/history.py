@@ -197,8 +197,8 @@ class DrillingHistory(Tabular):
         """Draw a quantity over time and depth, which runs downwards, and where friction holds the string.
 
         Args:
-            what: "speed", "torque", "angle", "tension", "displacement" or "velocity"; None for the speed of rotation, or
-                the velocity along the axis where nothing turns.
+            what: "speed", "torque", "angle", "tension", "displacement" or "velocity"; None for the speed of rotation,
+                or the velocity along the axis where nothing turns.
             file, between: see `plot`.
 
         Raises:

@@ -1,7 +1,7 @@
 """Put into the documentation what the measurements and the gallery have left in out/.
 
     python demos/evidence/put_in_docs.py accuracy orders      these tables and their pictures
-    python demos/evidence/put_in_docs.py gallery wells strings   the pictures of the gallery, of strings in wells and of those in motion
+    python demos/evidence/put_in_docs.py gallery wells strings    the pictures of these
 
 A table replaces what stands between <!-- name --> and <!-- /name --> in a page of docs/; one that is too long for that
 has a page of its own in docs/tables/. Pictures are cut to what is drawn, reduced to few colours and put in
