@@ -22,20 +22,31 @@ SCENES = Path(__file__).parent / "strings"
 _WAVES = "characteristics, extrapolated"
 
 
+def ends_at(scene, low, high):
+    """The speed (rpm) between two above which the bit, from rest, no longer sticks after 170 s, to half a rpm."""
+    while high - low > 0.5:
+        middle = (low + high) / 2
+        history = cf.simulate_drilling(scene.with_case(middle * cf.units.rpm), 200.0, save_every=0.02)
+        low, high = (middle, high) if history.stick_slip(since=170.0).sticks else (low, middle)
+    return (low + high) / 2
+
+
 def stick_slip(found, history, folder):
-    """Period, peak of the bit's speed, and extremes of the surface torque of the limit cycle."""
+    """Period, peak of the bit's speed, and extremes of the surface torque of the limit cycle; where it ends."""
     cycle = history.stick_slip(since=60.0)
     yield Check("period (s)", cycle.period, 6.0428, 2e-3, _WAVES)
     yield Check("peak bit speed (rad/s)", cycle.peak, 15.079234, 0.15, _WAVES)
     yield Check("surface torque (N m)", cycle.torque, [2062.859, 8571.097], 20.0, _WAVES)
+    yield Check("stick-slip ends (rpm)", ends_at(found.scene, 80.0, 120.0), 98.0, 2.0, _WAVES)
 
 
 def tuned_drive(found, history, folder):
-    """What is left of the oscillation after a minute; no stick-slip."""
+    """What is left of the oscillation after a minute; no stick-slip, which ends at a lower speed."""
     cycle = history.stick_slip(since=60.0)
     yield Check("peak bit speed (rad/s)", cycle.peak, 6.627654, 0.02, _WAVES)
     yield Check("surface torque (N m)", cycle.torque, [4879.782, 5106.510], 5.0, _WAVES)
     yield Check("at rest (share of time)", cycle.stuck, 0.0, 0.0, "no stick-slip")
+    yield Check("stick-slip ends (rpm)", ends_at(found.scene, 40.0, 60.0), 50.8, 2.0, _WAVES)
 
 
 def off_bottom(found, history, folder):

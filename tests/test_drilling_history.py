@@ -91,6 +91,7 @@ def test_tables_and_files(history, tmp_path):
         ({"dt": 100.0}, r"simulate_drilling.dt = 100.0: expected at most the duration, 60 s"),
         ({"dt": 1e-8}, r"dt = 1e-08: expected at least 6e-07 s: 1e\+08 steps in 60 s"),
         ({"dt": 0.1}, r"dt = 0.1: expected a step of at most 0.0531 s, .* 1 rad in a step at 3 times the speed"),
+        ({"duration": 3e5}, r"save_every = None: expected at least 0.015 s: 2e\+07 rows in 300000 s"),
         ({"save_every": 61.0}, r"save_every = 61.0: expected at most the duration"),
         ({"elements": 0}, r"elements = 0: expected how many along the string"),
         ({"model": "torsional"}, r"model = 'torsional': did you mean 'torsion'"),

@@ -78,8 +78,8 @@ def _outputs(parser):
         metavar="DIR",
         help="write path.xdmf, path.h5, path.csv, rods.png and rods.html there, or of a motion motion.xdmf, .h5, .csv, "
         "rods.png, rods.html and energy.png, and result.h5, which read_path or read_history of Python reads; of a "
-        "string in a well a .csv and pictures for each operation and for the depth_sweep; without it only the table is "
-        "shown",
+        "string in a well a .csv and pictures for each operation and for the depth_sweep; of a drill-string in motion "
+        "drilling.csv, charts and stability.csv; without it only the table is shown",
     )
     parser.add_argument("--no-picture", action="store_true", help="write no pictures")
     parser.add_argument(
@@ -130,7 +130,8 @@ def _common(parser):
     parser.add_argument("--degree", type=int, help="polynomial degree of r and q, 1 to 4 [4]")
     parser.add_argument("--formulation", help="mixed, displacement or multiplier [mixed]")
     parser.add_argument("--model", help="auto, determinate, planar or spatial; of a string in a well auto, "
-                        "soft, 'soft, buckled' or rod [auto]")  # fmt: skip
+                        "soft, 'soft, buckled' or rod [auto]; of a drill-string in motion auto, torsion or 'axial and torsional' "
+                        "[auto]")  # fmt: skip
     parser.add_argument(
         "--control", help="auto, load (stop at a limit point) or arc (arc length along the path, never back) [auto]"
     )

@@ -9,20 +9,6 @@ from cosserat_fenicsx.drilling.discs import Discs
 from cosserat_fenicsx.drilling.torsion.model import TorsionWaves
 
 
-class Coarser:
-    """What `step_errors` asks for a coarser model: a scene, and the name and `StringModel` that computed its motion."""
-
-    def __init__(self, scene, name, model):
-        self._given = scene, name, model
-
-    def coarser(self):
-        """A new `StringModel` at rest, with twice the step and half the elements."""
-        scene, name, model = self._given
-        if isinstance(model, AxialTorsional) and not isinstance(scene.string, Discs):
-            return model_of(scene, name, 2 * model.dt, max(2, (len(model.depths) - 1) // 2))
-        return model_of(scene, name, 2 * model.dt)
-
-
 def model_of(scene, name, dt=None, elements=None):
     """A new `StringModel` at rest.
 
@@ -33,14 +19,12 @@ def model_of(scene, name, dt=None, elements=None):
     Raises:
         SceneError: a scene that the model has no equations for; steps that its laws do not allow.
     """
-    given = {key: value for key, value in (("dt", dt), ("elements", elements)) if value is not None}
-    if isinstance(scene.string, Discs):
-        if elements is not None:
-            refuse("simulate_drilling", "elements", elements, "None for Discs, which are not divided")
-        return AxialTorsional(scene, **given)
-    if name == BOTH:
-        return AxialTorsional(scene, **given)
-    if len(given) > 1:
+    discs = isinstance(scene.string, Discs)
+    if discs and elements is not None:
+        refuse("simulate_drilling", "elements", elements, "None for Discs, which are not divided")
+    if discs or name == BOTH:
+        return AxialTorsional(scene, dt, elements)
+    if dt is not None and elements is not None:
         refuse("simulate_drilling", "elements", elements, "None beside dt: waves of torsion have cells of one step")
     if elements is not None:
         dt = math.fsum(part.length / part.torsional_speed for part in scene.segments) / elements

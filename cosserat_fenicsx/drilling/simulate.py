@@ -9,14 +9,14 @@ from cosserat_fenicsx.drilling.bit_laws import Cutting, Lobes
 from cosserat_fenicsx.drilling.choose import chosen, fastest
 from cosserat_fenicsx.drilling.folder import DrillingFolder
 from cosserat_fenicsx.drilling.history import DrillingHistory
-from cosserat_fenicsx.drilling.models import Coarser, model_of
+from cosserat_fenicsx.drilling.models import model_of
 from cosserat_fenicsx.drilling.scene import Drilling
 from cosserat_fenicsx.drilling.step_errors import step_errors
 from cosserat_fenicsx.drilling.time_loop import TimeLoop
 from cosserat_fenicsx.drilling.top_drive import Stiff
 
-#: More steps than these are refused as a mistake; so many profiles are kept where nothing else is asked for.
-MOST_STEPS, PROFILES = 1e8, 400
+#: More steps, and rows of a history, are refused as a mistake; so many profiles where nothing else is asked for.
+MOST_STEPS, MOST_ROWS, PROFILES = 1e8, 2e7, 400
 # Largest rotation in a step, rad, at three times the speed of the drive, as a bit that slips may have; and the largest
 # part of the angle between two blades or lobes.
 _TURN, _FASTER, _OF_BLADES = 1.0, 3.0, 0.25
@@ -66,7 +66,7 @@ def simulate_drilling(
     check_arguments(scene, duration, dt, elements, save_every, profile_every)
     name, why = chosen(scene, model)
     running = model_of(scene, name, dt, elements)
-    check_step(scene, running.dt, duration)
+    check_step(scene, running.dt, duration, save_every)
     history = DrillingHistory(scene, running.name, [*why, *running.why], running.dt, running.depths)
     apart = {
         "save_every": max(1, round((save_every or 0.0) / running.dt)),
@@ -78,7 +78,7 @@ def simulate_drilling(
         kept = DrillingFolder(folder).make(scene, history, asked)
     TimeLoop(running, history, kept, **apart).until(duration, progress)
     if check:
-        history.errors = step_errors(Coarser(scene, name, running), history.rows, duration / 2)
+        history.errors = step_errors(running, history.rows, duration / 2)
     return history
 
 
@@ -119,7 +119,7 @@ def _go_on(kept, scene, duration, progress):
     asked, memory = kept.head["asked"], kept.memory()
     running = model_of(scene, asked["model"], asked["dt"], asked["elements"])
     if duration > kept.asked:
-        check_step(scene, running.dt, duration)
+        check_step(scene, running.dt, duration, kept.head["apart"]["save_every"] * running.dt)
         kept.extend(duration, scene)
     rows, profiles = (memory["rows"], memory["profiles"]) if memory else (0, 0)
     history = kept.history(scene, rows, profiles)
@@ -168,8 +168,8 @@ def check_arguments(scene, duration, dt=None, elements=None, save_every=None, pr
                        f"at t = {t:g} s: no drive follows it; a Ramp, or a control with an inertia")  # fmt: skip
 
 
-def check_step(scene, dt, duration):
-    """Refuse a step that is too long for the rotation in it, and too many steps.
+def check_step(scene, dt, duration, save_every=None):
+    """Refuse a step that is too long for the rotation in it, and too many steps or rows.
 
     Raises:
         SceneError: naming the step and what it may be.
@@ -177,6 +177,9 @@ def check_step(scene, dt, duration):
     where, speed = "simulate_drilling", fastest(scene, duration)
     if duration / dt > MOST_STEPS:
         refuse(where, "duration", duration, f"at most {MOST_STEPS:g} steps of {dt:g} s, {MOST_STEPS * dt:g} s")
+    if duration / max(dt, save_every or 0.0) > MOST_ROWS:
+        refuse(where, "save_every", save_every, f"at least {duration / MOST_ROWS:.3g} s: {MOST_ROWS:g} rows in "
+               f"{duration:g} s")  # fmt: skip
     law = getattr(scene.bit, "law", None)
     parts = law.blades if isinstance(law, Cutting) else law.count if isinstance(law, Lobes) else None
     most, what = _TURN, f"{_TURN:g} rad in a step at {_FASTER:g} times the speed of the drive"

@@ -60,6 +60,9 @@ class _Stage:
         self._now = over.axvline(0.0, color="black", linewidth=0.8)
         for panel in (along, over):
             panel.grid(alpha=0.3)
+        figure.suptitle(self._title(float(history.profile_times[0])), fontsize=10)
+        figure.draw_without_rendering()
+        figure.set_layout_engine("none")  # found once: it would take half of the time of each frame
 
     def at(self, t):
         """(height, width, 3) the picture at t (s)."""
@@ -74,10 +77,13 @@ class _Stage:
         held = history.sticking[k + round(share)]
         self._held.set_data(speed[held] * RPM, history.depths[held])
         self._now.set_xdata([t, t])
-        pace = "real time" if self._speed == 1 else f"{self._speed:.3g} times faster than real"
-        self._figure.suptitle(f"{title_of(history)}\nt = {t:.2f} s ({pace})", fontsize=10)
+        self._figure.suptitle(self._title(t), fontsize=10)
         self._figure.canvas.draw()
         return np.asarray(self._figure.canvas.buffer_rgba())[..., :3].copy()
+
+    def _title(self, t):
+        pace = "real time" if self._speed == 1 else f"{self._speed:.3g} times faster than real"
+        return f"{title_of(self._history)}\nt = {t:.2f} s ({pace})"
 
     def close(self):
         """Nothing to free."""
