@@ -81,3 +81,11 @@ def _whole():
     from test_drilling_scenefile import FILE
 
     return FILE
+
+
+@pytest.mark.slow
+def test_the_command_line_maps_the_stability(tmp_path, capsys):
+    pytest.importorskip("matplotlib")
+    assert main(["run", str(DEMOS / "strings" / "stability_map.toml"), "--duration", "5", "-o", str(tmp_path)]) == 0
+    assert "20 speeds from 40 to 192 rpm" in capsys.readouterr().out
+    assert {"stability.csv", "stability.png", "drilling.csv", "map.png"} <= {file.name for file in tmp_path.iterdir()}

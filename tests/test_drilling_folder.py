@@ -1,5 +1,6 @@
 """A drill-string in motion that is written to a folder: whatever ends it, it goes on to the same digits."""
 
+import errno
 import json
 import signal
 import subprocess
@@ -130,3 +131,17 @@ def test_one_process_at_a_time(tmp_path, monkeypatch):
         cf.resume_drilling(tmp_path / "one", duration=2.0)
     busy.release()
     assert len(cf.resume_drilling(tmp_path / "one", duration=2.0)) == 200
+
+
+def test_a_full_disk(tmp_path, monkeypatch):
+    use(monkeypatch)
+
+    def full(*args):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(storage.checkpoints, "write", full)
+        with pytest.raises(cf.NotStored, match=r"No space left on device. Make room; .*resume_drilling\(") as stop:
+            cf.simulate_drilling(scene(), 10.0, folder=tmp_path / "one")
+    assert len(stop.value.path) > 0
+    assert len(cf.resume_drilling(tmp_path / "one")) == 1000

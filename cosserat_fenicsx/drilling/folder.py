@@ -210,8 +210,10 @@ class DrillingFolder:
         def written():
             for name, numbers in ((_SERIES, rows), (_PROFILES, profiles)):
                 if len(numbers):
+                    rest = memoryview(np.ascontiguousarray(numbers, dtype=float).tobytes())
                     with open(self.place / name, "ab", buffering=0) as stream:
-                        stream.write(np.ascontiguousarray(numbers, dtype=float).tobytes())
+                        while rest:  # a nearly full disk takes a part
+                            rest = rest[stream.write(rest) :]
 
         self._or_not_stored(history, written)
 
