@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from whirling_collar import ARM, AXIS, CLEARANCE, COLLAR, LENGTH, collar, rolling, whirl
+from rolling_collar import ARM, AXIS, CLEARANCE, COLLAR, LENGTH, collar, rolling, whirl
 
 import cosserat_fenicsx as cf
 from cosserat_fenicsx.actions.hole_wall import HoleWall
