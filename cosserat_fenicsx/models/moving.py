@@ -14,6 +14,7 @@ from cosserat_fenicsx.models.moving_forms import SpatialStep, compile_momentum
 from cosserat_fenicsx.models.rod_data import check_inertia, gauss_function, joined, nodal_inertia, rod_data
 from cosserat_fenicsx.models.scales import Scales
 from cosserat_fenicsx.models.spatial import SpatialModel
+from cosserat_fenicsx.models.stations import Delays
 from cosserat_fenicsx.quaternions import cross, small_rotations
 from cosserat_fenicsx.scene.damping import Damping
 from cosserat_fenicsx.scene.signals import signals_of
@@ -31,6 +32,7 @@ class Moving:
         time: unit of time, s.
         damped: whether any rod has damping.
         viscosity: the Functions of the law of the strain rates, as `laws.law_of` takes them.
+        delays: the `Delays` of its actions.
     """
 
     variations = ()
@@ -76,6 +78,7 @@ class Moving:
         self.start.x.array[:] = self.state.x.array
         self.velocity.x.array[:] = 0.0
         self._damp()
+        self.delays = Delays(self)
 
     def _damp(self):
         """Fill in the viscosity of the rods."""
@@ -131,6 +134,16 @@ class Moving:
     def slots(self):
         """(n,) the scene's number of every local node."""
         return self._slots
+
+    @property
+    def owned_nodes(self):
+        """Number of the local nodes that this rank owns; they come first."""
+        return self._owned_nodes
+
+    @property
+    def dofs_of_nodes(self):
+        """(n, components) local degrees of freedom of the local nodes."""
+        return self._nodal
 
     @property
     def rate_arrays(self):
