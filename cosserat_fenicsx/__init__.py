@@ -114,6 +114,7 @@ _HOME = {
     "Matched": "drilling.top_drive",
     "Motor": "drilling.top_drive",
     "PI": "drilling.top_drive",
+    "PipeAbove": "drilling.pipe_above",
     "Stiff": "drilling.top_drive",
     "Stribeck": "drilling.bit_laws",
     "TopDrive": "drilling.top_drive",
@@ -200,6 +201,7 @@ if TYPE_CHECKING:  # the same names, for editors and type checkers
     from cosserat_fenicsx.drilling.linear.stability import stability as stability
     from cosserat_fenicsx.drilling.linear.tuned import SoftSpeed as SoftSpeed
     from cosserat_fenicsx.drilling.linear.tuned import SoftTorque as SoftTorque
+    from cosserat_fenicsx.drilling.pipe_above import PipeAbove as PipeAbove
     from cosserat_fenicsx.drilling.scene import Drilling as Drilling
     from cosserat_fenicsx.drilling.scenefile import DrillingScene as DrillingScene
     from cosserat_fenicsx.drilling.scenefile import read_drilling_scene as read_drilling_scene

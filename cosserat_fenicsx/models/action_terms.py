@@ -74,6 +74,11 @@ class ActionTerms:
         """The arrays of the actions' memory."""
         return [function.x.array for function in self.memory_functions]
 
+    def follow(self, delayed):
+        """Take the values of actions that depend on earlier motion from {id of the action: its `Action.delayed`}."""
+        for term in self.terms:
+            term.follow(delayed)
+
     def commit(self):
         """Update the actions' memory to the state, which has been accepted."""
         for term in self.terms:
@@ -185,6 +190,7 @@ class Term:
             datum = (*at(action, 0.0).data(rod, np.zeros(1)), *action.memory)[k]
             function.x.array.reshape(-1, datum.size)[:] = self._scaled(datum, rod)
         self._values = None
+        self._delayed = {}
         self.put(0.0)
         self._values = None  # so that the first step takes them for new, and checks them
         for k, function in enumerate(self.memory):
@@ -198,10 +204,19 @@ class Term:
                 frames = model.axes @ rod.curve.frame(s[here].ravel())
                 self._frame.x.array.reshape(-1, 9)[numbers[here].ravel()] = frames.reshape(-1, 9)
 
+    def follow(self, delayed):
+        """See `ActionTerms.follow`."""
+        self._delayed = {id(action): delayed[id(action)] for action, *_ in self._where if id(action) in delayed}
+        self.moves = self.moves or bool(self._delayed)
+
+    def _values_of(self, action, t):
+        delayed = self._delayed.get(id(action))
+        return values_at(action, t) if delayed is None else {**values_at(action, t), **delayed.at(t)}
+
     def put(self, t):
         """Fill in the data at the time t, s; whether they differ from those before."""
         # on all ranks, since a user's function of time may communicate
-        values = [values_at(action, t) for action, *_ in self._where]
+        values = [self._values_of(action, t) for action, *_ in self._where]
         if values == self._values:
             return False
         self._values, self.acting = values, []

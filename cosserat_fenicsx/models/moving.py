@@ -15,6 +15,7 @@ from cosserat_fenicsx.models.nodal_inertia import check_inertia, nodal_inertia, 
 from cosserat_fenicsx.models.rod_data import gauss_function, joined, rod_data
 from cosserat_fenicsx.models.scales import Scales
 from cosserat_fenicsx.models.spatial import SpatialModel
+from cosserat_fenicsx.models.stations import Delays
 from cosserat_fenicsx.quaternions import cross, small_rotations
 from cosserat_fenicsx.scene.damping import Damping
 from cosserat_fenicsx.scene.signals import signals_of
@@ -35,6 +36,7 @@ class Moving:
             eccentric rods.
         lateral: Function, see `nodal_inertia.nodal_lateral`; None in a scene without such masses.
         viscosity: the Functions of the law of the strain rates, as `laws.law_of` takes them.
+        delays: the `Delays` of its actions.
     """
 
     variations = ()
@@ -90,6 +92,7 @@ class Moving:
         self.start.x.array[:] = self.state.x.array
         self.velocity.x.array[:] = 0.0
         self._damp()
+        self.delays = Delays(self)
 
     def _damp(self):
         """Fill in the viscosity of the rods."""

@@ -92,11 +92,17 @@ class Action:
             work. It then has `stiffness` (N/m^2; N/m at a station), `damping` (s/m), `begins` (m) and a method
             `tube_around` (arc lengths s (n,), points (n, 3) of the rod, measured depths (n,) near them) -> the
             `hole_wall.Around` of the points.
+        delayed: None; or a method that returns what depends on the earlier motion of its `station`, made for one motion:
+            an object with `longest`, the longest step that it allows (s), `begin` (motion) at the time 0, `at` (t) ->
+            {attribute: value}, of the action at a time in the next step, `accept` (t, h, motion) after a step from t
+            (s) to t + h, `undo` (), which takes back the last step, and `memory` and `recall` as of
+            `dynamics.steppers.protocol.Stepper`. `motion` is a `models.stations.StationMotion`.
         traits: None; or a dict of the fields of `models.traits.Traits`, where it takes long to find them from `work`.
     """
 
     at_nodes, scaled, permanent, follows, memory, evolve, traits = False, True, False, False, (), None, None
     touches = False
+    delayed = None
 
     def acts_on(self, rod):
         """Whether it acts along a rod."""

@@ -14,9 +14,10 @@ class MeanSpeeds:
         """(steps,) means over steps from number `first` on."""
         if self._signal.constant:
             return np.full(steps, self._signal(0.0))
-        return np.array([self._mean(n * self._dt, (n + 1) * self._dt) for n in range(first, first + steps)])
+        return np.array([self.between(n * self._dt, (n + 1) * self._dt) for n in range(first, first + steps)])
 
-    def _mean(self, start, end):
+    def between(self, start, end):
+        """Mean from one time to another (s)."""
         total, cuts = 0.0, [start, *(t for t in self._signal.jumps if start < t < end), end]
         for a, b in zip(cuts[:-1], cuts[1:], strict=True):
             middle, off = (a + b) / 2, (b - a) / (2 * 3**0.5)

@@ -4,6 +4,7 @@ from functools import lru_cache
 
 import numpy as np
 
+from cosserat_fenicsx.algebra.newton import Solved
 from cosserat_fenicsx.dynamics.start import drive
 from cosserat_fenicsx.dynamics.steppers.newton import StepNewton
 
@@ -33,6 +34,7 @@ class OneStep:
         self._h = None
         self._newton.forget()
         self.work = self.dissipated = 0.0
+        self.problem.model.delays.begin()
         self.jump()
 
     def jump(self):
@@ -52,7 +54,9 @@ class OneStep:
 
     def step(self, t, h):
         """See `Stepper`."""
-        problem = self.problem
+        problem, delays = self.problem, self.problem.model.delays
+        if h > delays.longest:
+            return Solved(False, 0, f"it is longer than the {delays.longest:.3g} s that an action allows")
         if self._h is None or abs(h - self._h) > 1e-9 * abs(h):
             problem.fresh, self._h = True, h
         problem.begin_step(t, h)
@@ -71,6 +75,7 @@ class OneStep:
         self._predictor = guesses[0]
         self.work += problem.work()
         self.dissipated += problem.dissipated()
+        delays.accept(t, h)
         problem.model.accept(unit)
         problem.model.actions.commit()
         return solved
@@ -120,6 +125,7 @@ class OneStep:
         self._state[:] = state
         for now, before in zip(self._rates, rates, strict=True):
             now[:] = before
+        self.problem.model.delays.undo()
         self.problem.begin_again()
 
     def memory(self):
@@ -137,6 +143,7 @@ class OneStep:
             },
             "problem": self.problem.memory(),
             "newton": self._newton.memory(),
+            "delays": self.problem.model.delays.memory(),
         }
 
     def recall(self, memory):
@@ -154,6 +161,7 @@ class OneStep:
         ]
         self.problem.recall(memory["problem"])
         self._newton.recall(memory["newton"])
+        self.problem.model.delays.recall(memory.get("delays", {}))
 
 
 def _numbered(arrays):

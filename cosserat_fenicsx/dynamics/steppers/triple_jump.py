@@ -6,6 +6,8 @@ the middle of each of the three, which lies inside the whole step; prescribed mo
 third of a step before its start and after its end.
 """
 
+import numpy as np
+
 from cosserat_fenicsx.algebra.newton import Solved
 from cosserat_fenicsx.dynamics.steppers.momentum import Momentum
 from cosserat_fenicsx.errors import SceneError
@@ -36,7 +38,7 @@ class TripleJump:
             raise SceneError(
                 "scheme = 'triple-jump' steps back in time: expected rods without damping, or another scheme"
             )
-        if self.problem.model.actions.memory:
+        if self.problem.model.actions.memory or np.isfinite(self.problem.model.delays.longest):
             raise SceneError(
                 "scheme = 'triple-jump' steps back in time: expected actions without memory, or another scheme"
             )

@@ -1,0 +1,199 @@
+"""The pipe above a rod, up to the top drive and the hook, as a condition at the rod's end in motions."""
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import ufl
+
+from cosserat_fenicsx.checks import instance, number, positive, refuse, store
+from cosserat_fenicsx.drilling.delay_lines import DelayLines, TopEnd
+from cosserat_fenicsx.drilling.hook import Hook
+from cosserat_fenicsx.drilling.segments import Segment, segment_of
+from cosserat_fenicsx.drilling.top_drive import PI, Matched, Stiff, TopDrive
+from cosserat_fenicsx.drilling.torsion.mean_speeds import MeanSpeeds
+from cosserat_fenicsx.drilling.wall_friction import ViscousDrag
+from cosserat_fenicsx.scene.action import PointAction, scalar, vector
+from cosserat_fenicsx.scene.rod import Station, StationOrName, is_known
+from cosserat_fenicsx.well.string import Laid
+
+# Drag acts at nodes, so many in the pipe at least.
+_BEADS = 16
+
+
+@dataclass(frozen=True)
+class PipeAbove(PointAction):
+    """The pipe between a rod's end and the top drive and hook: torsional and axial waves of the linear theory, exactly.
+
+    The pipe lies in the direction of the rod at rest. Along it, it exerts a force on the rod's end; about the rod's own
+    axis d3 there, it exerts a torque; across, it does nothing: hold the end by supports, as the wall of the hole does.
+    Its force is a dashpot, the impedance of the pipe, and what left the end earlier and comes back from the top
+    (`DelayLines`): with it the motion is as that of a rod of the whole length, without elements for the pipe. In the
+    energy balance it counts as work of the loads. At rest it is the spring of the pipe between the rod and a held top.
+
+    The steps are at most half the travel time of a wave through the shortest part of the pipe; longer ones are halved.
+    Only the schemes that step forwards can take it, and only the spatial model.
+
+    Args:
+        station: `rod.start` or `rod.end`; there the pipe goes on away from the rod.
+        pipe: a `DrillPipe` or another component with a length (m), or a `drilling.segments.Segment`; or several of
+            them, from the top down.
+        drive: a `TopDrive`. Its speed is about the axis that points from the pipe into the rod.
+        hook: a `Hook`; None for a rigid one at rest.
+        tension: with which the pipe pulls at the rod's end in the reference, N: the weight of what hangs there.
+        drag: a `ViscousDrag` of the pipe, as dashpots at 16 or more nodes; None for none.
+
+    Raises:
+        SceneError: a part of the wrong kind, a station inside the rod, or a number out of range.
+    """
+
+    station: StationOrName
+    pipe: object
+    drive: TopDrive
+    hook: Hook | None = None
+    tension: float = 0.0
+    drag: ViscousDrag | None = None
+
+    scaled = False
+
+    def __post_init__(self):
+        if is_known(self, "station", Station) and self.station.s not in (0.0, self.station.rod.length):
+            refuse(self, "station", self.station, "an end of the rod, rod.start or rod.end")
+        given = self.pipe if isinstance(self.pipe, list | tuple) else (self.pipe,)
+        if not given:
+            refuse(self, "pipe", self.pipe, "at least one part")
+        store(self, pipe=tuple(given))
+        for part in given:
+            if not isinstance(part, Segment) and not all(hasattr(part, x) for x in ("length", "stiffness", "mass")):
+                refuse(self, "pipe", part, "parts of the pipe: DrillPipe, HeavyWeight, ..., or Segment")
+            positive(part, "length", part.length, "m, of the pipe")
+        instance(self, "drive", self.drive, TopDrive, "a TopDrive(...)")
+        for field, kind in (("hook", Hook), ("drag", ViscousDrag)):
+            if getattr(self, field) is not None:
+                instance(self, field, getattr(self, field), kind, f"a {kind.__name__}(...) or None")
+        store(self, tension=number(self, "tension", self.tension, "a finite number (N)", math.isfinite))
+        _ = self.segments
+
+    @cached_property
+    def segments(self) -> tuple[Segment, ...]:
+        """The uniform parts, from the top down."""
+        return tuple(
+            part if isinstance(part, Segment) else segment_of(Laid(0.0, part.length, part), 0.0) for part in self.pipe
+        )
+
+    @cached_property
+    def _springs(self):
+        """Stiffness of the pipe at rest between its lower end and a held top, N/m and N m/rad."""
+        give = math.fsum(x.length / x.EA for x in self.segments) + 1 / (self.hook or Hook()).stiffness
+        return 1 / give, 1 / math.fsum(x.length / x.GJ for x in self.segments)
+
+    def down(self):
+        """(3,) from the pipe into the rod, at rest, inertial."""
+        tangent = self.station.rod.curve.frame(self.station.s)[:, 2]
+        return tangent if self.station.s == 0 else -tangent
+
+    #: in a motion: (thrust N, torque N m) at the moment, and damping (N s/m, N m s/rad), see `delayed`
+    acting = None
+
+    def data(self, rod, s):
+        """See `Action`."""
+        springs, forces, damping = self._springs, (-self.tension, 0.0), (0.0, 0.0)
+        if self.acting is not None:
+            springs, (forces, damping) = (0.0, 0.0), self.acting
+        values = zip((*forces, *damping, *springs), ("N", "N m", "N s/m", "N m s/rad", "N/m", "N m/rad"), strict=True)
+        return (vector(self.down(), "1"), *(scalar(value, unit) for value, unit in values))
+
+    @staticmethod
+    def work(point, test, down, thrust, torque, b, d, k, c):
+        """See `Action`."""
+        axis = point.R * down
+        along = thrust - b * ufl.dot(point.r_t, down) - k * ufl.dot(point.u, down)
+        about = torque - d * ufl.dot(point.omega, axis) - c * ufl.dot(point.theta, down)
+        return along * ufl.dot(down, test.phi_r) + about * ufl.dot(axis, test.phi)
+
+    def delayed(self):
+        """See `Action`."""
+        return _InMotion(self)
+
+
+class _InMotion:
+    """The `DelayLines` of a `PipeAbove` in a motion, see `Action.delayed`."""
+
+    def __init__(self, pipe):
+        self._pipe, self._down, drag = pipe, pipe.down(), pipe.drag or ViscousDrag()
+        parts = pipe.segments
+        axial = [(x.axial_impedance, x.length / x.axial_speed) for x in parts]
+        torsional = [(x.torsional_impedance, x.length / x.torsional_speed) for x in parts]
+        self._lines = (
+            _lines(axial, drag.axial, _hook_end(pipe.hook or Hook())),
+            _lines(torsional, drag.torsion, _drive_end(pipe.drive, parts[0].torsional_impedance)),
+        )
+        self._damping = tuple(line.dashpot for line in self._lines)
+        self.longest = min(line.longest for line in self._lines)
+
+    def begin(self, motion):
+        """See `Action.delayed`: where the pipe starts from is the equilibrium of its springs, in the motion of its
+        end."""
+        k, c = self._pipe._springs
+        axial, torsional = self._lines
+        axial.begin(motion.velocity @ self._down, -k * (motion.displacement @ self._down))
+        torsional.begin(self._about(motion), -c * (motion.rotation @ self._down))
+
+    def _about(self, motion):
+        return motion.angular_velocity @ (motion.R @ self._down)
+
+    def at(self, t):
+        """See `Action.delayed`."""
+        thrust, torque = (line.arriving(t) for line in self._lines)
+        return {"acting": ((thrust - self._pipe.tension, torque), self._damping)}
+
+    def accept(self, t, h, motion):
+        """See `Action.delayed`."""
+        for line, speed in zip(self._lines, (motion.velocity @ self._down, self._about(motion)), strict=True):
+            line.advance(t, h, speed)
+
+    def undo(self):
+        """See `Action.delayed`."""
+        for line in self._lines:
+            line.undo()
+
+    def memory(self):
+        """See `Action.delayed`."""
+        axial, torsional = self._lines
+        return {"axial": axial.memory(), "torsional": torsional.memory()}
+
+    def recall(self, memory):
+        """See `Action.delayed`."""
+        for line, name in zip(self._lines, ("axial", "torsional"), strict=True):
+            line.recall(memory[name])
+
+
+def _lines(parts, rate, end):
+    """The `DelayLines` of parts (impedance, travel time) with a drag of a rate (1/s)."""
+    pieces = np.ones(len(parts), dtype=int)
+    if rate:
+        times = np.array([time for _, time in parts])
+        pieces = np.ceil(_BEADS * times / times.sum()).astype(int)
+    impedance, time = (np.repeat(x, pieces) for x in np.transpose(parts))
+    time = time / np.repeat(pieces, pieces)
+    half = rate * impedance * time / 2  # of rate times the inertia of a piece
+    return DelayLines(impedance, time, np.append(half, 0.0) + np.append(0.0, half), end)
+
+
+def _hook_end(hook):
+    means = MeanSpeeds(hook.signal(), None)
+    if math.isinf(hook.stiffness):
+        return TopEnd(lambda start, end: -means.between(start, end), stiff=True)
+    return TopEnd(lambda start, end: -means.between(start, end), Ki=hook.stiffness)
+
+
+def _drive_end(drive, impedance):
+    control, mean = drive.control, MeanSpeeds(drive.signal(), None).between
+    if isinstance(control, Stiff):
+        return TopEnd(mean, stiff=True)
+    if isinstance(control, PI):
+        return TopEnd(mean, inertia=drive.inertia, Kp=control.Kp, Ki=control.Ki)
+    if isinstance(control, Matched):
+        return TopEnd(mean, Kp=control.impedance or impedance, given=control.torque)
+    return TopEnd(mean, inertia=drive.inertia, Kp=control.drag, given=control.torque)
