@@ -1,0 +1,59 @@
+"""The derivatives of a model's equations and of its carried contact force by the data of a scene, by ufl.derivative."""
+
+import numpy as np
+import ufl
+from dolfinx import fem
+
+from cosserat_fenicsx import compat
+from cosserat_fenicsx.compiling import compiling
+
+
+class DataDerivative:
+    """The change of the residual, and of n, in a direction of the data: of all Functions that `RodModel.load` fills in.
+
+    Args:
+        model: a `RodModel` of statics.
+
+    Attributes:
+        form: the compiled form of the change of what is balanced, at the model's state and data.
+    """
+
+    def __init__(self, model):
+        self._model, symbols = model, model.forms.symbols
+        live = (*symbols.unknowns, *model.carried)
+        self._data = [f for f in symbols.balance.coefficients() if f not in live]
+        self._directions = [fem.Function(f.function_space) for f in self._data]
+        pairs = list(zip(self._data, self._directions, strict=True))
+        with compiling():
+            self.form = fem.form(sum(ufl.derivative(symbols.balance, f, df) for f, df in pairs))
+            self._contact = None
+            if symbols.contact is not None:
+                self._moved = fem.Function(model.space)
+                named = ufl.algorithms.extract_coefficients(symbols.contact)
+                change = sum(ufl.derivative(symbols.contact, f, df) for f, df in pairs if f in named)
+                change += ufl.derivative(symbols.contact, symbols.unknowns[0], self._moved)
+                self._contact = fem.Expression(ufl.algorithms.expand_derivatives(change), model.forms.gauss[:, None])
+
+    def data(self):
+        """Copies of the arrays of the data, and of the state at rest, whose clamped part is data too."""
+        return [*(f.x.array.copy() for f in self._data), self._model._rest_state.copy()]
+
+    def take(self, changes):
+        """Set the direction: changes of what `data` returns."""
+        for df, change in zip(self._directions, changes, strict=False):
+            df.x.array[:] = change
+
+    def contact(self, moved):
+        """The change of the carried n, an array like `model.carried`'s; None where no n is carried.
+
+        Args:
+            moved: change of the model's state array, ghosts and clamped nodes included.
+        """
+        if self._contact is None:
+            return None
+        model = self._model
+        self._moved.x.array[:] = moved
+        values = compat.evaluate(self._contact, model.mesh, model._local_cells)
+        found = np.zeros_like(model.carried[0].x.array)
+        found[model.carried_dofs] = values
+        return found

@@ -1,0 +1,269 @@
+"""Derivatives of the queries of a path by numbers of its scene: the direct method.
+
+At a point of the path the residual R(x; d) vanishes, x the unknowns and d the data that the scene is turned into, all
+dimensionless. For a parameter p
+
+    dx/dp = -K^-1 (R_d dd/dp),
+
+with the tangent K as factorised by Newton's method and R_d by ufl.derivative: one factorisation a point, and one
+back-substitution for each parameter. dd/dp is a central difference of eighth order of the data, which are explicit
+functions of the scene; so are the constraint equations of supports and joints at fixed x. The contact force carried at
+the Gauss points changes by the derivative of its law. A query is then differenced along (x + t dx/dp, scene(p + t)),
+which contains units, geometry and whatever else it takes from the scene. No perturbed state is solved for.
+"""
+
+import contextlib
+import dataclasses
+
+import numpy as np
+
+from cosserat_fenicsx.differences import PLACES, STEP, derivative
+from cosserat_fenicsx.errors import NotConverged, SceneError
+from cosserat_fenicsx.models.data_derivative import DataDerivative
+from cosserat_fenicsx.models.signature import Signature
+from cosserat_fenicsx.results.accuracy import on_mesh
+from cosserat_fenicsx.results.perturbed import PerturbedPath
+from cosserat_fenicsx.results.sensitivity import Sensitivity
+from cosserat_fenicsx.scene.action import path_dependent
+from cosserat_fenicsx.scene.parameters import parameter_of
+from cosserat_fenicsx.statics.recording import record_of
+from cosserat_fenicsx.statics.solvers import solvers_of
+
+# Newton iterations from the recorded state to the same state, and how far it may move (lengths, rad).
+_ITERATIONS, _MOVED = 25, 1e-3
+# Largest motion (lengths, rad) over which queries are differenced.
+_REACH = 5e-3
+
+
+def sensitivity(path, query, parameters):
+    """Derivatives of a query of a path by numbers of its scene; see `Path.sensitivity`."""
+    if isinstance(parameters, str) or not hasattr(parameters, "__iter__"):
+        parameters = [parameters]
+    found = [parameter_of(path.scene, given) for given in parameters]
+    if not callable(query):
+        raise SceneError(f"query = {query!r}: expected a function of the path, lambda path: path.position('rod.end')")
+    _check(path)
+    value, derivatives, errors = _numbers(query(path)), {}, {}
+    with directly(path, found) as (direct, rates):
+        for parameter, rate in zip(found, rates, strict=True):
+            step, paths = direct.paths(parameter, rate)
+            values = [_numbers(query(each)) for each in paths]
+            derivatives[parameter.name], errors[parameter.name] = derivative(values, step)
+    return Sensitivity(
+        value, derivatives, errors, {x.name: x.value for x in found}, {x.name: x.unit or "unit" for x in found}
+    )
+
+
+def _numbers(value):
+    try:
+        return np.asarray(value, dtype=float)
+    except (TypeError, ValueError):
+        kind = type(value).__name__
+        raise SceneError(f"query returns a {kind}: expected a number or an array, such as one of its parts") from None
+
+
+def _check(path):
+    """Refuse paths that have no derivatives."""
+    if not len(path):
+        raise SceneError("sensitivity: the path has no converged point to differentiate at: expected at least one")
+    if path_dependent(path.scene):
+        raise SceneError("sensitivity: a load of the scene has memory: expected loads that depend on the state alone")
+    for load in path.scene.actions:
+        if load.refreshed is not None:
+            raise SceneError(
+                f"sensitivity: the tangent leaves out how a {type(load).__name__} turns with the position: expected "
+                "other loads, such as a Wall or a Foundation"
+            )
+
+
+@contextlib.contextmanager
+def directly(path, parameters):
+    """Context manager that gives the `Direct` of a path and, for each parameter, the rates of its points."""
+    scenes = [_scenes_near(path.scene, parameter) for parameter in parameters]
+    model = path.model
+    if model != "spatial" and path.scene.plane is not None and not all(map(_same_plane(path), sum(scenes, []))):
+        model = "spatial"
+    with solvers_of(
+        path.scene, path.layout, formulation=path.formulation, degree=path.degree, points=len(path.rule.gauss),
+        comm=path.comm, model=model,
+    ) as solvers:  # fmt: skip
+        direct = Direct(*solvers, path)
+        try:
+            for each, parameter in zip(scenes, parameters, strict=True):
+                direct.check(each, parameter)
+            direct.begin()
+            yield direct, direct.rates(scenes, [STEP * parameter.size for parameter in parameters])
+        finally:
+            direct.leave()
+
+
+def _scenes_near(scene, parameter):
+    """The scenes with the parameter at `PLACES` times its step from its value."""
+    try:
+        found = [parameter.scene_of(parameter.value + k * STEP * parameter.size) for k in PLACES]
+    except SceneError as problem:
+        raise SceneError(
+            f"parameter '{parameter.name}' = {parameter.value:g}: its neighbourhood, up to "
+            f"{max(PLACES) * STEP * parameter.size:.3g} from it, is refused: {problem}"
+        ) from None
+    for part in ("rods", "supports", "loads", "joints"):
+        if any(len(getattr(near, part)) != len(getattr(scene, part)) for near in found):
+            raise SceneError(f"parameter '{parameter.name}': it changes the number of {part}: expected a smooth change")
+    return found
+
+
+def _same_plane(path):
+    axes = np.array(path.scene.plane.axes)
+    return lambda scene: scene.plane is not None and np.allclose(scene.plane.axes, axes, rtol=0, atol=1e-12)
+
+
+class Direct:
+    """The direct method on one problem and path.
+
+    Args:
+        problem, newton, stability: see `solvers_of`, loaded with the path's scene.
+        path: the `Path`.
+    """
+
+    def __init__(self, problem, newton, stability, path):
+        self.problem, self._newton, self._stability, self._path = problem, newton, stability, path
+        self.model, self._scene, self._layout = problem.model, path.scene, path.layout
+        known = getattr(self.model, "data_derivative", None)
+        self._by_data = self.model.data_derivative = known or DataDerivative(self.model)
+        self.points = []
+
+    def begin(self):
+        """Find the path's points again, to rounding."""
+        self._apply_permanent()
+        self.model.EI = self.model.scales.moment * self.model.scales.length  # so that units depend on no parameter
+        self.points = [self._solved(*each) for each in self._starts()]
+
+    def leave(self):
+        """Leave the problem as it was found."""
+        self.model.EI = None
+        self._load(self._scene)
+        self._stability.load()
+
+    def check(self, scenes, parameter):
+        """Refuse a parameter that changes what the compiled code depends on, or the proportions of the mesh."""
+        signature = self.model.signature
+        for scene in scenes:
+            near = Signature.of(
+                scene, self._layout, formulation=self._path.formulation, degree=signature.degree,
+                points=signature.points, model=signature.model,
+            )  # fmt: skip
+            kept = dataclasses.replace(near, slender=signature.slender, formulation=signature.formulation)
+            if kept != signature:
+                raise SceneError(
+                    f"parameter '{parameter.name}': the model changes where it is varied: expected one that leaves "
+                    "symmetries, planes and what is held as they are, or a path with model='spatial'"
+                )
+            sizes = [self._layout.sizes(x) / max(rod.length for rod in x.rods) for x in (scene, self._scene)]
+            if not np.allclose(*sizes, rtol=1e-12):
+                raise SceneError(
+                    f"parameter '{parameter.name}' changes the lengths of rods over that of the longest one: expected "
+                    "one that scales all of them, or none"
+                )
+
+    # -- states ------------------------------------------------------------------------------------------------------
+
+    def _apply_permanent(self):
+        if self.problem.begins:
+            self.problem.end_beginning()
+
+    def _load(self, scene):
+        self.problem.load(scene, self._layout)
+        self._apply_permanent()
+
+    def _starts(self):
+        path, model = self._path, self.model
+        rq, n = on_mesh(path, path.layout)
+        return zip(path._records, model.unknowns_of(rq), n, strict=True)
+
+    def _solved(self, record, values, n):
+        """(load factor, numbers, record) of a point, solved to rounding."""
+        problem = self.problem
+        problem.set_load_factor(record.load_factor)
+        problem.begin_at(values, n, record.reactions)
+        before = problem.numbers()
+        self._newton.allow(_ITERATIONS)
+        solved = self._newton.solve()
+        if not solved.converged or self.model.largest(problem.x.array_r - before[0]) > _MOVED or record.neutral:
+            reason = solved.reason if not solved.converged else "a motion is neutral, or the state is not isolated"
+            raise NotConverged(
+                f"sensitivity: the point at the load factor {record.load_factor:.6g} has no derivative: {reason}"
+            )
+        return record.load_factor, problem.numbers(), record
+
+    # -- derivatives -------------------------------------------------------------------------------------------------
+
+    def rates(self, scenes, steps):
+        """For each parameter the derivatives of the numbers of every point (see `Problem.numbers`)."""
+        changes = [self._data_changes(each, step) for each, step in zip(scenes, steps, strict=True)]
+        self._load(self._scene)
+        found = [[] for _ in scenes]
+        for i, (eta, numbers, _) in enumerate(self.points):
+            self._factor(eta, numbers)
+            for rates, (data, of_ties) in zip(found, changes, strict=True):
+                rates.append(self._rate(eta, data, of_ties[i]))
+        return found
+
+    def _data_changes(self, scenes, step):
+        """Derivatives of the data, and for every point of the constraint equations' part of the residual."""
+        data, of_ties = [], []
+        for scene in scenes:
+            self._load(scene)
+            data.append(self._by_data.data())
+            of_ties.append([self._of_ties(eta, numbers[0]) for eta, numbers, _ in self.points])
+        whole = [derivative(arrays, step)[0] for arrays in zip(*data, strict=True)]
+        return whole, [derivative(arrays, step)[0] for arrays in zip(*of_ties, strict=True)]
+
+    def _of_ties(self, eta, x):
+        problem, found = self.problem, np.zeros(self.problem.numbering.size)
+        if problem.ties:
+            problem.ties.see(x)
+            problem.ties.add_residual(found, eta)
+        return found
+
+    def _factor(self, eta, numbers):
+        problem = self.problem
+        problem.set_load_factor(eta)
+        problem.put(numbers)
+        problem.function(problem.x, problem.b)
+        problem.factor()
+
+    def _rate(self, eta, data, of_ties):
+        problem, model, numbering = self.problem, self.model, self.problem.numbering
+        self._by_data.take(data)
+        clamped = np.where(numbering.rows < 0, data[-1], 0.0)
+        residual, rate = numbering.vector(), numbering.vector()
+        problem.assemble_data_derivative(self._by_data.form, clamped, residual)
+        residual.array_w[:] += of_ties
+        residual.scale(-1.0)
+        if not problem.solve(residual, rate) or not np.isfinite(rate.norm()):
+            raise NotConverged(
+                f"sensitivity: the tangent is singular at the load factor {eta:.6g}, where the path has no derivative"
+            )
+        moved = clamped.copy()
+        numbering.to_local(rate, moved)
+        contact = self._by_data.contact(moved)
+        carried = [] if contact is None else [contact]
+        return [rate.array_r.copy(), *carried, *(np.zeros_like(x.x.array) for x in model.carried[len(carried) :])]
+
+    # -- results -----------------------------------------------------------------------------------------------------
+
+    def paths(self, parameter, rates):
+        """(step, `PerturbedPath`s at `PLACES` times the step)."""
+        fastest = max(self.model.largest(rate[0]) for rate in rates)
+        step = min(STEP * parameter.size, _REACH / max(fastest, 1e-300))
+        return step, [self._moved(parameter, rates, k * step) for k in PLACES]
+
+    def _moved(self, parameter, rates, change):
+        problem = self.problem
+        self._load(parameter.scene_of(parameter.value + change))
+        found = PerturbedPath.beside(self._path, self.model)
+        for (eta, numbers, record), rate in zip(self.points, rates, strict=True):
+            problem.set_load_factor(eta)
+            problem.put([a + change * b for a, b in zip(numbers, rate, strict=True)])
+            found.append(record_of(problem, eta, record.negative_modes, record.iterations, record.steps))
+        return found
