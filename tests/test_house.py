@@ -79,6 +79,7 @@ FITTERS = {
     "statics": {
         "agreement",
         "circulatory",
+        "critical",
         "first_mesh",
         "grading",
         "linear_buckling",

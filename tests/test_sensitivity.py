@@ -199,3 +199,48 @@ def test_a_neutral_motion_has_no_derivative():
     path = cf.solve(scene, (0.0, 1.2), model="spatial", elements=4, branch=1)
     with pytest.raises(cf.NotConverged, match="no derivative"):
         path.sensitivity(tip, [E])
+
+
+def euler(*, E=210e9, diameter=0.2, length=20.0, loads=lambda rod: ()):
+    rod = cf.Rod(cf.Line((0, 0, 0), (0, 0, length)), cf.Circle(diameter), cf.Material(E=E, nu=0.3), name="column")
+    return rod, cf.Scene([rod], [cf.Clamp(rod.start)], [cf.Force(rod.end, (0, 0, -1e5)), *loads(rod)])
+
+
+def test_buckling_loads_of_a_column():
+    """P (1 + P/GA) = P_Euler: P is in proportion to E, nearly to d^4 and L^-2."""
+    rod, scene = euler()
+    found = cf.buckling(scene, 2).sensitivity([E, DIAMETER, LOAD, "rods.column.curve.end[2]"])
+    P, GA = found.value[0] * 1e5, rod.stiffness.shear[0]
+    x = P / GA / (1 + P / GA)
+    exact = 1.0, (4 + 2 * x) / (1 + x), -1.0, -2 / (1 + x)
+    for name, power in zip(found, exact, strict=True):
+        assert found.relative(name) == pytest.approx([power] * 2, rel=1e-8)
+        assert found.error[name] == pytest.approx(0, abs=1e-8 * abs(found[name]).max())
+    spread = cf.buckling(scene).uncertainty({E: 0.02 * 210e9, DIAMETER: 0.01 * 0.2})
+    assert spread.standard_deviation[0] / P * 1e5 == pytest.approx(np.hypot(0.02, 0.01 * exact[1]), rel=1e-6)
+
+
+def test_a_foundation_carries_a_part_of_the_buckling_load():
+    """Of a pinned column, P_cr = P_Euler + k (L/pi)^2 in its first mode without shear."""
+
+    def scene(k):
+        stiff = cf.Stiffness(shear=(np.inf,) * 2, axial=np.inf, bending=(1e6, 1e6), torsion=1e6)
+        rod = cf.Rod(cf.Line((0, 0, 0), (0, 0, 10.0)), stiff, name="column")
+        held = [cf.Hinge(rod.start, (0, 1, 0)), cf.Roller(rod.end, (1, 0, 0)), cf.Roller(rod.end, (0, 1, 0))]
+        return cf.Scene([rod], held, [cf.Force(rod.end, (0, 0, -1e4)), cf.Foundation(rod, k, direction=(1, 0, 0)),
+                                      cf.Foundation(rod, 10 * k, direction=(0, 1, 0))])  # fmt: skip
+
+    found = cf.buckling(scene(1e3), elements=8).sensitivity(["loads[1].stiffness", "loads[2].stiffness"])
+    assert found["loads[1].stiffness"][0] * 1e4 == pytest.approx((10 / np.pi) ** 2, rel=1e-5)
+    assert abs(found["loads[2].stiffness"][0]) * 1e4 < 1e-5
+
+
+def test_equal_buckling_loads_that_part_are_refused():
+    stiff = cf.Stiffness(shear=(1e9, 1e9), axial=1e9, bending=(1e6, 1e6), torsion=1e6)
+    rod = cf.Rod(cf.Line((0, 0, 0), (0, 0, 20.0)), stiff, name="column")
+    scene = cf.Scene([rod], [cf.Clamp(rod.start)], [cf.Force(rod.end, (0, 0, -1e5))])
+    with pytest.raises(cf.SceneError, match="it separates the critical load factors 0 and 1"):
+        cf.buckling(scene, 2).sensitivity(["rods.column.section.bending[0]"])
+    follower = cf.Scene([rod], [cf.Clamp(rod.start)], [cf.FollowerForce(rod.end, (0, 0, -1e5))])
+    with pytest.raises(cf.SceneError, match="have a potential"):
+        cf.buckling(follower).sensitivity([LOAD])

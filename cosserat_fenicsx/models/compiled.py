@@ -27,8 +27,8 @@ ActionWork = namedtuple("ActionWork", "dead permanent live")
 Live = namedtuple("Live", "form factor measure point work")
 
 #: What derivatives by data need, UFL: the forms that are balanced in equilibrium, factors included; n by the law, where
-#: n is carried, or None; and the Functions of the unknowns.
-Symbols = namedtuple("Symbols", "balance contact unknowns")
+#: n is carried, or None; the Functions of the unknowns; and the second variations.
+Symbols = namedtuple("Symbols", "balance contact unknowns seconds")
 
 
 @dataclass(frozen=True)
@@ -101,7 +101,7 @@ def compile_all(
         _unless_none(lambda a: fem.Expression(a, model.nodes[:, None]), at_nodes),
         points[:, 0],
         weights,
-        unknowns and Symbols(_balance(model, residual, acting), contact, unknowns),
+        unknowns and Symbols(_balance(model, residual, acting), contact, unknowns, seconds),
     )
 
 

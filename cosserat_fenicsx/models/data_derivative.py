@@ -1,4 +1,5 @@
-"""The derivatives of a model's equations and of its carried contact force by the data of a scene, by ufl.derivative."""
+"""Derivatives of a model's equations and carried contact force by the data of a scene, by ufl.derivative; and the value
+of its second variation."""
 
 import numpy as np
 import ufl
@@ -57,3 +58,27 @@ class DataDerivative:
         found = np.zeros_like(model.carried[0].x.array)
         found[model.carried_dofs] = values
         return found
+
+
+class EnergyOfMotion:
+    """The second variation of a spatial model along one motion, without supports and joints: a sum of squares of small
+    strains, which keeps its digits where the entries of the matrix would lose them.
+
+    Args:
+        model: a `SpatialModel`.
+    """
+
+    def __init__(self, model):
+        (space,), (second,) = model.variation_spaces, model.forms.symbols.seconds
+        self._model, self._motion = model, fem.Function(space)
+        with compiling():
+            self._form = fem.form(ufl.action(ufl.action(second, self._motion), self._motion))
+
+    def along(self, motion):
+        """The value at the model's state, over all ranks, dimensionless.
+
+        Args:
+            motion: (N, 6) displacements and rotations of all nodes in the scene's order, inertial, dimensionless.
+        """
+        self._motion.x.array.reshape(-1, 6)[:] = motion[self._model._slots]
+        return self._model.comm.allreduce(fem.assemble_scalar(self._form))

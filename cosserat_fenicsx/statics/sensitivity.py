@@ -42,11 +42,13 @@ def sensitivity(path, query, parameters):
     found = [parameter_of(path.scene, given) for given in parameters]
     if not callable(query):
         raise SceneError(f"query = {query!r}: expected a function of the path, lambda path: path.position('rod.end')")
-    _check(path)
+    if not len(path):
+        raise SceneError("sensitivity: the path has no converged point to differentiate at: expected at least one")
+    check_scene(path.scene)
     value, derivatives, errors = _numbers(query(path)), {}, {}
     with directly(path, found) as (direct, rates):
         for parameter, rate in zip(found, rates, strict=True):
-            step, paths = direct.paths(parameter, rate)
+            step, paths = direct.paths(path, parameter, rate)
             values = [_numbers(query(each)) for each in paths]
             derivatives[parameter.name], errors[parameter.name] = derivative(values, step)
     return Sensitivity(
@@ -62,13 +64,11 @@ def _numbers(value):
         raise SceneError(f"query returns a {kind}: expected a number or an array, such as one of its parts") from None
 
 
-def _check(path):
-    """Refuse paths that have no derivatives."""
-    if not len(path):
-        raise SceneError("sensitivity: the path has no converged point to differentiate at: expected at least one")
-    if path_dependent(path.scene):
+def check_scene(scene):
+    """Refuse loads whose derivatives are not known."""
+    if path_dependent(scene):
         raise SceneError("sensitivity: a load of the scene has memory: expected loads that depend on the state alone")
-    for load in path.scene.actions:
+    for load in scene.actions:
         if load.refreshed is not None:
             raise SceneError(
                 f"sensitivity: the tangent leaves out how a {type(load).__name__} turns with the position: expected "
@@ -79,7 +79,7 @@ def _check(path):
 @contextlib.contextmanager
 def directly(path, parameters):
     """Context manager that gives the `Direct` of a path and, for each parameter, the rates of its points."""
-    scenes = [_scenes_near(path.scene, parameter) for parameter in parameters]
+    scenes = [scenes_near(path.scene, parameter) for parameter in parameters]
     model = path.model
     if model != "spatial" and path.scene.plane is not None and not all(map(_same_plane(path), sum(scenes, []))):
         model = "spatial"
@@ -87,17 +87,13 @@ def directly(path, parameters):
         path.scene, path.layout, formulation=path.formulation, degree=path.degree, points=len(path.rule.gauss),
         comm=path.comm, model=model,
     ) as solvers:  # fmt: skip
-        direct = Direct(*solvers, path)
-        try:
-            for each, parameter in zip(scenes, parameters, strict=True):
-                direct.check(each, parameter)
-            direct.begin()
-            yield direct, direct.rates(scenes, [STEP * parameter.size for parameter in parameters])
-        finally:
-            direct.leave()
+        with Direct(*solvers, path.scene, path.layout) as direct:
+            direct.check(scenes, parameters)
+            direct.find(path)
+            yield direct, direct.rates(scenes, parameters)
 
 
-def _scenes_near(scene, parameter):
+def scenes_near(scene, parameter):
     """The scenes with the parameter at `PLACES` times its step from its value."""
     try:
         found = [parameter.scene_of(parameter.value + k * STEP * parameter.size) for k in PLACES]
@@ -121,35 +117,47 @@ class Direct:
     """The direct method on one problem and path.
 
     Args:
-        problem, newton, stability: see `solvers_of`, loaded with the path's scene.
-        path: the `Path`.
+        problem, newton, stability: see `solvers_of`, loaded with the scene.
+        scene, layout: these.
+
+    Attributes:
+        points: [(load factor, numbers, `Record`)] of the states where derivatives are taken.
     """
 
-    def __init__(self, problem, newton, stability, path):
-        self.problem, self._newton, self._stability, self._path = problem, newton, stability, path
-        self.model, self._scene, self._layout = problem.model, path.scene, path.layout
+    def __init__(self, problem, newton, stability, scene, layout):
+        self.problem, self.newton, self.stability = problem, newton, stability
+        self.model, self._scene, self._layout = problem.model, scene, layout
         known = getattr(self.model, "data_derivative", None)
         self._by_data = self.model.data_derivative = known or DataDerivative(self.model)
         self.points = []
 
-    def begin(self):
-        """Find the path's points again, to rounding."""
-        self._apply_permanent()
+    def __enter__(self):
         self.model.EI = self.model.scales.moment * self.model.scales.length  # so that units depend on no parameter
-        self.points = [self._solved(*each) for each in self._starts()]
+        return self
 
-    def leave(self):
+    def __exit__(self, *failure):
         """Leave the problem as it was found."""
         self.model.EI = None
         self._load(self._scene)
-        self._stability.load()
+        self.stability.load()
 
-    def check(self, scenes, parameter):
-        """Refuse a parameter that changes what the compiled code depends on, or the proportions of the mesh."""
+    def find(self, path):
+        """Take the points of a path, solved again to rounding."""
+        self._apply_permanent()
+        rq, n = on_mesh(path, self._layout)
+        starts = zip(path._records, self.model.unknowns_of(rq), n, strict=True)
+        self.points = [self._solved(*each) for each in starts]
+
+    def check(self, scenes, parameters):
+        """Refuse parameters that change what the compiled code depends on, or the proportions of the mesh."""
+        for each, parameter in zip(scenes, parameters, strict=True):
+            self._check(each, parameter)
+
+    def _check(self, scenes, parameter):
         signature = self.model.signature
         for scene in scenes:
             near = Signature.of(
-                scene, self._layout, formulation=self._path.formulation, degree=signature.degree,
+                scene, self._layout, formulation=signature.formulation.name, degree=signature.degree,
                 points=signature.points, model=signature.model,
             )  # fmt: skip
             kept = dataclasses.replace(near, slender=signature.slender, formulation=signature.formulation)
@@ -175,19 +183,14 @@ class Direct:
         self.problem.load(scene, self._layout)
         self._apply_permanent()
 
-    def _starts(self):
-        path, model = self._path, self.model
-        rq, n = on_mesh(path, path.layout)
-        return zip(path._records, model.unknowns_of(rq), n, strict=True)
-
     def _solved(self, record, values, n):
         """(load factor, numbers, record) of a point, solved to rounding."""
         problem = self.problem
         problem.set_load_factor(record.load_factor)
         problem.begin_at(values, n, record.reactions)
         before = problem.numbers()
-        self._newton.allow(_ITERATIONS)
-        solved = self._newton.solve()
+        self.newton.allow(_ITERATIONS)
+        solved = self.newton.solve()
         if not solved.converged or self.model.largest(problem.x.array_r - before[0]) > _MOVED or record.neutral:
             reason = solved.reason if not solved.converged else "a motion is neutral, or the state is not isolated"
             raise NotConverged(
@@ -197,15 +200,22 @@ class Direct:
 
     # -- derivatives -------------------------------------------------------------------------------------------------
 
-    def rates(self, scenes, steps):
+    def rates(self, scenes, parameters):
         """For each parameter the derivatives of the numbers of every point (see `Problem.numbers`)."""
-        changes = [self._data_changes(each, step) for each, step in zip(scenes, steps, strict=True)]
-        self._load(self._scene)
+        changes = self.data_changes(scenes, parameters)
         found = [[] for _ in scenes]
         for i, (eta, numbers, _) in enumerate(self.points):
-            self._factor(eta, numbers)
+            self.factor(eta, numbers)
             for rates, (data, of_ties) in zip(found, changes, strict=True):
-                rates.append(self._rate(eta, data, of_ties[i]))
+                rates.append(self._rate(data, of_ties[i]))
+        return found
+
+    def data_changes(self, scenes, parameters):
+        """For each parameter the derivatives of the data, and for every point of the supports' and joints' part of the
+        residual; the scene is loaded again."""
+        steps = [STEP * parameter.size for parameter in parameters]
+        found = [self._data_changes(each, step) for each, step in zip(scenes, steps, strict=True)]
+        self._load(self._scene)
         return found
 
     def _data_changes(self, scenes, step):
@@ -225,45 +235,73 @@ class Direct:
             problem.ties.add_residual(found, eta)
         return found
 
-    def _factor(self, eta, numbers):
+    def factor(self, eta, numbers):
+        """Go to a state, and factorise the tangent there."""
         problem = self.problem
         problem.set_load_factor(eta)
         problem.put(numbers)
         problem.function(problem.x, problem.b)
         problem.factor()
 
-    def _rate(self, eta, data, of_ties):
-        problem, model, numbering = self.problem, self.model, self.problem.numbering
+    def residual_change(self, data, of_ties):
+        """(change of the residual at the state, a vector; change of the model's state array at clamped nodes)."""
+        numbering, found = self.problem.numbering, self.problem.numbering.vector()
         self._by_data.take(data)
         clamped = np.where(numbering.rows < 0, data[-1], 0.0)
-        residual, rate = numbering.vector(), numbering.vector()
-        problem.assemble_data_derivative(self._by_data.form, clamped, residual)
-        residual.array_w[:] += of_ties
+        self.problem.assemble_data_derivative(self._by_data.form, clamped, found)
+        found.array_w[:] += of_ties
+        return found, clamped
+
+    def _rate(self, data, of_ties):
+        return self._response(*self.residual_change(data, of_ties))
+
+    def slope(self):
+        """Derivatives of the numbers by the load factor, at the state where the tangent was factorised."""
+        problem = self.problem
+        self._by_data.take([0.0] * len(self._by_data.data()))
+        return self._response(problem.load_derivative(problem.x).copy(), np.zeros_like(self.model.state.x.array))
+
+    def _response(self, residual, moved):
+        """The change of the numbers that balances a change of the residual, with the clamped nodes' moves `moved`."""
+        problem, model, rate = self.problem, self.model, self.problem.numbering.vector()
         residual.scale(-1.0)
         if not problem.solve(residual, rate) or not np.isfinite(rate.norm()):
             raise NotConverged(
-                f"sensitivity: the tangent is singular at the load factor {eta:.6g}, where the path has no derivative"
+                f"sensitivity: the tangent is singular at the load factor {problem.load_factor:.6g}, where the path "
+                "has no derivative"
             )
-        moved = clamped.copy()
-        numbering.to_local(rate, moved)
+        problem.numbering.to_local(rate, moved)
         contact = self._by_data.contact(moved)
         carried = [] if contact is None else [contact]
         return [rate.array_r.copy(), *carried, *(np.zeros_like(x.x.array) for x in model.carried[len(carried) :])]
 
     # -- results -----------------------------------------------------------------------------------------------------
 
-    def paths(self, parameter, rates):
-        """(step, `PerturbedPath`s at `PLACES` times the step)."""
-        fastest = max(self.model.largest(rate[0]) for rate in rates)
-        step = min(STEP * parameter.size, _REACH / max(fastest, 1e-300))
-        return step, [self._moved(parameter, rates, k * step) for k in PLACES]
+    def paths(self, path, parameter, rates):
+        """(step, `PerturbedPath`s beside a path at `PLACES` times the step)."""
+        step = self.step(parameter, rates)
+        return step, [self._moved(path, parameter, rates, k * step) for k in PLACES]
 
-    def _moved(self, parameter, rates, change):
-        problem = self.problem
+    def step(self, parameter, rates):
+        """A change of a parameter by which the state moves little."""
+        fastest = max(self.model.largest(rate[0]) for rate in rates)
+        return min(STEP * parameter.size, _REACH / max(fastest, 1e-300))
+
+    def load_near(self, parameter, change):
+        """Load the scene with a parameter changed."""
         self._load(parameter.scene_of(parameter.value + change))
-        found = PerturbedPath.beside(self._path, self.model)
-        for (eta, numbers, record), rate in zip(self.points, rates, strict=True):
-            problem.set_load_factor(eta)
-            problem.put([a + change * b for a, b in zip(numbers, rate, strict=True)])
-            found.append(record_of(problem, eta, record.negative_modes, record.iterations, record.steps))
+
+    def put(self, point, rate, change):
+        """Go to a state that is moved by a change times a rate."""
+        eta, numbers, _ = point
+        self.problem.set_load_factor(eta)
+        self.problem.put([a + change * b for a, b in zip(numbers, rate, strict=True)])
+
+    def _moved(self, path, parameter, rates, change):
+        self.load_near(parameter, change)
+        found = PerturbedPath.beside(path, self.model)
+        for point, rate in zip(self.points, rates, strict=True):
+            self.put(point, rate, change)
+            eta, _, record = point
+            found.append(record_of(self.problem, eta, record.negative_modes, record.iterations, record.steps))
         return found
