@@ -80,6 +80,7 @@ FITTERS = {
         "agreement",
         "circulatory",
         "critical",
+        "critical_points",
         "first_mesh",
         "grading",
         "linear_buckling",

@@ -158,7 +158,9 @@ class Path(Result):
         second."""
         return self._potential(self)
 
-    def sensitivity(self, query: Callable[[Self], object], parameters: Iterable[str | Parameter]) -> Sensitivity:
+    def sensitivity(
+        self, query: Callable[[Self], object] | Event, parameters: Iterable[str | Parameter]
+    ) -> Sensitivity:
         """Derivatives of a query by numbers of the scene, at every point of the path, by the direct method.
 
         They are those of the discrete equations on the path's mesh: one back-substitution with Newton's tangent for
@@ -167,7 +169,9 @@ class Path(Result):
         Args:
             query: a function of a path that returns a number or an array, smooth in the state, such as
                 ``lambda path: path.displacement("column.end")[:, 0]``, of `position`, `rotation`, `force`, `moment`,
-                `reaction`, `largest` and so on.
+                `reaction`, `largest` and so on. Or one of `events`, for its critical load factor: of a limit point by
+                the null vector of the tangent; of a bifurcation, which the parameter must not destroy, by the
+                eigenvalue that vanishes.
             parameters: names of numbers, "rods.column.material.E", "rods.column.section.diameter", "loads[0].force[2]"
                 (see `Parameter` for others).
 
@@ -175,8 +179,8 @@ class Path(Result):
             Sensitivity: {name: array of the shape of the query}, SI units.
 
         Raises:
-            SceneError: an unknown parameter (names the nearest), one that changes the model, a query of another kind,
-                an empty path, loads with memory.
+            SceneError: an unknown parameter (names the nearest), one that changes the model or destroys a bifurcation,
+                a query of another kind, an empty path, loads with memory.
             NotConverged: the tangent is singular at a point of the path.
         """
         return self._differentiated(self, query, parameters)
@@ -184,7 +188,7 @@ class Path(Result):
     def uncertainty(
         self,
         standard_deviations: Mapping[str | Parameter, float],
-        query: Callable[[Self], object],
+        query: Callable[[Self], object] | Event,
         correlation: np.ndarray | None = None,
     ) -> Uncertainty:
         """The first-order standard deviation of a query, with the share of each parameter; it can be printed.

@@ -85,34 +85,48 @@ class _Quotient:
     """
 
     def __init__(self, direct, modes, critical):
-        self._direct, self._modes, self._step = direct, modes, _STEP * critical
-        self._energy, self._part = EnergyOfMotion(direct.model), direct.stability.whole
+        self._direct, self._step, part = direct, _STEP * critical, direct.stability.whole
         if direct.problem.ties:
-            self._part.form.refresh()
-            self._part.assemble()  # for the springs in place of supports and joints
-        self._resistance = self._part.resistance
+            part.form.refresh()
+            part.assemble()  # for the springs in place of supports and joints
+        self._energies = Energies(direct, modes, part.resistance)
 
     def here(self):
         """(modes,) the critical changes of the load factor."""
         direct, eta, numbers = self._direct, self._direct.problem.load_factor, self._direct.problem.numbers()
         direct.factor(eta, numbers)
-        slope, stiff = direct.slope(), self._energies()
+        slope, stiff = direct.slope(), self._energies.here()
         sides = []
         for k in PLACES:
             direct.put((eta + k * self._step, numbers, None), slope, k * self._step)
             with direct.model.stress_alone():
-                sides.append(self._energies(stress_alone=True))
+                sides.append(self._energies.here(springs=False))
         direct.put((eta, numbers, None), slope, 0.0)
         return -stiff / derivative(sides, self._step)[0]
 
-    def _energies(self, stress_alone=False):
-        problem, model, axes = self._direct.problem, self._direct.model, self._part.variation.axes
+
+class Energies:
+    """The second variation along modes at the state of a `Direct`, supports and joints included.
+
+    Args:
+        direct: the `Direct`; modes: each (N, 6), dimensionless.
+        resistance: see `Part`; None for modes that satisfy all constraint equations.
+    """
+
+    def __init__(self, direct, modes, resistance=None):
+        self._direct, self._modes, self._resistance = direct, modes, resistance
+        self._energy = EnergyOfMotion(direct.model)
+        self._axes = direct.stability.whole.variation.axes
+
+    def here(self, springs=True):
+        """(modes,) dimensionless; springs: whether those in place of supports and joints count."""
+        ties, eta = self._direct.problem.ties, self._direct.problem.eta
         found = np.array([self._energy.along(mode) for mode in self._modes])
-        if problem.ties:
-            of_ties = problem.ties.second_variation(axes, problem.eta)
-            if not stress_alone:
-                of_ties = of_ties + problem.ties.springs(axes, problem.eta, self._resistance)
-            tied = np.array([mode[model.tied_slots].ravel() for mode in self._modes])
+        if ties:
+            of_ties = ties.second_variation(self._axes, eta)
+            if springs and self._resistance is not None:
+                of_ties = of_ties + ties.springs(self._axes, eta, self._resistance)
+            tied = np.array([mode[self._direct.model.tied_slots].ravel() for mode in self._modes])
             found += np.einsum("mi,ij,mj->m", tied, of_ties, tied)
         return found
 

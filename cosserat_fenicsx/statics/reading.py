@@ -11,7 +11,7 @@ from cosserat_fenicsx.models.scales import Scales
 from cosserat_fenicsx.results.export import saved
 from cosserat_fenicsx.results.path import Path
 from cosserat_fenicsx.statics.circulatory import conservative_along
-from cosserat_fenicsx.statics.sensitivity import sensitivity
+from cosserat_fenicsx.statics.critical_points import derivatives_of
 
 
 def read_path(file: File, *, comm: MPI.Comm | None = None) -> Path:
@@ -27,7 +27,7 @@ def read_path(file: File, *, comm: MPI.Comm | None = None) -> Path:
         SceneError: it cannot be read, is damaged, holds something else, or is of a newer release.
     """
     path = saved.read(file, "Path", assembled, comm or MPI.COMM_WORLD)
-    path._potential, path._differentiated = conservative_along, sensitivity
+    path._potential, path._differentiated = conservative_along, derivatives_of
     return path
 
 

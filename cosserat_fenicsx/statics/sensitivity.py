@@ -125,7 +125,7 @@ class Direct:
     """
 
     def __init__(self, problem, newton, stability, scene, layout):
-        self.problem, self.newton, self.stability = problem, newton, stability
+        self.problem, self.newton, self.stability = self.solvers = problem, newton, stability
         self.model, self._scene, self._layout = problem.model, scene, layout
         known = getattr(self.model, "data_derivative", None)
         self._by_data = self.model.data_derivative = known or DataDerivative(self.model)
@@ -286,6 +286,10 @@ class Direct:
         """A change of a parameter by which the state moves little."""
         fastest = max(self.model.largest(rate[0]) for rate in rates)
         return min(STEP * parameter.size, _REACH / max(fastest, 1e-300))
+
+    def reload(self):
+        """Load the scene itself again."""
+        self._load(self._scene)
 
     def load_near(self, parameter, change):
         """Load the scene with a parameter changed."""

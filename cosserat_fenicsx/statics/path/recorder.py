@@ -341,6 +341,6 @@ class Tracing:
 
 def differentiated(path, query, parameters):
     """See `Path.sensitivity`."""
-    from cosserat_fenicsx.statics.sensitivity import sensitivity  # which needs solvers, and they this module
+    from cosserat_fenicsx.statics.critical_points import derivatives_of  # which needs solvers, and they this module
 
-    return sensitivity(path, query, parameters)
+    return derivatives_of(path, query, parameters)
