@@ -199,3 +199,42 @@ def test_a_neutral_motion_has_no_derivative():
     path = cf.solve(scene, (0.0, 1.2), model="spatial", elements=4, branch=1)
     with pytest.raises(cf.NotConverged, match="no derivative"):
         path.sensitivity(tip, [E])
+
+
+def test_materials_of_a_scene_file_have_names(tmp_path):
+    """A material that two rods share changes for both, by whatever name."""
+    (tmp_path / "scene.toml").write_text("""
+        title = "two rods"
+        [materials.steel]
+        E = 210e9
+        [[rods]]
+        name = "column"
+        curve = {type = "Line", start = [0, 0, 0], end = [0, 0, 10]}
+        section = {type = "Circle", diameter = 0.2}
+        material = "steel"
+        [[rods]]
+        name = "arm"
+        curve = {type = "Line", start = [0, 0, 10], end = [5, 0, 10]}
+        section = {type = "Circle", diameter = 0.1}
+        material = "steel"
+        [[supports]]
+        type = "Clamp"
+        station = "column.start"
+        [[joints]]
+        first = "column.end"
+        second = "arm.start"
+        [[loads]]
+        type = "Force"
+        station = "arm.end"
+        force = [0, 0, -2e3]
+        """)
+    scene = cf.read_scene(tmp_path / "scene.toml")[0]
+    path = cf.solve(scene, [1.0], elements=4)
+    names = ["materials.steel.E", "materials[0].E", "rods.arm.material.E", "loads[0].force[2]"]
+    found = path.sensitivity(lambda path: path.rotation("arm.end")[:, 2], names)
+    by_load = found.relative(names[-1])
+    assert [found.relative(name)[0] for name in names] == pytest.approx([-by_load[0]] * 3 + [by_load[0]], rel=1e-9)
+    with pytest.raises(cf.SceneError, match="did you mean 'steel'"):
+        path.sensitivity(tip, ["materials.stel.E"])
+    with pytest.raises(cf.SceneError, match="lengths of rods over that of the longest"):
+        path.sensitivity(tip, ["rods.arm.curve.end[0]"])

@@ -16,7 +16,7 @@ import numpy as np
 from cosserat_fenicsx.checks import instance, number
 from cosserat_fenicsx.errors import SceneError, nearest
 from cosserat_fenicsx.scene.as_data import argument_of
-from cosserat_fenicsx.scene.rod import Rod, Station
+from cosserat_fenicsx.scene.rod import Station
 from cosserat_fenicsx.scene.scene import Scene
 
 _PARTS = ("rods", "materials", "supports", "loads", "joints")
@@ -73,8 +73,8 @@ def parameter_of(scene, given):
     """The `Parameter` given as one or by its name.
 
     Names are made of fields and numbers from 0: "rods.column.section.diameter" or "rods[0].section.diameter",
-    "rods.column.material.E", "materials[0].E" (of the rods' different materials, in order), "loads[1].force[2]",
-    "supports[0].displacement[0]".
+    "rods.column.material.E", "materials[0].E" (of the rods' different materials, in order) or "materials.steel.E" (of a
+    scene file), "loads[1].force[2]", "supports[0].displacement[0]".
 
     Raises:
         SceneError: there is no such number (names the nearest), or it is 0 and nothing tells its size.
@@ -115,11 +115,13 @@ def _find(scene, name):
                 raise SceneError(f"parameter '{name}': {_kind(here)} has no '{token}': {nearest(token, fields)}")
             owner, field, keys, here = here, token, [], getattr(here, token)
             continue
-        if isinstance(token, str) and isinstance(here, tuple) and all(isinstance(x, Rod) for x in here):
-            names = [rod.name for rod in here]
-            if token not in names:
-                raise SceneError(f"parameter '{name}': no rod is named '{token}': {nearest(token, names)}")
-            token = names.index(token)
+        if isinstance(token, str) and owner is scene and not keys and field in ("rods", "materials"):
+            named = scene.materials if field == "materials" else {rod.name: rod for rod in scene.rods}
+            if token not in named:
+                what = "no material of a scene file" if field == "materials" else "no rod"
+                raise SceneError(f"parameter '{name}': {what} is named '{token}': {nearest(token, named)}")
+            keys, here = [*keys, token], named[token]
+            continue
         if not isinstance(here, tuple | list | np.ndarray) or not isinstance(token, int) or token >= len(here):
             holds = f"{len(here)} items, numbered from 0" if isinstance(here, tuple | list | np.ndarray) else "no parts"
             raise SceneError(f"parameter '{name}': what is before '{token}' has {holds}")
