@@ -51,6 +51,9 @@ def test_equal_buckling_loads_that_part_are_refused():
     scene = cf.Scene([rod], [cf.Clamp(rod.start)], [cf.Force(rod.end, (0, 0, -1e5))])
     with pytest.raises(cf.SceneError, match="it separates the critical load factors 0 and 1"):
         cf.buckling(scene, 2).sensitivity(["rods.column.section.bending[0]"])
+    path = cf.solve(scene, (0.0, 1.0), model="spatial", elements=4)
+    with pytest.raises(cf.SceneError, match="it separates the two bifurcations"):
+        path.sensitivity(path.events[0], ["rods.column.section.bending[0]"])
     follower = cf.Scene([rod], [cf.Clamp(rod.start)], [cf.FollowerForce(rod.end, (0, 0, -1e5))])
     with pytest.raises(cf.SceneError, match="have a potential"):
         cf.buckling(follower).sensitivity([LOAD])

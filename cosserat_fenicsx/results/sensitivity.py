@@ -78,7 +78,8 @@ class Sensitivity(Mapping):
     def __str__(self):
         lines = [f"value {_text(self.value)}"]
         for name in self:
-            lines.append(f"d/d({name}) = {_text(self[name])} per {self.units[name]}, at {self.parameters[name]:.6g}")
+            per = f" per {self.units[name]}" if self.units[name] not in ("", "1") else ""
+            lines.append(f"d/d({name}) = {_text(self[name])}{per}, at {self.parameters[name]:.6g}")
         return "\n".join(lines)
 
 
@@ -104,7 +105,8 @@ class Uncertainty:
     def __str__(self):
         lines = [f"{_text(self.value)} +- {_text(self.standard_deviation)} (one standard deviation, first order)"]
         for name, given in self.given.items():
-            lines.append(f"  {_text(100 * self.shares[name], 3)} % from {name} +- {given:.6g} {self.units[name]}")
+            unit = f" {self.units[name]}" if self.units[name] != "1" else ""
+            lines.append(f"  {_text(100 * self.shares[name], 3)} % from {name} +- {given:.6g}{unit}".rstrip())
         return "\n".join(lines)
 
 

@@ -34,6 +34,8 @@ _BESIDE, _ASIDE, _BENT = 2e-5, (1e-5, 1e-4, 1e-3), 0.1
 # Changes of the state by an imperfection have opposite signs at the two points: their difference exceeds this share of
 # their sum; below the second number (lengths, rad) they are rounding. How far a mode may violate constraint equations.
 _OPPOSITE, _NOTHING, _HELD = 0.5, 1e-6, 1e-7
+# Relative derivatives of a double bifurcation, for its modes, differ by less.
+_TOGETHER = 1e-5
 
 
 def derivatives_of(path, query, parameters):
@@ -153,13 +155,21 @@ def _of_bifurcation(direct, crossing, parameters, rates):
     """(derivatives of the load factor, bounds on their errors)."""
     for parameter, each in zip(parameters, rates, strict=True):
         _check_perfect(direct.model, parameter, each)
-    mode = _mode(direct, crossing)
-    energies = Energies(direct, [mode])
-    by_load, found, errors = np.mean([_by_load(direct, energies, point) for point in direct.points]), [], []
+    modes = _modes(direct, crossing)
+    energies = Energies(direct, modes)
+    by_load = np.mean([_by_load(direct, energies, point) for point in direct.points], axis=0)
+    found, errors = [], []
     for parameter, each in zip(parameters, rates, strict=True):
-        slopes, error = _by_parameter(direct, energies, mode, parameter, each)
-        found.append(-slopes.mean() / by_load)
-        errors.append(error.max() / abs(by_load))
+        slopes, error = _by_parameter(direct, energies, modes, parameter, each)
+        of_modes = -slopes.mean(axis=0) / by_load
+        if np.ptp(of_modes) * parameter.size > _TOGETHER * abs(crossing.point.load_factor):
+            raise SceneError(
+                f"parameter '{parameter.name}': it separates the two bifurcations at the load factor "
+                f"{crossing.point.load_factor:.6g}, which have no derivatives by it: expected a parameter that keeps "
+                "the symmetry"
+            )
+        found.append(of_modes[0])
+        errors.append((error / np.abs(by_load)).max())
     return found, errors
 
 
@@ -173,14 +183,18 @@ def _check_perfect(model, parameter, rates):
         )
 
 
-def _mode(direct, crossing):
-    """(N, 6) the mode of all nodes: the mean of those at the two points."""
-    bordered, found = direct.newton.bordered, 0.0
+def _modes(direct, crossing):
+    """(N, 6) the mode of all nodes, the mean of those at the two points; of a double bifurcation also the other mode,
+    and their sum."""
+    bordered = direct.newton.bordered
+    found = [0.0] * (1 if crossing.partner is None else 2)
     for eta, numbers, _ in direct.points:
         direct.factor(eta, numbers)
-        _, motion = bordered.response(crossing.null)
-        found = found + np.sign(bordered.work(motion, crossing.null)) / 2 * direct.model.everywhere(motion)
-    return found
+        starts = [crossing.null] if crossing.partner is None else [crossing.null, bordered.motion_of(crossing.partner)]
+        for k, start in enumerate(starts):
+            _, motion = bordered.response(start)
+            found[k] = found[k] + np.sign(bordered.work(motion, start)) / 2 * direct.model.everywhere(motion)
+    return found if crossing.partner is None else [*found, found[0] + found[1]]
 
 
 def _stiff(direct):
@@ -190,29 +204,29 @@ def _stiff(direct):
 
 
 def _by_load(direct, energies, point):
-    """d mu/d eta along the path."""
+    """(modes,) d mu/d eta along the path."""
     eta, numbers, _ = point
     direct.factor(eta, numbers)
     slope, step, values = direct.slope(), 0.1 * _BESIDE * eta, []
     _stiff(direct)
     for k in PLACES:
         direct.put((eta + k * step, numbers, None), slope, k * step)
-        values.append(energies.here()[0])
+        values.append(energies.here())
     return derivative(values, step)[0]
 
 
-def _by_parameter(direct, energies, mode, parameter, rates):
-    """d mu/dp along the path at the two points, and errors."""
+def _by_parameter(direct, energies, modes, parameter, rates):
+    """(2, modes) d mu/dp along the path at the two points, and errors."""
     step, values, ties = direct.step(parameter, rates), [], direct.problem.ties
-    tied = mode[direct.model.tied_slots]
+    tied, size = np.array(modes)[:, direct.model.tied_slots], np.abs(modes).max()
     for k in PLACES:
         direct.load_near(parameter, k * step)
         _stiff(direct)
         values.append([])
         for point, rate in zip(direct.points, rates, strict=True):
             direct.put(point, rate, k * step)
-            values[-1].append(energies.here()[0])
-            if ties and np.abs(np.einsum("tni,ni->t", ties.gradients(), tied)).max() > _HELD * np.abs(mode).max():
+            values[-1].append(energies.here())
+            if ties and np.abs(np.einsum("tni,mni->tm", ties.gradients(), tied)).max() > _HELD * size:
                 raise SceneError(
                     f"parameter '{parameter.name}' turns supports or joints in which the mode moves: the derivative of "
                     "this bifurcation by it is not known"

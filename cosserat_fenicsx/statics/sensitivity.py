@@ -51,9 +51,7 @@ def sensitivity(path, query, parameters):
             step, paths = direct.paths(path, parameter, rate)
             values = [_numbers(query(each)) for each in paths]
             derivatives[parameter.name], errors[parameter.name] = derivative(values, step)
-    return Sensitivity(
-        value, derivatives, errors, {x.name: x.value for x in found}, {x.name: x.unit or "unit" for x in found}
-    )
+    return Sensitivity(value, derivatives, errors, {x.name: x.value for x in found}, {x.name: x.unit for x in found})
 
 
 def _numbers(value):
