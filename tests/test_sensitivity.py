@@ -238,3 +238,26 @@ def test_materials_of_a_scene_file_have_names(tmp_path):
         path.sensitivity(tip, ["materials.stel.E"])
     with pytest.raises(cf.SceneError, match="lengths of rods over that of the longest"):
         path.sensitivity(tip, ["rods.arm.curve.end[0]"])
+
+
+@pytest.mark.slow
+def test_a_cable_that_is_pulled_through_a_conduit():
+    """The force at its end by the friction and the stiffness of the wall, whose axis turns with the position."""
+    axis = cf.WellPath.from_survey([0, np.pi / 2], [90, 90], [0, 90])
+
+    def scene(stiffness=1e6, friction=0.3):
+        material = cf.Material(E=2e9, nu=0.4)
+        cable = cf.Rod(cf.Arc((0, 1, 0), (0, 0, 0), np.pi / 2), cf.Circle(0.012), material, name="cable")
+        wall = cf.TubeWall(cable, axis, radius=0.016, contact_radius=0.006, stiffness=stiffness, friction=friction,
+                           slip=(-1.0, 0.0), has_arm=False)  # fmt: skip
+        pulled = cf.Prescribed(cable.end, displacement=(0.0, 0.03, 0.0))
+        return cf.Scene([cable], [cf.Clamp(cable.start), pulled], [wall])
+
+    def pull(path):
+        return path.reaction("cable.end")[0][:, 1]
+
+    names = {"loads[0].stiffness": ("stiffness", 1e6), "loads[0].friction": ("friction", 0.3)}
+    found = cf.solve(scene(), [1.0], elements=12).sensitivity(pull, names)
+    for name, (field, value) in names.items():
+        by = differenced(lambda x: cf.solve(scene(**{field: x}), [1.0], elements=12), pull, value, step=5e-4)
+        agrees(found, name, by, tol=1e-7)

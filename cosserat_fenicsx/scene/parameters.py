@@ -85,6 +85,8 @@ def parameter_of(scene, given):
         raise SceneError(f"parameter = {given!r}: expected a name such as 'rods.column.material.E', or a Parameter")
     owner, field, keys = _find(scene, given)
     leaf, size = getattr(owner, field), None
+    if not keys and isinstance(leaf, tuple) and len(leaf) == 1 and np.shape(leaf[0]) == (2,):
+        keys = [0, 1]  # one number for all of a length, kept as a piece (end, number)
     for key in keys:
         leaf, size = leaf[key], leaf
     if isinstance(leaf, bool) or not isinstance(leaf, numbers.Real):

@@ -33,7 +33,7 @@ def critical_sensitivity(buckling, parameters):
         raise SceneError(f"sensitivity: {why}: expected a Buckling with load factors, of loads that have a potential")
     parameters = [parameters] if isinstance(parameters, str) else list(parameters)
     scene, layout, at = buckling.scene, buckling.equilibrium.layout, buckling.load_factor
-    check_scene(scene)
+    check_scene(scene, critical=True)
     found = [parameter_of(scene, given) for given in parameters]
     scenes = [scenes_near(scene, parameter) for parameter in found]
     with (

@@ -50,7 +50,7 @@ def _of_event(path, event, parameters):
         raise SceneError("sensitivity: the event is none of this path's: expected one of path.events")
     if event.kind == "bifurcation" and not path.conservative:
         raise SceneError("sensitivity: the loads have no potential, so that an energy does not tell of bifurcations")
-    check_scene(path.scene)
+    check_scene(path.scene, critical=True)
     parameters = [parameters] if isinstance(parameters, str) else list(parameters)
     found = [parameter_of(path.scene, given) for given in parameters]
     scenes = [scenes_near(path.scene, parameter) for parameter in found]

@@ -33,6 +33,8 @@ from cosserat_fenicsx.statics.solvers import solvers_of
 _ITERATIONS, _MOVED = 25, 1e-3
 # Largest motion (lengths, rad) over which queries are differenced.
 _REACH = 5e-3
+# Of data that depend on the position: motion over which they are differenced (lengths, rad), iterations, accuracy.
+_AHEAD, _FOLLOWED, _SETTLED = 1e-5, 50, 1e-7
 
 
 def sensitivity(path, query, parameters):
@@ -62,12 +64,12 @@ def _numbers(value):
         raise SceneError(f"query returns a {kind}: expected a number or an array, such as one of its parts") from None
 
 
-def check_scene(scene):
-    """Refuse loads whose derivatives are not known."""
+def check_scene(scene, critical=False):
+    """Refuse loads whose derivatives are not known; critical: those of critical loads."""
     if path_dependent(scene):
         raise SceneError("sensitivity: a load of the scene has memory: expected loads that depend on the state alone")
     for load in scene.actions:
-        if load.refreshed is not None:
+        if critical and load.refreshed is not None:
             raise SceneError(
                 f"sensitivity: the tangent leaves out how a {type(load).__name__} turns with the position: expected "
                 "other loads, such as a Wall or a Foundation"
@@ -127,6 +129,7 @@ class Direct:
         self.model, self._scene, self._layout = problem.model, scene, layout
         known = getattr(self.model, "data_derivative", None)
         self._by_data = self.model.data_derivative = known or DataDerivative(self.model)
+        self._refreshes = bool(self.model.actions.refreshed)
         self.points = []
 
     def __enter__(self):
@@ -200,31 +203,35 @@ class Direct:
 
     def rates(self, scenes, parameters):
         """For each parameter the derivatives of the numbers of every point (see `Problem.numbers`)."""
-        changes = self.data_changes(scenes, parameters)
+        steps = [STEP * parameter.size for parameter in parameters]
+        changes = [self._data_changes(each, step) for each, step in zip(scenes, steps, strict=True)]
+        self._load(self._scene)
         found = [[] for _ in scenes]
         for i, (eta, numbers, _) in enumerate(self.points):
             self.factor(eta, numbers)
-            for rates, (data, of_ties) in zip(found, changes, strict=True):
-                rates.append(self._rate(data, of_ties[i]))
-        return found
-
-    def data_changes(self, scenes, parameters):
-        """For each parameter the derivatives of the data, and for every point of the supports' and joints' part of the
-        residual; the scene is loaded again."""
-        steps = [STEP * parameter.size for parameter in parameters]
-        found = [self._data_changes(each, step) for each, step in zip(scenes, steps, strict=True)]
-        self._load(self._scene)
+            for rates, of_points in zip(found, changes, strict=True):
+                rates.append(self._rate(*of_points[i]))
         return found
 
     def _data_changes(self, scenes, step):
-        """Derivatives of the data, and for every point of the constraint equations' part of the residual."""
-        data, of_ties = [], []
+        """For every point the derivatives of the data, and of the constraint equations' part of the residual."""
+        near, found, whole = [], [], None
         for scene in scenes:
             self._load(scene)
-            data.append(self._by_data.data())
-            of_ties.append([self._of_ties(eta, numbers[0]) for eta, numbers, _ in self.points])
-        whole = [derivative(arrays, step)[0] for arrays in zip(*data, strict=True)]
-        return whole, [derivative(arrays, step)[0] for arrays in zip(*of_ties, strict=True)]
+            data = self._by_data.data()
+            near.append([(self._refreshed(point, data), self._of_ties(point[0], point[1][0])) for point in self.points])
+        for at_point in zip(*near, strict=True):
+            if whole is None or self._refreshes:
+                whole = [derivative(arrays, step)[0] for arrays in zip(*(data for data, _ in at_point), strict=True)]
+            found.append((whole, derivative([ties for _, ties in at_point], step)[0]))
+        return found
+
+    def _refreshed(self, point, data):
+        """The data at a point, where they depend on the position."""
+        if not self._refreshes:
+            return data
+        self.put(point, point[1], 0.0)
+        return self._by_data.data()
 
     def _of_ties(self, eta, x):
         problem, found = self.problem, np.zeros(self.problem.numbering.size)
@@ -251,7 +258,27 @@ class Direct:
         return found, clamped
 
     def _rate(self, data, of_ties):
-        return self._response(*self.residual_change(data, of_ties))
+        """The change of the numbers with data and constraint equations; data that depend on the position follow it, by
+        iteration, where the tangent does not contain it; where it does, the first step changes nothing but rounding."""
+        rate = self._response(*self.residual_change(data, of_ties))
+        for _ in range(_FOLLOWED if self._refreshes else 0):
+            moved = [a + b for a, b in zip(data, self._data_along(rate), strict=True)]
+            before, rate = rate, self._response(*self.residual_change(moved, of_ties))
+            if self.model.largest(rate[0] - before[0]) <= _SETTLED * self.model.largest(rate[0]):
+                return before
+        if self._refreshes:
+            raise NotConverged("sensitivity: how the loads turn with the position did not converge")
+        return rate
+
+    def _data_along(self, rate):
+        """Derivatives of the data along a change of the state."""
+        here, sides = (self.problem.load_factor, self.problem.numbers(), None), []
+        step = _AHEAD / max(self.model.largest(rate[0]), 1e-300)
+        for k in PLACES:
+            self.put(here, rate, k * step)
+            sides.append(self._by_data.data())
+        self.put(here, rate, 0.0)
+        return [derivative(arrays, step)[0] for arrays in zip(*sides, strict=True)]
 
     def slope(self):
         """Derivatives of the numbers by the load factor, at the state where the tangent was factorised."""
@@ -298,6 +325,8 @@ class Direct:
         eta, numbers, _ = point
         self.problem.set_load_factor(eta)
         self.problem.put([a + change * b for a, b in zip(numbers, rate, strict=True)])
+        if self._refreshes:
+            self.model.actions.refresh()
 
     def _moved(self, path, parameter, rates, change):
         self.load_near(parameter, change)
