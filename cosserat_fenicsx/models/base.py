@@ -71,6 +71,8 @@ class RodModel(Snapshots):
     time = 1.0
     #: bending stiffness that the units are made of, N m^2; None for that of each scene
     EI = None
+    #: a `DataDerivative` and an `EnergyOfMotion`, see `made_once`
+    data_derivative = energy_of_motion = None
 
     def __init__(self, comm, signature):
         self.comm, self.signature, self.axes = comm, signature, np.eye(3)

@@ -82,3 +82,10 @@ class EnergyOfMotion:
         """
         self._motion.x.array.reshape(-1, 6)[:] = motion[self._model._slots]
         return self._model.comm.allreduce(fem.assemble_scalar(self._form))
+
+
+def made_once(model, name, kind):
+    """The model's attribute of this name, an object of a class that compiles forms; made when it is first needed."""
+    if getattr(model, name) is None:
+        setattr(model, name, kind(model))
+    return getattr(model, name)

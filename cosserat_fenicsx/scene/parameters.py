@@ -25,8 +25,9 @@ _UNITS = {
     **dict.fromkeys(("diameter", "outer_diameter", "inner_diameter", "width", "height", "radius", "offset"), "m"),
     **dict.fromkeys(("start", "end", "displacement", "clearance", "length"), "m"),
     "E": "Pa", "nu": "1", "density": "kg/m^3", "force": "N", "moment": "N m", "rotation": "rad", "gravity": "m/s^2",
-    "Spring.stiffness": "N/m", "rotational": "N m/rad", "stiffness": "N/m^2", "LineForce.force": "N/m",
-    "LineMoment.moment": "N m/m", "shear": "N", "axial": "N", "bending": "N m^2", "torsion": "N m^2",
+    "friction": "1", "rotational": "N m/rad", "stiffness": "N/m^2", "Spring.stiffness": "N/m",
+    "TubeRing.stiffness": "N/m", "LineForce.force": "N/m", "LineMoment.moment": "N m/m", "shear": "N", "axial": "N",
+    "bending": "N m^2", "torsion": "N m^2",
 }  # fmt: skip
 
 

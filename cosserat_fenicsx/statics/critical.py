@@ -12,7 +12,7 @@ import numpy as np
 
 from cosserat_fenicsx.differences import PLACES, derivative
 from cosserat_fenicsx.errors import NotConverged, SceneError
-from cosserat_fenicsx.models.data_derivative import EnergyOfMotion
+from cosserat_fenicsx.models.data_derivative import EnergyOfMotion, made_once
 from cosserat_fenicsx.results.sensitivity import Sensitivity
 from cosserat_fenicsx.scene.parameters import parameter_of
 from cosserat_fenicsx.statics.path.follower import Follower
@@ -115,7 +115,7 @@ class Energies:
 
     def __init__(self, direct, modes, resistance=None):
         self._direct, self._modes, self._resistance = direct, modes, resistance
-        self._energy = EnergyOfMotion(direct.model)
+        self._energy = made_once(direct.model, "energy_of_motion", EnergyOfMotion)
         self._axes = direct.stability.whole.variation.axes
 
     def here(self, springs=True):

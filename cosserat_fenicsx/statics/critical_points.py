@@ -231,5 +231,4 @@ def _by_parameter(direct, energies, modes, parameter, rates):
                     f"parameter '{parameter.name}' turns supports or joints in which the mode moves: the derivative of "
                     "this bifurcation by it is not known"
                 )
-    direct.reload()
     return derivative(values, step)

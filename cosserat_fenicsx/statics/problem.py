@@ -87,6 +87,10 @@ class Problem(Equations):
         self.set_state(self.x)
         return anew
 
+    def forget(self):
+        """Load the next scene anew, even if it is the one that is loaded."""
+        self._loaded = None
+
     def _holds(self, scene, layout):
         """Whether this scene is loaded on this mesh and its data cannot have changed.
 

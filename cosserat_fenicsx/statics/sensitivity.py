@@ -19,7 +19,7 @@ import numpy as np
 
 from cosserat_fenicsx.differences import PLACES, STEP, derivative
 from cosserat_fenicsx.errors import NotConverged, SceneError
-from cosserat_fenicsx.models.data_derivative import DataDerivative
+from cosserat_fenicsx.models.data_derivative import DataDerivative, made_once
 from cosserat_fenicsx.models.signature import Signature
 from cosserat_fenicsx.results.accuracy import on_mesh
 from cosserat_fenicsx.results.perturbed import PerturbedPath
@@ -127,8 +127,7 @@ class Direct:
     def __init__(self, problem, newton, stability, scene, layout):
         self.problem, self.newton, self.stability = self.solvers = problem, newton, stability
         self.model, self._scene, self._layout = problem.model, scene, layout
-        known = getattr(self.model, "data_derivative", None)
-        self._by_data = self.model.data_derivative = known or DataDerivative(self.model)
+        self._by_data = made_once(self.model, "data_derivative", DataDerivative)
         self._refreshes = bool(self.model.actions.refreshed)
         self.points = []
 
@@ -137,10 +136,8 @@ class Direct:
         return self
 
     def __exit__(self, *failure):
-        """Leave the problem as it was found."""
         self.model.EI = None
-        self._load(self._scene)
-        self.stability.load()
+        self.problem.forget()
 
     def find(self, path):
         """Take the points of a path, solved again to rounding."""
@@ -168,7 +165,7 @@ class Direct:
                     "symmetries, planes and what is held as they are, or a path with model='spatial'"
                 )
             sizes = [self._layout.sizes(x) / max(rod.length for rod in x.rods) for x in (scene, self._scene)]
-            if not np.allclose(*sizes, rtol=1e-12):
+            if not np.allclose(*sizes, rtol=1e-10, atol=0):
                 raise SceneError(
                     f"parameter '{parameter.name}' changes the lengths of rods over that of the longest one: expected "
                     "one that scales all of them, or none"
@@ -311,10 +308,6 @@ class Direct:
         """A change of a parameter by which the state moves little."""
         fastest = max(self.model.largest(rate[0]) for rate in rates)
         return min(STEP * parameter.size, _REACH / max(fastest, 1e-300))
-
-    def reload(self):
-        """Load the scene itself again."""
-        self._load(self._scene)
 
     def load_near(self, parameter, change):
         """Load the scene with a parameter changed."""
