@@ -257,7 +257,8 @@ def test_a_cable_that_is_pulled_through_a_conduit():
         return path.reaction("cable.end")[0][:, 1]
 
     names = {"loads[0].stiffness": ("stiffness", 1e6), "loads[0].friction": ("friction", 0.3)}
-    found = cf.solve(scene(), [1.0], elements=12).sensitivity(pull, names)
+    path = cf.solve(scene(), [1.0], elements=12)
+    found = path.sensitivity(pull, names)
     for name, (field, value) in names.items():
         by = differenced(lambda x: cf.solve(scene(**{field: x}), [1.0], elements=12), pull, value, step=5e-4)
         agrees(found, name, by, tol=1e-7)

@@ -71,8 +71,8 @@ def check_scene(scene, critical=False):
     for load in scene.actions:
         if critical and load.refreshed is not None:
             raise SceneError(
-                f"sensitivity: the tangent leaves out how a {type(load).__name__} turns with the position: expected "
-                "other loads, such as a Wall or a Foundation"
+                f"sensitivity: derivatives of critical loads are not known with a {type(load).__name__}, whose data "
+                "turn with the position: expected other loads, such as a Wall or a Foundation"
             )
 
 
