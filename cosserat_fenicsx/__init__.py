@@ -53,6 +53,7 @@ _HOME = {
     "NotConverged": "errors",
     "NotStored": "errors",
     "Path": "results.path",
+    "Parameter": "scene.parameters",
     "Pin": "scene.supports",
     "PointAction": "scene.action",
     "PointMass": "actions.point_mass",
@@ -64,6 +65,7 @@ _HOME = {
     "Scene": "scene.scene",
     "SceneError": "errors",
     "SceneWarning": "errors",
+    "Sensitivity": "results.sensitivity",
     "Spline": "scene.curves",
     "Spring": "actions.spring",
     "StepControl": "statics.path.load_control",
@@ -71,6 +73,7 @@ _HOME = {
     "Tube": "scene.sections",
     "TubeRing": "actions.tube_wall",
     "TubeWall": "actions.tube_wall",
+    "Uncertainty": "results.sensitivity",
     "UniformCurvature": "scene.curves",
     "units": None,
     "Wall": "actions.wall",
@@ -232,6 +235,8 @@ if TYPE_CHECKING:  # the same names, for editors and type checkers
     from cosserat_fenicsx.results.modes import Modes as Modes
     from cosserat_fenicsx.results.path import Path as Path
     from cosserat_fenicsx.results.records import Event as Event
+    from cosserat_fenicsx.results.sensitivity import Sensitivity as Sensitivity
+    from cosserat_fenicsx.results.sensitivity import Uncertainty as Uncertainty
     from cosserat_fenicsx.scene.action import Action as Action
     from cosserat_fenicsx.scene.action import LineAction as LineAction
     from cosserat_fenicsx.scene.action import PointAction as PointAction
@@ -255,6 +260,7 @@ if TYPE_CHECKING:  # the same names, for editors and type checkers
     from cosserat_fenicsx.scene.loads import Moment as Moment
     from cosserat_fenicsx.scene.loads import Weight as Weight
     from cosserat_fenicsx.scene.materials import Material as Material
+    from cosserat_fenicsx.scene.parameters import Parameter as Parameter
     from cosserat_fenicsx.scene.rod import Rod as Rod
     from cosserat_fenicsx.scene.rod import euler_load as euler_load
     from cosserat_fenicsx.scene.rolled import Profile as Profile

@@ -69,6 +69,10 @@ class RodModel(Snapshots):
     load_norm = 0.0
     #: unit of time for velocities, s; not used in statics
     time = 1.0
+    #: bending stiffness that the units are made of, N m^2; None for that of each scene
+    EI = None
+    #: a `DataDerivative` and an `EnergyOfMotion`, see `made_once`
+    data_derivative = energy_of_motion = None
 
     def __init__(self, comm, signature):
         self.comm, self.signature, self.axes = comm, signature, np.eye(3)
@@ -241,7 +245,7 @@ class RodModel(Snapshots):
 
     def load(self, scene, layout):
         """Fill in the data of a scene of this signature; the state becomes its reference configuration."""
-        self.scene, self.layout, self.scales = scene, layout, Scales.of(scene)
+        self.scene, self.layout, self.scales = scene, layout, Scales.of(scene, self.EI)
         scales, rods = self.scales, self.rods
         rods.place([b * rod.length / scales.length for rod, b in zip(scene.rods, layout.breaks, strict=True)])
         self.axes = np.array(scene.plane.axes) if self.signature.flat else np.eye(3)

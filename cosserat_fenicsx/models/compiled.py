@@ -26,6 +26,10 @@ ActionWork = namedtuple("ActionWork", "dead permanent live")
 #: function (point, test).
 Live = namedtuple("Live", "form factor measure point work")
 
+#: What derivatives by data need, UFL: the forms that are balanced in equilibrium, factors included; n by the law, where
+#: n is carried, or None; the Functions of the unknowns; and the second variations.
+Symbols = namedtuple("Symbols", "balance contact unknowns seconds")
+
 
 @dataclass(frozen=True)
 class CompiledForms:
@@ -43,6 +47,7 @@ class CompiledForms:
         density, node_density: force and moment per length of the distributed actions, at the Gauss points and at the
             nodes, (6,), components along the model's axes; or None.
         gauss, weights: points in [0, 1] of one element, and their weights.
+        symbols: the `Symbols`, or None.
     """
 
     residual: object
@@ -59,10 +64,12 @@ class CompiledForms:
     node_density: object
     gauss: np.ndarray
     weights: np.ndarray
+    symbols: object
 
 
 def compile_all(
     model, residual, tangent, acting, seconds, *, fields=None, advance=None, forces=None, densities=(None, None),
+    unknowns=None, contact=None,
 ):  # fmt: skip
     """The `CompiledForms` of UFL forms and expressions.
 
@@ -70,6 +77,7 @@ def compile_all(
         acting: the `ActionWork`; forces: that of forces on displacements alone, or None.
         seconds: second variations, whose symmetric parts count.
         densities: see `action_densities`.
+        unknowns, contact: see `Symbols`, of models in statics.
     """
     seconds = [0.5 * (second + ufl.adjoint(second)) for second in seconds]
     forces = forces or ActionWork(None, None, [])
@@ -93,7 +101,14 @@ def compile_all(
         _unless_none(lambda a: fem.Expression(a, model.nodes[:, None]), at_nodes),
         points[:, 0],
         weights,
+        unknowns and Symbols(_balance(model, residual, acting), contact, unknowns, seconds),
     )
+
+
+def _balance(model, residual, acting):
+    for factor, form in ((model.load_factor, acting.dead), (model.permanent_factor, acting.permanent)):
+        residual = residual if form is None else residual - factor * form
+    return residual
 
 
 def compile_single(model, second):

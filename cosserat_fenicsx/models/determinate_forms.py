@@ -65,7 +65,7 @@ def compile_in_plane(model, displacements, rotations, N, N_permanent):
     rigid, direction = about_plane(psi), about_plane(w)
     sideways = ds(eq.second_variation(n, motion, section, rigid, direction))
     sideways -= varied_actions(acting, rigid, direction)
-    return _compiled(model, residual, tangent, acting, [tangent, sideways], dx, displacements, point_at)
+    return _compiled(model, residual, tangent, acting, [tangent, sideways], dx, displacements, point_at, (U, U_node))
 
 
 def compile_in_space(model, displacements, rotations, N, N_permanent):
@@ -107,7 +107,7 @@ def compile_in_space(model, displacements, rotations, N, N_permanent):
     rigid, direction = eq.tests_of(psi, along(psi)), eq.tests_of(w, along(w))
     second = ds(eq.second_variation(n, motion, section, rigid, direction))
     second -= varied_actions(acting, rigid, direction)
-    return _compiled(model, residual, tangent, acting, [second], dx, displacements, point_at)
+    return _compiled(model, residual, tangent, acting, [second], dx, displacements, point_at, (U, U_node))
 
 
 def _known_force(model, N, N_permanent):
@@ -115,9 +115,9 @@ def _known_force(model, N, N_permanent):
     return n if N_permanent is None else n + model.permanent_factor * N_permanent
 
 
-def _compiled(model, residual, tangent, acting, seconds, dx, displacements, point_at):
+def _compiled(model, residual, tangent, acting, seconds, dx, displacements, point_at, unknowns):
     """The `CompiledForms`, with the virtual work of the dead forces on displacements."""
     moved = VirtualMotion(ufl.TestFunction(displacements), NONE)
     forces = action_work(model, dx, moved, point_at, ())
     densities = action_densities(model, point_at)
-    return compile_all(model, residual, tangent, acting, seconds, forces=forces, densities=densities)
+    return compile_all(model, residual, tangent, acting, seconds, forces=forces, densities=densities, unknowns=unknowns)

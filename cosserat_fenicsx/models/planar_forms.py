@@ -65,4 +65,8 @@ def compile_forms(model, variations):
     m = equilibrium.contact_moment(weak.n, motion, section)
     fields = ufl.as_vector([weak.n[0], weak.n[1], m[2], motion.r_s[0], motion.r_s[1]])
     densities = action_densities(model, point_at)
-    return compile_all(model, residual, tangent, acting, seconds, fields=fields, advance=advance, densities=densities)
+    contact = ufl.as_vector(list(equilibrium.contact(motion, section)[0])[:2]) if model.carried else None
+    return compile_all(
+        model, residual, tangent, acting, seconds, fields=fields, advance=advance, densities=densities,
+        unknowns=(U, U_node), contact=contact,
+    )  # fmt: skip

@@ -14,10 +14,10 @@ class Scales:
     moment: float
 
     @classmethod
-    def of(cls, scene):
-        """Scales of the longest rod of a scene."""
+    def of(cls, scene, EI=None):
+        """Scales of the longest rod of a scene; EI (N m^2) instead of that rod's largest."""
         rod = max(scene.rods, key=lambda rod: rod.length)
-        EI, L = float(rod.profile.range[1].J[:2].max()), rod.length
+        EI, L = EI or float(rod.profile.range[1].J[:2].max()), rod.length
         return cls(L, EI / L**2, EI / L)
 
     def of_unit(self, unit, time=1.0):

@@ -79,6 +79,15 @@ class SpatialModel(RodModel):
         self.numbering.to_local(vector, local)
         return self._gather_nodes(local[self._nodal[: self._owned_nodes, :3]])
 
+    def everywhere(self, motion):
+        """(N, 6) a motion of all nodes in the scene's order, on all ranks, from that of this rank's free nodes, (nodes,
+        6), in the order of its part of the solver's vector."""
+        numbering, local = self.second_variations[0].numbering, np.zeros((len(self._nodal), 6))
+        vector = numbering.vector()
+        vector.array_w[:] = motion.ravel()
+        numbering.to_local(vector, local.reshape(-1))
+        return self._gather_nodes(local[: self._owned_nodes])
+
     def change_of(self, motion):
         """This rank's part of the change of the solver's vector, at the state, that corresponds to a vector (r, theta)
         in the second variation's numbering."""

@@ -72,6 +72,8 @@ def compile_forms(model, rotations):
     second -= varied_actions(acting, rigid, direction)
     fields = ufl.as_vector([*weak.n, *equilibrium.contact_moment(weak.n, state, section), *state.r_s])
     densities = action_densities(model, point_at)
+    contact = equilibrium.contact(state, section)[0] if model.carried else None
     return compile_all(
-        model, residual, tangent, acting, [second], fields=fields, advance=weak.advance, densities=densities
-    )
+        model, residual, tangent, acting, [second], fields=fields, advance=weak.advance, densities=densities,
+        unknowns=(U, U_node), contact=contact,
+    )  # fmt: skip

@@ -1,10 +1,13 @@
 """The result of linear buckling."""
 
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
+from cosserat_fenicsx.results.sensitivity import Sensitivity, Uncertainty
 from cosserat_fenicsx.results.shapes import Shapes, in_words, largest_error
+from cosserat_fenicsx.scene.parameters import Parameter
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -31,6 +34,7 @@ class Buckling(Shapes):
 
     load_factors: np.ndarray
     bound: float
+    _differentiated: Callable | None = None
 
     title = "Linear buckling"
 
@@ -38,6 +42,32 @@ class Buckling(Shapes):
     def modes(self):
         """(n, N, 3) see the class."""
         return self.shapes[:, :, :3]
+
+    def sensitivity(self, parameters: Iterable[str | Parameter]) -> Sensitivity:
+        """Derivatives of `load_factors` by numbers of the scene, by Rayleigh's quotient at fixed modes.
+
+        Equal load factors must change together, as those of a round column do by its diameter; their modes are checked
+        where they are among `shapes`.
+
+        Args:
+            parameters: see `Path.sensitivity`.
+
+        Returns:
+            Sensitivity: {name: (n,)}, SI units.
+
+        Raises:
+            SceneError: as of `Path.sensitivity`; no load factor, or loads without a potential; equal load factors that
+                a parameter separates.
+        """
+        return self._differentiated(self, parameters)
+
+    def uncertainty(
+        self, standard_deviations: Mapping[str | Parameter, float], correlation: np.ndarray | None = None
+    ) -> Uncertainty:
+        """The first-order standard deviation of `load_factors`, with the share of each parameter; see
+        `Path.uncertainty`."""
+        named = {getattr(x, "name", x): deviation for x, deviation in standard_deviations.items()}
+        return self.sensitivity(standard_deviations).uncertainty(named, correlation)
 
     @property
     def caution(self):

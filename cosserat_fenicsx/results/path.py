@@ -2,7 +2,7 @@
 
 import dataclasses
 import itertools
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cached_property
 from typing import Self
 
@@ -12,6 +12,8 @@ from cosserat_fenicsx.results.accuracy import leading_of, sizes_of
 from cosserat_fenicsx.results.records import Event, Record, Records
 from cosserat_fenicsx.results.recovery import element_contact
 from cosserat_fenicsx.results.result import Result
+from cosserat_fenicsx.results.sensitivity import Sensitivity, Uncertainty
+from cosserat_fenicsx.scene.parameters import Parameter
 from cosserat_fenicsx.scene.rod import RodOrName
 
 
@@ -39,8 +41,8 @@ class Path(Result):
     #: whether the formulation's virtual rotations are those of changes of q instead of independent small rotations
     galerkin = False
     _computed = (*Result._computed, "_records", "_contact", "conservative", "_reference", "_roughness")
-    # function of a path that computes its `conservative`
-    _potential = None
+    # functions of a path that compute its `conservative` and its `sensitivity`
+    _potential = _differentiated = None
 
     def __init__(self, *args, **more):
         super().__init__(*args, **more)
@@ -50,12 +52,13 @@ class Path(Result):
         self._expanded: Records | None = None
 
     @classmethod
-    def of(cls, model, why=(), potential=None):
-        """See `Result`; `potential`: a function of the path that computes its `conservative`."""
+    def of(cls, model, why=(), potential=None, differentiated=None):
+        """See `Result`; `potential`: a function of the path that computes its `conservative`; `differentiated`: one of
+        the path, a query and parameters that computes its `sensitivity`."""
         formulation = model.signature.formulation
         path = super().of(model, formulation.name, why)
         path.rounding, path.galerkin = formulation.force.rounding * model.round_off, formulation.unit_length.galerkin
-        path._potential = potential
+        path._potential, path._differentiated = potential, differentiated
         return path
 
     def extend(self, records):
@@ -154,6 +157,51 @@ class Path(Result):
         A dead moment has none where its section can turn about two axes. It is computed on first use, which may take a
         second."""
         return self._potential(self)
+
+    def sensitivity(
+        self, query: Callable[[Self], object] | Event, parameters: Iterable[str | Parameter]
+    ) -> Sensitivity:
+        """Derivatives of a query by numbers of the scene, at every point of the path, by the direct method.
+
+        They are those of the discrete equations on the path's mesh: one back-substitution with Newton's tangent for
+        each point and parameter, see statics/sensitivity.py. Every rank calls.
+
+        Args:
+            query: a function of a path that returns a number or an array, smooth in the state, such as
+                ``lambda path: path.displacement("column.end")[:, 0]``, of `position`, `rotation`, `force`, `moment`,
+                `reaction`, `largest` and so on. Or one of `events`, for its critical load factor: of a limit point by
+                the null vector of the tangent; of a bifurcation, which the parameter must not destroy, by the
+                eigenvalue that vanishes.
+            parameters: names of numbers, "rods.column.material.E", "rods.column.section.diameter", "loads[0].force[2]"
+                (see `Parameter` for others).
+
+        Returns:
+            Sensitivity: {name: array of the shape of the query}, SI units.
+
+        Raises:
+            SceneError: an unknown parameter (names the nearest), one that changes the model or destroys a bifurcation,
+                a query of another kind, an empty path, loads with memory.
+            NotConverged: the tangent is singular at a point of the path.
+        """
+        return self._differentiated(self, query, parameters)
+
+    def uncertainty(
+        self,
+        standard_deviations: Mapping[str | Parameter, float],
+        query: Callable[[Self], object] | Event,
+        correlation: np.ndarray | None = None,
+    ) -> Uncertainty:
+        """The first-order standard deviation of a query, with the share of each parameter; it can be printed.
+
+        Args:
+            standard_deviations: {name of a number of the scene, or `Parameter`: its standard deviation, in its unit}.
+            query: see `sensitivity`. correlation: see `Sensitivity.uncertainty`.
+
+        Raises:
+            SceneError, NotConverged: as of `sensitivity` and `Sensitivity.uncertainty`.
+        """
+        named = {getattr(x, "name", x): deviation for x, deviation in standard_deviations.items()}
+        return self.sensitivity(query, standard_deviations).uncertainty(named, correlation)
 
     @property
     def along_axis(self) -> np.ndarray:

@@ -30,6 +30,11 @@ _PARTS = ("supports", "loads", "joints", "velocities")
 _ARGUMENTS = {"quaternion": "frame"}
 
 
+def argument_of(field):
+    """The name of the constructor's argument that a field of one of the package's classes is given by."""
+    return _ARGUMENTS.get(field, field)
+
+
 class NotData(Exception):
     """A part of a scene has no form as data; its text names the part and says why."""
 
@@ -98,7 +103,7 @@ def _value(value, rods, top=False):
         what = "a function written in Python" if callable(value) else f"a part of the class {kind.__name__}"
         raise NotData(f"{what} cannot be stored as data")
     fields = [field.name for field in dataclasses.fields(kind) if field.init]
-    return {"type": kind.__name__, **{_ARGUMENTS.get(x, x): _value(getattr(value, x), rods) for x in fields}}
+    return {"type": kind.__name__, **{argument_of(x): _value(getattr(value, x), rods) for x in fields}}
 
 
 def _object(data, rods):

@@ -54,6 +54,8 @@ class Scene:
 
     #: time (s) up to which functions of time are sampled, see `over`
     horizon = 1.0
+    #: {name: Material} of the scene file it was read from
+    materials = {}
 
     def __post_init__(self):
         for field in ("rods", "supports", "loads", "joints", "velocities"):

@@ -44,6 +44,7 @@ from pathlib import Path
 from typing import Any
 
 from cosserat_fenicsx.annotations import File
+from cosserat_fenicsx.checks import store
 from cosserat_fenicsx.errors import SceneError, nearest
 from cosserat_fenicsx.scene.along import ALONG
 from cosserat_fenicsx.scene.curves import CURVES
@@ -158,7 +159,9 @@ def _scene(tables, folder):
         raise SceneError("[simulate]: 'duration' is missing: expected how long the motion lasts (s)")
     if isinstance(settings[0].get("load_factors"), str):
         settings[0]["load_factors"] = load_factors_in(settings[0]["load_factors"])
-    return Scene(rods, supports, loads, joints, title, velocities), *settings
+    scene = Scene(rods, supports, loads, joints, title, velocities)
+    store(scene, materials=materials)
+    return scene, *settings
 
 
 def load_factors_in(text):

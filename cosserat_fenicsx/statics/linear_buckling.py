@@ -18,6 +18,7 @@ from cosserat_fenicsx.scene.magnitudes import check_magnitudes
 from cosserat_fenicsx.scene.scene import Scene
 from cosserat_fenicsx.statics.agreement import until_two_meshes_agree
 from cosserat_fenicsx.statics.circulatory import circulatory_part
+from cosserat_fenicsx.statics.critical import critical_sensitivity
 from cosserat_fenicsx.statics.divergence import static_bifurcations
 from cosserat_fenicsx.statics.first_mesh import FIRST_ELEMENTS
 from cosserat_fenicsx.statics.grading import layers_of
@@ -114,7 +115,7 @@ def buckling(
         )
     bound = float(load_factors[0]) if len(load_factors) else most
     found = slice(0 if conservative else 1, None)  # without a potential the first one is the bound alone
-    return Buckling(state, shapes, error[found], conservative, comm, load_factors[found], bound)
+    return Buckling(state, shapes, error[found], conservative, comm, load_factors[found], bound, critical_sensitivity)
 
 
 def _critical(scene, layout, count, load_factor, degree, comm):

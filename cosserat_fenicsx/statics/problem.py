@@ -87,6 +87,10 @@ class Problem(Equations):
         self.set_state(self.x)
         return anew
 
+    def forget(self):
+        """Load the next scene anew, even if it is the one that is loaded."""
+        self._loaded = None
+
     def _holds(self, scene, layout):
         """Whether this scene is loaded on this mesh and its data cannot have changed.
 
@@ -141,6 +145,20 @@ class Problem(Equations):
         if self.ties:
             self.ties.put(self.x, multipliers)
         self.set_state(self.x)
+
+    def assemble_data_derivative(self, form, clamped, vector):
+        """The change of the residual at the state, without supports and joints, with data and with clamped nodes.
+
+        Args:
+            form: see `DataDerivative`; clamped: change of the model's state array at clamped nodes, zero elsewhere.
+            vector: of the solver, for the result.
+        """
+        self._local[:] = 0.0
+        Packed(form, (), ()).add_to_vector(self._local)
+        if clamped.any():
+            dofs = self.model.cell_dofs
+            np.add.at(self._local, dofs, np.einsum("eij,ej->ei", self.tangent_form.matrices(), clamped[dofs]))
+        self.numbering.add_up(self._local, vector)
 
     def _refresh(self):
         if self._refreshes:

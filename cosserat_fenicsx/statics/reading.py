@@ -12,6 +12,7 @@ from cosserat_fenicsx.ranks import communicator
 from cosserat_fenicsx.results.export import saved
 from cosserat_fenicsx.results.path import Path
 from cosserat_fenicsx.statics.circulatory import conservative_along
+from cosserat_fenicsx.statics.critical_points import derivatives_of
 
 
 def read_path(file: File, *, comm: MPI.Comm | None = None) -> Path:
@@ -27,7 +28,7 @@ def read_path(file: File, *, comm: MPI.Comm | None = None) -> Path:
         SceneError: it cannot be read, is damaged, holds something else, or is of a newer release.
     """
     path = saved.read(file, "Path", assembled, communicator(comm))
-    path._potential = conservative_along
+    path._potential, path._differentiated = conservative_along, derivatives_of
     return path
 
 

@@ -84,7 +84,10 @@ class Part:
     Attributes:
         variation: the model's `SecondVariation`; form: its `Packed` form.
         elimination, interface: for counts; the latter None where nothing is to be added.
+        resistance: (tied unknowns,) the stiffnesses that springs in place of supports and joints were last scaled by.
     """
+
+    resistance = None
 
     def __init__(self, problem, index):
         self.problem, self.model, self._index = problem, problem.model, index
@@ -143,7 +146,8 @@ class Part:
         found = ties.second_variation(axes, problem.eta)
         if not stress_alone:
             resistance = np.where(interface.nodes < 0, 0.0, np.append(diagonal, 0.0)[interface.nodes])
-            found = found + ties.springs(axes, problem.eta, np.abs(resistance + np.diag(found)))
+            self.resistance = np.abs(resistance + np.diag(found))
+            found = found + ties.springs(axes, problem.eta, self.resistance)
         return found
 
     def complete(self):

@@ -10,6 +10,7 @@ from cosserat_fenicsx.annotations import File
 from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.well import criteria, loaded
 from cosserat_fenicsx.well.contacts import WallContact, contacts_of, high_side, side_force_up_to, sides_of
+from cosserat_fenicsx.well.differentiated import Differentiated
 from cosserat_fenicsx.well.hole import Borehole
 from cosserat_fenicsx.well.mud import Mud
 from cosserat_fenicsx.well.operations import Operation
@@ -22,7 +23,7 @@ _LITTLE = 1e-2
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class TorqueAndDrag(Tabular):
+class TorqueAndDrag(Differentiated, Tabular):
     """What a string in its hole carries, from `torque_and_drag`. SI units; depths are measured depths.
 
     Arrays run down the hole along `md`, which repeats a depth where something jumps: the value above it, then that

@@ -3,6 +3,7 @@
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from scipy.optimize import least_squares
@@ -72,6 +73,8 @@ class FrictionFit:
         block_weight: N, as given or found; block_interval: (2,), NaN where it was given.
         confidence: of the intervals, such as 0.95.
         correlation: (m, m) of the estimates: close to 1 or -1 where the readings tell sums or differences alone.
+        standard_error: (m,) of the coefficients, and of the block's weight (N) where it was found: the root of the
+            diagonal of the covariance, scaled by the misfit.
         residuals: (k,) measured less computed over the standard deviations, hook loads before torques.
         misfit: root of the sum of their squares over the readings in excess: 1 where the standard deviations are right.
         doubts: sentences on what may be wrong, where the misfit is far above 1; these are warned of, too.
@@ -85,6 +88,7 @@ class FrictionFit:
     block_interval: np.ndarray
     confidence: float
     correlation: np.ndarray
+    standard_error: np.ndarray
     residuals: np.ndarray
     misfit: float
     doubts: tuple[str, ...] = ()
@@ -122,8 +126,8 @@ def calibrate_friction(
 ) -> FrictionFit:
     """One coefficient of friction for each section of a hole, such that hook loads and torques fit measured ones best.
 
-    Where they fit badly, a warning says what may be the cause. Weighted least squares by SciPy. The intervals are
-    Student's, of the linearised problem, scaled by the misfit.
+    Where they fit badly, a warning says what may be the cause. Weighted least squares by SciPy, with the exact
+    derivatives of the soft string. The intervals are Student's, of the linearised problem, scaled by the misfit.
 
     Args:
         hole: its own friction is not used.
@@ -151,20 +155,39 @@ def calibrate_friction(
     if readings <= wanted:
         raise SceneError(f"calibrate_friction: {readings} readings for {wanted} unknowns: expected more")
 
+    @lru_cache(maxsize=1)
+    def answers_of(friction):
+        with_friction = hole.with_friction(np.maximum(friction, 0.0))
+        return {id(m): torque_and_drag(with_friction, string, m.operation, depth=m.depth, **settings)
+                for m in measurements}  # fmt: skip
+
     def residuals(unknowns):
-        with_friction = hole.with_friction(np.maximum(unknowns[:sections], 0.0))
         block = unknowns[sections] * _BLOCK if unknown_block else block_weight
-        answers = {id(m): torque_and_drag(with_friction, string, m.operation, depth=m.depth, **settings)
-                   for m in measurements}  # fmt: skip
+        answers = answers_of(tuple(unknowns[:sections]))
         return np.array(
             [(m.hook_load - answers[id(m)].hook_load - block) / m.hook_load_sd for m in hooks]
             + [(m.torque - answers[id(m)].surface_torque) / m.torque_sd for m in turns]
         )
 
+    def slopes(unknowns):
+        answers = answers_of(tuple(unknowns[:sections]))
+        names = [f"hole.sections[{i}].friction" for i in range(sections)]
+
+        def row(m, query, sd):
+            found = answers[id(m)].sensitivity(names, query)
+            block = [_BLOCK if query == "hook_load" else 0.0] * unknown_block
+            return [-x / sd for x in (*found.values(), *block)]
+
+        return np.array(
+            [row(m, "hook_load", m.hook_load_sd) for m in hooks]
+            + [row(m, "surface_torque", m.torque_sd) for m in turns]
+        )
+
     free = [np.inf] * unknown_block  # of the block's weight
     bounds = [0.0] * sections + [-x for x in free], [_MOST] * sections + free
     start = [_START] * sections + [0.5] * unknown_block
-    found = least_squares(residuals, start, bounds=bounds, xtol=1e-10, ftol=1e-12, gtol=1e-12)
+    jacobian = slopes if model == SOFT else "2-point"  # of buckled strings no derivative is known
+    found = least_squares(residuals, start, jacobian, bounds, xtol=1e-10, ftol=1e-12, gtol=1e-12)
     _check_told(hole, found.jac, unknown_block)
     misfit = float(np.sqrt(2 * found.cost / (readings - wanted)))
     covariance = np.linalg.inv(found.jac.T @ found.jac) * misfit**2
@@ -193,7 +216,8 @@ def calibrate_friction(
         warnings.warn(f"calibrate_friction: {'; '.join(doubts)}", SceneWarning, stacklevel=2)
     return FrictionFit(
         hole.with_friction(friction), friction, np.maximum(ends[:sections], 0.0), block,
-        ends[-1] if unknown_block else np.full(2, np.nan), confidence, correlation, found.fun, misfit, doubts,
+        ends[-1] if unknown_block else np.full(2, np.nan), confidence, correlation,
+        spread * scale, found.fun, misfit, doubts,
         tuple(measurements),
     )  # fmt: skip
 

@@ -43,11 +43,13 @@ Solved = namedtuple("Solved", "chain at tension torque side side_force error tor
 # On [0, 1]: points, weights, matrix of the integrals from 0 to the points, and that from the values at the points of an
 # interval to those at the points of its halves.
 _RULE = gauss(_POINTS)
-_X, _W = (1 + _RULE.points) / 2, _RULE.weights / 2
-_Q = legvander(_RULE.points, _POINTS) @ _RULE.integral / 2
+_X = (1 + _RULE.points) / 2
+#: The integral over a piece from values at Gauss's points, and those up to these points.
+WEIGHTS = _RULE.weights / 2
+POINTS_TO = legvander(_RULE.points, _POINTS) @ _RULE.integral / 2
 AT = np.concatenate([[0.0], _X, [1.0]])
 #: The integrals over a piece up to the places AT, from values at them.
-UP_TO = np.concatenate([np.zeros((1, _POINTS)), _Q, _W[None]])
+UP_TO = np.concatenate([np.zeros((1, _POINTS)), POINTS_TO, WEIGHTS[None]])
 UP_TO = np.concatenate([np.zeros((_POINTS + 2, 1)), UP_TO, np.zeros((_POINTS + 2, 1))], axis=1)
 _HALVES = legvander(np.concatenate([_X - 1, _X]), _POINTS - 1) @ _RULE.series
 
@@ -136,11 +138,11 @@ class _Friction:
                 V = k * (pull + P) + across
                 N = np.sqrt(V * V + b2)
                 slope = drag * k * np.divide(V, N, out=np.zeros_like(V), where=N > 0)
-                A, A_end = (slope @ _Q.T) * length[:, None], (slope @ _W) * length
+                A, A_end = (slope @ POINTS_TO.T) * length[:, None], (slope @ WEIGHTS) * length
                 decay = (drag * N - slope * P) * np.exp(-A)
                 gain = np.exp(A_end)
-                self._chain(gain, gain * (decay @ _W) * length)
-                new = np.exp(A) * (self.starts[:-1, None] + (decay @ _Q.T) * length[:, None])
+                self.starts = chained(gain, gain * (decay @ WEIGHTS) * length)
+                new = np.exp(A) * (self.starts[:-1, None] + (decay @ POINTS_TO.T) * length[:, None])
                 change = np.abs(new - P).max()
                 P = new
                 scale = max(scale, np.abs(self.starts).max())
@@ -151,17 +153,9 @@ class _Friction:
                 raise NotConverged("torque_and_drag: the friction of the soft string did not converge")
         self._P = P
         self.points = k * (pull + P) + across
-        self.forces = (np.sqrt(self.points**2 + b2) @ _W) * length
-        self._chain(np.ones_like(length), self._drag[:, 0] * self.forces)
+        self.forces = (np.sqrt(self.points**2 + b2) @ WEIGHTS) * length
+        self.starts = chained(np.ones_like(length), self._drag[:, 0] * self.forces)
         self.tension = self._below + self.starts
-
-    def _chain(self, gain, added):
-        """P at the ends of pieces: each has gain times the P before plus what is added."""
-        now, starts = 0.0, [0.0]
-        for a, b in zip(gain.tolist(), added.tolist(), strict=True):
-            now = a * now + b
-            starts.append(now)
-        self.starts = np.array(starts)
 
     def solved(self, torque, error, torque_error):
         """The `Solved` of this chain; `torque` at the lower end."""
@@ -223,6 +217,14 @@ class _Friction:
         cuts[~((cuts > 1e-12) & (cuts < 1 - 1e-12))] = np.nan
         cuts[split & np.isnan(cuts).all(axis=1), 0] = 0.5
         return cuts
+
+
+def chained(gain, added):
+    """(n + 1,) from 0: each value is gain times the one before plus what is added, (n,)."""
+    found = [0.0]
+    for a, b in zip(gain.tolist(), added.tolist(), strict=True):
+        found.append(a * found[-1] + b)
+    return np.array(found)
 
 
 def _zero(below, inside, above):

@@ -9,11 +9,12 @@ from cosserat_fenicsx.errors import Interrupted, NotConverged
 from cosserat_fenicsx.interrupts import obey
 from cosserat_fenicsx.results.accuracy import on_mesh
 from cosserat_fenicsx.results.path import Path
-from cosserat_fenicsx.results.records import Event, Record, Records
+from cosserat_fenicsx.results.records import Event, Records
 from cosserat_fenicsx.statics.circulatory import conservative_along
 from cosserat_fenicsx.statics.path.chord import Chord
 from cosserat_fenicsx.statics.path.follower import Follower
 from cosserat_fenicsx.statics.path.track import NOTHING
+from cosserat_fenicsx.statics.recording import record_of
 
 # Loads over EA, about the axial strain that they cause, above which a mistake in the units is suggested.
 _ENORMOUS = 1.0
@@ -75,7 +76,7 @@ class Tracing:
         self.problem, _, self.stability = solvers
         self.model, self._options, self._choice, self._bar = self.problem.model, follow, choice, bar
         why = [*choice.why, self.model.signature.formulation.words]
-        self.path = Path.of(self.model, why, conservative_along)
+        self.path = Path.of(self.model, why, conservative_along, differentiated)
         if choice.model == "spatial":
             self._follower = Follower(*solvers, on_event=self._meet, from_rest=from_rest, **follow)
         else:  # planar models: load control without events; the spatial model takes over where more is needed
@@ -338,8 +339,8 @@ class Tracing:
         return motion / np.sqrt(self.track.product(motion, motion))
 
 
-def record_of(problem, load_factor, negative_modes, iterations, steps, neutral=False):
-    """The `Record` of a problem's state, an equilibrium; see there for what is given."""
-    model = problem.model
-    return Record(load_factor, *model.snapshot(), negative_modes, iterations, problem.multipliers(), neutral,
-                  model.densities.here(), problem.tie_forces(), model.clamps.loads(load_factor), steps)  # fmt: skip
+def differentiated(path, query, parameters):
+    """See `Path.sensitivity`."""
+    from cosserat_fenicsx.statics.critical_points import derivatives_of  # which needs solvers, and they this module
+
+    return derivatives_of(path, query, parameters)

@@ -1,0 +1,118 @@
+"""Derivatives of a result by numbers of its scene, and the first-order uncertainty that follows from them."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from cosserat_fenicsx.checks import number
+from cosserat_fenicsx.errors import SceneError, nearest
+
+
+@dataclass(frozen=True, eq=False)
+class Sensitivity(Mapping):
+    """Derivatives of one quantity: a mapping {name of a parameter: derivative}, arrays of the shape of `value`.
+
+    Attributes:
+        value: the quantity, an array; of a path its first axis are the points.
+        derivatives: {name: d value/d parameter}, SI units.
+        error: {name: estimated absolute error} of the derivatives as those of the discrete equations: an upper bound of
+            what the central differences of data and query leave.
+        parameters: {name: value of the parameter}. units: {name: its unit}.
+    """
+
+    value: np.ndarray
+    derivatives: dict[str, np.ndarray]
+    error: dict[str, np.ndarray]
+    parameters: dict[str, float]
+    units: dict[str, str]
+
+    def __getitem__(self, name):
+        if name not in self.derivatives:
+            raise SceneError(f"no derivative by '{name}': {nearest(name, self.derivatives)}")
+        return self.derivatives[name]
+
+    def __iter__(self):
+        return iter(self.derivatives)
+
+    def __len__(self):
+        return len(self.derivatives)
+
+    def relative(self, name: str) -> np.ndarray:
+        """The relative change of the value over that of the parameter, p/q dq/dp; NaN where the value is 0."""
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.where(self.value != 0, self[name] * self.parameters[name] / self.value, np.nan)
+
+    def uncertainty(
+        self, standard_deviations: Mapping[str, float], correlation: np.ndarray | None = None
+    ) -> "Uncertainty":
+        """First-order (linear) propagation: variance = sum_ij q_i s_i rho_ij s_j q_j, with the derivatives q_i.
+
+        Args:
+            standard_deviations: {name of a parameter: s_i}, in its unit; one of each derivative.
+            correlation: (m, m) rho of the parameters in the order of `standard_deviations`; None: independent.
+
+        Raises:
+            SceneError: a name without a derivative, a standard deviation below 0, or no matrix of correlations.
+        """
+        names = list(standard_deviations)
+        for name in names:
+            number("uncertainty", f"standard_deviations['{name}']", standard_deviations[name],
+                   "a standard deviation, 0 or more", lambda x: 0 <= x < np.inf)  # fmt: skip
+        rho = np.eye(len(names)) if correlation is None else np.asarray(correlation, dtype=float)
+        if rho.shape != (len(names),) * 2 or not np.allclose(rho, rho.T) or not np.allclose(np.diag(rho), 1):
+            raise SceneError(
+                f"uncertainty: correlation = {rho!r}: expected a symmetric matrix ({len(names)}, {len(names)}) with "
+                "ones on its diagonal, or None"
+            )
+        parts = np.array([self[name] * standard_deviations[name] for name in names])
+        products = parts * np.tensordot(rho, parts, 1)
+        variance = products.sum(axis=0)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            shares = np.where(variance > 0, products / variance, 0.0)
+        return Uncertainty(
+            self.value, np.sqrt(np.maximum(variance, 0.0)), dict(zip(names, parts, strict=True)),
+            dict(zip(names, shares, strict=True)), dict(standard_deviations), self.units,
+        )  # fmt: skip
+
+    def __str__(self):
+        lines = [f"value {_text(self.value)}"]
+        for name in self:
+            per = f" per {self.units[name]}" if self.units[name] not in ("", "1") else ""
+            lines.append(f"d/d({name}) = {_text(self[name])}{per}, at {self.parameters[name]:.6g}")
+        return "\n".join(lines)
+
+
+@dataclass(frozen=True, eq=False)
+class Uncertainty:
+    """The first-order uncertainty of a quantity: exact for linear dependence and normal distributions.
+
+    Attributes:
+        value: the quantity, an array. standard_deviation: of it, likewise.
+        parts: {name: derivative times standard deviation of the parameter}, with its sign.
+        shares: {name: share of the variance}, which add up to 1; 0 where nothing varies. With correlations a share may
+            be negative.
+        given: {name: standard deviation of the parameter}; units: {name: its unit}.
+    """
+
+    value: np.ndarray
+    standard_deviation: np.ndarray
+    parts: dict[str, np.ndarray]
+    shares: dict[str, np.ndarray]
+    given: dict[str, float]
+    units: dict[str, str]
+
+    def __str__(self):
+        lines = [f"{_text(self.value)} +- {_text(self.standard_deviation)} (one standard deviation, first order)"]
+        for name, given in self.given.items():
+            unit = f" {self.units[name]}" if self.units[name] != "1" else ""
+            lines.append(f"  {_text(100 * self.shares[name], 3)} % from {name} +- {given:.6g}{unit}".rstrip())
+        return "\n".join(lines)
+
+
+def _text(values, digits=6):
+    """A number, or the last of several points."""
+    last = np.asarray(values)
+    if last.ndim:
+        last = last[-1]
+    return np.array2string(last, precision=digits, formatter={"float_kind": lambda x: f"{x:.{digits}g}"})

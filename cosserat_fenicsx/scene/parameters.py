@@ -1,0 +1,199 @@
+"""A number of a scene by its name, and the scene with another value of it.
+
+Scenes are immutable: every object that holds the number, directly or not, is made anew by its constructor, with its
+checks. An object that several others share, such as a material, is changed for all of them.
+"""
+
+import dataclasses
+import math
+import numbers
+import re
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from cosserat_fenicsx.checks import instance, number
+from cosserat_fenicsx.errors import SceneError, nearest
+from cosserat_fenicsx.scene.as_data import argument_of
+from cosserat_fenicsx.scene.rod import Station
+from cosserat_fenicsx.scene.scene import Scene
+
+_PARTS = ("rods", "materials", "supports", "loads", "joints")
+_TOKEN = re.compile(r"\[(\d+)\]|\.?([^.\[\]]+)")
+_UNITS = {
+    **dict.fromkeys(("diameter", "outer_diameter", "inner_diameter", "width", "height", "radius", "offset"), "m"),
+    **dict.fromkeys(("start", "end", "displacement", "clearance", "length"), "m"),
+    "E": "Pa", "nu": "1", "density": "kg/m^3", "force": "N", "moment": "N m", "rotation": "rad", "gravity": "m/s^2",
+    "friction": "1", "rotational": "N m/rad", "stiffness": "N/m^2", "Spring.stiffness": "N/m",
+    "TubeRing.stiffness": "N/m", "LineForce.force": "N/m", "LineMoment.moment": "N m/m", "shear": "N", "axial": "N",
+    "bending": "N m^2", "torsion": "N m^2",
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A number that a scene depends on, for derivatives.
+
+    Args:
+        name: its name in results.
+        value: its value in the scene.
+        scene_of: a function of a value that returns the `Scene` with it: the same rods, supports, joints and loads in
+            the same order, at the same shares of the rods' lengths. It is called with values close to `value`.
+        unit: for tables.
+        scale: how large a change of it is large; None for the size of `value`, which then must not be zero.
+
+    Raises:
+        SceneError: an argument of the wrong kind, or no scale.
+    """
+
+    name: str
+    value: float
+    scene_of: Callable[[float], Scene]
+    unit: str = ""
+    scale: float | None = None
+
+    def __post_init__(self):
+        instance(self, "name", self.name, str, "a string")
+        number(self, "value", self.value, "a finite number", math.isfinite)
+        if not callable(self.scene_of):
+            raise SceneError(f"Parameter '{self.name}': scene_of = {self.scene_of!r}: expected a function of a value")
+        if not (self.value if self.scale is None else self.scale):
+            raise SceneError(
+                f"Parameter '{self.name}': its value is 0, so that its size is not known: expected "
+                "Parameter(name, 0.0, scene_of, scale=...), with a change that is large"
+            )
+
+    @property
+    def size(self):
+        """How large a change of it is large."""
+        return abs(self.value if self.scale is None else self.scale)
+
+
+def parameter_of(scene, given):
+    """The `Parameter` given as one or by its name.
+
+    Names are made of fields and numbers from 0: "rods.column.section.diameter" or "rods[0].section.diameter",
+    "rods.column.material.E", "materials[0].E" (of the rods' different materials, in order) or "materials.steel.E" (of a
+    scene file), "loads[1].force[2]", "supports[0].displacement[0]".
+
+    Raises:
+        SceneError: there is no such number (names the nearest), or it is 0 and nothing tells its size.
+    """
+    if isinstance(given, Parameter):
+        return given
+    if not isinstance(given, str):
+        raise SceneError(f"parameter = {given!r}: expected a name such as 'rods.column.material.E', or a Parameter")
+    owner, field, keys = _find(scene, given)
+    leaf, size = getattr(owner, field), None
+    if not keys and isinstance(leaf, tuple) and len(leaf) == 1 and np.shape(leaf[0]) == (2,):
+        keys = [0, 1]  # one number for all of a length, kept as a piece (end, number)
+    for key in keys:
+        leaf, size = leaf[key], leaf
+    if isinstance(leaf, bool) or not isinstance(leaf, numbers.Real):
+        raise SceneError(f"parameter '{given}' is {_kind(leaf)}: expected the name of a number{_inside(leaf, given)}")
+    unit = _UNITS.get(f"{type(owner).__name__}.{field}", _UNITS.get(field, "its SI unit"))
+    if leaf == 0 and size is not None:  # a component of a vector: as large as the vector
+        size = float(np.linalg.norm(np.asarray(size, dtype=float)))
+
+    def scene_of(value):
+        new = _put(getattr(owner, field), keys, value)
+        return _Rebuilding({id(owner): _made(owner, {field: new})}).of(scene)
+
+    return Parameter(given, float(leaf), scene_of, unit, size or None if leaf == 0 else None)
+
+
+def _find(scene, name):
+    """(dataclass that holds the number, its field, indices within the field)."""
+    tokens = [int(i) if i else word for i, word in _TOKEN.findall(name)]
+    if not tokens or tokens[0] not in _PARTS:
+        raise SceneError(f"parameter '{name}': {nearest(tokens[0] if tokens else '', _PARTS)}")
+    materials = list({id(rod.material): rod.material for rod in scene.rods if rod.material is not None}.values())
+    here = tuple(materials) if tokens[0] == "materials" else getattr(scene, tokens[0])
+    owner, field, keys = scene, tokens[0], []
+    for token in tokens[1:]:
+        if dataclasses.is_dataclass(here):
+            fields = [x.name for x in dataclasses.fields(here) if x.init]
+            if token not in fields:
+                raise SceneError(f"parameter '{name}': {_kind(here)} has no '{token}': {nearest(token, fields)}")
+            owner, field, keys, here = here, token, [], getattr(here, token)
+            continue
+        if isinstance(token, str) and owner is scene and not keys and field in ("rods", "materials"):
+            named = scene.materials if field == "materials" else {rod.name: rod for rod in scene.rods}
+            if token not in named:
+                what = "no material of a scene file" if field == "materials" else "no rod"
+                raise SceneError(f"parameter '{name}': {what} is named '{token}': {nearest(token, named)}")
+            keys, here = [*keys, token], named[token]
+            continue
+        if not isinstance(here, tuple | list | np.ndarray) or not isinstance(token, int) or token >= len(here):
+            holds = f"{len(here)} items, numbered from 0" if isinstance(here, tuple | list | np.ndarray) else "no parts"
+            raise SceneError(f"parameter '{name}': what is before '{token}' has {holds}")
+        keys, here = [*keys, token], here[token]
+    if owner is scene:
+        raise SceneError(f"parameter '{name}' is {_kind(here)}: expected the name of a number{_inside(here, name)}")
+    return owner, field, keys
+
+
+def _kind(value):
+    return f"a {type(value).__name__}"
+
+
+def _inside(value, name):
+    """What may follow a name, in words."""
+    if dataclasses.is_dataclass(value):
+        return ", such as " + " or ".join(f"'{name}.{x.name}'" for x in dataclasses.fields(value)[:3] if x.init)
+    return f", such as '{name}[0]'" if isinstance(value, tuple | list | np.ndarray) else ""
+
+
+def _put(value, keys, leaf):
+    """A value with another number at the place of indices."""
+    if not keys:
+        return leaf
+    if isinstance(value, np.ndarray):
+        new = np.array(value, dtype=float)
+        new[tuple(keys)] = leaf
+        return new
+    parts = list(value)
+    parts[keys[0]] = _put(parts[keys[0]], keys[1:], leaf)
+    return type(value)(parts)
+
+
+def _made(item, changes):
+    """A dataclass of the package, made anew with other fields."""
+    fields = [x.name for x in dataclasses.fields(item) if x.init]
+    return type(item)(**{argument_of(x): changes.get(x, getattr(item, x)) for x in fields})
+
+
+class _Rebuilding:
+    """Copies of objects that hold, directly or not, one that is replaced; all others are kept.
+
+    Args:
+        known: {id of an object: what replaces it}.
+    """
+
+    def __init__(self, known):
+        self._known, self._alive = known, []
+
+    def of(self, item):
+        """The copy of an object, or itself."""
+        if id(item) not in self._known:
+            self._known[id(item)] = self._copy(item)
+            self._alive.append(item)
+        return self._known[id(item)]
+
+    def _copy(self, item):
+        if isinstance(item, Station):
+            rod = self.of(item.rod)
+            if rod is item.rod:
+                return item
+            share = item.s / item.rod.length
+            return Station(rod, rod.length if share == 1 else share * rod.length)
+        if isinstance(item, tuple | list) and not hasattr(item, "_fields"):
+            parts = [self.of(x) for x in item]
+            return item if all(a is b for a, b in zip(parts, item, strict=True)) else type(item)(parts)
+        if not dataclasses.is_dataclass(item) or isinstance(item, type):
+            return item
+        fields = [x.name for x in dataclasses.fields(item) if x.init]
+        changed = {x: self.of(getattr(item, x)) for x in fields}
+        same = all(changed[x] is getattr(item, x) for x in fields)
+        return item if same else _made(item, changed)

@@ -1,0 +1,331 @@
+"""Derivatives of the queries of a path by numbers of its scene: the direct method.
+
+At a point of the path the residual R(x; d) vanishes, x the unknowns and d the data that the scene is turned into, all
+dimensionless. For a parameter p
+
+    dx/dp = -K^-1 (R_d dd/dp),
+
+with the tangent K as factorised by Newton's method and R_d by ufl.derivative: one factorisation a point, and one
+back-substitution for each parameter. dd/dp is a central difference of eighth order of the data, which are explicit
+functions of the scene; so are the constraint equations of supports and joints at fixed x. The contact force carried at
+the Gauss points changes by the derivative of its law. A query is then differenced along (x + t dx/dp, scene(p + t)),
+which contains units, geometry and whatever else it takes from the scene. No perturbed state is solved for.
+"""
+
+import contextlib
+import dataclasses
+
+import numpy as np
+
+from cosserat_fenicsx.differences import PLACES, STEP, derivative
+from cosserat_fenicsx.errors import NotConverged, SceneError
+from cosserat_fenicsx.models.data_derivative import DataDerivative, made_once
+from cosserat_fenicsx.models.signature import Signature
+from cosserat_fenicsx.results.accuracy import on_mesh
+from cosserat_fenicsx.results.perturbed import PerturbedPath
+from cosserat_fenicsx.results.sensitivity import Sensitivity
+from cosserat_fenicsx.scene.action import path_dependent
+from cosserat_fenicsx.scene.parameters import parameter_of
+from cosserat_fenicsx.statics.recording import record_of
+from cosserat_fenicsx.statics.solvers import solvers_of
+
+# Newton iterations from the recorded state to the same state, and how far it may move (lengths, rad).
+_ITERATIONS, _MOVED = 25, 1e-3
+# Largest motion (lengths, rad) over which queries are differenced.
+_REACH = 5e-3
+# Of data that depend on the position: motion over which they are differenced (lengths, rad), iterations, accuracy.
+_AHEAD, _FOLLOWED, _SETTLED = 1e-5, 50, 1e-7
+
+
+def sensitivity(path, query, parameters):
+    """Derivatives of a query of a path by numbers of its scene; see `Path.sensitivity`."""
+    if isinstance(parameters, str) or not hasattr(parameters, "__iter__"):
+        parameters = [parameters]
+    found = [parameter_of(path.scene, given) for given in parameters]
+    if not callable(query):
+        raise SceneError(f"query = {query!r}: expected a function of the path, lambda path: path.position('rod.end')")
+    if not len(path):
+        raise SceneError("sensitivity: the path has no converged point to differentiate at: expected at least one")
+    check_scene(path.scene)
+    value, derivatives, errors = _numbers(query(path)), {}, {}
+    with directly(path, found) as (direct, rates):
+        for parameter, rate in zip(found, rates, strict=True):
+            step, paths = direct.paths(path, parameter, rate)
+            values = [_numbers(query(each)) for each in paths]
+            derivatives[parameter.name], errors[parameter.name] = derivative(values, step)
+    return Sensitivity(value, derivatives, errors, {x.name: x.value for x in found}, {x.name: x.unit for x in found})
+
+
+def _numbers(value):
+    try:
+        return np.asarray(value, dtype=float)
+    except (TypeError, ValueError):
+        kind = type(value).__name__
+        raise SceneError(f"query returns a {kind}: expected a number or an array, such as one of its parts") from None
+
+
+def check_scene(scene, critical=False):
+    """Refuse loads whose derivatives are not known; critical: those of critical loads."""
+    if path_dependent(scene):
+        raise SceneError("sensitivity: a load of the scene has memory: expected loads that depend on the state alone")
+    for load in scene.actions:
+        if critical and load.refreshed is not None:
+            raise SceneError(
+                f"sensitivity: derivatives of critical loads are not known with a {type(load).__name__}, whose data "
+                "turn with the position: expected other loads, such as a Wall or a Foundation"
+            )
+
+
+@contextlib.contextmanager
+def directly(path, parameters):
+    """Context manager that gives the `Direct` of a path and, for each parameter, the rates of its points."""
+    scenes = [scenes_near(path.scene, parameter) for parameter in parameters]
+    model = path.model
+    if model != "spatial" and path.scene.plane is not None and not all(map(_same_plane(path), sum(scenes, []))):
+        model = "spatial"
+    with solvers_of(
+        path.scene, path.layout, formulation=path.formulation, degree=path.degree, points=len(path.rule.gauss),
+        comm=path.comm, model=model,
+    ) as solvers:  # fmt: skip
+        with Direct(*solvers, path.scene, path.layout) as direct:
+            direct.check(scenes, parameters)
+            direct.find(path)
+            yield direct, direct.rates(scenes, parameters)
+
+
+def scenes_near(scene, parameter):
+    """The scenes with the parameter at `PLACES` times its step from its value."""
+    try:
+        found = [parameter.scene_of(parameter.value + k * STEP * parameter.size) for k in PLACES]
+    except SceneError as problem:
+        raise SceneError(
+            f"parameter '{parameter.name}' = {parameter.value:g}: its neighbourhood, up to "
+            f"{max(PLACES) * STEP * parameter.size:.3g} from it, is refused: {problem}"
+        ) from None
+    for part in ("rods", "supports", "loads", "joints"):
+        if any(len(getattr(near, part)) != len(getattr(scene, part)) for near in found):
+            raise SceneError(f"parameter '{parameter.name}': it changes the number of {part}: expected a smooth change")
+    return found
+
+
+def _same_plane(path):
+    axes = np.array(path.scene.plane.axes)
+    return lambda scene: scene.plane is not None and np.allclose(scene.plane.axes, axes, rtol=0, atol=1e-12)
+
+
+class Direct:
+    """The direct method on one problem and path.
+
+    Args:
+        problem, newton, stability: see `solvers_of`, loaded with the scene.
+        scene, layout: these.
+
+    Attributes:
+        points: [(load factor, numbers, `Record`)] of the states where derivatives are taken.
+    """
+
+    def __init__(self, problem, newton, stability, scene, layout):
+        self.problem, self.newton, self.stability = self.solvers = problem, newton, stability
+        self.model, self._scene, self._layout = problem.model, scene, layout
+        self._by_data = made_once(self.model, "data_derivative", DataDerivative)
+        self._refreshes = bool(self.model.actions.refreshed)
+        self.points = []
+
+    def __enter__(self):
+        self.model.EI = self.model.scales.moment * self.model.scales.length  # so that units depend on no parameter
+        return self
+
+    def __exit__(self, *failure):
+        self.model.EI = None
+        self.problem.forget()
+
+    def find(self, path):
+        """Take the points of a path, solved again to rounding."""
+        self._apply_permanent()
+        rq, n = on_mesh(path, self._layout)
+        starts = zip(path._records, self.model.unknowns_of(rq), n, strict=True)
+        self.points = [self._solved(*each) for each in starts]
+
+    def check(self, scenes, parameters):
+        """Refuse parameters that change what the compiled code depends on, or the proportions of the mesh."""
+        for each, parameter in zip(scenes, parameters, strict=True):
+            self._check(each, parameter)
+
+    def _check(self, scenes, parameter):
+        signature = self.model.signature
+        for scene in scenes:
+            near = Signature.of(
+                scene, self._layout, formulation=signature.formulation.name, degree=signature.degree,
+                points=signature.points, model=signature.model,
+            )  # fmt: skip
+            kept = dataclasses.replace(near, slender=signature.slender, formulation=signature.formulation)
+            if kept != signature:
+                raise SceneError(
+                    f"parameter '{parameter.name}': the model changes where it is varied: expected one that leaves "
+                    "symmetries, planes and what is held as they are, or a path with model='spatial'"
+                )
+            sizes = [self._layout.sizes(x) / max(rod.length for rod in x.rods) for x in (scene, self._scene)]
+            if not np.allclose(*sizes, rtol=1e-10, atol=0):
+                raise SceneError(
+                    f"parameter '{parameter.name}' changes the lengths of rods over that of the longest one: expected "
+                    "one that scales all of them, or none"
+                )
+
+    # -- states ------------------------------------------------------------------------------------------------------
+
+    def _apply_permanent(self):
+        if self.problem.begins:
+            self.problem.end_beginning()
+
+    def _load(self, scene):
+        self.problem.load(scene, self._layout)
+        self._apply_permanent()
+
+    def _solved(self, record, values, n):
+        """(load factor, numbers, record) of a point, solved to rounding."""
+        problem = self.problem
+        problem.set_load_factor(record.load_factor)
+        problem.begin_at(values, n, record.reactions)
+        before = problem.numbers()
+        self.newton.allow(_ITERATIONS)
+        solved = self.newton.solve()
+        if not solved.converged or self.model.largest(problem.x.array_r - before[0]) > _MOVED or record.neutral:
+            reason = solved.reason if not solved.converged else "a motion is neutral, or the state is not isolated"
+            raise NotConverged(
+                f"sensitivity: the point at the load factor {record.load_factor:.6g} has no derivative: {reason}"
+            )
+        return record.load_factor, problem.numbers(), record
+
+    # -- derivatives -------------------------------------------------------------------------------------------------
+
+    def rates(self, scenes, parameters):
+        """For each parameter the derivatives of the numbers of every point (see `Problem.numbers`)."""
+        steps = [STEP * parameter.size for parameter in parameters]
+        changes = [self._data_changes(each, step) for each, step in zip(scenes, steps, strict=True)]
+        self._load(self._scene)
+        found = [[] for _ in scenes]
+        for i, (eta, numbers, _) in enumerate(self.points):
+            self.factor(eta, numbers)
+            for rates, of_points in zip(found, changes, strict=True):
+                rates.append(self._rate(*of_points[i]))
+        return found
+
+    def _data_changes(self, scenes, step):
+        """For every point the derivatives of the data, and of the constraint equations' part of the residual."""
+        near, found, whole = [], [], None
+        for scene in scenes:
+            self._load(scene)
+            data = self._by_data.data()
+            near.append([(self._refreshed(point, data), self._of_ties(point[0], point[1][0])) for point in self.points])
+        for at_point in zip(*near, strict=True):
+            if whole is None or self._refreshes:
+                whole = [derivative(arrays, step)[0] for arrays in zip(*(data for data, _ in at_point), strict=True)]
+            found.append((whole, derivative([ties for _, ties in at_point], step)[0]))
+        return found
+
+    def _refreshed(self, point, data):
+        """The data at a point, where they depend on the position."""
+        if not self._refreshes:
+            return data
+        self.put(point, point[1], 0.0)
+        return self._by_data.data()
+
+    def _of_ties(self, eta, x):
+        problem, found = self.problem, np.zeros(self.problem.numbering.size)
+        if problem.ties:
+            problem.ties.see(x)
+            problem.ties.add_residual(found, eta)
+        return found
+
+    def factor(self, eta, numbers):
+        """Go to a state, and factorise the tangent there."""
+        problem = self.problem
+        problem.set_load_factor(eta)
+        problem.put(numbers)
+        problem.function(problem.x, problem.b)
+        problem.factor()
+
+    def residual_change(self, data, of_ties):
+        """(change of the residual at the state, a vector; change of the model's state array at clamped nodes)."""
+        numbering, found = self.problem.numbering, self.problem.numbering.vector()
+        self._by_data.take(data)
+        clamped = np.where(numbering.rows < 0, data[-1], 0.0)
+        self.problem.assemble_data_derivative(self._by_data.form, clamped, found)
+        found.array_w[:] += of_ties
+        return found, clamped
+
+    def _rate(self, data, of_ties):
+        """The change of the numbers with data and constraint equations; data that depend on the position follow it, by
+        iteration, where the tangent does not contain it; where it does, the first step changes nothing but rounding."""
+        rate = self._response(*self.residual_change(data, of_ties))
+        for _ in range(_FOLLOWED if self._refreshes else 0):
+            moved = [a + b for a, b in zip(data, self._data_along(rate), strict=True)]
+            before, rate = rate, self._response(*self.residual_change(moved, of_ties))
+            if self.model.largest(rate[0] - before[0]) <= _SETTLED * self.model.largest(rate[0]):
+                return before
+        if self._refreshes:
+            raise NotConverged("sensitivity: how the loads turn with the position did not converge")
+        return rate
+
+    def _data_along(self, rate):
+        """Derivatives of the data along a change of the state."""
+        here, sides = (self.problem.load_factor, self.problem.numbers(), None), []
+        step = _AHEAD / max(self.model.largest(rate[0]), 1e-300)
+        for k in PLACES:
+            self.put(here, rate, k * step)
+            sides.append(self._by_data.data())
+        self.put(here, rate, 0.0)
+        return [derivative(arrays, step)[0] for arrays in zip(*sides, strict=True)]
+
+    def slope(self):
+        """Derivatives of the numbers by the load factor, at the state where the tangent was factorised."""
+        problem = self.problem
+        self._by_data.take([0.0] * len(self._by_data.data()))
+        return self._response(problem.load_derivative(problem.x).copy(), np.zeros_like(self.model.state.x.array))
+
+    def _response(self, residual, moved):
+        """The change of the numbers that balances a change of the residual, with the clamped nodes' moves `moved`."""
+        problem, model, rate = self.problem, self.model, self.problem.numbering.vector()
+        residual.scale(-1.0)
+        if not problem.solve(residual, rate) or not np.isfinite(rate.norm()):
+            raise NotConverged(
+                f"sensitivity: the tangent is singular at the load factor {problem.load_factor:.6g}, where the path "
+                "has no derivative"
+            )
+        problem.numbering.to_local(rate, moved)
+        contact = self._by_data.contact(moved)
+        carried = [] if contact is None else [contact]
+        return [rate.array_r.copy(), *carried, *(np.zeros_like(x.x.array) for x in model.carried[len(carried) :])]
+
+    # -- results -----------------------------------------------------------------------------------------------------
+
+    def paths(self, path, parameter, rates):
+        """(step, `PerturbedPath`s beside a path at `PLACES` times the step)."""
+        step = self.step(parameter, rates)
+        return step, [self._moved(path, parameter, rates, k * step) for k in PLACES]
+
+    def step(self, parameter, rates):
+        """A change of a parameter by which the state moves little."""
+        fastest = max(self.model.largest(rate[0]) for rate in rates)
+        return min(STEP * parameter.size, _REACH / max(fastest, 1e-300))
+
+    def load_near(self, parameter, change):
+        """Load the scene with a parameter changed."""
+        self._load(parameter.scene_of(parameter.value + change))
+
+    def put(self, point, rate, change):
+        """Go to a state that is moved by a change times a rate."""
+        eta, numbers, _ = point
+        self.problem.set_load_factor(eta)
+        self.problem.put([a + change * b for a, b in zip(numbers, rate, strict=True)])
+        if self._refreshes:
+            self.model.actions.refresh()
+
+    def _moved(self, path, parameter, rates, change):
+        self.load_near(parameter, change)
+        found = PerturbedPath.beside(path, self.model)
+        for point, rate in zip(self.points, rates, strict=True):
+            self.put(point, rate, change)
+            eta, _, record = point
+            found.append(record_of(self.problem, eta, record.negative_modes, record.iterations, record.steps))
+        return found

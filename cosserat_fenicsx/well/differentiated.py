@@ -1,0 +1,117 @@
+"""Derivatives of a torque and drag answer by friction, weights, mud and what acts on the bit, and its uncertainty."""
+
+import math
+import re
+from collections.abc import Iterable, Mapping
+
+import numpy as np
+
+from cosserat_fenicsx.errors import SceneError, nearest
+from cosserat_fenicsx.results.sensitivity import Sensitivity, Uncertainty
+from cosserat_fenicsx.well.soft_rates import Change, rates_of
+
+_NUMBERED = re.compile(r"(.*)\[(\d+)\](.*)")
+_QUERIES = ("hook_load", "surface_torque", "tension", "torque")
+
+
+class Differentiated:
+    """Base of `TorqueAndDrag` with its derivatives."""
+
+    def sensitivity(self, parameters: Iterable[str], query: str = "hook_load") -> Sensitivity:
+        """Derivatives of a soft string's loads, exactly: the linearised equations are solved on the same pieces.
+
+        Args:
+            parameters: names: "friction" (the same change everywhere), "hole.sections[0].friction", "mud.density"
+                (inside the string too where it is the same there), "weight" (N/m in mud, of all components),
+                "string.components[0].weight" (in mud), "operation.weight" and "operation.torque" (on bit).
+            query: "hook_load" (N), "surface_torque" (N m), or "tension" and "torque" at all of `md`.
+
+        Returns:
+            Sensitivity, in SI units.
+
+        Raises:
+            SceneError: an unknown name or query, a string with a helix, or the rod in contact.
+        """
+        if self.model not in ("soft", "soft, buckled") or self.solved.helical.any():
+            raise SceneError(
+                f"sensitivity: the answer is that of model = '{self.model}': expected one of model = 'soft', whose "
+                "equations are linearised, or one without a helix"
+            )
+        if query not in _QUERIES:
+            raise SceneError(f"query = {query!r}: {nearest(query, _QUERIES)}")
+        names = [parameters] if isinstance(parameters, str) else list(parameters)
+        found = {name: self._changed_by(name) for name in names}
+        rates = {name: self._rate(change, query) for name, (change, _, _) in found.items()}
+        zero = {name: np.zeros_like(rate) for name, rate in rates.items()}
+        return Sensitivity(
+            np.asarray(getattr(self, query)), rates, zero, {name: value for name, (_, value, _) in found.items()},
+            {name: unit for name, (_, _, unit) in found.items()},
+        )  # fmt: skip
+
+    def uncertainty(
+        self,
+        standard_deviations: Mapping[str, float],
+        query: str = "hook_load",
+        correlation: np.ndarray | None = None,
+    ) -> Uncertainty:
+        """The first-order standard deviation of a load, with the share of each parameter; it can be printed.
+
+        Args:
+            standard_deviations: {name: standard deviation}; names and query as of `sensitivity`.
+            correlation: see `Sensitivity.uncertainty`; that of a `FrictionFit` for its coefficients.
+
+        Raises:
+            SceneError: as of `sensitivity` and `Sensitivity.uncertainty`.
+        """
+        return self.sensitivity(standard_deviations, query).uncertainty(standard_deviations, correlation)
+
+    def _rate(self, change, query):
+        tension, torque = rates_of(self.solved, self.pieces, change, self.torque_convention == "coulomb")
+        if query in ("tension", "torque"):
+            return self._down(tension if query == "tension" else torque)
+        return np.asarray((tension if query == "hook_load" else torque)[-1, -1])
+
+    def _changed_by(self, name):
+        """(`Change`, value, unit) of a parameter."""
+        pieces, operation, mud = self.pieces, self.operation, self.mud
+        none, ones = np.zeros(len(pieces.top)), np.ones(len(pieces.top))
+        plain = {
+            "friction": (Change(none, ones, 0.0, 0.0), math.nan, "1"),
+            "weight": (Change(ones, none, 0.0, 0.0), math.nan, "N/m"),
+            "operation.weight": (Change(none, none, -1.0, 0.0), operation.weight, "N"),
+            "operation.torque": (Change(none, none, 0.0, 1.0), operation.torque, "N m"),
+        }
+        if mud is not None:
+            weights = np.array([_by_density(place.component, mud) for place in self.laid])[pieces.component]
+            plain["mud.density"] = Change(weights, none, 0.0, 0.0), mud.density, "kg/m^3"
+        if name in plain:
+            return plain[name]
+        match = _NUMBERED.fullmatch(name) if isinstance(name, str) else None
+        of_all = {
+            "hole.sections[].friction": [section.friction for section in self.hole.sections],
+            "string.components[].weight": [pieces.weight[pieces.component == i] for i in range(len(self.laid))],
+        }
+        kind = f"{match[1]}[]{match[3]}" if match else ""
+        if kind not in of_all:
+            known = [*plain, *(x.replace("[]", "[0]") for x in of_all)]
+            raise SceneError(f"parameter {name!r}: {nearest(name, known)}")
+        i, values = int(match[2]), of_all[kind]
+        if i >= len(values):
+            raise SceneError(f"parameter '{name}': expected a number from 0 to {len(values) - 1}")
+        if "friction" in kind:
+            above = np.searchsorted(
+                [section.to for section in self.hole.sections[:-1]], (pieces.top + pieces.bottom) / 2
+            )
+            return Change(none, (above == i).astype(float), 0.0, 0.0), values[i], "1"
+        weight = float(values[i][0]) if len(values[i]) else math.nan
+        return Change((pieces.component == i).astype(float), none, 0.0, 0.0), weight, "N/m"
+
+
+def _by_density(component, mud):
+    """Derivative of the weight in mud (N/m) by the mud's density, inside too where it is the same; 0 where the weight
+    in mud is given. See `components.weight_in_mud`."""
+    if component.weight is not None:
+        return 0.0
+    bore = math.pi / 4 * component.inner_diameter**2
+    lifted = component.mass / component.material.density + bore
+    return -mud.gravity * (lifted - bore * (mud.inside == mud.density))
