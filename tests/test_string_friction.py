@@ -89,6 +89,14 @@ def test_a_front_of_torsion_stops_by_itself(axial):
     assert unbalanced(rows) < 1e-11 and model.counts["halved"] == 0
 
 
+def test_a_lying_pipe_until_its_end_moves():
+    rows = AxialTorsional(lying(cf.TopDrive(2 * np.pi)), 0.003).advance(3000)
+    t, om = rows[:, 0], column(rows, "bit_speed")
+    assert t[om != 0][0] == pytest.approx(2.725, rel=2e-3)
+    assert column(rows, "surface_torque").max() == pytest.approx(12432.4, rel=1e-3)
+    assert om.max() == pytest.approx(12.565, rel=2e-3) and unbalanced(rows) < 1e-11
+
+
 class Slowly:
     """A turn forward within a time, and a quarter of a turn back within the same time."""
 

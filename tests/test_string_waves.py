@@ -153,6 +153,10 @@ def test_other_laws_of_the_bit_plug_in_as_end_conditions():
                         hook=cf.Hook(speed=-0.1))  # fmt: skip
     with pytest.raises(cf.SceneError, match="BitOnRock.law.*end"):
         AxialTorsional(scene)
+    lobes = cf.Drilling(scene.string, scene.drive, cf.BitOnRock(cf.Lobes(3, 0.002, LAW), 80e3, inertia=50.0))
+    with pytest.raises(cf.SceneError, match="BitOnRock.law.*end"):
+        AxialTorsional(lobes)
+    assert column(AxialTorsional(lobes, 0.01, 50, axial=False).advance(100), "torque_on_bit").max() > 0
     Z = IMPEDANCE[0], 296.3752962822167
     end = Swallow(*Z)
     model = AxialTorsional(scene, 0.004, 200, end=end)
@@ -185,7 +189,7 @@ class Wavy(Swallow):
 def test_a_bit_on_lobes(rpm, amplitude):
     """Three lobes of 2 mm: the weight on bit of forced vibration; where it exceeds the static one, the bit leaves."""
     rate, drag = 3 * rpm * cf.units.rpm, cf.ViscousDrag(0.2, 0.2)
-    bit = cf.BitOnRock(cf.Stribeck(0.0, 0.0), 80e3)
+    bit = cf.BitOnRock(cf.Lobes(3, 0.002), 80e3)
     scene = hanging(cf.Hook(5e6), cf.TopDrive(0.0), bit, drag=drag)
     model = AxialTorsional(scene, 0.002, 300, end=Wavy(0.002, rate))
     rows = model.advance(40000)

@@ -16,11 +16,11 @@ from cosserat_fenicsx.algebra.pointers import Pointers
 from cosserat_fenicsx.checks import number, positive, refuse
 from cosserat_fenicsx.drilling.axial_torsional.chain import chain_of, usual_step
 from cosserat_fenicsx.drilling.axial_torsional.intervals import intervals
-from cosserat_fenicsx.drilling.bit_laws import Stribeck
+from cosserat_fenicsx.drilling.bit_laws import Cutting, Lobes
 from cosserat_fenicsx.drilling.discs import Discs
 from cosserat_fenicsx.drilling.protocol import LEDGER, SERIES
 from cosserat_fenicsx.drilling.signals import ScalarSignal
-from cosserat_fenicsx.drilling.single_valued import check_bit
+from cosserat_fenicsx.drilling.single_valued import check_bit, stribeck_of
 from cosserat_fenicsx.drilling.top_drive import PI, Matched, Motor, Stiff
 from cosserat_fenicsx.errors import NotConverged, SceneError
 
@@ -46,7 +46,7 @@ class AxialTorsional(Pointers):
         elements: about how many along the string, each component has one at least; None for as many as waves of torsion
             pass in a step, within 40 to 400, or 250 without a step.
         axial: False for torsion alone.
-        end: None, or what acts on the bit in place of a `Stribeck` law, see `EndCondition`.
+        end: None, or what acts on the bit beside a law of friction, see `EndCondition`; where bits that cut plug in.
 
     Raises:
         SceneError: a bit law steeper than the impedance of the string without inertia at the bit; a step too long for a
@@ -68,7 +68,7 @@ class AxialTorsional(Pointers):
         self.dt = dt or usual_step(scene, elements)
         for _ in range(_TRIALS):
             self._set(elements)
-            if discs or self._lib.steepest(self._m, self.dt) > 0:
+            if self._lib.steepest(self._m, self.dt) > 0:
                 break
             if dt is not None:
                 self._refuse_step()
@@ -131,10 +131,12 @@ class AxialTorsional(Pointers):
             mass[0] += bit.mass
             m.hanging = bit.weight or 0.0
         m.weight = bit.weight or 0.0
-        if isinstance(bit.law, Stribeck):
-            m.law, m.weighs, m.rock = 1, bit.law.radius is not None, self._axial and bit.weight is not None
-            (m.still, m.slipping), m.decay = bit.law.torques(1.0), bit.law.speed or 0.0
-        elif self.end is None:
+        m.rock = self._axial and bit.weight is not None and not isinstance(bit.law, Cutting)
+        law = stribeck_of(bit.law)
+        if law is not None:
+            m.law, m.weighs, m.decay = 1, law.radius is not None, law.speed or 0.0
+            m.still, m.slipping = law.torques(1.0)
+        if self.end is None and (isinstance(bit.law, Cutting) or (self._axial and isinstance(bit.law, Lobes))):
             refuse("BitOnRock", "law", bit.law, "a Stribeck, or an `end` of the model, which does what the law says")
 
     def _set_hook(self, hook):
