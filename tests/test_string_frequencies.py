@@ -107,6 +107,22 @@ def test_all_roots_of_a_polynomial(seed):
     assert max(np.abs(roots - s).min() for s in expected) < 1e-9
 
 
+@pytest.mark.parametrize(
+    "roots",
+    [
+        [0.3 + 2j, 0.3 + 2j, 0.5 + 5j],
+        [0.3 + 2j] * 3,
+        [0.25, 0.25, 0.7 + 1j],
+        [0.3 + 2j, 0.3 + 2j + 1e-7],
+        [0.3 + 1e-6j],
+    ],
+    ids=["double", "triple", "real", "close", "hardly complex"],
+)
+def test_multiple_roots(roots):
+    found, _ = all_roots(function_with([complex(s) for s in roots]), Box(-1.0, 1.0, 0.0, 10.0), 1.0)
+    assert np.sort_complex(found) == pytest.approx(np.sort_complex(np.array(roots, dtype=complex)), abs=1e-8)
+
+
 def test_gains_of_tuned_drives():
     scene = pipe_and_collars("PI_stiff")
     for choose, name in ((cf.SoftSpeed, "SoftSpeed"), (cf.SoftTorque, "tuned")):

@@ -8,6 +8,7 @@ import pytest
 from reference_strings import GIVEN, RPM, drive_of, falling, pipe_and_collars, public_discs, tubes, weight_of_slope
 
 import cosserat_fenicsx as cf
+from cosserat_fenicsx.drilling.linear.impedances import axial, torsional
 from cosserat_fenicsx.drilling.single_valued import check_bit
 
 pytestmark = pytest.mark.serial
@@ -112,6 +113,20 @@ def test_counts_of_a_string_whose_bit_cuts():
         for re, im in row["rightmost_below_30_rad_s"]:
             assert np.nanmin(np.abs(answer.roots[i, 0] - complex(re, im))) < 1e-9
     assert any("axial motion of drill pipe" in answer.shape(k, 4).shares for k in answer.unstable(4))
+
+
+def test_the_shape_of_a_coupled_mode():
+    """Both equations of motion of the bit, with the depth of cut d = E (v - rho om)/s."""
+    speed, law, rate = 100 * RPM, cutting().bit.law, GIVEN["cutting"]["parameters"]["V"]
+    answer = cf.stability(cutting(), [speed], up_to=BAND)
+    for k in (*answer.unstable(0), 3, 8):
+        shape = answer.shape(k, 0)
+        s, om, v = shape.root, shape.rotation[-1], shape.velocity[-1]
+        d = (1 - np.exp(-2 * math.pi * s / (law.blades * speed))) / s * (v - rate / speed * om)
+        Zt, Za = (of(cutting()).impedance_at_bit(np.array([s]))[0] for of in (torsional, axial))
+        assert om == pytest.approx(1.0) and sum(shape.shares.values()) == pytest.approx(1.0)
+        assert Zt * om + law.torsional_stiffness * d == pytest.approx(0, abs=1e-7 * abs(Zt * om))
+        assert Za * v + law.axial_stiffness * d == pytest.approx(0, abs=1e-7 * abs(Za * v))
 
 
 def test_the_weight_sets_the_rate_of_penetration():

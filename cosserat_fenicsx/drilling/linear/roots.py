@@ -12,8 +12,9 @@ import numpy as np
 
 from cosserat_fenicsx.errors import NotConverged
 
-#: Largest change of phase from point to point of a contour, rad, and how far it may be from that of the derivatives.
-_TURN, _MISMATCH = 1.0, 0.3
+#: Largest change of phase from point to point of a contour, rad; how far it may be from that of the derivatives; and
+#: the largest step, in units of the distance of a single root that would lead to the same derivative.
+_TURN, _MISMATCH, _REACH = 1.0, 0.3, 1.5
 #: A contour that comes as near to a root as this share of its size is moved.
 _NEAR = 1e-9
 #: Newton's method stops at steps below the second number, or below the third where they no longer fall; relative.
@@ -57,8 +58,8 @@ class OnContour(Exception):
 def turns(f, corners, spacing):
     """Change of the phase of f along straight lines from corner to corner, rad.
 
-    Intervals are halved until the phase turns by less than `_TURN` in each, as the derivatives at both ends foretell:
-    a change by 2 pi that goes unseen would differ from what they say.
+    Intervals are halved until the phase turns by less than `_TURN` in each, as the derivatives at both ends foretell,
+    and until no root can be as near as the interval is long.
 
     Raises:
         OnContour: no interval is short enough.
@@ -75,8 +76,11 @@ def turns(f, corners, spacing):
             log = derivative / value
             step = np.diff(s)
             foretold = ((log[1:] + log[:-1]) / 2 * step).imag
-            # near a root both logarithmic derivatives are large: the size of the change has to be seen there, too
+            # beside two roots that are close to each other the phase turns by 2 pi, of which nothing is seen at points
+            # on both sides: the size of the logarithmic derivative says how near roots are
+            near = np.abs(log - _rate(f, s))
             rough = (np.abs(change) > _TURN) | (np.abs(change - foretold) > _MISMATCH)
+            rough |= np.maximum(near[1:], near[:-1]) * np.abs(step) > _REACH
             if not rough.any():
                 break
             where = np.flatnonzero(rough)
