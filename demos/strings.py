@@ -84,7 +84,15 @@ def stopped_block(found, history, folder):
                 "staircase, exact")  # fmt: skip
 
 
-STRINGS = (stick_slip, tuned_drive, off_bottom, stopped_block)
+def four_discs(found, history, folder):
+    """When the bit starts, and the peak after two minutes, from where on the motion is close to its limit cycle."""
+    source = "events located, tight tolerances"
+    starts = history.stick_slip(since=160.0).starts
+    yield Check("starts of the bit (s)", starts[:4], [167.506348, 175.812006, 184.118502, 192.425637], 0.01, source)
+    yield Check("peak bit speed (rad/s)", history.stick_slip(since=120.0).peak, 6.694377, 2e-3, source)
+
+
+STRINGS = (stick_slip, tuned_drive, off_bottom, stopped_block, four_discs)
 
 
 def run(demo, out="out/strings"):
@@ -102,9 +110,10 @@ def run(demo, out="out/strings"):
     if folder is not None:
         folder.mkdir(parents=True, exist_ok=True)
         history.plot(folder / "drilling.png")
-        history.plot_map(folder / "map.png")
+        if len(history.depths) > 10:
+            history.plot_map(folder / "map.png")
         history.plot_energy(folder / "energy.png")
-        if found.scene.drive.speed:
+        if history.bit_speed.any():
             history.plot_phase(folder / "phase.png")
     return history.model, list(demo(found, history, folder))
 

@@ -28,7 +28,11 @@ def bit():
     [
         ({}, TORSION, "nothing moves along the axis$"),
         ({"bit": bit()}, TORSION, "nothing moves along the axis, and the weight on bit stays as it is"),
-        ({"bit": bit(), "hole": hole(STRAIGHT), "mud": MUD}, BOTH, "weight on bit, which friction along the hole"),
+        (
+            {"bit": bit(), "hole": hole(BENT), "mud": MUD, "depth": 2000.0},
+            TORSION,
+            "and the weight on bit stays as it is",
+        ),
         ({"bit": cf.BitOnRock(cf.Cutting(0.1, 60e6, 0.6, 4))}, BOTH, "the torque on bit follows the depth of cut"),
         ({"bit": cf.BitOnRock(cf.Lobes(3, 2e-3), weight=80e3)}, BOTH, "the lobes of the rock lift the bit"),
         ({"bit": None, "hook": cf.Hook(speed=0.3)}, BOTH, "the hook moves"),
@@ -92,6 +96,17 @@ def test_every_model_moves_and_goes_on(changed, settings, tmp_path):
     assert np.array_equal(again.rows, whole.rows, equal_nan=True) and np.isfinite(whole.errors.peak)
     assert np.array_equal(again.angle, whole.angle) and again.sticking.shape == again.speed.shape
     assert whole.times[-1] == pytest.approx(6.0, abs=whole.dt) and "Estimated errors by the step" in str(whole)
+
+
+def test_rotation_alone_moves_nothing_along_the_axis():
+    """Which is why torsion is enough for a torque that follows the weight on bit: both models agree."""
+    string = cf.DrillString([cf.Collar(200.0, "NC46-65"), cf.DrillPipe(size="5 in 19.50 lb/ft")])
+    given = scene(string=string, bit=bit(), hole=hole(BENT), mud=MUD, drive=cf.TopDrive(cf.Ramp((6.0,), end=2.0)))
+    found, both = (cf.simulate_drilling(given, 30.0, model=name) for name in ("auto", BOTH))
+    assert found.model == TORSION and both.model == BOTH
+    assert (both.weight_on_bit == 80e3).all() and not both.bit_advance.any()
+    assert found.surface_torque[-1] == pytest.approx(both.surface_torque[-1], rel=1e-2)
+    assert found.bit_angle[-1] == pytest.approx(both.bit_angle[-1], rel=1e-2)
 
 
 def test_elements_and_steps():

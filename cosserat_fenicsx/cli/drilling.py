@@ -157,7 +157,7 @@ def explain_drilling(options, tables):
             f"Motion: {settings['duration']:g} s in {steps} steps of {model.dt:.4g} s, {len(model.depths)} places "
             "along the string."
         )
-        lines += [f"{line}." for line in model.why]
+        lines += [f"{line[0].upper()}{line[1:]}." for line in model.why]
     if found.speeds:
         weights = f" and {len(found.weights)} weights on bit" if found.weights else ""
         lines.append(f"Stability at {len(found.speeds)} speeds{weights}.")

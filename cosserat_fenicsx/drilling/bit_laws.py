@@ -18,7 +18,7 @@ def _not_negative(owner, field, unit):
 
 @dataclass(frozen=True)
 class Stribeck:
-    """Torque on bit T = T_d + (T_s - T_d) exp(-|om|/speed) against the rotation, anything up to T_s at rest.
+    """Torque on bit T = T_d + (T_s - T_d) exp(-om/speed) against the rotation om, anything up to T_s at rest.
 
     Args:
         static, dynamic: T_s and T_d, N m; with a `radius` coefficients of friction: then the torque is coefficient

@@ -42,7 +42,11 @@ def chosen(scene, model="auto"):
 
 
 def _asks_for_axial(scene):
-    """What takes the axial motion, in words; empty where nothing does."""
+    """What takes the axial motion, in words; empty where nothing does.
+
+    A string that hangs in its weight, or stands on the rock with a weight on bit, does so in equilibrium: rotation
+    slips around alone, without a force along the hole, and the weight on bit that the torque may follow stays.
+    """
     law, found = getattr(scene.bit, "law", None), []
     moves = scene.hook is not None and not (scene.hook.signal().constant and scene.hook.signal()(0.0) == 0.0)
     if moves:
@@ -51,8 +55,6 @@ def _asks_for_axial(scene):
         found.append("the torque on bit follows the depth of cut")
     if isinstance(law, Lobes):
         found.append("the lobes of the rock lift the bit")
-    if isinstance(law, Stribeck) and law.radius is not None and scene.hole is not None:
-        found.append("the torque on bit follows the weight on bit, which friction along the hole changes")
     return found
 
 

@@ -35,7 +35,7 @@ class Discs:
     axial_drags: tuple[float, ...] | None = None
 
     def __post_init__(self):
-        n = np.size(self.inertias)
+        n = finite_array(self, "inertias", self.inertias, "at least two positive numbers (kg m^2)").size
         if n < 2:
             refuse(self, "inertias", self.inertias, "at least two (kg m^2)")
         self._check(

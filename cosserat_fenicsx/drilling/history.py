@@ -28,19 +28,23 @@ class DrillingHistory(Tabular):
     and the advance of the bit are positive downwards, tension and hook load where they pull. A model of torsion alone
     leaves what is axial NaN.
 
+    Arrays (n,) over `times`:
+
+    - ``drive_speed``, ``bit_speed``: rad/s; ``drive_angle``, ``bit_angle``: rad;
+    - ``surface_torque``, ``torque_on_bit``: N m; ``hook_load``, ``weight_on_bit``: N;
+    - ``bit_velocity``: m/s; ``bit_advance``: m;
+    - ``kinetic``, ``strain``: energies, J; ``work_of_drive``, ``work_of_hook``, ``work_of_weight``: done on the string
+      since the start, J; ``lost_at_bit``, ``lost_at_wall``, ``lost_in_mud``: J.
+
+    Arrays (k, m) over `profile_times` and `depths`: ``angle``, ``speed``, ``torque``, ``displacement``, ``velocity``,
+    ``tension`` in the same units, and ``sticking``: True where wall or rock hold the string.
+
     Attributes:
         scene: the `Drilling`.
         model: "torsion" or "axial and torsional". why: sentences on that choice, and on what the model leaves out.
         dt: step, s. counts: {name: number} of the solver, such as steps that were halved.
         times: (n,) s, each at the end of a step.
-        drive_speed, bit_speed: (n,) rad/s. drive_angle, bit_angle: (n,) rad.
-        surface_torque, torque_on_bit: (n,) N m.
-        hook_load, weight_on_bit: (n,) N. bit_velocity: (n,) m/s. bit_advance: (n,) m.
-        kinetic, strain: (n,) energies, J. work_of_drive, work_of_hook, work_of_weight: (n,) done on the string since
-            the start, J. lost_at_bit, lost_at_wall, lost_in_mud: (n,) J.
         profile_times: (k,) s. depths: (m,) measured depths, m.
-        angle, speed, torque, displacement, velocity, tension: (k, m) along the string at these times, in the same
-            units. sticking: (k, m) True where wall or rock hold the string.
         errors: with `check`, estimated errors by the step of the second half: `period` (s) of stick-slip, `peak`
             (rad/s) of the bit, `least_torque` and `largest_torque` (N m) at the surface; else None.
         folder: the `pathlib.Path` that it is stored in, or None.

@@ -204,7 +204,7 @@ def _made(where, entry, classes):
     for name, value in entry.items():
         if name in inner:
             entry[name] = _made(f"{where}.{name}", value, inner[name])
-        elif isinstance(value, dict) and name == "speed":
+        elif isinstance(value, dict) and name == "speed" and cls in (TopDrive, Hook):
             entry[name] = _signal(f"{where}.{name}", value, dimensions[name])
         elif name in dimensions:
             entry[name] = in_si(f"{where}.{name}", value, dimensions[name], UNITS)

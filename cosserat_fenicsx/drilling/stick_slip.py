@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-#: A bit whose speed is below this share of the drive's mean speed is at rest.
-AT_REST = 1e-3
+#: The laws hold a bit at zero exactly: one whose speed is below this share of the drive's mean speed is at rest.
+AT_REST = 1e-6
 #: A bit that has started reaches this share of it.
 FAST = 0.5
 
