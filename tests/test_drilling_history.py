@@ -5,6 +5,7 @@ import pytest
 from fake_string import Pendulum, scene, use
 
 import cosserat_fenicsx as cf
+from cosserat_fenicsx.drilling.history import DrillingHistory
 from cosserat_fenicsx.drilling.protocol import LEDGER, PROFILE, SERIES
 
 pytestmark = pytest.mark.serial
@@ -58,6 +59,18 @@ def test_starts_and_stops_are_interpolated():
     speed = np.array([0.0, 0.0, 2.0, 2.0, 0.0, 0.6, 0.4, 0.0, -4.0])  # it creeps at 5 s
     starts, stops = crossings(np.arange(9.0), speed, 0.5, 1.0)
     assert starts == pytest.approx([1.25, 7.125]) and stops == pytest.approx([3.75])
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_a_bit_that_swings_back_stops_once_a_period(sign):
+    """6 + 10 sin(2 pi t/5): it turns against the drive for a time, and no sample is at rest."""
+    rows = np.zeros((12000, 1 + len(SERIES) + len(LEDGER)))
+    t = rows[:, 0] = 0.005 * np.arange(12000) + 0.0017
+    rows[:, 1 + SERIES.index("drive_speed")] = 6.0 * sign
+    rows[:, 1 + SERIES.index("bit_speed")] = sign * (6 + 10 * np.sin(2 * np.pi * t / 5))
+    found = DrillingHistory(scene(), "torsion", (), 0.005, np.arange(2.0), rows).stick_slip()
+    assert found.period == pytest.approx(5, rel=1e-4) and found.sticks and found.stuck == 0
+    assert found.starts[0] % 5 == pytest.approx(5 - np.arcsin(0.6) * 5 / (2 * np.pi), abs=6e-3)
 
 
 def test_balance(history):

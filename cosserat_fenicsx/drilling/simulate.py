@@ -9,7 +9,7 @@ from cosserat_fenicsx.drilling.bit_laws import Cutting, Lobes
 from cosserat_fenicsx.drilling.choose import chosen, fastest
 from cosserat_fenicsx.drilling.folder import DrillingFolder
 from cosserat_fenicsx.drilling.history import DrillingHistory
-from cosserat_fenicsx.drilling.models import model_of
+from cosserat_fenicsx.drilling.models import OtherSteps, model_of
 from cosserat_fenicsx.drilling.scene import Drilling
 from cosserat_fenicsx.drilling.step_errors import step_errors
 from cosserat_fenicsx.drilling.time_loop import TimeLoop
@@ -78,7 +78,7 @@ def simulate_drilling(
         kept = DrillingFolder(folder).make(scene, history, asked)
     TimeLoop(running, history, kept, **apart).until(duration, progress)
     if check:
-        history.errors = step_errors(running, history.rows, duration / 2)
+        history.errors = step_errors(OtherSteps(scene, name, running), history.rows, duration / 2)
     return history
 
 

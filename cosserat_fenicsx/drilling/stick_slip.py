@@ -19,7 +19,8 @@ class StickSlip:
         drive, mean: mean speeds of top drive and bit, rad/s, over whole periods where there are some.
         peak, least: largest and smallest speed of the bit, rad/s.
         period: mean time between two starts of the bit from rest, s; NaN where it starts fewer than twice.
-        periods: (n,) those times, s. starts, stops: when the bit starts and stops, s.
+        periods: (n,) those times, s. starts, stops: when the bit starts and stops, s. A bit that swings back stops
+            where it ceases to turn with the drive, and starts where it does so again.
         stuck: share of the time that the bit is at rest, over whole periods where there are some.
         severity: half the range of the bit's speed over the mean speed of the drive: 0 for a steady rotation, 1 and
             more where the bit comes to rest.
@@ -43,7 +44,7 @@ class StickSlip:
 
     @property
     def sticks(self) -> bool:
-        """Whether the bit comes to rest in this time."""
+        """Whether the bit comes to rest in this time, or swings back."""
         return len(self.starts) > 1 or self.stuck > 0.01
 
     def __str__(self):
@@ -91,7 +92,9 @@ def stick_slip_of(history, since):
     drive = history.drive_speed[rows]
     usual = max(float(np.abs(drive).mean()), 1e-3)
     level = AT_REST * usual
-    starts, stops = crossings(t, bit, level, FAST * usual)
+    # a bit that swings back passes through rest between two samples: what turns against the drive has stopped, too
+    forth = np.maximum(np.sign(drive.mean()) * bit, 0.0) if abs(drive.mean()) > usual / 2 else bit
+    starts, stops = crossings(t, forth, level, FAST * usual)
     periods = np.diff(starts)
     whole = (t[1:] > starts[0]) & (t[1:] <= starts[-1]) if len(periods) else np.full(len(lengths), True)
     mean_drive, mean = (_mean(values, lengths * whole) for values in (drive, bit))

@@ -157,7 +157,7 @@ class TorsionWaves(Pointers):
         if isinstance(control, PI):
             c.Kp, c.Ki = control.Kp, control.Ki
         elif isinstance(control, Matched):
-            c.Kp = self._below[0] if control.impedance is None else control.impedance
+            c.Kp = control.impedance or scene.segments[0].torsional_impedance
             c.given = control.torque
         elif isinstance(control, Motor):
             c.Kp, c.given = control.drag, control.torque
@@ -205,9 +205,9 @@ class TorsionWaves(Pointers):
             raise problem
         return rows
 
-    def coarser(self) -> "TorsionWaves":
-        """The same scene at rest, with twice the step."""
-        return type(self)(self.scene, 2 * self.dt, normal_force=self.normal_force)
+    def with_step(self, factor: float) -> "TorsionWaves":
+        """The same scene at rest, with so many times the step."""
+        return type(self)(self.scene, factor * self.dt, normal_force=self.normal_force)
 
     def profile(self) -> np.ndarray:
         """See `StringModel`; speeds and torques are means over the last two steps; a bit that sticks counts, too."""

@@ -1,0 +1,48 @@
+"""Estimated errors by the step of strings in motion, and what the estimate compares."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from torsion_scenes import PIPE, SPEED, off_bottom, run, stick_slip, string
+
+import cosserat_fenicsx as cf
+from cosserat_fenicsx.drilling.axial_torsional.model import AxialTorsional
+from cosserat_fenicsx.drilling.step_errors import cycle_of, step_errors
+from cosserat_fenicsx.drilling.torsion.model import TorsionWaves
+
+pytestmark = pytest.mark.serial
+
+
+def test_a_rotation_to_the_left_is_the_mirror_image():
+    models = [TorsionWaves(stick_slip(sign * 2 * np.pi), 20 / SPEED) for sign in (1, -1)]
+    (right, ours), (left, theirs) = ((cycle_of(rows, 30), step_errors(m, rows, 30))
+                                     for m in models for rows in run(m, 60)[1:])  # fmt: skip
+    assert left == pytest.approx((right.period, right.peak, -right.largest_torque, -right.least_torque), rel=1e-12)
+    assert theirs == pytest.approx((ours.period, ours.peak, ours.largest_torque, ours.least_torque), rel=1e-9)
+    assert right.peak > 15 and ours.peak > 0
+
+
+@pytest.mark.parametrize("model", ["torsion", "axial and torsional"])
+def test_where_friction_allows_no_longer_step_a_shorter_one_is_compared(model):
+    scene = replace(off_bottom()[0], friction=cf.WallFriction(0.3, 0.195, 0.05, of_rotation=True))
+    errors = cf.simulate_drilling(scene, 9, model=model, check=True, progress=False).errors
+    assert 0 < errors.peak < 5 and 0 < errors.largest_torque < 1000
+
+
+def test_a_mesh_that_cannot_be_coarser_is_compared_with_a_finer_one():
+    found = cf.simulate_drilling(stick_slip(), 60, model="axial and torsional", elements=2, check=True, progress=False)
+    assert len(found.depths) == 4
+    finer = cycle_of(run(AxialTorsional(stick_slip(), found.dt / 2, 6), 60)[1], 30)
+    assert found.errors == pytest.approx(2 * np.abs(np.subtract(cycle_of(found.rows, 30), finer)), rel=1e-6)
+
+
+def test_a_matched_drive_has_the_impedance_of_the_uppermost_component_however_short_it_is():
+    """A short thin sub above a stub and pipe: within a cell with them it must not change the drive."""
+    laid = string((5.0, 0.08, 0.03), (0.7, 0.25, 0.05), (2000.0, *PIPE[1:]))
+    scene = cf.Drilling(laid, cf.TopDrive(6.0, control=cf.Matched()))
+    Z = scene.segments[0].torsional_impedance
+    told = replace(scene, drive=cf.TopDrive(6.0, control=cf.Matched(Z)))
+    assert Z < 100
+    rows, given = (run(TorsionWaves(x, 20 / SPEED), 10)[1] for x in (scene, told))
+    assert np.array_equal(rows, given, equal_nan=True)
