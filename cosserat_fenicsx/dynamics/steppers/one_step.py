@@ -71,8 +71,7 @@ class OneStep:
         self._predictor = guesses[0]
         self.work += problem.work()
         self.dissipated += problem.dissipated()
-        problem.model.accept(unit)
-        problem.model.actions.commit()
+        problem.accept()
         return solved
 
     def _predicted(self, h):
