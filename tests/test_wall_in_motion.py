@@ -5,6 +5,7 @@ import pytest
 from conftest import COMM
 from moving_scenes import drift
 from mpi4py import MPI
+from scipy.integrate import simpson
 
 import cosserat_fenicsx as cf
 from cosserat_fenicsx.actions.hole_wall import HoleRing, HoleWall
@@ -194,6 +195,8 @@ def stopping(taken):
         ({"damping": -1.0}, "damping"),
         ({"damping": np.inf}, "damping"),
         ({"stiffness": 0.0}, "stiffness"),
+        ({"kinetic": 1.2}, "kinetic"),
+        ({"speed": 0.0}, "speed"),
         ({"contact_radius": 0.2}, "less than the radius of the tube"),
     ],
 )
@@ -229,3 +232,21 @@ def test_forces_of_walls_are_told(tmp_path_all):
     np.testing.assert_allclose(stored.wall_forces(wall).along, found.along, rtol=1e-9)
     with pytest.raises(cf.SceneError, match="a wall of the scene"):
         history.wall_forces(scene.loads[1])
+
+
+def test_friction_is_weaker_in_slip():
+    """v' = -mu(v) g until it stops; and a weight at tan = 0.25 moves it from rest where friction is 0.2, not 0.3."""
+    mu, kinetic, speed, v = 0.3, 0.4, 0.05, 0.2
+    rod, scene, _ = resting(HORIZONTAL, 1e8, linear=(v, 0, 0), friction=mu, kinetic=kinetic, speed=speed)
+    v0 = np.linspace(0, v, 4001)
+    rate = 1 / (mu * (kinetic + (1 - kinetic) * np.exp(-v0 / speed)) * G)
+    stop, path = (simpson(values, x=v0) for values in (rate, rate * v0))
+    history = cf.simulate(scene, 1.2 * stop, dt=stop / 400, **SMALL)
+    x = history.position(rod.start)[:, 0] - rod.curve.position(0.0)[0]
+    assert x[-1] == pytest.approx(path, rel=5e-3)
+    for friction, slides in ((0.3, False), (0.2, True)):
+        rod, scene, _ = resting(HORIZONTAL, 1e8, friction=friction, kinetic=0.5)
+        pull = cf.Force(rod.start, (0.25 * thick_rod(HORIZONTAL)[1] * G, 0, 0))
+        scene = cf.Scene([rod], [], [*scene.loads, pull])
+        moved = cf.simulate(scene, 0.1, dt=1e-3, **SMALL).displacement(rod.start)[-1, 0]
+        assert (moved > 1e-3) == slides and (slides or abs(moved) < 1e-6)

@@ -7,7 +7,7 @@ import numpy as np
 
 from cosserat_fenicsx.actions.tube_wall import TubeRing, TubeWall
 from cosserat_fenicsx.annotations import Numbers
-from cosserat_fenicsx.checks import number, store
+from cosserat_fenicsx.checks import number, positive, store
 
 #: Of a tube, near points of a rod: measured depth (n,), m; point of the axis (n, 3), m, inertial; unit tangent (n, 3);
 #: clearance (n,), m; radius of the rod's surface where friction acts (n,), m; friction coefficient (n,).
@@ -23,6 +23,8 @@ class _InMotion:
         super()._check(unit)
         expected = "a number of zero or more (s/m)"
         store(self, damping=number(self, "damping", self.damping, expected, lambda x: 0 <= x < np.inf))
+        store(self, kinetic=number(self, "kinetic", self.kinetic, "a number from 0 to 1", lambda x: 0 <= x <= 1))
+        store(self, speed=positive(self, "speed", self.speed, "m/s"))
 
     def data(self, rod, s):
         """See `Action`."""
@@ -58,6 +60,9 @@ class HoleWall(_InMotion, TubeWall):
         friction: friction coefficient; or pieces [(md_end, coefficient)] along the axis.
         begins: measured depth near which the rod's start lies, m.
         damping: s/m, over the speed of penetration.
+        kinetic: friction in fast slip over that at rest; the coefficient is ``friction (kinetic + (1 - kinetic)
+            exp(-v/speed))`` with the speed v of slip in the step before, so that a step has one solution.
+        speed: m/s, see `kinetic`.
 
     Raises:
         SceneError: numbers outside their range, or a rod as wide as the hole.
@@ -66,6 +71,8 @@ class HoleWall(_InMotion, TubeWall):
     slip: Numbers = field(default=(0.0, 0.0), init=False, repr=False, compare=False)
     has_arm: bool = field(default=True, init=False, repr=False, compare=False)
     damping: float = 0.0
+    kinetic: float = 1.0
+    speed: float = 0.1
 
 
 @dataclass(frozen=True)
@@ -79,7 +86,7 @@ class HoleRing(_InMotion, TubeRing):
         contact_radius: radius of the ring, m, the arm of its friction.
         stiffness: N/m.
         friction: friction coefficient.
-        begins, damping: see `HoleWall`.
+        begins, damping, kinetic, speed: see `HoleWall`.
 
     Raises:
         SceneError: numbers outside their range.
@@ -87,3 +94,5 @@ class HoleRing(_InMotion, TubeRing):
 
     slip: Numbers = field(default=(0.0, 0.0), init=False, repr=False, compare=False)
     damping: float = 0.0
+    kinetic: float = 1.0
+    speed: float = 0.1

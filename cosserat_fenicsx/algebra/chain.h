@@ -179,6 +179,7 @@ int attach(petsc *functions, newton *n, void *snes, void *vector, void *matrix, 
 
 int settle(contact *c);
 int broken(const contact *c);
+void slips(const contact *c, double *size);
 double stored(const contact *c, int at_start);
 
 int negative_modes(second_variation *v, int *sideways);

@@ -7,8 +7,8 @@
 
 enum { MOST_LOCAL = 60 };
 
-/* The normal force of a node, and its derivative by the distance R from the axis at the end of the step; R0 at its start.
-   By the discrete gradient of k <R - clearance>^2/2, so that its work is the change of this energy (Gonzalez, J.
+/* The normal force of a node, and its derivative by the distance R from the axis at the end of the step; R0: at its
+   start. By the discrete gradient of k <R - clearance>^2/2, so that its work is the change of this energy (Gonzalez, J.
    Nonlinear Sci. 6 (1996) 449), or at the end of the step; times 1 + damping * (R - R0)/h (Hunt & Crossley, J. Appl.
    Mech. 42 (1975) 440). */
 static double normal_force(const contact *c, int i, double R0, double R, double *slope)
@@ -51,8 +51,8 @@ static double settle_normal(const contact *c, int i, double R0, double R_now, do
     return n;
 }
 
-/* T with |T| <= most that makes the slip A T + b zero, or else opposite to T: the minimum of T A T/2 + b T in that disc,
-   by Newton's method for the multiplier (More & Sorensen, SIAM J. Sci. Stat. Comput. 4 (1983) 553). */
+/* T with |T| <= most that makes the slip A T + b zero, or else opposite to T: the minimum of T A T/2 + b T in that
+   disc, by Newton's method for the multiplier (More & Sorensen, SIAM J. Sci. Stat. Comput. 4 (1983) 553). */
 static void settle_friction(const double A[3], const double b[2], double most, double T[2])
 {
     double shift = 0;
@@ -84,7 +84,7 @@ static void cross3(const double *a, const double *b, double *c)
     c[0] = a[1] * b[2] - a[2] * b[1], c[1] = a[2] * b[0] - a[0] * b[2], c[2] = a[0] * b[1] - a[1] * b[0];
 }
 
-/* Directions at a node: x from the axis to the rod at the end, e and its size where the force acts, tau round the axis. */
+/* Directions at a node: x from the axis to the rod at the end, e and its size where the force acts, tau round it. */
 typedef struct {
     double x[3], R0, R, e[3], share, tau[3];
 } place;
@@ -120,21 +120,37 @@ static void respond(const double *W, const double *v, double *Wv)
     for (int k = 0; k < 6; k++) Wv[k] = dot6(W + 6 * k, v);
 }
 
+/* Forces and moments of unit friction round and along the axis; their work by a motion is the slip. */
+static void slip_directions(const contact *c, int i, const place *p, double *across, double *along)
+{
+    const double *t = c->tangent + 3 * i, arm = c->arm[i];
+    for (int k = 0; k < 3; k++) {
+        across[k] = p->tau[k], across[3 + k] = arm * t[k];
+        along[k] = t[k], along[3 + k] = -arm * p->tau[k];
+    }
+}
+
+/* Size of the slip of every node in the step, whose motion is given, whether it touches or would. */
+void slips(const contact *c, double *size)
+{
+    for (int i = 0; i < c->nodes; i++) {
+        double across[6], along[6];
+        const place p = place_of(c, i);
+        slip_directions(c, i, &p, across, along);
+        size[i] = hypot(dot6(across, c->moved + 6 * i), dot6(along, c->moved + 6 * i));
+    }
+}
+
 /* Solve a node with the forces of all others; returns the size of the change of its motion by its own. */
 static double settle_node(contact *c, int i)
 {
-    const double *t = c->tangent + 3 * i, *W = c->compliance + ((size_t)i * (2 * c->reach + 1) + c->reach) * 36;
-    const double arm = c->arm[i];
+    const double *W = c->compliance + ((size_t)i * (2 * c->reach + 1) + c->reach) * 36;
     double *force = c->force + 6 * i, *moved = c->moved + 6 * i, *law = c->law + 3 * i;
     const place p = place_of(c, i);
     if (p.R0 <= c->clearance[i] && p.R <= c->clearance[i] && law[0] == 0 && law[1] == 0 && law[2] == 0) return 0;
-    /* forces and moments of the law's three numbers; their work by the motion is -share (R), slip round, slip along */
     double inward[6] = {0}, across[6], along[6], out[6] = {0}, by[3][6], slip[6], change[6];
-    for (int k = 0; k < 3; k++) {
-        inward[k] = -p.share * p.e[k], out[k] = p.R > 0 ? p.x[k] / p.R : 0;
-        across[k] = p.tau[k], across[3 + k] = arm * t[k];
-        along[k] = t[k], along[3 + k] = -arm * p.tau[k];
-    }
+    for (int k = 0; k < 3; k++) inward[k] = -p.share * p.e[k], out[k] = p.R > 0 ? p.x[k] / p.R : 0;
+    slip_directions(c, i, &p, across, along);
     respond(W, inward, by[0]);
     const double N = settle_normal(c, i, p.R0, p.R, law[0], -dot6(out, by[0]));
     double T[2] = {0, 0};
@@ -158,14 +174,14 @@ static double settle_node(contact *c, int i)
         respond(W + 36 * j, change, moving);
         for (int k = 0; k < 6; k++) {
             to[k] += moving[k];
-            if (j == 0) size = fmax(size, fabs(moving[k]) * (k < 3 ? 1 : arm));
+            if (j == 0) size = fmax(size, fabs(moving[k]) * (k < 3 ? 1 : c->arm[i]));
         }
     }
     return size;
 }
 
-/* Forces of all nodes with which their law holds, to a share of the first change; the motion follows. Returns the number
-   of sweeps. */
+/* Forces of all nodes with which their law holds, to a share of the first change; the motion follows. Returns the
+   number of sweeps. */
 int settle(contact *c)
 {
     double first = 0;
@@ -188,13 +204,13 @@ int broken(const contact *c)
         double slope;
         const place p = place_of(c, i);
         const double off = fabs(normal_force(c, i, p.R0, p.R, &slope) - law[0]);
-        if (!(off <= 1e-6 * law[0] + 1e-10 * c->stiffness[i]) || (law[0] > 0 && c->clearance[i] > 0 && dot3(p.x, c->start + 3 * i) <= 0))
-            return 1;
+        if (!(off <= 1e-6 * law[0] + 1e-10 * c->stiffness[i])) return 1;
+        if (law[0] > 0 && c->clearance[i] > 0 && dot3(p.x, c->start + 3 * i) <= 0) return 1;
     }
     return 0;
 }
 
-/* Stored energy at the end of the step minus that at its start, over all nodes; the motion is given. */
+/* Stored energy of all nodes at the end of the step, whose motion is given, or at its start. */
 double stored(const contact *c, int at_start)
 {
     double sum = 0;

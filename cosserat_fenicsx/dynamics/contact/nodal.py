@@ -51,6 +51,9 @@ class NodalContact(Pointers):
         sizes = {"tangent": 3, "start": 3, "moved": 6, "force": 6, "law": 3}
         self._vectors = {name: np.zeros((n, size)) for name, size in sizes.items()}
         self._compliance = np.zeros((n, 2 * reach + 1, 6, 6))
+        self._weaker = np.concatenate([np.full((len(p.slots), 2), p.weaker) for p in touched])[order]
+        self._weaker[:, 1] *= model.time / scales.length
+        self._slip, self._slip_begun = np.full(n, np.nan), np.zeros(n)  # speeds of slip in the last step
         self._begun, self._law_begun = (self._vectors[name].copy() for name in ("force", "law"))
         self.c = contact = self._ffi.new("contact *")
         contact.nodes, contact.reach, contact.at_end = n, reach, at_end
@@ -78,6 +81,15 @@ class NodalContact(Pointers):
             numbers["clearance"][at], numbers["arm"][at] = tube.clearance / scales.length, tube.arm / scales.length
             numbers["friction"][at] = tube.friction
         self.c.h = h
+        if np.isnan(self._slip).any():  # the first step
+            velocity = self._nodes.of_local(self._problem.model.velocity.x.array)
+            vectors["moved"][:] = h * np.concatenate(
+                [velocity[:, :3], (small_rotations(now[:, 3:]) @ velocity[:, 3:, None])[..., 0]], axis=1
+            )
+            self.accept()
+        self._slip_begun[:] = self._slip
+        kinetic, speed = self._weaker.T
+        numbers["friction"] *= kinetic + (1 - kinetic) * np.exp(-self._slip / speed)
         if abs(h - self._known_for) > 1e-9 * h:
             self._known_for = np.nan
         self._begun[:], self._law_begun[:] = vectors["force"], vectors["law"]
@@ -89,6 +101,7 @@ class NodalContact(Pointers):
     def give_up(self):
         """The step has failed: the forces are those at its start again."""
         self._vectors["force"][:], self._vectors["law"][:] = self._begun, self._law_begun
+        self._slip[:] = self._slip_begun
 
     def add_forces(self, b):
         """Subtract the forces from this rank's part of a residual."""
@@ -148,6 +161,11 @@ class NodalContact(Pointers):
 
     # -- books -------------------------------------------------------------------------------------------------------
 
+    def accept(self):
+        """Take the step: friction in the next one has the coefficients of its slip speeds."""
+        self._lib.slips(self.c, self._ffi.from_buffer("double[]", self._slip))
+        self._slip /= self.c.h
+
     def books(self):
         """Increase of the stored energy in the step, and energy dissipated by friction and damping; dimensionless."""
         vectors = self._vectors
@@ -169,14 +187,14 @@ class NodalContact(Pointers):
         """What later steps depend on."""
         kept = {name: self._vectors[name].copy() for name in ("force", "law")}
         md = np.concatenate([place.md for place in self._walls])
-        return {**kept, "md": md, "compliance": self._compliance.copy(), "known_for": self._known_for,
-                "usual": self._usual}  # fmt: skip
+        kept |= {"md": md, "slip": self._slip.copy(), "compliance": self._compliance.copy()}
+        return {**kept, "known_for": self._known_for, "usual": self._usual}
 
     def recall(self, memory):
         """Restore what `memory` returned."""
         for name in ("force", "law"):
             self._vectors[name][:] = memory[name]
-        self._compliance[:] = memory["compliance"]
+        self._compliance[:], self._slip[:] = memory["compliance"], memory["slip"]
         self._known_for, self._usual = float(memory["known_for"]), float(memory["usual"])
         for place, md in zip(self._walls, np.split(memory["md"], self._ends), strict=True):
             place.md = md
@@ -188,6 +206,7 @@ class _Place:
     def __init__(self, wall, slots, s, lengths, origin):
         self.wall, self.slots, self.s, self.origin = wall, slots, s, origin
         self.stiffness, self.damping = wall.stiffness * lengths, np.full(len(s), wall.damping)
+        self.weaker = wall.kinetic, wall.speed
         self.md = s + wall.begins
 
 

@@ -76,8 +76,7 @@ class OneStep:
         self.work += problem.work()
         self.dissipated += problem.dissipated()
         delays.accept(t, h)
-        problem.model.accept(unit)
-        problem.model.actions.commit()
+        problem.accept()
         return solved
 
     def _predicted(self, h):

@@ -185,6 +185,13 @@ class StepProblem(Equations):
         lost = self._scalar(self.model.forms.dissipated) if self.model.damped else 0.0
         return lost + self.contact.books()[1] if self.contact else lost
 
+    def accept(self):
+        """Take the step, after its books."""
+        self.model.accept(self.h)
+        self.model.actions.commit()
+        if self.contact:
+            self.contact.accept()
+
     def energies(self):
         """Kinetic and strain energy of the state, dimensionless, over all ranks."""
         return tuple(self._scalar(form) for form in (self.model.forms.kinetic, self.model.forms.strain))
