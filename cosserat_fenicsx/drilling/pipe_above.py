@@ -2,7 +2,6 @@
 
 import math
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 import ufl
@@ -73,16 +72,31 @@ class PipeAbove(PointAction):
             if getattr(self, field) is not None:
                 instance(self, field, getattr(self, field), kind, f"a {kind.__name__}(...) or None")
         store(self, tension=number(self, "tension", self.tension, "a finite number (N)", math.isfinite))
-        _ = self.segments
+        store(self, _numbers=self._found_numbers())
 
-    @cached_property
+    def _found_numbers(self):
+        """What else a motion depends on, for the fingerprint of a scene: functions of time by some values."""
+        hook, drag, control = self.hook or Hook(), self.drag or ViscousDrag(), vars(self.drive.control)
+        found = [x for part in self.segments for x in (part.length, part.GJ, part.rhoJ, part.EA, part.rhoA)]
+        found += [
+            drag.torsion,
+            drag.axial,
+            hook.stiffness,
+            self.drive.inertia,
+            *map(float, filter(None, control.values())),
+        ]
+        for signal in (self.drive.signal(), hook.signal()):
+            found += [signal(t) for t in (0.0, 1.0, 10.0)]
+        return tuple(found)
+
+    @property
     def segments(self) -> tuple[Segment, ...]:
         """The uniform parts, from the top down."""
         return tuple(
             part if isinstance(part, Segment) else segment_of(Laid(0.0, part.length, part), 0.0) for part in self.pipe
         )
 
-    @cached_property
+    @property
     def _springs(self):
         """Stiffness of the pipe at rest between its lower end and a held top, N/m and N m/rad."""
         give = math.fsum(x.length / x.EA for x in self.segments) + 1 / (self.hook or Hook()).stiffness
@@ -103,6 +117,11 @@ class PipeAbove(PointAction):
             springs, (forces, damping) = (0.0, 0.0), self.acting
         values = zip((*forces, *damping, *springs), ("N", "N m", "N s/m", "N m s/rad", "N/m", "N m/rad"), strict=True)
         return (vector(self.down(), "1"), *(scalar(value, unit) for value, unit in values))
+
+    def holds(self, scene):
+        """See `Action`."""
+        none = np.zeros(3)
+        return [(self.station, np.r_[self.down(), none]), (self.station, np.r_[none, self.down()])]
 
     @staticmethod
     def work(point, test, down, thrust, torque, b, d, k, c):
