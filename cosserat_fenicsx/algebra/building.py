@@ -25,7 +25,7 @@ from cosserat_fenicsx import compat
 from cosserat_fenicsx.compiling import cache, compiling
 from cosserat_fenicsx.processor import instructions
 
-SOURCES = tuple(Path(__file__).with_name(name) for name in ("chain.c", "newton.c", "sweep.c"))
+SOURCES = tuple(Path(__file__).with_name(name) for name in ("chain.c", "newton.c", "sweep.c", "contact.c"))
 # What -ffast-math would add hides numbers that are not finite, and changes sums. Python's own -fwrapv slows loops down.
 _FLAGS = ("-O3", "-fno-math-errno", "-ffp-contract=fast", "-fno-wrapv", "-fopenmp-simd", "-fvisibility=hidden", "-g0")
 _DIGEST = hashlib.sha256

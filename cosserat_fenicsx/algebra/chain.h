@@ -93,6 +93,20 @@ typedef struct {
     double spent, enough;
 } stepping;
 
+/* Contact of nodes with the wall of a tube in a time step, whose nodes move linearly with the forces: see contact.c. All
+   vectors are inertial. */
+typedef struct {
+    int nodes, reach, at_end, most; /* nodes that may touch; how many on each side of one its force moves; whether forces
+                                       are those of the end of the step, not of its mean; sweeps */
+    const double *clearance, *stiffness, *friction, *damping, *arm; /* (nodes,); arm: radius of the rod's surface */
+    double h, share, smallest;      /* the step; changes that end the sweeps, of the first one and of all */
+    const double *tangent, *start;  /* (nodes, 3) of the tube; from its axis to the rod at the start, across it */
+    const double *compliance;       /* (nodes, 2 reach + 1, 6, 6) motion of the neighbours, and of the node itself in the
+                                       middle, by its force and moment */
+    double *moved;                  /* (nodes, 6) displacement and rotation in the step with the forces */
+    double *force, *law;            /* (nodes, 6) force and moment; (nodes, 3) normal force, friction round and along */
+} contact;
+
 /* Functions of PETSc. */
 typedef struct {
     int (*get_read)(void *, const double **);
@@ -162,6 +176,10 @@ void advance(problem *p);
 void begin(newton *n);
 int iterate(stepping *s);
 int attach(petsc *functions, newton *n, void *snes, void *vector, void *matrix, void *pc);
+
+int settle(contact *c);
+int broken(const contact *c);
+double stored(const contact *c, int at_start);
 
 int negative_modes(second_variation *v, int *sideways);
 int run(sweep *s);

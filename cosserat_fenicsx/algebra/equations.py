@@ -11,7 +11,7 @@ from cosserat_fenicsx.algebra.interface import condensed
 from cosserat_fenicsx.algebra.pointers import Pointers
 
 #: What C asks Python for, see newton.c.
-STATE, RESIDUAL, TANGENT, INTERFACE, ADD_UP, SUM, MATRICES, COUNT = (1 << k for k in range(8))
+STATE, RESIDUAL, TANGENT, INTERFACE, ADD_UP, SUM, MATRICES, COUNT, CONTACT = (1 << k for k in range(9))
 
 
 @cache
@@ -195,6 +195,8 @@ class Equations(Called):
             self._array(b, numbering.size)[:] = self._vector_of_x.array_r
         elif what == SUM:
             self._array(a, 1)[0] = numbering.comm.allreduce(float(a[0]))
+        elif what == CONTACT:
+            self._touch(self._array(a, numbering.size), self._array(b, numbering.size))
         else:
             self._change_matrices()
 
@@ -208,6 +210,9 @@ class Equations(Called):
         """Change the residual b at x, arrays of this rank's unknowns."""
         if self.ties:
             self.ties.add_residual(b, self.eta)
+
+    def _touch(self, x, change):
+        """Where nodes may touch: change Newton's step, which is subtracted from x; arrays of this rank's unknowns."""
 
     def _change_matrices(self):
         """Change `matrices`, of the elements."""

@@ -5,7 +5,7 @@
 #include <math.h>
 #include <string.h>
 
-enum { STATE = 1, RESIDUAL = 2, TANGENT = 4, INTERFACE = 8, ADD_UP = 16, SUM = 32, MATRICES = 64 };
+enum { STATE = 1, RESIDUAL = 2, TANGENT = 4, INTERFACE = 8, ADD_UP = 16, SUM = 32, MATRICES = 64, CONTACT = 256 };
 enum { FAILED = 1 };
 
 static int python_hook(void *self, int what, double *a, double *b);
@@ -130,6 +130,7 @@ int iterate(stepping *s)
             s->fresh = 0, s->spent = s->price, s->served = 0;
         }
         if (solve(p, s->b, s->change)) return FAILED;
+        if (!p->singular && hook(p, CONTACT, s->x, s->change)) return FAILED;
         if (p->singular) {
             s->outcome = SINGULAR;
             break;

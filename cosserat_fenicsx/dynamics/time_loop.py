@@ -161,5 +161,7 @@ class TimeLoop:
             ties = np.full((len(model.signature.connections.ties), 2, 6), np.nan)
             clamps = np.full((model.clamps.count, 6), np.nan)
         held = {"tie_forces": ties, "clamp_forces": clamps}
+        if problem.contact:
+            held["wall_forces"] = problem.contact.of_step() if stepped else np.full((problem.contact.count, 3), np.nan)
         self.history.append(Instant(problem.load_factor, nodal, gauss, 0, iterations, problem.multipliers(), time=t,
                                     rates=rates, steps=self._steps, ledger=ledger, **held))  # fmt: skip

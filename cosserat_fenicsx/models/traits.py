@@ -52,7 +52,7 @@ def data_of(action, rod, s):
 def traits_of(action, rods):
     """The `Traits` of an action in a scene with these rods."""
     work = work_of(action)
-    if work is None:
+    if work is None and not action.traits:
         return Traits(True, True, False, True, True)
     return Traits(**action.traits) if action.traits else found_traits(action, rods)
 

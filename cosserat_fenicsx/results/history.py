@@ -2,15 +2,17 @@
 
 from collections import namedtuple
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
 
 from cosserat_fenicsx.quaternions import directors
+from cosserat_fenicsx.results.at_walls import WallForces, wall_forces
 from cosserat_fenicsx.results.records import Record
 from cosserat_fenicsx.results.result import Result
 from cosserat_fenicsx.results.viscous import viscous_contact
+from cosserat_fenicsx.scene.action import Action
 from cosserat_fenicsx.scene.rod import RodOrName, StationOrName
 
 #: Energies (J), work and dissipation since the start (J), linear and angular momentum (kg m/s, kg m^2/s), inertial, the
@@ -28,6 +30,8 @@ class Instant(Record):
         ledger: the `Ledger`.
         clamp_forces: force and moment (points, 6) that held every clamped point in the last step, dimensionless,
             inertial: those of the clamp and of other supports and joints together; NaN where no step led to the state.
+        wall_forces: (touching nodes, 3) see `at_walls.WallForces`, dimensionless, wall by wall and rod by rod; NaN
+            likewise.
     """
 
     time: float = 0.0
@@ -35,6 +39,7 @@ class Instant(Record):
     steps: int = 0
     ledger: Ledger = None
     clamp_forces: np.ndarray = None
+    wall_forces: np.ndarray = field(default_factory=lambda: np.empty((0, 3)))
 
 
 class History(Result):
@@ -193,6 +198,18 @@ class History(Result):
     def _all_gauss(self):
         """(times, elements, points, 9) n, m and r' at the Gauss points, dimensionless."""
         return np.array([record.gauss_fields for record in self._records])
+
+    def wall_forces(self, wall: Action) -> WallForces:
+        """The forces of a wall of motions, such as a `HoleWall`, on the nodes that may touch it, in the step that led
+        to every state; NaN where no step did.
+
+        Args:
+            wall: of the scene.
+
+        Raises:
+            SceneError: something else.
+        """
+        return wall_forces(self, wall)
 
     def _at_clamp(self, point, joined):
         return self._stacked("clamp_forces")[:, point]

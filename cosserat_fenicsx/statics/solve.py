@@ -264,6 +264,12 @@ def check_arguments(scene, tol, elements):
             "a function of the arc length as Along(function), or a motion: cf.simulate(scene, duration) in Python, a "
             "duration under [simulate] in a scene file, --duration on the command line"
         )
+    for action in scene.actions:
+        if action.touches:
+            raise SceneError(
+                f"Scene: the {type(action).__name__} acts in motions alone: expected a TubeWall or a TubeRing for an "
+                "equilibrium, or a motion: cf.simulate(scene, duration)"
+            )
     check_no_mechanism(scene)
     if isinstance(tol, bool) or not isinstance(tol, numbers.Real) or not 1e-12 <= tol < 1:
         raise SceneError(f"tol = {tol!r}: expected a number from 1e-12 to below 1")

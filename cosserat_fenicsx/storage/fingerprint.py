@@ -128,9 +128,8 @@ def _apart(a, b):
     """The largest difference of two values; infinity where they differ and are not arrays of numbers of one shape."""
     a, b = _array(a), _array(b)
     if a.dtype.kind == "f" and b.dtype.kind == "f" and a.shape == b.shape:
-        return float(
-            np.abs(np.subtract(a, b, out=np.zeros_like(a), where=a != b)).max(initial=0.0)
-        )  # equal infinities differ by 0
+        # equal infinities differ by 0
+        return float(np.abs(np.subtract(a, b, out=np.zeros(a.shape), where=a != b)).max(initial=0.0))
     return 0.0 if a.shape == b.shape and bool((a == b).all()) else np.inf
 
 

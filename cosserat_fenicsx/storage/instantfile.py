@@ -18,7 +18,9 @@ _MAGIC = b"\x93NUMPY\x01\x00"
 #: Scalar columns of a row by their types in the file (the scalars of an `Instant`), and its arrays; the fields of its
 #: `Ledger` follow.
 _OF_INSTANT = {"time": "<f8", "load_factor": "<f8", "steps": "<i8", "iterations": "<i8"}
-_ARRAYS = ("rq", "rates", "gauss_fields", "reactions", "tie_forces", "clamp_forces")
+_ARRAYS = ("rq", "rates", "gauss_fields", "reactions", "tie_forces", "clamp_forces", "wall_forces")
+# Arrays that files of earlier releases lack.
+_NEW = ("wall_forces",)
 
 
 class InstantFile:
@@ -73,7 +75,7 @@ class InstantFile:
         if self._dtype is None:
             self._make(_dtype_of(instant))
         row = np.zeros((), self._dtype)
-        for name in (*_OF_INSTANT, *_ARRAYS):
+        for name in (*_OF_INSTANT, *self._arrays):
             row[name] = getattr(instant, name)
         for name, value in instant.ledger._asdict().items():
             row[name] = value
@@ -118,9 +120,13 @@ class InstantFile:
     def __getitem__(self, k):
         row = self.rows[k]
         more = {name: row[name].item() for name in _OF_INSTANT}
-        more |= {name: np.array(row[name]) for name in _ARRAYS}
+        more |= {name: np.array(row[name]) for name in self._arrays}
         ledger = Ledger(*(np.array(row[name]) if row[name].ndim else row[name].item() for name in Ledger._fields))
         return Instant(rq=more.pop("rq"), negative_modes=0, ledger=ledger, **more)
+
+    @property
+    def _arrays(self):
+        return [name for name in _ARRAYS if name in self._dtype.names]
 
     def __iter__(self):
         return (self[k] for k in range(len(self)))
@@ -162,7 +168,8 @@ def _read_header(file):
             raise ValueError("no .npy file")
         columns = [(name, kind, *map(tuple, shape)) for name, kind, *shape in told["descr"]]
         expected = {**_OF_INSTANT, **dict.fromkeys((*Ledger._fields, *_ARRAYS), "<f8")}
-        if {name: kind for name, kind, *_ in columns} != expected:  # an object in a file would be a pointer
+        found = dict.fromkeys(_NEW, "<f8") | {name: kind for name, kind, *_ in columns}
+        if found != expected:  # an object in a file would be a pointer
             raise ValueError("other columns than those of saved states")
         return np.dtype(columns), len(start) + inside
     except (ValueError, SyntaxError, struct.error, KeyError, TypeError, RecursionError, MemoryError) as problem:

@@ -119,6 +119,8 @@ class CollocationProblem(StepProblem):
         self._known.axpy(1.0, self._loads)
         if self.ties:
             self.ties.begin(model.ties_at(t + h))
+        if self.contact:
+            self.contact.begin(self.h)
 
     def work(self):
         """See `StepProblem`: by loads at mid-step, and the mean of the reactions at both ends."""
@@ -211,7 +213,7 @@ class GeneralisedAlpha(OneStep):
         elif problem.ties:
             problem.ties.forget()
         self._state[:] = self._start
-        problem.begin()
+        problem.begin_again()
         return solved
 
     def error(self, early=False):

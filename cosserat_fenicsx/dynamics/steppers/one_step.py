@@ -66,7 +66,7 @@ class OneStep:
         if not solved.converged:
             self._guesses = None
             self._state[:] = self._start
-            problem.begin()
+            problem.begin_again()
             return solved
         self._past = [
             *self._past[1 - 3 * _STRIDE :],
@@ -126,7 +126,7 @@ class OneStep:
         for now, before in zip(self._rates, rates, strict=True):
             now[:] = before
         self.problem.model.delays.undo()
-        self.problem.begin()
+        self.problem.begin_again()
 
     def memory(self):
         """See `Stepper`."""

@@ -3,8 +3,9 @@
 import numpy as np
 from dolfinx import fem
 
-from cosserat_fenicsx.algebra.equations import STATE, Equations
+from cosserat_fenicsx.algebra.equations import CONTACT, RESIDUAL, STATE, Equations
 from cosserat_fenicsx.algebra.packed import Packed
+from cosserat_fenicsx.dynamics.contact.nodal import NodalContact
 from cosserat_fenicsx.dynamics.steppers.moving_ties import MovingTies
 
 
@@ -33,7 +34,8 @@ class StepProblem(Equations):
         self._known, self._loads, self._vector = (self.numbering.vector() for _ in range(3))
         self.take_loads((self._known.array, np.ones(1)))
         self._start = model.start.x.array
-        self.load_factor, self.fresh = 1.0, True
+        self.load_factor, self.fresh, self.contact = 1.0, True, None
+        self._hooks = self.c.hooks
         self._pack()
 
     def _ends(self):
@@ -48,6 +50,9 @@ class StepProblem(Equations):
         for packed in self._packed:
             packed.refresh()
         self._assemble_loads()
+        walls = [action for action in scene.actions if action.touches]
+        self.contact = NodalContact(self, walls, at_end=self.acting_share == 1) if walls else None
+        self.c.hooks = self._hooks | (CONTACT | RESIDUAL) * bool(walls)
         self._begun = False  # the reactions of another scene are no initial guess
         self.begin()
 
@@ -79,6 +84,11 @@ class StepProblem(Equations):
         self.model.actions.refresh()
         self._state[:] = end
 
+    @property
+    def state(self):
+        """The array of the model's state."""
+        return self._state
+
     def begin(self):
         """Use the model's current state and velocity as the start of the next step."""
         multipliers = self.ties.everywhere() if self.ties and self._begun else None
@@ -88,6 +98,12 @@ class StepProblem(Equations):
         self.set_state(self.x)
         self._start[:] = self._state
         self.fresh = self._begun = True
+
+    def begin_again(self):
+        """Give up the last step: the state is that at its start."""
+        if self.contact:
+            self.contact.give_up()
+        self.begin()
 
     def begin_step(self, t, h):
         """Prepare the step from the time t (s), that of the current state, to t + h."""
@@ -100,6 +116,16 @@ class StepProblem(Equations):
         self._known.axpy(1.0, self._loads)
         if self.ties:
             self.ties.begin(model.ties_at(t + h))
+        if self.contact:
+            self.contact.begin(self.h)
+
+    def _change_residual(self, x, b):
+        super()._change_residual(x, b)
+        if self.contact:
+            self.contact.add_forces(b)
+
+    def _touch(self, x, change):
+        self.contact.meet(x, change)
 
     def _take_loads(self, t):
         """Evaluate the loads at the time t (s)."""
@@ -148,6 +174,8 @@ class StepProblem(Equations):
             done += self._known.dot(self._vector)
         if self.ties:
             done += model.comm.allreduce(self.ties.work(eta))
+        if self.contact:
+            done -= self.contact.books()[0]
         return done
 
     def momenta(self):
@@ -158,7 +186,8 @@ class StepProblem(Equations):
 
     def dissipated(self):
         """Energy dissipated by damping in the step from `start` to the state, dimensionless, over all ranks."""
-        return self._scalar(self.model.forms.dissipated) if self.model.damped else 0.0
+        lost = self._scalar(self.model.forms.dissipated) if self.model.damped else 0.0
+        return lost + self.contact.books()[1] if self.contact else lost
 
     def energies(self):
         """Kinetic and strain energy of the state, dimensionless, over all ranks."""
@@ -185,6 +214,8 @@ class StepProblem(Equations):
         kept = {"x": self.x.array_r.copy(), "state": self._state.copy(), "fresh": bool(self.fresh)}
         if not self.fresh:
             kept["tangent"] = super().memory()
+        if self.contact:
+            kept["contact"] = self.contact.memory()
         return kept
 
     def recall(self, memory):
@@ -195,3 +226,5 @@ class StepProblem(Equations):
         self.fresh = bool(memory["fresh"])
         if not self.fresh:
             super().recall(memory["tangent"])
+        if self.contact:
+            self.contact.recall(memory["contact"])

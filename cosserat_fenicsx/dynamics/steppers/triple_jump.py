@@ -31,8 +31,8 @@ class TripleJump:
         """See `Stepper`.
 
         Raises:
-            SceneError: a rod with damping, which would make the motion grow without bound back in time; or an action
-                with memory.
+            SceneError: a rod with damping, which would make the motion grow without bound back in time; an action with
+                memory; or a wall that nodes touch.
         """
         if self.problem.model.damped:
             raise SceneError(
@@ -41,6 +41,11 @@ class TripleJump:
         if self.problem.model.actions.memory or np.isfinite(self.problem.model.delays.longest):
             raise SceneError(
                 "scheme = 'triple-jump' steps back in time: expected actions without memory, or another scheme"
+            )
+        if self.problem.contact:
+            raise SceneError(
+                "scheme = 'triple-jump' steps back in time, and needs smooth motions: expected no walls such as a "
+                "HoleWall, or another scheme"
             )
         self._inner.begin()
 

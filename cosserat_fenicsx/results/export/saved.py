@@ -31,7 +31,7 @@ _FORMAT, _VERSION = "result of cosserat_fenicsx", 1
 _OF_RECORD = {"load_factor": "", "rq": "N7", "gauss_fields": "EG9", "negative_modes": "", "iterations": "",
               "steps": "", "reactions": "*", "neutral": "", "tie_forces": "T26"}  # fmt: skip
 _OF_POINT = _OF_RECORD | {"clamp_loads": "C6"}
-_OF_INSTANT = _OF_RECORD | {"time": "", "rates": "N6", "clamp_forces": "C6"}
+_OF_INSTANT = _OF_RECORD | {"time": "", "rates": "N6", "clamp_forces": "C6", "wall_forces": "*3"}
 _OF_LEDGER = {name: "3" if "momentum" in name else "" for name in Ledger._fields}
 _DENSITIES = {"densities_at_gauss_points": "EG6", "densities_at_nodes": "EP6"}
 _OF_EVENT = ("load_factor", "after", "residual", "error")

@@ -1,0 +1,207 @@
+/* Contact of nodes with the wall of a tube, with Coulomb friction, where the motion responds linearly to the forces:
+   block Gauss-Seidel over the nodes, each of which is solved with its exact law. */
+#include "chain.h"
+
+#include <math.h>
+#include <string.h>
+
+enum { MOST_LOCAL = 60 };
+
+/* The normal force of a node, and its derivative by the distance R from the axis at the end of the step; R0 at its start.
+   By the discrete gradient of k <R - clearance>^2/2, so that its work is the change of this energy (Gonzalez, J.
+   Nonlinear Sci. 6 (1996) 449), or at the end of the step; times 1 + damping * (R - R0)/h (Hunt & Crossley, J. Appl.
+   Mech. 42 (1975) 440). */
+static double normal_force(const contact *c, int i, double R0, double R, double *slope)
+{
+    const double k = c->stiffness[i], gap = c->clearance[i], p0 = fmax(R0 - gap, 0), p = fmax(R - gap, 0);
+    double n = 0, by_R = 0;
+    if (c->at_end)
+        n = k * p, by_R = p > 0 ? k : 0;
+    else if (p0 > 0 && p > 0)
+        n = k * (p0 + p) / 2, by_R = k / 2;
+    else if (p0 > 0 || p > 0) {
+        const double way = R - R0; /* at least the penetration, in size */
+        n = k * (p * p + p0 * p0) / (2 * fabs(way));
+        by_R = p > 0 ? k * p / way - n / way : n / -way;
+    }
+    const double factor = 1 + c->damping[i] * (R - R0) / c->h;
+    *slope = 0;
+    if (!(factor > 0)) return 0;
+    *slope = by_R * factor + n * c->damping[i] / c->h;
+    return n * factor;
+}
+
+/* The normal force N where R = R_now - give (N - now): by Newton's method within bounds. */
+static double settle_normal(const contact *c, int i, double R0, double R_now, double now, double give)
+{
+    double slope, low, high, R = R_now, n = normal_force(c, i, R0, R, &slope);
+    if (!(give > 0)) return n;
+    const double other = R_now - give * (n - now);
+    low = fmin(R_now, other), high = fmax(R_now, other);
+    for (int j = 0; j < MOST_LOCAL && high > low; j++) {
+        const double off = n - now - (R_now - R) / give;
+        if (off > 0) high = R;
+        else low = R;
+        double next = R - off / (slope + 1 / give);
+        if (!(next >= low && next <= high)) next = (low + high) / 2;
+        const int done = fabs(next - R) <= 1e-15 * (fabs(R) + c->clearance[i]);
+        R = next, n = normal_force(c, i, R0, R, &slope);
+        if (done) break;
+    }
+    return n;
+}
+
+/* T with |T| <= most that makes the slip A T + b zero, or else opposite to T: the minimum of T A T/2 + b T in that disc,
+   by Newton's method for the multiplier (More & Sorensen, SIAM J. Sci. Stat. Comput. 4 (1983) 553). */
+static void settle_friction(const double A[3], const double b[2], double most, double T[2])
+{
+    double shift = 0;
+    T[0] = T[1] = 0;
+    if (!(most > 0)) return;
+    const double trace = A[0] + A[2], floor = 1e-14 * trace;
+    if (!(trace > 0)) return;
+    for (int j = 0; j < MOST_LOCAL; j++) {
+        const double a = A[0] + shift + floor, d = A[2] + shift + floor, det = a * d - A[1] * A[1];
+        T[0] = -(d * b[0] - A[1] * b[1]) / det, T[1] = -(a * b[1] - A[1] * b[0]) / det;
+        const double size = hypot(T[0], T[1]);
+        if (size <= most * (1 + 1e-15)) break;
+        const double steep = (d * T[0] * T[0] - 2 * A[1] * T[0] * T[1] + a * T[1] * T[1]) / det;
+        const double change = size * size / steep * (size - most) / most;
+        if (!(change > 1e-16 * (shift + trace))) break;
+        shift += change;
+    }
+    const double size = hypot(T[0], T[1]);
+    if (size > most) T[0] *= most / size, T[1] *= most / size;
+}
+
+static double dot3(const double *a, const double *b)
+{
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+static void cross3(const double *a, const double *b, double *c)
+{
+    c[0] = a[1] * b[2] - a[2] * b[1], c[1] = a[2] * b[0] - a[0] * b[2], c[2] = a[0] * b[1] - a[1] * b[0];
+}
+
+/* Directions at a node: x from the axis to the rod at the end, e and its size where the force acts, tau round the axis. */
+typedef struct {
+    double x[3], R0, R, e[3], share, tau[3];
+} place;
+
+static place place_of(const contact *c, int i)
+{
+    place p;
+    const double *t = c->tangent + 3 * i, *x0 = c->start + 3 * i, *moved = c->moved + 6 * i;
+    const double along = dot3(moved, t);
+    double m[3];
+    for (int k = 0; k < 3; k++) {
+        p.x[k] = x0[k] + moved[k] - along * t[k];
+        m[k] = c->at_end ? p.x[k] : x0[k] + p.x[k];
+    }
+    p.R0 = sqrt(dot3(x0, x0)), p.R = sqrt(dot3(p.x, p.x));
+    const double size = sqrt(dot3(m, m)), both = c->at_end ? p.R : p.R0 + p.R;
+    p.share = both > 0 ? size / both : 0;
+    for (int k = 0; k < 3; k++) p.e[k] = size > 0 ? m[k] / size : 0;
+    cross3(t, p.e, p.tau);
+    return p;
+}
+
+static double dot6(const double *a, const double *b)
+{
+    double sum = 0;
+    for (int k = 0; k < 6; k++) sum += a[k] * b[k];
+    return sum;
+}
+
+/* Wv = W v: the motion (displacement, rotation) by a force and a moment v. */
+static void respond(const double *W, const double *v, double *Wv)
+{
+    for (int k = 0; k < 6; k++) Wv[k] = dot6(W + 6 * k, v);
+}
+
+/* Solve a node with the forces of all others; returns the size of the change of its motion by its own. */
+static double settle_node(contact *c, int i)
+{
+    const double *t = c->tangent + 3 * i, *W = c->compliance + ((size_t)i * (2 * c->reach + 1) + c->reach) * 36;
+    const double arm = c->arm[i];
+    double *force = c->force + 6 * i, *moved = c->moved + 6 * i, *law = c->law + 3 * i;
+    const place p = place_of(c, i);
+    if (p.R0 <= c->clearance[i] && p.R <= c->clearance[i] && law[0] == 0 && law[1] == 0 && law[2] == 0) return 0;
+    /* forces and moments of the law's three numbers; their work by the motion is -share (R), slip round, slip along */
+    double inward[6] = {0}, across[6], along[6], out[6] = {0}, by[3][6], slip[6], change[6];
+    for (int k = 0; k < 3; k++) {
+        inward[k] = -p.share * p.e[k], out[k] = p.R > 0 ? p.x[k] / p.R : 0;
+        across[k] = p.tau[k], across[3 + k] = arm * t[k];
+        along[k] = t[k], along[3 + k] = -arm * p.tau[k];
+    }
+    respond(W, inward, by[0]);
+    const double N = settle_normal(c, i, p.R0, p.R, law[0], -dot6(out, by[0]));
+    double T[2] = {0, 0};
+    if (c->friction[i] > 0 && N > 0) {
+        respond(W, across, by[1]), respond(W, along, by[2]);
+        for (int k = 0; k < 6; k++) slip[k] = moved[k] + by[0][k] * (N - law[0]);
+        const double A[3] = {dot6(across, by[1]), (dot6(across, by[2]) + dot6(along, by[1])) / 2, dot6(along, by[2])};
+        const double b[2] = {dot6(across, slip) - A[0] * law[1] - A[1] * law[2],
+                             dot6(along, slip) - A[1] * law[1] - A[2] * law[2]};
+        settle_friction(A, b, c->friction[i] * N, T);
+    }
+    law[0] = N, law[1] = T[0], law[2] = T[1];
+    for (int k = 0; k < 6; k++) {
+        const double now = N * inward[k] + T[0] * across[k] + T[1] * along[k];
+        change[k] = now - force[k], force[k] = now;
+    }
+    double size = 0;
+    for (int j = -c->reach; j <= c->reach; j++) {
+        double moving[6], *to = c->moved + 6 * (i + j);
+        if (i + j < 0 || i + j >= c->nodes) continue;
+        respond(W + 36 * j, change, moving);
+        for (int k = 0; k < 6; k++) {
+            to[k] += moving[k];
+            if (j == 0) size = fmax(size, fabs(moving[k]) * (k < 3 ? 1 : arm));
+        }
+    }
+    return size;
+}
+
+/* Forces of all nodes with which their law holds, to a share of the first change; the motion follows. Returns the number
+   of sweeps. */
+int settle(contact *c)
+{
+    double first = 0;
+    for (int sweep = 0; sweep < c->most; sweep++) {
+        double change = 0;
+        for (int i = 0; i < c->nodes; i++) change = fmax(change, settle_node(c, sweep % 2 ? c->nodes - 1 - i : i));
+        if (!isfinite(change)) return c->most;
+        first = fmax(first, change);
+        if (change <= fmax(c->share * first, c->smallest)) return sweep + 1;
+    }
+    return c->most;
+}
+
+/* Whether the normal forces are other than those of the motion, which is given, or a node has crossed the axis while it
+   touches: an iteration may settle on a motion that is none. */
+int broken(const contact *c)
+{
+    for (int i = 0; i < c->nodes; i++) {
+        const double *law = c->law + 3 * i;
+        double slope;
+        const place p = place_of(c, i);
+        const double off = fabs(normal_force(c, i, p.R0, p.R, &slope) - law[0]);
+        if (!(off <= 1e-6 * law[0] + 1e-10 * c->stiffness[i]) || (law[0] > 0 && c->clearance[i] > 0 && dot3(p.x, c->start + 3 * i) <= 0))
+            return 1;
+    }
+    return 0;
+}
+
+/* Stored energy at the end of the step minus that at its start, over all nodes; the motion is given. */
+double stored(const contact *c, int at_start)
+{
+    double sum = 0;
+    for (int i = 0; i < c->nodes; i++) {
+        const place p = place_of(c, i);
+        const double deep = fmax((at_start ? p.R0 : p.R) - c->clearance[i], 0);
+        sum += c->stiffness[i] * deep * deep / 2;
+    }
+    return sum;
+}

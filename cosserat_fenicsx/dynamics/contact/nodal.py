@@ -1,0 +1,219 @@
+"""Contact of nodes with walls in a time step: set-valued friction, on the compliance of the moving rods.
+
+Every Newton iteration has a tangent of the rods without contact. By its inverse the nodes that may touch respond
+linearly to their forces: with this compliance the laws of all nodes are solved exactly (algebra/contact.c), before the
+step is taken. So Newton's method sees smooth equations alone, whatever sticks, slips, touches or lifts off, and a
+tangent is kept through all of these. Where many nodes may touch, the compliance of neighbours alone is taken, by one
+solution for nodes that are far from each other; forces act on all nodes all the same, and what is neglected is made up
+for by the next iteration.
+"""
+
+import numpy as np
+
+from cosserat_fenicsx.algebra.pointers import Pointers
+from cosserat_fenicsx.dynamics.contact.nodes import TouchingNodes, motion_between
+from cosserat_fenicsx.quaternions import small_rotations
+
+# Up to so many nodes the compliance of all by all is taken; of more, that of so many neighbours on each side.
+_FEW, _NEIGHBOURS = 16, 6
+# The compliance, which differs little from step to step, is found again where it misses this many times the share of a
+# response that it has missed at best, or more than the second number. Smaller responses than the third number
+# (dimensionless) may be rounding.
+_WORSE, _MISSED, _ROUNDING = 10.0, 1e-3, 1e-9
+# Sweeps over the nodes, and changes of the motion that end them: over the first one, and dimensionless.
+_MOST, _SHARE, _SMALLEST = 200, 1e-6, 1e-16
+
+
+class NodalContact(Pointers):
+    """Contact of the nodes of a problem with the walls of its scene.
+
+    Args:
+        problem: a `StepProblem`, loaded; walls: the actions that touch, see `Action.touches`.
+        at_end: whether forces are those of the end of a step.
+    """
+
+    def __init__(self, problem, walls, *, at_end):
+        super().__init__()
+        self._problem, model = problem, problem.model
+        self._walls = touched = _places(model, walls)
+        scales, slots = model.scales, np.concatenate([place.slots for place in touched])
+        order = np.argsort(slots, kind="stable")
+        self._nodes = nodes = TouchingNodes(problem, slots[order])
+        self._slots = np.empty(len(order), dtype=int)  # of the walls' nodes in turn: their places here
+        self._slots[order] = np.arange(len(order))
+        nodes.hold(problem.state)
+        self._origin = np.concatenate([np.tile(p.origin, (len(p.slots), 1)) for p in touched])[order]
+        n, reach = nodes.count, nodes.count - 1 if nodes.count <= _FEW else _NEIGHBOURS
+        self._numbers = {name: np.zeros(n) for name in ("clearance", "stiffness", "friction", "damping", "arm")}
+        units = {"stiffness": scales.force / scales.length, "damping": model.time / scales.length}
+        for name in ("stiffness", "damping"):
+            self._numbers[name][:] = np.concatenate([getattr(p, name) for p in touched])[order] / units[name]
+        sizes = {"tangent": 3, "start": 3, "moved": 6, "force": 6, "law": 3}
+        self._vectors = {name: np.zeros((n, size)) for name, size in sizes.items()}
+        self._compliance = np.zeros((n, 2 * reach + 1, 6, 6))
+        self._begun, self._law_begun = (self._vectors[name].copy() for name in ("force", "law"))
+        self.c = contact = self._ffi.new("contact *")
+        contact.nodes, contact.reach, contact.at_end = n, reach, at_end
+        contact.most, contact.share, contact.smallest = _MOST, _SHARE, _SMALLEST
+        for name, array in {**self._numbers, **self._vectors, "compliance": self._compliance}.items():
+            setattr(contact, name, self.doubles(array))
+        self._usual = np.inf
+        self._known_for = np.nan  # length of the steps that the compliance is of
+        self._load, self._response = problem.numbering.vector(), problem.numbering.vector()
+
+    # -- a step ------------------------------------------------------------------------------------------------------
+
+    def begin(self, h):
+        """Begin a step of length h (dimensionless) at the problem's state."""
+        self._before = now = self._nodes.of_local(self._problem.state)
+        scales = self._problem.model.scales
+        points = now[:, :3] * scales.length + self._origin
+        vectors, numbers = self._vectors, self._numbers
+        for place, at in zip(self._walls, np.split(self._slots, self._ends), strict=True):
+            tube = place.wall.tube_around(place.s, points[at], place.md)
+            place.md = tube.md
+            away = (points[at] - tube.position) / scales.length
+            along = np.einsum("ij,ij->i", away, tube.tangent)
+            vectors["tangent"][at], vectors["start"][at] = tube.tangent, away - along[:, None] * tube.tangent
+            numbers["clearance"][at], numbers["arm"][at] = tube.clearance / scales.length, tube.arm / scales.length
+            numbers["friction"][at] = tube.friction
+        self.c.h = h
+        if abs(h - self._known_for) > 1e-9 * h:
+            self._known_for = np.nan
+        self._begun[:], self._law_begun[:] = vectors["force"], vectors["law"]
+
+    @property
+    def _ends(self):
+        return np.cumsum([len(place.slots) for place in self._walls])[:-1]
+
+    def give_up(self):
+        """The step has failed: the forces are those at its start again."""
+        self._vectors["force"][:], self._vectors["law"][:] = self._begun, self._law_begun
+
+    def add_forces(self, b):
+        """Subtract the forces from this rank's part of a residual."""
+        self._nodes.subtract(self._vectors["force"], b)
+
+    def meet(self, x, change):
+        """Change Newton's step by that of the forces: arrays of this rank's unknowns; `change` is subtracted from x."""
+        vectors = self._vectors
+        if np.isnan(self._known_for):
+            self._find_compliance()
+        vectors["moved"][:] = free = motion_between(self._before, self._nodes.unknowns(x, change))
+        before = vectors["force"].copy()
+        self._lib.settle(self.c)
+        if (before == vectors["force"]).all():
+            return
+        load = self._load
+        load.set(0.0)
+        self._nodes.subtract(vectors["force"] - before, load.array_w)
+        self._problem.solve(load, self._response)
+        change += self._response.array_r
+        foretold = vectors["moved"][:, :3] - free[:, :3]
+        size, missed = np.abs(foretold), np.abs(foretold + self._nodes.of_vector(self._response.array_r)[:, :3])
+        if size.max() > _ROUNDING:
+            share = missed.max() / size.max()
+            self._usual = min(self._usual, max(share, _MISSED))
+            if share > _WORSE * self._usual:
+                self._known_for = np.nan
+
+    @property
+    def broken(self):
+        """Whether forces do not follow from the motion at the problem's state, so that this is none."""
+        self._vectors["moved"][:] = motion_between(self._before, self._nodes.of_local(self._problem.state))
+        return bool(self._lib.broken(self.c))
+
+    def _find_compliance(self):
+        """Find the compliance by the current tangent."""
+        self._known_for, self._usual = self.c.h, np.inf
+        nodes, problem = self._nodes, self._problem
+        n, reach = self.c.nodes, self.c.reach
+        turning = small_rotations(nodes.of_local(problem.state)[:, 3:])
+        apart = min(2 * reach + 1, n)
+        for first in range(apart):
+            sources = np.arange(first, n, apart)
+            j = sources[:, None] + np.arange(-reach, reach + 1)
+            inside = (j >= 0) & (j < n)
+            j = np.clip(j, 0, n - 1)
+            for component in range(6):
+                force = np.zeros((n, 6))
+                force[sources, component] = -1.0
+                self._load.set(0.0)
+                nodes.subtract(force, self._load.array_w)
+                problem.solve(self._load, self._response)
+                found = nodes.of_vector(self._response.array_r)
+                turned = (turning @ found[:, 3:, None])[..., 0]
+                moved = np.concatenate([found[:, :3], turned], axis=1)
+                self._compliance[sources, :, :, component] = np.where(inside[..., None], moved[j], 0.0)
+
+    # -- books -------------------------------------------------------------------------------------------------------
+
+    def books(self):
+        """Increase of the stored energy in the step, and energy dissipated by friction and damping; dimensionless."""
+        vectors = self._vectors
+        vectors["moved"][:] = motion_between(self._before, self._nodes.of_local(self._problem.state))
+        gained = self._lib.stored(self.c, 0) - self._lib.stored(self.c, 1)
+        force = (vectors["force"] + self._begun) / 2 if self.c.at_end else vectors["force"]
+        return gained, -float(np.vdot(force, vectors["moved"])) - gained
+
+    @property
+    def count(self):
+        """Number of nodes that may touch, once for each wall."""
+        return self.c.nodes
+
+    def of_step(self):
+        """(count, 3) normal force, friction round and along the axis in the last step, wall by wall."""
+        return self._vectors["law"][self._slots]
+
+    def memory(self):
+        """What later steps depend on."""
+        kept = {name: self._vectors[name].copy() for name in ("force", "law")}
+        md = np.concatenate([place.md for place in self._walls])
+        return {**kept, "md": md, "compliance": self._compliance.copy(), "known_for": self._known_for,
+                "usual": self._usual}  # fmt: skip
+
+    def recall(self, memory):
+        """Restore what `memory` returned."""
+        for name in ("force", "law"):
+            self._vectors[name][:] = memory[name]
+        self._compliance[:] = memory["compliance"]
+        self._known_for, self._usual = float(memory["known_for"]), float(memory["usual"])
+        for place, md in zip(self._walls, np.split(memory["md"], self._ends), strict=True):
+            place.md = md
+
+
+class _Place:
+    """The nodes that may touch one wall along one rod: numbers in the scene, arc lengths (m), stiffness (N/m)."""
+
+    def __init__(self, wall, slots, s, lengths, origin):
+        self.wall, self.slots, self.s, self.origin = wall, slots, s, origin
+        self.stiffness, self.damping = wall.stiffness * lengths, np.full(len(s), wall.damping)
+        self.md = s + wall.begins
+
+
+def _places(model, walls):
+    scene, layout, p = model.scene, model.layout, model.signature.degree
+    first = np.concatenate([[0], np.cumsum(np.asarray(layout.counts) * p + 1)])
+    along, found = layout.node_s(model.nodes), []
+    for wall in walls:
+        for i, rod in enumerate(scene.rods):
+            here = np.arange(len(along[i]))
+            lengths = _shares(layout.breaks[i], model.nodes) * rod.length
+            if wall.station is not None:
+                if wall.station.rod is not rod:
+                    continue
+                here, lengths = here[[layout.vertex(scene, wall.station)[1] * p]], np.ones(1)
+            elif not wall.acts_on(rod):
+                continue
+            found.append(_Place(wall, first[i] + here, along[i][here] * rod.length, lengths, scene.origin(rod)))
+    return found
+
+
+def _shares(breaks, nodes):
+    """The share of a rod's length that belongs to each node: weights of the quadrature rule with these points."""
+    moments = 1 / np.arange(1, len(nodes) + 1)
+    weights = np.linalg.solve(np.vander(nodes, increasing=True).T, moments)
+    sizes, p = np.diff(breaks), len(nodes) - 1
+    shares = np.zeros(len(sizes) * p + 1)
+    np.add.at(shares, np.arange(len(sizes))[:, None] * p + np.arange(p + 1), sizes[:, None] * weights)
+    return shares

@@ -1,0 +1,231 @@
+"""Rods that touch the wall of a hole in motion, against closed forms: impact, sliding, rolling, invariants."""
+
+import numpy as np
+import pytest
+from conftest import COMM
+from moving_scenes import drift
+from mpi4py import MPI
+
+import cosserat_fenicsx as cf
+from cosserat_fenicsx.actions.hole_wall import HoleRing, HoleWall
+from cosserat_fenicsx.models.moving import Moving
+from cosserat_fenicsx.storage import runfolder
+
+SCHEMES = ("momentum", "energy", "generalised-alpha")
+STEEL = cf.Material(E=206e9, nu=0.3, density=7850.0)
+#: radius of the rod, clearance in the hole, m; measured depth of its start, m; gravity, m/s^2
+A, C, BEGIN, G = 0.085, 0.02, 5.0, 9.81
+VERTICAL = cf.WellPath.from_survey([0, 20], [0, 0], [0, 0])
+HORIZONTAL = cf.WellPath.from_survey([0, 20], [90, 90], [0, 0])
+SMALL = {"elements": 2, "degree": 2}
+
+
+def thick_rod(path):
+    """A rod of 1 m on the axis of a hole, almost rigid, and its mass, kg."""
+    rod = cf.Rod(cf.Line(path.position(BEGIN), path.position(BEGIN + 1)), cf.Circle(2 * A), STEEL, name="rod")
+    return rod, STEEL.density * np.pi * A**2
+
+
+def in_hole(path, linear, angular=(0, 0, 0), loads=(), **wall):
+    """(rod, scene) of the rod with initial velocities of its start's rigid motion, and a wall."""
+    rod, _ = thick_rod(path)
+    wall = HoleWall(rod, path, A + C, A, begins=BEGIN, **wall)
+    return rod, cf.Scene(
+        [rod], [], [wall, *loads], velocities=[cf.InitialVelocity(rod, linear=linear, angular=angular)]
+    )
+
+
+def resting(path, stiffness, linear=(0, 0, 0), angle=0.0, **wall):
+    """(rod, scene) of the rod on the low side of a horizontal hole in its weight, which is turned by an angle."""
+    rod, mass = thick_rod(path)
+    deep = C + mass * G / stiffness
+    down = np.array([0, np.sin(angle), np.cos(angle)])
+    place = path.position(BEGIN) + deep * np.array([0, 0, 1.0])
+    rod = cf.Rod(cf.Line(place, place + path.tangent(BEGIN)), cf.Circle(2 * A), STEEL, name="rod")
+    walls = HoleWall(rod, path, A + C, A, begins=BEGIN, stiffness=stiffness, **wall)
+    loads = [walls, cf.LineForce(rod, tuple(mass * G * down))]
+    return rod, cf.Scene([rod], [], loads, velocities=[cf.InitialVelocity(rod, linear=linear)]), deep
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+def test_an_impact_is_half_a_vibration_on_the_wall(scheme):
+    """Penetration v sqrt(m/k) and duration pi sqrt(m/k); the rod flies back as fast."""
+    stiffness, v = 1e6, 0.5
+    rod, scene = in_hole(VERTICAL, (v, 0, 0), stiffness=stiffness)
+    time = np.sqrt(thick_rod(VERTICAL)[1] / stiffness)
+    history = cf.simulate(scene, 0.15, dt=2.5e-4, scheme=scheme, **SMALL)
+    x, speed = history.position(rod.start)[:, 0], history.velocity(rod.start)[:, 0]
+    assert x.max() - C == pytest.approx(v * time, rel=1e-3)
+    out = np.flatnonzero(np.diff(np.sign(x - C)))
+    first, last = (np.interp(C, *sorted_pair(x[k : k + 2], history.times[k : k + 2])) for k in out[:2])
+    assert last - first == pytest.approx(np.pi * time, rel=2e-3)
+    assert speed[out[1] + 5] == pytest.approx(-v, rel=1e-4 if scheme != "generalised-alpha" else 5e-3)
+
+
+def sorted_pair(x, t):
+    order = np.argsort(x)
+    return x[order], t[order]
+
+
+def test_damping_takes_what_hunt_and_crossley_say():
+    """Restitution 1 - (2/3) damping v for small ones; the loss is booked."""
+    damping, v = 0.05, 0.4
+    rod, scene = in_hole(VERTICAL, (v, 0, 0), stiffness=1e6, damping=damping)
+    history = cf.simulate(scene, 0.12, dt=5e-4, **SMALL)
+    back = -history.velocity(rod.start)[-1, 0] / v
+    assert 1 - back == pytest.approx(2 / 3 * damping * v, rel=0.03)
+    assert history.dissipated[-1] == pytest.approx(history.kinetic[0] * (1 - back**2), rel=1e-3)
+
+
+def test_without_friction_energy_and_angular_momentum_stay():
+    """Oblique impacts of a spinning rod on a stiff wall, in steps as long as an impact."""
+    for scheme in ("momentum", "energy"):
+        rod, scene = in_hole(VERTICAL, (0.9, 0.3, 0), (0, 0, 3.0), stiffness=1e9)
+        history = cf.simulate(scene, 0.2, dt=1e-3, scheme=scheme, **SMALL)
+        assert np.count_nonzero(np.diff(np.sign(history.work))) > 4  # several impacts
+        assert np.abs(history.balance).max() < (1e-10 if scheme == "energy" else 1e-8) * history.kinetic[0]
+        assert np.abs(history.dissipated).max() < 1e-9
+        assert np.ptp(history.angular_momentum[:, 2]) < 1e-9 * np.abs(history.angular_momentum).max()
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+def test_sliding_is_stopped_by_coulombs_friction(scheme):
+    """It stops after v/(mu g), at v^2/(2 mu g), and stays there exactly."""
+    mu, v = 0.3, 0.2
+    rod, scene, _ = resting(HORIZONTAL, 1e8, linear=(v, 0, 0), friction=mu)
+    stop = v / (mu * G)
+    history = cf.simulate(scene, 2 * stop, dt=stop / 100, scheme=scheme, **SMALL)
+    x = history.position(rod.start)[:, 0] - rod.curve.position(0.0)[0]
+    sliding = history.times < 0.97 * stop
+    expected = v * history.times - mu * G * history.times**2 / 2
+    np.testing.assert_allclose(x[sliding], expected[sliding], atol=2e-3 * v * stop)
+    assert x[-1] == pytest.approx(v * stop / 2, rel=2e-3)
+    after = x[history.times > 1.1 * stop]
+    assert np.ptp(after) < 1e-3 * x[-1]
+    assert history.dissipated[-1] == pytest.approx(history.kinetic[0], rel=2e-2)
+
+
+def test_a_rod_rolls_in_the_hole_without_slip():
+    """A cylinder that rolls in a trough: omega^2 = 2 g/(3 (R - a)), and nothing is dissipated."""
+    stiffness, angle = 1e8, 0.1
+    rod, scene, deep = resting(HORIZONTAL, stiffness, angle=angle, friction=0.3)
+    period = 2 * np.pi * np.sqrt(1.5 * deep / G) * (1 + angle**2 / 16)
+    history = cf.simulate(scene, 2 * period, dt=period / 200, **SMALL)
+    y = history.position(rod.start)[:, 1]
+    assert y.max() == pytest.approx(deep * np.sin(2 * angle), rel=1e-3)
+    assert np.abs(y[200]) < 2e-3 * y.max()  # back after a period
+    assert np.abs(y[100]) == pytest.approx(y.max(), rel=1e-3)
+    spin, speed = history.angular_velocity(rod.start)[:, 0], history.velocity(rod.start)
+    assert np.abs(A * spin - speed[:, 1]).max() < 0.02 * np.abs(speed[:, 1]).max()
+    assert np.abs(history.dissipated).max() < 1e-6 * np.ptp(history.kinetic)
+
+
+def test_friction_does_not_act_where_nothing_touches():
+    rod, scene = in_hole(VERTICAL, (0, 0, 1.0), (0, 0, 5.0), friction=0.5)
+    history = cf.simulate(scene, 0.1, dt=1e-2, **SMALL)
+    assert drift(history.linear_momentum) < 1e-12 and drift(history.angular_momentum) < 1e-12
+
+
+def test_a_ring_touches_alone():
+    rod, mass = thick_rod(VERTICAL)
+    ring = HoleRing(rod.at(0.5), VERTICAL, C, A, stiffness=1e5, friction=0.2, begins=BEGIN)
+    scene = cf.Scene([rod], [], [ring], velocities=[cf.InitialVelocity(rod, linear=(0.5, 0, 0))])
+    history = cf.simulate(scene, 0.16, dt=1e-3, **SMALL)
+    deepest = history.position(rod.at(0.5))[:, 0].max() - C
+    assert deepest == pytest.approx(0.5 * np.sqrt(mass / 1e5), rel=1e-3)
+
+
+def test_all_numbers_of_ranks_agree():
+    def run(comm):
+        rod, scene = in_hole(VERTICAL, (0.9, 0.3, 0), (0, 0, 3.0), stiffness=1e9, friction=0.3, damping=0.1)
+        history = cf.simulate(scene, 0.1, dt=1e-3, elements=4, degree=2, comm=comm)
+        return history.position(rod.end)[-1], history.energy[-1]
+
+    (place, energy), (alone, energy_alone) = run(COMM), run(MPI.COMM_SELF)
+    np.testing.assert_allclose(place, alone, atol=1e-9)
+    assert energy == pytest.approx(energy_alone, rel=1e-8)
+
+
+@pytest.mark.serial
+@pytest.mark.parametrize("scheme", SCHEMES)
+def test_it_is_continued_to_the_same_digits(scheme, tmp_path, monkeypatch):
+    _, scene = in_hole(VERTICAL, (0.9, 0.3, 0), (0, 0, 3.0), stiffness=1e9, friction=0.3, damping=0.1)
+    asked = {"duration": 0.08, "dt": 1e-3, "scheme": scheme, **SMALL}
+    whole = cf.simulate(scene, **asked)
+    accept, taken = Moving.accept, []
+
+    def accept_or_stop(self, h):
+        accept(self, h)
+        taken.append(h)
+        if len(taken) == 50:
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr(Moving, "accept", accept_or_stop)
+    monkeypatch.setattr(runfolder, "APART", 0.0)
+    monkeypatch.setattr(runfolder, "SELDOM", 0)
+    if scheme == "generalised-alpha":
+        monkeypatch.setattr("cosserat_fenicsx.models.collocated.Collocated.accept", stopping(taken))
+    with pytest.raises(cf.Interrupted):
+        cf.simulate(scene, **asked, folder=tmp_path / "motion")
+    monkeypatch.undo()
+    history = cf.resume(tmp_path / "motion", scene)
+    for name in ("kinetic", "strain", "work", "dissipated"):
+        assert getattr(history, name).tobytes() == getattr(whole, name).tobytes(), name
+
+
+def stopping(taken):
+    from cosserat_fenicsx.models.collocated import Collocated
+
+    accept = Collocated.accept
+
+    def accept_or_stop(self, h):
+        accept(self, h)
+        taken.append(h)
+        if len(taken) == 50:
+            raise KeyboardInterrupt
+
+    return accept_or_stop
+
+
+@pytest.mark.parametrize(
+    ("wrong", "word"),
+    [
+        ({"friction": -0.1}, "friction"),
+        ({"damping": -1.0}, "damping"),
+        ({"damping": np.inf}, "damping"),
+        ({"stiffness": 0.0}, "stiffness"),
+        ({"contact_radius": 0.2}, "less than the radius of the tube"),
+    ],
+)
+def test_bad_numbers_are_refused(wrong, word):
+    rod, _ = thick_rod(VERTICAL)
+    with pytest.raises(cf.SceneError, match=word):
+        HoleWall(rod, VERTICAL, **{"radius": A + C, "contact_radius": A, **wrong})
+
+
+def test_equilibria_and_other_schemes_refuse_it():
+    rod, scene = in_hole(VERTICAL, (0.5, 0, 0))
+    with pytest.raises(cf.SceneError, match="HoleWall acts in motions alone"):
+        cf.solve(scene, [1.0])
+    with pytest.raises(cf.SceneError, match="expected no walls"):
+        cf.simulate(scene, 0.1, dt=0.01, scheme="triple-jump")
+    with pytest.raises(cf.SceneError, match="HoleWall"):
+        cf.simulate(scene, 0.1, dt=0.01, model="planar")
+
+
+def test_forces_of_walls_are_told(tmp_path_all):
+    """The weight of a rod that slides, and friction against it; from memory, a folder and a file alike."""
+    mu, v = 0.3, 0.2
+    rod, scene, _ = resting(HORIZONTAL, 1e8, linear=(v, 0, 0), friction=mu)
+    wall, weight = scene.loads[0], thick_rod(HORIZONTAL)[1] * G
+    history = cf.simulate(scene, 0.02, dt=5e-4, **SMALL)
+    found = history.wall_forces(wall)
+    assert found.normal.shape == (41, 5) and np.isnan(found.normal[0]).all()
+    np.testing.assert_allclose(found.s, [0, 0.25, 0.5, 0.75, 1])
+    assert found.normal[1:].sum(axis=1) == pytest.approx(weight, rel=1e-3)
+    np.testing.assert_allclose(found.along[1:], -mu * found.normal[1:], rtol=1e-6)
+    assert np.abs(found.around[1:]).max() < 1e-3 * weight
+    stored = cf.simulate(scene, 0.02, dt=5e-4, **SMALL, folder=tmp_path_all / "motion")
+    np.testing.assert_allclose(stored.wall_forces(wall).along, found.along, rtol=1e-9)
+    with pytest.raises(cf.SceneError, match="a wall of the scene"):
+        history.wall_forces(scene.loads[1])
