@@ -89,6 +89,8 @@ class Action:
             {attribute: value}, of the action at a time in the next step, `accept` (t, h, motion) after a step from t
             (s) to t + h, `undo` (), which takes back the last step, and `memory` and `recall` as of
             `dynamics.steppers.protocol.Stepper`. `motion` is a `models.stations.StationMotion`.
+        resists: None; or a method (speed, rad/s, from 0 on) -> torque (N m) about the axis d3 against the rotation of its
+            `station` in motions, and its derivative: at 0 the largest torque that holds, then a convex function.
         touches: whether it is a wall that nodes of rods touch in motions (dynamics/contact), in place of a virtual
             work. It then has `stiffness` (N/m^2; N/m at a station), `damping` (s/m), `begins` (m) and a method
             `tube_around` (arc lengths s (n,), points (n, 3) of the rod, measured depths (n,) near them) -> the
@@ -97,7 +99,7 @@ class Action:
     """
 
     at_nodes, scaled, permanent, follows, memory, evolve, traits = False, True, False, False, (), None, None
-    delayed, touches = None, False
+    delayed, resists, touches = None, None, False
 
     def acts_on(self, rod):
         """Whether it acts along a rod."""
