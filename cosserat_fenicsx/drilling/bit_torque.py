@@ -22,7 +22,7 @@ class BitTorque(PointAction):
         station: where.
         law: a `Stribeck`.
         weight: on bit, N, constant, for a law by coefficients of friction; the force itself is a load of its own.
-        inertia: of the bit about the axis, kg m^2.
+        inertia_of_bit: about the axis, kg m^2. `Damping.drag` of the rod would act on it, too: here that is taken off.
 
     Raises:
         SceneError: not a station, not such a law, or numbers that are negative.
@@ -52,7 +52,9 @@ class BitTorque(PointAction):
         static, dynamic = self.law.torques(self.weight)
         if speed == 0:
             return static, 0.0
+        damping = self.station.rod.damping
+        drag = self.inertia_of_bit * damping.drag if damping else 0.0
         if self.law.speed is None:
-            return dynamic, 0.0
+            return dynamic - drag * speed, -drag
         part = (static - dynamic) * math.exp(-speed / self.law.speed)
-        return dynamic + part, -part / self.law.speed
+        return dynamic + part - drag * speed, -part / self.law.speed - drag

@@ -17,8 +17,8 @@ from cosserat_fenicsx.scene.action import PointAction, scalar, vector
 from cosserat_fenicsx.scene.rod import Station, StationOrName, is_known
 from cosserat_fenicsx.well.string import Laid
 
-# Drag acts at nodes, so many in the pipe at least.
-_BEADS = 16
+# Drag acts at nodes, so many in the pipe at least: errors of 3e-4 at a rate of 0.3 per s in 3000 m.
+_BEADS = 64
 
 
 @dataclass(frozen=True)
@@ -41,7 +41,8 @@ class PipeAbove(PointAction):
         drive: a `TopDrive`. Its speed is about the axis that points from the pipe into the rod.
         hook: a `Hook`; None for a rigid one at rest.
         tension: with which the pipe pulls at the rod's end in the reference, N: the weight of what hangs there.
-        drag: a `ViscousDrag` of the pipe, as dashpots at 16 or more nodes; None for none.
+        drag: a `ViscousDrag` of the pipe, as dashpots at 64 or more nodes; it shortens the
+            longest step; None for none.
 
     Raises:
         SceneError: a part of the wrong kind, a station inside the rod, or a number out of range.

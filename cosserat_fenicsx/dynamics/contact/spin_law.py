@@ -90,7 +90,7 @@ class SpinLaw(Pointers):
                 f"{type(self._action).__name__}: in steps of {h * self._time:.3g} s its torque falls faster with the speed "
                 "than the rod can follow, and several speeds are possible: expected a shorter dt, or an inertia there"
             )
-        speed = (size - C * self._law(math.inf)[0]) / h  # too fast; the law is convex, so the iteration falls to the root
+        speed = size / h  # the law is convex: after the first iteration it falls to the root
         for _ in range(_MOST):
             torque, slope = self._law(speed)
             last, speed = speed, max(speed - (speed * h + C * torque - size) / (h + C * slope), 0.0)
