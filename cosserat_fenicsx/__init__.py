@@ -107,6 +107,7 @@ _HOME = {
     "WellScene": "well.scenefile",
     "WellPath": "well.path",
     "BitOnRock": "drilling.bit_laws",
+    "BitTorque": "drilling.bit_torque",
     "Cutting": "drilling.bit_laws",
     "Discs": "drilling.discs",
     "Drilling": "drilling.scene",
@@ -188,6 +189,7 @@ if TYPE_CHECKING:  # the same names, for editors and type checkers
     from cosserat_fenicsx.drilling.bit_laws import Lobes as Lobes
     from cosserat_fenicsx.drilling.bit_laws import Stribeck as Stribeck
     from cosserat_fenicsx.drilling.bit_laws import Wear as Wear
+    from cosserat_fenicsx.drilling.bit_torque import BitTorque as BitTorque
     from cosserat_fenicsx.drilling.discs import Discs as Discs
     from cosserat_fenicsx.drilling.history import DrillingHistory as DrillingHistory
     from cosserat_fenicsx.drilling.hook import Hook as Hook

@@ -13,6 +13,7 @@ import numpy as np
 
 # Samples of an interpolation; the travel time of a part over the longest step, so that all of them are known.
 _SAMPLES, _LEAST = 4, 2.0
+_EACH, _DIAGONAL = np.arange(_SAMPLES), np.eye(_SAMPLES)[:, :, None]
 # Samples kept beyond those that may be read.
 _SPARE = 512
 
@@ -56,8 +57,8 @@ class DelayLines:
     """The waves of one kind, torsional or axial, in parts from the top down.
 
     Args:
-        impedance, time: (n,) of the parts, and their travel times, s. drag: (n + 1,) force over speed at the nodes, from
-            the top down. top: a `TopEnd`.
+        impedance, time: (n,) of the parts, and their travel times, s. drag: (n + 1,) force over speed at the nodes,
+            from the top down. top: a `TopEnd`.
     """
 
     def __init__(self, impedance, time, drag, top):
@@ -92,13 +93,11 @@ class DelayLines:
             return self._first
         times = self._times[:count]
         first = np.clip(np.searchsorted(times, asked) - _SAMPLES // 2, 0, count - _SAMPLES)
-        at = first + np.arange(_SAMPLES)[:, None]
-        apart = asked - times[at]
-        weights = np.ones_like(apart)
-        for j in range(_SAMPLES):
-            for k in range(_SAMPLES):
-                if k != j:
-                    weights[j] *= apart[k] / (times[at[j]] - times[at[k]])
+        at = first + _EACH[:, None]
+        known = times[at]
+        factors = (asked - known) / (known[:, None] - known + _DIAGONAL)
+        factors[_EACH, _EACH] = 1.0
+        weights = factors.prod(axis=1)
         read = (weights * self._values[at, np.arange(len(asked))]).sum(axis=0)
         return np.where(asked < times[0], self._first, read)
 

@@ -13,7 +13,7 @@ from cosserat_fenicsx.algebra.packed import Packed
 from cosserat_fenicsx.algebra.pencil import Pencil
 from cosserat_fenicsx.checks import instance, number, refuse
 from cosserat_fenicsx.element import lobatto_weights
-from cosserat_fenicsx.errors import NotConverged
+from cosserat_fenicsx.errors import NotConverged, SceneError
 from cosserat_fenicsx.models.nodal_inertia import check_inertia, nodal_inertia, nodal_lateral, nodal_offsets
 from cosserat_fenicsx.progress import MeshProgress
 from cosserat_fenicsx.quaternions import directors
@@ -21,6 +21,7 @@ from cosserat_fenicsx.ranks import communicator
 from cosserat_fenicsx.results.modes import Modes
 from cosserat_fenicsx.results.shapes import Equilibrium
 from cosserat_fenicsx.scene.action import has_permanent
+from cosserat_fenicsx.scene.describe import describe
 from cosserat_fenicsx.scene.magnitudes import check_magnitudes
 from cosserat_fenicsx.scene.scene import Scene
 from cosserat_fenicsx.scene.statical import without_mechanism
@@ -77,6 +78,12 @@ def modes(
     """
     instance("modes", "scene", scene, Scene, "a Scene")
     check_inertia(scene)
+    for action in scene.actions:
+        if action.delayed is not None:
+            raise SceneError(
+                f"modes: {describe(action)}: expected no actions whose forces come from earlier motion: rods in "
+                "its place, or the spectrum of a simulated motion, show the modes"
+            )
     number("modes", "load_factor", load_factor, "a finite number", math.isfinite)
     for name, value in (("count", count), ("elements", 1 if elements is None else elements)):
         if isinstance(value, bool) or not isinstance(value, numbers.Integral) or value < 1:

@@ -149,6 +149,11 @@ class Moving:
         """(n,) the scene's number of every local node."""
         return self._slots
 
+    def slot_of(self, station):
+        """The scene's number of the node at a station."""
+        rod, vertex = self.layout.vertex(self.scene, station)
+        return sum(self.layout.counts[:rod]) * self.signature.degree + rod + vertex * self.signature.degree
+
     @property
     def owned_nodes(self):
         """Number of the local nodes that this rank owns; they come first."""

@@ -20,9 +20,7 @@ class StationNode:
 
     def __init__(self, model, station):
         self._model = model
-        rod, vertex = model.layout.vertex(model.scene, station)
-        degree = model.signature.degree
-        slot = sum(model.layout.counts[:rod]) * degree + rod + vertex * degree
+        slot = model.slot_of(station)
         here = np.flatnonzero(model.slots[: model.owned_nodes] == slot)
         self._dofs = model.dofs_of_nodes[here[0]] if len(here) else None
         self._rest = model.reference[slot]

@@ -116,8 +116,8 @@ class CollocationProblem(StepProblem):
         self._known.axpy(1.0, self._loads)
         if self.ties:
             self.ties.begin(model.ties_at(t + h))
-        if self.contact:
-            self.contact.begin(self.h)
+        for part in self.touching:
+            part.begin(self.h)
 
     def work(self):
         """See `StepProblem`: by loads at mid-step, and the mean of the reactions at both ends."""

@@ -6,6 +6,7 @@ from dolfinx import fem
 from cosserat_fenicsx.algebra.equations import CONTACT, RESIDUAL, STATE, Equations
 from cosserat_fenicsx.algebra.packed import Packed
 from cosserat_fenicsx.dynamics.contact.nodal import NodalContact
+from cosserat_fenicsx.dynamics.contact.spin_law import SpinLaw
 from cosserat_fenicsx.dynamics.steppers.moving_ties import MovingTies
 
 
@@ -34,7 +35,7 @@ class StepProblem(Equations):
         self._known, self._loads, self._vector = (self.numbering.vector() for _ in range(3))
         self.take_loads((self._known.array, np.ones(1)))
         self._start = model.start.x.array
-        self.load_factor, self.fresh, self.contact = 1.0, True, None
+        self.load_factor, self.fresh, self.contact, self.touching = 1.0, True, None, []
         self._hooks = self.c.hooks
         self._pack()
 
@@ -48,7 +49,9 @@ class StepProblem(Equations):
         self._assemble_loads()
         walls = [action for action in scene.actions if action.touches]
         self.contact = NodalContact(self, walls, at_end=self.acting_share == 1) if walls else None
-        self.c.hooks = self._hooks | (CONTACT | RESIDUAL) * bool(walls)
+        laws = [SpinLaw(self, action) for action in scene.actions if action.resists]
+        self.touching = [self.contact, *laws] if walls else laws
+        self.c.hooks = self._hooks | (CONTACT | RESIDUAL) * bool(self.touching)
         self._begun = False  # the reactions of another scene are no initial guess
         self.begin()
 
@@ -97,8 +100,8 @@ class StepProblem(Equations):
 
     def begin_again(self):
         """Give up the last step: the state is that at its start."""
-        if self.contact:
-            self.contact.give_up()
+        for part in self.touching:
+            part.give_up()
         self.begin()
 
     def begin_step(self, t, h):
@@ -112,16 +115,17 @@ class StepProblem(Equations):
         self._known.axpy(1.0, self._loads)
         if self.ties:
             self.ties.begin(model.ties_at(t + h))
-        if self.contact:
-            self.contact.begin(self.h)
+        for part in self.touching:
+            part.begin(self.h)
 
     def _change_residual(self, x, b):
         super()._change_residual(x, b)
-        if self.contact:
-            self.contact.add_forces(b)
+        for part in self.touching:
+            part.add_forces(b)
 
     def _touch(self, x, change):
-        self.contact.meet(x, change)
+        for part in self.touching:
+            part.meet(x, change)
 
     def _take_loads(self, t):
         """Evaluate the loads at the time t (s)."""
@@ -170,9 +174,7 @@ class StepProblem(Equations):
             done += self._known.dot(self._vector)
         if self.ties:
             done += model.comm.allreduce(self.ties.work(eta))
-        if self.contact:
-            done -= self.contact.books()[0]
-        return done
+        return done - sum(part.books()[0] for part in self.touching)
 
     def momenta(self):
         """Linear and angular momentum of the state, see `Moving.momenta`."""
@@ -183,7 +185,7 @@ class StepProblem(Equations):
     def dissipated(self):
         """Energy dissipated by damping in the step from `start` to the state, dimensionless, over all ranks."""
         lost = self._scalar(self.model.forms.dissipated) if self.model.damped else 0.0
-        return lost + self.contact.books()[1] if self.contact else lost
+        return lost + sum(part.books()[1] for part in self.touching)
 
     def accept(self):
         """Take the step, after its books."""
@@ -217,8 +219,8 @@ class StepProblem(Equations):
         kept = {"x": self.x.array_r.copy(), "state": self._state.copy(), "fresh": bool(self.fresh)}
         if not self.fresh:
             kept["tangent"] = super().memory()
-        if self.contact:
-            kept["contact"] = self.contact.memory()
+        for i, part in enumerate(self.touching):
+            kept[f"touching {i}"] = part.memory()
         return kept
 
     def recall(self, memory):
@@ -229,5 +231,5 @@ class StepProblem(Equations):
         self.fresh = bool(memory["fresh"])
         if not self.fresh:
             super().recall(memory["tangent"])
-        if self.contact:
-            self.contact.recall(memory["contact"])
+        for i, part in enumerate(self.touching):
+            part.recall(memory[f"touching {i}"])

@@ -42,7 +42,7 @@ class TripleJump:
             raise SceneError(
                 "scheme = 'triple-jump' steps back in time: expected actions without memory, or another scheme"
             )
-        if self.problem.contact:
+        if self.problem.touching:
             raise SceneError(
                 "scheme = 'triple-jump' steps back in time, and needs smooth motions: expected no walls such as a "
                 "HoleWall, or another scheme"
