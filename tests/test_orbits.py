@@ -153,8 +153,28 @@ def test_what_is_refused_in_words(collar):
         (lambda: history.whirl(middle, since=0.1), r"whirl.since = 0.1: expected a time \(s\), at most 0.099"),
         (lambda: history.whirl(middle, since="late"), "whirl.since = 'late': expected a time"),
         (lambda: history[0].plot_orbit(middle), "expected a history with at least two times"),
-        (lambda: history.plot_campbell(middle), "expected a motion with at least 192 times"),
+        (lambda: history.plot_campbell(middle), "expected a motion with at least 200 times"),
         (lambda: draw_campbell(history, circles(np.linspace(0, 1, 500), (0.01, 1.0)), middle), "expected a run-up"),
     ):
         with pytest.raises(cf.SceneError, match=words):
             asked()
+
+
+def test_a_film_enlarges_the_clearance(collar, tmp_path):
+    pytest.importorskip("pyvista")
+    from cosserat_fenicsx.pictures.between import Between
+    from cosserat_fenicsx.pictures.enlarged import Enlarged
+
+    rod, _, history = collar
+    x = np.array([0.0, 0.5, 1.0])
+    bodies = Between(history).bodies(0.05, x)
+    (moved,) = Enlarged(history.scene, 40.0, "animate").bodies(bodies, x)
+    assert np.hypot(*moved.line[1, :2]) == pytest.approx(40 * np.hypot(*bodies[0].line[1, :2]), rel=1e-12)
+    np.testing.assert_allclose(moved.line[:, 2], bodies[0].line[:, 2], atol=1e-12)
+    history.animate(tmp_path / "a.gif", enlarge=40, fps=2, speed=0.05, size=(320, 240))
+    assert (tmp_path / "a.gif").stat().st_size > 1000
+    with pytest.raises(cf.SceneError, match="animate.enlarge = 0: expected a positive number"):
+        history.animate(tmp_path / "b.gif", enlarge=0)
+    free = cf.Scene([rod], velocities=[cf.InitialVelocity(rod, linear=(1, 0, 0))])
+    with pytest.raises(cf.SceneError, match="enlarge = 2.0: expected 1, since no rod is in a hole"):
+        Enlarged(free, 2.0, "animate")

@@ -8,9 +8,9 @@ from cosserat_fenicsx.pictures.figures import draw_chart, empty_figure
 _RPM, _MM = 30 / np.pi, 1e3
 # A run-up changes the speed by more than this share of the largest.
 _CONSTANT = 0.05
-# Windows, half overlapping; amplitudes below this share of the largest are not told apart; values of the transform per
-# independent one.
-_WINDOWS, _FLOOR, _FINER = 24, 1e-3, 4
+# Least number of times; shares of the duration that a window has at least and at most; windows that overlap at a time;
+# amplitudes below this share of the largest are not told apart; values of the transform per independent one.
+_LEAST, _SHORTEST, _LONGEST, _OVERLAP, _FLOOR, _FINER = 200, 1 / 40, 1 / 4, 8, 1e-3, 4
 
 
 def draw_campbell(history, orbit, station, file=None, *, reach=None):
@@ -28,8 +28,8 @@ def draw_campbell(history, orbit, station, file=None, *, reach=None):
         OSError: the file cannot be written.
     """
     speed = np.abs(orbit.spin)
-    if len(orbit.times) < 8 * _WINDOWS:
-        raise SceneError(f"Campbell diagram: expected a motion with at least {8 * _WINDOWS} times, not {len(history)}")
+    if len(orbit.times) < _LEAST:
+        raise SceneError(f"Campbell diagram: expected a motion with at least {_LEAST} times, not {len(history)}")
     if np.ptp(speed) < _CONSTANT * speed.max() or speed.max() == 0:
         raise SceneError(
             f"Campbell diagram: expected a run-up; the spin of {station} is {speed.min():.4g} to {speed.max():.4g} "
@@ -46,9 +46,10 @@ def _figure(history, orbit, station, reach):
     reach = reach or (1.25 * rolling if touches else 2.5) * float(speed.max())
     figure = empty_figure(9, 8)
     above, below = figure.subplots(2, 1, sharex=True, height_ratios=(1, 2))
-    x = np.abs(orbit.spin) * _RPM
+    x = np.interp(orbit.times, at, speed) * _RPM
+    ends = np.array([x.min(), x.max()])
     above.plot(x, orbit.radius * _MM, color="tab:blue", lw=0.7, label="radius")
-    above.plot(x[[0, -1]], np.full(2, orbit.clearance.min()) * _MM, color="peru", lw=1.6, label="clearance")
+    above.plot(ends, np.full(2, orbit.clearance.min()) * _MM, color="peru", lw=1.6, label="clearance")
     above.set_ylabel("distance from the\naxis of the hole (mm)")
     shown = np.abs(rates) <= reach
     level = 20 * np.log10(np.maximum(amplitude[order][:, shown] / amplitude.max(), _FLOOR))
@@ -56,7 +57,6 @@ def _figure(history, orbit, station, reach):
         speed[order] * _RPM, rates[shown] * _RPM, level.T, shading="nearest", cmap="Greys", rasterized=True
     )
     figure.colorbar(drawn, ax=below, label=f"amplitude (dB of {amplitude.max() * _MM:.3g} mm)")
-    ends = np.array([x.min(), x.max()])
     lines = [(1, "rotation, forward", "tab:blue"), (-1, "rotation, backward", "tab:cyan")]
     lines += [(-rolling, "rolling without slip", "tab:red")] if touches else []
     for factor, label, colour in lines:
@@ -71,7 +71,10 @@ def _figure(history, orbit, station, reach):
 
 
 def spectra(orbit):
-    """Spectra of an `Orbit` in windows of its duration that overlap by half.
+    """Spectra of an `Orbit` in overlapping windows of its duration.
+
+    Their length T is that in which a rate that grows with the spin, by a in a unit of time, changes by as much as
+    T resolves: a T = 2 pi/T.
 
     Returns:
         at (m,): middles, s; amplitude (m, k): radius of a circle at each rate, m; speed (m,): size of the mean spin,
@@ -82,9 +85,10 @@ def spectra(orbit):
     x, y = (np.interp(t, orbit.times, values) for values in orbit.position.T)
     spin = np.interp(t, orbit.times, orbit.spin)
     z = x + 1j * y * (-1.0 if spin.mean() < 0 else 1.0)
-    size = 2 * count // (_WINDOWS + 1)
+    best = np.sqrt(2 * np.pi / max(np.ptp(orbit.spin) * (t[-1] - t[0]), 1e-300))
+    size = round(count * min(max(best, _SHORTEST), _LONGEST))
     window = np.hanning(size)
-    starts = np.arange(_WINDOWS) * (size // 2)
+    starts = np.arange(0, count - size + 1, max(1, size // _OVERLAP))
     rows = starts[:, None] + np.arange(size)
     found = np.fft.fftshift(np.fft.fft(z[rows] * window, _FINER * size, axis=1), axes=1)
     rates = np.fft.fftshift(np.fft.fftfreq(_FINER * size, t[1] - t[0])) * 2 * np.pi

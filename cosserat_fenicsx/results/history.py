@@ -177,7 +177,7 @@ class History(Result):
 
         return energy_chart.draw(self, file)
 
-    def animate(self, file, *, fps=25, speed=None, magnify=1.0, size=(960, 720), progress=None):
+    def animate(self, file, *, fps=25, speed=None, magnify=1.0, enlarge=1.0, size=(960, 720), progress=None):
         """Film of the rods, coloured by bending moment, at a constant rate of frames; see `animation.film`.
 
         Args:
@@ -185,12 +185,13 @@ class History(Result):
             fps: frames per second.
             speed: seconds of the motion per second of the film; None for a suitable round number, 1 if possible.
             magnify: factor of the displacements in the picture.
+            enlarge: factor of the distances from the axes of the holes that rods are in, and of their clearances.
             size: (width, height), pixels.
             progress: whether to show a progress bar; None: only if it takes long.
         """
         from cosserat_fenicsx.pictures import animation
 
-        animation.film(self, file, fps=fps, speed=speed, magnify=magnify, size=size, progress=progress)
+        animation.film(self, file, fps=fps, speed=speed, magnify=magnify, enlarge=enlarge, size=size, progress=progress)
 
     @cached_property
     def _all_rates(self):
