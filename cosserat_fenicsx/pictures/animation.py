@@ -15,6 +15,7 @@ from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.interrupts import obey
 from cosserat_fenicsx.pictures.between import Between
 from cosserat_fenicsx.pictures.drawing import add_body, at_rest, frame, load_pyvista, points_of, prefix, thickening
+from cosserat_fenicsx.pictures.enlarged import Enlarged
 from cosserat_fenicsx.pictures.labels import plain
 from cosserat_fenicsx.progress import Progress
 from cosserat_fenicsx.ranks import Alone, on_first
@@ -31,7 +32,7 @@ _WHITE = 244
 _PIECES, _LETTER = 100, 16
 
 
-def film(history, file, *, fps=FPS, speed=None, magnify=1.0, size=SIZE, progress=None):
+def film(history, file, *, fps=FPS, speed=None, magnify=1.0, enlarge=1.0, size=SIZE, progress=None):
     """Write a film of the rods, coloured by bending moment; the camera is fixed and shows the whole motion.
 
     Frames come at a constant rate, interpolated between the saved times (`between.Between`).
@@ -43,6 +44,7 @@ def film(history, file, *, fps=FPS, speed=None, magnify=1.0, size=SIZE, progress
         speed: seconds of the motion per second of the film; None for 1 where the film then takes 2 to 10 s, and
             otherwise for 1, 2 or 5 times a power of ten.
         magnify: factor on displacements.
+        enlarge: factor on distances from the axes of the holes that rods are in, and on their clearances.
         size: (width, height), pixels, even.
         progress: True, False, or None for a bar on long runs in a terminal.
 
@@ -57,6 +59,7 @@ def film(history, file, *, fps=FPS, speed=None, magnify=1.0, size=SIZE, progress
         raise SceneError(f"{file}: expected a history with at least two times")
     fps = number("animate", "fps", fps, "a number from 1 to 100", lambda x: 1 <= x <= 100)
     positive("animate", "magnify", magnify, "-")
+    enlarged = Enlarged(history.scene, enlarge, "animate")
     width, height = pixels(size)
     if file.suffix == ".gif":
         fps = 100 / round(100 / fps)
@@ -66,7 +69,9 @@ def film(history, file, *, fps=FPS, speed=None, magnify=1.0, size=SIZE, progress
     pace = _pace_in_words(speed)
     on_first(
         history.comm,
-        lambda: record(lambda: _Stage(history, times, magnify, (width, height), pace), file, times, fps, progress),
+        lambda: record(
+            lambda: _Stage(history, times, magnify, enlarged, (width, height), pace), file, times, fps, progress
+        ),
     )
 
 
@@ -155,13 +160,13 @@ def record(make_stage, file, times, fps, progress):
 class _Stage:
     """The scene of the film: constant parts are drawn once, meshes of the rods are moved for every frame."""
 
-    def __init__(self, history, times, magnify, size, pace):
+    def __init__(self, history, times, magnify, enlarged, size, pace):
         pyvista = load_pyvista()
         self._between, self._magnify, self._pace = Between(history), magnify, pace
-        self._x = np.linspace(0, 1, _PIECES + 1)
+        self._x, self._enlarged = np.linspace(0, 1, _PIECES + 1), enlarged
         self._digits = max(0, 2 - math.floor(math.log10(times[-1] - times[0])))
         resting = at_rest(history.scene)
-        bodies = [self._between.bodies(t, self._x, magnify) for t in times]
+        bodies = [self._bodies(t) for t in times]
         everywhere = np.concatenate([*resting, *(body.line for made in bodies for body in made)])
         extent = float(np.ptp(everywhere, axis=0).max())
         peak = max(body.values.max() for made in bodies for body in made)
@@ -174,14 +179,20 @@ class _Stage:
             add_body(self._plotter, pyvista, body, factor, peak, moving=True)
             for body, factor in zip(bodies[0], self._factors, strict=True)
         ]
+        radii = [factor * body.radius for body, factor in zip(bodies[0], self._factors, strict=True)]
+        enlarged.add_holes(self._plotter, pyvista, radii)
         for line in resting:
             self._plotter.add_mesh(pyvista.lines_from_points(line), color="lightgrey", line_width=2)
         self._head, self._letters = history.scene.title or "Motion", size[0] // _LETTER
         self._notes = self._not_to_scale()
         frame(self._plotter, everywhere)
 
+    def _bodies(self, t):
+        return self._enlarged.bodies(self._between.bodies(t, self._x, self._magnify), self._x)
+
     def _not_to_scale(self):
         notes = [f"displacements magnified {self._magnify:g} times"] if self._magnify != 1 else []
+        notes += self._enlarged.note
         thicker = sorted({f"{float(f'{factor:.2g}'):g}" for factor in self._factors if factor > 1})
         notes += [f"sections drawn {' and '.join(thicker)} times their size"] if thicker else []
         if self._between.smooth < 1:
@@ -190,9 +201,7 @@ class _Stage:
 
     def at(self, t):
         """(height, width, 3) the picture at t (s)."""
-        for mesh, body, factor in zip(
-            self._meshes, self._between.bodies(t, self._x, self._magnify), self._factors, strict=True
-        ):
+        for mesh, body, factor in zip(self._meshes, self._bodies(t), self._factors, strict=True):
             mesh.points[:] = points_of(body, factor)
             mesh["value"][:] = np.repeat(body.values / self._scale, body.outline.shape[1])
             mesh.GetPoints().Modified()

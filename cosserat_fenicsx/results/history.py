@@ -7,11 +7,14 @@ from functools import cached_property
 
 import numpy as np
 
+from cosserat_fenicsx.annotations import File
 from cosserat_fenicsx.quaternions import directors
 from cosserat_fenicsx.results.at_walls import WallForces, wall_forces
+from cosserat_fenicsx.results.orbits import Orbit, orbit_of
 from cosserat_fenicsx.results.records import Record
 from cosserat_fenicsx.results.result import Result
 from cosserat_fenicsx.results.viscous import viscous_contact
+from cosserat_fenicsx.results.whirl import Whirl, whirl
 from cosserat_fenicsx.scene.action import Action
 from cosserat_fenicsx.scene.rod import RodOrName, StationOrName
 
@@ -174,7 +177,7 @@ class History(Result):
 
         return energy_chart.draw(self, file)
 
-    def animate(self, file, *, fps=25, speed=None, magnify=1.0, size=(960, 720), progress=None):
+    def animate(self, file, *, fps=25, speed=None, magnify=1.0, enlarge=1.0, size=(960, 720), progress=None):
         """Film of the rods, coloured by bending moment, at a constant rate of frames; see `animation.film`.
 
         Args:
@@ -182,12 +185,13 @@ class History(Result):
             fps: frames per second.
             speed: seconds of the motion per second of the film; None for a suitable round number, 1 if possible.
             magnify: factor of the displacements in the picture.
+            enlarge: factor of the distances from the axes of the holes that rods are in, and of their clearances.
             size: (width, height), pixels.
             progress: whether to show a progress bar; None: only if it takes long.
         """
         from cosserat_fenicsx.pictures import animation
 
-        animation.film(self, file, fps=fps, speed=speed, magnify=magnify, size=size, progress=progress)
+        animation.film(self, file, fps=fps, speed=speed, magnify=magnify, enlarge=enlarge, size=size, progress=progress)
 
     @cached_property
     def _all_rates(self):
@@ -210,6 +214,64 @@ class History(Result):
             SceneError: something else.
         """
         return wall_forces(self, wall)
+
+    def orbit(self, station: StationOrName, wall: Action | None = None) -> Orbit:
+        """The axis of a section in the cross-section of its hole, and the wall's normal force on it.
+
+        Args:
+            station: of a rod that a wall of motions is around.
+            wall: a `HoleWall` or `HoleRing` of the scene; None where only one is around the station.
+
+        Raises:
+            SceneError: another wall, another station, or no wall.
+        """
+        return orbit_of(self, station, wall)
+
+    def whirl(self, station: StationOrName, wall: Action | None = None, since: float | None = None) -> Whirl:
+        """How a section whirls in its hole: rate, ratio to the spin, radius, contact; `print` shows it with units.
+
+        Args:
+            station, wall: see `orbit`.
+            since: the time from which on, s; None for the whole motion.
+
+        Raises:
+            SceneError: see `orbit`; or a time that leaves fewer than two states.
+        """
+        return whirl(self, station, wall, since)
+
+    def plot_orbit(self, station: StationOrName, wall: Action | None = None, file: File | None = None):
+        """Chart of the way of a section's axis in the circle of the clearance, seen down the hole, coloured by time.
+
+        Args:
+            station, wall: see `orbit`.
+            file: a .png or .pdf; None returns matplotlib's Figure.
+        """
+        from cosserat_fenicsx.pictures import orbit_chart
+
+        return orbit_chart.draw_orbit(self, orbit_of(self, station, wall), self.station(station), file)
+
+    def plot_whirl(self, station: StationOrName, wall: Action | None = None, file: File | None = None):
+        """Chart over time of a section's distance from the axis of the hole, of its rates of whirl and spin, and of the
+        wall's normal force.
+
+        Args: see `plot_orbit`.
+        """
+        from cosserat_fenicsx.pictures import orbit_chart
+
+        return orbit_chart.draw_whirl(self, orbit_of(self, station, wall), self.station(station), file)
+
+    def plot_campbell(self, station: StationOrName, wall: Action | None = None, file: File | None = None):
+        """Campbell diagram of a section over a run-up: amplitude of whirl and its spectrum, forward and backward, over
+        the speed of rotation.
+
+        Args: see `plot_orbit`.
+
+        Raises:
+            SceneError: the speed of rotation hardly changes, or too few times are saved.
+        """
+        from cosserat_fenicsx.pictures import campbell_chart
+
+        return campbell_chart.draw_campbell(self, orbit_of(self, station, wall), self.station(station), file)
 
     def _at_clamp(self, point, joined):
         return self._stacked("clamp_forces")[:, point]
