@@ -14,8 +14,8 @@ class EndForce(NamedTuple):
         torque: N m, against the rotation, and anything up to that at rest; None for that of the bit's Stribeck law.
         flats: N, half of what wear flats bear: their force is flats above the given one where the bit moves down, flats
             below it where it moves up, and anything between at rest.
-        rock: None, or place (m below that at the start) and velocity (m/s, downwards) at the end of the step of the face
-            of a rigid rock, which pushes but does not pull.
+        rock: None, or place (m below that at the start) and velocity (m/s, downwards), at the end of the step, of the
+            face of a rigid rock, which pushes but does not pull.
     """
 
     force: np.ndarray

@@ -39,8 +39,8 @@ class AxialTorsional(Pointers):
 
     A string that starts at rest is in the tension of its weight in mud along the hole, without friction. A bit with a
     weight stands on a rock that does not give way, with the hook lowered until it bears that weight; without one the
-    string hangs off bottom. The rock pushes the bit but does not pull it; the torque of a bit whose law has a `radius` follows
-    the weight on bit of the step before. Speeds, forces and torques that are told are means over the last step.
+    string hangs off bottom. The rock pushes the bit but does not pull it; the torque of a bit whose law has a `radius`
+    follows the weight on bit of the step before. Speeds, forces and torques that are told are means over the last step.
 
     Args:
         scene: a `Drilling`.
