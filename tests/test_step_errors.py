@@ -46,3 +46,11 @@ def test_a_matched_drive_has_the_impedance_of_the_uppermost_component_however_sh
     assert Z < 100
     rows, given = (run(TorsionWaves(x, 20 / SPEED), 10)[1] for x in (scene, told))
     assert np.array_equal(rows, given, equal_nan=True)
+
+
+def test_a_refused_step_is_told_with_one_that_passes():
+    scene = replace(off_bottom()[0], friction=cf.WallFriction(0.3, 0.195, 0.05, of_rotation=True))
+    with pytest.raises(cf.SceneError, match=r"dt = 0.02 s: expected at most about (\S+) s") as refused:
+        AxialTorsional(scene, 0.02, axial=False)
+    told = float(str(refused.value).split("about ")[1].split()[0])
+    assert told > 1e-3 and AxialTorsional(scene, told, axial=False).dt == told

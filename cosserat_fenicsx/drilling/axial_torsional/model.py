@@ -201,11 +201,14 @@ class AxialTorsional(Pointers):
     # -- words ---------------------------------------------------------------------------------------------------------
 
     def _refuse_step(self):
-        shorter = self.dt / 2
-        while self._lib.steepest(self._m, shorter) <= 0 and shorter > self.dt * 2.0**-_TRIALS:
-            shorter /= 2
+        asked = self.dt
+        for _ in range(_TRIALS):
+            self.dt /= 2
+            self._set(self._asked)  # masses of elements depend on the step
+            if self._lib.steepest(self._m, self.dt) > 0:
+                break
         raise SceneError(
-            f"AxialTorsional.dt = {self.dt:g} s: expected at most about {shorter:.3g} s: in longer steps the law of "
+            f"AxialTorsional.dt = {asked:g} s: expected at most about {self.dt:.3g} s: in longer steps the law of "
             "friction or of the bit falls more steeply than inertia and string allow, and the speed at the end of a "
             "step is not determined"
         )

@@ -8,8 +8,8 @@ Where the bit cuts, at the rotation Om and the rate of penetration V, with n bla
 
     (s Za(s) + ka E) (s Zt(s) - kt rho E) + ka kt rho E^2 = 0,   E = 1 - exp(-s tau),  rho = V/Om,
 
-Za and Zt with the mass and the inertia of the bit, ka and kt weight and torque per depth of cut. Both are written
-without denominators, as entire functions of s.
+which is s Za Zt + E (ka Zt - kt rho Za) = 0, Za and Zt with the mass and the inertia of the bit, ka and kt weight and
+torque per depth of cut. Both are written without denominators, as entire functions of s.
 """
 
 import math
@@ -88,31 +88,26 @@ class Regenerative:
         return 2 * math.pi / (self.blades * self.speed)
 
     def _memory(self, s):
-        """E/s and its derivative."""
+        """q E/s, q times its derivative, and q = exp(tau min(Re s, 0)), with which nothing overflows."""
         tau = self.delay
         x = s * tau
         small = np.abs(x) < 1e-2
         y = np.where(small, 1.0, x)
-        decayed = np.exp(-y)
-        value = np.where(small, 1 - x / 2 * (1 - x / 3 * (1 - x / 4 * (1 - x / 5 * (1 - x / 6 * (1 - x / 7))))),
-                         (1 - decayed) / y)  # fmt: skip
+        size = np.exp(np.minimum(x.real, 0.0))
+        decayed, q = np.exp(-1j * y.imag - np.maximum(y.real, 0.0)), np.exp(np.minimum(y.real, 0.0))
+        series = 1 - x / 2 * (1 - x / 3 * (1 - x / 4 * (1 - x / 5 * (1 - x / 6 * (1 - x / 7)))))
+        value = np.where(small, size * series, (q - decayed) / y)
         series = -1 / 2 + x / 3 * (1 - 3 * x / 8 * (1 - 4 * x / 15 * (1 - 5 * x / 24 * (1 - 6 * x / 35))))
-        slope = np.where(small, series, (decayed * (1 + y) - 1) / y**2)
-        return tau * value, tau**2 * slope
+        slope = np.where(small, size * series, (decayed * (1 + y) - q) / y**2)
+        return tau * value, tau**2 * slope, size
 
     def __call__(self, s):
         om, T, dom, dT = self.torsion.bit(s)
         v, A, dv, dA = self.axial.bit(s)
-        e, de = self._memory(s)
-        rho = self.penetration / self.speed
-        first, second = A + self.ka * e * v, T - self.kt * rho * e * om
-        dfirst = dA + self.ka * (de * v + e * dv)
-        dsecond = dT - self.kt * rho * (de * om + e * dom)
-        k = self.ka * self.kt * rho
-        return (
-            first * second + k * e**2 * v * om,
-            dfirst * second + first * dsecond + k * (2 * e * de * v * om + e**2 * (dv * om + v * dom)),
-        )
+        e, de, q = self._memory(s)
+        ka, kt = self.ka, self.kt * self.penetration / self.speed
+        cut, dcut = ka * v * T - kt * om * A, ka * (dv * T + v * dT) - kt * (dom * A + om * dA)
+        return q * A * T + e * cut, q * (dA * T + A * dT) + de * cut + e * dcut
 
     @property
     def spacing(self):
@@ -151,10 +146,10 @@ class Regenerative:
     def motion(self, s):
         """Relative motion of the bit in each guide: rotation and axial velocity, (2,)."""
         at = np.array([s], dtype=complex)
-        (om, T, *_), (v, A, *_), (e, _) = self.torsion.bit(at), self.axial.bit(at), self._memory(at)
+        (om, T, *_), (v, A, *_), (e, _, q) = self.torsion.bit(at), self.axial.bit(at), self._memory(at)
         rho = self.penetration / self.speed
         # per unit of rotation, from the equation that is the better conditioned one of both
-        axial, torsional = A / v + self.ka * e, T / om - self.kt * rho * e
+        axial, torsional = q * A / v + self.ka * e, q * T / om - self.kt * rho * e
         if abs(axial[0]) > abs(self.ka * e[0]) * 1e-6:
             return 1.0 + 0j, complex(self.ka * e[0] * rho / axial[0])
         return 1.0 + 0j, complex(-torsional[0] / (self.kt * e[0]))

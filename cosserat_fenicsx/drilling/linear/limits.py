@@ -44,7 +44,7 @@ def critical_slopes(scene: Drilling, up_to: float = 10.0) -> tuple[np.ndarray, n
         om, B, *_ = guide.bit(1j * np.asarray(w))
         return B * np.conj(om), np.abs(om) ** 2
 
-    width = math.pi / (2 * guide.travel)
+    width = 0.47 * math.pi / guide.travel  # no edge at a frequency of a uniform string
     edges = np.linspace(0.0, top, 1 + max(1, math.ceil(top / width)))
     found = []
     for a, b in zip(edges[:-1], edges[1:], strict=True):

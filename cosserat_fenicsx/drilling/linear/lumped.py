@@ -109,11 +109,11 @@ class LumpedCutting:
             with np.errstate(over="ignore"):
                 decayed = np.exp(-s * tau)
             E, dE = 1 - decayed, tau * decayed
-            axial, daxial = s**2 + 2 * za * wa * s + wa**2 + n * psi * E, 2 * s + 2 * za * wa + n * psi * dE
+            axial, daxial = s**2 + 2 * za * wa * s + wa**2, 2 * s + 2 * za * wa
             if rho == 0.0:
-                return axial, daxial
-            torsional, dtorsional = s**2 + 2 * zt * s + 1 - n * rho * E, 2 * s + 2 * zt - n * rho * dE
-            k = n**2 * psi * rho
-            return axial * torsional + k * E**2, daxial * torsional + axial * dtorsional + 2 * k * E * dE
+                return axial + n * psi * E, daxial + n * psi * dE
+            torsional, dtorsional = s**2 + 2 * zt * s + 1, 2 * s + 2 * zt
+            cut, dcut = n * (psi * torsional - rho * axial), n * (psi * dtorsional - rho * daxial)  # E^2 drops out
+            return axial * torsional + E * cut, daxial * torsional + axial * dtorsional + dE * cut + E * dcut
 
         return f

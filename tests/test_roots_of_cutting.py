@@ -1,0 +1,36 @@
+"""Roots of a bit that cuts where the delay is long beside the time of a wave."""
+
+import numpy as np
+import pytest
+from torsion_scenes import string
+
+import cosserat_fenicsx as cf
+from cosserat_fenicsx.drilling.linear.lumped import LumpedCutting
+
+A, EPSILON, ZETA, BLADES, WEIGHT = 0.108, 60e6, 0.6, 4, 5e4
+
+
+@pytest.mark.parametrize(("length", "speed", "up_to"), [(50.0, 3.0, 30.0), (300.0, 1.0, 10.0), (2000.0, 0.2, 1.0)])
+def test_short_strings_and_slow_rotation(length, speed, up_to):
+    """Every root fulfils (s Za + ka E)(s Zt - kt rho E) + ka kt rho E^2 = 0 with Z coth(s L/c) of a uniform string."""
+    bit = cf.BitOnRock(cf.Cutting(A, EPSILON, ZETA, BLADES), weight=WEIGHT, inertia=1.0, mass=10.0)
+    scene = cf.Drilling(string((length, 0.127, 0.1)), cf.TopDrive(1.0), bit)
+    roots = cf.stability(scene, [speed], up_to=up_to).roots[0, 0]
+    (part,) = scene.segments
+    ka, kt = BLADES * ZETA * EPSILON * A, BLADES * EPSILON * A**2 / 2
+    rho, tau = WEIGHT / ka * BLADES / (2 * np.pi), 2 * np.pi / (BLADES * speed)
+    s, E = roots, 1 - np.exp(-roots * tau)
+    Za = part.axial_impedance / np.tanh(s * length / part.axial_speed) + 10.0 * s
+    Zt = part.torsional_impedance / np.tanh(s * length / part.torsional_speed) + 1.0 * s
+    terms = s * Za * s * Zt, -s * Za * kt * rho * E, s * Zt * ka * E
+    assert len(roots) > 4 and np.isfinite(roots).all()
+    assert (np.abs(sum(terms)) < 1e-9 * np.max(np.abs(terms), axis=0)).all()
+
+
+def test_the_lumped_bit_at_slow_rotation():
+    lumped = LumpedCutting(13.9, 4, penetration=0.5, axial_damping=0.0, torsional_damping=0.1)
+    roots = lumped.roots(0.05, up_to=2.0)
+    rho, E = 0.5 / 0.05, 1 - np.exp(-roots * 2 * np.pi / (4 * 0.05))
+    axial, torsional = roots**2, roots**2 + 0.2 * roots + 1
+    terms = axial * torsional, 4 * 13.9 * E * torsional, -4 * rho * E * axial
+    assert len(roots) > 4 and (np.abs(sum(terms)) < 1e-9 * np.max(np.abs(terms), axis=0)).all()
