@@ -219,7 +219,9 @@ class AxialTorsional(Pointers):
             told.append("friction at the wall against axial and rotary slip together, normal force by the soft string "
                         "from the tension of the step before")  # fmt: skip
             bit = self.scene.bit
-            if bit is not None and bit.weight is not None:
+            if self.scene.start == "steady":
+                told.append("starts in steady motion, all of it at the speeds of drive and hook")
+            elif bit is not None and bit.weight is not None:
                 told.append(f"starts with {bit.weight:g} N on bit, without friction; the rock does not give way")
             else:
                 told.append("starts hanging off bottom, without friction")

@@ -132,6 +132,8 @@ class TorsionWaves(Pointers):
             )
         if cells.dt < asked / 2:
             yield f"dt is less than the {asked:.4g} s asked for, or the law of friction would have several answers"
+        if scene.start == "steady":
+            yield "starts in steady rotation at the speed of the drive"
         if scene.hole is not None and self.normal_force is None:
             yield "wall force of the soft string without axial motion: tension is that of the weight"
         if scene.hook is not None and (scene.hook.speed != 0 or math.isfinite(scene.hook.stiffness)):
