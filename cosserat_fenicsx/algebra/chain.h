@@ -180,6 +180,7 @@ int attach(petsc *functions, newton *n, void *snes, void *vector, void *matrix, 
 int settle(contact *c);
 int broken(const contact *c);
 double stored(const contact *c, int at_start);
+double lost(const contact *c, const double *before);
 
 int negative_modes(second_variation *v, int *sideways);
 int run(sweep *s);

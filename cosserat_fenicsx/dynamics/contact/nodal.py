@@ -52,6 +52,7 @@ class NodalContact(Pointers):
         self._vectors = {name: np.zeros((n, size)) for name, size in sizes.items()}
         self._compliance = np.zeros((n, 2 * reach + 1, 6, 6))
         self._begun, self._law_begun = (self._vectors[name].copy() for name in ("force", "law"))
+        self._at_start = self.doubles(self._law_begun)
         self.c = contact = self._ffi.new("contact *")
         contact.nodes, contact.reach, contact.at_end = n, reach, at_end
         contact.most, contact.share, contact.smallest = _MOST, _SHARE, _SMALLEST
@@ -153,8 +154,9 @@ class NodalContact(Pointers):
         vectors = self._vectors
         vectors["moved"][:] = motion_between(self._before, self._nodes.of_local(self._problem.state))
         gained = self._lib.stored(self.c, 0) - self._lib.stored(self.c, 1)
-        force = (vectors["force"] + self._begun) / 2 if self.c.at_end else vectors["force"]
-        return gained, -float(np.vdot(force, vectors["moved"])) - gained
+        if self.c.at_end:
+            return gained, self._lib.lost(self.c, self._at_start)
+        return gained, -float(np.vdot(vectors["force"], vectors["moved"])) - gained
 
     @property
     def count(self):
