@@ -43,7 +43,10 @@ class NodalContact(Pointers):
         self._slots[order] = np.arange(len(order))
         nodes.hold(problem.state)
         self._origin = np.concatenate([np.tile(p.origin, (len(p.slots), 1)) for p in touched])[order]
-        n, reach = nodes.count, nodes.count - 1 if nodes.count <= _FEW else _NEIGHBOURS
+        n, self._coupled = nodes.count, nodes.count - 1 if nodes.count <= _FEW else _NEIGHBOURS
+        # nodes at the same point have the same neighbours: how they share a force would matter otherwise
+        of, along = nodes.points, np.arange(n)
+        reach = int((np.searchsorted(of, of + self._coupled, side="right") - 1 - along).max())
         self._numbers = {name: np.zeros(n) for name in ("clearance", "stiffness", "friction", "damping", "arm")}
         units = {"stiffness": scales.force / scales.length, "damping": model.time / scales.length}
         for name in ("stiffness", "damping"):
@@ -134,8 +137,8 @@ class NodalContact(Pointers):
         for first in range(apart):
             sources = np.arange(first, n, apart)
             j = sources[:, None] + np.arange(-reach, reach + 1)
-            inside = (j >= 0) & (j < n)
-            j = np.clip(j, 0, n - 1)
+            inside, j = (j >= 0) & (j < n), np.clip(j, 0, n - 1)
+            inside &= np.abs(nodes.points[j] - nodes.points[sources, None]) <= self._coupled
             for component in range(6):
                 force = np.zeros((n, 6))
                 force[sources, component] = -1.0
