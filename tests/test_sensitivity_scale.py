@@ -56,6 +56,18 @@ def test_parameters_that_move_elements_are_refused():
             path.sensitivity(tip, [name])
 
 
+def test_a_number_that_two_rods_share_counts_once():
+    steel = cf.Material(E=210e9, nu=0.3)
+    lower = cf.Rod(cf.Line((0, 0, 0), (0, 0, 5.0)), cf.Circle(0.2), steel, name="lower")
+    upper = cf.Rod(cf.Line((0, 0, 5.0), (0, 0, 8.0)), cf.Circle(0.1), steel, name="mast")
+    joint = [cf.Joint(lower.end, upper.start)]
+    path = cf.solve(cf.Scene([lower, upper], [cf.Clamp(lower.start)], [cf.Force(upper.end, (1e3, 0, 0))], joint), [1.0])
+    names = [f"rods.{name}.material.E" for name in ("lower", "mast")]
+    with pytest.raises(cf.SceneError, match="is the same number of the scene as 'rods.lower.material.E'"):
+        path.uncertainty(dict.fromkeys(names, 1e9), tip)
+    assert path.sensitivity(tip, names[1:]).relative(names[1]) == pytest.approx(-1.0, rel=1e-3)
+
+
 @pytest.mark.parametrize(
     "rho", [[[1, 0.9, 0.9], [0.9, 1, -0.9], [0.9, -0.9, 1]], [[1, 2], [3]], np.full((3, 3), np.nan)]
 )

@@ -73,6 +73,33 @@ class Parameter:
         return abs(self.value if self.scale is None else self.scale)
 
 
+@dataclass(frozen=True)
+class _OfScene(Parameter):
+    """A parameter by its name: `place` tells whether another name means the same number."""
+
+    place: tuple = ()
+
+
+def check_once(scene, given):
+    """Refuse two names of the same number, such as that of a shared material, whose uncertainty would count twice.
+
+    Args:
+        given: names or `Parameter`s.
+
+    Raises:
+        SceneError: there are two, or two parameters with one name; see also `parameter_of`.
+    """
+    names = {}
+    for parameter in [parameter_of(scene, each) for each in given]:
+        place = getattr(parameter, "place", parameter.name)
+        if place in names:
+            raise SceneError(
+                f"parameter '{parameter.name}' is the same number of the scene as '{names[place]}': expected one of "
+                "them, whose standard deviation counts once"
+            )
+        names[place] = parameter.name
+
+
 def parameter_of(scene, given):
     """The `Parameter` given as one or by its name.
 
@@ -106,7 +133,7 @@ def parameter_of(scene, given):
         new = _put(getattr(owner, field), keys, value)
         return _Rebuilding({id(owner): _made(owner, {field: new})}).of(scene)
 
-    return Parameter(given, float(leaf), scene_of, unit, size or None)
+    return _OfScene(given, float(leaf), scene_of, unit, size or None, (id(owner), field, *keys))
 
 
 def _extent(curve):
