@@ -114,6 +114,8 @@ _HOME = {
     "Lobes": "drilling.bit_laws",
     "Matched": "drilling.top_drive",
     "Motor": "drilling.top_drive",
+    "MixedScene": "drilling.mixed",
+    "mixed_scene": "drilling.mixed",
     "PI": "drilling.top_drive",
     "PipeAbove": "drilling.pipe_above",
     "Stiff": "drilling.top_drive",
@@ -167,6 +169,8 @@ if TYPE_CHECKING:  # the same names, for editors and type checkers
     from cosserat_fenicsx.drilling.discs import Discs as Discs
     from cosserat_fenicsx.drilling.history import DrillingHistory as DrillingHistory
     from cosserat_fenicsx.drilling.hook import Hook as Hook
+    from cosserat_fenicsx.drilling.mixed import MixedScene as MixedScene
+    from cosserat_fenicsx.drilling.mixed import mixed_scene as mixed_scene
     from cosserat_fenicsx.drilling.pipe_above import PipeAbove as PipeAbove
     from cosserat_fenicsx.drilling.scene import Drilling as Drilling
     from cosserat_fenicsx.drilling.scenefile import DrillingScene as DrillingScene
