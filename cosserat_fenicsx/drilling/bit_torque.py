@@ -40,7 +40,9 @@ class BitTorque(PointAction):
         is_known(self, "station", Station)
         instance(self, "law", self.law, Stribeck, "a Stribeck(...)")
         for field, unit in (("weight", "N"), ("inertia_of_bit", "kg m^2")):
-            value = number(self, field, getattr(self, field), f"a number from 0 on ({unit})", lambda x: 0 <= x < math.inf)
+            value = number(
+                self, field, getattr(self, field), f"a number from 0 on ({unit})", lambda x: 0 <= x < math.inf
+            )
             store(self, **{field: value})
 
     def inertia(self, rod):
