@@ -13,6 +13,7 @@ from cosserat_fenicsx.drilling.choose import chosen
 from cosserat_fenicsx.drilling.discs import Discs
 from cosserat_fenicsx.drilling.folder import DrillingFolder
 from cosserat_fenicsx.drilling.models import model_of
+from cosserat_fenicsx.drilling.pictures.shown import turns
 from cosserat_fenicsx.drilling.scenefile import drilling_in
 from cosserat_fenicsx.drilling.simulate import check_arguments, resume_drilling
 from cosserat_fenicsx.errors import Interrupted, NotConverged, NotStored, SceneError
@@ -123,7 +124,9 @@ def _write(history, out, pictures, film, speed, stops):
     """Write the files of a motion; `stops`: whether a signal ends the writing."""
     files = {"drilling.csv": history.write}
     if pictures and len(history) > 1:
-        files |= {"drilling.png": history.plot, "phase.png": history.plot_phase, "energy.png": history.plot_energy}
+        files |= {"drilling.png": history.plot, "energy.png": history.plot_energy}
+        if turns(history):
+            files["phase.png"] = history.plot_phase
         if len(history.profile_times) > 1:
             files |= {"map.png": history.plot_map}
     if film and len(history.profile_times) > 1:

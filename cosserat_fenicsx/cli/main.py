@@ -63,8 +63,8 @@ def _rods_alone(do):
 
         tables = tables_of(options.scene)
         if _is_drilling(tables):
-            raise SceneError(f"cosserat {options.command} is for rods, and {options.scene} is a drill-string in motion: "
-                             "`cosserat run` with a table [stability] computes its modes")  # fmt: skip
+            raise SceneError(f"cosserat {options.command} is for rods, and {options.scene} is a drill-string in "
+                             "motion: `cosserat run` with a table [stability] computes its modes")  # fmt: skip
         return do(options)
 
     return command
