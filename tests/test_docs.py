@@ -74,6 +74,9 @@ def test_programs_run(page, program, tmp_path, monkeypatch, capsys):
     if "whirl" in names:
         middle = names["history"].position(names["rod"].at(6.0))[:, :2]
         assert np.hypot(*middle.T) == pytest.approx(0.01153104608640505, rel=1e-3)  # the exact beam
+    elif "wall" in names:  # a collar that turns on the low side slips at the angle of friction
+        _, y, z = names["history"].position(names["pipe"].at(6.0)).T
+        assert np.arctan2(y, z)[names["history"].times > 2].mean() == pytest.approx(np.arctan(0.3), rel=0.02)
     elif {"history", "rod"} <= set(names):
         end = names["history"].position(names["rod"].start)[-1]
         assert end == pytest.approx((40.6897, 0.1578, -3.0316), abs=1e-4)

@@ -1,6 +1,7 @@
 """Strings and holes: dimensions, buoyancy, standard sizes, states along the string, and input that is refused."""
 
 import math
+import warnings
 
 import numpy as np
 import pytest
@@ -170,6 +171,16 @@ def test_the_soft_string_says_what_it_leaves_out():
 def test_what_is_refused(do, words):
     with pytest.raises(cf.SceneError, match=words):
         do()
+
+
+def test_a_rotation_in_radians_per_second_is_doubted():
+    for operation in (cf.Ream, cf.BackReam):
+        words = rf"{operation.__name__}.rpm = 8.37758 .* revolutions per minute, not in rad/s.* 8.37758 rad/s are 80$"
+        with pytest.warns(cf.SceneWarning, match=words):
+            operation(0.15, 80 * cf.units.rpm)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        cf.Ream(0.15, 20)
 
 
 def test_a_density_in_other_units_is_doubted():

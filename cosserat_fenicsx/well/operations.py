@@ -15,6 +15,8 @@ from cosserat_fenicsx.errors import SceneWarning
 
 # Weights (N) and torques (N m) on bit below these are numbers in other units by all appearance.
 _HARDLY = {"weight": 500.0, "torque": 50.0}
+# Revolutions per minute below this are rad/s by all appearance: 80 rev/min are 8.4 rad/s.
+_SLOW = 20.0
 
 
 class Operation:
@@ -117,7 +119,8 @@ class _Reaming(Operation):
     """Base of moving along the hole while rotating.
 
     Args:
-        speed: along the hole, m/s, positive. rpm: revolutions per minute, positive.
+        speed: along the hole, m/s, positive. rpm: revolutions per minute, positive; below 20, which look like rad/s,
+            a `SceneWarning` says so.
         weight, torque: on bit, N and N m.
     """
 
@@ -129,6 +132,13 @@ class _Reaming(Operation):
     def __post_init__(self):
         super().__post_init__()
         store(self, speed=positive(self, "speed", self.speed, "m/s"), rpm=positive(self, "rpm", self.rpm, "1/min"))
+        if self.rpm < _SLOW:
+            warnings.warn(
+                f"{type(self).__name__}.rpm = {self.rpm:g} 1/min is hardly a rotation: it is in revolutions per minute, "
+                f"not in rad/s; 80 rev/min are 80, not 80 * units.rpm. {self.rpm:g} rad/s are {self.rpm / units.rpm:g}",
+                SceneWarning,
+                stacklevel=3,
+            )
 
     def direction(self, radius):
         """(c, e) for a contact radius (m)."""
