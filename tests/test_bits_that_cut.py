@@ -1,5 +1,6 @@
 """Bits that cut with a delay, and bits on lobes, at the end of a string: growth, closed forms, memory."""
 
+import dataclasses
 import math
 
 import numpy as np
@@ -77,6 +78,25 @@ def test_a_bit_that_is_pulled_up_steadily_is_free():
     rows = AxialTorsional(scene, 0.002).advance(200)
     assert not column(rows, "weight_on_bit").any() and not column(rows, "torque_on_bit").any()
     assert np.abs(column(rows, "bit_velocity") + 0.01).max() < 1e-9
+
+
+@pytest.mark.parametrize("start", ["rest", "steady"])
+def test_without_a_hook_the_string_follows_the_bit(start):
+    """The load of the hook stays, so that the mean weight on bit does; it drills by its depth of cut."""
+    turns, steel = 240 * cf.units.rpm, 26.71375795359451 * 3000 + 147.91899737466485 * 200
+    scene = dataclasses.replace(drilling(start, 120e3, rpm=240.0), hook=None)
+    rows = AxialTorsional(scene, 0.004).advance(5000)
+    # V from weight = k cut + flats + drag of the mud
+    stiffness = WORN.axial_stiffness * 2 * math.pi / (4 * turns)
+    rate = (120e3 - 0.108 * 0.011 * 60e6) / (stiffness + 0.5 * steel)
+    weight = 120e3 - 0.5 * steel * rate
+    if start == "steady":  # before vibrations grow
+        assert column(rows, "weight_on_bit")[:250] == pytest.approx(weight, rel=1e-6)
+        assert column(rows, "bit_velocity")[:250] == pytest.approx(rate, rel=1e-5)
+    else:
+        late = rows[:, 0] > 10
+        assert column(rows, "weight_on_bit")[late].mean() == pytest.approx(weight, rel=0.05)
+        assert np.ptp(column(rows, "bit_advance")[late]) > 5 * rate
 
 
 @pytest.mark.parametrize("weight", [None, 120e3])

@@ -26,7 +26,8 @@ class Drilling:
         drive: a `TopDrive`.
         bit: a `BitOnRock`; None where the lower end is free.
         hole: a `Borehole`; None for a string without walls, as in a straight vertical hole.
-        hook: a `Hook`; None for a rigid one at rest.
+        hook: a `Hook`; None for a rigid one at rest, or, where the bit has a `Cutting` law and a weight, for one whose
+            load stays the same, so that the string follows the bit.
         mud: a `Mud`; None where all components have their weight in mud, or where there is no hole: in air.
         friction: `WallFriction`; None for that of the hole, the same at rest and in motion.
         drag: `ViscousDrag`; None for none.

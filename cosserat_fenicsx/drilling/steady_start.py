@@ -1,5 +1,7 @@
 """The steady motion that a scene may start with: which scenes have one, and its velocities."""
 
+import math
+
 import numpy as np
 
 from cosserat_fenicsx.checks import refuse
@@ -34,7 +36,32 @@ def check_rock(scene) -> None:
                "with a weight does not give way, unless its law is Cutting(...)")  # fmt: skip
 
 
+def follows_the_bit(scene) -> bool:
+    """Whether the load of the hook stays the same, so that the string follows the bit, which drills by its weight."""
+    bit = scene.bit
+    return scene.hook is None and bit is not None and bit.weight is not None and isinstance(bit.law, Cutting)
+
+
 def steady_velocities(scene) -> np.ndarray:
-    """(2,) of steady motion: m/s downwards, rad/s."""
-    down = 0.0 if scene.hook is None else -scene.hook.signal()(0.0)
-    return np.array([down, scene.drive.signal()(0.0)])
+    """(2,) of steady motion: m/s downwards, rad/s.
+
+    Raises:
+        SceneError: a bit that drills by its weight, which its wear flats bear.
+    """
+    turning = scene.drive.signal()(0.0)
+    if follows_the_bit(scene):
+        return np.array([penetration(scene.bit, turning), turning])
+    return np.array([0.0 if scene.hook is None else -scene.hook.signal()(0.0), turning])
+
+
+def penetration(bit, turning) -> float:
+    """Rate (m/s) at which a bit with a `Cutting` law drills by its weight at a speed of rotation (rad/s).
+
+    Raises:
+        SceneError: a weight that its wear flats bear.
+    """
+    law, wear = bit.law, bit.law.wear
+    idle = law.a * wear.length * wear.stress if wear else 0.0
+    if bit.weight <= idle:
+        refuse(bit, "weight", bit.weight, f"more than the wear flats carry, {idle:.6g} N")
+    return (bit.weight - idle) / law.axial_stiffness * law.blades * turning / (2 * math.pi)

@@ -11,19 +11,21 @@ quadratic energies, and works are those of the step's own forces.
 from pathlib import Path
 
 import numpy as np
+from scipy.optimize import brentq
 
 from cosserat_fenicsx.algebra.pointers import Pointers
 from cosserat_fenicsx.checks import number, positive, refuse
 from cosserat_fenicsx.drilling.axial_torsional.bits import end_of, forces_of
 from cosserat_fenicsx.drilling.axial_torsional.chain import chain_of, usual_step
 from cosserat_fenicsx.drilling.axial_torsional.intervals import intervals
+from cosserat_fenicsx.drilling.axial_torsional.reasons import reasons
 from cosserat_fenicsx.drilling.axial_torsional.steady import steady_state
 from cosserat_fenicsx.drilling.bit_laws import Cutting
 from cosserat_fenicsx.drilling.discs import Discs
 from cosserat_fenicsx.drilling.protocol import LEDGER, SERIES
 from cosserat_fenicsx.drilling.signals import ScalarSignal
 from cosserat_fenicsx.drilling.single_valued import check_bit, stribeck_of
-from cosserat_fenicsx.drilling.steady_start import check_rock, check_steady, steady_velocities
+from cosserat_fenicsx.drilling.steady_start import check_rock, check_steady, follows_the_bit, steady_velocities
 from cosserat_fenicsx.drilling.top_drive import PI, Matched, Motor, Stiff
 from cosserat_fenicsx.errors import NotConverged, SceneError
 
@@ -77,7 +79,7 @@ class AxialTorsional(Pointers):
                 self._refuse_step()
             self.dt /= 2
         self._start()
-        self.why = self._reasons()
+        self.why = reasons(scene, len(self.depths) - 1, self.dt, axial=self._axial, wall=self._m.pieces > 0)
 
     def _set(self, elements):
         """All that C needs."""
@@ -143,8 +145,8 @@ class AxialTorsional(Pointers):
 
     def _set_hook(self, hook):
         top = self._m.top[0]
-        top.rigid = hook is None or np.isinf(hook.stiffness)
-        if not top.rigid:
+        top.rigid = (hook is None or np.isinf(hook.stiffness)) and not follows_the_bit(self.scene)
+        if not top.rigid and hook is not None:
             top.integral = hook.stiffness
         return ScalarSignal("Hook", "speed", 0.0, "m/s") if hook is None else hook.signal()
 
@@ -189,9 +191,16 @@ class AxialTorsional(Pointers):
                 self._lib.limits(m)
             return kept["limit"]
 
-        bears = forces_of(self.scene.bit, motion)
-        extra = (bears - [m.bit.hanging, 0.0])[unknowns]
-        x, above = steady_state(motion[unknowns], self._chain, limits, (m.decay, m.of_rotation), extra)
+        def found(down):
+            motion[0] = down
+            bears = forces_of(self.scene.bit, motion)
+            extra = (bears - [m.bit.hanging, 0.0])[unknowns]
+            return bears, *steady_state(motion[unknowns], self._chain, limits, (m.decay, m.of_rotation), extra)
+
+        if self._axial and follows_the_bit(self.scene):  # what brakes the string takes a part of the weight on bit
+            most = motion[0]
+            motion[0] = brentq(lambda down: found(down)[2][0], 1e-9 * most, most * (1 + 1e-9), xtol=1e-15 * most)
+        bears, x, above = found(motion[0])
         kept["x"][:], kept["v"][:], kept["w"][:], kept["held"][:] = x, motion[unknowns], motion[unknowns], 0
         m.bit.weight, m.bit.torque = bears
         for i, force in enumerate(above):
@@ -214,22 +223,6 @@ class AxialTorsional(Pointers):
             "friction or of the bit falls more steeply than inertia and string allow, and the speed at the end of a "
             "step is not determined"
         )
-
-    def _reasons(self):
-        told = [f"{len(self.depths) - 1} elements, steps of {self.dt:.3g} s"]
-        if self._axial:
-            told.append("friction at the wall against axial and rotary slip together, normal force by the soft string "
-                        "from the tension of the step before")  # fmt: skip
-            bit = self.scene.bit
-            if self.scene.start == "steady":
-                told.append("starts in steady motion, all of it at the speeds of drive and hook")
-            elif bit is not None and bit.weight is not None:
-                told.append(f"starts with {bit.weight:g} N on bit, without friction; the rock does not give way")
-            else:
-                told.append("starts hanging off bottom, without friction")
-        elif self._m.pieces:
-            told.append("friction at the wall by the tension at rest")
-        return tuple(told)
 
     # -- the protocol of string models ---------------------------------------------------------------------------------
 

@@ -19,6 +19,7 @@ import numpy as np
 from cosserat_fenicsx.checks import refuse
 from cosserat_fenicsx.drilling.discs import Discs
 from cosserat_fenicsx.drilling.hook import Hook
+from cosserat_fenicsx.drilling.steady_start import follows_the_bit
 from cosserat_fenicsx.drilling.top_drive import PI, Matched, Motor, Stiff
 
 #: |g L|^2 below which sinh(g L)/g and its derivative are taken from their series, of which 1e-16 is left out.
@@ -192,6 +193,10 @@ def _held(s):
     return 0.0, 1.0, 0.0, 0.0
 
 
+def _free(s):
+    return 1.0, 0.0, 0.0, 0.0
+
+
 def _drive_top(drive, impedance):
     """What the drive does: (om, M) at the top and their derivatives, free of poles."""
     control, inertia = drive.control, drive.inertia
@@ -240,6 +245,8 @@ def axial(scene) -> Guide:
         refuse(scene, "string", scene.string, "a DrillString: discs turn alone")
     stiffness = (scene.hook or Hook()).stiffness
     top = _held if np.isinf(stiffness) else lambda s: (s, -stiffness, 1.0, 0.0)
+    if follows_the_bit(scene):
+        top = _free
     rate = scene.drag.axial if scene.drag else 0.0
     parts = tuple(Uniform(x.length, x.EA, x.rhoA, rate, x.name) for x in scene.segments)
     return Guide("axial", parts, scene.bit.mass if scene.bit else 0.0, top)

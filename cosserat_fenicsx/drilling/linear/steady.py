@@ -1,6 +1,7 @@
 """The steady rotation of a scene, and its linear equation for small motions."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
@@ -10,6 +11,7 @@ from cosserat_fenicsx.drilling.discs import Discs
 from cosserat_fenicsx.drilling.linear.characteristic import FallingTorque, Regenerative
 from cosserat_fenicsx.drilling.linear.impedances import axial, torsional
 from cosserat_fenicsx.drilling.single_valued import refuse_several_speeds, slope, stribeck_of
+from cosserat_fenicsx.drilling.steady_start import penetration
 
 
 class Steady:
@@ -57,12 +59,7 @@ class Steady:
                 refuse(self.scene.bit, "weight", None, "the weight on bit (N), or a Hook whose speed (m/s) is a "
                        "negative number: that of the block downwards")  # fmt: skip
             return rate
-        wear = self.law.wear
-        idle = self.law.a * wear.length * wear.stress if wear else 0.0
-        if weight <= idle:
-            refuse(self.scene.bit, "weight", weight, f"more than the wear flats carry, {idle:.6g} N")
-        cut = (weight - idle) / self.law.axial_stiffness
-        return cut * self.law.blades * speed / (2 * math.pi)
+        return penetration(replace(self.scene.bit, weight=weight), speed)
 
     def equation(self, parameters):
         """The characteristic function of `parameters`."""
