@@ -15,7 +15,7 @@ from cosserat_fenicsx.dynamics.contact.nodes import TouchingNodes, motion_betwee
 from cosserat_fenicsx.quaternions import small_rotations
 
 # Up to so many nodes the compliance of all by all is taken; of more, that of so many neighbours on each side.
-_FEW, _NEIGHBOURS = 16, 6
+_FEW, _NEIGHBOURS = 16, 8
 # The compliance, which differs little from step to step, is found again where it misses this many times the share of a
 # response that it has missed at best, or more than the second number. Smaller responses than the third number
 # (dimensionless) may be rounding.
