@@ -15,11 +15,14 @@ _EIGHT, _SIX = (4 / 5, -1 / 5, 4 / 105, -1 / 280), (3 / 4, -3 / 20, 1 / 60, 0.0)
 _SMOOTH, _ROUNDING = 1e-6, 1e-9
 
 
-def is_smooth(values, step):
-    """Whether the estimated error of `derivative` is small: that the step is short, and no jump is near."""
-    found, error = derivative(values, step)
-    rounding = _ROUNDING * np.abs(values).max(initial=0.0) / step
-    return error.max(initial=0.0) <= _SMOOTH * np.abs(found).max(initial=0.0) + rounding
+def is_smooth(values, step, of_all=lambda sizes: sizes):
+    """Whether the estimated error of `derivative` is small: that the step is short, and no jump is near.
+
+    Args:
+        of_all: makes (3,) sizes the largest ones of all ranks, where these hold parts of the values.
+    """
+    sizes = of_all(np.array([np.abs(x).max(initial=0.0) for x in (*derivative(values, step), values)]))
+    return sizes[1] <= _SMOOTH * sizes[0] + _ROUNDING * sizes[2] / step
 
 
 def derivative(values, step):

@@ -220,7 +220,7 @@ class Direct:
         """For every point the derivatives of the data, and of the constraint equations' part of the residual."""
 
         def smooth(arrays):
-            if not is_smooth(arrays, step):
+            if not is_smooth(arrays, step, lambda sizes: np.max(self.model.comm.allgather(sizes), axis=0)):
                 raise SceneError(
                     f"parameter '{parameter.name}' = {parameter.value:g}: the scene does not change smoothly up to "
                     f"{max(PLACES) * step:.3g} from it: expected cf.Parameter(..., scale=...) with a smaller scale; "
