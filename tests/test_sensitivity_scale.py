@@ -74,6 +74,15 @@ def test_parameters_that_move_elements_are_refused():
             path.sensitivity(tip, [name])
 
 
+def test_diameters_of_a_thin_tube():
+    """EI has the power four of both diameters."""
+    outer, inner, names = 0.1, 0.0999, [f"rods.mast.section.{side}_diameter" for side in ("outer", "inner")]
+    rod = cf.Rod(cf.Line((0, 0, 0), (0, 0, 20.0)), cf.Tube(outer, inner), cf.Material(E=210e9, nu=0.3), name="mast")
+    path = cf.solve(cf.Scene([rod], [cf.Clamp(rod.start)], [cf.Moment(rod.end, (0, 1e-3, 0))]), [1.0], elements=4)
+    found, power = path.sensitivity(tip, names), 4 / (outer**4 - inner**4)
+    assert [found.relative(name)[0] for name in names] == pytest.approx([-power * outer**4, power * inner**4], rel=1e-6)
+
+
 def test_a_number_that_two_rods_share_counts_once():
     steel = cf.Material(E=210e9, nu=0.3)
     lower = cf.Rod(cf.Line((0, 0, 0), (0, 0, 5.0)), cf.Circle(0.2), steel, name="lower")
