@@ -11,6 +11,18 @@ PLACES = (-4, -3, -2, -1, 1, 2, 3, 4)
 STEP = 4e-3
 # Weights of f(k h) - f(-k h), k = 1 .. 4, of orders eight and six.
 _EIGHT, _SIX = (4 / 5, -1 / 5, 4 / 105, -1 / 280), (3 / 4, -3 / 20, 1 / 60, 0.0)
+# Largest relative error of a derivative of what is smooth, and relative rounding of the values.
+_SMOOTH, _ROUNDING = 1e-6, 1e-9
+
+
+def is_smooth(values, step, of_all=lambda sizes: sizes):
+    """Whether the estimated error of `derivative` is small: that the step is short, and no jump is near.
+
+    Args:
+        of_all: makes (3,) sizes the largest ones of all ranks, where these hold parts of the values.
+    """
+    sizes = of_all(np.array([np.abs(x).max(initial=0.0) for x in (*derivative(values, step), values)]))
+    return sizes[1] <= _SMOOTH * sizes[0] + _ROUNDING * sizes[2] / step
 
 
 def derivative(values, step):

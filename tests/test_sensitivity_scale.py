@@ -45,6 +45,24 @@ def test_a_scene_that_changes_abruptly_is_refused():
     assert found["lean"] == pytest.approx(20 * by_end(mast()), rel=1e-9)
 
 
+def test_a_line_that_becomes_vertical_needs_its_d1():
+    """Without one its directors jump there by a right angle."""
+
+    def tilted(lean, d1=(1, 0, 0)):
+        rod = cf.Rod(cf.Line((0, 0, 0), (lean, 0, 20.0), d1), cf.Rectangle(0.2, 0.1), cf.Material(E=210e9, nu=0.3),
+                     name="mast")  # fmt: skip
+        return cf.Scene([rod], [cf.Clamp(rod.start)], [cf.Force(rod.end, (5e3, 5e3, -6e3))])
+
+    def solved(lean, *d1):
+        return cf.solve(tilted(lean, *d1), [1.0], elements=4, model="spatial")
+
+    name = "rods.mast.curve.end[0]"
+    with pytest.raises(cf.SceneError, match="and d1 for a Line that becomes vertical"):
+        solved(0.0, None).sensitivity(tip, [name])
+    found = solved(0.0).sensitivity(tip, [name])[name]
+    assert found == pytest.approx((tip(solved(0.01)) - tip(solved(-0.01))) / 0.02, rel=1e-5)
+
+
 def test_parameters_that_move_elements_are_refused():
     path = cf.solve(mast(at=10.0), [1.0], elements=4)
     stepped = [(8.0, cf.Circle(0.2)), (None, cf.Circle(0.1))]
@@ -54,6 +72,15 @@ def test_parameters_that_move_elements_are_refused():
     ):  # fmt: skip
         with pytest.raises(cf.SceneError, match="moves a load, support, joint or end of a section"):
             path.sensitivity(tip, [name])
+
+
+def test_diameters_of_a_thin_tube():
+    """EI has the power four of both diameters."""
+    outer, inner, names = 0.1, 0.0999, [f"rods.mast.section.{side}_diameter" for side in ("outer", "inner")]
+    rod = cf.Rod(cf.Line((0, 0, 0), (0, 0, 20.0)), cf.Tube(outer, inner), cf.Material(E=210e9, nu=0.3), name="mast")
+    path = cf.solve(cf.Scene([rod], [cf.Clamp(rod.start)], [cf.Moment(rod.end, (0, 1e-3, 0))]), [1.0], elements=4)
+    found, power = path.sensitivity(tip, names), 4 / (outer**4 - inner**4)
+    assert [found.relative(name)[0] for name in names] == pytest.approx([-power * outer**4, power * inner**4], rel=1e-6)
 
 
 def test_a_number_that_two_rods_share_counts_once():

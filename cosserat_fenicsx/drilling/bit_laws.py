@@ -78,7 +78,8 @@ class Cutting:
     """A drag bit that cuts: weight n zeta epsilon a d and torque n epsilon a^2 d/2 for the depth of cut d of a blade.
 
     d = U(t) - U(t - tau), U the depth of the bit; within the delay tau the bit turns by 2 pi/n. Wear flats add the
-    weight a l sigma and the torque gamma mu a/2 times that weight.
+    weight a l sigma and the torque gamma mu a/2 times that weight. Rotation of a positive sign
+    cuts; backwards the blades slide over rock that stays, so that a string that is turned so does not drill.
 
     Args:
         a: radius of the bit, m. epsilon: intrinsic specific energy, Pa. zeta: ratio of vertical to horizontal force.

@@ -19,6 +19,7 @@ from cosserat_fenicsx.scene.as_data import argument_of
 from cosserat_fenicsx.scene.curves import CURVES
 from cosserat_fenicsx.scene.rod import Station
 from cosserat_fenicsx.scene.scene import Scene
+from cosserat_fenicsx.scene.sections import Tube
 from cosserat_fenicsx.scene.splines import Spline
 
 _NOTHING = 1e-6  # of a vector: components that are 0 but for rounding
@@ -125,6 +126,8 @@ def parameter_of(scene, given):
     unit = _UNITS.get(f"{type(owner).__name__}.{field}", _UNITS.get(field, "its SI unit"))
     if isinstance(owner, CURVES) and unit == "m":  # places change by parts of the curve, wherever its origin lies
         size = _extent(owner)
+    elif isinstance(owner, Tube) and field != "shear_factor":  # a thin wall is gone where a diameter changes little
+        size = owner.outer_diameter - owner.inner_diameter
     elif size is not None:  # a component that is 0, or rounding of it: as large as the vector
         whole = math.hypot(*size) if all(isinstance(x, numbers.Real) for x in size) else math.inf
         size = whole if abs(leaf) <= (_NOTHING * whole if len(size) == 3 else 0) and whole < math.inf else None

@@ -17,7 +17,7 @@ import dataclasses
 
 import numpy as np
 
-from cosserat_fenicsx.differences import PLACES, STEP, derivative
+from cosserat_fenicsx.differences import PLACES, STEP, derivative, is_smooth
 from cosserat_fenicsx.errors import NotConverged, SceneError
 from cosserat_fenicsx.models.data_derivative import DataDerivative, made_once
 from cosserat_fenicsx.models.rodmesh import same_places
@@ -32,8 +32,6 @@ from cosserat_fenicsx.statics.solvers import solvers_of
 
 # Newton iterations from the recorded state to the same state, and how far it may move (lengths, rad).
 _ITERATIONS, _MOVED = 25, 1e-3
-# Largest relative error of the derivatives of data, and of what rounding may do to data.
-_SMOOTH, _ROUNDING = 1e-6, 1e-9
 # Largest motion (lengths, rad) over which queries are differenced.
 _REACH = 5e-3
 # Of data that depend on the position: motion over which they are differenced (lengths, rad), iterations, accuracy.
@@ -222,14 +220,13 @@ class Direct:
         """For every point the derivatives of the data, and of the constraint equations' part of the residual."""
 
         def smooth(arrays):
-            found, error = derivative(arrays, step)
-            rounding = _ROUNDING * np.abs(arrays).max(initial=0.0) / step
-            if error.max(initial=0.0) > _SMOOTH * np.abs(found).max(initial=0.0) + rounding:
+            if not is_smooth(arrays, step, lambda sizes: np.max(self.model.comm.allgather(sizes), axis=0)):
                 raise SceneError(
                     f"parameter '{parameter.name}' = {parameter.value:g}: the scene does not change smoothly up to "
-                    f"{max(PLACES) * step:.3g} from it: expected cf.Parameter(..., scale=...) with a smaller scale"
+                    f"{max(PLACES) * step:.3g} from it: expected cf.Parameter(..., scale=...) with a smaller scale; "
+                    "and d1 for a Line that becomes vertical, whose directors turn there"
                 )
-            return found
+            return derivative(arrays, step)[0]
 
         near, found, whole = [], [], None
         for scene in scenes:
