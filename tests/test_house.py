@@ -71,7 +71,7 @@ ROOMS = {
     "dynamics": {"scene", "models", "algebra", "results", "storage", "statics"},
     "studies": {"results", "storage"},
     "well": {"actions", "scene", "models", "statics", "results", "pictures"},
-    "drilling": {"well", "scene", "results", "storage", "pictures", "algebra"},
+    "drilling": {"actions", "well", "scene", "results", "storage", "pictures", "algebra"},
     "cli": {"drilling", "well", "scene", "models", "statics", "dynamics", "results", "storage", "pictures"},
 }
 #: Files that combine scenes, models, solvers and results; all other solver files import none of scene, models and
