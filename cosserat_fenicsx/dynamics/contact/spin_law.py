@@ -88,7 +88,8 @@ class SpinLaw(Pointers):
         if -slope * C >= h:
             raise SceneError(
                 f"{type(self._action).__name__}: in steps of {h * self._time:.3g} s its torque falls faster with the "
-                "speed than the rod can follow, and several speeds are possible: expected a shorter dt, or an inertia there"
+                "speed than the rod can follow, and several speeds are possible: expected a shorter dt, or an inertia "
+                "there"
             )
         speed = size / h  # the law is convex: after the first iteration it falls to the root
         for _ in range(_MOST):
