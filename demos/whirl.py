@@ -85,7 +85,7 @@ def main(out="out/whirl", film=False):
             getattr(history, f"plot_{name}")(middle, wall, Path(out) / f"{name}.png")
         if film:
             turned = np.flatnonzero((history.times > 6.0) & (history.times < 8.2))
-            history.at_points(turned).animate(Path(out) / "whirl.gif", enlarge=40, speed=0.2, fps=15)
+            history.at_points(turned).animate(Path(out) / "whirl.gif", enlarge=60, speed=0.2, fps=15)
     return checks
 
 

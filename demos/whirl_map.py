@@ -5,7 +5,7 @@ mpirun -n 2 python demos/whirl_map.py             on two ranks
 python demos/whirl_map.py --quick                 2 x 2 cases, without a picture
 
 Every case starts as a collar that rolls backward round its hole, held by a ring in its middle. Where friction is below
-what steady rolling takes, it slips, slows down, leaves the wall, and comes to whirl forward with its unbalance.
+what steady rolling takes, it slips, slows down and leaves the wall; with time its unbalance alone is left, forward.
 """
 
 import argparse
@@ -60,8 +60,8 @@ def main(quick=False, out="out/whirl"):
     ]
     if MPI.COMM_WORLD.rank == 0:
         print(report(f"{ratio.size} simulations and the theory", [("map", "spatial", check) for check in checks]))
-        print(f"{ratio.size} simulations of {DURATION:g} s on {MPI.COMM_WORLD.size} rank(s): {took:.1f} s; backward "
-              f"rolling in {int(rolls.sum())}, forward whirl in {int((ratio > 0).sum())}")  # fmt: skip
+        print(f"{ratio.size} simulations of {DURATION:g} s on {MPI.COMM_WORLD.size} rank(s): {took:.1f} s; rolling "
+              f"backward in {int(rolls.sum())}, forward already in {int((ratio > 0).sum())}")  # fmt: skip
         if not quick:
             Path(out).mkdir(parents=True, exist_ok=True)
             picture(ratio, rolls > 0, speeds, frictions, Path(out) / "map.png")

@@ -15,10 +15,11 @@ ARM, CLEARANCE = OUTER / 2, (HOLE - OUTER) / 2
 #: N s/m^2; bending stiffness, N m^2.
 STEEL_MASS, MUD_MASS, DRAG, EI = 149.6953, 51.8744, 283.1071, 8464506.9
 MESH = {"elements": 8, "degree": 2}
-_STEEL, _MIDDLE, _BEGIN, _COUPLED = cf.Material(206e9, 0.2989, density=7850.0), LENGTH / 2, 5.0, 0.2
+_STEEL, _MIDDLE, _BEGIN = cf.Material(206e9, 0.2989, density=7850.0), LENGTH / 2, 0.2
 _AXIS = cf.WellPath.from_survey([0, 100], [0, 0], [0, 0])
-# The coupling above the collar: stiff in torsion, soft in bending, but so short that no torque buckles it.
-_COUPLING = cf.Stiffness((1e7, 1e7), 1e8, (5e2, 5e2), 1e5, mass=1.0, inertia=(1e-2, 1e-2, 2e-2))
+# The coupling above the collar: stiff in torsion, soft in bending, but so short (_BEGIN, m) that no torque buckles it.
+_SHAPE = ((0.06, 0.06), (-0.06, 0.06), (-0.06, -0.06), (0.06, -0.06))
+_COUPLING = cf.Stiffness((1e7, 1e7), 1e8, (5e2, 5e2), 1e5, mass=1.0, inertia=(1e-2, 1e-2, 2e-2), outline=_SHAPE)
 
 
 def rods(eccentricity=OFFSET):
@@ -26,7 +27,7 @@ def rods(eccentricity=OFFSET):
     slide."""
     collar = cf.Rod(cf.Line((0, 0, _BEGIN), (0, 0, _BEGIN + LENGTH)), cf.Tube(OUTER, INNER), _STEEL, name="collar",
                     eccentricity=(eccentricity, 0.0))  # fmt: skip
-    coupling = cf.Rod(cf.Line((0, 0, _BEGIN - _COUPLED), (0, 0, _BEGIN)), _COUPLING, name="coupling")
+    coupling = cf.Rod(cf.Line((0, 0, 0), (0, 0, _BEGIN)), _COUPLING, name="coupling")
     bearings = [cf.Pin(collar.start), *(cf.Roller(collar.end, normal) for normal in ((1, 0, 0), (0, 1, 0)))]
     return collar, coupling, [cf.Joint(collar.start, coupling.end)], bearings
 
@@ -74,7 +75,7 @@ def rolling(spin, friction, duration, stiffness=1e9):
         return (spin - rate) * float(w(s, 1)), 0.0, spin
 
     def coupled(s):
-        return s / _COUPLED * (spin - rate) * float(w(0.0, 1)), 0.0, spin
+        return s / _BEGIN * (spin - rate) * float(w(0.0, 1)), 0.0, spin
 
     velocities = [
         cf.InitialVelocity(collar, linear=lambda s: (0.0, rate * float(w(s)), 0.0), angular=angular),

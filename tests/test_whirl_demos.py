@@ -39,4 +39,5 @@ def test_a_coarse_map_agrees_with_the_theory(capsys):
     from known_numbers import deviation
 
     assert all(deviation(check) == 0 for check in whirl_map.main(quick=True))
-    assert "backward rolling in 2, forward whirl in 2" in capsys.readouterr().out
+    told = capsys.readouterr().out
+    assert "4 simulations of 2.5 s on 1 rank(s)" in told and "rolling backward in 2" in told

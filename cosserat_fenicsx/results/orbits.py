@@ -49,7 +49,7 @@ class Orbit:
         return np.hypot(*self.position.T)
 
     @property
-    def turns(self) -> bool:
+    def turns(self) -> np.ndarray:
         """(n - 1,) whether the angle is counted between two times: the radius is above a hundredth of the largest."""
         far = self.radius > _NEAR_AXIS * self.radius.max(initial=0.0)
         return far[1:] & far[:-1]
@@ -90,7 +90,8 @@ class Orbit:
 
 def orbit_of(history, station, wall=None, where="orbit"):
     """See `History.orbit`."""
-    station, wall = history.station(station), wall_around(history, history.station(station), wall, where)
+    station = history.station(station)
+    wall = wall_around(history, station, wall, where)
     points = history.position(station)
     s = np.full(len(points), station.s)
     around = wall.tube_around(s, points, s + wall.begins)

@@ -4,7 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cosserat_fenicsx.checks import number, refuse
+from cosserat_fenicsx.checks import number
+from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.results.orbits import orbit_of
 
 _RPM = 30 / np.pi
@@ -55,7 +56,8 @@ class Whirl:
 
     @property
     def direction(self) -> str:
-        """ "forward", "backward" or "none": it stays within a thousandth of the clearance from the axis."""
+        """Which way it goes round: "forward", "backward", or "none" where it stays within a thousandth of the clearance
+        from the axis."""
         if np.isnan(self.rate) or self.rate == 0 or self.largest <= _LITTLE * self.clearance:
             return "none"
         return "forward" if self.rate > 0 else "backward"
@@ -85,7 +87,7 @@ def whirl(history, station, wall=None, since=None):
     """See `History.whirl`."""
     found = orbit_of(history, station, wall, "whirl")
     if len(found.times) < 2:
-        refuse("whirl", "history", history, "a motion with at least two times")
+        raise SceneError("whirl: expected a motion with at least two times")
     first, last = float(found.times[0]), float(found.times[-1])
     if since is not None:
         before = float(found.times[-2])
