@@ -216,8 +216,9 @@ class AxialTorsional(Pointers):
     def _reasons(self):
         told = [f"{len(self.depths) - 1} elements, steps of {self.dt:.3g} s"]
         if self._axial:
-            told.append("friction at the wall against axial and rotary slip together, normal force by the soft string "
-                        "from the tension of the step before")  # fmt: skip
+            if self._m.pieces:
+                told.append("friction at the wall against axial and rotary slip together, normal force by the soft "
+                            "string from the tension of the step before")  # fmt: skip
             bit = self.scene.bit
             if bit is not None and bit.weight is not None:
                 told.append(f"starts with {bit.weight:g} N on bit, without friction; the rock does not give way")
