@@ -41,7 +41,7 @@ law = { type = "Stribeck", static = "6 kN m", dynamic = "4 kN m", speed = "30 rp
 
 [hook]
 stiffness = "5 MN/m"
-speed = { type = "Table", times = [0.0, 5.0], values = ["0 m/s", "10 m/h"] }
+speed = { type = "Table", times = ["0 s", 5.0], values = ["0 m/s", "10 m/h"] }
 
 [wall_friction]
 static = 0.3
@@ -189,3 +189,22 @@ def test_mistakes_are_told_in_words_of_the_command_line(tmp_path, capsys, monkey
     use(monkeypatch, stops_at=500)
     assert main(["run", str(file)]) == 130
     assert capsys.readouterr().err.startswith("cosserat: interrupted at t = ")
+
+
+def test_explain_tells_what_may_be_mistaken(tmp_path, capsys):
+    (tmp_path / "scene.toml").write_text(FILE, encoding="utf-8")
+    assert main(["explain", str(tmp_path / "scene.toml")]) == 0
+    told = capsys.readouterr().out
+    for words in (
+        "N/m in mud.",
+        "Mud: 1198.26 kg/m^3, 10 ppg.",
+        "to 2500 m, 0.31115 m wide, friction 0.2.",
+        "Bit at md = 2500 m; largest inclination of the hole 60 degrees.",
+        "Drive: 0 to 60 rpm, which depends on time, PI(",
+        "its torque does not follow the weight: that takes coefficients and a radius",
+        "Hook: 5e+06 N/m, the block moves upwards at 0 to 0.0027778 m/s.",
+    ):
+        assert words in told, words
+    assert main(["explain", str(ROOT / "demos" / "strings" / "stopped_block.toml")]) == 0
+    told = capsys.readouterr().out
+    assert "N/m in air." in told and "Hole: none, no walls" in told and "friction at the wall" not in told.lower()

@@ -54,3 +54,18 @@ def test_a_refused_step_is_told_with_one_that_passes():
         AxialTorsional(scene, 0.02, axial=False)
     told = float(str(refused.value).split("about ")[1].split()[0])
     assert told > 1e-3 and AxialTorsional(scene, told, axial=False).dt == told
+
+
+CUTTING = cf.Cutting(a=0.108, epsilon=60e6, zeta=0.6, blades=4)
+
+
+@pytest.mark.parametrize(("law", "torque", "most"), [(cf.Stribeck(6e3, 4e3), 60e3, 1.0), (CUTTING, 9e3, np.pi / 8)])
+def test_a_bit_below_a_motor_that_turns_too_far_in_a_step_is_refused(law, torque, most):
+    """A motor has no speed asked for: the rotation in a step is known afterwards alone."""
+    scene = cf.Drilling(string(PIPE), cf.TopDrive(inertia=100.0, control=cf.Motor(torque)),
+                        cf.BitOnRock(law, inertia=50.0), hook=cf.Hook(speed=0.0), drag=cf.ViscousDrag(0.1))  # fmt: skip
+    with pytest.raises(cf.NotConverged, match=r"the bit turns by .* rad in a step of .* expected a shorter dt") as stop:
+        cf.simulate_drilling(scene, 60.0, dt=0.02, progress=False)
+    history = stop.value.path
+    assert len(history) > 10 and np.abs(history.bit_speed).max() * history.dt <= most
+    assert len(cf.simulate_drilling(scene, float(history.times[-1]), dt=0.02, progress=False)) == len(history)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from moving_scenes import drift
 from scipy.optimize import brentq
-from whirling_collar import AMPLITUDES, CLEARANCE, FIRST_CONTACT, Collar
+from eccentric_collar import AMPLITUDES, CLEARANCE, FIRST_CONTACT, Collar
 
 import cosserat_fenicsx as cf
 from cosserat_fenicsx.actions.added_mass import AddedMass

@@ -9,6 +9,7 @@ from cosserat_fenicsx import units
 from cosserat_fenicsx.cli.deliver import prepare
 from cosserat_fenicsx.cli.say import BAD_INPUT, DONE, INTERRUPTED, NOT_CONVERGED, say
 from cosserat_fenicsx.cli.well import warnings_in_words
+from cosserat_fenicsx.drilling.bit_laws import Stribeck
 from cosserat_fenicsx.drilling.choose import chosen
 from cosserat_fenicsx.drilling.discs import Discs
 from cosserat_fenicsx.drilling.folder import DrillingFolder
@@ -18,6 +19,7 @@ from cosserat_fenicsx.drilling.scenefile import drilling_in
 from cosserat_fenicsx.drilling.simulate import check_arguments, resume_drilling
 from cosserat_fenicsx.errors import Interrupted, NotConverged, NotStored, SceneError
 from cosserat_fenicsx.interrupts import obey, patience
+from cosserat_fenicsx.well.field_units import in_si
 
 _TAKEN = ("duration", "dt", "elements", "model", "save_every")
 # Options of the command line that are for rods alone.
@@ -157,11 +159,16 @@ def explain_drilling(options, tables):
             lines.append(
                 f"String, {part.name}: {part.length:g} m, impedance {part.torsional_impedance:.5g} N m s/rad in "
                 f"torsion and {part.axial_impedance:.5g} N s/m along the axis, waves at {part.torsional_speed:.5g} and "
-                f"{part.axial_speed:.5g} m/s, {part.weight:.5g} N/m in mud."
+                f"{part.axial_speed:.5g} m/s, {part.weight:.5g} N/m{_fluid(scene)}."
             )
-    lines.append(f"Drive: {_drive(scene.drive)}.")
+        lines += _in_hole(scene)
+    lines.append(f"Drive: {_drive(scene.drive, settings.get('duration'))}.")
     lines.append(f"Bit: {scene.bit.law}{_at_bit(scene.bit)}." if scene.bit else "Bit: none, the lower end is free.")
-    for name in ("hook", "friction", "drag"):
+    if scene.hook is not None:
+        stiff = f"{scene.hook.stiffness:g} N/m" if math.isfinite(scene.hook.stiffness) else "rigid"
+        upwards = _over_time(scene.hook.signal(), 1.0, settings.get("duration"))
+        lines.append(f"Hook: {stiff}, the block moves upwards at {upwards} m/s.")
+    for name in ("friction", "drag"):
         if getattr(scene, name) is not None:
             lines.append(f"{name.capitalize()}: {getattr(scene, name)}.")
     name, why = chosen(scene, settings.get("model", "auto"))
@@ -181,9 +188,41 @@ def explain_drilling(options, tables):
     return "\n".join(lines)
 
 
-def _drive(drive):
+def _fluid(scene):
+    """Where the weight per length is, in words."""
+    if scene.mud is not None and scene.mud.density > 0:
+        return " in mud"
+    return " in air" if scene.mud is not None or scene.hole is None else ""
+
+
+def _in_hole(scene):
+    """Lines on mud and hole."""
+    mud = scene.mud
+    if mud is not None:
+        yield f"Mud: {mud.density:g} kg/m^3, {mud.density / in_si('mud', '1 ppg', 'density'):.4g} ppg."
+    if scene.hole is None:
+        yield f"Hole: none, no walls; bit at md = {scene.bit_depth:g} m, the string hangs vertically."
+        return
+    for i, section in enumerate(scene.hole.sections, start=1):
+        yield (f"Hole, {section.name or f'section {i}'}: to {section.to:g} m, {section.diameter:g} m wide, friction "
+               f"{section.friction:g}.")  # fmt: skip
+    inclination = math.degrees(scene.hole.path.inclination.max())
+    yield f"Bit at md = {scene.bit_depth:g} m; largest inclination of the hole {inclination:.4g} degrees."
+
+
+def _over_time(signal, unit, duration):
+    """A number, or from which to which it goes up to a time (s), in multiples of a unit."""
+    if signal.constant:
+        return f"{signal(0.0) / unit:.5g}"
+    until = duration or max(signal.jumps, default=1.0)
+    times = [*(until * k / 200 for k in range(201)), *(t for t in signal.jumps if 0 <= t <= until)]
+    values = [signal(t) / unit for t in times]
+    return f"{min(values):.5g} to {max(values):.5g}"
+
+
+def _drive(drive, duration):
     signal = drive.signal()
-    asked = f"{signal(0.0) / units.rpm:.5g} rpm" if signal.constant else "a speed that depends on time"
+    asked = f"{_over_time(signal, units.rpm, duration)} rpm" + ("" if signal.constant else ", which depends on time")
     asked = asked if drive.speed is not None else "no speed asked for"
     inertia = f", inertia {drive.inertia:g} kg m^2" if drive.inertia else ""
     return f"{asked}, {drive.control}{inertia}"
@@ -192,4 +231,6 @@ def _drive(drive):
 def _at_bit(bit):
     told = [f"{bit.weight / 1e3:g} kN on bit"] if bit.weight else []
     told += [f"inertia {bit.inertia:g} kg m^2"] if bit.inertia else []
+    if bit.weight and isinstance(bit.law, Stribeck) and bit.law.radius is None:
+        told.append("its torque does not follow the weight: that takes coefficients and a radius")
     return "".join(f", {x}" for x in told)

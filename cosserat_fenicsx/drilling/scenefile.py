@@ -228,6 +228,8 @@ def _signal(where, entry, dimension):
         entry["value"] = (in_si(f"{where}.value", entry["value"], dimension, UNITS),)
     if isinstance(entry.get("values"), list):
         entry["values"] = [(in_si(f"{where}.values[{i}]", x, dimension, UNITS),) for i, x in enumerate(entry["values"])]
+    if isinstance(entry.get("times"), list):
+        entry["times"] = [in_si(f"{where}.times[{i}]", x, "time", UNITS) for i, x in enumerate(entry["times"])]
     for name in ("start", "peak", "end"):
         if name in entry:
             entry[name] = in_si(f"{where}.{name}", entry[name], "time", UNITS)

@@ -13,7 +13,7 @@ from cosserat_fenicsx.drilling.models import OtherSteps, model_of
 from cosserat_fenicsx.drilling.scene import Drilling
 from cosserat_fenicsx.drilling.step_errors import step_errors
 from cosserat_fenicsx.drilling.time_loop import TimeLoop
-from cosserat_fenicsx.drilling.top_drive import Stiff
+from cosserat_fenicsx.drilling.top_drive import Motor, Stiff
 
 #: More steps, and rows of a history, are refused as a mistake; so many profiles where nothing else is asked for.
 MOST_STEPS, MOST_ROWS, PROFILES = 1e8, 2e7, 400
@@ -58,7 +58,7 @@ def simulate_drilling(
     Raises:
         SceneError: an argument outside its range, an unknown model, a step that is too long for the rotation in it, or
             a jump in speed that no drive follows.
-        NotConverged: a step fails however short it is; `.path` holds the history up to there.
+        NotConverged: a step fails however short it is, or a bit below a `Motor` turns too far in it; `.path` holds the history up to there.
         Interrupted: Ctrl-C; `.path` holds the history up to there.
         NotStored: the folder can no longer be written to.
     """
@@ -76,7 +76,7 @@ def simulate_drilling(
     if folder is not None:
         asked = {"duration": float(duration), "asked": {"model": name, "dt": dt, "elements": elements}, "apart": apart}
         kept = DrillingFolder(folder).make(scene, history, asked)
-    TimeLoop(running, history, kept, **apart).until(duration, progress)
+    TimeLoop(running, history, kept, **apart, turn=_turn_to_watch(scene)).until(duration, progress)
     if check:
         history.errors = step_errors(OtherSteps(scene, name, running), history.rows, duration / 2)
     return history
@@ -126,7 +126,7 @@ def _go_on(kept, scene, duration, progress):
     if len(history) < rows or len(history.profile_times) < profiles:  # another file than those of the checkpoint
         memory, rows, profiles, history = None, 0, 0, kept.history(scene, 0, 0)
     kept.cut(rows, profiles)
-    loop = TimeLoop(running, history, kept, **kept.head["apart"])
+    loop = TimeLoop(running, history, kept, **kept.head["apart"], turn=_turn_to_watch(scene))
     if memory:
         loop.recall(memory)
     return loop.until(duration, progress)
@@ -180,16 +180,29 @@ def check_step(scene, dt, duration, save_every=None):
     if duration / max(dt, save_every or 0.0) > MOST_ROWS:
         refuse(where, "save_every", save_every, f"at least {duration / MOST_ROWS:.3g} s: {MOST_ROWS:g} rows in "
                f"{duration:g} s")  # fmt: skip
+    most, words = _largest_turn(scene)
+    if words:
+        what = f"{words} at that speed"
+    else:
+        what, speed = f"{most:g} rad in a step at {_FASTER:g} times the speed of the drive", _FASTER * speed
+    if speed * dt > most:
+        refuse(where, "dt", dt, f"a step of at most {most / speed:.3g} s, too short for more than {what}")
+
+
+def _largest_turn(scene):
+    """The largest rotation of the bit in a step, rad, and words on it where blades or lobes decide for it."""
     law = getattr(scene.bit, "law", None)
     parts = law.blades if isinstance(law, Cutting) else law.count if isinstance(law, Lobes) else None
-    most, what = _TURN, f"{_TURN:g} rad in a step at {_FASTER:g} times the speed of the drive"
-    if parts is not None:
-        named = "blades" if isinstance(law, Cutting) else "lobes"
-        most, what = _OF_BLADES * 2 * math.pi / parts, f"{_OF_BLADES:g} of the angle between {named} at that speed"
-        speed /= _FASTER
-    if _FASTER * speed * dt > most:
-        longest = most / (_FASTER * speed)
-        refuse(where, "dt", dt, f"a step of at most {longest:.3g} s, too short for more than {what}")
+    if parts is None:
+        return _TURN, ""
+    named = "blades" if isinstance(law, Cutting) else "lobes"
+    return _OF_BLADES * 2 * math.pi / parts, f"{_OF_BLADES:g} of the angle between {named}"
+
+
+def _turn_to_watch(scene):
+    """The largest rotation in a step where it is not known before the motion, below a motor; else infinite."""
+    watched = scene.bit is not None and isinstance(scene.drive.control, Motor)
+    return _largest_turn(scene)[0] if watched else math.inf
 
 
 def _seconds(where, field, value):

@@ -21,8 +21,8 @@ _SHOWN = (
     ("bit advance", "bit_advance", 1.0),
 )
 _CAPTION = (
-    "A row holds for the end of a step, forces and torques in it are means over the step (of torsion alone over two, the "
-    "first of them over what there is). The motion begins at t = 0, and ends with the step that reaches its duration."
+    "A row holds for the end of a step, forces and torques in it are means over the step, or of torsion alone over two "
+    "(at the first one, the time before the start counts with zero). The motion begins at t = 0, and ends with the step that reaches its duration."
 )
 
 

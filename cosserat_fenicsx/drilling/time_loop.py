@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from cosserat_fenicsx.drilling.history import COLUMNS
 from cosserat_fenicsx.errors import Interrupted, NotConverged
 from cosserat_fenicsx.interrupts import obey
 from cosserat_fenicsx.progress import Progress
@@ -9,6 +10,7 @@ from cosserat_fenicsx.ranks import world
 
 #: Steps that are done before it is looked whether a stop was asked for.
 CHUNK = 256
+_BIT_SPEED = COLUMNS.index("bit_speed")
 # Part of a step by which the end may be missed.
 _NOTHING = 1e-6
 
@@ -20,11 +22,12 @@ class TimeLoop:
         model: a `StringModel`. history: the `DrillingHistory` that it is written to.
         folder: a `DrillingFolder`, or None.
         save_every, profile_every: steps between rows and between profiles.
+        turn: the largest rotation of the bit in a step, rad.
     """
 
-    def __init__(self, model, history, folder, save_every, profile_every):
+    def __init__(self, model, history, folder, save_every, profile_every, turn=np.inf):
         self.model, self.history, self._folder = model, history, folder
-        self._save_every, self._profile_every = save_every, profile_every
+        self._save_every, self._profile_every, self._turn = save_every, profile_every, turn
         self._rows, self._profiles = len(history), len(history.profile_times)
 
     def memory(self):
@@ -78,9 +81,22 @@ class TimeLoop:
         rows = np.asarray(model.advance(min(CHUNK, to_profile, left)))
         if not len(rows):
             raise NotConverged(f"the {model.name} model does not advance from t = {model.time:g} s")
+        self._watch(rows)
         self._add(rows[self._saved(len(rows))], profile=model.steps % self._profile_every == 0)
         if self._folder and self._folder.due:
             self._keep()
+
+    def _watch(self, rows):
+        """Stop where the bit turns too far in a step."""
+        turns = np.abs(rows[:, _BIT_SPEED]) * self.model.dt
+        if turns.max() > self._turn:
+            first = int(np.argmax(turns > self._turn))
+            self._add(rows[:first][self._saved(len(rows))[:first]])
+            raise NotConverged(
+                f"{self.model.name}: at t = {rows[first, 0]:.6g} s the bit turns by {turns[first]:.3g} rad in a step of "
+                f"{self.model.dt:.3g} s, more than {self._turn:.3g} rad: expected a shorter dt, or a drag that limits "
+                "the speed of the Motor"
+            )
 
     def _saved(self, count):
         """Which of the last `count` steps are kept."""

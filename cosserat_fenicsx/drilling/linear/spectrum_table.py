@@ -9,6 +9,12 @@ from cosserat_fenicsx.results.tables import as_text
 
 #: Modes that are listed with their places and drives, the fastest ones.
 _LISTED = 12
+_DRIVES = {
+    "stiff": "it turns at the speed asked for",
+    "matched": "it reflects no waves",
+    "SoftTorque": "PI control of the string's impedance at its first mode",
+    "SoftSpeed": "the same with four times the impedance",
+}
 
 
 def stability_table(answer):
@@ -33,7 +39,8 @@ def stability_table(answer):
     names = list(rows[0][3])
     table = Table(
         caption="growth: in 1/s. fastest: the largest of all cases. at: the middle one of those in which the mode "
-        "grows, its frequency and growth there, with the drive of the scene; to the right the growth with other drives."
+        "grows, its frequency and growth there, with the drive of the scene. mode: counted from 0 by frequency there. "
+        f"To the right the growth with other drives: {_words(names)}. gone: with that drive no mode is near."
     )
     for heading in ("mode", "grows in", "fastest", "at rpm", "kN", "frequency (Hz)", "growth", *names):
         table.add_column(heading, justify="right")
@@ -46,6 +53,14 @@ def stability_table(answer):
     if len(grows) > _LISTED:
         lines.append(f"{len(grows) - _LISTED} more modes grow: to_dataframe() has all.")
     return "\n".join([*lines, *map("{}.".format, _advice(answer, rows, names))])
+
+
+def _words(names):
+    """What other drives are, and why some are missing."""
+    told = [f"{name}, {_DRIVES[name]}" for name in names if name in _DRIVES]
+    if "SoftTorque" not in names and "SoftSpeed" not in names:
+        told.append("SoftTorque and SoftSpeed are compared where the drive has an inertia")
+    return "; ".join(told)
 
 
 def _middle(answer, k):
