@@ -66,7 +66,7 @@ def _of_event(path, event, parameters):
             rates, errors = of(direct, crossing, found, direct.rates(scenes, found))
     return Sensitivity(
         np.asarray(event.load_factor), _named(found, rates), _named(found, errors), {x.name: x.value for x in found},
-        {x.name: x.unit for x in found},
+        {x.name: x.unit for x in found}, f"load factor of the {event.kind}",
     )  # fmt: skip
 
 
