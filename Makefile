@@ -18,7 +18,7 @@ export VTK_DEFAULT_OPENGL_WINDOW = vtkEGLRenderWindow
 # A numpy in the user's own site directory would hide the distribution's.
 export PYTHONNOUSERSITE = 1
 
-.PHONY: help setup packages demo motion gallery well string test docs tables figure3 work-precision failures rods-in-wells random random-wells clean
+.PHONY: help setup packages demo motion gallery well string whirl test docs tables figure3 work-precision failures rods-in-wells random random-wells clean
 
 help:
 	@echo "make demo    solve the eccentric cantilever of the paper on two processes; writes out/"
@@ -26,6 +26,7 @@ help:
 	@echo "make gallery the scene files of demos/, each with a picture and a number that must come out; writes out/"
 	@echo "make well    strings in wells: torque and drag, each with pictures and a number that must come out; writes out/wells/ (half a minute)"
 	@echo "make string  drill-strings in motion: stick-slip, waves, a map of stability, each with pictures and numbers that must come out; writes out/strings/ (a minute)"
+	@echo "make whirl   a collar in its hole from forward to backward whirl, and a map of whirl over speed and friction; writes out/whirl/ (five minutes)"
 	@echo "make docs    the documentation as a site that needs no network; writes out/docs/index.html"
 	@echo "make test    all tests on one, two and four processes"
 	@echo "make tables  the tables of accuracy and cost in docs/, measured anew and put there"
@@ -53,6 +54,10 @@ well: setup
 string: setup
 	$(PYTHON) demos/strings.py
 	$(MPIRUN) -n 2 $(PYTHON) demos/strings_map.py
+
+whirl: setup
+	$(PYTHON) demos/whirl.py --film
+	$(MPIRUN) -n 2 $(PYTHON) demos/whirl_map.py
 
 # Warnings are errors. What Sphinx keeps between two builds lies beside the pages.
 docs: setup .venv/.docs

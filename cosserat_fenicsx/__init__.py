@@ -117,6 +117,8 @@ _HOME = {
     "Lobes": "drilling.bit_laws",
     "Matched": "drilling.top_drive",
     "Motor": "drilling.top_drive",
+    "MixedScene": "drilling.mixed",
+    "mixed_scene": "drilling.mixed",
     "PI": "drilling.top_drive",
     "PipeAbove": "drilling.pipe_above",
     "Stiff": "drilling.top_drive",
@@ -206,6 +208,8 @@ if TYPE_CHECKING:  # the same names, for editors and type checkers
     from cosserat_fenicsx.drilling.linear.stability import stability as stability
     from cosserat_fenicsx.drilling.linear.tuned import SoftSpeed as SoftSpeed
     from cosserat_fenicsx.drilling.linear.tuned import SoftTorque as SoftTorque
+    from cosserat_fenicsx.drilling.mixed import MixedScene as MixedScene
+    from cosserat_fenicsx.drilling.mixed import mixed_scene as mixed_scene
     from cosserat_fenicsx.drilling.pipe_above import PipeAbove as PipeAbove
     from cosserat_fenicsx.drilling.scene import Drilling as Drilling
     from cosserat_fenicsx.drilling.scenefile import DrillingScene as DrillingScene

@@ -71,6 +71,14 @@ def test_steady_drilling_is_a_solution():
         assert np.abs(column(rows, name) / value - 1).max() < 1e-6, name
 
 
+def test_a_bit_that_is_pulled_up_steadily_is_free():
+    """The rock does not pull it: no weight, no torque, and all of the string moves with the hook."""
+    scene = hanging(cf.Hook(speed=0.01), cf.TopDrive(12.0), cf.BitOnRock(WORN), start="steady")
+    rows = AxialTorsional(scene, 0.002).advance(200)
+    assert not column(rows, "weight_on_bit").any() and not column(rows, "torque_on_bit").any()
+    assert np.abs(column(rows, "bit_velocity") + 0.01).max() < 1e-9
+
+
 @pytest.mark.parametrize("weight", [None, 120e3])
 def test_a_bit_that_cuts_from_rest_keeps_the_books(weight):
     rows = AxialTorsional(drilling(weight=weight), 0.002).advance(8000)
@@ -126,6 +134,7 @@ def test_what_is_recalled_goes_on_to_the_same_digits():
     ("scene", "message"),
     [
         (lambda: AxialTorsional(drilling(), axial=False), "torsion alone"),
+        (lambda: AxialTorsional(drilling("steady", 80e3, cf.Stribeck(4e3, 3e3, 1.0))), "does not give way"),
         (lambda: drilling("turning"), "Drilling.start.*'rest' or 'steady'"),
         (lambda: AxialTorsional(cf.Drilling(drilling().string, cf.TopDrive(control=cf.Motor(5e3)), start="steady")),
          "Drilling.start.*PI"),

@@ -5,6 +5,7 @@ import pytest
 from fake_string import scene, use
 
 import cosserat_fenicsx as cf
+from cosserat_fenicsx.drilling.pictures.shown import advance_unit
 
 pytest.importorskip("matplotlib")
 pytestmark = pytest.mark.serial
@@ -34,9 +35,10 @@ def test_over_time(history, tmp_path):
 
 def test_the_map(history):
     panel, bar = history.plot_map().axes
-    speeds, sticks = panel.collections
+    speeds, sticks, of_bit = panel.collections
     assert np.asarray(speeds.get_array()).reshape(5, -1) == pytest.approx(history.speed.T / cf.units.rpm)
     assert np.ma.count(np.ma.masked_invalid(sticks.get_array())) == history.sticking.sum() > 0
+    assert len(of_bit.get_paths()) > 1 and "(at the lower edge: the bit)" in panel.get_title()
     assert bar.get_ylabel() == "speed of rotation (rpm)" and panel.get_ylabel() == "measured depth (m)"
     assert panel.get_ylim() == (1000.0, 0.0) and "grey: held by friction" in panel.get_title()
     assert history.plot_map(what="angle").axes[1].get_ylabel() == "turns (1)"
@@ -44,6 +46,31 @@ def test_the_map(history):
         history.plot_map(what="tension")
     with pytest.raises(cf.SceneError, match="what = 'speeds': did you mean 'speed'"):
         history.plot_map(what="speeds")
+
+
+def test_what_is_grey_is_told_and_the_drive_is_named(history):
+    legend = [text.get_text() for text in history.plot().axes[0].get_legend().get_texts()]
+    assert "bit at rest" in legend
+    string, rpm = history.scene.string, cf.units.rpm
+    history.scene = scene(drive=cf.TopDrive(60 * rpm, inertia=2900.0, control=cf.SoftSpeed(string, 2900.0)))
+    assert "PI (Kp = 4 impedances) drive at 60 rpm" in history.plot()._suptitle.get_text()
+
+
+def test_long_runs_show_bands_between_extremes(monkeypatch):
+    use(monkeypatch)
+    history = cf.simulate_drilling(scene(), 1000.0, dt=0.02, profile_every=10.0)
+    speeds = history.plot().axes[0]
+    assert not speeds.lines and len(speeds.collections) == 2
+    tops = [shape.get_paths()[0].vertices[:, 1].max() for shape in speeds.collections]
+    assert max(tops) == pytest.approx(history.bit_speed.max() / cf.units.rpm)
+    assert history.plot(between=(900.0, 930.0)).axes[0].lines
+    period = history.stick_slip().period
+    words = f"profiles are 10 s apart, and the period of stick-slip is {period:.3g} s"
+    assert words in history.plot_map().axes[0].get_title() and words[1:] in str(history)
+
+
+def test_a_long_way_is_in_metres():
+    assert advance_unit(np.array([np.nan, 0.2])) == ("mm", 1e3) and advance_unit(np.array([-3.0, 0.0])) == ("m", 1.0)
 
 
 def test_phase_and_energy(history):

@@ -116,3 +116,22 @@ def test_elements_and_steps():
         cf.simulate_drilling(drilled, 1.0, elements=80, dt=0.01)
     with pytest.raises(cf.SceneError, match="elements = 8: expected None for Discs"):
         cf.simulate_drilling(scene(string=cf.Discs((9.0, 2.0), (7.0,)), bit=None), 1.0, elements=8)
+
+
+def test_more_weight_on_bit_than_the_string_has_along_the_hole_is_told():
+    """Upright in air the segments' own weight; at 60 degrees half of it."""
+    heavy = cf.BitOnRock(cf.Stribeck(6e3, 4e3, 3.0), weight=1e8)
+    given = scene(bit=heavy)
+    weighs = sum(part.weight * part.length for part in given.segments)
+    told = f"the string weighs along the hole, {weighs / 1e3:.4g} kN: the hook would have to push"
+    assert told in "\n".join(chosen(given)[1])
+    slanted = cf.WellPath.from_survey([0, 2000], [60, 60], [0, 0])
+    given = scene(bit=heavy, hole=hole(slanted, 0.0), mud=MUD)
+    weighs = sum(part.weight * part.length for part in given.segments) / 2
+    assert f"along the hole, {weighs / 1e3:.4g} kN" in "\n".join(chosen(given)[1])
+    assert not any("push" in line for line in chosen(scene(bit=bit(), string=long()))[1])
+
+
+def long():
+    return cf.DrillString([cf.Collar(300.0, outer_diameter=0.2032, inner_diameter=0.0714),
+                           cf.DrillPipe(1700.0, size="5 in 19.50 lb/ft")])  # fmt: skip

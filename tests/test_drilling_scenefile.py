@@ -102,7 +102,7 @@ def test_laws_inside_laws(tmp_path):
     ("old", "new", "words"),
     [
         ("[drive]", "[drives]", r"unknown key 'drives', did you mean 'drive'"),
-        ("inertia = 2900.0", "inertias = 2900.0", r"TopDrive.inertia = None: expected a positive number"),
+        ("inertia = 2900.0", "inertias = 2900.0", r"drive.inertia is missing: expected .* SoftSpeed chooses"),
         ('"SoftSpeed"', '"SoftSpeeds"', r"drive.control.type = 'SoftSpeeds': did you mean 'SoftSpeed'"),
         ('{ type = "SoftSpeed" }', '{ type = "PI", Kp = 3.0 }', r"drive.control: PI.Ki = None: expected a gain: SoftT"),
         ('static = "6 kN m"', 'static = "6 kN"', r"bit.law.static = '6 kN': kN is a unit of force, expected .* moment"),
@@ -165,3 +165,27 @@ def test_the_reference_has_every_key_and_unit():
     for expected in (arguments, keys, units):
         assert expected <= told, expected - told
     assert math.isclose(MORE_UNITS["angular velocity"][1]["rpm"], math.pi / 30)
+
+
+def refused(capsys, *arguments):
+    assert main([str(x) for x in arguments]) == 2
+    return capsys.readouterr().err
+
+
+def test_mistakes_are_told_in_words_of_the_command_line(tmp_path, capsys, monkeypatch):
+    use(monkeypatch)
+    file = ROOT / "demos" / "strings" / "stick_slip.toml"
+    text, other, folder = file.read_text(encoding="utf-8"), tmp_path / "other.toml", tmp_path / "run"
+    other.write_text(text.replace("[drive]", "[topdrive]"), encoding="utf-8")
+    assert "unknown key 'topdrive', did you mean 'drive'?" in refused(capsys, "run", other)
+    for command in ("modes", "buckling"):
+        assert f"cosserat {command} is for rods" in refused(capsys, command, file)
+    assert "--static is for rods" in refused(capsys, "run", file, "--static")
+    assert "there is no such folder" in refused(capsys, "resume", folder)
+    assert main(["run", str(file), "--duration", "5", "--folder", str(folder)]) == 0
+    assert f"`cosserat resume {folder}` continues it" in refused(capsys, "run", file, "--folder", folder)
+    other.write_text(text.replace("60 rpm", "61 rpm"), encoding="utf-8")
+    assert "the scene is not the one of the motion: " in refused(capsys, "run", other, "--folder", folder)
+    use(monkeypatch, stops_at=500)
+    assert main(["run", str(file)]) == 130
+    assert capsys.readouterr().err.startswith("cosserat: interrupted at t = ")

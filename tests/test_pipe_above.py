@@ -134,6 +134,7 @@ def test_the_answer_to_a_torque_at_the_bit_is_that_of_the_whole_string(scheme):
     assert errors[1] < 1e-3 and errors[0] > 2.5 * errors[1]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("hook", "frequencies"), [(cf.Hook(5e6), ON_HOOK), (None, UNDER_RIGID_HOOK)])
 def test_axial_natural_frequencies_are_those_of_the_reference(hook, frequencies):
     blow = pulse((0, 0, -2e4), 0.15)
@@ -143,6 +144,7 @@ def test_axial_natural_frequencies_are_those_of_the_reference(hook, frequencies)
     np.testing.assert_allclose(found, frequencies, rtol=2.5e-4)
 
 
+@pytest.mark.slow
 def test_torsional_natural_frequencies_are_those_of_the_reference():
     rod, scene = collars(None, torque(0.2))
     history = motion(scene, 40.0, 0.01, elements=2)

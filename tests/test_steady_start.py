@@ -36,6 +36,13 @@ def test_nothing_changes(model, drive):
     assert column(rows, "torque_on_bit")[0] == pytest.approx(4000 + 2000 * np.exp(-SPEED / 3), rel=1e-9)
 
 
+@pytest.mark.parametrize("model", ["torsion", "axial and torsional"])
+def test_the_books_begin_with_the_energy_of_the_start(model):
+    history = cf.simulate_drilling(drilling(bit=cf.BitOnRock(LAW, weight=50e3, inertia=50.0)), 5.0, model=model)
+    assert np.abs(history.balance).max() < 1e-9 * history.work_of_drive[-1] and history.kinetic[0] > 1e3
+    assert any("steady" in sentence for sentence in history.why)
+
+
 @pytest.mark.parametrize("model", [lambda x: TorsionWaves(x, 0.002), lambda x: AxialTorsional(x, 0.002, 600)])
 def test_surface_torque_is_that_of_torque_and_drag(model):
     scene = drilling()

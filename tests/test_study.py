@@ -105,6 +105,20 @@ def test_a_case_cannot_ask_for_the_other_ranks():
         assert found.results[2] == [0.7]
 
 
+def test_a_task_that_changes_its_arguments_does_not_change_those_of_other_cases():
+    given = np.array([1.0, 2.0])
+
+    def changing(numbers, array, more):
+        numbers.append(more)
+        array *= more
+        return [sum(numbers), *array]
+
+    study = cf.study(changing, {"numbers": [[1, 2], [4]], "array": [given], "more": [10, 20]})
+    expected = [[total + more, more, 2 * more] for total in (3, 4) for more in (10, 20)]
+    assert np.array(study.results).tolist() == expected
+    assert study.cases[0]["numbers"] == [1, 2] and given.tolist() == [1.0, 2.0]
+
+
 def test_a_study_within_a_case():
     def sums(n):
         return sum(cf.study(lambda k: k, {"k": range(1, n + 1)}).results)
@@ -128,7 +142,9 @@ def test_values_to_the_last_digit(value, tmp_path_all):
             assert found.results[0]["value"].dtype == value.dtype and found.results[0]["value"].shape == value.shape
 
 
-@pytest.mark.parametrize("value", [object(), [[1], [1, 2]], {"a": {"b": 1}}, {1: 2}, [object()]])
+@pytest.mark.parametrize(
+    "value", [object(), [[1], [1, 2]], {"a": {"b": 1}}, {1: 2}, [object()], np.ma.array([1], mask=[1])]
+)
 def test_results_that_cannot_be_kept_are_failures(value):
     ((_, why),) = cf.study(lambda i: value, [{"i": 0}]).failures
     assert why.startswith("SceneError: study.task") and "expected" in why

@@ -254,8 +254,11 @@ def test_what_is_told_and_refused():
     model = TorsionWaves(replace(scene, friction=steep), 20 / SPEED, normal_force=wall_force)
     assert model.dt < 5 / SPEED and any("would have several answers" in line for line in model.why)
     sudden = cf.WallFriction(0.5, 0.1, 1e-9, of_rotation=True)
-    with pytest.raises(cf.SceneError, match="TorsionWaves.scene.friction = .*decays more slowly"):
+    with pytest.raises(cf.SceneError, match="Drilling.friction = .*decays more slowly"):
         TorsionWaves(replace(scene, friction=sudden))
+    light = cf.BitOnRock(cf.Stribeck(6000.0, 2000.0, 1e-3), inertia=0.01)
+    with pytest.raises(cf.SceneError, match="BitOnRock.law = .*a larger inertia of the bit than 0.01"):
+        TorsionWaves(replace(stick_slip(), bit=light))
     law = cf.Stribeck(6000.0, 2000.0, 1.0)
     with pytest.raises(cf.SceneError, match="impedance of the string at the bit is 1793.82"):
         TorsionWaves(cf.Drilling(string_of(PIPE, (200.0, 0.1651, 0.05715)), cf.TopDrive(1.0), cf.BitOnRock(law)))

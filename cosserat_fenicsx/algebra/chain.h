@@ -181,6 +181,7 @@ int settle(contact *c);
 int broken(const contact *c);
 void slips(const contact *c, double *size);
 double stored(const contact *c, int at_start);
+double lost(const contact *c, const double *before);
 
 int negative_modes(second_variation *v, int *sideways);
 int run(sweep *s);

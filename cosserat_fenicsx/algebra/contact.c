@@ -221,3 +221,23 @@ double stored(const contact *c, int at_start)
     }
     return sum;
 }
+
+/* Energy that friction and damping took in a step whose forces are those of its end: by the mean of both ends, but no
+   less than zero at a node. A force that begins or ends in the step is no source of energy; what the scheme errs there
+   is left to the balance. before: the law's numbers at the start. The motion is given. */
+double lost(const contact *c, const double *before)
+{
+    double sum = 0;
+    for (int i = 0; i < c->nodes; i++) {
+        const double *t = c->tangent + 3 * i, *moved = c->moved + 6 * i, *end = c->law + 3 * i, *start = before + 3 * i;
+        const place p = place_of(c, i);
+        const double k = c->stiffness[i], arm = c->arm[i], gap = c->clearance[i], p0 = fmax(p.R0 - gap, 0);
+        const double round = dot3(p.tau, moved) + arm * dot3(t, moved + 3);
+        const double along = dot3(t, moved) - arm * dot3(p.tau, moved + 3);
+        const double at_end = end[0] - k * fmax(p.R - gap, 0);
+        const double damping = at_end + (p0 > 0 && start[0] == 0 ? at_end : start[0] - k * p0);
+        const double friction = (start[1] + end[1]) * round + (start[2] + end[2]) * along;
+        sum += fmax(damping * (p.R - p.R0) / 2, 0) + fmax(-friction / 2, 0);
+    }
+    return sum;
+}

@@ -11,7 +11,9 @@ from cosserat_fenicsx.cli.say import BAD_INPUT, DONE, INTERRUPTED, NOT_CONVERGED
 from cosserat_fenicsx.cli.well import warnings_in_words
 from cosserat_fenicsx.drilling.choose import chosen
 from cosserat_fenicsx.drilling.discs import Discs
+from cosserat_fenicsx.drilling.folder import DrillingFolder
 from cosserat_fenicsx.drilling.models import model_of
+from cosserat_fenicsx.drilling.pictures.shown import turns
 from cosserat_fenicsx.drilling.scenefile import drilling_in
 from cosserat_fenicsx.drilling.simulate import check_arguments, resume_drilling
 from cosserat_fenicsx.errors import Interrupted, NotConverged, NotStored, SceneError
@@ -28,6 +30,9 @@ def _scene(options, tables):
         if getattr(options, name, None) is not None:
             option = f"--{name.replace('_', '-')}"
             raise SceneError(f"{option} is for rods, and this scene is a drill-string in motion")
+    if options.static:
+        raise SceneError("--static is for rods, and this scene is a drill-string in motion: strings in equilibrium are "
+                         "scenes with [well] and [[operations]]")  # fmt: skip
     found = drilling_in(tables, Path(options.scene))
     asked = {name: getattr(options, name) for name in _TAKEN if getattr(options, name, None) is not None}
     return replace(found, settings={**found.settings, **asked})
@@ -39,10 +44,19 @@ def run_drilling(options, tables):
     found = _scene(options, tables)
     if found.title:
         say(found.title, file=sys.stdout)
+    _check_folder(options.folder, found.scene)
     code = DONE
     if "duration" in found.settings or not found.speeds:
         code = _deliver(lambda: found.simulate(folder=options.folder), options)
     return _stability(found, options) if code == DONE and found.speeds else code
+
+
+def _check_folder(folder, scene):
+    """Refuse the folder of another motion, or of this one."""
+    if folder and (Path(folder) / "drilling.json").exists():
+        DrillingFolder(folder).open().scene(scene)  # refused with what differs
+        raise SceneError(f"--folder {folder}: it holds this motion already: `cosserat resume {folder}` continues it; "
+                         "or expected another name")  # fmt: skip
 
 
 def _stability(found, options):
@@ -99,7 +113,8 @@ def _deliver(compute, options):
         if out is not None:
             _write(history, out, not options.no_picture, film if code == DONE else None, options.speed, code == DONE)
     if trouble is not None:
-        say(f"cosserat: {trouble}")
+        reached = f" at t = {history.times[-1]:.6g} s of the motion" if len(history) else ""
+        say(f"cosserat: interrupted{reached}" if code == INTERRUPTED else f"cosserat: {trouble}")
         if options.folder and code in (INTERRUPTED, NOT_CONVERGED) and not isinstance(trouble, NotConverged):
             say(f"cosserat: `cosserat resume {options.folder}` continues from there")
     return code
@@ -109,7 +124,9 @@ def _write(history, out, pictures, film, speed, stops):
     """Write the files of a motion; `stops`: whether a signal ends the writing."""
     files = {"drilling.csv": history.write}
     if pictures and len(history) > 1:
-        files |= {"drilling.png": history.plot, "phase.png": history.plot_phase, "energy.png": history.plot_energy}
+        files |= {"drilling.png": history.plot, "energy.png": history.plot_energy}
+        if turns(history):
+            files["phase.png"] = history.plot_phase
         if len(history.profile_times) > 1:
             files |= {"map.png": history.plot_map}
     if film and len(history.profile_times) > 1:

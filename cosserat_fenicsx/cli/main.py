@@ -13,7 +13,10 @@ from cosserat_fenicsx.cli.eigen import run_buckling, run_modes
 from cosserat_fenicsx.cli.options import parser
 from cosserat_fenicsx.cli.say import BAD_INPUT, DONE, INTERRUPTED, in_words, say
 from cosserat_fenicsx.cli.together import together
-from cosserat_fenicsx.errors import CosseratError, SceneWarning
+from cosserat_fenicsx.errors import CosseratError, SceneError, SceneWarning
+
+# Tables that a drill-string in motion has, and a string in a well has not.
+_OF_DRILLING = {"drive", "bit", "hook", "wall_friction", "drag", "simulate", "stability", "discs"}
 
 
 def main(arguments=None):
@@ -22,7 +25,8 @@ def main(arguments=None):
     Returns:
         0 done, 1 not converged (the partial path is written), 2 bad input, 130 interrupted (likewise written).
     """
-    whole = parser({"run": _run, "resume": _resume, "buckling": run_buckling, "modes": run_modes, "explain": _explain})
+    whole = parser({"run": _run, "resume": _resume, "buckling": _rods_alone(run_buckling),
+                    "modes": _rods_alone(run_modes), "explain": _explain})  # fmt: skip
     options = whole.parse_args(arguments)
     if options.command is None:
         whole.print_help()
@@ -46,6 +50,26 @@ def main(arguments=None):
         return BAD_INPUT
 
 
+def _is_drilling(tables):
+    """Whether a file is that of a drill-string in motion, also one whose [drive] is missing or misspelt."""
+    return "drive" in tables or bool({"string", "well", "discs"} & set(tables) and _OF_DRILLING & set(tables))
+
+
+def _rods_alone(do):
+    """A command that refuses scenes of strings."""
+
+    def command(options):
+        from cosserat_fenicsx.scene.toml_tables import tables_of
+
+        tables = tables_of(options.scene)
+        if _is_drilling(tables):
+            raise SceneError(f"cosserat {options.command} is for rods, and {options.scene} is a drill-string in "
+                             "motion: `cosserat run` with a table [stability] computes its modes")  # fmt: skip
+        return do(options)
+
+    return command
+
+
 def _settings(options):
     """The scene and the arguments of `solve`: options of the command line replace those of the file."""
     from cosserat_fenicsx.scene.scenefile import load_factors_in, read_scene
@@ -64,7 +88,7 @@ def _run(options):
     from cosserat_fenicsx.scene.toml_tables import tables_of
 
     tables = tables_of(options.scene)
-    if "drive" in tables:
+    if _is_drilling(tables):
         from cosserat_fenicsx.cli.drilling import run_drilling
 
         return run_drilling(options, tables)
@@ -96,7 +120,13 @@ def _run(options):
 
 
 def _resume(options):
-    if (Path(options.folder) / "drilling.json").exists():
+    folder = Path(options.folder)
+    if not folder.is_dir():
+        raise SceneError(
+            f"{folder}: no motion was found there, there is no such folder: expected the DIR of "
+            "`cosserat run ... --folder DIR`"
+        )
+    if (folder / "drilling.json").exists():
         from cosserat_fenicsx.cli.drilling import resume_run
 
         return resume_run(options)
@@ -118,7 +148,7 @@ def _explain(options):
     from cosserat_fenicsx.scene.toml_tables import tables_of
 
     tables = tables_of(options.scene)
-    if "drive" in tables:
+    if _is_drilling(tables):
         from cosserat_fenicsx.cli.drilling import explain_drilling
 
         say(explain_drilling(options, tables), file=sys.stdout)

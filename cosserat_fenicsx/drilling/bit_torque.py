@@ -13,7 +13,7 @@ from cosserat_fenicsx.scene.rod import Station, StationOrName, is_known
 
 @dataclass(frozen=True)
 class BitTorque(PointAction):
-    """A torque about the rod's axis d3 that falls with the speed of rotation, and anything up to the static one at rest.
+    """A torque about the rod's axis d3 that falls with the speed of rotation; at rest anything up to the static one.
 
     The law is set-valued: within a step the bit sticks or slips. In `simulate` alone, in the spatial model; at rest it
     exerts nothing. It is not multiplied by the load factor. What it dissipates counts as such in the energy balance.
@@ -40,7 +40,9 @@ class BitTorque(PointAction):
         is_known(self, "station", Station)
         instance(self, "law", self.law, Stribeck, "a Stribeck(...)")
         for field, unit in (("weight", "N"), ("inertia_of_bit", "kg m^2")):
-            value = number(self, field, getattr(self, field), f"a number from 0 on ({unit})", lambda x: 0 <= x < math.inf)
+            value = number(
+                self, field, getattr(self, field), f"a number from 0 on ({unit})", lambda x: 0 <= x < math.inf
+            )
             store(self, **{field: value})
 
     def inertia(self, rod):

@@ -67,7 +67,21 @@ def _still(scene):
 
 def _left_out(scene, name):
     """Sentences on what a string on the axis of the hole leaves out."""
-    return _buckled(scene, name) if scene.hole is not None else []
+    return _pushed(scene) + (_buckled(scene, name) if scene.hole is not None else [])
+
+
+def _pushed(scene):
+    """A sentence where more weight is on the bit than the string has along the hole."""
+    weight = getattr(scene.bit, "weight", None) or 0.0
+    depths = np.concatenate([[0.0], np.cumsum([part.length for part in scene.segments])])
+    down = depths if scene.hole is None else np.array([scene.hole.path.position(md)[2] for md in depths])
+    along = float(np.dot([part.weight for part in scene.segments], np.diff(down)))
+    if weight <= along:
+        return []
+    return [
+        f"APPROXIMATE: the weight on bit, {weight / 1e3:.4g} kN, is more than the string weighs along the hole, "
+        f"{along / 1e3:.4g} kN: the hook would have to push by {(weight - along) / 1e3:.4g} kN"
+    ]
 
 
 def _buckled(scene, name):

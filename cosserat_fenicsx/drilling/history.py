@@ -111,10 +111,12 @@ class DrillingHistory(Tabular):
     @property
     def balance(self) -> np.ndarray:
         """(n,) what the ledger does not account for, J: energies and losses less works, the loss of the scheme with
-        the sign turned."""
+        the sign turned; of a motion that starts in steady rotation, less that of the first time, which has the energy
+        that it starts with."""
         ledger = {name: np.nan_to_num(getattr(self, name)) for name in LEDGER}
         works = sum(values for name, values in ledger.items() if name.startswith("work"))
-        return sum(values for name, values in ledger.items() if not name.startswith("work")) - works
+        missing = sum(values for name, values in ledger.items() if not name.startswith("work")) - works
+        return missing - missing[:1] if self.scene.start == "steady" else missing
 
     def stick_slip(self, since: float | None = None) -> StickSlip:
         """Period, peaks, and when the bit starts and stops.

@@ -176,7 +176,10 @@ def _drive(entry, given):
         kind = class_named("drive.control", table("drive.control", control).get("type"), (*CONTROLS, *_TUNED))
         if kind in _TUNED:
             known_keys(f"drive.control ({kind.__name__})", control, ("type",))
-            inertia = positive("TopDrive", "inertia", entry.get("inertia"), "kg m^2, of the drive")
+            if "inertia" not in entry:
+                raise SceneError(f"drive.inertia is missing: expected that of the drive (kg m^2), about 2000 to 4000: "
+                                 f"{kind.__name__} chooses its gains by it")  # fmt: skip
+            inertia = positive("TopDrive", "inertia", entry["inertia"], "kg m^2, of the drive")
             standing = Drilling(drive=TopDrive(0.0), **given)
             discs = isinstance(standing.string, Discs)  # refused there
             entry["control"] = kind(*((standing, inertia) if discs else (standing.string, inertia, standing.bit_depth)))

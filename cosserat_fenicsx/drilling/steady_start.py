@@ -3,6 +3,7 @@
 import numpy as np
 
 from cosserat_fenicsx.checks import refuse
+from cosserat_fenicsx.drilling.bit_laws import Cutting
 from cosserat_fenicsx.drilling.top_drive import PI, Motor, Stiff
 
 
@@ -19,6 +20,18 @@ def check_steady(scene) -> None:
                "have the speed asked for in steady rotation")  # fmt: skip
     if not speed > 0:
         refuse("Drilling", "start", "steady", "'rest' where the drive does not turn at the start, or a speed above 0")
+
+
+def check_rock(scene) -> None:
+    """Refuse a hook that moves a string with axial motion whose bit stands on rock that does not give way.
+
+    Raises:
+        SceneError: so it is.
+    """
+    bit, (down, _) = scene.bit, steady_velocities(scene)
+    if down and bit is not None and bit.weight is not None and not isinstance(bit.law, Cutting):
+        refuse("Drilling", "start", "steady", f"'rest' with a hook that moves at {-down:g} m/s: the rock below a bit "
+               "with a weight does not give way, unless its law is Cutting(...)")  # fmt: skip
 
 
 def steady_velocities(scene) -> np.ndarray:

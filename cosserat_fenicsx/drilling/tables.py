@@ -3,6 +3,7 @@
 import numpy as np
 from rich.table import Table
 
+from cosserat_fenicsx.drilling.pictures.shown import advance_unit, alias
 from cosserat_fenicsx.results.tables import as_text
 
 # Rows that are shown.
@@ -17,18 +18,25 @@ _SHOWN = (
     ("torque on bit (kN m)", "torque_on_bit", 1e-3),
     ("hook load (kN)", "hook_load", 1e-3),
     ("weight on bit (kN)", "weight_on_bit", 1e-3),
-    ("bit advance (mm)", "bit_advance", 1e3),
+    ("bit advance", "bit_advance", 1.0),
+)
+_CAPTION = (
+    "A row holds for the end of a step, forces and torques in it are means over the step (of torsion alone over two, the "
+    "first of them over what there is). The motion begins at t = 0, and ends with the step that reaches its duration."
 )
 
 
 def history_table(history):
     """Text: the state at some times, what the bit does, and what decided for the model."""
-    steps = ", ".join(f"{name} {value}" for name, value in history.counts.items())
-    title = f"{history.model} model, steps of {history.dt:.4g} s" + (f" ({steps})" if steps else "")
-    table = Table(title=title)
+    halved = history.counts.get("halved", 0)
+    told = f", {halved} times halved where the motion needs it" if halved else ""
+    table = Table(title=f"{history.model} model, steps of {history.dt:.4g} s{told}", caption=_CAPTION)
     rows = np.unique(np.linspace(0, len(history) - 1, _ROWS).astype(int)) if len(history) else []
     columns = [(head, getattr(history, name) * factor) for head, name, factor in _SHOWN]
     columns = [(head, values) for head, values in columns if head == "t (s)" or not np.isnan(values).all()]
+    unit, factor = advance_unit(history.bit_advance)
+    columns = [(f"{head} ({unit})", values * factor) if head == "bit advance" else (head, values)
+               for head, values in columns]  # fmt: skip
     for head, _ in columns:
         table.add_column(head, justify="right")
     for k in rows:
@@ -36,12 +44,16 @@ def history_table(history):
     lines = [as_text(table)]
     if len(history) > 5:
         lines.append(str(history.stick_slip()))
-        worked = np.nan_to_num(history.work_of_drive[-1])
-        lines.append(f"Energy: work of the drive {worked / 1e3:.5g} kJ; the ledger does not account for "
+        worked = {name: np.nan_to_num(getattr(history, f"work_of_{name}")[-1]) for name in ("drive", "hook", "weight")}
+        done = ", ".join(f"of the {name} {x / 1e3:.5g} kJ" for name, x in worked.items() if x or name == "drive")
+        lines.append(f"Energy: work {done}; the ledger does not account for "
                      f"{history.balance[-1] / 1e3:.3g} kJ.")  # fmt: skip
     if history.errors is not None:
         period, peak, *torques = history.errors
         told = "" if np.isnan(period) else f"period {period:.2g} s, "
         lines.append(f"Estimated errors by the step: {told}peak {peak * _RPM:.2g} rpm, surface torque "
                      f"{max(torques) / 1e3:.2g} kN m.")  # fmt: skip
+    caution = alias(history)
+    if caution:
+        lines.append(f"{caution[0].upper()}{caution[1:]}.")
     return "\n".join([*lines, *history.why])

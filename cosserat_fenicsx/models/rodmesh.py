@@ -171,6 +171,20 @@ def _fixed_ends(scene, rod):
     return ends
 
 
+def same_places(scene, other):
+    """Whether what needs element ends lies at the same shares of the rods' lengths in two scenes with the same rods.
+
+    Places where the points of a spline lie are left out: nothing jumps there.
+    """
+
+    def places(rod, of):
+        offsets = rod.mass_centre.breaks if rod.mass_centre else ()
+        return np.sort([*(x.s for x in of.stations(rod)), *rod.profile.breaks, *offsets]) / rod.length
+
+    found = [(places(a, scene), places(b, other)) for a, b in zip(scene.rods, other.rods, strict=True)]
+    return all(a.shape == b.shape and np.allclose(a, b, rtol=0, atol=1e-10) for a, b in found)
+
+
 class RodMesh:
     """A dolfinx mesh of intervals in reference arc length, one chain per rod, each starting at zero.
 

@@ -8,6 +8,8 @@ from cosserat_fenicsx.pictures.figures import draw_chart, empty_figure
 _RPM, _MM, _KILO = 30 / np.pi, 1e3, 1e-3
 # Shares of the duration over which rates are taken in the chart, so that it shows no single impacts.
 _WINDOW = 0.01
+# The rate of rolling is drawn where the mean radius is above this share of the clearance.
+_NEAR_WALL = 0.95
 _GREY = "0.45"
 
 
@@ -76,10 +78,12 @@ def _whirl(history, orbit, station):
     at, rate, spin, radius = rates(orbit)
     middle.plot(at, rate * _RPM, color="tab:red", lw=1.2, label="whirl")
     middle.plot(at, spin * _RPM, color="tab:blue", lw=1.2, label="spin")
-    touching = np.interp(at, t, np.nan_to_num(orbit.normal) > 0) > 0
-    rolling = np.where(touching, -orbit.contact_radius / np.maximum(radius, 1e-300) * spin * _RPM, np.nan)
-    if touching.any():
-        middle.plot(at, rolling, "--", color=_GREY, lw=1.2, label="rolling\nwithout slip")
+    near = radius > _NEAR_WALL * orbit.clearance.min()
+    if near.any():
+        rolling = -orbit.contact_radius / np.maximum(radius, _NEAR_WALL * orbit.clearance.min()) * spin
+        middle.plot(
+            at, np.where(near, rolling, np.nan) * _RPM, "--", color="black", lw=1.6, label="rolling\nwithout slip"
+        )
     middle.set_ylabel("rate, forward in the\ndirection of the spin (rpm)")
     below.plot(t, orbit.normal * _KILO, color="tab:brown", lw=0.9)
     below.set_ylabel("normal force of the\nwall on a node (kN)")

@@ -7,7 +7,7 @@ import numpy as np
 
 from cosserat_fenicsx.results.sensitivity import Sensitivity, Uncertainty
 from cosserat_fenicsx.results.shapes import Shapes, in_words, largest_error
-from cosserat_fenicsx.scene.parameters import Parameter
+from cosserat_fenicsx.scene.parameters import Parameter, check_once
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -66,6 +66,7 @@ class Buckling(Shapes):
     ) -> Uncertainty:
         """The first-order standard deviation of `load_factors`, with the share of each parameter; see
         `Path.uncertainty`."""
+        check_once(self.scene, standard_deviations)
         named = {getattr(x, "name", x): deviation for x, deviation in standard_deviations.items()}
         return self.sensitivity(standard_deviations).uncertainty(named, correlation)
 

@@ -13,7 +13,7 @@ from cosserat_fenicsx.results.records import Event, Record, Records
 from cosserat_fenicsx.results.recovery import element_contact
 from cosserat_fenicsx.results.result import Result
 from cosserat_fenicsx.results.sensitivity import Sensitivity, Uncertainty
-from cosserat_fenicsx.scene.parameters import Parameter
+from cosserat_fenicsx.scene.parameters import Parameter, check_once
 from cosserat_fenicsx.scene.rod import RodOrName
 
 
@@ -200,6 +200,7 @@ class Path(Result):
         Raises:
             SceneError, NotConverged: as of `sensitivity` and `Sensitivity.uncertainty`.
         """
+        check_once(self.scene, standard_deviations)
         named = {getattr(x, "name", x): deviation for x, deviation in standard_deviations.items()}
         return self.sensitivity(query, standard_deviations).uncertainty(named, correlation)
 

@@ -8,6 +8,8 @@ import numpy as np
 from cosserat_fenicsx.checks import number
 from cosserat_fenicsx.errors import SceneError, nearest
 
+_NEGATIVE = 1e-6  # eigenvalues of correlations that were rounded, as in a table
+
 
 @dataclass(frozen=True, eq=False)
 class Sensitivity(Mapping):
@@ -63,12 +65,7 @@ class Sensitivity(Mapping):
         for name in names:
             number("uncertainty", f"standard_deviations['{name}']", standard_deviations[name],
                    "a standard deviation, 0 or more", lambda x: 0 <= x < np.inf)  # fmt: skip
-        rho = np.eye(len(names)) if correlation is None else np.asarray(correlation, dtype=float)
-        if rho.shape != (len(names),) * 2 or not np.allclose(rho, rho.T) or not np.allclose(np.diag(rho), 1):
-            raise SceneError(
-                f"uncertainty: correlation = {rho!r}: expected a symmetric matrix ({len(names)}, {len(names)}) with "
-                "ones on its diagonal, or None"
-            )
+        rho = np.eye(len(names)) if correlation is None else _correlation(correlation, len(names))
         parts = np.array([self[name] * standard_deviations[name] for name in names])
         products = parts * np.tensordot(rho, parts, 1)
         variance = products.sum(axis=0)
@@ -119,6 +116,25 @@ class Uncertainty:
             unit = f" {self.units[name]}" if self.units[name] != "1" else ""
             lines.append(f"  {_text(100 * self.shares[name], 3)} % from {name} +- {given:.6g}{unit}".rstrip())
         return "\n".join(lines)
+
+
+def _correlation(given, count):
+    try:
+        rho = np.asarray(given, dtype=float)
+    except (TypeError, ValueError):
+        rho = np.empty(0)
+    if rho.shape != (count, count) or not np.allclose(rho, rho.T) or not np.allclose(np.diag(rho), 1):
+        raise SceneError(
+            f"uncertainty: correlation = {given!r}: expected a symmetric matrix ({count}, {count}) with ones on its "
+            "diagonal, or None"
+        )
+    least = np.linalg.eigvalsh(rho).min(initial=1.0)
+    if least < -_NEGATIVE:
+        raise SceneError(
+            f"uncertainty: correlation = {given!r}: its least eigenvalue is {least:.3g}, with which variances are "
+            "negative: expected a matrix whose eigenvalues are 0 or more"
+        )
+    return rho
 
 
 def _text(values, digits=6):

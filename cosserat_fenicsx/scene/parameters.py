@@ -16,14 +16,17 @@ import numpy as np
 from cosserat_fenicsx.checks import instance, number
 from cosserat_fenicsx.errors import SceneError, nearest
 from cosserat_fenicsx.scene.as_data import argument_of
+from cosserat_fenicsx.scene.curves import CURVES
 from cosserat_fenicsx.scene.rod import Station
 from cosserat_fenicsx.scene.scene import Scene
+from cosserat_fenicsx.scene.splines import Spline
 
+_NOTHING = 1e-6  # of a vector: components that are 0 but for rounding
 _PARTS = ("rods", "materials", "supports", "loads", "joints")
 _TOKEN = re.compile(r"\[(\d+)\]|\.?([^.\[\]]+)")
 _UNITS = {
     **dict.fromkeys(("diameter", "outer_diameter", "inner_diameter", "width", "height", "radius", "offset"), "m"),
-    **dict.fromkeys(("start", "end", "displacement", "clearance", "length"), "m"),
+    **dict.fromkeys(("start", "end", "centre", "points", "displacement", "clearance", "length"), "m"),
     "E": "Pa", "nu": "1", "density": "kg/m^3", "force": "N", "moment": "N m", "rotation": "rad", "gravity": "m/s^2",
     "friction": "1", "rotational": "N m/rad", "stiffness": "N/m^2", "Spring.stiffness": "N/m",
     "TubeRing.stiffness": "N/m", "LineForce.force": "N/m", "LineMoment.moment": "N m/m", "shear": "N", "axial": "N",
@@ -70,6 +73,33 @@ class Parameter:
         return abs(self.value if self.scale is None else self.scale)
 
 
+@dataclass(frozen=True)
+class _OfScene(Parameter):
+    """A parameter by its name: `place` tells whether another name means the same number."""
+
+    place: tuple = ()
+
+
+def check_once(scene, given):
+    """Refuse two names of the same number, such as that of a shared material, whose uncertainty would count twice.
+
+    Args:
+        given: names or `Parameter`s.
+
+    Raises:
+        SceneError: there are two, or two parameters with one name; see also `parameter_of`.
+    """
+    names = {}
+    for parameter in [parameter_of(scene, each) for each in given]:
+        place = getattr(parameter, "place", parameter.name)
+        if place in names:
+            raise SceneError(
+                f"parameter '{parameter.name}' is the same number of the scene as '{names[place]}': expected one of "
+                "them, whose standard deviation counts once"
+            )
+        names[place] = parameter.name
+
+
 def parameter_of(scene, given):
     """The `Parameter` given as one or by its name.
 
@@ -93,14 +123,25 @@ def parameter_of(scene, given):
     if isinstance(leaf, bool) or not isinstance(leaf, numbers.Real):
         raise SceneError(f"parameter '{given}' is {_kind(leaf)}: expected the name of a number{_inside(leaf, given)}")
     unit = _UNITS.get(f"{type(owner).__name__}.{field}", _UNITS.get(field, "its SI unit"))
-    if leaf == 0 and size is not None:  # a component of a vector: as large as the vector
-        size = float(np.linalg.norm(np.asarray(size, dtype=float)))
+    if isinstance(owner, CURVES) and unit == "m":  # places change by parts of the curve, wherever its origin lies
+        size = _extent(owner)
+    elif size is not None:  # a component that is 0, or rounding of it: as large as the vector
+        whole = math.hypot(*size) if all(isinstance(x, numbers.Real) for x in size) else math.inf
+        size = whole if abs(leaf) <= (_NOTHING * whole if len(size) == 3 else 0) and whole < math.inf else None
 
     def scene_of(value):
         new = _put(getattr(owner, field), keys, value)
         return _Rebuilding({id(owner): _made(owner, {field: new})}).of(scene)
 
-    return Parameter(given, float(leaf), scene_of, unit, size or None if leaf == 0 else None)
+    return _OfScene(given, float(leaf), scene_of, unit, size or None, (id(owner), field, *keys))
+
+
+def _extent(curve):
+    """The shortest length (m) that shapes a curve."""
+    if isinstance(curve, Spline):
+        return float(np.linalg.norm(np.diff(curve.points, axis=0), axis=1).min())
+    arm = np.linalg.norm(np.subtract(curve.start, curve.centre)) if hasattr(curve, "centre") else curve.length
+    return float(min(arm, curve.length))
 
 
 def _find(scene, name):

@@ -20,6 +20,7 @@ import numpy as np
 from cosserat_fenicsx.differences import PLACES, STEP, derivative
 from cosserat_fenicsx.errors import NotConverged, SceneError
 from cosserat_fenicsx.models.data_derivative import DataDerivative, made_once
+from cosserat_fenicsx.models.rodmesh import same_places
 from cosserat_fenicsx.models.signature import Signature
 from cosserat_fenicsx.results.accuracy import on_mesh
 from cosserat_fenicsx.results.perturbed import PerturbedPath
@@ -31,6 +32,8 @@ from cosserat_fenicsx.statics.solvers import solvers_of
 
 # Newton iterations from the recorded state to the same state, and how far it may move (lengths, rad).
 _ITERATIONS, _MOVED = 25, 1e-3
+# Largest relative error of the derivatives of data, and of what rounding may do to data.
+_SMOOTH, _ROUNDING = 1e-6, 1e-9
 # Largest motion (lengths, rad) over which queries are differenced.
 _REACH = 5e-3
 # Of data that depend on the position: motion over which they are differenced (lengths, rad), iterations, accuracy.
@@ -172,6 +175,11 @@ class Direct:
                     f"parameter '{parameter.name}' changes the lengths of rods over that of the longest one: expected "
                     "one that scales all of them, or none"
                 )
+            if not same_places(scene, self._scene):
+                raise SceneError(
+                    f"parameter '{parameter.name}' moves a load, support, joint or end of a section along its rod, "
+                    "and elements with it: expected one that leaves their shares of the length as they are"
+                )
 
     # -- states ------------------------------------------------------------------------------------------------------
 
@@ -203,7 +211,7 @@ class Direct:
     def rates(self, scenes, parameters):
         """For each parameter the derivatives of the numbers of every point (see `Problem.numbers`)."""
         steps = [STEP * parameter.size for parameter in parameters]
-        changes = [self._data_changes(each, step) for each, step in zip(scenes, steps, strict=True)]
+        changes = [self._data_changes(*each) for each in zip(scenes, steps, parameters, strict=True)]
         self._load(self._scene)
         found = [[] for _ in scenes]
         for i, (eta, numbers, _) in enumerate(self.points):
@@ -212,8 +220,19 @@ class Direct:
                 rates.append(self._rate(*of_points[i]))
         return found
 
-    def _data_changes(self, scenes, step):
+    def _data_changes(self, scenes, step, parameter):
         """For every point the derivatives of the data, and of the constraint equations' part of the residual."""
+
+        def smooth(arrays):
+            found, error = derivative(arrays, step)
+            rounding = _ROUNDING * np.abs(arrays).max(initial=0.0) / step
+            if error.max(initial=0.0) > _SMOOTH * np.abs(found).max(initial=0.0) + rounding:
+                raise SceneError(
+                    f"parameter '{parameter.name}' = {parameter.value:g}: the scene does not change smoothly up to "
+                    f"{max(PLACES) * step:.3g} from it: expected cf.Parameter(..., scale=...) with a smaller scale"
+                )
+            return found
+
         near, found, whole = [], [], None
         for scene in scenes:
             self._load(scene)
@@ -221,8 +240,8 @@ class Direct:
             near.append([(self._refreshed(point, data), self._of_ties(point[0], point[1][0])) for point in self.points])
         for at_point in zip(*near, strict=True):
             if whole is None or self._refreshes:
-                whole = [derivative(arrays, step)[0] for arrays in zip(*(data for data, _ in at_point), strict=True)]
-            found.append((whole, derivative([ties for _, ties in at_point], step)[0]))
+                whole = [smooth(arrays) for arrays in zip(*(data for data, _ in at_point), strict=True)]
+            found.append((whole, smooth([ties for _, ties in at_point])))
         return found
 
     def _refreshed(self, point, data):

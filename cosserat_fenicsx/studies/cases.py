@@ -53,6 +53,16 @@ def _values(name, values):
     return values
 
 
+def unshared(value):
+    """A case, or a part of one, with lists, dicts and arrays of its own, which a task may change: those given belong to
+    several cases."""
+    if isinstance(value, np.ndarray):
+        return value.copy()
+    if type(value) in (list, tuple):
+        return type(value)(map(unshared, value))
+    return {name: unshared(part) for name, part in value.items()} if type(value) is dict else value
+
+
 def check_task(task, cases):
     """Refuse a task that cannot be called with its cases, before any of them is computed.
 

@@ -17,7 +17,7 @@ from cosserat_fenicsx.errors import CosseratError, InstallationError, Interrupte
 from cosserat_fenicsx.interrupts import obey
 from cosserat_fenicsx.progress import CaseProgress
 from cosserat_fenicsx.ranks import apart, communicator
-from cosserat_fenicsx.studies.cases import cases_of, check_task
+from cosserat_fenicsx.studies.cases import cases_of, check_task, unshared
 from cosserat_fenicsx.studies.described import NotDescribed, described, task_described
 from cosserat_fenicsx.studies.folder import StudyFolder
 from cosserat_fenicsx.studies.outcome import Study
@@ -46,7 +46,8 @@ def study(
     `InstallationError` is none: what is missing for one case is missing for all.
 
     Args:
-        task: a function of the arguments of a case, by name. It returns a number, a text, an array of numbers or of
+        task: a function of the arguments of a case, by name; lists, dicts and arrays among them are its own, and may
+            be changed. It returns a number, a text, an array of numbers or of
             texts, None, or a dict of these by name; where it computes more, it writes that to files of its own.
         cases: dicts of arguments, in a list or another iterable; or one dict {name: values}, whose product is taken,
             the last name running fastest: `{"speed": [40, 60], "weight": [50e3, 100e3]}` has four cases.
@@ -168,7 +169,7 @@ class _Run:
         began = time.monotonic()
         try:
             with apart():
-                found = {"result": to_data(self._task(**self._cases[i]))}
+                found = {"result": to_data(self._task(**unshared(self._cases[i])))}
         except InstallationError:
             raise
         except (Exception, SystemExit) as problem:

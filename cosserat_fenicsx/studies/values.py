@@ -48,7 +48,8 @@ def _of_value(value):
         array = np.asarray(value)
     except ValueError:  # rows of different lengths
         array = np.asarray(None)
-    if not isinstance(value, np.ndarray | list | tuple) or array.dtype.kind not in "biufcU":
+    masked = isinstance(value, np.ma.MaskedArray)  # whose mask would be lost
+    if masked or not isinstance(value, np.ndarray | list | tuple) or array.dtype.kind not in "biufcU":
         refuse("study.task", "result", value, _EXPECTED)
     flat, pairs = array.ravel(), array.dtype.kind == "c"
     if pairs:

@@ -1,7 +1,7 @@
 """Put into the documentation what the measurements and the gallery have left in out/.
 
     python demos/evidence/put_in_docs.py accuracy orders      these tables and their pictures
-    python demos/evidence/put_in_docs.py gallery wells strings    the pictures of these
+    python demos/evidence/put_in_docs.py gallery wells strings whirl    the pictures of these
 
 A table replaces what stands between <!-- name --> and <!-- /name --> in a page of docs/; one that is too long for that
 has a page of its own in docs/tables/. Pictures are cut to what is drawn, reduced to few colours and put in
@@ -56,6 +56,8 @@ STRINGS = {
     "stopped_block_map.png": "stopped_block/map.png",
     "stability_map.png": "stability_map.png",
 }
+#: Those of whirl in a hole: files in out/whirl/.
+WHIRL = {"whirl.png": "whirl.png"}
 WIDTH, COLOURS, MARGIN = 1100, 256, 12  # pixels, number, pixels
 
 
@@ -76,7 +78,7 @@ def main(names, out="out", docs=ROOT / "docs"):
         page, *pictures = PAGES.get(name, (None,))
         title, *more = ALONE.get(name, (None,))
         drawn = {picture: picture for picture in (GALLERY if name == "gallery" else pictures + more)}
-        for group, files in (("wells", WELLS), ("strings", STRINGS)):
+        for group, files in (("wells", WELLS), ("strings", STRINGS), ("whirl", WHIRL)):
             if name == group:
                 drawn = {picture: f"{group}/{file}" for picture, file in files.items()}
         for picture, file in drawn.items():
@@ -99,6 +101,6 @@ def main(names, out="out", docs=ROOT / "docs"):
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument(
-        "names", nargs="+", choices=sorted({*PAGES, *ALONE, "gallery", "wells", "strings"}), metavar="NAME"
+        "names", nargs="+", choices=sorted({*PAGES, *ALONE, "gallery", "wells", "strings", "whirl"}), metavar="NAME"
     )
     main(parser.parse_args().names)

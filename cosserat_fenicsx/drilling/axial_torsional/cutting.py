@@ -36,7 +36,7 @@ class CuttingEnd:
         self._flats = 0.0 if wear is None else law.a * wear.length * wear.stress
         self._rubbing = 0.0 if wear is None else wear.geometry * wear.friction * law.a / 2
         rate, turning = float(motion[0]), float(motion[1])
-        slope = rate / turning if turning > 0 else 0.0
+        slope = max(rate, 0.0) / turning if turning > 0 else 0.0  # a bit that is pulled up leaves no rock
         cut = 2 * math.pi / law.blades * slope
         if turning <= 0:
             cut = max(weight - self._flats, 0.0) / law.axial_stiffness
@@ -46,7 +46,7 @@ class CuttingEnd:
 
     def steady_forces(self, rate: float, speed: float) -> tuple[float, float]:
         """Weight (N) and torque (N m) on bit at a steady rate of penetration (m/s) and speed (rad/s)."""
-        cut = 2 * math.pi / self.law.blades * rate / speed
+        cut = 2 * math.pi / self.law.blades * max(rate, 0.0) / speed
         flats = self._flats if rate > 0 else 0.0
         return self.law.axial_stiffness * cut + flats, self.law.torsional_stiffness * cut + self._rubbing * flats
 

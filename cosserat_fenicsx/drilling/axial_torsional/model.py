@@ -23,7 +23,7 @@ from cosserat_fenicsx.drilling.discs import Discs
 from cosserat_fenicsx.drilling.protocol import LEDGER, SERIES
 from cosserat_fenicsx.drilling.signals import ScalarSignal
 from cosserat_fenicsx.drilling.single_valued import check_bit, stribeck_of
-from cosserat_fenicsx.drilling.steady_start import check_steady, steady_velocities
+from cosserat_fenicsx.drilling.steady_start import check_rock, check_steady, steady_velocities
 from cosserat_fenicsx.drilling.top_drive import PI, Matched, Motor, Stiff
 from cosserat_fenicsx.errors import NotConverged, SceneError
 
@@ -173,6 +173,8 @@ class AxialTorsional(Pointers):
         self.end = self._given_end or end_of(scene.bit, self._kept["x"][-1], motion, axial)
         if scene.start == "steady":
             check_steady(scene)
+            if axial:
+                check_rock(scene)
             motion[1 - axial :] = steady_velocities(scene)[1 - axial :]
             self._set_steady(motion)
             self.end = self._given_end or end_of(scene.bit, self._kept["x"][-1], motion, axial)
@@ -219,7 +221,9 @@ class AxialTorsional(Pointers):
             told.append("friction at the wall against axial and rotary slip together, normal force by the soft string "
                         "from the tension of the step before")  # fmt: skip
             bit = self.scene.bit
-            if bit is not None and bit.weight is not None:
+            if self.scene.start == "steady":
+                told.append("starts in steady motion, all of it at the speeds of drive and hook")
+            elif bit is not None and bit.weight is not None:
                 told.append(f"starts with {bit.weight:g} N on bit, without friction; the rock does not give way")
             else:
                 told.append("starts hanging off bottom, without friction")

@@ -3,7 +3,19 @@
 import numpy as np
 
 from cosserat_fenicsx.checks import refuse
-from cosserat_fenicsx.drilling.pictures.shown import BIT, DRIVE, GREY, KILO, RPM, times_between, title_of, turns
+from cosserat_fenicsx.drilling.pictures.shown import (
+    BIT,
+    DRIVE,
+    GREY,
+    KILO,
+    RPM,
+    advance_unit,
+    bands,
+    swings,
+    times_between,
+    title_of,
+    turns,
+)
 from cosserat_fenicsx.drilling.stick_slip import AT_REST
 from cosserat_fenicsx.pictures.figures import draw_chart, empty_figure
 from cosserat_fenicsx.ranks import world
@@ -13,7 +25,7 @@ _PANELS = (
     ("speed (rpm)", (("drive_speed", RPM, "drive", DRIVE), ("bit_speed", RPM, "bit", BIT))),
     ("torque (kN m)", (("surface_torque", KILO, "at the surface", DRIVE), ("torque_on_bit", KILO, "on bit", BIT))),
     ("force (kN)", (("hook_load", KILO, "hook load", DRIVE), ("weight_on_bit", KILO, "weight on bit", BIT))),
-    ("bit advance (mm)", (("bit_advance", 1e3, "bit advance", BIT),)),
+    ("bit advance (m)", (("bit_advance", 1.0, "bit advance", BIT),)),
 )
 #: (attribute, label, colour, style) of the ledger.
 _LEDGER = (
@@ -26,6 +38,8 @@ _LEDGER = (
     ("lost_at_wall", "lost at the wall", "tab:brown", ":"),
     ("lost_in_mud", "lost in the mud", "tab:purple", ":"),
 )
+# A chart with more oscillations of the bit than this shows the bands between their extremes.
+_SWINGS = 80
 # Energies below this share of the largest are not drawn.
 _LITTLE = 1e-9
 
@@ -41,31 +55,45 @@ def _over_time(history, rows):
     panels = [(axis, [(getattr(history, name)[rows] * factor, *look) for name, factor, *look in lines])
               for axis, lines in _PANELS]  # fmt: skip
     panels = [(axis, [line for line in lines if np.nan_to_num(line[0]).any()]) for axis, lines in panels]
-    panels = [(axis, lines) for axis, lines in panels if lines]  # without what stays zero, or is unknown
+    panels = [_readable(*panel) for panel in panels if panel[1]]  # without what stays zero, or is unknown
+    many = max(swings(history.bit_speed[rows]), swings(np.nan_to_num(history.bit_velocity[rows]))) > _SWINGS
     figure = empty_figure(10, 1.2 + 2.3 * len(panels))
     axes = figure.subplots(len(panels), 1, sharex=True, squeeze=False)[:, 0]
     for panel, (axis, lines) in zip(axes, panels, strict=True):
         for values, label, colour in lines[::-1]:
-            panel.plot(t, values, color=colour, label=label, linewidth=1.1)
+            if many:
+                middles, ((least, most),) = bands(t, values)
+                panel.fill_between(middles, least, most, color=colour, label=label, alpha=0.4)
+            else:
+                panel.plot(t, values, color=colour, label=label, linewidth=1.1)
         panel.set_ylabel(axis)
         panel.grid(alpha=0.3)
+        if panel is axes[0] and turns(history) and not many:
+            lower = "bit" if history.scene.bit is not None else "lower end"
+            _shade_rest(panel, t, history.bit_speed[rows], history.drive_speed[rows], f"{lower} at rest")
         if len(lines) > 1 or lines[0][1] not in axis:
             panel.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), frameon=False)
-    if history.scene.bit is not None and turns(history):
-        _shade_rest(axes[0], t, history.bit_speed[rows], history.drive_speed[rows])
     axes[0].margins(x=0.0)
     axes[-1].set_xlabel("time (s)")
-    figure.suptitle(title_of(history))
+    figure.suptitle(title_of(history) + ("\nbands between the extremes of oscillations" if many else ""))
     return figure
 
 
-def _shade_rest(panel, t, bit, drive):
+def _readable(axis, lines):
+    """The advance of a bit in mm, where it is short."""
+    if "advance" not in axis:
+        return axis, lines
+    unit, factor = advance_unit(lines[0][0])
+    return f"bit advance ({unit})", [(values * factor, *look) for values, *look in lines]
+
+
+def _shade_rest(panel, t, bit, drive, label):
     """Grey where the bit is at rest."""
     level = AT_REST * max(float(np.abs(drive).mean()), 1e-3)
     at_rest = np.abs(bit) <= level
-    panel.fill_between(
-        t, 0, 1, where=at_rest, transform=panel.get_xaxis_transform(), color="0.88", linewidth=0, zorder=0
-    )
+    if at_rest.any():
+        panel.fill_between(t, 0, 1, where=at_rest, transform=panel.get_xaxis_transform(), color="0.88", linewidth=0,
+                           zorder=0, label=label)  # fmt: skip
 
 
 def draw_phase(history, file, since=None):
@@ -106,7 +134,8 @@ def _energy(history):
     for name, label, colour, style in _LEDGER:
         if np.abs(values[name]).max() > _LITTLE * most:
             above.plot(history.times, values[name], style, color=colour, label=label)
-    above.set_ylabel("energy (kJ)")
+    axial = not np.isnan(history.hook_load).all()
+    above.set_ylabel("energy (kJ)" + ("; strain: less that\nof the string as it hangs at rest" if axial else ""))
     above.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), frameon=False)
     below.plot(history.times, history.balance * KILO, color=GREY)
     below.set_ylabel("not accounted\nfor (kJ)")

@@ -2,13 +2,15 @@
 
 import numpy as np
 
-from cosserat_fenicsx.drilling.pictures.shown import SHOWN, times_between, title_of, turns
+from cosserat_fenicsx.drilling.pictures.shown import SHOWN, alias, times_between, title_of, turns
 from cosserat_fenicsx.errors import SceneError, nearest
 from cosserat_fenicsx.pictures.figures import draw_chart, empty_figure
 from cosserat_fenicsx.ranks import world
 
 # At most so many depths are drawn; the colour of places that stick.
 _DEPTHS, _STICKS = 500, "0.8"
+# Part of the height in which a bit at rest is marked.
+_BIT = 0.03
 
 
 def draw_map(history, file, what=None, between=None):
@@ -47,6 +49,12 @@ def _map(history, rows, what):
         panel.pcolormesh(t, depths, np.where(sticks, 1.0, np.nan), shading="nearest", cmap=ListedColormap([_STICKS]),
                          rasterized=True)  # fmt: skip
         told = "; grey: held by friction"
+        if sticks[-1].any():  # a row of the map is too thin to be seen
+            panel.fill_between(t, 0, _BIT, where=sticks[-1], transform=panel.get_xaxis_transform(), step="mid",
+                               color=_STICKS, edgecolor="0.3", linewidth=0.3)  # fmt: skip
+            told += " (at the lower edge: the bit)"
     panel.set(xlabel="time (s)", ylabel="measured depth (m)", ylim=(depths[-1], depths[0]), xlim=(t[0], t[-1]))
-    panel.set_title(f"{title_of(history)}{told}", fontsize=11)
+    caution = alias(history)
+    told += f"\n{caution}" if caution else ""
+    panel.set_title(f"{title_of(history)}{told}", fontsize=8 if caution else 11)
     return figure

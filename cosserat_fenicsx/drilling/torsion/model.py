@@ -77,14 +77,18 @@ class TorsionWaves(Pointers):
         asked = dt = dt or time / min(max(scene.bit_depth / _LONGEST, _FEWEST), _CELLS)
         if time / dt > _MOST:
             refuse("TorsionWaves", "dt", dt, f"at least {1 / _MOST:g} of the travel time of the string, {time:.4g} s")
-        factor = 1.0
+        factor, at_bit = 1.0, False
         while factor >= 1:
             if time / dt > _MOST:
-                refuse("TorsionWaves", "scene.friction", scene.friction, "a friction that decays more slowly with the "
+                if at_bit:
+                    refuse("BitOnRock", "law", scene.bit.law, "a torque that falls more slowly with the speed, or a "
+                           f"larger inertia of the bit than {scene.bit.inertia:g} kg m^2: with {_MOST:g} cells the "
+                           "speed of the bit is not determined")  # fmt: skip
+                refuse("Drilling", "friction", scene.friction, "a friction that decays more slowly with the "
                        f"speed: with {_MOST:g} cells the speed at every place is not determined")  # fmt: skip
             self.cells = cells = cells_of(scene.segments, dt)
             self._set_nodes(drag)
-            factor = self._steepness()
+            factor, at_bit = self._steepness()
             dt = cells.dt * min(_NARROWER / factor if factor else 1.0, _NARROWER)
         self.dt, self.depths = cells.dt, cells.depths
         self.signal = MeanSpeeds(scene.drive.signal(), self.dt)
@@ -107,12 +111,14 @@ class TorsionWaves(Pointers):
             self._decay[-1] = law.speed or 0.0
 
     def _steepness(self):
-        """The largest slope of a law of friction over the impedance of its node; laws that drop at once left out."""
+        """The largest slope of a law of friction over the impedance of its node, laws that drop at once left out; and
+        whether it is that of the bit."""
         slope = np.divide(self._hold - self._slide, self._decay, out=np.zeros_like(self._hold), where=self._decay > 0)
         impedance = self._above + self._below + self._drag
         if self.scene.bit is not None:
             impedance[-1] += 2 * self.scene.bit.inertia / self.cells.dt
-        return (slope / impedance).max()
+        steep = slope / impedance
+        return steep.max(), self.scene.bit is not None and int(steep.argmax()) == len(steep) - 1
 
     def _reasons(self, asked):
         cells, scene = self.cells, self.scene
@@ -132,6 +138,8 @@ class TorsionWaves(Pointers):
             )
         if cells.dt < asked / 2:
             yield f"dt is less than the {asked:.4g} s asked for, or the law of friction would have several answers"
+        if scene.start == "steady":
+            yield "starts in steady rotation at the speed of the drive"
         if scene.hole is not None and self.normal_force is None:
             yield "wall force of the soft string without axial motion: tension is that of the weight"
         if scene.hook is not None and (scene.hook.speed != 0 or math.isfinite(scene.hook.stiffness)):

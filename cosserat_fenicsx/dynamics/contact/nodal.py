@@ -43,7 +43,10 @@ class NodalContact(Pointers):
         self._slots[order] = np.arange(len(order))
         nodes.hold(problem.state)
         self._origin = np.concatenate([np.tile(p.origin, (len(p.slots), 1)) for p in touched])[order]
-        n, reach = nodes.count, nodes.count - 1 if nodes.count <= _FEW else _NEIGHBOURS
+        n, self._coupled = nodes.count, nodes.count - 1 if nodes.count <= _FEW else _NEIGHBOURS
+        # nodes at the same point have the same neighbours: how they share a force would matter otherwise
+        of, along = nodes.points, np.arange(n)
+        reach = int((np.searchsorted(of, of + self._coupled, side="right") - 1 - along).max())
         self._numbers = {name: np.zeros(n) for name in ("clearance", "stiffness", "friction", "damping", "arm")}
         units = {"stiffness": scales.force / scales.length, "damping": model.time / scales.length}
         for name in ("stiffness", "damping"):
@@ -55,6 +58,7 @@ class NodalContact(Pointers):
         self._weaker[:, 1] *= model.time / scales.length
         self._slip, self._slip_begun = np.full(n, np.nan), np.zeros(n)  # speeds of slip in the last step
         self._begun, self._law_begun = (self._vectors[name].copy() for name in ("force", "law"))
+        self._at_start = self.doubles(self._law_begun)
         self.c = contact = self._ffi.new("contact *")
         contact.nodes, contact.reach, contact.at_end = n, reach, at_end
         contact.most, contact.share, contact.smallest = _MOST, _SHARE, _SMALLEST
@@ -146,8 +150,8 @@ class NodalContact(Pointers):
         for first in range(apart):
             sources = np.arange(first, n, apart)
             j = sources[:, None] + np.arange(-reach, reach + 1)
-            inside = (j >= 0) & (j < n)
-            j = np.clip(j, 0, n - 1)
+            inside, j = (j >= 0) & (j < n), np.clip(j, 0, n - 1)
+            inside &= np.abs(nodes.points[j] - nodes.points[sources, None]) <= self._coupled
             for component in range(6):
                 force = np.zeros((n, 6))
                 force[sources, component] = -1.0
@@ -171,8 +175,9 @@ class NodalContact(Pointers):
         vectors = self._vectors
         vectors["moved"][:] = motion_between(self._before, self._nodes.of_local(self._problem.state))
         gained = self._lib.stored(self.c, 0) - self._lib.stored(self.c, 1)
-        force = (vectors["force"] + self._begun) / 2 if self.c.at_end else vectors["force"]
-        return gained, -float(np.vdot(force, vectors["moved"])) - gained
+        if self.c.at_end:
+            return gained, self._lib.lost(self.c, self._at_start)
+        return gained, -float(np.vdot(vectors["force"], vectors["moved"])) - gained
 
     @property
     def count(self):

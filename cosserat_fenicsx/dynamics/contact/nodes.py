@@ -25,6 +25,9 @@ class TouchingNodes:
         rows = np.zeros((self.count, 7), dtype=np.int64)
         rows[self._here] = numbering.rows[self._dofs]
         rows = self._sum(rows)
+        again = (rows[1:] == rows[:-1]).all(axis=1) & (rows[1:] >= 0).any(axis=1)
+        #: (n,) number of the point that a node is: those that follow each other may be the same, as of two walls
+        self.points = np.concatenate([[0], np.cumsum(~again)])
         #: entries (of nodes and components) whose unknowns are in this rank's part of the solver's vector
         self._mine = np.nonzero((rows >= numbering.first) & (rows < numbering.first + numbering.size))
         self._rows = rows[self._mine] - numbering.first

@@ -1,7 +1,7 @@
 """A torque at a node that resists its rotation by a set-valued law, such as that of a bit on rock, in a time step.
 
-As walls do (`NodalContact`), it acts on the compliance of the moving rods: the rotation of the node about its axis d3 in
-a step is a linear function of the torque, by the tangent of Newton's method, and with it the law is solved exactly
+As walls do (`NodalContact`), it acts on the compliance of the moving rods: the rotation of the node about its axis d3
+in a step is a linear function of the torque, by the tangent of Newton's method, and with it the law is solved exactly
 before Newton's step is taken. The node sticks as long as a torque up to the static one can keep it.
 """
 
@@ -87,8 +87,8 @@ class SpinLaw(Pointers):
         torque, slope = self._law(1e-300)
         if -slope * C >= h:
             raise SceneError(
-                f"{type(self._action).__name__}: in steps of {h * self._time:.3g} s its torque falls faster with the speed "
-                "than the rod can follow, and several speeds are possible: expected a shorter dt, or an inertia there"
+                f"{type(self._action).__name__}: in steps of {h * self._time:.3g} s its torque falls faster with the "
+                "speed than the rod can follow, and several speeds are possible: expected a shorter dt, or an inertia there"
             )
         speed = size / h  # the law is convex: after the first iteration it falls to the root
         for _ in range(_MOST):

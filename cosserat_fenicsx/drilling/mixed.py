@@ -1,0 +1,162 @@
+"""A drill-string in motion with a rod for its lower part, and waves for the pipe above: `mixed_scene`."""
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from cosserat_fenicsx.actions.hole_wall import HoleWall
+from cosserat_fenicsx.actions.tube_wall import TubeWall
+from cosserat_fenicsx.checks import instance, number, refuse
+from cosserat_fenicsx.drilling.bit_laws import Stribeck
+from cosserat_fenicsx.drilling.bit_torque import BitTorque
+from cosserat_fenicsx.drilling.pipe_above import PipeAbove
+from cosserat_fenicsx.drilling.scene import Drilling
+from cosserat_fenicsx.scene.along import AlongPieces
+from cosserat_fenicsx.scene.curves import Line
+from cosserat_fenicsx.scene.damping import Damping
+from cosserat_fenicsx.scene.loads import Force, LineForce
+from cosserat_fenicsx.scene.rod import Rod
+from cosserat_fenicsx.scene.scene import Scene
+from cosserat_fenicsx.scene.supports import Roller
+from cosserat_fenicsx.well.components import DrillPipe
+
+# Of a straight section: largest curvature times length, rad. Lengths below this are none, m.
+_STRAIGHT, _NOTHING = 1e-9, 1e-9
+# Wall of a hole that has no stiffness, N/m^2.
+_WALL = 1e8
+
+
+@dataclass(frozen=True)
+class MixedScene:
+    """A `Scene` of the lower part of a string, for `simulate`.
+
+    Attributes:
+        scene: of the rod, its loads, the wall of the hole, and the pipe above. at_rest: the same rod for `solve`, with
+            a wall without friction, whose equilibrium at the load factor 1 may be the `start` of the motion.
+        rod: from the top down. above: the `PipeAbove`. depth: measured depth of the rod's upper end, m.
+        why: what is left out, sentences.
+    """
+
+    scene: Scene
+    at_rest: Scene
+    rod: Rod
+    above: PipeAbove
+    depth: float
+    why: tuple
+
+
+def mixed_scene(drilling: Drilling, depth: float | None = None) -> MixedScene:
+    """A rod for a string's lower part, in a straight section of its hole, and waves for the pipe above.
+
+    Components of the axes are north, east, down, as in a `WellPath`; without a hole the string is vertical below the
+    origin. Both ends of the rod are held on the axis of the hole, where they may turn and move along. With a hole, the
+    rod's nodes touch the wall, with the friction of the hole. The bit's law acts at the lower end (`BitTorque`), under
+    a weight on bit that is constant; the tension of the pipe at the start is that of the equilibrium without friction.
+
+    Args:
+        drilling: a `Drilling` with a `DrillString`.
+        depth: measured depth of the rod's upper end, m; None for the lower end of the lowest `DrillPipe`.
+
+    Returns:
+        MixedScene.
+
+    Raises:
+        SceneError: discs, a depth outside the string, a hole that is not straight below it, a bit that cuts, or drags
+            of torsion and of axial motion that differ.
+    """
+    instance("mixed_scene", "drilling", drilling, Drilling, "a Drilling")
+    if not hasattr(drilling.string, "components"):
+        refuse("mixed_scene", "drilling.string", drilling.string, "a DrillString; discs are no rod")
+    top = _depth(drilling, depth)
+    parts = list(zip(reversed(drilling.laid), drilling.segments, strict=True))  # from the top down
+    below = [
+        (max(place.top, top), place.bottom, place.component, x) for place, x in parts if place.bottom > top + _NOTHING
+    ]
+    above = [replace(x, length=min(place.bottom, top) - place.top) for place, x in parts if place.top < top - _NOTHING]
+    start, end, t = _line(drilling, top)
+    ends = [bottom - top for _, bottom, _, _ in below]
+    ends[-1] = float(np.linalg.norm(np.subtract(end, start)))
+    sections = [replace(part.stiffness, mass=x.rhoA) for _, _, part, x in below]
+    rod = Rod(Line(start, end), sections[0] if len(sections) == 1 else [*zip(ends, sections, strict=True)],
+              name="lower part", damping=_damping(drilling))  # fmt: skip
+    weights = [(x, (0.0, 0.0, part[3].weight)) for x, part in zip(ends, below, strict=True)]
+    on_bit = 0.0 if drilling.bit is None else drilling.bit.weight or 0.0
+    hanging = math.fsum((bottom - upper) * x.weight for upper, bottom, _, x in below) * t[2] - on_bit
+    pipe = PipeAbove(rod.start, tuple(above), drilling.drive, drilling.hook, hanging, drilling.drag)
+    loads = [LineForce(rod, AlongPieces(weights) if len(weights) > 1 else weights[0][1]), pipe]
+    loads += [Force(rod.end, tuple(-on_bit * t))] if on_bit else []
+    supports = [Roller(x, tuple(across)) for x in (rod.start, rod.end) for across in np.linalg.svd(t[None])[2][1:]]
+    walls = _walls(drilling, rod, top, [(x, part[2].contact_radius) for x, part in zip(ends, below, strict=True)])
+    at_rest = Scene([rod], supports, [*loads, *walls[:1]])
+    scene = Scene([rod], supports, [*loads, *_bit(drilling, rod), *walls[1:]])
+    return MixedScene(scene, at_rest, rod, pipe, top, tuple(_why(drilling, top)))
+
+
+def _depth(drilling, depth):
+    if depth is None:
+        pipes = [place.bottom for place in drilling.laid if isinstance(place.component, DrillPipe)]
+        if not pipes or max(pipes) >= drilling.bit_depth:
+            refuse("mixed_scene", "depth", depth, "the measured depth (m) of the rod's upper end, where no component "
+                   "lies below the lowest DrillPipe")  # fmt: skip
+        return max(pipes)
+    return number("mixed_scene", "depth", depth, f"a depth within the string, from 0 to {drilling.bit_depth:g} m",
+                  lambda x: 0 < x < drilling.bit_depth)  # fmt: skip
+
+
+def _line(drilling, top):
+    """Ends and direction of the axis below a measured depth."""
+    if drilling.hole is None:
+        return (0.0, 0.0, top), (0.0, 0.0, drilling.bit_depth), np.array([0.0, 0.0, 1.0])
+    path = drilling.hole.path
+    md = np.linspace(top, drilling.bit_depth, 65)[:-1]
+    bend = np.linalg.norm(path.curvature(md), axis=1).max() * (drilling.bit_depth - top)
+    if bend > _STRAIGHT:
+        refuse("mixed_scene", "depth", top, f"a section of the hole that is straight down to the bit; this turns by "
+               f"about {bend:.3g} rad")  # fmt: skip
+    ends = path.position(np.array([top, drilling.bit_depth]))
+    return tuple(ends[0]), tuple(ends[1]), path.tangent(top)
+
+
+def _damping(drilling):
+    drag = drilling.drag
+    if drag is None or drag.torsion == drag.axial == 0:
+        return None
+    if drag.torsion != drag.axial:
+        refuse("mixed_scene", "drilling.drag", drag, "the same rate of torsion and axial motion, for the rod")
+    return Damping(drag=drag.torsion)
+
+
+def _bit(drilling, rod):
+    if drilling.bit is None:
+        return []
+    law = drilling.bit.law
+    instance("mixed_scene", "drilling.bit.law", law, Stribeck, "a Stribeck; the rod's end knows no depth of cut")
+    return [BitTorque(rod.end, law, drilling.bit.weight or 0.0, drilling.bit.inertia)]
+
+
+def _walls(drilling, rod, top, radii):
+    """Walls for equilibria and for motions."""
+    hole = drilling.hole
+    if hole is None:
+        return []
+    radius = [(section.to, section.diameter / 2) for section in hole.sections]
+    given = {"stiffness": hole.wall_stiffness or _WALL, "begins": top}
+    friction = [(section.to, section.friction) for section in hole.sections]
+    if drilling.friction is not None:
+        ours = drilling.friction
+        friction = [(to, ours.kinetic * (x if ours.of_hole else 1.0)) for to, x in friction]
+    return [TubeWall(rod, hole.path, radius, radii, **given),
+            HoleWall(rod, hole.path, radius, radii, friction=friction, **given)]  # fmt: skip
+
+
+def _why(drilling, top):
+    yield f"rod below {top:g} m, waves of torsion and stretch in the pipe above"
+    if drilling.hole is not None:
+        yield "the pipe above turns and moves without friction at the wall"
+        friction = drilling.friction
+        if friction is not None and friction.static != friction.kinetic:
+            yield "friction at the rod's wall is the kinetic one, at rest too"
+        if drilling.hole.wall_stiffness is None:
+            yield f"the wall has a stiffness of {_WALL:g} N/m^2"
+    yield "mud adds no mass to sideways motions of the rod"
