@@ -24,7 +24,7 @@ from cosserat_fenicsx.models.rodmesh import same_places
 from cosserat_fenicsx.models.signature import Signature
 from cosserat_fenicsx.results.accuracy import on_mesh
 from cosserat_fenicsx.results.perturbed import PerturbedPath
-from cosserat_fenicsx.results.sensitivity import Sensitivity, called
+from cosserat_fenicsx.results.sensitivity import Sensitivity
 from cosserat_fenicsx.scene.action import path_dependent
 from cosserat_fenicsx.scene.parameters import parameter_of
 from cosserat_fenicsx.statics.recording import record_of
@@ -56,9 +56,7 @@ def sensitivity(path, query, parameters):
             step, paths = direct.paths(path, parameter, rate)
             values = [_numbers(query(each)) for each in paths]
             derivatives[parameter.name], errors[parameter.name] = derivative(values, step)
-    return Sensitivity(
-        value, derivatives, errors, {x.name: x.value for x in found}, {x.name: x.unit for x in found}, called(query)
-    )
+    return Sensitivity(value, derivatives, errors, {x.name: x.value for x in found}, {x.name: x.unit for x in found})
 
 
 def _numbers(value):
