@@ -157,6 +157,8 @@ def test_uncertainty_adds_up():
     assert found.standard_deviation == pytest.approx(np.sqrt((parts**2).sum(axis=0)), rel=1e-12)
     assert sum(found.shares.values()) == pytest.approx(1.0)
     assert f"% from {E} +- 5e+09 Pa" in str(found)
+    assert str(slopes).startswith("tip = ") and ", the last of 2\n" in str(slopes)
+    assert str(path.sensitivity(lambda path: 1.0, [E])).startswith("value = 1\n")
     together = path.uncertainty(given, tip, correlation=np.ones((3, 3)))
     assert together.standard_deviation == pytest.approx(np.abs(parts.sum(axis=0)), rel=1e-9)
     with pytest.raises(cf.SceneError, match="ones on its diagonal"):

@@ -100,8 +100,12 @@ def test_refusals_in_words():
     here = capstan()
     for name, words in (
         ("hole.sections[3].friction", "a number from 0 to 0"),
-        ("hole.section[0].friction", r"did you mean 'hole.sections\[0\].friction'"),
-        ("mud.density", "known|did you mean"),
+        (
+            "operation.rpm",
+            r"known: friction, weight, operation.weight, operation.torque, hole.sections\[i\].friction "
+            r"with i from 0 to 0, string.components\[i\].weight with i from 0 to 0$",
+        ),
+        ("mud.density", "known: friction"),  # there is no mud
         (3, "known"),
     ):
         with pytest.raises(cf.SceneError, match=words):
@@ -112,5 +116,15 @@ def test_refusals_in_words():
     buckled = cf.torque_and_drag(hole, cf.DrillString([COLLAR, PIPE]), cf.Sliding(90e3), mud=cf.Mud(1200.0),
                                  model="soft, buckled")  # fmt: skip
     assert buckled.solved.helical.any()
-    with pytest.raises(cf.SceneError, match="expected one of model = 'soft'"):
+    with pytest.raises(cf.SceneError, match="a string with a helix .model = 'soft, buckled'.*model='soft'"):
         buckled.sensitivity(["friction"])
+
+
+def test_what_is_printed_has_names_and_units():
+    found = capstan().sensitivity(["friction", "operation.weight"])
+    first, by_friction, by_weight = str(found).splitlines()
+    assert first == f"hook_load = {found.value:.6g} N"
+    assert by_friction == f"d/d(friction) = {found['friction']:.6g} N"  # of all sections: it has no one value
+    assert by_weight == f"d/d(operation.weight) = {found['operation.weight']:.6g} N per N, at -900000"
+    told = str(found.uncertainty({"operation.weight": 1e3}))
+    assert told.startswith(f"hook_load = {found.value:.6g} +- {1e3 * abs(found['operation.weight']):.6g} N (one")

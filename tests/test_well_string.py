@@ -175,7 +175,7 @@ def test_what_is_refused(do, words):
 
 def test_a_rotation_in_radians_per_second_is_doubted():
     for operation in (cf.Ream, cf.BackReam):
-        words = rf"{operation.__name__}.rpm = 8.37758 .* revolutions per minute, not in rad/s.* 8.37758 rad/s are 80$"
+        words = rf"{operation.__name__}.rpm = 8.37758 .* revolutions a minute, not in rad/s.* 8.37758 rad/s are 80$"
         with pytest.warns(cf.SceneWarning, match=words):
             operation(0.15, 80 * cf.units.rpm)
     with warnings.catch_warnings():

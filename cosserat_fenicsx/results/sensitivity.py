@@ -20,7 +20,8 @@ class Sensitivity(Mapping):
         derivatives: {name: d value/d parameter}, SI units.
         error: {name: estimated absolute error} of the derivatives as those of the discrete equations: an upper bound of
             what the central differences of data and query leave.
-        parameters: {name: value of the parameter}. units: {name: its unit}.
+        parameters: {name: value of the parameter, NaN where the name stands for several}. units: {name: its unit}.
+        quantity, unit: what is differentiated, and its unit, for `print`; empty where it is not known.
     """
 
     value: np.ndarray
@@ -28,6 +29,8 @@ class Sensitivity(Mapping):
     error: dict[str, np.ndarray]
     parameters: dict[str, float]
     units: dict[str, str]
+    quantity: str = "value"
+    unit: str = ""
 
     def __getitem__(self, name):
         if name not in self.derivatives:
@@ -41,7 +44,8 @@ class Sensitivity(Mapping):
         return len(self.derivatives)
 
     def relative(self, name: str) -> np.ndarray:
-        """The relative change of the value over that of the parameter, p/q dq/dp; NaN where the value is 0."""
+        """The relative change of the value over that of the parameter, p/q dq/dp; NaN where the value is 0, and where
+        the name stands for several numbers."""
         with np.errstate(divide="ignore", invalid="ignore"):
             return np.where(self.value != 0, self[name] * self.parameters[name] / self.value, np.nan)
 
@@ -69,14 +73,16 @@ class Sensitivity(Mapping):
             shares = np.where(variance > 0, products / variance, 0.0)
         return Uncertainty(
             self.value, np.sqrt(np.maximum(variance, 0.0)), dict(zip(names, parts, strict=True)),
-            dict(zip(names, shares, strict=True)), dict(standard_deviations), self.units,
+            dict(zip(names, shares, strict=True)), dict(standard_deviations), self.units, self.quantity, self.unit,
         )  # fmt: skip
 
     def __str__(self):
-        lines = [f"value {_text(self.value)}"]
+        unit = f" {self.unit}" if self.unit else ""
+        lines = [f"{self.quantity} = {_text(self.value)}{unit}{_which(self.value)}"]
         for name in self:
             per = f" per {self.units[name]}" if self.units[name] not in ("", "1") else ""
-            lines.append(f"d/d({name}) = {_text(self[name])}{per}, at {self.parameters[name]:.6g}")
+            here = f", at {self.parameters[name]:.6g}" if np.isfinite(self.parameters[name]) else ""
+            lines.append(f"d/d({name}) = {_text(self[name])}{unit}{per}{here}")
         return "\n".join(lines)
 
 
@@ -90,6 +96,7 @@ class Uncertainty:
         shares: {name: share of the variance}, which add up to 1; 0 where nothing varies. With correlations a share may
             be negative.
         given: {name: standard deviation of the parameter}; units: {name: its unit}.
+        quantity, unit: see `Sensitivity`.
     """
 
     value: np.ndarray
@@ -98,9 +105,13 @@ class Uncertainty:
     shares: dict[str, np.ndarray]
     given: dict[str, float]
     units: dict[str, str]
+    quantity: str = "value"
+    unit: str = ""
 
     def __str__(self):
-        lines = [f"{_text(self.value)} +- {_text(self.standard_deviation)} (one standard deviation, first order)"]
+        unit = f" {self.unit}" if self.unit else ""
+        size = f"{_text(self.value)} +- {_text(self.standard_deviation)}{unit}{_which(self.value)}"
+        lines = [f"{self.quantity} = {size} (one standard deviation, first order)"]
         for name, given in self.given.items():
             unit = f" {self.units[name]}" if self.units[name] != "1" else ""
             lines.append(f"  {_text(100 * self.shares[name], 3)} % from {name} +- {given:.6g}{unit}".rstrip())
@@ -132,3 +143,14 @@ def _text(values, digits=6):
     if last.ndim:
         last = last[-1]
     return np.array2string(last, precision=digits, formatter={"float_kind": lambda x: f"{x:.{digits}g}"})
+
+
+def called(query):
+    """The name of a function, for the `quantity` that it computes."""
+    name = getattr(query, "__name__", "")
+    return name if name.isidentifier() else "value"
+
+
+def _which(values):
+    """Which of several values `_text` shows."""
+    return f", the last of {len(values)}" if np.ndim(values) and len(values) > 1 else ""

@@ -52,8 +52,9 @@ def critical_sensitivity(buckling, parameters):
             derivatives[parameter.name] = critical * relative[: len(critical)]
             errors[parameter.name] = critical * error[: len(critical)]
     return Sensitivity(
-        buckling.load_factors, derivatives, errors, {x.name: x.value for x in found}, {x.name: x.unit for x in found}
-    )
+        buckling.load_factors, derivatives, errors, {x.name: x.value for x in found}, {x.name: x.unit for x in found},
+        "load factor",
+    )  # fmt: skip
 
 
 def _state(direct, load_factor):

@@ -13,12 +13,14 @@ evaluated at two equilibria a little before and behind it, and the means are tak
 the distance.
 """
 
+from dataclasses import replace
+
 import numpy as np
 
 from cosserat_fenicsx.differences import PLACES, derivative
 from cosserat_fenicsx.errors import NotConverged, SceneError
 from cosserat_fenicsx.results.records import Event
-from cosserat_fenicsx.results.sensitivity import Sensitivity
+from cosserat_fenicsx.results.sensitivity import Sensitivity, called
 from cosserat_fenicsx.scene.parameters import parameter_of
 from cosserat_fenicsx.statics.critical import Energies
 from cosserat_fenicsx.statics.path.follower import Follower
@@ -42,7 +44,7 @@ def derivatives_of(path, query, parameters):
     """See `Path.sensitivity`."""
     if isinstance(query, Event):
         return _of_event(path, query, parameters)
-    return sensitivity(path, query, parameters)
+    return replace(sensitivity(path, query, parameters), quantity=called(query))
 
 
 def _of_event(path, event, parameters):
@@ -66,7 +68,7 @@ def _of_event(path, event, parameters):
             rates, errors = of(direct, crossing, found, direct.rates(scenes, found))
     return Sensitivity(
         np.asarray(event.load_factor), _named(found, rates), _named(found, errors), {x.name: x.value for x in found},
-        {x.name: x.unit for x in found},
+        {x.name: x.unit for x in found}, f"load factor of the {event.kind}",
     )  # fmt: skip
 
 

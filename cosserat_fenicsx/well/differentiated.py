@@ -11,7 +11,8 @@ from cosserat_fenicsx.results.sensitivity import Sensitivity, Uncertainty
 from cosserat_fenicsx.well.soft_rates import Change, rates_of
 
 _NUMBERED = re.compile(r"(.*)\[(\d+)\](.*)")
-_QUERIES = ("hook_load", "surface_torque", "tension", "torque")
+#: {query: its unit}
+_QUERIES = {"hook_load": "N", "surface_torque": "N m", "tension": "N", "torque": "N m"}
 
 
 class Differentiated:
@@ -32,10 +33,12 @@ class Differentiated:
         Raises:
             SceneError: an unknown name or query, a string with a helix, or the rod in contact.
         """
-        if self.model not in ("soft", "soft, buckled") or self.solved.helical.any():
+        rod = self.model not in ("soft", "soft, buckled")
+        if rod or self.solved.helical.any():
+            why = "that of the rod in contact" if rod else "that of a string with a helix"
             raise SceneError(
-                f"sensitivity: the answer is that of model = '{self.model}': expected one of model = 'soft', whose "
-                "equations are linearised, or one without a helix"
+                f"sensitivity: this answer is {why} (model = '{self.model}'), of which no derivatives are known: "
+                "expected the answer of torque_and_drag(..., model='soft')"
             )
         if query not in _QUERIES:
             raise SceneError(f"query = {query!r}: {nearest(query, _QUERIES)}")
@@ -45,7 +48,7 @@ class Differentiated:
         zero = {name: np.zeros_like(rate) for name, rate in rates.items()}
         return Sensitivity(
             np.asarray(getattr(self, query)), rates, zero, {name: value for name, (_, value, _) in found.items()},
-            {name: unit for name, (_, _, unit) in found.items()},
+            {name: unit for name, (_, _, unit) in found.items()}, query, _QUERIES[query],
         )  # fmt: skip
 
     def uncertainty(
@@ -93,8 +96,8 @@ class Differentiated:
         }
         kind = f"{match[1]}[]{match[3]}" if match else ""
         if kind not in of_all:
-            known = [*plain, *(x.replace("[]", "[0]") for x in of_all)]
-            raise SceneError(f"parameter {name!r}: {nearest(name, known)}")
+            numbered = [f"{x.replace('[]', '[i]')} with i from 0 to {len(y) - 1}" for x, y in of_all.items()]
+            raise SceneError(f"parameter {name!r} of a string: known: {', '.join([*plain, *numbered])}")
         i, values = int(match[2]), of_all[kind]
         if i >= len(values):
             raise SceneError(f"parameter '{name}': expected a number from 0 to {len(values) - 1}")

@@ -134,8 +134,9 @@ class _Reaming(Operation):
         store(self, speed=positive(self, "speed", self.speed, "m/s"), rpm=positive(self, "rpm", self.rpm, "1/min"))
         if self.rpm < _SLOW:
             warnings.warn(
-                f"{type(self).__name__}.rpm = {self.rpm:g} 1/min is hardly a rotation: it is in revolutions per minute, "
-                f"not in rad/s; 80 rev/min are 80, not 80 * units.rpm. {self.rpm:g} rad/s are {self.rpm / units.rpm:g}",
+                f"{type(self).__name__}.rpm = {self.rpm:g} 1/min is hardly a rotation: it is in revolutions a minute, "
+                "not in rad/s; 80 rev/min are 80, not 80 * units.rpm. "
+                f"{self.rpm:g} rad/s are {self.rpm / units.rpm:g}",
                 SceneWarning,
                 stacklevel=3,
             )
