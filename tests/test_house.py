@@ -51,6 +51,7 @@ SHARED = {
     "differences",
     "element",
     "errors",
+    "homes",
     "interrupts",
     "processor",
     "progress",
