@@ -58,7 +58,8 @@ def simulate_drilling(
     Raises:
         SceneError: an argument outside its range, an unknown model, a step that is too long for the rotation in it, or
             a jump in speed that no drive follows.
-        NotConverged: a step fails however short it is, or a bit below a `Motor` turns too far in it; `.path` holds the history up to there.
+        NotConverged: a step fails however short it is, or a bit below a `Motor` turns too far in it; `.path` holds
+            the history up to there.
         Interrupted: Ctrl-C; `.path` holds the history up to there.
         NotStored: the folder can no longer be written to.
     """

@@ -93,9 +93,9 @@ class TimeLoop:
             first = int(np.argmax(turns > self._turn))
             self._add(rows[:first][self._saved(len(rows))[:first]])
             raise NotConverged(
-                f"{self.model.name}: at t = {rows[first, 0]:.6g} s the bit turns by {turns[first]:.3g} rad in a step of "
-                f"{self.model.dt:.3g} s, more than {self._turn:.3g} rad: expected a shorter dt, or a drag that limits "
-                "the speed of the Motor"
+                f"{self.model.name}: at t = {rows[first, 0]:.6g} s the bit turns by {turns[first]:.3g} rad in a step "
+                f"of {self.model.dt:.3g} s, more than {self._turn:.3g} rad: expected a shorter dt, or a drag that "
+                "limits the speed of the Motor"
             )
 
     def _saved(self, count):

@@ -103,4 +103,6 @@ def _range(answer):
     if np.isnan(answer.weights).all():
         return told
     kN = answer.weights / 1e3
+    if len(kN) == 1:
+        return f"{told}, {kN[0]:.4g} kN on bit"
     return f"{told}, {len(kN)} weights on bit from {kN.min():.4g} to {kN.max():.4g} kN"
