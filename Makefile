@@ -105,7 +105,8 @@ work-precision: setup
 	$(PYTHON) demos/evidence/work_precision.py
 	$(PYTHON) demos/evidence/work_precision_motion.py
 	$(PYTHON) demos/evidence/soft_string.py
-	$(PYTHON) demos/evidence/put_in_docs.py work_precision work_precision_motion soft_string
+	$(PYTHON) demos/evidence/work_precision_string.py
+	$(PYTHON) demos/evidence/put_in_docs.py work_precision work_precision_motion soft_string work_precision_string
 
 setup: .venv/.stamp
 
