@@ -46,7 +46,7 @@ def picture(severity, growth, speeds, weights, file):
         values = np.nan_to_num(growth[:, :, k], nan=-1.0).T
         if (values < 0).any():
             panel.contour(x, y, values, levels=[0.0], colors="white", linewidths=1.2)
-    panel.plot([], [], color="white", label="to the left of it another mode grows")
+    panel.plot([], [], color="white", label="left of each line one more mode grows (linear theory)")
     panel.legend(loc="lower right", facecolor="0.4", labelcolor="white")
     panel.set(xlabel="speed (rpm)", ylabel="weight on bit (kN)")
     panel.set_title(f"Stick-slip after {FOUND.settings['duration']:g} s from rest, {severity.size} simulations")
