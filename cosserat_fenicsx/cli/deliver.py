@@ -4,9 +4,10 @@ import sys
 import tempfile
 from pathlib import Path
 
-from cosserat_fenicsx.cli.say import BAD_INPUT, DONE, INTERRUPTED, NOT_CONVERGED, first_rank, in_words, say
+from cosserat_fenicsx.cli.ended import ended
+from cosserat_fenicsx.cli.say import BAD_INPUT, INTERRUPTED, first_rank, in_words, say
 from cosserat_fenicsx.cli.together import together
-from cosserat_fenicsx.errors import Interrupted, NotConverged, NotStored, SceneError
+from cosserat_fenicsx.errors import NotConverged, SceneError
 from cosserat_fenicsx.interrupts import obey, patience
 
 
@@ -35,18 +36,7 @@ def deliver(computed, options, moving):
     if at is not None and out is None:
         say("cosserat: --at has no effect without -o DIR, which pictures are written to")
 
-    code, trouble = DONE, None
-    try:
-        with patience():
-            path = together(computed)
-    except (NotConverged, NotStored) as failure:
-        path, trouble, code = failure.path, failure, NOT_CONVERGED
-    except SceneError as failure:
-        if failure.path is None:
-            raise
-        path, trouble, code = failure.path, failure, BAD_INPUT
-    except Interrupted as stop:
-        path, trouble, code = stop.path, stop, INTERRUPTED
+    path, trouble, code = ended(lambda: together(computed))
     if path is not None and len(path):
         station = options.station or _default_station(path)
         _report(path, station)

@@ -7,7 +7,8 @@ from pathlib import Path
 
 from cosserat_fenicsx import units
 from cosserat_fenicsx.cli.deliver import prepare
-from cosserat_fenicsx.cli.say import BAD_INPUT, DONE, INTERRUPTED, NOT_CONVERGED, say
+from cosserat_fenicsx.cli.ended import ended
+from cosserat_fenicsx.cli.say import DONE, INTERRUPTED, NOT_CONVERGED, say
 from cosserat_fenicsx.cli.well import warnings_in_words
 from cosserat_fenicsx.drilling.bit_laws import Stribeck
 from cosserat_fenicsx.drilling.choose import chosen
@@ -17,7 +18,7 @@ from cosserat_fenicsx.drilling.models import model_of
 from cosserat_fenicsx.drilling.pictures.shown import turns
 from cosserat_fenicsx.drilling.scenefile import drilling_in
 from cosserat_fenicsx.drilling.simulate import check_arguments, resume_drilling
-from cosserat_fenicsx.errors import Interrupted, NotConverged, NotStored, SceneError
+from cosserat_fenicsx.errors import NotConverged, SceneError
 from cosserat_fenicsx.interrupts import obey, patience
 from cosserat_fenicsx.well.field_units import in_si
 
@@ -98,18 +99,7 @@ def _deliver(compute, options):
         if out is None or Path(film).name != film:
             raise SceneError(f"--animate {film}: expected a name without folders, and -o DIR to write the film to")
         check_name(film)
-    code, trouble = DONE, None
-    try:
-        with patience():
-            history = compute()
-    except (NotConverged, NotStored) as failure:
-        history, trouble, code = failure.path, failure, NOT_CONVERGED
-    except SceneError as failure:
-        if failure.path is None:
-            raise
-        history, trouble, code = failure.path, failure, BAD_INPUT
-    except Interrupted as stop:
-        history, trouble, code = stop.path, stop, INTERRUPTED
+    history, trouble, code = ended(compute)
     if len(history):
         say(str(history), file=sys.stdout)
         if out is not None:

@@ -4,6 +4,7 @@ import numpy as np
 
 from cosserat_fenicsx.drilling.bit_laws import Cutting, Lobes, Stribeck
 from cosserat_fenicsx.drilling.discs import Discs
+from cosserat_fenicsx.drilling.wall_friction import coefficients
 from cosserat_fenicsx.errors import NotConverged, SceneError, nearest
 from cosserat_fenicsx.well import criteria
 from cosserat_fenicsx.well.operations import RotaryDrilling, RotateOffBottom, TripIn, TripOut
@@ -120,12 +121,10 @@ def _operations(scene):
 
 def _with_friction(scene):
     """The hole with the kinetic friction of the motion."""
-    friction = scene.friction
-    if friction is None:
+    if scene.friction is None:
         return scene.hole
-    if friction.of_hole:
-        return scene.hole.with_friction([section.friction * friction.kinetic for section in scene.hole.sections])
-    return scene.hole.with_friction(friction.kinetic)
+    of_hole = np.array([section.friction for section in scene.hole.sections])
+    return scene.hole.with_friction(coefficients(scene.friction, of_hole)[1].tolist())
 
 
 def fastest(scene, until):

@@ -3,6 +3,8 @@
 import math
 from dataclasses import dataclass
 
+import numpy as np
+
 from cosserat_fenicsx.checks import number, positive, refuse, store
 
 
@@ -46,6 +48,15 @@ class WallFriction:
     def decays(self) -> bool:
         """Whether the coefficient depends on the slip."""
         return self.static > self.kinetic
+
+
+def coefficients(friction: WallFriction | None, of_hole: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Static and kinetic coefficients (n,) where those of the hole's sections are `of_hole` (n,); without a friction of
+    the scene both are these."""
+    if friction is None:
+        return of_hole.copy(), of_hole.copy()
+    factor = of_hole if friction.of_hole else np.ones_like(of_hole)
+    return friction.static * factor, friction.kinetic * factor
 
 
 @dataclass(frozen=True)

@@ -13,6 +13,7 @@ import numpy as np
 
 from cosserat_fenicsx.drilling.discs import Discs
 from cosserat_fenicsx.drilling.torsion.wall import scene_pieces
+from cosserat_fenicsx.drilling.wall_friction import coefficients
 
 # Shares of the mass that couples neighbours.
 _LEAST, _MOST = 1 / 12, 0.235
@@ -167,7 +168,7 @@ def _against_the_wall(drilling, depths):
     # a node with a drive, hook or bit has no friction beside: its neighbour takes it
     lowest = len(depths) - (1 if drilling.bit is None else 2)
     first, second = (np.clip(element + i, 1, lowest).astype(np.int32) for i in (0, 1))
-    still, slipping = _coefficients(drilling.friction, pieces.friction[of])
+    still, slipping = coefficients(drilling.friction, pieces.friction[of])
     wall = Wall(element.astype(np.int32), first, second, share, length, k, w * normal, w * b, tension, still, slipping,
                 pieces.radius[of])  # fmt: skip
     return hanging, float(below[0]), wall
@@ -177,8 +178,3 @@ def _static_weight(drilling):
     return 0.0 if drilling.bit is None or drilling.bit.weight is None else drilling.bit.weight
 
 
-def _coefficients(friction, of_hole):
-    if friction is None:
-        return of_hole.copy(), of_hole.copy()
-    factor = of_hole if friction.of_hole else np.ones_like(of_hole)
-    return friction.static * factor, friction.kinetic * factor

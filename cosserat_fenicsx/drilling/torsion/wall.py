@@ -4,6 +4,7 @@ from collections import namedtuple
 
 import numpy as np
 
+from cosserat_fenicsx.drilling.wall_friction import coefficients
 from cosserat_fenicsx.quadrature import gauss
 from cosserat_fenicsx.well.mud import Mud
 from cosserat_fenicsx.well.operations import RotaryDrilling, RotateOffBottom
@@ -69,7 +70,8 @@ def wall_of(scene, depths, normal_force=None):
     at = np.minimum(np.searchsorted(pieces.bottom, middle), len(pieces.bottom) - 1)
     load = (force * _RULE.weights).sum(axis=1) * half[:, 0]
     node = np.searchsorted(middles, middle)
-    static, kinetic, speed = _coefficients(scene, middle)
+    static, kinetic = coefficients(scene.friction, scene.hole.at(middle, "friction"))
+    speed = None if scene.friction is None else scene.friction.speed
     torque = load * pieces.radius[at]
     hold, slide = (np.bincount(node, torque * x, size) for x in (static, kinetic))
     decay = np.zeros(size)
@@ -82,12 +84,3 @@ def wall_of(scene, depths, normal_force=None):
             x[-2] += x[-1]
             x[-1] = 0.0
     return Wall(hold, slide, decay)
-
-
-def _coefficients(scene, md):
-    """Static and kinetic coefficient of friction at measured depths, and the decay of their difference or None."""
-    ours, hole = scene.friction, scene.hole.at(md, "friction")
-    if ours is None:
-        return hole, hole, None
-    factor = hole if ours.of_hole else np.ones(len(md))
-    return ours.static * factor, ours.kinetic * factor, ours.speed
