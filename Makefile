@@ -63,11 +63,12 @@ whirl: setup
 docs: setup .venv/.docs
 	$(PYTHON) -m sphinx -q -W --keep-going -b html docs out/docs
 
+# Two workers that know nothing of each other, then two ranks, then four for what depends on how many there are.
 # pytest's cache directory is off in parallel: the ranks would write it all at once.
 test: setup
-	$(PYTHON) -m pytest
-	$(MPIRUN) -n 2 $(PYTHON) -m pytest -p no:cacheprovider --color=no
-	$(MPIRUN) -n 4 $(PYTHON) -m pytest -p no:cacheprovider --color=no
+	$(PYTHON) -m pytest -n 2 --dist worksteal
+	$(MPIRUN) -n 2 $(PYTHON) -m pytest -p no:cacheprovider --color=no -m "not serial"
+	$(MPIRUN) -n 4 $(PYTHON) -m pytest -p no:cacheprovider --color=no -m ranks
 
 tables: setup
 	$(PYTHON) demos/evidence/accuracy.py

@@ -22,7 +22,3 @@ def sh(*command, **options):
 
 def ask(*command):
     return sh(*command, stdout=subprocess.PIPE, text=True).stdout
-
-
-def remove(path):
-    sh("rm", "-rf", "--one-file-system", path)

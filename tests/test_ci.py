@@ -1,4 +1,4 @@
-"""The trees of .ci: what is performed, which cached tree serves, and what a failure means for the whole run."""
+"""The images of .ci: which base serves, when a suite is due, and what a failure means for the whole run."""
 
 import os
 import sys
@@ -12,27 +12,20 @@ import pytest
 ROOT = Path(__file__).parent.parent
 sys.path.append(str(ROOT / ".ci"))
 
-import layers  # noqa: E402
+import engine  # noqa: E402
 from command import Failed, ask  # noqa: E402
-from dockerfile import read  # noqa: E402
 from verdict import DEVELOPMENT, verdict  # noqa: E402
 
-pytestmark = pytest.mark.serial
+pytestmark = [pytest.mark.serial, pytest.mark.once]
 RECORDED = DEVELOPMENT["sid"]
 
 
-def test_suites_differ_in_from_alone():
-    (stable, *rest), (development, *same) = (read(ROOT / "Dockerfile", **given) for given in ({}, {"SUITE": "sid"}))
-    assert (stable.text, development.text) == ("debian:trixie", "debian:sid")
-    assert rest == same
-    assert not any("SUITE" in step.env for step in rest)
-
-
-@pytest.mark.parametrize("last", ["RUN true", "CMD [1]\nCMD [2]", "CMD make", "ADD . ."])
-def test_what_is_not_understood_is_refused(tmp_path, last):
-    (tmp_path / "Dockerfile").write_text(f"FROM debian:trixie\nRUN true\n{last}\n")
-    with pytest.raises(Failed, match="Dockerfile: "):
-        read(tmp_path / "Dockerfile")
+@pytest.fixture
+def debian():
+    loader = SourceFileLoader("debian", str(ROOT / ".ci" / "debian"))
+    module = module_from_spec(spec_from_loader("debian", loader))
+    loader.exec_module(module)
+    return module
 
 
 @pytest.mark.parametrize(
@@ -55,82 +48,92 @@ def test_a_failure_counts_where_success_is_recorded(suite, version, failure, wor
     assert ("update DEVELOPMENT" in words) == (version == "9.1.0" and not failure)
 
 
-@pytest.fixture
-def steps(tmp_path):
-    (tmp_path / "Dockerfile").write_text("FROM debian:sid\nRUN install\nUSER rod\nRUN make\nCMD []\n")
-    return read(tmp_path / "Dockerfile")[:-1]
+FAKE = """#!/bin/sh
+echo "$@" >> "$LOG"
+case " $* " in
+    *" overlay "*" images "*) [ -z "$NO_OVERLAY" ] ;;
+    *" inspect "*) grep -q " commit " "$LOG" ;;
+    *" from scratch "*) echo container ;;
+esac
+"""
 
 
 @pytest.fixture
-def performed(monkeypatch):
-    """What was performed since this list was cleared; a step whose text is in it as "no ..." fails."""
-    texts = []
-
-    def perform(tree, step):
-        if f"no {step.text}" in texts:
-            raise Failed(f"{step.text}: unreachable")
-        texts.append(step.text)
-        (tree / step.text).write_text(str(time.time_ns()))
-
-    monkeypatch.setattr(layers, "perform", perform)
-    return texts
-
-
-def test_a_tree_is_made_once_and_anew_when_it_is_old(tmp_path, steps, performed, capsys):
-    cache = tmp_path / "cache"
-    with layers.locked(cache):
-        tree, remaining = layers.cached(steps, cache, days=7)
-        assert performed == ["debian:sid", "install"] and [step.text for step in remaining] == ["make"]
-        first = (tree / "install").read_text()
-
-        performed.clear()
-        assert layers.cached(steps, cache, days=7)[0] == tree and not performed
-
-        week = time.time() - 8 * 86400
-        os.utime(tree, (week, week))
-        performed.append("no install")
-        assert layers.cached(steps, cache, days=7)[0] == tree
-        assert "8 days ago serves, as it could not be made anew: install: unreachable" in capsys.readouterr().out
-        assert (tree / "install").read_text() == first and not (cache / "new").exists()
-
-        performed.clear()
-        layers.cached(steps, cache, days=7)
-        assert performed == ["debian:sid", "install"] and (tree / "install").read_text() != first
-        assert layers.cached(steps, cache, days=7)[0] == tree and len(performed) == 2
+def log(tmp_path, monkeypatch):
+    """Words of the commands that were given to a buildah and an mmdebstrap that only write these down."""
+    tools = tmp_path / "tools"
+    tools.mkdir()
+    (tools / "buildah").write_text(FAKE)
+    (tools / "mmdebstrap").write_text('#!/bin/sh\necho mmdebstrap "$@" >> "$LOG"\n[ -z "$UNREACHABLE" ]\n')
+    (tools / "apt-get").write_text("#!/bin/sh\necho mirror\n")
+    (tools / "apt-config").write_text("#!/bin/sh\necho 'Acquire::http::Proxy \"p\";'\n")
+    for tool in tools.iterdir():
+        tool.chmod(0o755)
+    monkeypatch.setenv("PATH", f"{tools}:{os.environ['PATH']}")
+    monkeypatch.setenv("LOG", str(tmp_path / "log"))
+    return tmp_path / "log"
 
 
-def test_only_trees_in_use_stay(tmp_path, steps, performed):
-    cache = tmp_path / "cache"
-    with layers.locked(cache):
-        old, _ = layers.cached(steps, cache, days=7)
-        changed = [steps[0], steps[1]._replace(text="install more"), *steps[2:]]
-        performed.append("no install more")
-        with pytest.raises(Failed, match="unreachable"):
-            layers.cached(changed, cache, days=7)
-        assert old.exists()
-        performed.clear()
-    with layers.locked(cache):
-        new, _ = layers.cached(changed, cache, days=7)
-        assert new.exists() and not old.exists()
+def test_a_base_is_made_once_and_anew_when_it_is_old(tmp_path, log, monkeypatch, capsys):
+    engine.Engine(tmp_path / "cache").base("sid", days=7)
+    said = log.read_text()
+    assert "--variant=minbase" in said and "Acquire::http::Proxy" in said and "commit --quiet --rm" in said
+    assert said.count("mmdebstrap") == 1 and "debian:sid" in said
+
+    made = engine.Engine(tmp_path / "cache")
+    made.base("sid", days=7)
+    assert log.read_text().count("mmdebstrap") == 1
+
+    week = time.time() - 8 * 86400
+    os.utime(tmp_path / "cache/sid/base", (week, week))
+    monkeypatch.setenv("UNREACHABLE", "1")
+    made.base("sid", days=7)
+    assert "debian:sid of 8 days ago serves, as it could not be made anew: exit code 1" in capsys.readouterr().out
+    with pytest.raises(Failed, match="mmdebstrap"):
+        made.base("trixie", days=7)
+
+    monkeypatch.delenv("UNREACHABLE")
+    made.base("sid", days=7)
+    made.base("sid", days=7)
+    assert log.read_text().count("mmdebstrap") == 4
 
 
-def test_the_run_goes_on_without_the_development_branch(tmp_path, monkeypatch, capsys):
-    loader = SourceFileLoader("debian", str(ROOT / ".ci" / "debian"))
-    debian = module_from_spec(spec_from_loader("debian", loader))
-    loader.exec_module(debian)
+def test_layers_are_copies_where_overlays_cannot_be(tmp_path, log, monkeypatch):
+    monkeypatch.setenv("NO_OVERLAY", "1")
+    engine.Engine(tmp_path / "cache").build("trixie", "certificates:/etc/ssl/certs")
+    built = [line for line in log.read_text().splitlines() if " bud " in line][0]
+    assert built.startswith("--storage-driver vfs") and "--build-arg SUITE=trixie" in built
 
-    def unreachable(*_, **__):
-        raise Failed("the mirror does not answer")
 
-    monkeypatch.setattr(debian, "cached", unreachable)
+def test_the_development_branch_is_tested_once_a_day_and_when_it_may_have_broken(debian, tmp_path):
+    (tmp_path / "cosserat_fenicsx").mkdir()
+    compat, other = tmp_path / "cosserat_fenicsx/compat.py", tmp_path / "cosserat_fenicsx/other.py"
+    compat.write_text("A = 1")
+    other.write_text("B = 1")
+    stamp = tmp_path / "tested"
+    assert debian.is_due("sid", stamp, tmp_path)
+    stamp.write_text(debian.served(tmp_path))
+    assert not debian.is_due("sid", stamp, tmp_path) and debian.is_due("trixie", stamp, tmp_path)
+    other.write_text("B = 2")
+    assert not debian.is_due("sid", stamp, tmp_path)
+    other.write_text("from cosserat_fenicsx import compat")
+    assert debian.is_due("sid", stamp, tmp_path)
+    stamp.write_text(debian.served(tmp_path))
+    os.utime(stamp, (time.time() - 90000,) * 2)
+    assert debian.is_due("sid", stamp, tmp_path)
+
+
+def test_the_run_goes_on_without_the_development_branch(debian, tmp_path, log, monkeypatch, capsys):
+    monkeypatch.setenv("UNREACHABLE", "1")
     monkeypatch.chdir(ROOT)
-    debian.main(tmp_path, ["sid"])
-    assert "=== SKIPPED: debian:sid cannot be had today: the mirror does not answer" in capsys.readouterr().out
+    debian.main(tmp_path / "cache", ["sid"])
+    assert "=== SKIPPED: debian:sid cannot be had today: exit code 1 from: mmdebstrap" in capsys.readouterr().out
     with pytest.raises(SystemExit) as ended:
-        debian.main(tmp_path, ["trixie", "sid"])
+        debian.main(tmp_path / "cache", ["trixie", "sid"])
     assert ended.value.code == 1
     said = capsys.readouterr().out
-    assert "=== FAILED on debian:trixie: the mirror does not answer" in said and "sid" not in said
+    assert "=== FAILED on debian:trixie: exit code 1 from: mmdebstrap" in said and "sid" not in said
+    assert not list(tmp_path.glob("cache/*/tested"))
 
 
 def test_a_failed_command_is_named_and_its_output_shown(capsys):
