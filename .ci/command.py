@@ -1,6 +1,8 @@
 """Running commands; one that fails raises `Failed`, which says in words which it was."""
 
+import os
 import shlex
+import signal
 import subprocess
 
 
@@ -9,15 +11,31 @@ class Failed(Exception):
 
 
 def sh(*command, **options):
-    words = [str(part) for part in command]
+    """Run a command to its end; whatever ends the wait for it ends all processes that it has started."""
+    words, limit = [str(part) for part in command], options.pop("timeout", None)
+    # A group of its own, since what runs in a container is not the command's child only.
+    with subprocess.Popen(words, stdin=subprocess.DEVNULL, start_new_session=True, **options) as process:
+        try:
+            output, _ = process.communicate(timeout=limit)
+        except subprocess.TimeoutExpired:
+            _end(process)
+            raise Failed(f"not done after {limit / 60:g} minutes: {shlex.join(words)}") from None
+        except BaseException:
+            _end(process)
+            raise
+    if process.returncode:
+        if output:  # what was to be read, and now explains
+            print(output, flush=True)
+        raise Failed(f"exit code {process.returncode} from: {shlex.join(words)}")
+    return subprocess.CompletedProcess(words, 0, output)
+
+
+def _end(process):
+    os.killpg(process.pid, signal.SIGTERM)
     try:
-        return subprocess.run(words, check=True, stdin=subprocess.DEVNULL, **options)
-    except subprocess.CalledProcessError as error:
-        if error.stdout:  # what was to be read, and now explains
-            print(error.stdout, flush=True)
-        raise Failed(f"exit code {error.returncode} from: {shlex.join(words)}") from None
-    except subprocess.TimeoutExpired as error:
-        raise Failed(f"not done after {error.timeout / 60:g} minutes: {shlex.join(words)}") from None
+        process.wait(10)
+    except subprocess.TimeoutExpired:
+        os.killpg(process.pid, signal.SIGKILL)
 
 
 def ask(*command):

@@ -87,7 +87,7 @@ class Engine:
 
 def bootstrap(suite, archive):
     """The files of a minimal Debian, from the mirror that apt of this machine uses."""
-    release = re.search(r"^VERSION_CODENAME=(\w+)", Path("/etc/os-release").read_text(), re.M)[1]
+    release = re.search(r"^VERSION_CODENAME=(\w+)", Path("/etc/os-release").read_text(), re.MULTILINE)[1]
     targets = ["apt-get", "indextargets", "--format", "$(REPO_URI)"]
     targets += ["Created-By: Packages", "Origin: Debian", f"Codename: {release}"]
     mirrors = ask(*targets).split()

@@ -13,7 +13,7 @@ ROOT = Path(__file__).parent.parent
 sys.path.append(str(ROOT / ".ci"))
 
 import engine  # noqa: E402
-from command import Failed, ask  # noqa: E402
+from command import Failed, ask, sh  # noqa: E402
 from verdict import DEVELOPMENT, verdict  # noqa: E402
 
 pytestmark = [pytest.mark.serial, pytest.mark.once]
@@ -140,3 +140,10 @@ def test_a_failed_command_is_named_and_its_output_shown(capsys):
     with pytest.raises(Failed, match=r"exit code 3 from: sh -c 'echo seen; exit 3'"):
         ask("sh", "-c", "echo seen; exit 3")
     assert "seen" in capsys.readouterr().out
+
+
+def test_a_command_that_takes_too_long_ends_with_all_it_has_started(tmp_path):
+    with pytest.raises(Failed, match="not done after 0.005 minutes: sh -c"):
+        sh("sh", "-c", f"(sleep 1; touch {tmp_path}/late) & wait", timeout=0.3)
+    time.sleep(1)
+    assert not (tmp_path / "late").exists()
