@@ -4,7 +4,7 @@ import numpy as np
 
 import cosserat_fenicsx as cf
 
-SECTION = cf.Stiffness(shear=(3e5, 3e5), axial=8e5, bending=(10.0, 10.0), torsion=8.0, mass=1.0)
+SECTION = cf.Stiffness(shear=(3e3, 3e3), axial=8e3, bending=(10.0, 10.0), torsion=8.0, mass=1.0)
 
 
 def grid_shell(n, release=None, m=None):
