@@ -22,7 +22,7 @@ _SHOWN = (
 )
 _CAPTION = (
     "A row holds for the end of a step, forces and torques in it are means over the step, or of torsion alone over two "
-    "(at the first one, the time before the start counts with zero). The motion begins at t = 0, and ends with the "
+    "(at the first one, the time before the start counts with zero): history.mean_times. The motion begins at t = 0, and ends with the "
     "step that reaches its duration."
 )
 

@@ -35,6 +35,7 @@ typedef struct {
 
 typedef struct {
     int nodes, dofs, pieces;
+    int at_end;                     /* whether speeds are told at the end of a step; otherwise means over it */
     const double *mass, *mass_off;  /* (nodes, dofs), (nodes - 1, dofs): tridiagonal mass matrix */
     const double *drag, *drag_off;  /* the same of what is proportional to the velocity */
     const double *spring;           /* (nodes - 1, dofs) stiffness of elements */

@@ -42,7 +42,8 @@ class AxialTorsional(Pointers):
     A string that starts at rest is in the tension of its weight in mud along the hole, without friction. A bit with a
     weight stands on a rock that does not give way, with the hook lowered until it bears that weight; without one the
     string hangs off bottom. The rock pushes the bit but does not pull it; the torque of a bit whose law has a `radius`
-    follows the weight on bit of the step before. Speeds, forces and torques that are told are means over the last step.
+    follows the weight on bit of the step before. Speeds, forces and torques that are told are means over the last step, but for speeds of discs,
+    which are those at its end.
 
     Args:
         scene: a `Drilling`.
@@ -109,6 +110,7 @@ class AxialTorsional(Pointers):
         m, chain, n = self._m, self._chain, self._dofs
         nodes = len(chain.depths)
         m.nodes, m.dofs, m.hanging_top = nodes, n, chain.hanging_top
+        m.at_end = isinstance(self.scene.string, Discs)
         for name in ("mass", "mass_off", "drag", "drag_off", "spring", "hanging"):
             self._array(name, getattr(chain, name))
         for name in (*_STATE, "a", "o", "rho", "b", "y", "c"):
@@ -301,7 +303,7 @@ class AxialTorsional(Pointers):
     def profile(self) -> np.ndarray:
         """See `StringModel.profile`. The node of the bit sticks where the rock holds it."""
         m, n, kept = self._m, self._dofs, self._kept
-        x, v = kept["x"], kept["w"]
+        x, v = kept["x"], kept["v" if m.at_end else "w"]
         forces = np.diff(x, axis=0) * kept["spring"]
         at = np.concatenate([forces[:1], (forces[:-1] + forces[1:]) / 2, forces[-1:]])
         torque, nothing = -at[:, -1], np.full(m.nodes, np.nan)

@@ -215,7 +215,7 @@ static int step(model *m, double h, const double *from, const double *to)
 static void write_record(const model *m, double *row)
 {
     const int n = m->dofs, last = m->nodes - 1, turn = n - 1;
-    const double *x = m->x, *v = m->v, *w = m->w;
+    const double *x = m->x, *v = m->v, *w = m->at_end ? v : m->w;
     double kinetic = 0, strain = 0, weight = 0;
     for (int i = 0; i <= last; i++)
         for (int d = 0; d < n; d++) {
