@@ -55,6 +55,10 @@ class PI:
         if self.Kp == 0:
             refuse(self, "Kp", 0.0, f"{gains}; without Kp the speed oscillates for ever")
 
+    def __repr__(self):
+        rule = f", rule={self.rule!r}" if self.rule else ""
+        return f"PI(Kp={self.Kp!r}, Ki={self.Ki!r}{rule})"
+
 
 @dataclass(frozen=True)
 class Matched:
