@@ -81,6 +81,31 @@ def test_a_drive_calms_the_first_mode_and_leaves_the_collars():
     assert "8.137 Hz moves" in text
 
 
+def test_a_tuned_drive_is_one_drive_whoever_tells_of_it():
+    """The drive of the scene is a column, with the growth of the scene, whatever inertia the bit adds to the mode; a
+    drive chosen by hand is compared with the one that its string would have."""
+    string, case = tubes(*GIVEN["sections"]), ([60 * RPM], [8e4])
+
+    def told(control, **given):
+        return cf.stability(pipe_and_collars(drive=cf.TopDrive(1.0, 2900.0, control), inertia=50.0), *case, up_to=BAND)
+
+    soft, torque = (choose(string, 2900.0) for choose in (cf.SoftSpeed, cf.SoftTorque))
+    assert (soft.rule, torque.rule) == ("SoftSpeed", "SoftTorque") and cf.PI(soft.Kp, soft.Ki) == soft
+    own = told(soft)
+    assert cf.SoftSpeed(own.scene, 2900.0) == soft
+    heard = cf.SoftSpeed(string, 2900.0, bit_inertia=50.0)
+    assert heard.Ki == pytest.approx(2900.0 * (2 * math.pi * cf.natural_frequencies(own.scene, 1)[0]) ** 2, rel=1e-12)
+    columns, k = own.with_drives(0), own.unstable(0)[0]
+    assert (columns["SoftSpeed"] == own.growth[0, 0]).all()
+    text = str(own)
+    assert "SoftSpeed (own)" in text and "of the scene, SoftSpeed." in " ".join(text.split())
+    for other in (told(torque), told(cf.PI(38e3, 1e5))):
+        near = int(np.abs(other.frequency[0, 0] - own.frequency[0, 0, k]).argmin())
+        assert other.with_drives(0)["SoftSpeed"][near] == pytest.approx(own.growth[0, 0, k], rel=1e-9)
+        if other.scene.drive.control == torque:
+            assert columns["SoftTorque"][k] == pytest.approx(other.growth[0, 0, near], rel=1e-9)
+
+
 def test_every_case_of_a_map_has_all_its_modes():
     """The same roots as one by one, and each mode in its own column: its growth falls with the speed."""
     scene, speeds, weights = pipe_and_collars("SoftSpeed", inertia=20.0), np.linspace(3, 14, 6), [2e4, 6e4, 1.2e5]
@@ -228,6 +253,8 @@ def test_a_torque_that_falls_too_fast():
         (lambda: cf.stability(replace(cutting(), hook=None), [1.0]), "or a Hook whose speed"),
         (lambda: cf.limit_weight(cutting(), 1.0), "a Stribeck law and a radius"),
         (lambda: cf.stability(pipe_and_collars(), [5.0], up_to=1.0).shape(99), "a number from 0 to"),
+        (lambda: cf.PI(1.0, 1.0, rule="SoftSped"), "PI.rule = 'SoftSped': expected 'SoftTorque' or 'SoftSpeed', or"),
+        (lambda: cf.SoftSpeed(tubes(*GIVEN["sections"]), 2900.0, bit_inertia=-1), "bit_inertia = -1"),
         (lambda: cf.LumpedCutting(13.9, 4).limits(3.0, 2.0), "more than low"),
     ],
 )

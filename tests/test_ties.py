@@ -2,11 +2,13 @@
 
 import numpy as np
 import pytest
+from dense import tangent_of_ties
 from mpi4py import MPI
 
 import cosserat_fenicsx as cf
 from cosserat_fenicsx.dynamics.solvers import solvers_of as moving_solvers
 from cosserat_fenicsx.models.rodmesh import Layout
+from cosserat_fenicsx.models.tie_pattern import TiePattern
 from cosserat_fenicsx.models.ties import Ties
 from cosserat_fenicsx.scene.ties import AngleTie, PositionTie, TurnTie
 from cosserat_fenicsx.statics.solvers import solvers_of as static_solvers
@@ -43,8 +45,9 @@ def test_gradient_and_tangent():
         TurnTie(0, None, vector(), (0, 0, 0)),
         AngleTie(1, 2, vector(), vector()),
     ]  # fmt: skip
-    known, multipliers = Ties(ties, NODES, rng.normal(size=(3, 3)), 2.0), rng.normal(size=len(ties))
-    gradient, tangent = known.on_nodes(known.evaluate(rq, ETA)[1]), known.change(rq, ETA, multipliers)
+    known, multipliers = Ties(ties, TiePattern(NODES, 3), rng.normal(size=(3, 3)), 2.0), rng.normal(size=len(ties))
+    gradient = known.on_nodes(known.evaluate(rq, ETA)[1])
+    tangent = known.pattern.full(known.change(rq, ETA, multipliers)).reshape(3, 6, 3, 6)
     for node in range(3):
         for direction in range(6):
             (c1, g1), (c0, g0) = (known.evaluate(moved(rq, node, direction, sign * STEP), ETA) for sign in (1, -1))
@@ -105,7 +108,7 @@ def test_blocks_of_a_problem(kind, model):
             rows.begin(model.ties)
         y = random(0.2)
         see(y)
-        of_nodes, reactions, equations = rows.tangent_blocks(ETA)
+        of_nodes, reactions, equations = tangent_of_ties(rows, ETA)
         J = np.block([[of_nodes, reactions], [equations, np.zeros((len(added), len(added)))]])
         for j, column in enumerate(np.eye(len(y))):
             change = (residual(y + STEP * column) - residual(y - STEP * column)) / (2 * STEP)

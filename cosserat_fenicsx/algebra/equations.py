@@ -225,7 +225,7 @@ class Equations(Called):
     def _derivatives_of_ties(self):
         """The tangent's part of supports and joints, see `Interface.factor`."""
         if not self.ties:
-            return (np.empty((0, 0)),)
+            return (np.empty(0),)
         return self.ties.tangent_blocks(self.eta)
 
     def _solve_interface(self):

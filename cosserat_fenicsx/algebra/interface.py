@@ -23,8 +23,11 @@ def condensed(model, numbering, cell_dofs, tied, **options):
     """
     order = np.argsort(model.rods.cells[: len(cell_dofs)])
     elimination = Elimination(numbering, cell_dofs, order, tied.ravel(), **options)
-    needed = elimination.unknowns or numbering.comm.size > 1
-    return elimination, Interface(elimination, tied, numbering.multipliers) if needed else None
+    if not elimination.unknowns and numbering.comm.size == 1:
+        return elimination, None
+    links = model.signature.connections
+    equations = links.equations if numbering.multipliers else ()
+    return elimination, Interface(elimination, tied, links.pattern, equations)
 
 
 class Interface:
@@ -33,21 +36,21 @@ class Interface:
     Args:
         elimination: the `Elimination`.
         tied: (tied nodes, block) numbers of the unknowns in constraint equations, -1 where clamped.
-        multipliers: number of constraint equations.
+        pattern: the `TiePattern` of the tied nodes.
+        equations: indices of the ties whose multipliers belong to the system.
 
     Attributes:
         nodes: places in the system of the tied nodes' unknowns, -1 where clamped.
     """
 
-    def __init__(self, elimination, tied, multipliers=0):
+    def __init__(self, elimination, tied, pattern, equations=()):
         self._elimination, self._size = elimination, elimination.unknowns
         known = elimination.interface
         self.nodes = nodes = np.where(tied.ravel() >= 0, np.searchsorted(known, tied.ravel()), -1)
-        added = len(known) - multipliers + np.arange(multipliers)
-        grids = [elimination.places]
-        for rows, columns in ((nodes, nodes), (nodes, added), (added, nodes)):
-            grids.append(np.stack([np.repeat(rows, len(columns)), np.tile(columns, len(rows))]))
-        rows, columns = np.concatenate(grids, axis=1)
+        of_nodes, ends, multipliers = pattern.places(nodes.reshape(tied.shape), np.array(equations, dtype=np.intp))
+        multipliers = multipliers + (len(known) - len(equations))
+        added = [np.stack(pair) for pair in ((ends, multipliers), (multipliers, ends))]
+        rows, columns = np.concatenate([elimination.places, of_nodes, *added], axis=1)
         self._here = (rows >= 0) & (columns >= 0)
         self._dense = self._size <= _DENSE
         self._solver = _Dense(self._size) if self._dense else _Sparse(self._size)
@@ -57,9 +60,8 @@ class Interface:
         """The entries of the sum of all ranks' condensed matrices and of the constraint equations' derivatives.
 
         Args:
-            of_nodes, others: derivatives of the reactions by nodes and by multipliers, and of the equations by nodes:
-                arrays over the tied nodes' unknowns, clamped ones included, and multipliers; the last two only where
-                multipliers belong to the system.
+            of_nodes, others: derivatives of the reactions by nodes and by multipliers, and of the equations by nodes,
+                as `TieRows.tangent_blocks` returns them; the last two only where multipliers belong to the system.
         """
         values = np.concatenate([self._elimination.all_condensed(), *(part.ravel() for part in (of_nodes, *others))])
         here = self._here[: len(values)]

@@ -13,8 +13,8 @@ class TieRows:
     """Constraint equations of one problem; all ranks evaluate them.
 
     Args:
-        model: its `rows_of_tied`, `ties`, `held_forces`, `tied_motion`, `tie_maps`, `rows_turn` and `tied_at_rest` are
-            used.
+        model: its `rows_of_tied`, `signature.connections`, `ties`, `held_forces`, `tied_motion`, `tie_maps`,
+            `rows_turn` and `tied_at_rest` are used.
         numbering: the problem's `Numbering`.
 
     Attributes:
@@ -33,6 +33,7 @@ class TieRows:
         self._free_rows = self.rows.ravel()[self._free]
         self._here = numbering.comm.rank == numbering.comm.size - 1
         links = model.signature.connections
+        self._pattern = links.pattern
         self._added, self._count = np.array(links.equations, dtype=np.intp), len(links.ties)
         # for every added equation: what multiplies its reaction at both stations, the ground has none
         signs = [(-1.0, 0.0 if links.ties[i][2] is None else -1.0) for i in self._added]
@@ -129,20 +130,27 @@ class TieRows:
 
     @np.errstate(**_WILD)
     def tangent_blocks(self, eta):
-        """Derivatives of `residual_blocks`: of the reactions by the nodes and by the multipliers, and of the equations
-        by the nodes."""
+        """Derivatives of `residual_blocks`, in blocks of few nodes each.
+
+        Returns:
+            Of the reactions by the nodes, (pairs, block, block) of the `TiePattern`; of the reactions at both ends of
+            every equation by its multiplier, (equations, 2, block); and of the equations by the same unknowns.
+        """
         (nodal, multipliers), acting, ties, model = self.seen, self._acting(), self.ties, self.model
         change, gradients = ties.change(model.tied_motion(acting), eta, multipliers), self._gradients(eta)
-        (trial, test), added = model.tie_maps(acting), ties.on_nodes(gradients)[self._added]
-        of_nodes = reactions_by_nodes(test, change, self.share * trial)
-        reactions = reactions_by_multipliers(test, added)
+        (trial, test), added, pattern = self._maps(acting), gradients[self._added], self._pattern
+        of_nodes = test[pattern.first] @ change @ (self.share * trial)[pattern.second]
+        reactions = (pattern.of_ends(test)[self._added] @ added[..., None])[..., 0]
         if model.rows_turn:
-            places = np.arange(len(of_nodes)).reshape(len(nodal), -1)
             turned = self.share * model.turned_reactions(acting, ties.reactions(gradients, multipliers))
-            of_nodes[places[:, :, None], places[:, None, :]] += turned
+            of_nodes[pattern.own] += turned
         if acting is not nodal:
-            (trial, _), added = model.tie_maps(nodal), ties.on_nodes(self._evaluate(eta)[1])[self._added]
-        return of_nodes, reactions, by_nodes(added, trial)
+            (trial, _), added = self._maps(nodal), self._evaluate(eta)[1][self._added]
+        return of_nodes, reactions, (added[..., None, :] @ pattern.of_ends(trial)[self._added])[..., 0, :]
+
+    def _maps(self, values):
+        """The model's `tie_maps`, for every node where one serves all."""
+        return [np.broadcast_to(part, (len(values), *part.shape[1:])) for part in self.model.tie_maps(values)]
 
     def add_residual(self, b, eta):
         """Add the reactions to the rows of the nodes, and the constraint equations in the rows of the multipliers, in
@@ -159,11 +167,9 @@ class TieRows:
             axes: (block, 6) the (displacement, rotation) of each of the unknowns of a node.
 
         Returns:
-            (tied nodes * block, the same).
+            (pairs, block, block) of the `TiePattern`.
         """
-        change = self._symmetric_change(eta)
-        size = len(change) * len(axes)
-        return (axes @ (change @ axes.T).reshape(len(change), 6, -1)).reshape(size, size)
+        return axes @ self._symmetric_change(eta) @ axes.T
 
     def springs(self, axes, eta, resistance):
         """Penalty springs that replace all constraint equations; arguments and result as of `second_variation`.
@@ -171,34 +177,34 @@ class TieRows:
         Args:
             resistance: (tied nodes * block,) stiffness of the elements against these motions of the nodes.
         """
-        gradient = (self.ties.on_nodes(self._evaluate(eta)[1]) @ axes.T).reshape(-1, len(resistance))
-        stiffness = _HELD * (gradient * gradient * resistance).max(axis=1, keepdims=True)
-        return gradient.T @ (stiffness * gradient)
+        gradient, pattern = self._evaluate(eta)[1] @ axes.T, self._pattern
+        of_ends = pattern.of_ends(resistance.reshape(-1, len(axes)))
+        stiffness = _HELD * (gradient * gradient * of_ends).max(axis=(1, 2))
+        return pattern.sums(np.einsum("t,tia,tjb->tiajb", stiffness, gradient, gradient))
+
+    def diagonal(self, blocks):
+        """(tied nodes * block,) the diagonal of what `second_variation` returned."""
+        return np.einsum("nii->ni", blocks[self._pattern.own]).ravel()
+
+    def energy(self, blocks, motions):
+        """(k,) v^T A v of blocks A as of `second_variation` and motions v of the tied nodes (k, nodes, block)."""
+        return self._pattern.energy(blocks, motions)
+
+    def add_to_matrix(self, A, rows, blocks):
+        """Add what `second_variation` returned to a PETSc matrix on rank 0.
+
+        Args:
+            rows: (tied nodes, block) numbers of the unknowns, -1 where clamped.
+        """
+        rows, pattern = rows.astype(PETSc.IntType), self._pattern
+        for i, j, values in zip(rows[pattern.first], rows[pattern.second], blocks, strict=True):
+            A.setValues(i, j, values, PETSc.InsertMode.ADD_VALUES)
 
     def _symmetric_change(self, eta):
-        """The symmetric part of the derivative of the reactions, (tied nodes, 6, tied nodes, 6); evaluated once for all
-        parts of the second variation."""
+        """The symmetric part of the derivative of the reactions, (pairs, 6, 6); evaluated once for all parts of the
+        second variation."""
         if self._change[0] != eta:
             nodal, multipliers = self.seen
             change = self.ties.change(self.model.tied_motion(nodal), eta, multipliers)
-            self._change = eta, 0.5 * (change + change.transpose(2, 3, 0, 1))
+            self._change = eta, 0.5 * (change + change[self._pattern.mirrored].swapaxes(1, 2))
         return self._change[1]
-
-
-def reactions_by_nodes(test, change, trial):
-    """The reactions' derivatives, (tied nodes, 6, tied nodes, 6), in rows and columns of the nodes; see
-    `RodModel.tie_maps`."""
-    count, size = len(change), len(change) * test.shape[1]
-    turned = (test @ change.reshape(count, 6, -1)).reshape(size, count, 6)
-    return (turned.swapaxes(0, 1) @ trial).swapaxes(0, 1).reshape(size, -1)
-
-
-def reactions_by_multipliers(test, gradient):
-    """Gradients (ties, tied nodes, 6) as columns on the rows of the nodes."""
-    # sizes in full, since there may be no ties; one map may serve all nodes
-    return (test @ gradient.transpose(1, 2, 0)).reshape(gradient.shape[1] * test.shape[1], len(gradient))
-
-
-def by_nodes(gradient, trial):
-    """Gradients (ties, tied nodes, 6) as rows on the columns of the nodes."""
-    return (gradient.swapaxes(0, 1) @ trial).swapaxes(0, 1).reshape(len(gradient), gradient.shape[1] * trial.shape[2])

@@ -8,7 +8,7 @@ blade to blade. `Lobes`: a rock whose face is wavy.
 import math
 from dataclasses import dataclass
 
-from cosserat_fenicsx.checks import instance, number, positive, refuse, store
+from cosserat_fenicsx.checks import instance, number, positive, refuse, stiffness, store
 
 
 def _not_negative(owner, field, unit):
@@ -116,7 +116,8 @@ class Cutting:
 
 @dataclass(frozen=True)
 class Lobes:
-    """A face of the rock that lifts a roller-cone bit: by amplitude sin(count theta), theta the angle of the bit.
+    """A face of the rock that lifts a roller-cone bit: by amplitude sin(count theta), theta the angle by which the bit
+    has turned since the start.
 
     Args:
         count: lobes in a revolution; three for tricone bits. amplitude: m.
@@ -149,18 +150,28 @@ class BitOnRock:
         weight: static weight on bit, N. None where the law needs none, or where the speed of drilling decides it.
         inertia: of the bit and what turns with it beyond the string's sections, kg m^2.
         mass: the same for axial motion, kg.
+        rock_stiffness: of the rock below a bit with a weight, N/m: weight on bit per depth by which the bit presses into
+            the rock, which pushes it back but does not pull. Infinite for rigid rock, where a bit that comes down is
+            stopped by an impulse and not by a force. `Cutting` has the depth of cut in its place.
 
     Raises:
-        SceneError: an unknown law, a weight that is missing, or a negative number.
+        SceneError: an unknown law, a weight that is missing, or a negative number; a stiffness of rock beside `Cutting`,
+            or without a weight.
     """
 
     law: Stribeck | Cutting | Lobes
     weight: float | None = None
     inertia: float = 0.0
     mass: float = 0.0
+    rock_stiffness: float = math.inf
 
     def __post_init__(self):
         instance(self, "law", self.law, LAWS, "Stribeck(...), Cutting(...) or Lobes(...)")
+        store(self, rock_stiffness=stiffness(self, "rock_stiffness", self.rock_stiffness, "N/m"))
+        if isinstance(self.law, Cutting) and self.rock_stiffness < math.inf:
+            refuse(self, "rock_stiffness", self.rock_stiffness, "infinity: Cutting has a depth of cut in its place")
+        if self.weight is None and self.rock_stiffness < math.inf:
+            refuse(self, "weight", None, "the weight on bit (N), where the rock has a stiffness")
         for field, unit in (("inertia", "kg m^2"), ("mass", "kg")):
             _not_negative(self, field, unit)
         if self.weight is not None:

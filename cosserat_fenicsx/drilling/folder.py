@@ -30,7 +30,7 @@ from cosserat_fenicsx.storage.lock import FolderLock
 
 #: Least time between checkpoints: in s, and as a multiple of the time that it takes to write one.
 APART, SELDOM = 2.0, 20
-_FORMAT = 1
+_FORMAT = 2
 _HEAD, _SCENE, _LATEST = "drilling.json", "scene.json", "checkpoint.npz"
 _SERIES, _PROFILES = "series.f64", "profiles.f64"
 _TOLD = {"model": str, "why": list, "dt": float, "depths": list, "duration": float}

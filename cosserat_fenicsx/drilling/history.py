@@ -7,6 +7,7 @@ import numpy as np
 
 from cosserat_fenicsx.annotations import File
 from cosserat_fenicsx.checks import number
+from cosserat_fenicsx.drilling.discs import Discs
 from cosserat_fenicsx.drilling.protocol import LEDGER, PROFILE, SERIES
 from cosserat_fenicsx.drilling.quantities import QUANTITIES, heading
 from cosserat_fenicsx.drilling.scene import Drilling
@@ -28,6 +29,11 @@ class DrillingHistory(Tabular):
     and the advance of the bit are positive downwards, tension and hook load where they pull. A model of torsion alone
     leaves what is axial NaN.
 
+    A row holds for the end of a step, but for what a model finds as a mean over its last step, or of the torsion of a
+    string over its last two: forces and torques, and speeds along a string but those of a drive or a bit whose inertia
+    the torsion alone turns. These hold for `mean_times`, to the second order in the step; as values for `times` they
+    are late by half a step, or by one.
+
     Arrays (n,) over `times`:
 
     - ``drive_speed``, ``bit_speed``: rad/s; ``drive_angle``, ``bit_angle``: rad;
@@ -43,7 +49,7 @@ class DrillingHistory(Tabular):
         scene: the `Drilling`.
         model: "torsion" or "axial and torsional". why: sentences on that choice, and on what the model leaves out.
         dt: step, s. counts: {name: number} of the solver, such as steps that were halved.
-        times: (n,) s, each at the end of a step.
+        times: (n,) s, each at the end of a step. mean_times: (n,) s, the middles of those over which means are taken.
         profile_times: (k,) s. depths: (m,) measured depths, m.
         errors: with `check`, estimated errors by the step of the second half: `period` (s) of stick-slip, `peak`
             (rad/s) of the bit, `least_torque` and `largest_torque` (N m) at the surface; else None.
@@ -107,6 +113,12 @@ class DrillingHistory(Tabular):
 
     def __dir__(self):
         return sorted({*super().__dir__(), *COLUMNS, *PROFILE, "profile_times"})
+
+    @property
+    def mean_times(self) -> np.ndarray:
+        """(n,) s: the middles of the steps over which forces, torques and some speeds are means, see the class."""
+        over_two = self.model == "torsion" and not isinstance(self.scene.string, Discs)
+        return self.times - (self.dt if over_two else self.dt / 2)
 
     @property
     def balance(self) -> np.ndarray:

@@ -12,6 +12,7 @@ QUANTITIES = {
     "bit_velocity": ("bit velocity", "m/s"),
     "bit_advance": ("bit advance", "m"),
     "weight_on_bit": ("weight on bit", "N"),
+    "impulse_on_bit": ("impulse of impacts on bit", "N s"),
     "kinetic": ("kinetic energy", "J"),
     "strain": ("strain energy", "J"),
     "work_of_drive": ("work of drive", "J"),

@@ -69,7 +69,7 @@ _DIMENSIONS = {
     "Matched": {"torque": "moment"},
     "Motor": {"torque": "moment"},
     "Hook": {"stiffness": "stiffness", "speed": "speed"},
-    "BitOnRock": {"weight": "force"},
+    "BitOnRock": {"weight": "force", "rock_stiffness": "stiffness"},
     "Stribeck": {"static": "moment", "dynamic": "moment", "speed": "angular velocity", "radius": "length"},
     "Cutting": {"a": "length", "epsilon": "pressure"},
     "Wear": {"stress": "pressure", "length": "length"},

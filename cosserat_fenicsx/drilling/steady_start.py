@@ -25,7 +25,7 @@ def check_steady(scene) -> None:
 
 
 def check_rock(scene) -> None:
-    """Refuse a hook that moves a string with axial motion whose bit stands on rock that does not give way.
+    """Refuse a hook that moves a string with axial motion whose bit stands on rock that is not drilled.
 
     Raises:
         SceneError: so it is.
@@ -33,7 +33,7 @@ def check_rock(scene) -> None:
     bit, (down, _) = scene.bit, steady_velocities(scene)
     if down and bit is not None and bit.weight is not None and not isinstance(bit.law, Cutting):
         refuse("Drilling", "start", "steady", f"'rest' with a hook that moves at {-down:g} m/s: the rock below a bit "
-               "with a weight does not give way, unless its law is Cutting(...)")  # fmt: skip
+               "with a weight is not drilled and does not give way, unless its law is Cutting(...)")  # fmt: skip
 
 
 def follows_the_bit(scene) -> bool:

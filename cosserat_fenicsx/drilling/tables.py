@@ -22,7 +22,7 @@ _SHOWN = (
 )
 _CAPTION = (
     "A row holds for the end of a step, forces and torques in it are means over the step, or of torsion alone over two "
-    "(at the first one, the time before the start counts with zero). The motion begins at t = 0, and ends with the "
+    "(at the first one, the time before the start counts with zero): history.mean_times. The motion begins at t = 0, and ends with the "
     "step that reaches its duration."
 )
 
@@ -49,6 +49,7 @@ def history_table(history):
         done = ", ".join(f"of the {name} {x / 1e3:.5g} kJ" for name, x in worked.items() if x or name == "drive")
         lines.append(f"Energy: work {done}; the ledger does not account for "
                      f"{history.balance[-1] / 1e3:.3g} kJ.")  # fmt: skip
+    lines += _impacts(history)
     if history.errors is not None:
         period, peak, *torques = history.errors
         told = "" if np.isnan(period) else f"period {period:.2g} s, "
@@ -58,3 +59,13 @@ def history_table(history):
     if caution:
         lines.append(f"{caution[0].upper()}{caution[1:]}.")
     return "\n".join([*lines, *history.why])
+
+
+def _impacts(history):
+    """A sentence on the impacts of the bit on rigid rock, where there are some."""
+    told = np.nan_to_num(history.impulse_on_bit)
+    if not len(told) or told[-1] == 0:
+        return []
+    each = np.diff(told, prepend=0.0)
+    return [f"Impacts of the bit on rigid rock: the largest impulse {each.max():.4g} N s, at t = "
+            f"{history.times[each.argmax()]:.5g} s, together {told[-1]:.4g} N s; the weight on bit is without them."]

@@ -10,10 +10,13 @@ A drive with the speed om and the inertia I hands the torque M down to the strin
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from cosserat_fenicsx.checks import instance, number, positive, refuse, store
 from cosserat_fenicsx.drilling.signals import ScalarSignal
+
+#: Rules that choose the gains of a `PI` control, and its Kp over the impedance of the string: see `linear.tuned`.
+RULES = {"SoftTorque": 1.0, "SoftSpeed": 4.0}
 
 
 @dataclass(frozen=True)
@@ -28,24 +31,33 @@ class PI:
     Args:
         Kp: torque per difference of speeds, N m s/rad.
         Ki: torque per difference of angles, N m/rad; 0 for none.
+        rule: name of the rule that chose the gains, "SoftTorque" or "SoftSpeed", which set it themselves; None for
+            gains that were given. Controls with the same gains are equal, whatever the rule.
 
     Raises:
-        SceneError: gains that are missing, negative or not finite, or a Kp of zero.
+        SceneError: gains that are missing, negative or not finite, or a Kp of zero; an unknown rule.
     """
 
     Kp: float | None = None
     Ki: float | None = None
+    rule: str | None = field(default=None, compare=False)
 
     def __post_init__(self):
+        if self.rule is not None and not (isinstance(self.rule, str) and self.rule in RULES):
+            refuse(self, "rule", self.rule, " or ".join(map(repr, RULES)) + ", or None")
         gains = "a gain: SoftTorque(pipe), SoftSpeed(string) choose them, or give Kp and Ki"
-        for field, unit in (("Kp", "N m s/rad"), ("Ki", "N m/rad")):
-            value = getattr(self, field)
+        for name, unit in (("Kp", "N m s/rad"), ("Ki", "N m/rad")):
+            value = getattr(self, name)
             if value is None:
-                refuse(self, field, value, f"{gains} ({unit})")
-            value = number(self, field, value, f"{gains}, not negative ({unit})", lambda x: 0 <= x < math.inf)
-            store(self, **{field: value})
+                refuse(self, name, value, f"{gains} ({unit})")
+            value = number(self, name, value, f"{gains}, not negative ({unit})", lambda x: 0 <= x < math.inf)
+            store(self, **{name: value})
         if self.Kp == 0:
             refuse(self, "Kp", 0.0, f"{gains}; without Kp the speed oscillates for ever")
+
+    def __repr__(self):
+        rule = f", rule={self.rule!r}" if self.rule else ""
+        return f"PI(Kp={self.Kp!r}, Ki={self.Ki!r}{rule})"
 
 
 @dataclass(frozen=True)

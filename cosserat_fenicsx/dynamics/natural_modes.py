@@ -6,7 +6,6 @@ import numbers
 
 import numpy as np
 from mpi4py import MPI
-from petsc4py import PETSc
 from scipy import sparse
 
 from cosserat_fenicsx.algebra.packed import Packed
@@ -192,15 +191,15 @@ def _stiffness(problem):
     model = problem.model
     (variation,) = model.second_variations
     tied = variation.tied
-    K = variation.numbering.matrix(variation.cell_dofs, tied[tied >= 0])
+    K = variation.numbering.matrix(variation.cell_dofs, tied, model.signature.connections.pattern)
     true = model.section.K
     model.stiffen(np.where(np.isfinite(true), true, model.bounded_K))  # stability counts bound finite ones as well
     Packed(variation.form, (), ()).add_to_matrix(K)
     model.stiffen(model.bounded_K)
     if problem.ties:
-        rows, of_ties = tied.ravel().astype(PETSc.IntType), problem.ties.second_variation(variation.axes, problem.eta)
+        of_ties = problem.ties.second_variation(variation.axes, problem.eta)
         if model.comm.rank == 0:
-            K.setValues(rows, rows, of_ties, PETSc.InsertMode.ADD_VALUES)
+            problem.ties.add_to_matrix(K, tied, of_ties)
     K.assemble()
     size = K.getSize()[0]
     parts = model.comm.allgather(K.getValuesCSR())

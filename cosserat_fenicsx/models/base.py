@@ -235,7 +235,9 @@ class RodModel(Snapshots):
         return rows
 
     def _rows_of_tied(self, numbering, dofs):
-        here = {int(s): numbering.rows[dofs[i]] for i, s in enumerate(self._slots) if s in self.tied_slots}
+        here = {
+            int(self._slots[i]): numbering.rows[dofs[i]] for i in np.flatnonzero(np.isin(self._slots, self.tied_slots))
+        }
         everywhere = {}
         for part in self.comm.allgather(here):
             everywhere.update(part)
@@ -287,11 +289,9 @@ class RodModel(Snapshots):
         return 4 * np.finfo(float).eps * stiffest * self.signature.degree / sizes.min() * np.sqrt(self.unknowns)
 
     def _tie(self):
-        links = self.signature.connections
-        place = {vertex: i for i, vertex in enumerate(links.tied)}
-        nodes = [(place[a], -1 if b is None else place[b]) for _, a, b in links.ties]
-        reference = self.reference[self.tied_slots]
-        self.ties = Ties(ties_of(self.scene), nodes, reference, self.scales.length, self.comm) if nodes else None
+        links, reference = self.signature.connections, self.reference[self.tied_slots]
+        given = links.pattern, reference, self.scales.length, self.comm
+        self.ties = Ties(ties_of(self.scene), *given) if links.ties else None
 
     def set_motion(self, values, n):
         """Set the initial guess, in the scene's order: the nodes' unknowns (N, components), and n at the Gauss points

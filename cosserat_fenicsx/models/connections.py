@@ -1,7 +1,9 @@
 """Where a scene's supports and joints act on a layout."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
+from cosserat_fenicsx.models.tie_pattern import TiePattern
 from cosserat_fenicsx.scene.planes import independent_in
 from cosserat_fenicsx.scene.signals import at
 
@@ -50,6 +52,12 @@ class Connections:
     def tied(self):
         """Vertices in constraint equations, each once."""
         return tuple(dict.fromkeys(x for _, a, b in self.ties for x in (a, b) if x is not None))
+
+    @cached_property
+    def pattern(self):
+        """The `TiePattern` of all ties on the vertices `tied`."""
+        place = {vertex: i for i, vertex in enumerate(self.tied)}
+        return TiePattern([(place[a], -1 if b is None else place[b]) for _, a, b in self.ties], len(place))
 
 
 def ties_of(scene, t=0.0):

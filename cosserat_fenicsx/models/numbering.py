@@ -121,17 +121,19 @@ class Numbering:
             self._local.array_w[:] = numbers[self.free]
             self._scatter.scatter(self._local, b, PETSc.InsertMode.ADD_VALUES, PETSc.ScatterMode.REVERSE)
 
-    def matrix(self, cell_dofs, tied):
-        """A matrix preallocated for all elements of this rank and for the constraint equations.
+    def matrix(self, cell_dofs, tied, pattern):
+        """A matrix preallocated for all elements of this rank and for what ties add between nodes.
 
         Args:
             cell_dofs: (cells, dofs) local degrees of freedom of every element of this rank.
-            tied: indices (of any rank) of the unknowns in constraint equations; the same on all ranks.
+            tied: (tied nodes, block) indices (of any rank) of the unknowns in constraint equations, -1 where clamped;
+                the same on all ranks.
+            pattern: the `TiePattern` of the tied nodes.
         """
         A = PETSc.Mat().create(self.comm)
         A.setType("aij")
         A.setSizes(((self.size, self.total), (self.size, self.total)), bsize=self.block if self._blocked else 1)
-        A.setPreallocationNNZ(self._room(cell_dofs, tied))
+        A.setPreallocationNNZ(self._room(cell_dofs, tied, pattern))
         if self._blocked:
             whole = self.rows.reshape(-1, self.block)[:, 0]
             blocks = np.where(whole >= 0, whole // self.block, -1).astype(PETSc.IntType)
@@ -143,7 +145,7 @@ class Numbering:
         A.setOption(PETSc.Mat.Option.NEW_NONZERO_ALLOCATION_ERR, True)
         return A
 
-    def _room(self, cell_dofs, tied):
+    def _room(self, cell_dofs, tied, pattern):
         """Upper bounds on the non-zeros of every row of this rank: in its own columns, and in those of other ranks."""
         count = np.zeros(len(self.rows))
         wide = np.count_nonzero(self.rows[cell_dofs] >= 0, axis=1)
@@ -154,7 +156,6 @@ class Numbering:
         else:
             self.add_up(count, room)
         first, array = self.first, room.array_r.astype(PETSc.IntType)
-        mine = tied[(tied >= first) & (tied < first + self.size)] - first
-        array[mine] += len(tied) + self.multipliers
-        array[max(0, self.first_multiplier - first) :] += len(tied) + 1
+        mine = (tied.ravel() >= first) & (tied.ravel() < first + self.size)
+        array[tied.ravel()[mine] - first] += pattern.widths(tied.shape[1])[mine]
         return np.minimum(array, self.size), np.minimum(array, self.total - self.size)

@@ -116,7 +116,7 @@ class Layout:
 
     def vertex(self, scene, station):
         """(rod index, element end) of a station of the layout's scene."""
-        rod = scene.rods.index(station.rod)
+        rod = scene.number(station.rod)
         return rod, int(np.argmin(np.abs(self.breaks[rod] - station.s / station.rod.length)))
 
     def sizes(self, scene):

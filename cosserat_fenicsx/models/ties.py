@@ -32,25 +32,22 @@ class Ties:
 
     Args:
         ties: those of the scene (`cosserat_fenicsx.scene.ties`).
-        nodes: (a, b) of every tie as indices into the tied nodes; b = -1 for the ground.
+        pattern: the `TiePattern` of the tied nodes.
         reference: (tied nodes, 3) positions at rest.
         length: unit of length, m.
         comm: of the ranks that make them together.
     """
 
-    def __init__(self, ties, nodes, reference, length, comm=MPI.COMM_SELF):
+    def __init__(self, ties, pattern, reference, length, comm=MPI.COMM_SELF):
         with compiling():
             self._add_values, self._add_changes = _kernels(comm)
-        self._length, self._count = length, len(reference)
-        self._nodes = np.array(nodes) % (self._count + 1)  # the ground last
+        self._length, self.pattern = length, pattern
+        self._nodes = pattern.ends % (len(reference) + 1)  # the ground last
         rest = np.append(reference, [_GROUND[:3]], axis=0)
         # what the kernels take, see forms/ties.py; motions, load factor and multipliers are of the last evaluation
         self._rows, self._motion = np.zeros((len(ties), eq.COUNT)), np.tile(_GROUND, (len(rest), 1))
         self._rows[:, eq.PLACES["place"]] = np.subtract(*rest[self._nodes.T])
         self._take(ties)
-        # 1 where a tied node is a or b of a tie, else 0: (ties, tied nodes, 2), and (tied nodes, ties and 2)
-        self._ends = (self._nodes[:, None, :] == np.arange(self._count)[:, None]).astype(float)
-        self._sums = self._ends.swapaxes(0, 1).reshape(self._count, -1)
         self._turning = np.array([i for i, tie in enumerate(ties) if not isinstance(tie, PositionTie)], dtype=np.intp)
 
     def _take(self, ties):
@@ -84,25 +81,20 @@ class Ties:
 
     def on_nodes(self, gradients):
         """(ties, tied nodes, 6) from gradients (ties, 2, 6)."""
-        return self._ends @ gradients
+        return self.pattern.on_nodes(gradients)
 
     def reactions(self, gradients, multipliers):
         """(tied nodes, 6) forces and moments, sums over the ties, from gradients (ties, 2, 6)."""
-        return self._sums @ (multipliers[:, None, None] * gradients).reshape(-1, 6)
+        return self.pattern.by_nodes(multipliers[:, None, None] * gradients)
 
     def change(self, rq, eta, multipliers):
-        """The tangent of the reactions, (tied nodes, 6, tied nodes, 6), at (r, q) (tied nodes, 7), a load factor and
+        """The tangent of the reactions, (pairs, 6, 6) of the pattern, at (r, q) (tied nodes, 7), a load factor and
         multipliers (ties,)."""
-        found, total = np.zeros((len(self._turning), 144)), np.zeros((self._count, 6, self._count, 6))
+        found = np.zeros((len(self._turning), 144))
         self._see(rq, eta)
         self._rows[:, -1] = multipliers
         self._add_changes(self._rows[self._turning], found)
-        for tie, block in zip(self._turning, found.reshape(-1, 2, 6, 2, 6), strict=True):
-            ends = [(i, node) for i, node in enumerate(self._nodes[tie]) if node < self._count]
-            for i, k in ends:
-                for j, m in ends:
-                    total[k, :, m] += block[i, :, j]
-        return total
+        return self.pattern.sums(found.reshape(-1, 2, 6, 2, 6), self._turning)
 
 
 def _numbers(tie, length):

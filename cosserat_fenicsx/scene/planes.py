@@ -169,7 +169,7 @@ def _motions(holder, until):
 
 def _normal_of(directions):
     """The normal of directions that span a plane; None where all are parallel."""
-    _, sizes, right = np.linalg.svd(directions)
+    _, sizes, right = np.linalg.svd(directions, full_matrices=len(directions) < 3)
     return right[2] if len(sizes) > 1 and sizes[1] > _PARALLEL else None
 
 

@@ -2,6 +2,7 @@
 
 import copy
 import warnings
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -12,6 +13,7 @@ from cosserat_fenicsx.checks import instance
 from cosserat_fenicsx.errors import SceneError, SceneWarning, nearest
 from cosserat_fenicsx.scene.action import Action
 from cosserat_fenicsx.scene.describe import describe
+from cosserat_fenicsx.scene.groups import Groups
 from cosserat_fenicsx.scene.initial import InitialVelocity
 from cosserat_fenicsx.scene.joints import Joint
 from cosserat_fenicsx.scene.magnitudes import magnitudes
@@ -67,10 +69,10 @@ class Scene:
             raise SceneError("Scene.rods is empty: expected at least one Rod")
         for i, rod in enumerate(self.rods):
             instance("Scene", f"rods[{i}]", rod, Rod, "a Rod")
-        names = [rod.name for rod in self.rods]
-        for name in names:
-            if names.count(name) > 1:
-                raise SceneError(f"Scene.rods: {names.count(name)} rods are named '{name}': expected one each")
+        for name, count in Counter(rod.name for rod in self.rods).items():
+            if count > 1:
+                raise SceneError(f"Scene.rods: {count} rods are named '{name}': expected one each")
+        object.__setattr__(self, "_numbers", {rod: i for i, rod in enumerate(self.rods)})
         object.__setattr__(self, "_given", self.supports)
         rods = {rod.name: rod for rod in self.rods}
         for field in ("supports", "loads", "joints", "velocities"):
@@ -85,13 +87,15 @@ class Scene:
                 self._check_rod(f"joints[{i}]", end, end.rod)
         for i, load in enumerate(self.loads):
             self._check_load(f"loads[{i}]", load)
+        moving = set()
         for i, velocity in enumerate(self.velocities):
             instance("Scene", f"velocities[{i}]", velocity, InitialVelocity, "an InitialVelocity(rod)")
             self._check_rod(f"velocities[{i}]", velocity.rod, velocity.rod)
-            if velocity.rod in [other.rod for other in self.velocities[:i]]:
+            if velocity.rod in moving:
                 raise SceneError(
                     f"Scene.velocities[{i}] is the second of rod '{velocity.rod.name}': expected one a rod"
                 )
+            moving.add(velocity.rod)
         check_held_once(self)
         object.__setattr__(self, "_leaders", self._find_leaders())
 
@@ -113,7 +117,7 @@ class Scene:
                 load.check_rod(rod)
 
     def _check_rod(self, field, place, rod):
-        if rod not in self.rods:
+        if rod not in self._numbers:
             raise SceneError(
                 f"Scene.{field} acts at {place}, a station of a rod that is not in the scene: "
                 f"expected one of {', '.join(rod.name for rod in self.rods)}"
@@ -121,17 +125,14 @@ class Scene:
 
     def _find_leaders(self):
         """For every rod the first rod of its structure: the rods connected by joints, directly or indirectly."""
-        leaders = {rod: rod for rod in self.rods}
-
-        def find(rod):
-            while leaders[rod] is not rod:
-                rod = leaders[rod]
-            return rod
-
+        joined = Groups()
         for joint in self.joints:
-            one, other = sorted((find(joint.first.rod), find(joint.second.rod)), key=self.rods.index)
-            leaders[other] = one
-        return {rod: find(rod) for rod in self.rods}
+            joined.join(self._numbers[joint.first.rod], self._numbers[joint.second.rod])
+        return {rod: self.rods[joined.leader(i)] for i, rod in enumerate(self.rods)}
+
+    def number(self, rod: Rod) -> int:
+        """The place of a rod of the scene in `rods`."""
+        return self._numbers[rod]
 
     def leader(self, rod: Rod) -> Rod:
         """The first rod of the structure that a rod belongs to."""
@@ -179,11 +180,18 @@ class Scene:
 
     def stations(self, rod):
         """All stations of a rod that supports, loads and joints refer to, and those where its loads are not smooth."""
-        named = [x.station for x in (*self.supports, *self.loads) if x.station is not None]
-        named += [end for joint in self.joints for end in (joint.first, joint.second)]
-        breaks = {s for load in self.loads if load.station is None and load.acts_on(rod) for s in load.breaks(rod)}
-        named += [rod.at(s) for s in sorted(breaks) if 0 < s < rod.length]
-        return [station for station in named if station.rod is rod]
+        named, along = self._named
+        breaks = {s for load in along if load.acts_on(rod) for s in load.breaks(rod)}
+        return [*named.get(rod, ()), *(rod.at(s) for s in sorted(breaks) if 0 < s < rod.length)]
+
+    @cached_property
+    def _named(self):
+        """{rod: its stations that supports, loads and joints refer to}, and the loads along rods."""
+        named = {}
+        stations = [x.station for x in (*self.supports, *self.loads) if x.station is not None]
+        for station in (*stations, *(end for joint in self.joints for end in (joint.first, joint.second))):
+            named.setdefault(station.rod, []).append(station)
+        return named, [load for load in self.loads if load.station is None]
 
     @property
     def cautions(self) -> list[str]:
@@ -227,10 +235,10 @@ class Scene:
 
     def _unjoined(self):
         """Warnings about ends of different structures that lie at one point, unless both have supports."""
-        held, reported = [support.station for support in self.supports], []
+        held, reported = {support.station for support in self.supports}, set()
         for end, other in touching(self):
             if not (end in held and other in held) and (other, end) not in reported:
-                reported.append((end, other))
+                reported.add((end, other))
                 yield (
                     f"{end} and {other} lie at one point and are not joined: if they should be, add Joint({end}, "
                     f"{other})"

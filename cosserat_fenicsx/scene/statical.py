@@ -7,14 +7,18 @@ import functools
 import numpy as np
 
 from cosserat_fenicsx.errors import SceneError
+from cosserat_fenicsx.scene.groups import Groups
 from cosserat_fenicsx.scene.joints import Joint
+from cosserat_fenicsx.scene.nullspace import null_space
 from cosserat_fenicsx.scene.supports import Clamp
 from cosserat_fenicsx.scene.ties import PositionTie, TurnTie
 
-# Relative singular values below this are zero.
-_RANK_TOLERANCE = 1e-9
 # Ends nearer than this, over a rod's length, lie at one point.
 _TOUCHING_DISTANCE = 1e-6
+# Holders that a message lists.
+_NAMED = 8
+# A direction along which hardly two points of a structure have the same coordinate.
+_OBLIQUE = np.array([0.5381, 0.6427, 0.5453])
 
 
 def rows_of(tie):
@@ -28,86 +32,85 @@ def rows_of(tie):
     return ((tie.a, row), (tie.b, -row)) if tie.b is not None else ((tie.a, row),)
 
 
-def _all_rows(scene):
-    """(support or joint, [(station, row (6,)), ...]) for every scalar constraint of the scene."""
-    for support in scene.supports:
-        if support.clamps:
-            yield from ((support, [(support.station, row)]) for row in np.eye(6))
-        yield from ((support, rows_of(tie)) for tie in support.ties())
-    groups = _RigidGroups()
+def _holders(scene):
+    """The supports and joints that add constraints: not the rigid joints that close a loop of rigid joints."""
+    yield from scene.supports
+    rigid = Groups()
     for joint in scene.joints:
-        if joint.rigid and not groups.join(joint.first, joint.second):
-            continue  # a rigid joint that closes a loop of rigid joints adds no constraint
-        if joint.rigid:
-            yield from ((joint, [(joint.first, row), (joint.second, -row)]) for row in np.eye(6))
-        else:
-            yield from ((joint, rows_of(tie)) for tie in joint.ties())
+        if not joint.rigid or rigid.join(_key(scene, joint.first), _key(scene, joint.second)):
+            yield joint
 
 
-class _RigidGroups:
-    """Groups of stations that rigid joints connect."""
-
-    def __init__(self):
-        self._groups = []
-
-    def join(self, *stations):
-        """Connect two stations; False where they are in one group already."""
-        keys = {_key(station) for station in stations}
-        if any(keys <= group for group in self._groups):
-            return False
-        met = [group for group in self._groups if group & keys]
-        self._groups = [group for group in self._groups if not group & keys] + [keys.union(*met)]
-        return True
+def _rows(holder):
+    """[(station, row (6,)), ...] of every scalar constraint of a support or a joint."""
+    if isinstance(holder, Joint) and holder.rigid:
+        return [[(holder.first, row), (holder.second, -row)] for row in np.eye(6)]
+    if not isinstance(holder, Joint) and holder.clamps:
+        return [[(holder.station, row)] for row in np.eye(6)]
+    return [rows_of(tie) for tie in holder.ties()]
 
 
-def _key(station):
-    """A hashable key of a station, equal for stations so near that they share the end of an element."""
-    return station.rod, round(station.s / station.rod.length, 9)
+def _key(scene, station):
+    """A key of a station, equal for stations so near that they share the end of an element."""
+    return scene.number(station.rod), round(station.s / station.rod.length, 9)
 
 
 def check_held_once(scene):
     """Refuse redundant constraints: several that hold the same motion of one station.
 
-    Constraints at different stations of a rod are never redundant, since the rod between them is elastic.
+    Constraints at different stations of a rod are never redundant, since the rod between them is elastic. So only those
+    may be that connect stations, and the ground, in a closed loop.
 
     Raises:
         SceneError: naming the redundant supports and joints.
     """
-    stations, holders, rows = [], [], []
-    for holder, parts in _all_rows(scene):
-        row = {}
-        for station, values in parts:
-            key = _key(station)
-            if key not in stations:
-                stations.append(key)
-            row[stations.index(key)] = values
-        holders.append(holder)
-        rows.append(row)
-    if not rows:
-        return
-    matrix = np.zeros((len(rows), 6 * len(stations)))
-    for i, row in enumerate(rows):
-        for k, values in row.items():
-            matrix[i, 6 * k : 6 * k + 6] = values
-    left, sizes, _ = np.linalg.svd(matrix)
-    dependencies = left[:, np.count_nonzero(sizes > _RANK_TOLERANCE * sizes[0]) :]
-    redundant = [
-        holder for holder, part in zip(holders, dependencies, strict=True) if np.abs(part).max(initial=0) > 1e-6
-    ]
+    joined, grounded, closed, stations = Groups(), set(), [], []
+    for holder in _holders(scene):
+        if isinstance(holder, Joint):
+            one, other = (joined.leader(_key(scene, x)) for x in (holder.first, holder.second))
+            if not joined.join(one, other) or (one in grounded and other in grounded):
+                closed.append(one)
+            if one in grounded or other in grounded:
+                grounded.add(joined.leader(one))
+        else:
+            one = joined.leader(_key(scene, holder.station))
+            if one in grounded:
+                closed.append(one)
+            grounded.add(one)
+        stations.append((holder, one))
+    loops = {joined.leader(one): [] for one in closed}
+    for holder, one in stations if loops else ():
+        if (leader := joined.leader(one)) in loops:
+            loops[leader] += [(holder, row) for row in _rows(holder)]
+    redundant = {id(holder) for loop in loops.values() for holder in _redundant(scene, loop)}
     if redundant:
-        names = list(dict.fromkeys(_name(scene, holder) for holder in redundant))
+        names = list(dict.fromkeys(name for name, holder in _named(scene) if id(holder) in redundant))
+        names = [*names[:_NAMED], f"{len(names) - _NAMED} more"] if len(names) > _NAMED else names
         raise SceneError(
             f"Scene: {' and '.join(names)} hold the same motion twice, or contradict each other: expected each motion "
             "of a station to be held once"
         )
 
 
-def _name(scene, holder):
+def _redundant(scene, constraints):
+    """The holders among (holder, [(station, row), ...]) constraints that hold a motion which others of them hold."""
+    columns, entries = {}, []
+    for i, (_, parts) in enumerate(constraints):
+        for station, values in parts:
+            k = columns.setdefault(_key(scene, station), len(columns))
+            entries += [(6 * k + j, i, value) for j, value in enumerate(values) if value]
+    dependent, _ = null_space(*map(np.array, zip(*entries, strict=True)), (6 * len(columns), len(constraints)))
+    return [
+        holder for (holder, _), part in zip(constraints, dependent, strict=True) if np.abs(part).max(initial=0) > 1e-6
+    ]
+
+
+def _named(scene):
+    """(name, support or joint) for all of them."""
     for i, support in enumerate(scene.supports):
-        if support is holder:  # by identity, since equal supports may occur twice
-            return f"supports[{i}] ({type(holder).__name__} at {holder.station})"
-    (i,) = (i for i, joint in enumerate(scene.joints) if joint is holder)
-    return f"joints[{i}] ({holder.first} with {holder.second})"
+        yield f"supports[{i}] ({type(support).__name__} at {support.station})", support
+    for i, joint in enumerate(scene.joints):
+        yield f"joints[{i}] ({joint.first} with {joint.second})", joint
 
 
 @functools.lru_cache(maxsize=32)  # scenes are immutable, and often solved repeatedly
@@ -117,37 +120,82 @@ def check_no_mechanism(scene):
     Raises:
         SceneError: naming the motion that is free.
     """
-    size = max(rod.length for rod in scene.rods)
-    starts = [rod.curve.position(0.0) for rod in scene.rods]
-    rows = []
-    elastic = ((action, [held]) for action in scene.loads for held in action.holds(scene))
-    for _, parts in (*_all_rows(scene), *elastic):
-        row = np.zeros(6 * len(scene.rods))
-        for station, values in parts:
-            k = scene.rods.index(station.rod)
-            arm = (station.rod.curve.position(station.s) - starts[k]) / size
-            row[6 * k : 6 * k + 3] += values[:3]
-            row[6 * k + 3 : 6 * k + 6] += values[3:] + np.cross(arm, values[:3])
-        rows.append(row)
-    matrix = np.array(rows).reshape(-1, 6 * len(scene.rods))
-    _, sizes, right = np.linalg.svd(matrix)
-    held = np.count_nonzero(sizes > _RANK_TOLERANCE * sizes.max(initial=0))
-    free = right[held:].reshape(-1, len(scene.rods), 6)
+    free, complete = free_motions(scene)
     if len(free) == 0:
         return
-    for k, rod in enumerate(scene.rods):
-        if np.linalg.matrix_rank(free[:, k], tol=1e-6) == 6:
-            raise SceneError(
-                f"Scene.supports: nothing holds rod '{rod.name}', it is free to move: expected a support such as "
-                f"Clamp({rod.name}.start){_or_a_joint(scene, rod)}"
-            )
+    loose = np.flatnonzero(np.linalg.matrix_rank(free.swapaxes(0, 1), tol=1e-6) == 6)
+    if len(loose):
+        rod = scene.rods[loose[0]]
+        raise SceneError(
+            f"Scene.supports: nothing holds rod '{rod.name}', it is free to move: expected a support such as "
+            f"Clamp({rod.name}.start){_or_a_joint(scene, rod)}"
+        )
     k = int(np.argmax(np.abs(free).max(axis=(0, 2))))
     motion = free[np.argmax(np.abs(free[:, k]).max(axis=1)), k]
-    others = f", and {len(free) - 1} more motion(s) are free" if len(free) > 1 else ""
+    least = "" if complete else "at least "
+    others = f", and {least}{len(free) - 1} more motion(s) are free" if len(free) > 1 else ""
+    words = _words(motion, scene.rods[k].curve.position(0.0), _size(scene))
     raise SceneError(
-        f"Scene is a mechanism: rod '{scene.rods[k].name}' can {_words(motion, starts[k], size)}{others}: "
+        f"Scene is a mechanism: rod '{scene.rods[k].name}' can {words}{others}: "
         "expected supports and joints that hold it, such as a Clamp or a Hinge"
     )
+
+
+def free_motions(scene):
+    """The rigid motions of the rods that no support, joint or elastic action resists.
+
+    Rods that rigid joints connect move as one body, and not at all where it is clamped; the constraints of the other
+    bodies, six unknowns each, are the rows of a matrix, and the motions its null space.
+
+    Returns:
+        (k, rods, 6) an orthonormal basis, of every rod the velocity of its start over the length of the longest rod and
+        its rotation; and whether it is complete, see `null_space`.
+    """
+    bodies, size = Groups(), _size(scene)
+    for joint in scene.joints:
+        if joint.rigid:
+            bodies.join(scene.number(joint.first.rod), scene.number(joint.second.rod))
+    of_rod = [bodies.leader(k) for k in range(len(scene.rods))]
+    clamped = {of_rod[scene.number(x.station.rod)] for x in scene.supports if x.clamps}
+    columns = {body: 6 * i for i, body in enumerate(b for b in dict.fromkeys(of_rod) if b not in clamped)}
+    if not columns:
+        return np.zeros((0, len(scene.rods), 6)), True
+    held = [*scene.supports, *(joint for joint in scene.joints if not joint.rigid)]
+    rows = [rows_of(tie) for item in held for tie in item.ties()]
+    rows += [[part] for action in scene.loads for part in action.holds(scene)]
+    i, body, place, row = [], [], [], []
+    for number, parts in enumerate(rows):
+        for station, values in parts:
+            if (leader := of_rod[scene.number(station.rod)]) in columns:
+                i.append(number), body.append(leader), row.append(values)
+                place.append(station.rod.curve.position(station.s))
+    starts = np.array([rod.curve.position(0.0) for rod in scene.rods])
+    body, row = np.array(body, dtype=int), np.array(row).reshape(-1, 6)
+    arm = (np.array(place).reshape(-1, 3) - starts[body]) / size
+    # of a body that is larger than the longest rod, rotations are measured by the motion of its farthest point
+    reach = np.ones(len(scene.rods))
+    np.maximum.at(reach, body, np.linalg.norm(arm, axis=1))
+    row[:, 3:] = (row[:, 3:] + np.cross(arm, row[:, :3])) / reach[body, None]
+    first = np.array([columns[k] for k in body.tolist()], dtype=int)
+    places = np.repeat(i, 6).astype(int), (first[:, None] + np.arange(6)).ravel()
+    motions, complete = null_space(*places, row.ravel(), (len(rows), 6 * len(columns)))
+    if not motions.size:
+        return np.zeros((0, len(scene.rods), 6)), True
+    of_bodies = motions.T.reshape(-1, len(columns), 6)
+    free = np.zeros((len(of_bodies), len(scene.rods), 6))
+    for k, leader in enumerate(of_rod):
+        if leader in columns:
+            moved, turn = np.split(of_bodies[:, columns[leader] // 6], 2, axis=1)
+            turn = turn / reach[leader]
+            free[:, k] = np.hstack([moved + np.cross(turn, (starts[k] - starts[leader]) / size), turn])
+    if len(columns) < len(scene.rods):  # rods of one body repeat its motion
+        free = np.linalg.qr(free.reshape(len(free), -1).T)[0].T.reshape(free.shape)
+    return free, complete
+
+
+def _size(scene):
+    """The length of the longest rod, m."""
+    return max(rod.length for rod in scene.rods)
 
 
 def _or_a_joint(scene, rod):
@@ -160,12 +208,22 @@ def _or_a_joint(scene, rod):
 
 def touching(scene):
     """Pairs of ends of different structures that lie at one point, each in both orders, in the order of the rods."""
+    if all(scene.leader(rod) is scene.rods[0] for rod in scene.rods):
+        return
     ends = [end for rod in scene.rods for end in (rod.start, rod.end)]
     places = np.array([end.rod.curve.position(end.s) for end in ends])
-    for end, place in zip(ends, places, strict=True):
-        for j in np.flatnonzero(np.linalg.norm(places - place, axis=1) <= _TOUCHING_DISTANCE * end.rod.length):
-            if scene.leader(end.rod) is not scene.leader(ends[j].rod):
-                yield end, ends[j]
+    reach = np.array([_TOUCHING_DISTANCE * end.rod.length for end in ends])
+    along = places @ _OBLIQUE
+    order = np.argsort(along)
+    # ends at one point are neighbours in the order of their coordinates; a little more than the reach, for rounding
+    wide = 1.01 * reach + 1e-15 * np.abs(places).max()
+    first = np.searchsorted(along[order], along - wide)
+    last = np.searchsorted(along[order], along + wide, side="right")
+    for i in np.flatnonzero(last - first > 1).tolist():
+        near = np.sort(order[first[i] : last[i]])
+        for j in near[np.linalg.norm(places[near] - places[i], axis=1) <= reach[i]].tolist():
+            if scene.leader(ends[i].rod) is not scene.leader(ends[j].rod):
+                yield ends[i], ends[j]
 
 
 def without_mechanism(scene):

@@ -63,8 +63,7 @@ class CirculatoryPart:
         """The matrix of the bilinear form h of `models.circulatory`: d omega(w, psi) = h(w, psi) - h(psi, w)."""
         model, variation = self._model, self._variation
         model.take(rq, load_factor)
-        tied = variation.tied
-        matrix = variation.numbering.matrix(variation.cell_dofs, tied[tied >= 0])
+        matrix = variation.numbering.matrix(variation.cell_dofs, variation.tied, model.signature.connections.pattern)
         if self._form:
             self._form.refresh()
             self._form.add_to_matrix(matrix)

@@ -127,8 +127,8 @@ class Energies:
             of_ties = ties.second_variation(self._axes, eta)
             if springs and self._resistance is not None:
                 of_ties = of_ties + ties.springs(self._axes, eta, self._resistance)
-            tied = np.array([mode[self._direct.model.tied_slots].ravel() for mode in self._modes])
-            found += np.einsum("mi,ij,mj->m", tied, of_ties, tied)
+            tied = np.array([mode[self._direct.model.tied_slots] for mode in self._modes])
+            found += ties.energy(of_ties, tied)
         return found
 
 

@@ -106,7 +106,7 @@ class Part:
     def K(self):
         """The matrix, made where it is first needed: for eigenvalues and modes."""
         variation = self.variation
-        K = variation.numbering.matrix(variation.cell_dofs, variation.tied[variation.tied >= 0])
+        K = variation.numbering.matrix(variation.cell_dofs, variation.tied, self.model.signature.connections.pattern)
         K.setOption(PETSc.Mat.Option.SYMMETRIC, True)
         return K
 
@@ -132,13 +132,13 @@ class Part:
         if self.problem.ties:
             if not stress_alone:
                 self.elimination.count(self.form)  # for the diagonal that springs are scaled by
-            tied, of_ties = self.variation.tied.ravel().astype(PETSc.IntType), self._of_ties(stress_alone)
+            of_ties = self._of_ties(stress_alone)
             if self.model.comm.rank == 0:
-                self.K.setValues(tied, tied, of_ties, PETSc.InsertMode.ADD_VALUES)
+                self.problem.ties.add_to_matrix(self.K, self.variation.tied, of_ties)
         self.K.assemble()
 
     def _of_ties(self, stress_alone=False):
-        """The part of supports and joints, (tied unknowns, the same), after a count of pivots."""
+        """The part of supports and joints, see `TieRows.second_variation`, after a count of pivots."""
         problem, comm, interface = self.problem, self.model.comm, self.interface
         ties, axes, diagonal = problem.ties, self.variation.axes, self.elimination.diagonal
         if comm.size > 1:
@@ -146,7 +146,7 @@ class Part:
         found = ties.second_variation(axes, problem.eta)
         if not stress_alone:
             resistance = np.where(interface.nodes < 0, 0.0, np.append(diagonal, 0.0)[interface.nodes])
-            self.resistance = np.abs(resistance + np.diag(found))
+            self.resistance = np.abs(resistance + ties.diagonal(found))
             found = found + ties.springs(axes, problem.eta, self.resistance)
         return found
 
@@ -157,7 +157,7 @@ class Part:
         if comm.size > 1:
             negative, zero = comm.allreduce(np.array([negative, zero]))
         if self.interface:
-            of_ties = self._of_ties() if self.problem.ties else np.empty((0, 0))
+            of_ties = self._of_ties() if self.problem.ties else np.empty(0)
             further = self.interface.signs(of_ties)
             negative, zero = negative + further[0], zero + further[1]
         chain.negative, chain.zero = int(negative), int(zero)

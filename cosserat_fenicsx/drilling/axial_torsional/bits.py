@@ -27,7 +27,7 @@ def end_of(bit, place, motion, axial):
             refuse("BitOnRock", "law", law, "a Stribeck, for torsion alone: the torque of Cutting follows the depth of "
                    "cut; model='axial and torsional'")  # fmt: skip
         return CuttingEnd(law, bit.weight or 0.0, place, motion)
-    return LobedEnd(law) if isinstance(law, Lobes) and axial else None
+    return LobedEnd(law, place[1], motion[1]) if isinstance(law, Lobes) and axial else None
 
 
 def forces_of(bit, motion):

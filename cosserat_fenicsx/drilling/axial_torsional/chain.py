@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cosserat_fenicsx.drilling.axial_torsional.contact import USUAL, time_of_impact
 from cosserat_fenicsx.drilling.discs import Discs
 from cosserat_fenicsx.drilling.torsion.wall import scene_pieces
 from cosserat_fenicsx.drilling.wall_friction import coefficients
@@ -70,16 +71,17 @@ class Wall:
     radius: np.ndarray
 
 
-def usual_step(scene, elements: int | None) -> float:
+def usual_step(scene, elements: int | None, axial: bool) -> float:
     """The time step (s) of a `Drilling` for so many elements, where none is asked for."""
+    longest = min(_LONGEST, USUAL * time_of_impact(scene)) if axial else _LONGEST
     if isinstance(scene.string, Discs):
         discs, shortest = scene.string, math.inf
         for inertias, springs in ((discs.inertias, discs.stiffnesses), (discs.masses, discs.axial_stiffnesses)):
             if inertias is not None:
                 around = np.append(springs, 0.0) + np.append(0.0, springs)
                 shortest = min(shortest, float(np.sqrt(np.array(inertias) / around).min()))
-        return min(_LONGEST, _SHARE * shortest)
-    return min(_LONGEST, _travel_time(scene) / (elements or _USUAL))
+        return min(longest, _SHARE * shortest)
+    return min(longest, _travel_time(scene) / (elements or _USUAL))
 
 
 def _travel_time(scene):

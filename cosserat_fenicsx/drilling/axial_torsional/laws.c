@@ -85,10 +85,17 @@ static double cut(model *m)
     return fabs(s - copysign(sigma, tau));
 }
 
-/* The weight on bit on a rigid rock, which pushes but does not pull. */
+/* The weight on bit on a rock, which pushes but does not pull: on a rigid one, or on a spring that is as long at rest
+   as the static weight compresses it. */
 static double rest(model *m, double h)
 {
     const int i = m->nodes - 1;
+    if (m->bit.stiffness > 0) {
+        const double k = m->bit.stiffness, still = k * (m->x[2 * i] - m->bit.middle) + m->bit.hanging;
+        const double pressed = still + k * h / 2 * m->w[2 * i];
+        if (pressed > 0) m->c[2 * i] = still, m->d[3 * i] = k * h / 2;
+        return fabs(m->force[2 * i] - fmax(pressed, 0)) / (m->rho[2 * i] + k * h / 2);
+    }
     const double gap = (m->bit.face - m->x[2 * i]) / h, s = m->w[2 * i] - gap;
     if (m->force[2 * i] + m->rho[2 * i] * s > 0) {
         m->mask[i] |= AXIAL;
@@ -163,5 +170,6 @@ static void take_forces(model *m)
     }
     const int j = last * n + n - 1, mask = m->mask[last];
     if (m->bit.law) m->force[j] = mask & TURN ? missing(m, last, n - 1) : m->c[j] + m->d[3 * last + 2] * m->w[j];
-    if (pushed(m)) m->force[2 * last] = mask & AXIAL ? missing(m, last, 0) : m->c[2 * last];
+    if (pushed(m))
+        m->force[2 * last] = mask & AXIAL ? missing(m, last, 0) : m->c[2 * last] + m->d[3 * last] * m->w[2 * last];
 }

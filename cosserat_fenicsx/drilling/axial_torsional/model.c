@@ -13,6 +13,9 @@ static inline int bit_of(const model *m, int d) { return m->dofs == 1 ? TURN : 1
 /* Whether a set-valued law acts on the bit along the axis. */
 static inline int pushed(const model *m) { return m->bit.rock || m->bit.flat > 0; }
 
+/* Whether the bit stands on a rock that does not give way. */
+static inline int on_rigid(const model *m) { return m->bit.rock && m->bit.stiffness == 0; }
+
 /* Largest friction forces at the nodes from the tension now: the normal force of the soft string,
    |T k n + w (e - (e.t) t)|. */
 void limits(model *m)

@@ -17,14 +17,19 @@ typedef struct {
 /* The lower end. Its force against the motion of the last node is force + tangent w + the law. */
 typedef struct {
     int law, weighs, rock;          /* whether there is a Stribeck law, whether its torques are per weight on bit,
-                                       whether the bit rests on a rigid rock */
+                                       whether the bit stands on a rock */
+    double stiffness;               /* of that rock, N/m; 0: it is rigid */
     double still, slipping, decay;  /* torques of the law, or per weight, and speed; 0: it drops at once */
     double flat;                    /* half the largest force of the flats of a worn bit; 0: none */
     double force[2], tangent[4];    /* given from Python before a step, for other laws: weight on bit and torque */
     double hanging;                 /* static weight on bit, with which the string hangs */
-    double weight, torque;          /* of the last step */
+    double weight, torque;          /* of the last step, with the impulse of an impact on rigid rock */
+    double told[2], share;          /* the same without it; the share of the weight that this leaves */
+    double mass;                    /* of the bit, a part of the last node's; of discs all of that */
+    double slowed, slowing;         /* momentum of the last element that the told weight lacks, N s; its force, N */
+    double impulse;                 /* of all impacts on rigid rock since the start, N s */
     double floor, sinking;          /* place of the rock's face at the end of the step, and its velocity downwards */
-    double face;                    /* its place at the end of the part of a step that is being done */
+    double face, middle;            /* its place at the end and in the middle of the part of a step that is being done */
     double factor;                  /* of the next step, on the law's torques */
 } lower;
 
@@ -35,6 +40,7 @@ typedef struct {
 
 typedef struct {
     int nodes, dofs, pieces;
+    int at_end;                     /* whether speeds are told at the end of a step; otherwise means over it */
     const double *mass, *mass_off;  /* (nodes, dofs), (nodes - 1, dofs): tridiagonal mass matrix */
     const double *drag, *drag_off;  /* the same of what is proportional to the velocity */
     const double *spring;           /* (nodes - 1, dofs) stiffness of elements */

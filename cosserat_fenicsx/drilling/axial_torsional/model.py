@@ -34,15 +34,18 @@ _STATE = ("x", "v", "w", "force")
 _TRIALS = 30
 _ELEMENTS = 1_000_000
 _SUMS = ("drive", "hook", "bit", "wall", "mud")
+_BIT = ("weight", "torque", "share", "impulse", "slowed", "slowing", "floor", "sinking", "face")
 
 
 class AxialTorsional(Pointers):
     """A string with axial and torsional motion, or with torsion alone; a `StringModel`.
 
     A string that starts at rest is in the tension of its weight in mud along the hole, without friction. A bit with a
-    weight stands on a rock that does not give way, with the hook lowered until it bears that weight; without one the
+    weight stands on a rock, rigid or of a stiffness, with the hook lowered until it bears that weight; without one the
     string hangs off bottom. The rock pushes the bit but does not pull it; the torque of a bit whose law has a `radius`
-    follows the weight on bit of the step before. Speeds, forces and torques that are told are means over the last step.
+    follows the weight on bit of the step before. A bit that comes down on rigid rock is stopped by an impulse, which is
+    told as such: the weight on bit, and the torque by it, leave it out. Speeds, forces and torques that are told are means over the last step, but for speeds of discs,
+    which are those at its end.
 
     Args:
         scene: a `Drilling`.
@@ -70,7 +73,7 @@ class AxialTorsional(Pointers):
         if elements is not None:
             expected = f"a number of elements from 2 to {_ELEMENTS}"
             number("AxialTorsional", "elements", elements, expected, lambda x: 2 <= x <= _ELEMENTS and x == int(x))
-        self.dt = dt or usual_step(scene, elements)
+        self.dt = dt or usual_step(scene, elements, self._axial)
         for _ in range(_TRIALS):
             self._set(elements)
             if self._lib.steepest(self._m, self.dt) > 0:
@@ -79,7 +82,7 @@ class AxialTorsional(Pointers):
                 self._refuse_step()
             self.dt /= 2
         self._start()
-        self.why = reasons(scene, len(self.depths) - 1, self.dt, axial=self._axial, wall=self._m.pieces > 0)
+        self.why = reasons(scene, self.depths, self.dt, axial=self._axial, wall=self._m.pieces > 0)
 
     def _set(self, elements):
         """All that C needs."""
@@ -95,7 +98,7 @@ class AxialTorsional(Pointers):
         self._lib.limits(self._m)
         m, held = self._m, self._kept["held"]
         held[self._kept["limit"][:, 0] > 0] = 3 if self._axial else 2
-        held[-1] |= 2 * m.bit.law + m.bit.rock
+        held[-1] |= 2 * m.bit.law + (m.bit.rock and not m.bit.stiffness)
 
     # -- what C sees ---------------------------------------------------------------------------------------------------
 
@@ -109,6 +112,7 @@ class AxialTorsional(Pointers):
         m, chain, n = self._m, self._chain, self._dofs
         nodes = len(chain.depths)
         m.nodes, m.dofs, m.hanging_top = nodes, n, chain.hanging_top
+        m.at_end = isinstance(self.scene.string, Discs)
         for name in ("mass", "mass_off", "drag", "drag_off", "spring", "hanging"):
             self._array(name, getattr(chain, name))
         for name in (*_STATE, "a", "o", "rho", "b", "y", "c"):
@@ -135,9 +139,11 @@ class AxialTorsional(Pointers):
         mass[-1] += bit.inertia
         if self._axial:
             mass[0] += bit.mass
+            m.mass = mass[0] if self._m.at_end else bit.mass
             m.hanging = bit.weight or 0.0
         m.weight = bit.weight or 0.0
-        m.rock = self._axial and bit.weight is not None and not isinstance(bit.law, Cutting)
+        m.rock, m.share = self._axial and bit.weight is not None and not isinstance(bit.law, Cutting), 1.0
+        m.stiffness = bit.rock_stiffness if m.rock and np.isfinite(bit.rock_stiffness) else 0.0
         law = stribeck_of(bit.law)
         if law is not None:
             m.law, m.weighs, m.decay = 1, law.radius is not None, law.speed or 0.0
@@ -202,7 +208,7 @@ class AxialTorsional(Pointers):
             motion[0] = brentq(lambda down: found(down)[2][0], 1e-9 * most, most * (1 + 1e-9), xtol=1e-15 * most)
         bears, x, above = found(motion[0])
         kept["x"][:], kept["v"][:], kept["w"][:], kept["held"][:] = x, motion[unknowns], motion[unknowns], 0
-        m.bit.weight, m.bit.torque = bears
+        m.bit.weight, m.bit.torque = m.bit.told = bears.tolist()
         for i, force in enumerate(above):
             top = m.top[i]
             top.force = force
@@ -295,23 +301,23 @@ class AxialTorsional(Pointers):
 
     @property
     def weight_on_bit(self) -> float:
-        """In the last step, N."""
-        return self._m.bit.weight
+        """In the last step, N, without the impulse of an impact on rigid rock."""
+        return self._m.bit.told[0]
 
     def profile(self) -> np.ndarray:
         """See `StringModel.profile`. The node of the bit sticks where the rock holds it."""
         m, n, kept = self._m, self._dofs, self._kept
-        x, v = kept["x"], kept["w"]
+        x, v = kept["x"], kept["v" if m.at_end else "w"]
         forces = np.diff(x, axis=0) * kept["spring"]
         at = np.concatenate([forces[:1], (forces[:-1] + forces[1:]) / 2, forces[-1:]])
         torque, nothing = -at[:, -1], np.full(m.nodes, np.nan)
-        torque[[0, -1]] = m.top[n - 1].force, m.bit.torque
+        torque[[0, -1]] = m.top[n - 1].force, m.bit.told[1]
         sticking = (kept["held"] & 2) / 2
         if not self._axial:
             return np.array([x[:, -1], v[:, -1], torque, nothing, nothing, nothing, sticking])
         hanging = kept["hanging"]
         tension = at[:, 0] + np.concatenate([hanging[:1], (hanging[:-1] + hanging[1:]) / 2, hanging[-1:]])
-        tension[[0, -1]] = m.hanging_top - m.top[0].force, -m.bit.weight
+        tension[[0, -1]] = m.hanging_top - m.top[0].force, -m.bit.told[0]
         return np.array([x[:, 1], v[:, 1], torque, x[:, 0], v[:, 0], tension, sticking])
 
     def memory(self) -> dict:
@@ -320,7 +326,7 @@ class AxialTorsional(Pointers):
         found = {name: self._kept[name].copy() for name in (*_STATE, "held")}
         found["sums"] = np.array([getattr(m.sums, name) for name in _SUMS])
         found["ends"] = np.array([*((m.top[i].error, m.top[i].force) for i in (0, 1))]).ravel()
-        found["bit"] = np.array([m.bit.weight, m.bit.torque, m.bit.floor, m.bit.sinking, m.bit.face])
+        found["bit"] = np.array([*(getattr(m.bit, name) for name in _BIT), *m.bit.told])
         found["counts"] = np.array([self.steps, m.halved, m.iterations, m.most])
         if self.end is not None:
             found["end"] = self.end.memory()
@@ -335,7 +341,9 @@ class AxialTorsional(Pointers):
             setattr(m.sums, name, value)
         for i, (error, force) in enumerate(np.reshape(memory["ends"], (2, 2))):
             m.top[i].error, m.top[i].force = error, force
-        m.bit.weight, m.bit.torque, m.bit.floor, m.bit.sinking, m.bit.face = memory["bit"]
+        for name, value in zip(_BIT, memory["bit"], strict=False):
+            setattr(m.bit, name, value)
+        m.bit.told = memory["bit"][len(_BIT) :].tolist()
         self.steps, m.halved, m.iterations, m.most = (int(x) for x in memory["counts"])
         if self.end is not None:
             self.end.recall(memory["end"])

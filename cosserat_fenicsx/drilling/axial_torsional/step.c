@@ -25,7 +25,7 @@ static inline double eliminate(model *m, const double *given_top, double given_b
             for (int k = 0; k < n; k++)
                 if (m->top[k].rigid) mask |= bit_of(m, k), given[k] = given_top[k];
         if (i == last) {
-            if (mask & AXIAL && m->bit.rock) given[0] = given_bit;
+            if (mask & AXIAL && on_rigid(m)) given[0] = given_bit;
             for (int k = 0; k < n; k++)
                 for (int l = 0; l < n; l++) p[k][l] += m->bit.tangent[2 * (k + 2 - n) + l + 2 - n];
         }
@@ -65,7 +65,7 @@ static inline double eliminate(model *m, const double *given_top, double given_b
 /* The mean velocities w and the forces of the laws in a step; 0 where Newton's method does not converge. */
 static int solve(model *m, double h, const double *signal)
 {
-    const double gap = m->bit.rock ? (m->bit.face - m->x[2 * m->nodes - 2]) / h : 0;
+    const double gap = on_rigid(m) ? (m->bit.face - m->x[2 * m->nodes - 2]) / h : 0;
     memset(m->broken, 0, m->nodes * sizeof *m->broken);
     loads(m, h, signal);
     m->ease = 1;
@@ -100,19 +100,20 @@ static double set_velocity(model *m, int i, int d, double v)
 }
 
 /* Velocities of held nodes in one of the unknowns become 0, that of a bit on a rock the rock's, by impulses on these
-   nodes alone: others go along so that their momentum stays, which loses energy and never brings any. */
-static void settle(model *m, int d)
+   nodes alone: others go along so that their momentum stays, which loses energy and never brings any. Returns the
+   impulse on the last node. */
+static double settle(model *m, int d)
 {
     const int n = m->dofs, last = m->nodes - 1, rigid = m->top[d].rigid, mask = bit_of(m, d);
     double *v = m->v + d, *change = m->y + d, *pivot = m->q + d;
     const double *mass = m->mass + d, *off = m->mass_off + d;
     int moves = 0;
     for (int i = 0; i <= last; i++) {
-        const double sinking = i == last && d < n - 1 && m->bit.rock ? m->bit.sinking : 0;
+        const double sinking = i == last && d < n - 1 && on_rigid(m) ? m->bit.sinking : 0;
         change[i * n] = m->held[i] & mask ? sinking - v[i * n] : 0;
         moves |= change[i * n] != 0;
     }
-    if (!moves) return;
+    if (!moves) return 0;
     /* pivots of free nodes; 0 where a node is held */
     for (int i = 0; i <= last; i++) {
         pivot[i * n] = 0;
@@ -123,6 +124,7 @@ static void settle(model *m, int d)
         if (before) pivot[i * n] -= o * o / before;
         change[i * n] -= before ? o / before * change[(i - 1) * n] : o * change[(i - 1) * n];
     }
+    double on_last = 0;
     for (int i = last; i >= 0; i--)
         if (pivot[i * n])
             change[i * n] = (change[i * n] - (i < last ? off[i * n] * change[(i + 1) * n] : 0)) / pivot[i * n];
@@ -132,12 +134,37 @@ static void settle(model *m, int d)
             if (i) impulse += off[(i - 1) * n] * change[(i - 1) * n];
             if (i < last) impulse += off[i * n] * change[(i + 1) * n];
             const double work = impulse * (v[i * n] + change[i * n] / 2);
+            if (i == last) on_last = impulse;
             if (i == 0)
                 *(d == n - 1 ? &m->sums.drive : &m->sums.hook) += work;
             else
                 *(i == last && (m->bit.law || pushed(m)) ? &m->sums.bit : &m->sums.wall) -= work;
         }
     for (int i = 0; i <= last; i++) v[i * n] += change[i * n];
+    return on_last;
+}
+
+/* The weight on bit of a step from the momentum (N s) that a rigid rock gave the bit in it. A bit that comes down on the
+   rock takes its velocity at once: the impulse of the bit's mass has no duration, and is told as such, not as a force
+   that would be the larger the shorter the step. The half element beside it, which the mesh stops at once, too, is one
+   that a wave stops by the force Z (change of velocity): as long as that takes. */
+static void weigh(model *m, double h, double momentum, int stood, double before)
+{
+    lower *bit = &m->bit;
+    const int last = m->nodes - 1;
+    const double change = before - bit->sinking, whole = m->mass[2 * last];
+    const double impulse = stood || !(m->held[last] & AXIAL) ? 0 : fmax(fmin(whole * change, momentum), 0);
+    if (impulse > 0) {
+        const double half = whole + m->mass_off[2 * last - 2] - bit->mass;
+        bit->impulse += impulse * bit->mass / whole;
+        bit->slowed += impulse * (1 - bit->mass / whole);
+        bit->slowing = sqrt(2 * half * m->spring[2 * last - 2]) * change;
+    }
+    const double wave = fmin(bit->slowed, h * bit->slowing);
+    bit->slowed -= wave;
+    bit->weight = momentum / h;
+    bit->told[0] = (momentum - impulse + wave) / h;
+    bit->share = momentum > 0 ? bit->told[0] / bit->weight : 1;
 }
 
 /* Take a step that has converged. */
@@ -174,6 +201,8 @@ static void commit(model *m, double h, const double *signal)
         }
     }
     const double *w = m->w + (size_t)last * n;
+    const double before = n == 2 ? m->v[2 * last] : 0;
+    const int stood = m->held[last] & AXIAL, slips = !(m->mask[last] & TURN);
     double force[2];
     for (int d = 2 - n; d < 2; d++) {
         force[d] = m->bit.force[d];
@@ -181,15 +210,25 @@ static void commit(model *m, double h, const double *signal)
         if (d ? m->bit.law : pushed(m)) force[d] += m->force[last * n + d + n - 2];
         sums->bit += h * force[d] * w[d + n - 2];
     }
-    if (n == 2) m->bit.weight = force[0];
-    m->bit.torque = force[1];
+    if (n == 2) m->bit.weight = m->bit.told[0] = force[0];
+    /* of a torque by the weight of the step before, what its impulse makes is one, too */
+    m->bit.torque = m->bit.told[1] = force[1];
+    if (m->bit.weighs && m->bit.share < 1) {
+        const double most = m->bit.share * m->bit.factor * m->bit.still;
+        m->bit.told[1] = slips ? m->bit.share * force[1] : fmax(fmin(force[1], most), -most);
+    }
     for (int j = 0; j < m->nodes * n; j++) {
         m->x[j] += h * m->w[j];
         m->v[j] = 2 * m->w[j] - m->v[j];
     }
     for (int i = 0; i <= last; i++) m->held[i] = m->mask[i];
     /* what is held in a step ends it at rest, or with the rock */
-    for (int d = 0; d < n; d++) settle(m, d);
+    double given = 0;
+    for (int d = 0; d < n; d++) {
+        const double impulse = settle(m, d);
+        if (d < turn) given = -impulse;
+    }
+    if (n == 2 && on_rigid(m)) weigh(m, h, h * force[0] + given, stood, before);
 }
 
 static int step(model *m, double h, const double *from, const double *to)
@@ -215,7 +254,7 @@ static int step(model *m, double h, const double *from, const double *to)
 static void write_record(const model *m, double *row)
 {
     const int n = m->dofs, last = m->nodes - 1, turn = n - 1;
-    const double *x = m->x, *v = m->v, *w = m->w;
+    const double *x = m->x, *v = m->v, *w = m->at_end ? v : m->w;
     double kinetic = 0, strain = 0, weight = 0;
     for (int i = 0; i <= last; i++)
         for (int d = 0; d < n; d++) {
@@ -235,10 +274,10 @@ static void write_record(const model *m, double *row)
         strain += m->top[0].integral * error * error / 2 - m->hanging_top * error;
     }
     const double drive = m->top[turn].force, hook = n == 2 ? m->hanging_top - m->top[0].force : NAN;
-    const double series[] = {w[turn], x[turn], drive, w[last * n + turn], x[last * n + turn], m->bit.torque, hook,
-                             n == 2 ? w[2 * last] : NAN, n == 2 ? x[2 * last] : NAN, n == 2 ? m->bit.weight : NAN,
-                             kinetic, strain, m->sums.drive, m->sums.hook, weight, m->sums.bit, m->sums.wall,
-                             m->sums.mud};
+    const double series[] = {w[turn], x[turn], drive, w[last * n + turn], x[last * n + turn], m->bit.told[1], hook,
+                             n == 2 ? w[2 * last] : NAN, n == 2 ? x[2 * last] : NAN, n == 2 ? m->bit.told[0] : NAN,
+                             n == 2 ? m->bit.impulse : NAN, kinetic, strain, m->sums.drive, m->sums.hook, weight,
+                             m->sums.bit, m->sums.wall, m->sums.mud};
     memcpy(row, series, sizeof series);
 }
 
@@ -263,6 +302,7 @@ int advance(model *m, int intervals, const double *interval, double *record)
                 end[d] = from[d] + (done + size) * (to[d] - from[d]);
             }
             m->bit.face = face + (done + size) * sinks;
+            m->bit.middle = face + (done + size / 2) * sinks;
             if (step(m, size * h, begin, end)) {
                 done += size;
                 /* parts begin at multiples of their length */
@@ -275,7 +315,7 @@ int advance(model *m, int intervals, const double *interval, double *record)
         }
         if (interval[1 + 2 * n] != 0) {
             write_record(m, record);
-            record += 18;
+            record += 19;
         }
     }
     return intervals;

@@ -77,8 +77,9 @@ def bit_bounce(scene: Drilling, speeds: Numbers) -> BitBounce:
     """Forced axial vibration of a string whose bit follows the lobes of the rock.
 
     The bit moves by amplitude sin(count theta); the weight on bit shakes by the modulus of i w Z(i w) - m w^2, times
-    the amplitude, with w = count Om, the axial impedance Z of the string below its hook and the mass m of the bit. It
-    is linear: it holds while the weight shakes by less than the static one.
+    the amplitude, with w = count Om, the axial impedance Z of the string below its hook and the mass m of the bit. Rock
+    of the stiffness k takes a part of the motion: of that dynamic stiffness D there acts D k/(D + k). It is linear: it
+    holds while the weight shakes by less than the static one.
 
     Args:
         scene: a `Drilling` whose bit has the law `Lobes`.
@@ -98,4 +99,5 @@ def _amplitude(scene, speeds):
     law, guide = scene.bit.law, axial(scene)
     s = 1j * law.count * speeds
     with np.errstate(divide="ignore"):
-        return np.abs(s * (guide.impedance_at_bit(s) + guide.inertia * s)) * law.amplitude
+        stiffness, rock = s * (guide.impedance_at_bit(s) + guide.inertia * s), scene.bit.rock_stiffness
+        return np.abs(stiffness if math.isinf(rock) else 1 / (1 / stiffness + 1 / rock)) * law.amplitude

@@ -91,7 +91,8 @@ class Stability(Tabular):
         Args:
             i, j: of the speed and the weight.
             drives: {name: TopDrive}; None for a stiff and a matched one, and `SoftTorque` and `SoftSpeed` where the
-                drive has an inertia.
+                drive has an inertia: tuned as the scene's own is where one of these rules chose its gains, which then
+                is among them.
 
         Returns:
             {name: (k,)}: 1/s, the largest growth of those modes whose frequency is nearest to that of mode k; NaN where

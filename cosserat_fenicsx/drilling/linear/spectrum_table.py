@@ -5,6 +5,7 @@ import math
 import numpy as np
 from rich.table import Table
 
+from cosserat_fenicsx.drilling.linear.drives import own_rule
 from cosserat_fenicsx.results.tables import as_text
 
 #: Modes that are listed with their places and drives, the fastest ones.
@@ -36,13 +37,16 @@ def stability_table(answer):
         drives = {name: growth[k] for name, growth in known[i, j].items()}
         places.append(f"{answer.frequency[i, j, k]:.4g} Hz moves: {answer.shape(k, i, j).where}")
         rows.append((k, i, j, drives))
-    names = list(rows[0][3])
+    names, own = list(rows[0][3]), own_rule(answer.scene)
+    drive = own or type(answer.scene.drive.control).__name__
     table = Table(
         caption="growth: in 1/s. fastest: the largest of all cases. at: the middle one of those in which the mode "
-        "grows, its frequency and growth there, with the drive of the scene. mode: counted from 0 by frequency there. "
-        f"To the right the growth with other drives: {_words(names)}. gone: with that drive no mode is near."
+        f"grows, its frequency and growth there, with the drive of the scene, {drive}. mode: counted from 0 by frequency "
+        f"there. To the right the growth with {'each drive' if own else 'other drives'}: {_words(names)}. gone: with that "
+        "drive no mode is near."
     )
-    for heading in ("mode", "grows in", "fastest", "at rpm", "kN", "frequency (Hz)", "growth", *names):
+    headings = [f"{name} (own)" if name == own else name for name in names]
+    for heading in ("mode", "grows in", "fastest", "at rpm", "kN", "frequency (Hz)", "growth", *headings):
         table.add_column(heading, justify="right")
     for k, i, j, drives in rows:
         share = f"{int((answer.growth[:, :, k] > 0).sum())} of {cases}"
@@ -52,7 +56,7 @@ def stability_table(answer):
     lines += [as_text(table), *places]
     if len(grows) > _LISTED:
         lines.append(f"{len(grows) - _LISTED} more modes grow: to_dataframe() has all.")
-    return "\n".join([*lines, *map("{}.".format, _advice(answer, rows, names))])
+    return "\n".join([*lines, *map("{}.".format, _advice(answer, rows, [name for name in names if name != own]))])
 
 
 def _words(names):

@@ -25,6 +25,7 @@ _PANELS = (
     ("speed (rpm)", (("drive_speed", RPM, "drive", DRIVE), ("bit_speed", RPM, "bit", BIT))),
     ("torque (kN m)", (("surface_torque", KILO, "at the surface", DRIVE), ("torque_on_bit", KILO, "on bit", BIT))),
     ("force (kN)", (("hook_load", KILO, "hook load", DRIVE), ("weight_on_bit", KILO, "weight on bit", BIT))),
+    ("impulse (kN s)", (("impulse_on_bit", KILO, "impacts on rigid\nrock, their sum", BIT),)),
     ("bit advance (m)", (("bit_advance", 1.0, "bit advance", BIT),)),
 )
 #: (attribute, label, colour, style) of the ledger.

@@ -170,14 +170,14 @@ int advance(waves *w, int steps, const double *speeds, double first, int width, 
         row[4] = w->bit_inertia > 0 ? w->bit_speed : (w->last_speed[n] + w->speed[n]) / 2;
         row[5] = w->angle[n];
         row[6] = w->bit ? (w->last_on_bit + w->torque[n]) / 2 : 0.0;
-        for (int i = 7; i < 11; i++) row[i] = NAN;
-        energies(w, row + 11, row + 12);
-        row[13] = w->work;
-        row[14] = row[15] = 0.0;
-        row[16] = w->at_bit;
-        row[17] = w->at_wall;
-        row[18] = w->in_mud;
-        if (!isfinite(row[11] + row[12])) return k;
+        for (int i = 7; i < 12; i++) row[i] = NAN;
+        energies(w, row + 12, row + 13);
+        row[14] = w->work;
+        row[15] = row[16] = 0.0;
+        row[17] = w->at_bit;
+        row[18] = w->at_wall;
+        row[19] = w->in_mud;
+        if (!isfinite(row[12] + row[13])) return k;
     }
     return steps;
 }

@@ -1,0 +1,211 @@
+"""Redundant constraints and free motions of frames: the same answers as by a dense decomposition, and fast."""
+
+import time
+
+import numpy as np
+import pytest
+from frames import SECTION, grid_shell, random_frame
+
+import cosserat_fenicsx as cf
+from cosserat_fenicsx.scene import nullspace
+from cosserat_fenicsx.scene.statical import check_no_mechanism, free_motions
+
+pytestmark = pytest.mark.serial
+
+
+def held_by(holder):
+    """[[(station, row (6,)), ...]] of a support or a joint, over displacement and rotation."""
+    both = [holder.first, holder.second] if isinstance(holder, cf.Joint) else [holder.station]
+    moved, turned = np.eye(6)[:3], np.eye(6)[3:]
+    axis = getattr(holder, "release", None) if len(both) == 2 else getattr(holder, "axis", None)
+    if isinstance(holder, cf.Clamp) or (len(both) == 2 and axis is None):
+        rows = [*moved, *turned]
+    elif isinstance(holder, cf.Prescribed):
+        rows = turned
+    elif isinstance(holder, cf.Roller):
+        rows = [np.r_[holder.normal, 0, 0, 0]]
+    else:  # across the axis of a hinge the rotation is held
+        across = np.linalg.svd(np.array([axis]))[2][1:] if axis not in (None, "all") else []
+        rows = [*moved, *(np.r_[0, 0, 0, v] for v in across)]
+    return [[(station, sign * row) for station, sign in zip(both, (1, -1), strict=False)] for row in rows]
+
+
+def dense_rows(rods, constraints):
+    """The constraints' matrix by the rigid motions of the rods."""
+    size = max(rod.length for rod in rods)
+    matrix = np.zeros((len(constraints), len(rods), 6))
+    for i, parts in enumerate(constraints):
+        for station, row in parts:
+            arm = (station.rod.curve.position(station.s) - station.rod.curve.position(0.0)) / size
+            matrix[i, rods.index(station.rod)] += np.r_[row[:3], row[3:] + np.cross(arm, row[:3])]
+    return matrix.reshape(len(constraints), 6 * len(rods))
+
+
+def kernel(matrix):
+    _, sizes, right = np.linalg.svd(matrix)
+    return right[np.count_nonzero(sizes > 1e-9 * sizes.max(initial=0)) :]
+
+
+def dense_redundant(supports, joints):
+    """Whether constraints of stations are dependent, rigid joints that close a loop of such apart."""
+    stations, rows, loops = [], [], {}
+    for holder in (*supports, *joints):
+        if isinstance(holder, cf.Joint) and holder.release is None:
+            one, other = (loops.setdefault(x, {x}) for x in (holder.first, holder.second))
+            if one is other:
+                continue
+            one |= other
+            loops |= dict.fromkeys(one, one)
+        rows += held_by(holder)
+    for parts in rows:
+        stations += [station for station, _ in parts if station not in stations]
+    matrix = np.zeros((len(rows), 6 * len(stations)))
+    for i, parts in enumerate(rows):
+        for station, row in parts:
+            k = stations.index(station)
+            matrix[i, 6 * k : 6 * k + 6] += row
+    return len(kernel(matrix.T)) > 0
+
+
+@pytest.mark.parametrize("dense", [150, 0])
+def test_random_frames_have_the_free_motions_of_a_dense_decomposition(monkeypatch, dense):
+    monkeypatch.setattr(nullspace, "_DENSE", dense)
+    rng, free, redundant = np.random.default_rng(3), [], 0
+    for _ in range(100):
+        rods, supports, loads, joints = random_frame(rng)
+        if dense_redundant(supports, joints):
+            redundant += 1
+            with pytest.raises(cf.SceneError, match="hold the same motion twice"):
+                cf.Scene(rods, supports, loads, joints)
+            continue
+        scene = cf.Scene(rods, supports, loads, joints)
+        rows = [row for holder in (*supports, *joints) for row in held_by(holder)]
+        rows += [[(load.station, np.r_[load.direction, 0, 0, 0])] for load in loads]
+        expected = kernel(dense_rows(rods, rows))
+        found, complete = free_motions(scene)
+        assert complete and len(found) == len(expected)
+        found = found.reshape(len(found), 6 * len(rods))
+        assert np.abs(found.T @ found - expected.T @ expected).max(initial=0) < 1e-9
+        free.append(len(found))
+        if len(found):
+            with pytest.raises(cf.SceneError, match="mechanism|nothing holds"):
+                check_no_mechanism(scene)
+        else:
+            check_no_mechanism(scene)
+    assert 5 < redundant < 70 and free.count(0) > 5 and sum(n > 8 for n in free) > 5
+
+
+def gate(angle):
+    """A rod with a hinge at both ends, one axis of which is turned by an angle away from the rod."""
+    rod = cf.Rod(cf.Line((0, 0, 0), (0, 0, 2.0)), SECTION, name="gate")
+    joined = cf.Rod(cf.Line((0, 0, 2.0), (1.0, 0, 2.0)), SECTION, name="wall")
+    turned = cf.Joint(rod.end, joined.start, (np.sin(angle), 0, np.cos(angle)))
+    return cf.Scene([rod, joined], [cf.Hinge(rod.start, (0, 0, 1.0)), cf.Clamp(joined.end)], [], [turned])
+
+
+@pytest.mark.parametrize("dense", [150, 0])
+def test_what_is_nearly_free_is_told_from_what_is_free(monkeypatch, dense):
+    """Hinges that are out of line by 1e-8 rad and more hold a rod, as the largest of dense decompositions say."""
+    monkeypatch.setattr(nullspace, "_DENSE", dense)
+    for angle in (1e-2, 1e-5, 1e-6, 1e-7, 1e-8):
+        check_no_mechanism(gate(angle))
+    with pytest.raises(cf.SceneError, match=r"rod 'gate' can turn about the axis \(0, 0, -?1\) through \(0, 0, 0\) m:"):
+        check_no_mechanism(gate(0.0))
+
+
+def chain(sag, count, feet=cf.Hinge):
+    """Rods with parallel hinges from support to support, the middle of the straight line of them lower by `sag`."""
+    half = count // 2
+    points = [(k, 0.0, -sag * (half - abs(k - half))) for k in range(count + 1)]
+    rods = [cf.Rod(cf.Line(a, b), SECTION, name=f"r{k}") for k, (a, b) in enumerate(zip(points, points[1:]))]
+    y = (0.0, 1.0, 0.0)
+    joints = [cf.Joint(a.end, b.start, y if k + 1 == half else None) for k, (a, b) in enumerate(zip(rods, rods[1:]))]
+    return cf.Scene(rods, [feet(rods[0].start, y), feet(rods[-1].end, y)], [], joints)
+
+
+@pytest.mark.parametrize("count", [2, 400])
+def test_the_flat_arch_of_three_hinges(count):
+    """Three hinges in line leave an infinitesimal mechanism; a little off it they hold."""
+    for sag in (1e-1, 1e-4, 1e-6):
+        check_no_mechanism(chain(sag, count))
+    with pytest.raises(cf.SceneError, match=r"can turn about the axis \(0, -?1, 0\)"):
+        check_no_mechanism(chain(0.0, count))
+
+
+def processor_time(act):
+    begun = time.process_time()
+    act()
+    return time.process_time() - begun
+
+
+def test_a_frame_of_a_thousand_rods_is_built_in_no_time():
+    """1008 rods take 0.02 s; a dense decomposition took 27 s for 208 rods, and grows with the cube."""
+    parts = grid_shell(18)
+    assert len(parts[0]) == 1008
+    assert processor_time(lambda: check_no_mechanism(cf.Scene(*parts))) < 0.5
+
+
+@pytest.mark.slow
+def test_a_frame_of_ten_thousand_rods_is_built_in_seconds():
+    parts = grid_shell(57, m=58)
+    assert len(parts[0]) == 10_033
+    assert processor_time(lambda: check_no_mechanism(cf.Scene(*parts))) < 5.0
+
+
+def test_the_free_motion_of_one_rod_among_a_thousand_is_named():
+    rods, supports, loads, joints = grid_shell(18)
+    held = cf.Scene(rods, supports, loads, joints)
+    check_no_mechanism(held)
+    # r499 has a ball joint at its start and a hinge along it at its end
+    axis = rods[499].curve.frame(0.0)[:, 2]
+    ends = [k for k, joint in enumerate(joints) if joint.second.rod is rods[499]]
+    assert len(ends) == 2 and all(joint.first.rod is not rods[499] for joint in joints)
+    for k, release in zip(ends, ("all", tuple(axis)), strict=True):
+        joints[k] = cf.Joint(joints[k].first, joints[k].second, release)
+    scene = cf.Scene(rods, supports, loads, joints)
+    with pytest.raises(cf.SceneError, match="mechanism: rod 'r499' can turn about the axis") as refusal:
+        check_no_mechanism(scene)
+    assert "more motion" not in str(refusal.value)
+    (found,), _ = free_motions(scene)
+    np.testing.assert_allclose(np.abs(found[499, 3:]), np.abs(axis), atol=1e-9)
+    assert np.abs(np.delete(found, 499, axis=0)).max() < 1e-9
+
+
+def test_many_loose_rods_are_refused_in_seconds():
+    """With ball joints everywhere every rod spins about its axis; so many motions are counted up to a limit."""
+    scene = cf.Scene(*grid_shell(12, lambda joint: "all"))
+
+    def refused():
+        with pytest.raises(cf.SceneError, match=r"rod 'r\d+' can turn about the axis .* at least 127 more motion"):
+            check_no_mechanism(scene)
+
+    assert processor_time(refused) < 6.0
+
+
+def test_a_large_frame_with_hinges_is_told_from_a_mechanism():
+    """Ball joints at one end of every rod, which rigid joints at the other hold; one of the two kinds alone would not
+    be found by bodies that rigid joints connect."""
+    rods, supports, loads, joints = grid_shell(8)
+    ends = [k for k, joint in enumerate(joints) if joint.second == joint.second.rod.end]
+    for k in ends[::2]:
+        joints[k] = cf.Joint(joints[k].first, joints[k].second, "all")
+    check_no_mechanism(cf.Scene(rods, supports, loads, joints))
+
+
+def test_redundant_constraints_of_many_are_named():
+    """One doubled hinge among a thousand joints, and one among 200 rods that meet at a point."""
+    rods, supports, loads, joints = grid_shell(18)
+    first, second = joints[700].first, joints[700].second
+    joints[700] = cf.Joint(first, second, (0, 0, 1.0))
+    cf.Scene(rods, supports, loads, joints)
+    with pytest.raises(cf.SceneError, match=rf"Scene: joints\[700\].* and joints\[{len(joints)}\] \({second}"):
+        cf.Scene(rods, supports, loads, [*joints, cf.Joint(second, first, "all")])
+    ends = [(np.cos(k), np.sin(k), 0.1 * k) for k in range(200)]
+    spokes = [cf.Rod(cf.Line((0, 0, 0), end), SECTION, name=f"s{k}") for k, end in enumerate(ends)]
+    hub = [cf.Joint(spokes[0].start, rod.start, "all") for rod in spokes[1:]]
+    feet = [cf.Clamp(rod.end) for rod in spokes]
+    check_no_mechanism(cf.Scene(spokes, feet, [], hub))
+    with pytest.raises(
+        cf.SceneError, match=r"joints\[6\] .* and joints\[7\] .* and joints\[199\] .* same motion twice"
+    ):
+        cf.Scene(spokes, feet, [], [*hub, cf.Joint(spokes[7].start, spokes[8].start, "all")])
