@@ -11,7 +11,6 @@ from dataclasses import fields as fields_of
 import basix
 import numpy as np
 import ufl
-from dolfinx import fem
 
 from cosserat_fenicsx import compat
 from cosserat_fenicsx.element import lobatto_weights
@@ -85,20 +84,25 @@ def compile_all(
         if form is not None:
             form.signature()
     points, weights = basix.make_quadrature(basix.CellType.interval, 2 * model.signature.points - 1)
-    at_gauss, at_nodes = densities
+    # what depends on the loads alone is compiled apart, so that scenes that differ in these share the rest
+    residual_form, tangent_form, *second_forms = compat.forms(model.mesh, [residual, tangent, *seconds])
+    given = acting.dead, acting.permanent, forces.dead, forces.permanent
+    dead, permanent, force, permanent_force = compat.forms(model.mesh, given)
+    fields_there, advance_there = compat.expressions(model.mesh, [(fields, points), (advance, points)])
+    density, node_density = compat.expressions(model.mesh, zip(densities, (points, model.nodes), strict=True))
     return CompiledForms(
-        compat.form_for_speed(residual),
-        compat.form_for_speed(tangent),
-        _unless_none(fem.form, acting.dead),
-        _unless_none(fem.form, acting.permanent),
-        tuple(compat.form_for_speed(second) for second in seconds),
-        _unless_none(lambda a: fem.Expression(a, points), fields),
+        residual_form,
+        tangent_form,
+        dead,
+        permanent,
+        tuple(second_forms),
+        fields_there,
         0 if fields is None else len(fields),
-        _unless_none(lambda a: fem.Expression(a, points), advance),
-        _unless_none(fem.form, forces.dead),
-        _unless_none(fem.form, forces.permanent),
-        _unless_none(lambda a: fem.Expression(a, points), at_gauss),
-        _unless_none(lambda a: fem.Expression(a, model.nodes[:, None]), at_nodes),
+        advance_there,
+        force,
+        permanent_force,
+        density,
+        node_density,
         points[:, 0],
         weights,
         unknowns and Symbols(_balance(model, residual, acting), contact, unknowns, seconds),
@@ -115,13 +119,9 @@ def compile_single(model, second):
     """The `CompiledForms` of a model that has only a second variation, unsymmetric, or None."""
     points, weights = basix.make_quadrature(basix.CellType.interval, 2 * model.signature.points - 1)
     none = {field.name: None for field in fields_of(CompiledForms)}
-    seconds = (_unless_none(fem.form, second),)
+    seconds = tuple(compat.forms(model.mesh, [second]))
     given = {"second_variations": seconds, "fields_size": 0, "gauss": points[:, 0], "weights": weights}
     return CompiledForms(**none | given)
-
-
-def _unless_none(make, a):
-    return None if a is None else make(a)
 
 
 def measures(model):

@@ -3,7 +3,6 @@
 from dataclasses import dataclass
 
 import ufl
-from dolfinx import fem
 
 from cosserat_fenicsx import compat
 from cosserat_fenicsx.forms import equilibrium, inertia
@@ -136,7 +135,7 @@ class StepForms:
 
     def of_moving_axis(self):
         """What the balances have per length besides the rates of `momentum`; or None."""
-        return None
+        return
 
     def constraint(self):
         """Terms of the residual in addition to the balances, or 0."""
@@ -276,14 +275,15 @@ class SpatialStep(StepForms):
 
 def compile_motion(model, residual, tangent, acting, fields, others, of_step):
     """`MotionForms` of UFL forms; all signatures are computed before the first is compiled, see `compiled`."""
-    others = {name: form for name, form in others.items()}
     for form in others.values():
         if form is not None:
             form.signature()
     steady = compile_all(model, residual, tangent, acting, [], fields=fields)
-    others = {name: form and compat.form_for_speed(form) for name, form in others.items()}
+    compiled = {}
+    # what depends on the actions is compiled apart, so that scenes that differ in these share the rest
+    for live in (True, False):
+        names = [name for name in others if name.startswith("live") == live]
+        compiled |= zip(names, compat.forms(model.mesh, [others[name] for name in names]), strict=True)
     places = steady.gauss, model.nodes
-    return MotionForms(**vars(steady), **others, **{
-        name: None if a is None else fem.Expression(a, x[:, None])
-        for name, a, x in zip(("of_step", "of_step_at_nodes"), of_step, places, strict=True)
-    })  # fmt: skip
+    step, step_at_nodes = compat.expressions(model.mesh, zip(of_step, places, strict=True))
+    return MotionForms(**vars(steady), **compiled, of_step=step, of_step_at_nodes=step_at_nodes)
