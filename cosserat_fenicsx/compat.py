@@ -30,7 +30,6 @@ try:
     import ufl
     from dolfinx import fem, jit
     from dolfinx import mesh as dolfinx_mesh
-    from mpi4py import MPI
     from petsc4py import PETSc
 except ImportError as missing:
     raise InstallationError(f"dolfinx cannot be imported ({missing}). {_HOW_TO_INSTALL}") from missing
