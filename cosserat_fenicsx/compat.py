@@ -5,13 +5,15 @@ All other modules call the functions below and contain no version checks.
 """
 
 import contextlib
+import functools
 import logging
 import math
 import platform
+import threading
 
 import numpy as np
 
-from cosserat_fenicsx import interrupts
+from cosserat_fenicsx import code_cache, interrupts
 from cosserat_fenicsx.errors import InstallationError
 from cosserat_fenicsx.processor import instructions
 
@@ -24,10 +26,10 @@ _HOW_TO_INSTALL = (
 try:
     import _cffi_backend
     import dolfinx
+    import ffcx.codegeneration.jit as ffcx_compiler
     import ufl
     from dolfinx import fem, jit
     from dolfinx import mesh as dolfinx_mesh
-    from mpi4py import MPI
     from petsc4py import PETSc
 except ImportError as missing:
     raise InstallationError(f"dolfinx cannot be imported ({missing}). {_HOW_TO_INSTALL}") from missing
@@ -73,22 +75,6 @@ def quiet_compiler():
         logging.disable(before)
 
 
-_JIT_DEFAULTS = getattr(jit, "DOLFINX_DEFAULT_JIT_OPTIONS", None) or jit.DOLFINX_DEFAULT_JIT_PARAMETERS
-
-
-@contextlib.contextmanager
-def waiting_for_compilers(seconds):
-    """Wait so long (whole s) for another process that compiles the same form; None for dolfinx's own 10 s, unless the
-    user has set a time."""
-    before = _JIT_DEFAULTS["timeout"]
-    if seconds is not None:
-        _JIT_DEFAULTS["timeout"] = (seconds, before[1])
-    try:
-        yield
-    finally:
-        _JIT_DEFAULTS["timeout"] = before
-
-
 if _VERSION < (0, 8):
 
     def lagrange(mesh, degree, size, *, discontinuous=False):
@@ -100,13 +86,25 @@ if _VERSION < (0, 8):
         """An element whose `size`-component values live at the Gauss points of `quadrature_degree`."""
         return ufl.VectorElement("Quadrature", mesh.ufl_cell(), quadrature_degree, dim=size, quad_scheme="default")
 
+    def _usual_elements(p):
+        """Those of rods with nodal unknowns in P_p."""
+        families = ("Lagrange", p), ("Discontinuous Lagrange", p), ("Discontinuous Lagrange", 1)
+        found = [
+            ufl.VectorElement(family, ufl.interval, q, dim=size) for family, q in families for size in range(1, 10)
+        ]
+        rule = 2 * p - 1
+        found += [
+            ufl.VectorElement("Quadrature", ufl.interval, rule, dim=n, quad_scheme="default") for n in range(1, 10)
+        ]
+        return list(dict.fromkeys(found))
+
     def mixed(*elements):
         """The product of several elements."""
         return ufl.MixedElement(*elements)
 
     def function_space(mesh, element):
         """The finite element space of `element` on `mesh`."""
-        return fem.FunctionSpace(mesh, element)
+        return _constructed(lambda: fem.FunctionSpace(mesh, element), _element(mesh.comm, element))
 
     def interval_domain():
         """UFL's domain of a line, without a mesh."""
@@ -189,32 +187,121 @@ def alias(function):
     return fem.Function(function.function_space, function.x)
 
 
-def form_for_speed(form):
-    """A form compiled with more optimisation, for kernels that run very often: a tenth more to compile, and from a
-    sixth to half of the running time less."""
-    options = {"cffi_extra_compile_args": ["-O3", "-g0", *instructions()]}
-    return fem.form(form, **{"jit_params" if _VERSION < (0, 6) else "jit_options": options})
-
-
 #: Gives a function that compiles a communicator as its first argument: rank 0 calls it before the others.
 rank_0_first = jit.mpi_jit_decorator
 
+# Held while a function of dolfinx or FFCx is replaced.
+_REPLACING = threading.RLock()
 
-def on_rows(expression):
-    """For `rank_0_first`: a compiled function (numbers, results) that adds the values of a UFL expression of the
+
+@contextlib.contextmanager
+def _replaced(module, name, function):
+    with _REPLACING:
+        before = getattr(module, name)
+        setattr(module, name, function)
+        try:
+            yield
+        finally:
+            setattr(module, name, before)
+
+
+class _NotInCache(Exception):
+    """The cache has no compiled module of this name."""
+
+
+def _from_cache(name, objects, folder, timeout):
+    """In place of FFCx's own, which waits for whatever has been begun, and loads whatever is there."""
+    module = code_cache.load(name)
+    if module is None:
+        raise _NotInCache(name)
+    return [getattr(module.lib, x) for x in objects], module
+
+
+def _compiled(kind, objects):
+    """FFCx's (compiled objects, module, code) of a list of UFL's, all in one module, from the cache or compiled.
+
+    Modules are compiled for speed: a tenth more to compile than by default, and from a sixth to half of the running
+    time less. The macro among the flags gives them names of their own: no other program makes them.
+    """
+    flags = ["-O3", "-g0", *instructions(), "-DCOSSERAT_FENICSX", *code_cache.more_flags()]
+
+    def found(folder):
+        return getattr(ffcx_compiler, f"compile_{kind}")(objects, cache_dir=folder, cffi_extra_compile_args=flags)
+
+    def cached():
+        with _replaced(ffcx_compiler, "get_cached_module", _from_cache):
+            return found(code_cache.folder())
+
+    with _REPLACING:
+        try:
+            return cached()
+        except _NotInCache as missing:
+            name = str(missing)
+        with code_cache.alone_with(name) as part:
+            try:
+                return cached()
+            except _NotInCache:
+                made = found(part)
+                code_cache.install(*(part / f"{name}{end}" for end in (code_cache.SUFFIX, ".c", ".c.cached")))
+                return made
+
+
+def _constructed(make, found):
+    """An object of dolfinx whose code is `found`: (compiled, module, code)."""
+    with _replaced(jit, "ffcx_jit", lambda *_, **__: found):
+        return make()
+
+
+@rank_0_first
+def _compiled_one_by_one(kind, objects):
+    """(compiled, module, code) of each of `objects`, which are in one module."""
+    found, module, code = _compiled(kind, objects) if objects else ((), None, None)
+    return [(compiled, module, code) for compiled in found]
+
+
+def forms(mesh, given):
+    """dolfinx's forms of a list of UFL's, or None for None, compiled together."""
+    found = iter(_compiled_one_by_one(mesh.comm, "forms", [form for form in given if form is not None]))
+    return [None if form is None else _constructed(lambda form=form: fem.form(form), next(found)) for form in given]
+
+
+def expressions(mesh, given):
+    """dolfinx's Expressions of a list of (UFL expression or None, points (m,)), or None for None, compiled together."""
+    given = [(a, np.reshape(points, (-1, 1))) for a, points in given]
+    found = iter(_compiled_one_by_one(mesh.comm, "expressions", [pair for pair in given if pair[0] is not None]))
+    return [None if a is None else _constructed(lambda a=a, x=x: fem.Expression(a, x), next(found)) for a, x in given]
+
+
+@rank_0_first
+@functools.cache
+def _element(element):
+    """(compiled, module, code) of an element, for releases that compile elements: with others of its degree, since a
+    module of one takes as long as one of thirty."""
+    p = (element.degree() + 1) // 2 if element.family() == "Quadrature" else element.degree()
+    usual = _usual_elements(max(1, p))
+    for elements in (usual, [element]) if element in usual else ([element],):
+        found, module, code = _compiled("elements", elements)
+        return found[elements.index(element)], module, code
+
+
+def on_rows(expressions):
+    """For `rank_0_first`: compiled functions (numbers, results) that add the values of UFL expressions of the
     components of one ufl.Constant, for every row of `numbers` (m, components), to the rows of `results` (m, ..); both
     contiguous."""
-    compiled, module, _ = jit.ffcx_jit(MPI.COMM_SELF, (expression, np.array([[0.5]])))
-    call, buffer, null = compiled.tabulate_tensor_float64, module.ffi.from_buffer, module.ffi.NULL
+    found, module, _ = _compiled("expressions", [(a, np.array([[0.5]])) for a in expressions])
+    buffer, null = module.ffi.from_buffer, module.ffi.NULL
     others = (null,) * (3 if _VERSION < (0, 10) else 4)
 
-    def add(numbers, results):
-        given, found = buffer("double[]", numbers), buffer("double[]", results)
-        step, size = numbers.shape[1], math.prod(results.shape[1:])
-        for i in range(len(numbers)):
-            call(found + i * size, null, given + i * step, *others)
+    def adding(compiled):
+        def add(numbers, results):
+            given, into = buffer("double[]", numbers), buffer("double[]", results)
+            step, size = numbers.shape[1], math.prod(results.shape[1:])
+            for i in range(len(numbers)):
+                compiled.tabulate_tensor_float64(into + i * size, null, given + i * step, *others)
 
-    return add
+        return add
+
+    return [adding(compiled) for compiled in found]
 
 
 def kernel(form):

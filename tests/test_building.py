@@ -8,6 +8,7 @@ import pytest
 import cosserat_fenicsx as cf
 from cosserat_fenicsx import compat
 from cosserat_fenicsx.algebra import building
+from cosserat_fenicsx.code_cache import folder
 
 pytestmark = pytest.mark.serial
 
@@ -46,13 +47,13 @@ def works(module):
 def test_the_c_of_the_package_is_built(monkeypatch, tmp_path):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     ffi, lib = building.module.__wrapped__()
-    (file,) = building.cache().iterdir()
+    (file,) = folder().iterdir()
     assert file.name.startswith("cosserat_chain_") and callable(lib.eliminate) and ffi.sizeof("kernel") > 0
 
 
 def test_c_is_compiled_once_and_in_silence(source, monkeypatch, capfd):
     made = building.module(source)
-    (file,) = building.cache().iterdir()  # and nothing else
+    (file,) = folder().iterdir()  # and nothing else
     monkeypatch.setenv("CC", "/no/compiler")
     assert building.module(source) is made and works(made)
     building.module.cache_clear()
@@ -62,17 +63,17 @@ def test_c_is_compiled_once_and_in_silence(source, monkeypatch, capfd):
     building.module.cache_clear()
     with pytest.raises(cf.InstallationError, match="/no/compiler"):
         building.module(source)
-    assert list(building.cache().iterdir()) == [file]
+    assert list(folder().iterdir()) == [file]
 
 
 @pytest.mark.parametrize("kept", [0.0, 0.5, 0.99])
 def test_a_damaged_file_is_made_anew(source, monkeypatch, kept):
     building.module(source)
-    (file,) = building.cache().iterdir()
+    (file,) = folder().iterdir()
     content = file.read_bytes()
     monkeypatch.setenv("XDG_CACHE_HOME", str(source.parent / "other"))  # Python loads nothing twice from one place
-    building.cache().mkdir(parents=True)
-    damaged = building.cache() / file.name
+    folder().mkdir(parents=True)
+    damaged = folder() / file.name
     damaged.write_bytes(content[: int(kept * len(content))])
     building.module.cache_clear()
     assert works(building.module(source)) and len(damaged.read_bytes()) == len(content)
@@ -104,7 +105,7 @@ def test_no_compiler(source, monkeypatch, compiler, words):
     monkeypatch.setenv("CC", compiler)
     with pytest.raises(cf.InstallationError, match=words) as told:
         building.module(source)
-    assert "\n" not in str(told.value) and not list(building.cache().iterdir())
+    assert "\n" not in str(told.value) and not list(folder().iterdir())
 
 
 def test_no_cache(source, monkeypatch):

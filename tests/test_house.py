@@ -46,6 +46,7 @@ SHARED = {
     "analytic",
     "annotations",
     "checks",
+    "code_cache",
     "compat",
     "compiling",
     "differences",

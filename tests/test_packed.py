@@ -13,6 +13,7 @@ from cosserat_fenicsx.statics import solvers
 @pytest.mark.parametrize("formulation", ["mixed", "displacement", "multiplier"])
 @pytest.mark.parametrize("degree", [1, 3])
 def test_packed_forms_are_the_forms(formulation, degree):
+    """Every part of a form to the last digit, and their sum."""
     random = np.random.default_rng(COMM.rank)
     packed = None
     for length in (20.0, 30.0):
@@ -22,29 +23,42 @@ def test_packed_forms_are_the_forms(formulation, degree):
             model, forms = problem.model, problem.model.forms
             moving = [model.state, *model.carried]
             compiled = forms.residual, forms.tangent, forms.second_variations[0]
+            assert [len(parts) for parts in compiled] == [2, 2, 2]
             if packed is None:
                 factors = model.load_factor, model.permanent_factor
-                packed = [Packed(form, moving, factors) for form in compiled]
-            for form in packed:
+                packed = [[Packed(form, moving, factors) for form in (*parts, parts)] for parts in compiled]
+            for form in (form for forms in packed for form in forms):
                 form.refresh()
             for eta in (0.3, 0.8):
                 problem.set_load_factor(eta)
                 for function in moving:
                     function.x.array[:] = random.normal(size=len(function.x.array))
                     function.x.scatter_forward()
-                with fem_petsc.assemble_vector(forms.residual).localForm() as local:
-                    found = np.zeros(len(local.array_r))
-                    packed[0].add_to_vector(found)
-                    np.testing.assert_array_equal(found, local.array_r)
-                for form, mine in zip(compiled[1:], packed[1:], strict=True):
-                    A = fem_petsc.create_matrix(form)
-                    matrices = []
-                    for add in (lambda A, form=form: fem_petsc.assemble_matrix(A, form), mine.add_to_matrix):
-                        A.zeroEntries()
-                        add(A)
-                        A.assemble()
-                        matrices.append(A.copy())
-                    difference, whole = matrices
-                    size = whole.norm()
-                    difference.axpy(-1.0, whole)
-                    assert size > 0 and difference.norm() == 0
+                total = 0
+                for part, mine in zip(forms.residual, packed[0], strict=False):
+                    with fem_petsc.assemble_vector(part).localForm() as local:
+                        found = np.zeros(len(local.array_r))
+                        mine.add_to_vector(found)
+                        np.testing.assert_array_equal(found, local.array_r)
+                        total += found
+                found = np.zeros(len(total))
+                packed[0][-1].add_to_vector(found)
+                np.testing.assert_allclose(found, total, rtol=0, atol=1e-14 * np.abs(total).max(initial=0))
+                for parts, (*mine, together) in zip(compiled[1:], packed[1:], strict=True):
+                    total = assembled(parts[0], together.add_to_matrix)
+                    size = total.norm()
+                    for part, my in zip(parts, mine, strict=True):
+                        whole = assembled(part, lambda A, part=part: fem_petsc.assemble_matrix(A, part))
+                        total.axpy(-1.0, whole)
+                        assert whole.norm() > 0
+                        whole.axpy(-1.0, assembled(part, my.add_to_matrix))
+                        assert whole.norm() == 0
+                    assert total.norm() < 1e-14 * size
+
+
+def assembled(form, add):
+    """The matrix of a form's shape to which `add` adds."""
+    A = fem_petsc.create_matrix(form)
+    add(A)
+    A.assemble()
+    return A

@@ -24,7 +24,8 @@ typedef void tabulator(double *, const double *, const double *, const double *,
 
 static void take_constants(kernel *k)
 {
-    for (int i = 0; i < k->constants; i++) k->c[k->slot[i]] = *k->constant[i];
+    for (; k; k = k->next)
+        for (int i = 0; i < k->constants; i++) k->c[k->slot[i]] = *k->constant[i];
 }
 
 static double *coefficients(kernel *k, int e)
@@ -41,17 +42,17 @@ static double *coefficients(kernel *k, int e)
 void pack(kernel *k)
 {
     take_constants(k);
-    for (int e = 0; e < k->elements; e++) coefficients(k, e);
+    for (; k; k = k->next)
+        for (int e = 0; e < k->elements; e++) coefficients(k, e);
 }
 
 /* The numbers A of an element. */
 static const double *element(kernel *k, int e, double *A)
 {
-    const double *w = coefficients(k, e);
     double x[6];
     for (int i = 0; i < 2; i++) memcpy(x + 3 * i, k->x + 3 * (size_t)k->corners[2 * e + i], 3 * sizeof *x);
     memset(A, 0, k->size * sizeof *A);
-    ((tabulator *)k->tabulate)(A, w, k->c, x, 0, 0 LAST);
+    for (; k; k = k->next) ((tabulator *)k->tabulate)(A, coefficients(k, e), k->c, x, 0, 0 LAST);
     return A;
 }
 

@@ -12,7 +12,7 @@ typedef struct {
 } source;
 
 /* A compiled form or expression with the coefficients of all elements. */
-typedef struct {
+typedef struct kernel {
     void *tabulate;                /* FFCx's function for one element */
     int elements, size, width;     /* numbers that it returns, and that it takes, for an element */
     double *w, *c;                 /* coefficients (elements, width), constants */
@@ -23,6 +23,7 @@ typedef struct {
     const double *x;               /* (points, 3) the mesh's geometry */
     const int *corners;            /* (elements, 2) */
     double *A;                     /* (size,) work space */
+    struct kernel *next;           /* a part of the same form, whose numbers are added; 0 for none */
 } kernel;
 
 /* Elimination of the unknowns of elements in turn, along the rods. A segment is a run of elements that share unknowns

@@ -42,7 +42,7 @@ class Packed(_Kernel):
     """A compiled form.
 
     Args:
-        form: a linear or bilinear form, integrated over this rank's elements.
+        form: a linear or bilinear form, integrated over this rank's elements; or several as a tuple, for their sum.
         moving: the Functions whose values change; those of all others are taken by `refresh`.
         constants: the Constants whose values change; those of all others are taken by `refresh`, too.
 
@@ -51,6 +51,8 @@ class Packed(_Kernel):
     """
 
     def __init__(self, form, moving, constants):
+        form, *others = form if isinstance(form, tuple) else (form,)
+        self._others = Packed(tuple(others), moving, constants) if others else None
         self._form = compat.kernel(form)
         spaces, elements = self._form.function_spaces, self._form.mesh.topology.index_map(1).size_local
         of_spaces = [_dofs(space)[:elements] for space in spaces]
@@ -64,6 +66,8 @@ class Packed(_Kernel):
         self._c = np.array(cpp.fem.pack_constants(self._form), dtype=float)
         sources = [place for function in moving for place in self._places(function.x.array)]
         self._set(self._w, self._c, sources, [slot for constant in constants for slot in self._slots(constant.value)])
+        if self._others:
+            self.c.next = self._others.c
 
     def _pack(self):
         """{key of the integral: coefficients (elements, n)}."""
@@ -96,6 +100,8 @@ class Packed(_Kernel):
         for packed in self._pack().values():
             self._w[:] = packed
         self._c[:] = cpp.fem.pack_constants(self._form)
+        if self._others:
+            self._others.refresh()
 
     def add_to_vector(self, array):
         """Add a linear form to an array of local degrees of freedom, ghosts included."""
@@ -110,7 +116,10 @@ class Packed(_Kernel):
     def add_to_matrix(self, A):
         """Add a bilinear form to a PETSc matrix by the matrix's local-to-global map; -1 there means to skip."""
         self._lib.pack(self.c)
-        cpp.fem.petsc.assemble_matrix(A, self._form, self._c, {self._key: self._w} if self._key else {}, [])
+        part = self
+        while part:
+            cpp.fem.petsc.assemble_matrix(A, part._form, part._c, {part._key: part._w} if part._key else {}, [])
+            part = part._others
 
 
 class PackedExpression(_Kernel):

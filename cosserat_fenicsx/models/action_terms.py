@@ -136,10 +136,14 @@ class Term:
         """The virtual work, weighted, per unit of the measure."""
         return self.weight[0] * self.kind.work(point, test, *self.numbers)
 
-    def compile_evolution(self, point):
-        """Compile the update of the memory."""
+    def evolution(self, point):
+        """The update of the memory: its UFL expression, and the points of an element where it is evaluated."""
         changed = [x for a in self.kind.evolve(point, *self.numbers) for x in (a if a.ufl_shape else [a])]
-        self._evolution = fem.Expression(ufl.as_vector(changed), self._dof_places[:, None])
+        return ufl.as_vector(changed), self._dof_places
+
+    def take_evolution(self, compiled):
+        """Take the compiled `evolution`."""
+        self._evolution = compiled
 
     # -- numbers -----------------------------------------------------------------------------------------------------
 

@@ -162,8 +162,9 @@ class RodModel(Snapshots):
             self.carried_dofs = numbers.reshape(len(nodes), nodes.shape[1] * self.force_size)
         self.carries_force, self.force_is_unknown = not force.of_motion, force.unknown
         self.forms = self._compile(spaces)
-        for term, point in self.evolving:
-            term.compile_evolution(point)
+        evolutions = compat.expressions(self.mesh, [term.evolution(point) for term, point in self.evolving])
+        for (term, _), compiled in zip(self.evolving, evolutions, strict=True):
+            term.take_evolution(compiled)
         self.rule = ElementRule(self.nodes, self.forms.gauss, self.forms.weights)
         self._prepare_variations(spaces)
         self.clamps = Clamps(self)

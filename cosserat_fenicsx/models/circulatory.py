@@ -41,11 +41,11 @@ class CirculatoryModel(SpatialModel):
         form = varied_actions(work(test), test, direction)
         of_bracket = work(VirtualMotion(NONE, ufl.cross(direction.phi, test.phi), NONE, NONE))
         for factor, part in (
-            (self.load_factor, of_bracket.dead),
-            (self.permanent_factor, of_bracket.permanent),
+            *((self.load_factor, part) for part in of_bracket.dead.values()),
+            *((self.permanent_factor, part) for part in of_bracket.permanent.values()),
             *((live.factor, live.form) for live in of_bracket.live),
         ):
-            form += 0 if part is None else 0.5 * factor * part
+            form += 0.5 * factor * part
         return form or None
 
     @property

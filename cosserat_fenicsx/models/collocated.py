@@ -48,8 +48,8 @@ class Collocated:
 
     def _compile_collocated(self, step):
         forms, change, rate = compile_collocated(step)
-        points = forms.gauss[:, None]
-        self._strain_change, self._strain_rate = fem.Expression(change, points), fem.Expression(rate, points)
+        strains = [(change, forms.gauss), (rate, forms.gauss)]
+        self._strain_change, self._strain_rate = compat.expressions(self.mesh, strains)
         return forms
 
     def _at_gauss(self, expression):

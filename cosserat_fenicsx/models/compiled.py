@@ -11,7 +11,6 @@ from dataclasses import fields as fields_of
 import basix
 import numpy as np
 import ufl
-from dolfinx import fem
 
 from cosserat_fenicsx import compat
 from cosserat_fenicsx.element import lobatto_weights
@@ -19,12 +18,15 @@ from cosserat_fenicsx.forms.point import resultants, variation
 
 #: Integrals over the rods with Gauss points, with the nodes of P_p, and with the two ends of every element as points.
 Measures = namedtuple("Measures", "gauss nodes ends")
-#: Virtual work of the actions: forms of the dead ones per unit of the load factor and of the permanent factor, or None;
-#: and a list of `Live` for the others.
+#: Virtual work of the actions: {number of the term: its form}, of the dead ones per unit of the load factor and of the
+#: permanent factor; and a list of `Live` for the others.
 ActionWork = namedtuple("ActionWork", "dead permanent live")
 #: Virtual work that depends on the state: its form, its factor (UFL), its measure, its point, and its integrand, a
 #: function (point, test).
 Live = namedtuple("Live", "form factor measure point work")
+
+#: What an action adds to the residual, to the tangent and to every second variation: UFL forms, None where nothing.
+LiveParts = namedtuple("LiveParts", "residual tangent seconds")
 
 #: What derivatives by data need, UFL: the forms that are balanced in equilibrium, factors included; n by the law, where
 #: n is carried, or None; the Functions of the unknowns; and the second variations.
@@ -33,19 +35,20 @@ Symbols = namedtuple("Symbols", "balance contact unknowns seconds")
 
 @dataclass(frozen=True)
 class CompiledForms:
-    """What a solver assembles and evaluates.
+    """What a solver assembles and evaluates. A tuple of forms or expressions stands for their sum: each kind of action
+    has a part of its own, so that scenes with different actions share the rest.
 
     Attributes:
-        residual, tangent: of the unknowns, live loads included.
+        residual, tangent: of the unknowns, live loads included; tuples.
         dead, permanent: virtual work of what does not depend on the motion, per unit of load factor and of the
-            permanent factor; or None.
-        second_variations: symmetric forms in small displacements and rotations; stable if none has negative
+            permanent factor; tuples, empty where there is none.
+        second_variations: symmetric forms in small displacements and rotations, tuples; stable if none has negative
             eigenvalues.
         fields, fields_size: the components of n, m and r' at the Gauss points, and their number; None and 0 without.
         advance: the next carried n at the Gauss points; or None.
-        force, permanent_force: virtual work of the dead forces on displacements, for the determinate models; or None.
+        force, permanent_force: virtual work of the dead forces on displacements, for the determinate models; tuples.
         density, node_density: force and moment per length of the distributed actions, at the Gauss points and at the
-            nodes, (6,), components along the model's axes; or None.
+            nodes, (6,), components along the model's axes; tuples.
         gauss, weights: points in [0, 1] of one element, and their weights.
         symbols: the `Symbols`, or None.
     """
@@ -68,46 +71,99 @@ class CompiledForms:
 
 
 def compile_all(
-    model, residual, tangent, acting, seconds, *, fields=None, advance=None, forces=None, densities=(None, None),
-    unknowns=None, contact=None,
+    model, residual, tangent, acting, seconds, derivative, *, variations=(), fields=None, advance=None, forces=None,
+    densities=((), ()), unknowns=None, contact=None,
 ):  # fmt: skip
     """The `CompiledForms` of UFL forms and expressions.
 
     Args:
+        residual, tangent: without actions; derivative: of a form, in the direction of the trial function.
         acting: the `ActionWork`; forces: that of forces on displacements alone, or None.
-        seconds: second variations, whose symmetric parts count.
+        seconds: second variations without actions, whose symmetric parts count; variations: the (test, direction) of
+            each, or None for that which is the tangent.
         densities: see `action_densities`.
         unknowns, contact: see `Symbols`, of models in statics.
     """
-    seconds = [0.5 * (second + ufl.adjoint(second)) for second in seconds]
-    forces = forces or ActionWork(None, None, [])
-    for form in (residual, tangent, *seconds, acting.dead, acting.permanent, forces.dead, forces.permanent):
-        if form is not None:
-            form.signature()
+    seconds = [_symmetric(second) for second in seconds]
+    forces = forces or ActionWork({}, {}, [])
+    lives = [_live_parts(live, derivative, variations) for live in acting.live]
+    loads = acting.dead, acting.permanent, forces.dead, forces.permanent
+    groups = [[residual, tangent, *seconds], *([live.residual, live.tangent, *live.seconds] for live in lives)]
+    numbers = sorted({number for forms in loads for number in forms})
+    groups += [[forms.get(number) for forms in loads] for number in numbers]
+    (core, *others) = compile_groups(model, groups)
+    of_lives, of_loads = others[: len(lives)], others[len(lives) :]
+    residual_forms, tangent_forms, *second_forms = (tuple(filter(None, forms)) for forms in zip(core, *of_lives))
+    dead, permanent, force, permanent_force = (
+        tuple(filter(None, (group[i] for group in of_loads))) for i in range(len(loads))
+    )
     points, weights = basix.make_quadrature(basix.CellType.interval, 2 * model.signature.points - 1)
-    at_gauss, at_nodes = densities
+    fields_there, advance_there = compat.expressions(model.mesh, [(fields, points), (advance, points)])
+    density, node_density = (
+        tuple(compat.expressions(model.mesh, [(a, places)])[0] for a in given)
+        for given, places in zip(densities, (points, model.nodes), strict=True)
+    )
+    for live in lives:
+        residual += live.residual
+        seconds = [a if b is None else a + b for a, b in zip(seconds, live.seconds, strict=True)]
     return CompiledForms(
-        compat.form_for_speed(residual),
-        compat.form_for_speed(tangent),
-        _unless_none(fem.form, acting.dead),
-        _unless_none(fem.form, acting.permanent),
-        tuple(compat.form_for_speed(second) for second in seconds),
-        _unless_none(lambda a: fem.Expression(a, points), fields),
+        residual_forms,
+        tangent_forms,
+        dead,
+        permanent,
+        tuple(second_forms),
+        fields_there,
         0 if fields is None else len(fields),
-        _unless_none(lambda a: fem.Expression(a, points), advance),
-        _unless_none(fem.form, forces.dead),
-        _unless_none(fem.form, forces.permanent),
-        _unless_none(lambda a: fem.Expression(a, points), at_gauss),
-        _unless_none(lambda a: fem.Expression(a, model.nodes[:, None]), at_nodes),
+        advance_there,
+        force,
+        permanent_force,
+        density,
+        node_density,
         points[:, 0],
         weights,
         unknowns and Symbols(_balance(model, residual, acting), contact, unknowns, seconds),
     )
 
 
+def compile_groups(model, groups):
+    """dolfinx's forms of lists of UFL forms or None, one module for each list."""
+    for form in (form for group in groups for form in group):
+        if form is not None:
+            form.signature()
+    return [compat.forms(model.mesh, group) for group in groups]
+
+
+def _symmetric(form):
+    return 0.5 * (form + ufl.adjoint(form))
+
+
+def _live_parts(live, derivative, variations):
+    tangent, seconds = nonzero(derivative(live.form)), []
+    tangent = None if tangent is None else -live.factor * tangent
+    for pair in variations:
+        second = tangent
+        if pair is not None:
+            change = variation(live.work, live.point, *pair)
+            second = None if _is_zero(change) else nonzero(-live.factor * change * live.measure)
+        seconds.append(None if second is None else _symmetric(second))
+    return LiveParts(-live.factor * live.form, tangent, seconds)
+
+
+def nonzero(form):
+    """A UFL form; None where it is zero, such as the derivative of an action that only remembers the motion."""
+    if not isinstance(form, ufl.Form) or ufl.algorithms.expand_derivatives(form).empty():
+        return None
+    return form
+
+
+def _is_zero(a):
+    return isinstance(a, ufl.constantvalue.Zero) or (isinstance(a, int) and a == 0)
+
+
 def _balance(model, residual, acting):
-    for factor, form in ((model.load_factor, acting.dead), (model.permanent_factor, acting.permanent)):
-        residual = residual if form is None else residual - factor * form
+    for factor, forms in ((model.load_factor, acting.dead), (model.permanent_factor, acting.permanent)):
+        for form in forms.values():
+            residual = residual - factor * form
     return residual
 
 
@@ -115,13 +171,9 @@ def compile_single(model, second):
     """The `CompiledForms` of a model that has only a second variation, unsymmetric, or None."""
     points, weights = basix.make_quadrature(basix.CellType.interval, 2 * model.signature.points - 1)
     none = {field.name: None for field in fields_of(CompiledForms)}
-    seconds = (_unless_none(fem.form, second),)
+    seconds = (() if second is None else tuple(compat.forms(model.mesh, [second])),)
     given = {"second_variations": seconds, "fields_size": 0, "gauss": points[:, 0], "weights": weights}
     return CompiledForms(**none | given)
-
-
-def _unless_none(make, a):
-    return None if a is None else make(a)
 
 
 def measures(model):
@@ -157,9 +209,9 @@ def action_work(model, dx, test, point_at, unknowns, accepted_at=None, test_at=N
         accepted_at: as `point_at`, for the update of memory at an accepted state; by default the same.
         test_at: function place -> the `VirtualMotion` there; given where test functions depend on the state.
     """
-    sums, live = {"load": [], "permanent": []}, []
+    dead, live = {"load": {}, "permanent": {}}, []
     factors = {"load": model.load_factor, "permanent": model.permanent_factor, "full": 1}
-    for term in model.actions.terms:
+    for number, term in enumerate(model.actions.terms):
         kind = term.kind
         measure = {"point": dx.ends, "line": dx.gauss, "node": dx.nodes}[kind.place]
         point = point_at(kind.place, term.rest, term.frame)
@@ -170,33 +222,22 @@ def action_work(model, dx, test, point_at, unknowns, accepted_at=None, test_at=N
         if set(unknowns) & set(form.coefficients()) or kind.memory or kind.refreshed:
             live.append(Live(form, factors[kind.scaled], measure, point, term.work))
         else:
-            sums["load" if kind.scaled == "load" else "permanent"].append(form)
+            dead["load" if kind.scaled == "load" else "permanent"][number] = form
         if kind.memory and term not in (known for known, _ in model.evolving):
             model.evolving.append((term, (accepted_at or point_at)(kind.place, term.rest, term.frame)))
-    return ActionWork(*(sum(forms) if forms else None for forms in sums.values()), live)
+    return ActionWork(*dead.values(), live)
 
 
 def action_densities(model, point_at):
-    """Force and moment per length of all distributed actions, UFL (6,): at the Gauss points, and at the nodes for
-    actions integrated there; None where there are none."""
+    """Force and moment per length of the distributed actions, UFL (6,), one of each term: lists of those at the Gauss
+    points, and of those at the nodes, for actions integrated there."""
     factors = {"load": model.load_factor, "permanent": model.permanent_factor, "full": 1}
-    found = []
-    for place in ("line", "node"):
-        terms = [term for term in model.actions.terms if term.kind.place == place]
-        total = 0
-        for term in terms:
-            force, moment = resultants(term.work, point_at(place, term.rest, term.frame))
-            total += factors[term.kind.scaled] * ufl.as_vector([*force, *moment])
-        found.append(total if terms else None)
-    return tuple(found)
-
-
-def with_live_actions(acting, residual, tangent, derivative):
-    """Residual and tangent with the work of state-dependent actions added."""
-    for live in acting.live:
-        residual -= live.factor * live.form
-        tangent -= live.factor * derivative(live.form)
-    return residual, tangent
+    found = {"line": [], "node": []}
+    for term in model.actions.terms:
+        if term.kind.place in found:
+            force, moment = resultants(term.work, point_at(term.kind.place, term.rest, term.frame))
+            found[term.kind.place].append(factors[term.kind.scaled] * ufl.as_vector([*force, *moment]))
+    return tuple(found.values())
 
 
 def varied_actions(acting, test, direction):

@@ -10,7 +10,6 @@ from cosserat_fenicsx.models.compiled import action_work, derivative_in, measure
 from cosserat_fenicsx.models.moving_forms import (
     SpatialData,
     along,
-    booked,
     compile_motion,
     parts_of,
     virtual_work_of_step,
@@ -64,8 +63,6 @@ def compile_conserving(model):
 
     of_step = virtual_work_of_step(model, of_stress, point_at)
     acting = action_work(model, dx, eq.tests_of(phi, along(phi)), point_at, {U, nodal}, end_point)
-    live = booked(acting)
-    live_tangent = None if live is None else derivative(live)  # 0 where only data or memory see the state
     state = eq.state_of(U, along(U), U)
     n, m = inertia.contact(state, section, viscosity, lambda a: ufl.derivative(a, U, V))
     tests, kappa = eq.tests_of(phi, along(phi)), energy.angular_momentum(q1, spin, body)
@@ -77,11 +74,10 @@ def compile_conserving(model):
     lost += 2 * h * model.drag[0] * energy.kinetic_energy(moved, turned, body) * dx.nodes
     others = {
         "momentum": momentum * dx.nodes,
-        "live": live,
-        "live_tangent": live_tangent if isinstance(live_tangent, ufl.Form) else None,
         "kinetic": energy.kinetic_energy(r_t, spin, body) * dx.nodes,
         "strain": energy.strain_energy(after, section) * dx.gauss,
         "dissipated": lost,
     }
     fields = ufl.as_vector([*n, *m, *state.r_s])
-    return compile_motion(model, residual, derivative(residual), acting, fields, others, of_step)
+    dead = acting._replace(live=[])
+    return compile_motion(model, residual, dead, derivative, fields, others, of_step, acting, turned=True)

@@ -26,14 +26,15 @@ class DataDerivative:
         self._directions = [fem.Function(f.function_space) for f in self._data]
         pairs = list(zip(self._data, self._directions, strict=True))
         with compiling():
-            self.form = fem.form(sum(ufl.derivative(symbols.balance, f, df) for f, df in pairs))
+            (self.form,) = compat.forms(model.mesh, [sum(ufl.derivative(symbols.balance, f, df) for f, df in pairs)])
             self._contact = None
             if symbols.contact is not None:
                 self._moved = fem.Function(model.space)
                 named = ufl.algorithms.extract_coefficients(symbols.contact)
                 change = sum(ufl.derivative(symbols.contact, f, df) for f, df in pairs if f in named)
                 change += ufl.derivative(symbols.contact, symbols.unknowns[0], self._moved)
-                self._contact = fem.Expression(ufl.algorithms.expand_derivatives(change), model.forms.gauss[:, None])
+                change = ufl.algorithms.expand_derivatives(change)
+                (self._contact,) = compat.expressions(model.mesh, [(change, model.forms.gauss)])
 
     def data(self):
         """Copies of the arrays of the data, and of the state at rest, whose clamped part is data too."""
@@ -72,7 +73,7 @@ class EnergyOfMotion:
         (space,), (second,) = model.variation_spaces, model.forms.symbols.seconds
         self._model, self._motion = model, fem.Function(space)
         with compiling():
-            self._form = fem.form(ufl.action(ufl.action(second, self._motion), self._motion))
+            (self._form,) = compat.forms(model.mesh, [ufl.action(ufl.action(second, self._motion), self._motion)])
 
     def along(self, motion):
         """The value at the model's state, over all ranks, dimensionless.

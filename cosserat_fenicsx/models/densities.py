@@ -9,7 +9,7 @@ class Densities:
     def load(self, model):
         """Prepare for the model's scene. Dead densities are evaluated once, per unit of each of the two factors."""
         self._model, self._dead = model, None
-        if model.forms.density is None or model.signature.lives_along_rods:
+        if not model.forms.density or model.signature.lives_along_rods:
             return
         factors = model.load_factor, model.permanent_factor
         before = [float(factor.value) for factor in factors]
@@ -36,12 +36,12 @@ class Densities:
         if self._dead is not None:
             factors = (float(factor.value) for factor in (model.load_factor, model.permanent_factor))
             at_gauss = sum(factor * of_unit for factor, of_unit in zip(factors, self._dead, strict=True))
-        elif model.forms.density is not None:
+        elif model.forms.density:
             at_gauss = self._at(model.forms.density, len(model.forms.gauss))
-        if model.forms.node_density is None:
+        if not model.forms.node_density:
             return at_gauss, None
         return at_gauss, self._at(model.forms.node_density, len(model.nodes))
 
-    def _at(self, expression, points):
-        values = self._model.gathered(expression, points, 6).reshape(-1, points, 2, 3)
+    def _at(self, expressions, points):
+        values = sum(self._model.gathered(each, points, 6) for each in expressions).reshape(-1, points, 2, 3)
         return (values @ self._model.axes).reshape(-1, points, 6)

@@ -39,22 +39,20 @@ class _KnownForce(RodModel):
         self._known = self._take(self.forms.force, self._force)
         self._lasting = 0.0 if self._permanent is None else self._take(self.forms.permanent_force, self._permanent)
 
-    def _take(self, form, function):
+    def _take(self, forms, function):
         """The contact force at the Gauss points that balances dead forces; also stored in a Function."""
-        nodal = self._nodal_forces(form)
+        nodal = self._nodal_forces(forms)
         self.load_norm += float(np.linalg.norm(nodal))
         known = self._tree.forces(nodal, self.rule)
         self.rods.fill(function, known)
         return known
 
-    def _nodal_forces(self, form):
+    def _nodal_forces(self, forms):
         """(N, d) nodal forces equivalent to the dead forces, in the scene's order, on all ranks."""
-        total = np.zeros((len(self.reference), self.force_size))
-        if form is None:
-            return total
-        form = compat.kernel(form)
-        local = np.zeros((len(self._slots), 3))
-        cpp.fem.assemble_vector(local.reshape(-1), form, cpp.fem.pack_constants(form), cpp.fem.pack_coefficients(form))
+        total, local = np.zeros((len(self.reference), self.force_size)), np.zeros((len(self._slots), 3))
+        for form in map(compat.kernel, forms):
+            packed = cpp.fem.pack_constants(form), cpp.fem.pack_coefficients(form)
+            cpp.fem.assemble_vector(local.reshape(-1), form, *packed)
         np.add.at(total, self._slots, local[:, : self.force_size])
         return self.comm.allreduce(total) if self.comm.size > 1 else total
 

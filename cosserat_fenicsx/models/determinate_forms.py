@@ -14,8 +14,6 @@ from cosserat_fenicsx.models.compiled import (
     compile_all,
     derivative_in,
     measures,
-    varied_actions,
-    with_live_actions,
 )
 from cosserat_fenicsx.models.laws import as_matrix, law_of
 
@@ -59,13 +57,15 @@ def compile_in_plane(model, displacements, rotations, N, N_permanent):
 
     acting = action_work(model, dx, test, point_at, (U, U_node))
     internal = eq.moments(n, motion, section, test, ds)
-    residual, tangent = with_live_actions(acting, internal, derivative(internal), derivative)
+    tangent = derivative(internal)
 
     psi, w = ufl.TestFunction(rotations), ufl.TrialFunction(rotations)
     rigid, direction = about_plane(psi), about_plane(w)
     sideways = ds(eq.second_variation(n, motion, section, rigid, direction))
-    sideways -= varied_actions(acting, rigid, direction)
-    return _compiled(model, residual, tangent, acting, [tangent, sideways], dx, displacements, point_at, (U, U_node))
+    return _compiled(
+        model, internal, tangent, acting, [tangent, sideways], derivative, [None, (rigid, direction)], dx,
+        displacements, point_at, (U, U_node),
+    )  # fmt: skip
 
 
 def compile_in_space(model, displacements, rotations, N, N_permanent):
@@ -101,13 +101,15 @@ def compile_in_space(model, displacements, rotations, N, N_permanent):
 
     acting = action_work(model, dx, test, point_at, (U, U_node))
     internal = eq.moments(n, motion, section, test, ds) + spatial.unit_quaternion(motion, test) * dx.nodes
-    residual, tangent = with_live_actions(acting, internal, derivative(internal), derivative)
+    tangent = derivative(internal)
 
     psi, w = ufl.TestFunction(rotations), ufl.TrialFunction(rotations)
     rigid, direction = eq.tests_of(psi, along(psi)), eq.tests_of(w, along(w))
     second = ds(eq.second_variation(n, motion, section, rigid, direction))
-    second -= varied_actions(acting, rigid, direction)
-    return _compiled(model, residual, tangent, acting, [second], dx, displacements, point_at, (U, U_node))
+    return _compiled(
+        model, internal, tangent, acting, [second], derivative, [(rigid, direction)], dx, displacements, point_at,
+        (U, U_node),
+    )  # fmt: skip
 
 
 def _known_force(model, N, N_permanent):
@@ -115,9 +117,14 @@ def _known_force(model, N, N_permanent):
     return n if N_permanent is None else n + model.permanent_factor * N_permanent
 
 
-def _compiled(model, residual, tangent, acting, seconds, dx, displacements, point_at, unknowns):
+def _compiled(
+    model, residual, tangent, acting, seconds, derivative, variations, dx, displacements, point_at, unknowns
+):
     """The `CompiledForms`, with the virtual work of the dead forces on displacements."""
     moved = VirtualMotion(ufl.TestFunction(displacements), NONE)
     forces = action_work(model, dx, moved, point_at, ())
     densities = action_densities(model, point_at)
-    return compile_all(model, residual, tangent, acting, seconds, forces=forces, densities=densities, unknowns=unknowns)
+    return compile_all(
+        model, residual, tangent, acting, seconds, derivative, variations=variations, forces=forces,
+        densities=densities, unknowns=unknowns,
+    )  # fmt: skip

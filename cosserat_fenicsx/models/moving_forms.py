@@ -3,7 +3,6 @@
 from dataclasses import dataclass
 
 import ufl
-from dolfinx import fem
 
 from cosserat_fenicsx import compat
 from cosserat_fenicsx.forms import equilibrium, inertia
@@ -15,9 +14,10 @@ from cosserat_fenicsx.models.compiled import (
     CompiledForms,
     action_work,
     compile_all,
+    compile_groups,
     derivative_in,
     measures,
-    with_live_actions,
+    nonzero,
 )
 from cosserat_fenicsx.models.laws import as_matrix, law_of
 
@@ -29,8 +29,8 @@ class MotionForms(CompiledForms):
     Attributes:
         residual: without the dead loads, and without the momenta at the start of the step, over h.
         momentum: momenta of the state and its velocity times the test functions.
-        live: virtual work of state-dependent actions at the middle of the step, factors included; or None.
-        live_tangent: its derivative, where this is not part of the tangent.
+        live: minus the virtual work of state-dependent actions at the middle of the step, factors included; a tuple.
+        live_tangent: its derivative, where this is not part of the tangent; a tuple.
         kinetic, strain: energies of the state; dissipated: energy dissipated in the step.
         of_step, of_step_at_nodes: the two results of `virtual_work_of_step`, compiled, or None.
     """
@@ -40,7 +40,7 @@ class MotionForms(CompiledForms):
     kinetic: object
     strain: object
     dissipated: object
-    live_tangent: object = None
+    live_tangent: tuple = ()
     of_step: object = None
     of_step_at_nodes: object = None
 
@@ -136,7 +136,7 @@ class StepForms:
 
     def of_moving_axis(self):
         """What the balances have per length besides the rates of `momentum`; or None."""
-        return None
+        return
 
     def constraint(self):
         """Terms of the residual in addition to the balances, or 0."""
@@ -167,21 +167,20 @@ class StepForms:
 
         Args:
             of_step: see `virtual_work_of_step`.
-            acting: `ActionWork` in the residual; working: that in the energy balance, at the middle of the step.
+            acting: `ActionWork` in the residual; working: that in the energy balance, at the middle of the step, or
+                None for the same.
         """
         model, dx, section, viscosity, h = self.model, self.dx, self.section, self.viscosity, self.model.h
-        residual, tangent = with_live_actions(acting, residual, self.derivative(residual), self.derivative)
         n, m = inertia.contact(self.after, section, viscosity, lambda a: ufl.derivative(a, self.state, self.velocity))
         lost = inertia.viscous_loss(self.before, self.after, section, viscosity, h) * dx.gauss
         lost += 2 * h * model.drag[0] * self.kinetic(self.halfway, self.passed) * dx.nodes
         others = {
             "momentum": self.momentum_before() * dx.nodes,
-            "live": booked(working),
             "kinetic": self.kinetic_before() * dx.nodes,
             "strain": inertia.strain_energy(self.after, section) * dx.gauss,
             "dissipated": lost,
         }
-        return compile_motion(model, residual, tangent, acting, self.fields(n, m), others, of_step)
+        return compile_motion(model, residual, acting, self.derivative, self.fields(n, m), others, of_step, working)
 
 
 def compile_momentum(step, stress=inertia.averaged_stress):
@@ -200,7 +199,7 @@ def compile_momentum(step, stress=inertia.averaged_stress):
     residual += model.drag[0] * step.momentum(step.halfway, step.passed) * dx.nodes
     residual += step.constraint()
     acting = step.actions(step.halfway_point)
-    return step.compiled(residual, acting, acting, virtual_work_of_step(model, of_stress, step.halfway_point))
+    return step.compiled(residual, acting, None, virtual_work_of_step(model, of_stress, step.halfway_point))
 
 
 def virtual_work_of_step(model, stress, point_at):
@@ -227,11 +226,6 @@ def virtual_work_of_step(model, stress, point_at):
     if not any(term.kind.place == "node" for term, _, _ in acting):
         return at_gauss, None
     return at_gauss, ufl.as_vector([-less(test, "node") for test in tests[:6]])
-
-
-def booked(acting):
-    """The virtual work of state-dependent actions with their factors, for the energy balance; or None."""
-    return sum(live.factor * live.form for live in acting.live) if acting.live else None
 
 
 class SpatialStep(StepForms):
@@ -274,16 +268,31 @@ class SpatialStep(StepForms):
         return ufl.as_vector([*n, *m, *self.after.r_s])
 
 
-def compile_motion(model, residual, tangent, acting, fields, others, of_step):
-    """`MotionForms` of UFL forms; all signatures are computed before the first is compiled, see `compiled`."""
-    others = {name: form for name, form in others.items()}
-    for form in others.values():
+def compile_motion(model, residual, acting, derivative, fields, others, of_step, working=None, *, turned=False):
+    """`MotionForms` of UFL forms; all signatures are computed before the first is compiled, see `compiled`.
+
+    Args:
+        residual: without actions; acting: the `ActionWork` in it; derivative: see `compile_all`.
+        others: {name in `MotionForms`: form}.
+        working: the `ActionWork` in the energy balance, where it is another one.
+        turned: whether the live part of `working` has a tangent of its own.
+    """
+    lives = [] if working is None else working.live
+    booked = [(-live.factor * live.form, derivative(live.form) if turned else None) for live in lives]
+    tangents = [None if change is None else nonzero(change) for _, change in booked]
+    groups = [list(others.values())]
+    groups += [
+        [work, None if change is None else -live.factor * change]
+        for live, (work, _), change in zip(lives, booked, tangents, strict=True)
+    ]
+    for form in (form for group in groups for form in group):
         if form is not None:
             form.signature()
-    steady = compile_all(model, residual, tangent, acting, [], fields=fields)
-    others = {name: form and compat.form_for_speed(form) for name, form in others.items()}
-    places = steady.gauss, model.nodes
-    return MotionForms(**vars(steady), **others, **{
-        name: None if a is None else fem.Expression(a, x[:, None])
-        for name, a, x in zip(("of_step", "of_step_at_nodes"), of_step, places, strict=True)
-    })  # fmt: skip
+    steady = compile_all(model, residual, derivative(residual), acting, [], derivative, fields=fields)
+    of_others, *of_lives = compile_groups(model, groups)
+    live, live_tangent = (tuple(group[i] for group in of_lives if group[i]) for i in range(2))
+    step, step_at_nodes = compat.expressions(model.mesh, zip(of_step, (steady.gauss, model.nodes), strict=True))
+    return MotionForms(
+        **vars(steady), **dict(zip(others, of_others, strict=True)), of_step=step, of_step_at_nodes=step_at_nodes,
+        live=steady.residual[1:] if working is None else live, live_tangent=live_tangent,
+    )  # fmt: skip

@@ -13,8 +13,6 @@ from cosserat_fenicsx.models.compiled import (
     compile_all,
     derivative_in,
     measures,
-    varied_actions,
-    with_live_actions,
 )
 from cosserat_fenicsx.models.laws import law_of, stiff_enough
 
@@ -54,19 +52,18 @@ def compile_forms(model, variations):
         return eq.point_of(*((U, along(U)) if place == "line" else (U_node, along(U_node))), rest=rest, frame=frame)
 
     acting = action_work(model, dx, test, point_at, (U, U_node))
-    residual, tangent = with_live_actions(acting, weak.internal, weak.tangent, derivative)
 
     psi, w = ufl.TestFunction(variations), ufl.TrialFunction(variations)
-    stiff, seconds = section._replace(law=stiff_enough(weak.n, data)), []
+    stiff, seconds, variations_of = section._replace(law=stiff_enough(weak.n, data)), [], []
     for tests_of in (eq.tests_of, eq.sideways_tests_of):
         rigid, direction = tests_of(psi, along(psi)), tests_of(w, along(w))
-        second = ds(equilibrium.second_variation(weak.n, motion, stiff, rigid, direction))
-        seconds.append(second - varied_actions(acting, rigid, direction))
+        seconds.append(ds(equilibrium.second_variation(weak.n, motion, stiff, rigid, direction)))
+        variations_of.append((rigid, direction))
     m = equilibrium.contact_moment(weak.n, motion, section)
     fields = ufl.as_vector([weak.n[0], weak.n[1], m[2], motion.r_s[0], motion.r_s[1]])
     densities = action_densities(model, point_at)
     contact = ufl.as_vector(list(equilibrium.contact(motion, section)[0])[:2]) if model.carried else None
     return compile_all(
-        model, residual, tangent, acting, seconds, fields=fields, advance=advance, densities=densities,
-        unknowns=(U, U_node), contact=contact,
+        model, weak.internal, weak.tangent, acting, seconds, derivative, variations=variations_of, fields=fields,
+        advance=advance, densities=densities, unknowns=(U, U_node), contact=contact,
     )  # fmt: skip

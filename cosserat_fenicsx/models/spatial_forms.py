@@ -13,8 +13,6 @@ from cosserat_fenicsx.models.compiled import (
     compile_all,
     derivative_in,
     measures,
-    varied_actions,
-    with_live_actions,
 )
 from cosserat_fenicsx.models.laws import as_matrix, law_of, stiff_enough
 
@@ -62,18 +60,16 @@ def compile_forms(model, rotations):
         return formulation.unit_length.tests(phi, along(phi), at.q, at.q_s)
 
     acting = action_work(model, dx, test, point_at, (U, U_node), test_at=test_at)
-    residual, tangent = with_live_actions(acting, internal, tangent, derivative)
 
     # The second variation in (r, theta) satisfies |q| = 1 by construction.
     psi, w = ufl.TestFunction(rotations), ufl.TrialFunction(rotations)
     rigid, direction = eq.rotation_tests_of(psi, along(psi)), eq.rotation_tests_of(w, along(w))
     stiff = section._replace(law=stiff_enough(weak.n, data))
     second = ds(equilibrium.second_variation(weak.n, state, stiff, rigid, direction, model.stiffness))
-    second -= varied_actions(acting, rigid, direction)
     fields = ufl.as_vector([*weak.n, *equilibrium.contact_moment(weak.n, state, section), *state.r_s])
     densities = action_densities(model, point_at)
     contact = equilibrium.contact(state, section)[0] if model.carried else None
     return compile_all(
-        model, residual, tangent, acting, [second], fields=fields, advance=weak.advance, densities=densities,
-        unknowns=(U, U_node), contact=contact,
+        model, internal, tangent, acting, [second], derivative, variations=[(rigid, direction)], fields=fields,
+        advance=weak.advance, densities=densities, unknowns=(U, U_node), contact=contact,
     )  # fmt: skip

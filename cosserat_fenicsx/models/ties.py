@@ -24,7 +24,7 @@ _GROUND = (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
 @cache
 def _kernels():
     """The compiled `forms.ties.derivatives`, which are the same for all scenes and models."""
-    return [compat.on_rows(x) for x in eq.derivatives(ufl.Constant(compat.interval_domain(), shape=(eq.COUNT,)))]
+    return compat.on_rows(eq.derivatives(ufl.Constant(compat.interval_domain(), shape=(eq.COUNT,))))
 
 
 class Ties:

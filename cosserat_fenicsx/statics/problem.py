@@ -40,7 +40,7 @@ class Problem(Equations):
         self.take_forms(Packed(forms.residual, moving, constants), Packed(forms.tangent, moving, constants), advance)
         self._dead, self._permanent, *self._difference = (self.numbering.vector() for _ in range(4))
         self._loads, self._permanent_loads = (
-            None if form is None else Packed(form, (), ()) for form in (forms.dead, forms.permanent)
+            Packed(form, (), ()) if form else None for form in (forms.dead, forms.permanent)
         )
         self._live = [function.x.array for function in model.carried]
         self.load_factor = self.load_norm = 0.0

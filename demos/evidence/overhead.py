@@ -32,10 +32,16 @@ class BareLoop:
     def __init__(self, model, path):
         self.model, self.iterations = model, path.iterations
         forms = model.forms
-        self.A, self.K = fem_petsc.create_matrix(forms.tangent), fem_petsc.create_matrix(forms.second_variations[0])
+        # of one part each, since no load depends on the state
+        (self.residual_form,), (self.tangent,), ((self.second,),) = (
+            forms.residual, forms.tangent, forms.second_variations
+        )  # fmt: skip
+        self.A, self.K = fem_petsc.create_matrix(self.tangent), fem_petsc.create_matrix(self.second)
         self.K.setOption(PETSc.Mat.Option.SYMMETRIC, True)
-        self.b, self.x = fem_petsc.assemble_vector(forms.residual), self.A.createVecRight()
-        self.dead = fem_petsc.assemble_vector(forms.dead)
+        self.b, self.x = fem_petsc.assemble_vector(self.residual_form), self.A.createVecRight()
+        self.dead = self.b.duplicate()
+        for form in forms.dead:
+            fem_petsc.assemble_vector(self.dead, form)
         (node,) = np.flatnonzero(model._slots == 0).astype(np.int32)  # the clamped one
         self.clamped = model._nodal[node]
         self.dead.array_w[self.clamped] = 0
@@ -53,7 +59,7 @@ class BareLoop:
     def residual(self, eta):
         with self.b.localForm() as numbers:
             numbers.set(0.0)
-        fem_petsc.assemble_vector(self.b, self.model.forms.residual)
+        fem_petsc.assemble_vector(self.b, self.residual_form)
         self.b.axpy(-eta, self.dead)
         self.b.array_w[self.clamped] = 0.0
 
@@ -72,7 +78,7 @@ class BareLoop:
             self.residual(eta)
             for _ in range(iterations):
                 self.A.zeroEntries()
-                fem_petsc.assemble_matrix(self.A, forms.tangent, bcs=self.held)
+                fem_petsc.assemble_matrix(self.A, self.tangent, bcs=self.held)
                 self.A.assemble()
                 self.ksp.setOperators(self.A)
                 self.ksp.solve(self.b, self.x)
@@ -83,7 +89,7 @@ class BareLoop:
                 self.residual(eta)
             if stability:
                 self.K.zeroEntries()
-                fem_petsc.assemble_matrix(self.K, forms.second_variations[0], bcs=self.held_rotations)
+                fem_petsc.assemble_matrix(self.K, self.second, bcs=self.held_rotations)
                 self.K.assemble()
                 self.pc.setOperators(self.K)
                 self.pc.setUp()

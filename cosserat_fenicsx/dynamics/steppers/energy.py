@@ -54,7 +54,7 @@ class TurnedStepProblem(StepProblem):
         rows[:, 0] = np.einsum("ni,ni->n", q, q) - 1
         if self._live:
             self._assemble(self._live, self._vector)
-            b -= self._vector.array_r
+            b += self._vector.array_r
         super()._change_residual(x, b)
 
     def _change_matrices(self):
@@ -71,7 +71,7 @@ class TurnedStepProblem(StepProblem):
             rows[:, k, 3, columns] += 2 * q[:, k] * share[:, k]
             rows[:, k, 4:, columns] += own[:, k] * share[:, k, :, None]
         if self._live_tangent:
-            self.matrices -= self._live_tangent.matrices()
+            self.matrices += self._live_tangent.matrices()
 
 
 def _turning(q):

@@ -64,8 +64,9 @@ class StepProblem(Equations):
         )
 
     def _pack_form(self, form):
-        """A form for assembly, all of whose data may change in time; None where there is none."""
-        if form is None:
+        """A form for assembly, or a tuple of them for their sum, all of whose data may change in time; None where there
+        is none."""
+        if not form:
             return None
         model, actions = self.model, self.model.actions
         moving = (*model.ends, *actions.data, *actions.memory_functions)
@@ -171,7 +172,7 @@ class StepProblem(Equations):
         if self._live:
             self._refresh(0.5)
             self._assemble(self._live, self._known)
-            done += self._known.dot(self._vector)
+            done -= self._known.dot(self._vector)
         if self.ties:
             done += model.comm.allreduce(self.ties.work(eta))
         return done - sum(part.books()[0] for part in self.touching)

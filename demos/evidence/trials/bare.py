@@ -54,8 +54,10 @@ class Loop:
         forms, nodal, slots = self.model.forms, self.model._nodal, self.model._slots
         (clamp,), (self._tip,) = nodal[slots == 0], nodal[slots == slots.max(), :3]
         self.held = clamp[list(held)].astype(np.int32)
-        self.A, self.b = fem_petsc.create_matrix(forms.tangent), fem_petsc.assemble_vector(forms.residual)
-        self.dead = fem_petsc.assemble_vector(forms.dead)
+        self.A, self.b = fem_petsc.create_matrix(forms.tangent[0]), fem_petsc.assemble_vector(forms.residual[0])
+        self.dead = self.b.duplicate()
+        for form in forms.dead:
+            fem_petsc.assemble_vector(self.dead, form)
         self.x = self.A.createVecRight()
         self.x.array_w[:] = self._at_rest = self.model.state.x.array.copy()
         scales = self.model.scales
@@ -93,14 +95,16 @@ class Loop:
         self.model.state.x.array[:] = x.array_r
         with b.localForm() as numbers:
             numbers.set(0.0)
-        fem_petsc.assemble_vector(b, self.forms.residual)
+        for form in self.forms.residual:
+            fem_petsc.assemble_vector(b, form)
         b.axpy(-self.eta, self.dead)
         b.array_w[:] *= self.rows
         b.array_w[self.held] = x.array_r[self.held] - self._at_rest[self.held]
 
     def _jacobian(self, snes, x, A, P):
         P.zeroEntries()
-        fem_petsc.assemble_matrix(P, self.forms.tangent)
+        for form in self.forms.tangent:
+            fem_petsc.assemble_matrix(P, form)
         P.assemble()
         rows = P.createVecLeft()
         rows.array_w[:] = self.rows
@@ -154,7 +158,9 @@ def weakly_unit(model):
     residual = equilibrium.displacement(state, section, test, ds) + ds(eq.unit_quaternion(state, test))
     with compat.quiet_compiler():
         return SimpleNamespace(
-            residual=fem.form(residual), tangent=fem.form(ufl.derivative(residual, U, trial)), dead=model.forms.dead
+            residual=(fem.form(residual),),
+            tangent=(fem.form(ufl.derivative(residual, U, trial)),),
+            dead=model.forms.dead,
         )
 
 

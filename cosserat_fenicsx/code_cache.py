@@ -1,0 +1,160 @@
+"""The folder of compiled code: which one it is, whose its files are, and one process at a time that makes a file of it.
+
+Whoever can write to a file there runs code in the name of whoever loads it. So the folder and its files must belong to
+the user, and nobody else may write to them; what does not is not loaded.
+
+A file is made in a folder of its own and moved to its place when it is complete, so a process that is ended meanwhile
+leaves nothing that others would take for compiled code, or would wait for.
+"""
+
+import contextlib
+import fcntl
+import hashlib
+import importlib.machinery
+import importlib.util
+import os
+import shlex
+import shutil
+import stat
+import tempfile
+import time
+import warnings
+from functools import cache as once
+from pathlib import Path
+
+from cosserat_fenicsx.errors import InstallationError
+
+#: How the name of a compiled module ends.
+SUFFIX = importlib.machinery.EXTENSION_SUFFIXES[0]
+_DIGEST = hashlib.sha256
+_DIGEST_SIZE = _DIGEST().digest_size
+# Longest time (s) to wait for another process that makes the same file; then it is made twice, which does no harm.
+_PATIENCE = 300
+_OTHERS_MAY_WRITE = stat.S_IWGRP | stat.S_IWOTH
+
+
+def folder():
+    """The folder of compiled forms, and of our own C, whether it exists or not: dolfinx's, or one of the user's own
+    beside it where that belongs to another user or others may write to it.
+
+    Raises:
+        InstallationError: neither of them belongs to the user alone.
+    """
+    given = Path(os.environ.get("XDG_CACHE_HOME") or "")
+    base = (
+        given if given.is_absolute() else Path.home() / ".cache"
+    )  # a relative one is to be ignored, says its standard
+    shared, own = base / "fenics", base / f"fenics-{os.geteuid()}"
+    problem = why_unsafe(shared)
+    if problem is None:
+        return shared
+    if why_unsafe(own) is not None:
+        raise InstallationError(
+            f"compiled code would be loaded from {shared}, which {problem}, or from {own}, which {why_unsafe(own)}: "
+            "set XDG_CACHE_HOME to a folder that is yours alone"
+        )
+    _say(f"the cache of compiled code {shared} is not used, because it {problem}; {own} takes its place")
+    return own
+
+
+@once
+def _say(words):
+    warnings.warn(words, RuntimeWarning, stacklevel=3)
+
+
+def more_flags():
+    """Flags for the C compiler from the environment's COSSERAT_FENICSX_CFLAGS, after all others."""
+    return shlex.split(os.environ.get("COSSERAT_FENICSX_CFLAGS", ""))
+
+
+def why_unsafe(path):
+    """Why code in a folder or a file may be another user's, in words; None if it is the user's own, or is not there."""
+    try:
+        found = path.stat() if path.is_dir() else path.lstat()
+    except (FileNotFoundError, NotADirectoryError):
+        return None
+    if found.st_uid != os.geteuid():
+        return f"belongs to another user (number {found.st_uid})"
+    return "can be written to by others" if found.st_mode & _OTHERS_MAY_WRITE else None
+
+
+def make(path):
+    """Make a folder, and those around it, for the user alone."""
+    if not path.is_dir():
+        make(path.parent)
+        path.mkdir(mode=0o700, exist_ok=True)
+
+
+@contextlib.contextmanager
+def alone_with(name):
+    """One process at a time makes the file `name` of the folder, in a new folder of its own, which is given.
+
+    The lock ends with its process, however that ends; where the file system has no locks, several processes may make
+    the same file. What ended processes have left of theirs is removed.
+    """
+    place = folder()
+    make(place)
+    with _locked(place / f"{name}.lock") as alone:
+        if alone:
+            for left in place.glob(f"{name}.part-*"):
+                shutil.rmtree(left, ignore_errors=True)
+        with tempfile.TemporaryDirectory(dir=place, prefix=f"{name}.part-", ignore_cleanup_errors=True) as part:
+            yield Path(part)
+
+
+@contextlib.contextmanager
+def _locked(file):
+    """Whether this process is the only one with a lock on the file, which is made, and removed at the end."""
+    end, pause, alone = time.monotonic() + _PATIENCE, 1e-3, None
+    while alone is None:
+        handle = os.open(file, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_CLOEXEC, 0o600)
+        try:
+            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            with contextlib.suppress(FileNotFoundError):  # the one before may have removed the file that is locked now
+                alone = True if os.path.samestat(os.fstat(handle), file.stat()) else None
+        except BlockingIOError:
+            alone = False if time.monotonic() > end else None
+            time.sleep(pause)
+            pause = min(0.1, 2 * pause)
+        except OSError:
+            alone = False  # a file system without locks
+        if alone is None:
+            os.close(handle)
+    try:
+        yield alone
+    finally:
+        if alone:
+            file.unlink(missing_ok=True)
+        os.close(handle)
+
+
+def install(made, *beside):
+    """Move a compiled module that is complete to its place in the folder, after the files that belong to it."""
+    with open(made, "r+b") as binary:
+        digest = _DIGEST(binary.read()).digest()
+        binary.write(digest)
+        binary.flush()
+        os.fsync(binary.fileno())
+    for file in (*beside, made):
+        file.chmod(file.stat().st_mode & ~_OTHERS_MAY_WRITE)
+        file.replace(folder() / file.name)
+
+
+def load(name):
+    """The compiled module of this name; None where there is none that is complete, the user's own, and of this system.
+
+    Raises:
+        OSError: the cache cannot be read.
+    """
+    file = folder() / (name + SUFFIX)
+    if why_unsafe(file) is not None:
+        return None
+    # The system's loader maps what is there, and the process ends where a part is missing: hence a digest at the end.
+    with contextlib.suppress(FileNotFoundError, ImportError):
+        content = file.read_bytes()
+        if _DIGEST(content[:-_DIGEST_SIZE]).digest() == content[-_DIGEST_SIZE:]:
+            spec = importlib.util.spec_from_file_location(name, file)
+            made = importlib.util.module_from_spec(spec)
+            spec.loader.exec_module(made)
+            return made
+    return None
