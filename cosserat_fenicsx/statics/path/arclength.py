@@ -11,7 +11,7 @@ import math
 
 from cosserat_fenicsx.interrupts import obey
 from cosserat_fenicsx.statics.path.events import Lost
-from cosserat_fenicsx.statics.path.track import FAR, INTENDED, growth_of, through
+from cosserat_fenicsx.statics.path.track import FAR, INTENDED, bends, growth_of, through
 
 # Largest distance of the corrected point from the predictor over the length of the step; the second applies where the
 # number of negative modes changes without a limit point: the step may have changed to another branch.
@@ -60,11 +60,11 @@ class ArcLength:
                     look = self._locator.between
                     landing, crossings = look(track.here, point, target, self._weight, probe=not branching)
                 except Lost as lost:
-                    track.failure = "the critical points within a step could not be resolved"
+                    track.failure = lost.reason
                     if branching:
                         return track.restore()
                     self._step = self._length(track.here, point)
-                    point = self._shorten(lost.args[0])
+                    point = self._shorten(lost.share)
             if point is None:
                 if self._step < self.control.smallest * self._scale:
                     return False
@@ -212,6 +212,9 @@ class ArcLength:
         point = track.point(solved)
         moved, change = numbers[0] - here.numbers[0], found - here.load_factor
         track.set_tangent(point, track.slope_found(), moved, change, self._weight)
+        if not bends(track, here, point, self._weight).resolved:
+            track.failure = "the path bends too sharply"
+            return self._shorten()
         if point.negative_modes != here.negative_modes and point.rise * here.rise > 0 and bend > _SURE:
             track.failure = "the step crossed a point where stability changes"
             return self._shorten()
