@@ -17,7 +17,7 @@ _FINE, _MOST = 1e-8, 25
 _PROBES = (1 / 3, 2 / 3)
 # Number of iterations after which the bracket of a root is bisected instead of interpolated.
 _OFTEN = 6
-# Distances on both sides of a bifurcation at which the path is solved for, and the largest length between these two
+# Distances on both sides of a critical point at which the path is solved for, and the largest length between these two
 # points, over their distance along the chord.
 _BESIDE, _STEEP = (1e-3, 1e-4), 2.0
 # Smallest distance of the coordinates of two interpolation points.
@@ -111,15 +111,19 @@ class Chord:
             return None
         return _PROBES[int(np.flatnonzero(changes)[0])]
 
-    def passes(self, place):
-        """Whether the path passes smoothly through a coordinate, with the load factor monotonic there.
+    def passes(self, place, *, turning):
+        """Whether the path passes smoothly through a coordinate.
 
         By points of the path that are solved for close to it on both sides. Where an imperfect structure turns off
-        before the bifurcation of the perfect one, these lie on both sides of a limit point, or on two paths.
+        before the bifurcation of the perfect one, these lie on two paths, or on both sides of a limit point.
+
+        Args:
+            place: the coordinate.
+            turning: whether the load factor turns there; else it is monotonic.
         """
         for apart in _BESIDE:
             before, after = (self._point(place + aside) for aside in (-apart, apart))
-            if before is None or after is None or before.rise * after.rise <= 0:
+            if before is None or after is None or (before.rise * after.rise < 0) != turning:
                 continue
             steep = bends(self.track, before, after, self._weight)
             if steep.resolved and steep.length <= _STEEP * 2 * apart * self.length:

@@ -114,10 +114,13 @@ class Locator:
         return landing, crossings
 
     def _explained(self, a, b, crossings):
-        """Whether the numbers of negative modes of two points agree with the critical points between them.
+        """Whether two points agree with the critical points between them.
 
-        Each of these changes the number by one. Under loads without a potential the number tells nothing about them.
+        The load factor turns at a limit point alone. Each critical point changes the number of negative modes by one;
+        under loads without a potential the number tells nothing about them.
         """
+        if (a.rise * b.rise < 0) != any(crossing.kind == "limit" for crossing in crossings):
+            return False
         counts = a.negative_modes, b.negative_modes
         if min(counts) < 0 or self.track.without_potential:
             return True
@@ -135,11 +138,17 @@ class Locator:
         return _in_order([crossing for crossing in found if crossing.residual <= _SINGULAR])
 
     def limits(self, chord):
-        """[the `Crossing` at the extremum of the load factor], whatever its residual; an empty list without one."""
+        """[the `Crossing` at the extremum of the load factor], whatever its residual; an empty list without one.
+
+        Raises:
+            Lost: it was located where the path does not pass.
+        """
         (_, a), (_, b) = chord.known[0], chord.known[-1]
         if a.rise * b.rise >= 0:
             return []
         place = chord.root(lambda point: point.rise)
+        if not chord.passes(place, turning=True):
+            raise Lost(0.5, ASIDE)
         direction = chord.neighbours(place)[0].along
         return self._singular("limit", chord, place, [direction])
 
@@ -162,7 +171,7 @@ class Locator:
             if place is not None:
                 here = self._singular("bifurcation", chord, place, modes)
                 here = [x for x in here if x.residual <= _SINGULAR and not self._known(x, (*limits, *found))]
-                if here and not chord.passes(place):
+                if here and not chord.passes(place, turning=False):
                     raise Lost(0.5, ASIDE)
                 found += here
         return _in_order(found)
