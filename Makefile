@@ -18,7 +18,7 @@ export VTK_DEFAULT_OPENGL_WINDOW = vtkEGLRenderWindow
 # A numpy in the user's own site directory would hide the distribution's.
 export PYTHONNOUSERSITE = 1
 
-.PHONY: help setup packages demo motion gallery well string whirl test docs tables figure3 work-precision failures rods-in-wells random random-wells clean
+.PHONY: help setup packages demo motion gallery well string whirl test docs tables figure3 work-precision failures rods-in-wells random random-wells imperfect clean
 
 help:
 	@echo "make demo    solve the eccentric cantilever of the paper on two processes; writes out/"
@@ -36,6 +36,7 @@ help:
 	@echo "make rods-in-wells  the exact rod in three wells: Newton steps, processor time, errors (about 5 minutes)"
 	@echo "make random  200 random scenes against the strong form, at three tolerances (about 5 minutes)"
 	@echo "make random-wells  100 random wells, strings and operations against finer meshes in a stiffer wall (about half an hour)"
+	@echo "make imperfect  60 symmetric structures with small imperfections against paths in small steps (about 20 minutes)"
 	@echo "make setup   only what all of these need first: the Debian packages and the environment .venv"
 	@echo "make clean   remove .venv, out and whatever else was built here"
 
@@ -100,6 +101,9 @@ random: setup
 
 random-wells: setup
 	$(PYTHON) tests/random_wells.py 100
+
+imperfect: setup
+	$(PYTHON) tests/imperfect_structures.py 60
 
 # Goes on where it was broken off; `$(PYTHON) demos/evidence/work_precision.py --fresh` forgets the samples that are there.
 work-precision: setup

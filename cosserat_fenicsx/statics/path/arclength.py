@@ -10,14 +10,18 @@ import itertools
 import math
 
 from cosserat_fenicsx.interrupts import obey
-from cosserat_fenicsx.statics.path.events import Lost
-from cosserat_fenicsx.statics.path.track import FAR, INTENDED, growth_of, through
+from cosserat_fenicsx.statics.path.events import UNEXPLAINED, Lost
+from cosserat_fenicsx.statics.path.track import FAR, INTENDED, bends, growth_of, through
 
 # Largest distance of the corrected point from the predictor over the length of the step; the second applies where the
 # number of negative modes changes without a limit point: the step may have changed to another branch.
 _BEND, _SURE = 0.4, 0.1
-# A closed path is recognised by a step that passes its first point at a distance below this times the step's length.
-_BESIDE = 0.1
+# A closed path is recognised by a step that passes its first point at a distance below the first number times the
+# step's length, where the path itself passes at one below the second.
+_BESIDE, _SAME = 0.1, 1e-4
+# A step that is shorter than the first number times the length of the path from the unloaded state, and turns by less
+# than the second (rad), is on the path whatever the number of negative modes.
+_SHORT, _STRAIGHT = 3e-3, 0.05
 # Smallest first step, over the length of the path from the unloaded state.
 _FIRST = 0.02
 
@@ -34,6 +38,10 @@ class ArcLength:
     def __init__(self, track, control, locator):
         self.track, self.control, self._locator = track, control, locator
         self._step = None
+        # Whether the number of negative modes changes as the critical points tell. The second variation that is counted
+        # has bounded stiffnesses, and under some loads it is the symmetric part of the tangent: once that has been seen
+        # in a step that is plain, the number tells nothing about later ones.
+        self._counts = True
 
     def to(self, target, *, first=None, slope=None, on_step=None, on_event=None):
         """Advance to the next point of the path with the load factor `target`, solved at exactly that load factor.
@@ -57,14 +65,18 @@ class ArcLength:
             branching, point, first = first is not None, first or self._attempt(), None
             if point is not None:
                 try:
-                    look = self._locator.between
-                    landing, crossings = look(track.here, point, target, self._weight, probe=not branching)
+                    landing, crossings = self._locator.between(
+                        track.here, point, target, self._weight, probe=not branching, explained=self._counts
+                    )
                 except Lost as lost:
-                    track.failure = "the critical points within a step could not be resolved"
+                    track.failure = lost.reason
                     if branching:
                         return track.restore()
-                    self._step = self._length(track.here, point)
-                    point = self._shorten(lost.args[0])
+                    if lost.reason == UNEXPLAINED and self._plain(point):
+                        self._counts = False
+                    else:
+                        self._step = self._length(track.here, point)
+                    point = self._shorten(lost.share)
             if point is None:
                 if self._step < self.control.smallest * self._scale:
                     return False
@@ -84,6 +96,11 @@ class ArcLength:
                 return True
         track.failure = f"{self.control.most_steps} steps of arc length did not reach it (StepControl.most_steps)"
         return track.restore()
+
+    def _plain(self, point):
+        """Whether a step is so short and straight that it cannot have changed to another path."""
+        found = bends(self.track, self.track.here, point, self._weight)
+        return found.length < _SHORT * self._scale and found.turn < _STRAIGHT and found.corner < _STRAIGHT / 10
 
     def _accept(self, point, end):
         """Accept a point, within the step from the last point to `end` or at its end."""
@@ -149,7 +166,11 @@ class ArcLength:
             self._scale *= shrunk
 
     def _passes(self, place, a, b):
-        """Whether the step from a to b passes through an earlier point of the path, in the path's direction there."""
+        """Whether the step from a to b passes through an earlier point of the path, in the path's direction there.
+
+        The path is solved for in the plane through that point, perpendicular to its direction: it must be the same
+        state under the same load factor, with as many negative modes.
+        """
         track, w = self.track, self._weight
         chord, change = b.numbers[0] - a.numbers[0], b.load_factor - a.load_factor
         moved, gain = place.numbers[0] - a.numbers[0], place.load_factor - a.load_factor
@@ -157,7 +178,14 @@ class ArcLength:
         along = track.product(moved, chord) + w * gain * change
         beside = track.product(moved, moved) + w * gain**2 - along**2 / size
         onward = track.product(place.along, chord) + w * place.rise * change
-        return 0 <= along < size and beside < (_BESIDE**2) * size and onward > 0
+        if not (0 <= along < size and beside < (_BESIDE**2) * size and onward > 0):
+            return False
+        share = (track.product(place.along, moved) + w * place.rise * gain) / onward  # in the plane of the place
+        guess = [u + share * (v - u) for u, v in zip(a.numbers, b.numbers, strict=True)]
+        solved = track.on_plane(guess, a.load_factor + share * change, place.along, w * place.rise)
+        off, gap = track.problem.numbers()[0] - place.numbers[0], track.problem.load_factor - place.load_factor
+        same = solved.converged and track.product(off, off) + w * gap**2 <= (_SAME**2) * size
+        return same and track.point(solved).negative_modes == place.negative_modes
 
     def _length(self, a, b):
         moved, change = b.numbers[0] - a.numbers[0], b.load_factor - a.load_factor
@@ -212,6 +240,9 @@ class ArcLength:
         point = track.point(solved)
         moved, change = numbers[0] - here.numbers[0], found - here.load_factor
         track.set_tangent(point, track.slope_found(), moved, change, self._weight)
+        if not bends(track, here, point, self._weight).resolved:
+            track.failure = "the path bends too sharply"
+            return self._shorten()
         if point.negative_modes != here.negative_modes and point.rise * here.rise > 0 and bend > _SURE:
             track.failure = "the step crossed a point where stability changes"
             return self._shorten()

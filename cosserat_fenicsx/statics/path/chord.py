@@ -9,7 +9,7 @@ import math
 
 import numpy as np
 
-from cosserat_fenicsx.statics.path.track import through
+from cosserat_fenicsx.statics.path.track import bends, through
 
 # Relative accuracy of the load factor at which a search ends, and its largest number of iterations.
 _FINE, _MOST = 1e-8, 25
@@ -17,6 +17,9 @@ _FINE, _MOST = 1e-8, 25
 _PROBES = (1 / 3, 2 / 3)
 # Number of iterations after which the bracket of a root is bisected instead of interpolated.
 _OFTEN = 6
+# Distances on both sides of a critical point at which the path is solved for, and the largest length between these two
+# points, over their distance along the chord.
+_BESIDE, _STEEP = (1e-3, 1e-4), 2.0
 # Smallest distance of the coordinates of two interpolation points.
 _APART = 1e-5
 # Offsets of the coordinate, tried in turn until Newton's method converges.
@@ -36,6 +39,7 @@ class Chord:
         self.track, self._weight = track, weight
         self.known = [(0.0, a), (1.0, b)]
         self.normal, self.change = b.numbers[0] - a.numbers[0], b.load_factor - a.load_factor
+        self.length = math.sqrt(track.product(self.normal, self.normal) + weight * self.change**2)
         self._before = {}
         if len(track.history) > 1:  # the point before a, for the curvature
             point = track.history[-2]
@@ -106,6 +110,25 @@ class Chord:
         if min(counts) < 0 or (changes >= 0).all() or (changes <= 0).all():
             return None
         return _PROBES[int(np.flatnonzero(changes)[0])]
+
+    def passes(self, place, *, turning):
+        """Whether the path passes smoothly through a coordinate.
+
+        By points of the path that are solved for close to it on both sides. Where an imperfect structure turns off
+        before the bifurcation of the perfect one, these lie on two paths, or on both sides of a limit point.
+
+        Args:
+            place: the coordinate.
+            turning: whether the load factor turns there; else it is monotonic.
+        """
+        for apart in _BESIDE:
+            before, after = (self._point(place + aside) for aside in (-apart, apart))
+            if before is None or after is None or (before.rise * after.rise < 0) != turning:
+                continue
+            steep = bends(self.track, before, after, self._weight)
+            if steep.resolved and steep.length <= _STEEP * 2 * apart * self.length:
+                return True
+        return False
 
     def neighbours(self, place):
         """The nearest known points below and above a coordinate."""

@@ -26,6 +26,9 @@ _SINGULAR = 1e-5
 # Two events are the same where the cosine of their null vectors is above the first number and their coordinates on the
 # chord differ by less than the second.
 _ALIKE, _ONE_PLACE = 0.7, 1e-2
+#: Why a step is shortened, in words.
+UNEXPLAINED = "the number of negative modes changes otherwise than the critical points that were located tell"
+ASIDE = "the path turns off just before the tangent becomes singular"
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,7 +56,16 @@ class Crossing:
 
 
 class Lost(Exception):
-    """A step is too long to resolve the critical points within it; the argument is the share of the step to keep."""
+    """A step is too long to resolve the critical points within it.
+
+    Args:
+        share: of the step to keep.
+        reason: in words.
+    """
+
+    def __init__(self, share, reason="the critical points within a step could not be resolved"):
+        super().__init__(reason)
+        self.share, self.reason = share, reason
 
 
 class Locator:
@@ -66,7 +78,7 @@ class Locator:
     def __init__(self, track):
         self.track = track
 
-    def between(self, a, b, target, weight, *, probe=True):
+    def between(self, a, b, target, weight, *, probe=True, explained=True):
         """The critical points and the requested load factor between two points.
 
         Args:
@@ -74,13 +86,15 @@ class Locator:
             target: load factor.
             weight: of the load factor in the metric.
             probe: whether to check for negative modes that appear and vanish between them.
+            explained: whether the number of negative modes must change as the critical points tell.
 
         Returns:
             (landing, crossings): the first `PathPoint` with the load factor `target` after a, or None; the `Crossing`s
             up to there, in the order of the path.
 
         Raises:
-            Lost: the point at `target` was not found, or negative modes appear and vanish between a and b.
+            Lost: the point at `target` was not found, negative modes appear and vanish between a and b, or their number
+                changes otherwise than the critical points tell.
         """
         chord = Chord(self.track, a, b, weight)
         place = chord.comes_and_goes() if probe else None
@@ -94,27 +108,58 @@ class Locator:
                 place, landing = self._land(chord, low, high, before, after, target)
                 break
         crossings = self.crossings(chord, limits)
+        if probe and explained and not self._explained(a, b, crossings):
+            raise Lost(0.5, UNEXPLAINED)
         if landing is not None:
             crossings = [crossing for crossing in crossings if crossing.place <= place]
         return landing, crossings
 
+    def _explained(self, a, b, crossings):
+        """Whether two points agree with the critical points between them.
+
+        The load factor turns at a limit point alone. Each critical point changes the number of negative modes by one;
+        under loads without a potential the number tells nothing about them.
+        """
+        if (a.rise * b.rise < 0) != any(crossing.kind == "limit" for crossing in crossings):
+            return False
+        counts = a.negative_modes, b.negative_modes
+        if min(counts) < 0 or self.track.without_potential:
+            return True
+        change = abs(counts[1] - counts[0])
+        return change <= len(crossings) and (len(crossings) - change) % 2 == 0
+
     def crossings(self, chord, limits=None):
-        """All `Crossing`s of a `Chord`, in order; `limits`: its limit points where they are known."""
+        """All `Crossing`s of a `Chord`, in order; `limits`: its limit points where they are known.
+
+        Raises:
+            Lost: a bifurcation was located where the path does not pass.
+        """
         limits = self.limits(chord) if limits is None else limits
         found = [*limits, *self.bifurcations(chord, limits)]
         return _in_order([crossing for crossing in found if crossing.residual <= _SINGULAR])
 
     def limits(self, chord):
-        """[the `Crossing` at the extremum of the load factor], whatever its residual; an empty list without one."""
+        """[the `Crossing` at the extremum of the load factor], whatever its residual; an empty list without one.
+
+        Raises:
+            Lost: it was located where the path does not pass.
+        """
         (_, a), (_, b) = chord.known[0], chord.known[-1]
         if a.rise * b.rise >= 0:
             return []
         place = chord.root(lambda point: point.rise)
+        if not chord.passes(place, turning=True):
+            raise Lost(0.5, ASIDE)
         direction = chord.neighbours(place)[0].along
         return self._singular("limit", chord, place, [direction])
 
     def bifurcations(self, chord, limits=()):
-        """The `Crossing`s where the tangent becomes singular away from limit points."""
+        """The `Crossing`s where the tangent becomes singular away from limit points.
+
+        Raises:
+            Lost: one was located where the path does not pass: an imperfect structure turns off before it, and the
+                chord leads from its path to another one.
+        """
         counts = [point.negative_modes for _, point in (chord.known[0], chord.known[-1])]
         if min(counts) < 0:  # singular to rounding at one of the two
             return []
@@ -126,7 +171,10 @@ class Locator:
             place = chord.root(self._stiffness_against(self.track.motion_at(point, modes[0])), near)
             if place is not None:
                 here = self._singular("bifurcation", chord, place, modes)
-                found += [x for x in here if x.residual <= _SINGULAR and not self._known(x, (*limits, *found))]
+                here = [x for x in here if x.residual <= _SINGULAR and not self._known(x, (*limits, *found))]
+                if here and not chord.passes(place, turning=False):
+                    raise Lost(0.5, ASIDE)
+                found += here
         return _in_order(found)
 
     def _stiffness_against(self, motion):

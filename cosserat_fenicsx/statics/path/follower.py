@@ -5,7 +5,7 @@ from dataclasses import replace
 from cosserat_fenicsx.errors import NotConverged
 from cosserat_fenicsx.statics.path.arclength import ArcLength
 from cosserat_fenicsx.statics.path.chord import Chord
-from cosserat_fenicsx.statics.path.events import Locator
+from cosserat_fenicsx.statics.path.events import Locator, Lost
 from cosserat_fenicsx.statics.path.load_control import Continuation
 from cosserat_fenicsx.statics.path.sweep import Sweep
 from cosserat_fenicsx.statics.path.track import INTENDED, Track
@@ -152,11 +152,19 @@ class Follower:
         return self.fork is not None and not self.left
 
     def _watch(self, a, b):
-        """Report the bifurcations within a step of load control; False to leave the path there."""
+        """Report the bifurcations within a step of load control.
+
+        Returns:
+            False to leave the path there; None where the step is too long to tell.
+        """
         looks = a.negative_modes != b.negative_modes or (b.negative_modes > 0 and self.track.without_potential)
         if not (looks and (self._on_event or self._branch)):
             return True
-        crossings = self.locator.bifurcations(Chord.balanced(self.track, a, b))
+        try:
+            crossings = self.locator.bifurcations(Chord.balanced(self.track, a, b))
+        except Lost as lost:
+            self.track.failure = lost.reason
+            return None
         self.track.put(b.numbers, b.load_factor)
         return not any(self._meet(crossing) for crossing in crossings)
 

@@ -77,7 +77,7 @@ class Continuation:
         track: a `Track`.
         control: a `StepControl`.
         watch: called as watch(a, b) with the two points of a step, before b is accepted; False ends the continuation
-            at a.
+            at a, None rejects the step.
 
     Attributes:
         step: the next step of the load factor; None where it is still to be chosen.
@@ -173,8 +173,8 @@ class Continuation:
         if adaptive and changed and not self._smooth(numbers[0], predicted[0], _SMOOTH if guard else _NEAR):
             track.failure = "the step crossed a point where stability changes"
             return track.restore()
-        if adaptive and self._watch and not self._watch(here, point):
-            self._refused = True
+        if adaptive and self._watch and not (onward := self._watch(here, point)):
+            self._refused = onward is False
             return track.restore()
         taken = abs(eta - here.load_factor)
         track.keep(point)

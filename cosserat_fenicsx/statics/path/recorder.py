@@ -12,6 +12,7 @@ from cosserat_fenicsx.results.path import Path
 from cosserat_fenicsx.results.records import Event, Records
 from cosserat_fenicsx.statics.circulatory import conservative_along
 from cosserat_fenicsx.statics.path.chord import Chord
+from cosserat_fenicsx.statics.path.events import Lost
 from cosserat_fenicsx.statics.path.follower import Follower
 from cosserat_fenicsx.statics.path.track import NOTHING
 from cosserat_fenicsx.statics.recording import record_of
@@ -290,8 +291,7 @@ class Tracing:
                     point = self._found(*guesses[k], normal, weight * change, coarse._records[k].neutral, at_load=still)
                 track.set_tangent(point, track.slope(), normal, change, weight)
                 if before is not None and k > left + 1:  # nothing changes sign in the step onto a branch
-                    for crossing in self._follower.locator.crossings(Chord(track, before, point, weight)):
-                        self._meet(crossing)
+                    self._meet_between(before, point, weight)
                 track.keep(point)
                 track.restore()
                 self._record(point)
@@ -301,6 +301,15 @@ class Tracing:
             raise Interrupted(self.path) from None
         self.path.control, self.path.left = "arc", coarse.left
         return self.path
+
+    def _meet_between(self, a, b, weight):
+        """Report the events between two points of a path on a coarser mesh that were found on this one."""
+        try:
+            crossings = self._follower.locator.crossings(Chord(self.track, a, b, weight))
+        except Lost as lost:
+            raise NotConverged(f"an event of the path was not found on a finer mesh: {lost.reason}", self.path) from None
+        for crossing in crossings:
+            self._meet(crossing)
 
     def _balance(self, a, b):
         """The weight that gives load factor and unknowns equal shares in the distance of two guesses; 0 without one."""

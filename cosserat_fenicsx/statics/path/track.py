@@ -11,6 +11,9 @@ from cosserat_fenicsx.statics.stability import NegativeModes
 #: Largest distance of the corrected point of a step from the predictor (rad, rod lengths), and the distance that step
 #: control aims at.
 FAR, INTENDED = 0.5, 0.1
+#: Largest angle (rad) between the tangents of the path at the two ends of a step, and largest distance of the step's
+#: direction from the mean of these tangents, all of unit length: zero on a line and on a circle.
+TURN, CORNER = 0.9, 0.12
 #: Motions below this are rounding (rad, rod lengths): an inextensible column does not move until it buckles.
 NOTHING = 1e-8
 #: Newton iterations of a step beyond which the next step does not grow, and from which on it is halved.
@@ -215,6 +218,43 @@ def through(points, places, at):
         for total, values in zip(numbers, point.numbers, strict=True):
             total += weight * values
     return numbers, float(np.dot(weights, [point.load_factor for point in points]))
+
+
+@dataclass(frozen=True)
+class Bends:
+    """How a step leads from a point of a path to another one, see `TURN` and `CORNER`.
+
+    Attributes:
+        turn: angle between the two tangents, rad.
+        corner: distance of the step's direction from the mean of the tangents.
+        length: of the step.
+    """
+
+    turn: float
+    corner: float
+    length: float
+
+    @property
+    def resolved(self):
+        """Whether the step is short enough to follow the path."""
+        return self.turn <= TURN and self.corner <= CORNER
+
+
+def bends(track, a, b, weight):
+    """The `Bends` of a step between two points with tangents; weight: of the load factor in the metric."""
+
+    def product(u, v):
+        return track.product(u[0], v[0]) + weight * u[1] * v[1]
+
+    def cosine(u, v):
+        return product(u, v) / math.sqrt(product(u, u) * product(v, v))
+
+    chord = b.numbers[0] - a.numbers[0], b.load_factor - a.load_factor
+    begin, end = (a.along, a.rise), (b.along, b.rise)
+    turn = math.acos(min(max(cosine(begin, end), -1.0), 1.0))
+    mean = math.sqrt(max(2 + 2 * math.cos(turn), 1e-30))
+    along = (cosine(begin, chord) + cosine(end, chord)) / mean
+    return Bends(turn, math.sqrt(max(2 - 2 * along, 0.0)), math.sqrt(product(chord, chord)))
 
 
 def growth_of(off, order, iterations):

@@ -1,0 +1,67 @@
+"""Imperfect symmetric structures: the path is that of small steps, and a limit point is no bifurcation."""
+
+import imperfect_structures
+import numpy as np
+import pytest
+
+import cosserat_fenicsx as cf
+
+pytestmark = pytest.mark.serial
+
+
+def hinged_arch(sideways):
+    """A hinged circular arch of half-angle 0.6 rad with a force on its crown, a part of it sideways: (crown, scene)."""
+    R, half, axis = 10.0, 0.6, (0, 1, 0)
+    curve = cf.Arc((0, 0, 0), (-R * np.sin(half), 0, R * np.cos(half)), 2 * half, axis)
+    rod = cf.Rod(curve, cf.Stiffness((1e5, 1e5), 1e5, (1.0, 100.0), 100.0))
+    crown = rod.at(R * half)
+    supports = [cf.Hinge(end, axis) for end in (rod.start, rod.end)]
+    return crown, cf.Scene([rod], supports, [cf.Force(crown, (sideways, 0, -1.0))])
+
+
+#: By small steps (and, of 1e-2, by shooting of the strong form): the limit points, and the crown at the load factor 0.6.
+ARCH = {
+    3e-2: ((0.18983433, -0.10203886), (4.12838e-4, 0, -3.692597)),
+    1e-2: ((0.19421969, -0.10447634), (1.37607e-4, 0, -3.692603)),
+    1e-3: ((0.19759409, -0.10636187), (1.37607e-5, 0, -3.692604)),
+    1e-4: ((0.19834251, -0.10678178), (1.37607e-6, 0, -3.692604)),
+}
+
+
+@pytest.mark.parametrize("control", ["auto", "arc"])
+@pytest.mark.parametrize("sideways", ARCH)
+def test_an_imperfect_arch_snaps_through(sideways, control):
+    crown, scene = hinged_arch(sideways)
+    limits, end = ARCH[sideways]
+    path = cf.solve(scene, (0, 0.6), elements=8, control=control)
+    assert [event.kind for event in path.events] == ["limit", "limit"]
+    np.testing.assert_allclose([event.load_factor for event in path.events], limits, rtol=2e-6)
+    np.testing.assert_allclose(path.displacement(crown)[-1], end, atol=3e-6)
+    assert path.stable[-1] and not [said for said in path.why if "negative modes go" in said]
+
+
+def test_the_imperfect_arch_with_an_estimate():
+    crown, scene = hinged_arch(1e-2)
+    path = cf.solve(scene, (0, 0.6))
+    assert [event.kind for event in path.events] == ["limit", "limit"] and path.error.max() <= 1e-6
+    np.testing.assert_allclose(path.displacement(crown)[-1], ARCH[1e-2][1], atol=3e-6)
+
+
+@pytest.mark.parametrize("sideways", [1e-3, 3e-4, 1e-4, 1e-5])
+@pytest.mark.parametrize("top", [0.3, 1.0, 5.0])
+def test_the_first_event_of_an_imperfect_arch_is_a_limit_point(sideways, top):
+    _, scene = hinged_arch(sideways)
+    path = cf.solve(scene, (0, top), elements=8, control="arc", until=lambda path: path.events)
+    assert path.events[0].kind == "limit"
+
+
+# an arch, a toggle that is nearly perfect, a dome of six arcs
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [0, 3, 12])
+def test_structures_follow_small_steps(seed):
+    given = imperfect_structures.structure(seed)
+    truth = imperfect_structures.small_steps(given, imperfect_structures.STEP)
+    assert truth.events and truth.reached
+    for control in imperfect_structures.CONTROLS:
+        verdict, words, _ = imperfect_structures.outcome(given, truth, control, elements=8)
+        assert verdict == "right", f"{given.kind}, {control}: {words}"
