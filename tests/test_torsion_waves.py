@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from string_cells import turn
 from torsion_scenes import (
     COLUMN,
     DENSITY,
@@ -29,6 +30,13 @@ from cosserat_fenicsx.drilling.torsion.model import TorsionWaves
 pytestmark = pytest.mark.serial
 PIPE_IMPEDANCE = 296.3752962822167
 ANGLE, STICKING = PROFILE.index("angle"), PROFILE.index("sticking")
+#: Of the lower end off bottom after 1, 2, ... 60 s, rad, by exact waves in cells of 2.5 m with friction at their ends.
+REFERENCE_ANGLES = np.array([
+    0, 0, 0, 0, 0, 3.68, 13.43, 21.7, 22.21, 22.21, 23.07, 31.58, 42.44, 45.47, 45.47, 45.47, 47.85, 58.92,
+    69.09, 69.97, 69.97, 69.97, 73.46, 84.49, 94.16, 94.72, 94.72, 95.48, 101.21, 112.04, 117.52, 117.76,
+    117.76, 120.61, 130.02, 138.9, 140.11, 140.11, 140.17, 146.76, 158.51, 164.38, 164.38, 164.38, 165, 173.2,
+    184.83, 188.79, 188.8, 188.8, 191.51, 200.94, 209.99, 212.14, 212.14, 212.15, 217.9, 228.75, 235.39, 235.71,
+])  # fmt: skip
 
 
 @pytest.mark.parametrize(("speed", "dt"), [(np.pi, 20 / SPEED), (2 * np.pi, 7.3 / SPEED)])
@@ -158,6 +166,47 @@ def test_starts_off_bottom():
             starts.append(t[k])
     assert starts == pytest.approx([5.408, 10.78, 16.61, 22.49], rel=3e-3)
     assert imbalance(rows) < 1e-11
+
+
+def starts_of(t, speed, half=20 * cf.units.rpm):
+    """Times where the lower end turns with half the speed of the drive after it has been at rest."""
+    found, resting = [], True
+    for k in range(len(t)):
+        if speed[k] <= 0:
+            resting = True
+        elif resting and speed[k] > half:
+            resting = False
+            found.append(t[k])
+    return np.array(found)
+
+
+def test_how_often_a_string_starts_off_bottom():
+    """Ten times in 60 s, whatever the mesh and the method, and in the angles of the reference. Speeds of single steps
+    have more: where a slip ends, waves of even and odd steps stop one after the other, and the speed of the lower end
+    alternates between rest and motion, which the list of the reference counts as starts."""
+    scene, wall_force = off_bottom()
+    parts = [(x.length, x.torsional_impedance, x.rhoJ) for x in scene.segments]
+    radius = np.array([x.radius for x in scene.segments])
+
+    def friction(md, which):
+        torque = wall_force(md) * radius[which]
+        return 0.3 * torque, 0.195 * torque, 1.0
+
+    t, speed, angle = turn(parts, friction, (2900.0, 38e3, 100e3, 40 * cf.units.rpm), 0.1, 10.0, 60.0)
+    ten = starts_of(t, speed)
+    assert len(ten) == 10 and ten[:4] == pytest.approx([5.408, 10.78, 16.61, 22.49], rel=6e-3)
+    model = TorsionWaves(scene, 10.0001 / 2787.5976461718205, normal_force=wall_force)
+    steps, told = [], []
+    while model.time < 60:
+        told.append(model.advance(1)[0])
+        steps.append(model._changing["speed"][-1])
+    times, mean = np.array(told)[:, 0], np.array(told)[:, COLUMN["bit_speed"]]
+    assert len(starts_of(times, mean)) == 10
+    assert len(starts_of(times, np.array(steps))) > 100
+    turned = np.interp(np.arange(61.0), times, np.array(told)[:, COLUMN["bit_angle"]])
+    for angles in (turned, np.interp(np.arange(61.0), t, angle), np.append(0.0, REFERENCE_ANGLES)):
+        rests = np.diff(angles) < 0.5
+        assert (rests[:-1] & ~rests[1:]).sum() == 10 and angles[-1] == pytest.approx(236, abs=2)
 
 
 def test_a_wave_goes_through_parts_of_any_length():
