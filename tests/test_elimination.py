@@ -7,8 +7,10 @@ import pytest
 from conftest import COMM
 from dense import tangent
 from mpi4py import MPI
+from scipy.linalg import eigvalsh_tridiagonal
 
 import cosserat_fenicsx as cf
+from cosserat_fenicsx.algebra import interface
 from cosserat_fenicsx.models.rodmesh import Layout
 from cosserat_fenicsx.statics.solvers import solvers_of
 
@@ -289,3 +291,23 @@ def test_ranks_share_the_elimination(name):
             found.append((nodal, model.inner(x.array_r, x.array_r), stability.count()))
     for alone, together in zip(*found, strict=True):
         np.testing.assert_allclose(together, alone, rtol=1e-9, atol=1e-11)
+
+
+@pytest.mark.parametrize("zeros", [0, 1, 7])
+def test_signs_of_a_large_system_without_a_pivot_on_its_diagonal(zeros):
+    """Of a sparse symmetric matrix whose factors need pivots off the diagonal; a dense one would take minutes."""
+    rng, size = np.random.default_rng(5), 3000
+    system = interface._Sparse(size)
+    i = np.arange(size)
+    rows, columns = np.concatenate([i, i[1:], i[:-1]]), np.concatenate([i, i[:-1], i[1:]])
+    entry = system.entries(rows, columns)
+    beside, diagonal = rng.normal(size=size - 1), rng.normal(size=size)
+    diagonal[::2] = 0.0  # no pivots
+    beside[1::2] *= 0.1
+    for k in range(zeros):
+        diagonal[10 * k + 40] = beside[10 * k + 39] = beside[10 * k + 40] = 0.0
+    values = np.zeros(system.room)
+    np.add.at(values, entry, np.concatenate([diagonal, beside, beside]))
+    eigenvalues = eigvalsh_tridiagonal(diagonal, beside)
+    expected = int((eigenvalues < -1e-12).sum()), int((np.abs(eigenvalues) <= 1e-12).sum())
+    assert expected[1] == zeros and system.signs(values) == expected

@@ -3,7 +3,9 @@
 import contextlib
 
 import numpy as np
+from petsc4py import PETSc
 
+from cosserat_fenicsx.algebra import linear
 from cosserat_fenicsx.algebra.elimination import Elimination
 from cosserat_fenicsx.algebra.pointers import Pointers
 
@@ -170,8 +172,22 @@ class _Sparse:
                 return int((pivots < 0).sum()), 0
         except RuntimeError:
             pass
-        dense = _Dense(self._size)
-        return dense.signs(matrix.toarray().ravel())
+        return _inertia(matrix.tocsr())
+
+
+def _inertia(matrix):
+    """(negative, zero) numbers of eigenvalues of a symmetric scipy matrix, by factors with pivots of two rows too."""
+    matrix.sort_indices()
+    parts = matrix.indptr.astype(PETSc.IntType), matrix.indices.astype(PETSc.IntType), matrix.data
+    A, pc = PETSc.Mat().createAIJ(matrix.shape, csr=parts, comm=PETSc.COMM_SELF), PETSc.PC().create(PETSc.COMM_SELF)
+    A.setOption(PETSc.Mat.Option.SYMMETRIC, True)
+    pc.setOperators(A)
+    linear.factor_constrained(pc, A, _ROUNDING)
+    pc.setUp()
+    negative, zero, _ = pc.getFactorMatrix().getInertia()
+    pc.destroy()
+    A.destroy()
+    return negative, zero
 
 
 def _scale(diagonal):

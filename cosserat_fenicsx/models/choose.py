@@ -1,5 +1,6 @@
 """The choice of the cheapest model that is valid for a scene, with its reasons as text."""
 
+from collections import Counter
 from dataclasses import dataclass, field
 
 from cosserat_fenicsx.errors import SceneError, nearest
@@ -99,17 +100,16 @@ def _not_a_tree(scene):
         for holder in holders:
             where = holder.station if what == "support" else f"{holder.first} with {holder.second}"
             return f"statics alone does not give the contact force, because of the {type(holder).__name__} at {where}"
+    clamps = Counter(scene.leader(x.station.rod) for x in scene.supports)
+    joints = Counter(scene.leader(x.first.rod) for x in scene.joints)
     structures = {}
     for rod in scene.rods:
         structures.setdefault(scene.leader(rod), []).append(rod)
     for rods in structures.values():
-        clamps = sum(x.station.rod in rods for x in scene.supports)
-        joints = sum(x.first.rod in rods for x in scene.joints)
-        if clamps > 1:
-            return (
-                f"statics alone does not give the contact force of rod '{rods[0].name}', which is held {clamps} times"
-            )
-        if joints >= len(rods):
+        held = clamps[rods[0]]
+        if held > 1:
+            return f"statics alone does not give the contact force of rod '{rods[0].name}', which is held {held} times"
+        if joints[rods[0]] >= len(rods):
             return f"statics alone does not give the contact force of rod '{rods[0].name}', which closes a ring"
     return ""
 
