@@ -72,7 +72,7 @@ ROOMS = {
     "statics": {"scene", "models", "algebra", "results"},
     "dynamics": {"scene", "models", "algebra", "results", "storage", "statics"},
     "studies": {"results", "storage"},
-    "well": {"actions", "scene", "models", "statics", "results", "pictures"},
+    "well": {"actions", "scene", "models", "statics", "results", "storage", "pictures"},
     "drilling": {"actions", "well", "scene", "results", "storage", "pictures", "algebra"},
     "cli": {"drilling", "well", "scene", "models", "statics", "dynamics", "results", "storage", "pictures"},
 }
@@ -164,7 +164,9 @@ def test_one_place_says_which_ranks_work_together():
     """Within a study a rank is alone: what takes all ranks by itself would wait for the others for ever."""
     for file in PACKAGE.rglob("*.py"):
         if file.parent.name != "cli" and file.name not in ("ranks.py", "pool.py"):
-            assert "MPI.COMM_WORLD" not in file.read_text(encoding="utf-8"), f"{file}: expected ranks.communicator(comm)"
+            assert "MPI.COMM_WORLD" not in file.read_text(encoding="utf-8"), (
+                f"{file}: expected ranks.communicator(comm)"
+            )
 
 
 def test_files_stay_small():
