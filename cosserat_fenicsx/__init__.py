@@ -6,6 +6,7 @@ Modules are imported when their names are first used, so that `import cosserat_f
 import importlib
 from os import path as _path
 
+from cosserat_fenicsx.aborting import watch as _watch
 from cosserat_fenicsx.homes import HOMES as _HOME
 
 __version__ = "0.1.0"
@@ -17,6 +18,8 @@ _checkout = _path.dirname(_path.dirname(_path.realpath(__file__)))
 if all(_path.isfile(_path.join(_checkout, *file)) for file in (("forms", "spatial.py"), ("pyproject.toml",))):
     # A plain checkout: forms/ lies beside the package; an installation has it inside.
     __path__.append(_checkout)
+
+_watch()
 
 if TYPE_CHECKING:  # the same names, for editors and type checkers
     from cosserat_fenicsx import analytic as analytic
