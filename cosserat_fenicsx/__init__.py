@@ -191,8 +191,11 @@ if not TYPE_CHECKING:  # to type checkers it would say that every name exists
             raise AttributeError(f"module 'cosserat_fenicsx' has no attribute '{name}'")
         if _HOME[name] is None:
             return importlib.import_module(f"cosserat_fenicsx.{name}")
-        value = getattr(importlib.import_module(f"cosserat_fenicsx.{_HOME[name]}"), name)
-        globals()[name] = value
+        from cosserat_fenicsx.arguments import in_words
+
+        home = importlib.import_module(f"cosserat_fenicsx.{_HOME[name]}")
+        value = globals()[name] = in_words(getattr(home, name))
+        setattr(home, name, value)  # the same object, as pickle expects
         return value
 
 

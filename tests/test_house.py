@@ -46,6 +46,7 @@ SHARED = {
     "aborting",
     "analytic",
     "annotations",
+    "arguments",
     "checks",
     "compat",
     "compiling",

@@ -1,15 +1,14 @@
 """A scene: rods, joints, supports and actions, independent of solvers and meshes."""
 
 import copy
-import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
-from cosserat_fenicsx.checks import instance
-from cosserat_fenicsx.errors import SceneError, SceneWarning, nearest
+from cosserat_fenicsx.checks import instance, warn
+from cosserat_fenicsx.errors import SceneError, nearest
 from cosserat_fenicsx.scene.action import Action
 from cosserat_fenicsx.scene.describe import describe
 from cosserat_fenicsx.scene.initial import InitialVelocity
@@ -198,7 +197,7 @@ class Scene:
     def warn(self):
         """Raise a `SceneWarning` for each of `doubts`, on behalf of the caller of the function that calls this."""
         for doubt in self.doubts:
-            warnings.warn(doubt, SceneWarning, stacklevel=3)
+            warn(doubt)
 
     @property
     def follows(self):

@@ -2,13 +2,12 @@
 
 import json
 import os
-import warnings
 from pathlib import Path
 
 import numpy as np
 
-from cosserat_fenicsx.checks import instance
-from cosserat_fenicsx.errors import SceneError, SceneWarning
+from cosserat_fenicsx.checks import instance, warn
+from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.ranks import on_first, world
 from cosserat_fenicsx.results.export.beside import replaced
 from cosserat_fenicsx.storage import rows
@@ -84,8 +83,7 @@ class SweepFile:
             with replaced(self._file) as fresh:
                 fresh.write_bytes(b"".join(sound))
             more = f", and {len(lost) - 1} more" if len(lost) > 1 else ""
-            warnings.warn(f"depth_sweep.file = {str(self._file)!r}, {lost[0]}{more}: left out, and computed again",
-                          SceneWarning, stacklevel=2)  # fmt: skip
+            warn(f"depth_sweep.file = {str(self._file)!r}, {lost[0]}{more}: left out, and computed again")  # fmt: skip
         return found
 
     def _compare(self, head, line):
