@@ -22,7 +22,7 @@ def line_of(row):
 
 
 def row_in(line, entries, *, checksum=True):
-    """The row in a line (bytes).
+    """The row in a line (bytes), and whether it has a checksum.
 
     Args:
         entries: what it must hold, see `entries.checked`.
@@ -42,7 +42,7 @@ def row_in(line, entries, *, checksum=True):
         raise ValueError("no row") from None
     if isinstance(row, dict):
         row.pop(CHECKSUM, None)
-    return checked(row, entries)
+    return checked(row, entries), bool(mark)
 
 
 def cut(file):

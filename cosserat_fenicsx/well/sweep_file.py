@@ -72,7 +72,7 @@ class SweepFile:
         found, lost, sound = [], [], [rows.line_of(head)]
         for k, line in enumerate(lines, start=2):
             try:
-                row = rows.row_in(line, entries)
+                row, _ = rows.row_in(line, entries)
             except ValueError as problem:
                 lost.append(f"line {k}: {problem}")
                 continue
@@ -89,7 +89,7 @@ class SweepFile:
     def _compare(self, head, line):
         """Refuse a file that does not hold this sweep."""
         try:
-            old = rows.row_in(
+            old, _ = rows.row_in(
                 line, {"format": (lambda _: True, ""), "sweep": (lambda x: isinstance(x, dict), "a dict")}
             )
             release = "" if old["format"] == _FORMAT else "it is of another release"
