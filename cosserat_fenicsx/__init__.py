@@ -6,6 +6,7 @@ Modules are imported when their names are first used, so that `import cosserat_f
 import importlib
 from os import path as _path
 
+from cosserat_fenicsx.aborting import watch as _watch
 from cosserat_fenicsx.homes import HOMES as _HOME
 
 __version__ = "0.1.0"
@@ -17,6 +18,8 @@ _checkout = _path.dirname(_path.dirname(_path.realpath(__file__)))
 if all(_path.isfile(_path.join(_checkout, *file)) for file in (("forms", "spatial.py"), ("pyproject.toml",))):
     # A plain checkout: forms/ lies beside the package; an installation has it inside.
     __path__.append(_checkout)
+
+_watch()
 
 if TYPE_CHECKING:  # the same names, for editors and type checkers
     from cosserat_fenicsx import analytic as analytic
@@ -188,8 +191,11 @@ if not TYPE_CHECKING:  # to type checkers it would say that every name exists
             raise AttributeError(f"module 'cosserat_fenicsx' has no attribute '{name}'")
         if _HOME[name] is None:
             return importlib.import_module(f"cosserat_fenicsx.{name}")
-        value = getattr(importlib.import_module(f"cosserat_fenicsx.{_HOME[name]}"), name)
-        globals()[name] = value
+        from cosserat_fenicsx.arguments import in_words
+
+        home = importlib.import_module(f"cosserat_fenicsx.{_HOME[name]}")
+        value = globals()[name] = in_words(getattr(home, name))
+        setattr(home, name, value)  # the same object, as pickle expects
         return value
 
 

@@ -2,13 +2,29 @@
 
 import math
 import numbers
+import re
+import stat
+import sys
+import warnings
+from pathlib import Path
 
 import numpy as np
 
-from cosserat_fenicsx.errors import SceneError
+from cosserat_fenicsx.errors import SceneError, SceneWarning
 
 #: Sizes beyond this, and below its inverse, are refused: their fourth powers would not be numbers.
 LARGEST = 1e60
+#: Largest size (bytes) of a text file that is read.
+MOST_TEXT = 2**27
+# How workbooks of spreadsheet programs begin: as .zip archives (.xlsx, .ods), or as .xls.
+_WORKBOOKS = (b"PK\x03\x04", b"\xd0\xcf\x11\xe0")
+# Sizes in SI, by units, beyond which nothing of a string, its hole, its mud and its rig is: numbers above these are
+# mistakes, such as of units, and what follows from them has no meaning.
+_MOST = {"m": 1e6, "m/s": 1e5, "N": 1e10, "N m": 1e10, "N/m": 1e13, "N/m^2": 1e15, "Pa": 1e15, "N s/m^2": 1e10,
+         "N m s/rad": 1e10, "kg/m": 1e6, "kg/m^3": 1e5, "kg m^2": 1e10, "1/min": 1e6, "rad/s": 1e5,
+         "1/s": 1e6}  # fmt: skip
+_SMALLEST = min(_MOST.values())
+_OF_STRINGS = ("cosserat_fenicsx.well.", "cosserat_fenicsx.drilling.")
 # Values with a longer text, such as that of a rod, are abbreviated in messages.
 _LONGEST = 100
 
@@ -21,6 +37,14 @@ def refuse(owner, field, value, expected):
     raise SceneError(f"{where}.{field} = {given}: expected {expected}")
 
 
+def warn(text):
+    """Give a `SceneWarning`, at the line outside the package from which it was called."""
+    frame, level = sys._getframe(1), 2
+    while frame is not None and frame.f_globals.get("__name__", "").partition(".")[0] == "cosserat_fenicsx":
+        frame, level = frame.f_back, level + 1
+    warnings.warn(text, SceneWarning, stacklevel=2 if frame is None else level)
+
+
 def number(owner, field, value, expected, accept):
     """`value` as a float where it is a number that `accept` accepts; refused otherwise."""
     if isinstance(value, bool) or not isinstance(value, numbers.Real):
@@ -31,13 +55,24 @@ def number(owner, field, value, expected, accept):
         refuse(owner, field, f"{str(value)[:10]}...", expected)
     if math.isnan(given) or not accept(given):
         refuse(owner, field, value, expected)
+    if abs(given) > _SMALLEST and abs(given) != math.inf:
+        unit = re.search(r"\(([^(),]+)", expected)
+        most = _most(owner, unit[1] if unit else "")
+        if abs(given) > most:
+            refuse(owner, field, value, f"{expected}, of at most {most:g}{f' {unit[1]}' if unit else ''}")
     return given
+
+
+def _most(owner, unit):
+    """The largest size of a number with a unit that an object has."""
+    of_strings = any(kind.__module__.startswith(_OF_STRINGS) for kind in type(owner).__mro__)
+    return _MOST.get(unit, LARGEST) if of_strings else LARGEST
 
 
 def positive(owner, field, value, unit):
     """A number above zero, neither so small nor so large that its powers are not numbers."""
     found = number(owner, field, value, f"a positive number ({unit})", lambda x: 0 < x < math.inf)
-    if not 1 / LARGEST <= found <= LARGEST:
+    if found < 1 / LARGEST:
         refuse(owner, field, value, f"a positive number ({unit}) from {1 / LARGEST:g} to {LARGEST:g}")
     return found
 
@@ -67,6 +102,40 @@ def vector(owner, field, value, unit, size=3):
     if array.shape != (size,):
         refuse(owner, field, value, expected)
     return tuple(array.tolist())
+
+
+def text_of(file, expected, *, pipes=False):
+    """The text of a user's file, without the mark that some editors begin files with.
+
+    Args:
+        expected: what the file should be, for messages.
+        pipes: whether it may be a pipe.
+
+    Raises:
+        SceneError: it cannot be read, is no plain file, is too large, holds a workbook, or is not UTF-8.
+    """
+    file = Path(file)
+    try:
+        mode = file.stat().st_mode
+        plain = stat.S_ISREG(mode) or stat.S_ISDIR(mode) or (pipes and stat.S_ISFIFO(mode))
+        data = b""
+        if plain:
+            with file.open("rb") as stream:
+                data = stream.read(MOST_TEXT + 1)
+    except OSError as problem:
+        raise SceneError(f"{file}: cannot be read ({problem.strerror}): expected {expected}") from None
+    except ValueError as problem:  # a null character in its name
+        raise SceneError(f"{str(file)!r}: cannot be read ({problem}): expected {expected}") from None
+    if not plain:
+        raise SceneError(f"{file}: no plain file: expected {expected}")
+    if len(data) > MOST_TEXT:
+        raise SceneError(f"{file}: larger than {MOST_TEXT / 2**20:g} MiB: expected {expected}")
+    if data.startswith(_WORKBOOKS):
+        raise SceneError(f"{file}: a workbook or another archive: expected {expected}; save the sheet as .csv (UTF-8)")
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError as problem:
+        raise SceneError(f"{file}: not UTF-8 ({problem.reason} at byte {problem.start}): save it as UTF-8") from None
 
 
 def call(function, x, name, where):

@@ -12,6 +12,7 @@ import pytest
 from mpi4py import MPI
 
 import cosserat_fenicsx as cf
+from cosserat_fenicsx.aborting import end_all
 
 COMM = MPI.COMM_WORLD
 
@@ -40,7 +41,7 @@ def pytest_runtest_makereport(item, call):
             file=sys.stderr,
             flush=True,
         )
-        COMM.Abort(1)
+        end_all()
 
 
 @pytest.fixture

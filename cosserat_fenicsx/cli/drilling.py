@@ -8,8 +8,7 @@ from pathlib import Path
 from cosserat_fenicsx import units
 from cosserat_fenicsx.cli.deliver import prepare
 from cosserat_fenicsx.cli.ended import ended
-from cosserat_fenicsx.cli.say import DONE, INTERRUPTED, NOT_CONVERGED, say
-from cosserat_fenicsx.cli.well import warnings_in_words
+from cosserat_fenicsx.cli.say import DONE, INTERRUPTED, NOT_CONVERGED, say, warnings_in_words
 from cosserat_fenicsx.drilling.bit_laws import Stribeck
 from cosserat_fenicsx.drilling.choose import chosen
 from cosserat_fenicsx.drilling.discs import Discs
@@ -82,6 +81,7 @@ def _stability(found, options):
     return DONE
 
 
+@warnings_in_words()
 def resume_run(options):
     """`cosserat resume` of a folder that holds a drill-string in motion; returns the exit code."""
     return _deliver(lambda: resume_drilling(options.folder, duration=options.duration), options)

@@ -11,7 +11,7 @@ from cosserat_fenicsx import interrupts
 from cosserat_fenicsx.cli.deliver import deliver
 from cosserat_fenicsx.cli.eigen import run_buckling, run_modes
 from cosserat_fenicsx.cli.options import parser
-from cosserat_fenicsx.cli.say import BAD_INPUT, DONE, INTERRUPTED, in_words, say
+from cosserat_fenicsx.cli.say import BAD_INPUT, DONE, INTERRUPTED, in_words, say, warnings_in_words
 from cosserat_fenicsx.cli.together import together
 from cosserat_fenicsx.errors import CosseratError, SceneError, SceneWarning
 
@@ -119,6 +119,7 @@ def _run(options):
         return deliver(computed, options, bool(moving))
 
 
+@warnings_in_words()
 def _resume(options):
     folder = Path(options.folder)
     if not folder.is_dir():

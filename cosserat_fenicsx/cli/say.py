@@ -1,6 +1,8 @@
 """Messages of the command line, printed by one MPI rank alone, and its exit codes."""
 
 import sys
+import warnings
+from contextlib import contextmanager
 
 from cosserat_fenicsx.ranks import launched
 
@@ -20,6 +22,26 @@ def first_rank():
 def say(text, file=None):
     if first_rank():
         print(text, file=file or sys.stderr, flush=True)
+
+
+@contextmanager
+def warnings_in_words():
+    """Say each warning about a scene once, without the place in the code that it comes from."""
+    from cosserat_fenicsx.errors import SceneWarning
+
+    said = set()
+
+    def show(message, category, *where, **more):
+        if not issubclass(category, SceneWarning):
+            usual(message, category, *where, **more)
+        elif str(message) not in said:
+            said.add(str(message))
+            say(f"cosserat: warning: {message}")
+
+    with warnings.catch_warnings():
+        usual, warnings.showwarning = warnings.showwarning, show
+        warnings.simplefilter("always", SceneWarning)
+        yield
 
 
 def in_words(problem):

@@ -1,8 +1,8 @@
 """Under mpirun: what only one rank raises ends all of them, which would wait for it for ever otherwise."""
 
 import sys
-import time
 
+from cosserat_fenicsx.aborting import all_are_here, end_all
 from cosserat_fenicsx.ranks import launched
 
 # Time (s) within which ranks that fail together get here.
@@ -25,9 +25,9 @@ def together(action):
     try:
         return action()
     except Exception as problem:
-        if not _all_are_here(own):
+        if not all_are_here(own, _PATIENCE):
             print(f"cosserat: rank {rank} of {size} alone: {_in_full(problem)}", file=sys.stderr, flush=True)
-            MPI.COMM_WORLD.Abort(1)
+            end_all()
         raise
 
 
@@ -38,12 +38,3 @@ def _in_full(problem):
     if isinstance(problem, CosseratError | OSError):
         return in_words(problem)
     return f"{type(problem).__name__}: {problem}"
-
-
-def _all_are_here(comm):
-    met, until = comm.Ibarrier(), time.monotonic() + _PATIENCE
-    while not met.Test():
-        if time.monotonic() > until:
-            return False
-        time.sleep(0.01)
-    return True

@@ -2,8 +2,6 @@
 
 import math
 import sys
-import warnings
-from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,8 +9,8 @@ import numpy as np
 
 from cosserat_fenicsx import units
 from cosserat_fenicsx.cli.deliver import prepare
-from cosserat_fenicsx.cli.say import DONE, INTERRUPTED, say
-from cosserat_fenicsx.errors import Interrupted, SceneError, SceneWarning
+from cosserat_fenicsx.cli.say import DONE, INTERRUPTED, say, warnings_in_words
+from cosserat_fenicsx.errors import Interrupted, SceneError
 from cosserat_fenicsx.ranks import on_first, world
 from cosserat_fenicsx.well.components import weight_in_mud
 from cosserat_fenicsx.well.scenefile import well_in
@@ -40,24 +38,6 @@ def _scene(options, tables):
     scene = well_in(tables, Path(options.scene))
     asked = {name: getattr(options, name) for name in ("tol", "model") if getattr(options, name) is not None}
     return replace(scene, settings={**scene.settings, **asked})
-
-
-@contextmanager
-def warnings_in_words():
-    """Say each warning about a scene once, without the place in the code that it comes from."""
-    said = set()
-
-    def show(message, category, *where, **more):
-        if not issubclass(category, SceneWarning):
-            usual(message, category, *where, **more)
-        elif str(message) not in said:
-            said.add(str(message))
-            say(f"cosserat: warning: {message}")
-
-    with warnings.catch_warnings():
-        usual, warnings.showwarning = warnings.showwarning, show
-        warnings.simplefilter("always", SceneWarning)
-        yield
 
 
 @warnings_in_words()

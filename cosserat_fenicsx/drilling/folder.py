@@ -3,7 +3,7 @@
 drilling.json    the arguments of `simulate_drilling`, the model and what decided for it, the fingerprint of the scene
 scene.json       the scene as data, where it has that form: no folder can run code
 series.f64, profiles.f64   rows of numbers, 8 bytes each, see `history.COLUMNS`; only complete rows count
-checkpoint.npz   the memory of the model and of the loop, and how many rows there were then
+checkpoint.npz   the memory of the model and of the loop, how many rows there were then, and checksums of these
 
 Rows after those that the checkpoint tells of are computed again, to the same digits.
 """
@@ -11,12 +11,13 @@ Rows after those that the checkpoint tells of are computed again, to the same di
 import json
 import os
 import time
+import zlib
 from pathlib import Path
 
 import numpy as np
 
 from cosserat_fenicsx import __version__
-from cosserat_fenicsx.checks import instance
+from cosserat_fenicsx.checks import instance, warn
 from cosserat_fenicsx.drilling.as_data import fingerprint, from_data, to_data
 from cosserat_fenicsx.drilling.history import COLUMNS, DrillingHistory
 from cosserat_fenicsx.drilling.protocol import PROFILE
@@ -25,6 +26,19 @@ from cosserat_fenicsx.ranks import on_first, world
 from cosserat_fenicsx.results.export.beside import replaced
 from cosserat_fenicsx.scene.as_data import NotData
 from cosserat_fenicsx.storage import checkpoints
+from cosserat_fenicsx.storage.entries import (
+    A_NUMBER,
+    A_POSITIVE,
+    A_TEXT,
+    A_WHOLE,
+    AN_INDEX,
+    POSITIVE_OR_NONE,
+    SOME_TEXTS,
+    checked,
+    numbers,
+    or_none,
+    whole,
+)
 from cosserat_fenicsx.storage.fingerprint import difference
 from cosserat_fenicsx.storage.lock import FolderLock
 
@@ -33,7 +47,29 @@ APART, SELDOM = 2.0, 20
 _FORMAT = 2
 _HEAD, _SCENE, _LATEST = "drilling.json", "scene.json", "checkpoint.npz"
 _SERIES, _PROFILES = "series.f64", "profiles.f64"
-_TOLD = {"model": str, "why": list, "dt": float, "depths": list, "duration": float}
+_FILES = (_SERIES, _PROFILES)
+# What drilling.json must hold.
+_ENTRIES = {
+    "format": A_NUMBER,
+    "scene": (lambda value: isinstance(value, dict), "the numbers of a scene"),
+    "model": A_TEXT,
+    "why": SOME_TEXTS,
+    "dt": A_POSITIVE,
+    "depths": (lambda value: numbers(value) and sorted(value) == value, "ascending numbers (m)"),
+    "duration": A_POSITIVE,
+    "asked.model": A_TEXT,
+    "asked.dt": POSITIVE_OR_NONE,
+    "asked.elements": (or_none(whole), "a whole number above zero or null"),
+    "apart.save_every": A_WHOLE,
+    "apart.profile_every": A_WHOLE,
+}
+# And what a checkpoint must, beside what the model remembers.
+_OF_MEMORY = {
+    "rows": AN_INDEX,
+    "profiles": AN_INDEX,
+    "model": (lambda value: isinstance(value, dict), "what the model remembers"),
+}
+_SUMS_OF_FILES = {"sums": (lambda value: isinstance(value, dict), "checksums of the rows")}
 
 
 class DrillingFolder:
@@ -52,6 +88,7 @@ class DrillingFolder:
     def __init__(self, place):
         instance("simulate_drilling", "folder", place, str | os.PathLike, "the name of a folder")
         self.place, self.head, self._last, self._apart = Path(place), None, None, APART
+        self._sums = dict.fromkeys(_FILES, 0)  # checksums of the files so far
         self._lock = FolderLock(self.place, "motion")
 
     def make(self, scene, history, asked):
@@ -122,11 +159,20 @@ class DrillingFolder:
             raise SceneError(
                 f"{self.place / _HEAD} is damaged ({problem}): expected what simulate_drilling wrote"
             ) from None
-        for name, kind in {"format": int, "scene": dict, **_TOLD}.items():
-            if not isinstance(head, dict) or not isinstance(head.get(name), kind):
-                raise SceneError(f"{self.place / _HEAD} is damaged ({name}): expected what simulate_drilling wrote")
-        if head["format"] != _FORMAT:
-            raise SceneError(f"{self.place}: its format is {head['format']}: expected {_FORMAT}, that of this release")
+        try:
+            checked(head, {"format": _ENTRIES["format"]})
+            if head["format"] != _FORMAT:
+                raise SceneError(
+                    f"{self.place}: its format is {head['format']}: expected {_FORMAT}, that of this release"
+                )
+            checked(head, _ENTRIES)
+        except SceneError:
+            raise
+        except ValueError as problem:
+            raise SceneError(
+                f"{self.place / _HEAD} is damaged ({str(problem).split()[0]}): {problem}; expected what "
+                "simulate_drilling wrote"
+            ) from None
         self.head = head
         return self
 
@@ -195,10 +241,40 @@ class DrillingFolder:
 
     # -- rows and checkpoints ----------------------------------------------------------------------------------------
 
+    def _sizes(self, rows, profiles):
+        """{name: bytes} of so many rows in the files."""
+        return {
+            _SERIES: 8 * rows * len(COLUMNS),
+            _PROFILES: 8 * profiles * (1 + len(PROFILE) * len(self.head["depths"])),
+        }
+
     def cut(self, rows, profiles):
         """Leave the first rows alone, before a motion is continued."""
-        sizes = {_SERIES: rows * len(COLUMNS), _PROFILES: profiles * (1 + len(PROFILE) * len(self.head["depths"]))}
-        self._try(lambda: [os.truncate(self.place / name, 8 * size) for name, size in sizes.items()])
+        sizes = self._sizes(rows, profiles)
+
+        def done():
+            for name, size in sizes.items():
+                os.truncate(self.place / name, size)
+                self._sums[name] = _checksum(self.place / name, size)
+
+        self._try(done)
+
+    def wrong(self, memory):
+        """Why a checkpoint does not belong to the rows in the files, in words; None where it does. The same on all
+        ranks; in checkpoints of releases before there were checksums, the numbers of rows alone are compared.
+        """
+
+        def compared():
+            told = memory.get("sums")
+            for name, size in self._sizes(memory["rows"], memory["profiles"]).items():
+                if (self.place / name).stat().st_size < size:
+                    return f"{self.place / name} has fewer rows than its checkpoint tells of"
+                if told and told.get(name) != _checksum(self.place / name, size):
+                    return f"{self.place / name}: its numbers are not those that were written"
+            return None
+
+        comm = world()
+        return comm.bcast(compared() if comm.rank == 0 else None)
 
     def add(self, history, rows, profiles):
         """Append rows to the files.
@@ -208,12 +284,14 @@ class DrillingFolder:
         """
 
         def written():
-            for name, numbers in ((_SERIES, rows), (_PROFILES, profiles)):
-                if len(numbers):
-                    rest = memoryview(np.ascontiguousarray(numbers, dtype=float).tobytes())
+            for name, added in ((_SERIES, rows), (_PROFILES, profiles)):
+                if len(added):
+                    data = np.ascontiguousarray(added, dtype=float).tobytes()
+                    rest = memoryview(data)
                     with open(self.place / name, "ab", buffering=0) as stream:
                         while rest:  # a nearly full disk takes a part
                             rest = rest[stream.write(rest) :]
+                    self._sums[name] = zlib.crc32(data, self._sums[name])
 
         self._or_not_stored(history, written)
 
@@ -234,16 +312,47 @@ class DrillingFolder:
             for name in (_SERIES, _PROFILES):
                 with open(self.place / name, "rb") as stream:
                     os.fsync(stream.fileno())
-            checkpoints.write(self.place / _LATEST, memory)
+            checkpoints.write(self.place / _LATEST, {**memory, "sums": dict(self._sums)})
 
         self._or_not_stored(history, written)
         self._last = time.monotonic()
         self._apart = max(APART, SELDOM * (self._last - began))
 
-    def memory(self):
-        """What the last checkpoint holds, the same on all ranks; None where there is none that can be read."""
+    def memory(self, tell=True):
+        """What the last checkpoint holds, the same on all ranks; None where there is none that can be gone on from.
+
+        Args:
+            tell: whether to warn where it is damaged.
+        """
         comm = world()
-        return comm.bcast(checkpoints.read(self.place / _LATEST) if comm.rank == 0 else None)
+        return comm.bcast(self._read_checkpoint(tell) if comm.rank == 0 else None)
+
+    def _read_checkpoint(self, tell):
+        try:
+            memory = checkpoints.read(self.place / _LATEST)
+            if memory is None:
+                return None
+            checked(memory, _OF_MEMORY if memory[checkpoints.CHECKSUM] is None else {**_OF_MEMORY, **_SUMS_OF_FILES})
+        except (checkpoints.Damaged, ValueError) as problem:
+            if tell:
+                place = "" if isinstance(problem, checkpoints.Damaged) else f"{self.place / _LATEST}: "
+                self.tell_lost(f"{place}{problem}")
+            return None
+        if memory[checkpoints.CHECKSUM] is None:
+            warn(f"{self.place / _LATEST} has no checksum, as those of earlier releases: numbers that were changed in "
+                 "it, or in the rows, are not noticed")  # fmt: skip
+            memory.pop("sums", None)
+        return memory
+
+    def unlike(self, memory, running):
+        """Why what a checkpoint remembers is not of the kind of what a `StringModel` does, in words; None where it is."""
+        found = checkpoints.unlike(memory["model"], running.memory())
+        return found and f"{self.place / _LATEST}: {found}"
+
+    def tell_lost(self, why):
+        """Warn that a motion is computed from its start again."""
+        if world().rank == 0:
+            warn(f"{why}: the motion is computed from its start again")
 
     def _or_not_stored(self, history, action):
         try:
@@ -254,3 +363,12 @@ class DrillingFolder:
                 f"cosserat_fenicsx.resume_drilling({str(self.place)!r}) continues it",
                 history,
             ) from None
+
+
+def _checksum(file, size):
+    """The CRC-32 of the first bytes of a file."""
+    total = 0
+    with open(file, "rb") as stream:
+        while size > 0 and (data := stream.read(min(size, 1 << 20))):
+            total, size = zlib.crc32(data, total), size - len(data)
+    return total

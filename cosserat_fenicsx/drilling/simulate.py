@@ -3,6 +3,8 @@
 import math
 import numbers
 
+import numpy as np
+
 from cosserat_fenicsx.annotations import File
 from cosserat_fenicsx.checks import instance, number, refuse
 from cosserat_fenicsx.drilling.bit_laws import Cutting, Lobes
@@ -14,9 +16,12 @@ from cosserat_fenicsx.drilling.scene import Drilling
 from cosserat_fenicsx.drilling.step_errors import step_errors
 from cosserat_fenicsx.drilling.time_loop import TimeLoop
 from cosserat_fenicsx.drilling.top_drive import Motor, Stiff
+from cosserat_fenicsx.errors import SceneError
 
 #: More steps, and rows of a history, are refused as a mistake; so many profiles where nothing else is asked for.
 MOST_STEPS, MOST_ROWS, PROFILES = 1e8, 2e7, 400
+# Relative differences below this are rounding, as by another machine.
+_ROUNDING = 1e-9
 # Largest rotation in a step, rad, at three times the speed of the drive, as a bit that slips may have; and the largest
 # part of the angle between two blades or lobes.
 _TURN, _FASTER, _OF_BLADES = 1.0, 3.0, 0.25
@@ -117,20 +122,44 @@ def resume_drilling(
 
 
 def _go_on(kept, scene, duration, progress):
-    asked, memory = kept.head["asked"], kept.memory()
-    running = model_of(scene, asked["model"], asked["dt"], asked["elements"])
+    running, memory = _running(kept, scene), kept.memory()
     if duration > kept.asked:
         check_step(scene, running.dt, duration, kept.head["apart"]["save_every"] * running.dt)
         kept.extend(duration, scene)
+    why = memory and (kept.wrong(memory) or kept.unlike(memory, running))
+    if why:
+        kept.tell_lost(why)
+        memory = None
     rows, profiles = (memory["rows"], memory["profiles"]) if memory else (0, 0)
     history = kept.history(scene, rows, profiles)
-    if len(history) < rows or len(history.profile_times) < profiles:  # another file than those of the checkpoint
-        memory, rows, profiles, history = None, 0, 0, kept.history(scene, 0, 0)
     kept.cut(rows, profiles)
     loop = TimeLoop(running, history, kept, **kept.head["apart"], turn=_turn_to_watch(scene))
     if memory:
         loop.recall(memory)
     return loop.until(duration, progress)
+
+
+def _running(kept, scene):
+    """The model of a motion that is gone on with.
+
+    Raises:
+        SceneError: it is not the one that the rows are of.
+    """
+    asked, told = kept.head["asked"], kept.head
+    running = model_of(scene, asked["model"], asked["dt"], asked["elements"])
+    alike = {
+        "model": running.name == told["model"],
+        "dt": math.isclose(running.dt, told["dt"], rel_tol=_ROUNDING),
+        "depths": len(running.depths) == len(told["depths"])
+        and np.allclose(running.depths, told["depths"], rtol=_ROUNDING, atol=0),
+    }
+    for name, same in alike.items():
+        if not same:
+            raise SceneError(
+                f"{kept.place}: the {name} of its motion is another one than that of this release, or drilling.json is "
+                "damaged: expected a new motion by simulate_drilling"
+            )
+    return running
 
 
 def read_drilling(folder: File, scene: Drilling | None = None) -> DrillingHistory:
@@ -142,7 +171,13 @@ def read_drilling(folder: File, scene: Drilling | None = None) -> DrillingHistor
         SceneError: no such folder, or another scene.
     """
     kept = DrillingFolder(folder).open()
-    return kept.history(kept.scene(scene))
+    scene, memory = kept.scene(scene), kept.memory(tell=False)  # before the rows, which another process may be writing
+    why = memory and kept.wrong(memory)
+    if why and "fewer" not in why:
+        raise SceneError(
+            f"{why}: expected the files as they were; cosserat_fenicsx.resume_drilling computes them again"
+        )
+    return kept.history(scene)
 
 
 def check_arguments(scene, duration, dt=None, elements=None, save_every=None, profile_every=None):

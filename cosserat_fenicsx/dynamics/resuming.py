@@ -9,7 +9,7 @@ import numpy as np
 from mpi4py import MPI
 
 from cosserat_fenicsx.annotations import File
-from cosserat_fenicsx.checks import instance, refuse
+from cosserat_fenicsx.checks import instance, refuse, warn
 from cosserat_fenicsx.dynamics.simulate import check_counts, pace_of, positive_time
 from cosserat_fenicsx.dynamics.solvers import solvers_of
 from cosserat_fenicsx.dynamics.steppers import SCHEMES
@@ -22,6 +22,7 @@ from cosserat_fenicsx.dynamics.time_loop import TimeLoop
 from cosserat_fenicsx.ranks import communicator
 from cosserat_fenicsx.results.export import saved
 from cosserat_fenicsx.results.history import History
+from cosserat_fenicsx.storage import checkpoints, entries
 from cosserat_fenicsx.storage.runfolder import RunFolder
 from cosserat_fenicsx.scene.scene import Scene
 from cosserat_fenicsx.statics.reading import assembled
@@ -99,25 +100,25 @@ def _check_plane(kept, scene, until):
 def _go_on(kept, scene, until, comm, progress):
     asked, ends = kept.asked, [t for t in kept.durations if t < until]
     marks = marks_of(scene, until, asked["save_every"], ends)
-    memory = _memory(kept, _history(kept, scene, comm))
     scene_over, layout = scene.over(asked["duration"]), Layout.of(scene, asked["elements"])
     scheme, load_factor = asked["scheme"], asked["load_factor"]
     model = kept.told["model"]
     with solvers_of(scene_over, layout, asked["degree"], scheme, load_factor, comm, model) as (problem, stepper):
-        alike = np.array_equal(memory["nodes"], problem.model.slots)
-        if not comm.allreduce(alike, op=MPI.LAND):
-            raise SceneError(
-                f"{kept.place}: its nodes are numbered differently here: expected the release of dolfinx that it was "
-                "computed with"
-            )
         history = _history(kept, scene, comm, problem.model.expansion())
-        history.go_on_after(memory["saved"])
         stepper.rho_inf = asked["rho_inf"]
         problem.begin()
         stepper.begin()
         pace = pace_of(asked["duration"], tol=asked["tol"], dt=asked["dt"], scheme=scheme)
         pace.watch(scene, asked["duration"], load_factor, stepper.impulse_error)
         motion = TimeLoop(problem, stepper, pace, history, kept)
+        memory = _memory(kept, history, motion)
+        alike = np.array_equal(memory["nodes"], problem.model.slots)
+        if not comm.allreduce(alike, op=MPI.LAND):
+            raise SceneError(
+                f"{kept.place}: its nodes are numbered differently here: expected the release of dolfinx that it was "
+                "computed with"
+            )
+        history.go_on_after(memory["saved"])
         motion.recall(memory)
         if until > kept.durations[-1]:
             kept.extend(until, scene)
@@ -143,7 +144,15 @@ def read_history(folder: File, scene: Scene | None = None, *, comm: MPI.Comm | N
         if scene is not None:
             refuse("read_history", "scene", scene, f"None, since the file {folder} holds its scene")
         return saved.read(folder, "History", assembled, comm)
-    return _history(*_open(folder, scene, comm), comm)
+    kept, scene = _open(folder, scene, comm)
+    _, states, why = next(kept.memories())  # before the states, which another process may be writing
+    history = _history(kept, scene, comm)
+    if not why and states is not None and states["rows"] <= len(history) and not history.sound(states):
+        raise SceneError(
+            f"{kept.place}: the numbers of saved states are not those that were written (their checksum is that of "
+            "others): expected the files as they were; cosserat_fenicsx.resume computes them again"
+        )
+    return history
 
 
 def _open(folder, scene, comm, duration=None):
@@ -165,12 +174,45 @@ def _history(kept, scene, comm, expand=None):
     return StoredHistory.as_told(kept.told, scene, layout, scales, comm, connections, expand).keep_in(kept.place)
 
 
-def _memory(kept, history):
-    """The latest checkpoint of this rank before which all states are saved."""
-    for memory in kept.memories():
-        if memory["saved"] <= len(history):
+def _memory(kept, history, motion=None):
+    """The latest checkpoint of this rank before which all states are saved.
+
+    Args:
+        motion: the `TimeLoop` that will recall it, whose data it must be like.
+
+    Raises:
+        SceneError: there is none.
+    """
+    lost = []
+    for memory, states, why in kept.memories():
+        if memory is not None:
+            why = _wrong(memory, motion)
+        missing = memory is None and not why
+        reasons = [text for text in history.comm.allgather(why) if text]
+        if history.comm.allreduce(missing, op=MPI.LOR) or reasons:
+            lost += reasons[:1]
+        elif not history.comm.allreduce(memory["saved"] <= len(history), op=MPI.LAND):
+            continue
+        elif not history.sound(states):
+            lost.append(f"{history.folder}: the numbers of saved states are not those that were written")
+        else:
+            if lost and motion is not None and history.comm.rank == 0:
+                warn(f"{lost[0]}: the motion is continued from its start, which computes them again")
             return memory
     raise SceneError(
-        f"{kept.place}: no checkpoint can be read (checkpoint.npz and start.npz are missing or damaged): expected a "
-        "new run by simulate; read_history shows the states that were saved"
+        f"{kept.place}: no checkpoint can be read (checkpoint.npz and start.npz are missing or damaged"
+        f"{''.join(f'; {text}' for text in lost[:1])}): expected a new run by simulate; read_history shows the states "
+        "that were saved"
     )
+
+
+def _wrong(memory, motion):
+    """What is wrong with the data of a checkpoint, "" where nothing is."""
+    try:
+        entries.checked(memory, {"saved": entries.AN_INDEX, "t": entries.A_NUMBER})
+    except ValueError as problem:
+        return f"checkpoint: {problem}"
+    if not isinstance(memory.get("nodes"), np.ndarray):
+        return "checkpoint: nodes is missing"
+    found = checkpoints.unlike(memory, {} if motion is None else motion.memory())
+    return f"checkpoint: {found}" if found else ""

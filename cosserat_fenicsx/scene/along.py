@@ -11,7 +11,7 @@ from pathlib import PurePath
 import numpy as np
 
 from cosserat_fenicsx.annotations import File, Numbers, Rows
-from cosserat_fenicsx.checks import call, number, refuse, vector
+from cosserat_fenicsx.checks import call, number, refuse, text_of, vector
 from cosserat_fenicsx.errors import SceneError
 
 # Elements end at the rows of tables of up to this length. Longer ones have kinks inside elements.
@@ -178,9 +178,10 @@ def kinks_of(value):
 
 
 def _read(file):
+    text = text_of(file, "arc lengths and vectors as .csv")
     try:
-        table = np.loadtxt(file, delimiter=",", comments="#", ndmin=2)
-    except (OSError, ValueError) as problem:
+        table = np.loadtxt(text.splitlines(), delimiter=",", comments="#", ndmin=2)
+    except ValueError as problem:
         raise SceneError(
             f"AlongTable.s = {str(file)!r}: cannot be read ({problem}): expected arc lengths (m), or a .csv file of "
             "four columns, s (m) and three components, no heading but lines that begin with #"

@@ -7,7 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from cosserat_fenicsx.checks import LARGEST, refuse
+from cosserat_fenicsx.checks import LARGEST, refuse, text_of
+from cosserat_fenicsx.errors import SceneError
 
 # Smallest distance of neighbouring points over the extent of all: nearer ones leave the curvature to rounding errors.
 _APART = 1e-7
@@ -64,21 +65,19 @@ def _coincide(a, b, points):
 def _from_csv(owner, field, file):
     rows = []
     try:
-        with file.open(newline="", encoding="utf-8-sig") as stream:
-            for number, row in enumerate(csv.reader(stream), start=1):
-                if not any(cell.strip() for cell in row):
-                    continue
-                try:
-                    x, y, z = map(float, row)
-                except ValueError:
-                    if rows or number > 1:
-                        refuse(
-                            owner, field, str(file), f"three numbers in line {number}, which is {','.join(row)!r:.60}"
-                        )
-                else:
-                    rows.append((x, y, z))
-    except (OSError, UnicodeDecodeError) as problem:
+        table = list(csv.reader(io.StringIO(text_of(file, "points as .csv"), newline="")))
+    except (SceneError, csv.Error) as problem:
         refuse(owner, field, str(file), f"a text file that can be read ({problem})")
+    for number, row in enumerate(table, start=1):
+        if not any(cell.strip() for cell in row):
+            continue
+        try:
+            x, y, z = map(float, row)
+        except ValueError:
+            if rows or number > 1:
+                refuse(owner, field, str(file), f"three numbers in line {number}, which is {','.join(row)!r:.60}")
+        else:
+            rows.append((x, y, z))
     return rows or np.empty((0, 3))
 
 

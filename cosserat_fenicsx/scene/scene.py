@@ -1,7 +1,6 @@
 """A scene: rods, joints, supports and actions, independent of solvers and meshes."""
 
 import copy
-import warnings
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -9,8 +8,8 @@ from functools import cached_property
 
 import numpy as np
 
-from cosserat_fenicsx.checks import instance
-from cosserat_fenicsx.errors import SceneError, SceneWarning, nearest
+from cosserat_fenicsx.checks import instance, warn
+from cosserat_fenicsx.errors import SceneError, nearest
 from cosserat_fenicsx.scene.action import Action
 from cosserat_fenicsx.scene.describe import describe
 from cosserat_fenicsx.scene.groups import Groups
@@ -206,7 +205,7 @@ class Scene:
     def warn(self):
         """Raise a `SceneWarning` for each of `doubts`, on behalf of the caller of the function that calls this."""
         for doubt in self.doubts:
-            warnings.warn(doubt, SceneWarning, stacklevel=3)
+            warn(doubt)
 
     @property
     def follows(self):

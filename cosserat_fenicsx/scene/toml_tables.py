@@ -4,6 +4,7 @@ import inspect
 import tomllib
 from pathlib import Path
 
+from cosserat_fenicsx.checks import text_of
 from cosserat_fenicsx.errors import SceneError, nearest
 
 
@@ -15,14 +16,12 @@ def tables_of(file):
     """
     file = Path(file)
     try:
-        return tomllib.loads(file.read_text(encoding="utf-8-sig"))  # some editors begin a file with a mark
-    except OSError as problem:
-        raise SceneError(f"{file}: cannot be read ({problem.strerror}): expected a scene file in TOML") from None
-    except UnicodeDecodeError as problem:
-        raise SceneError(f"{file}: not UTF-8 ({problem.reason} at byte {problem.start}): save it as UTF-8") from None
+        return tomllib.loads(text_of(file, "a scene file in TOML", pipes=True))
     except tomllib.TOMLDecodeError as problem:
         hint = "; text, and a number with its unit, stand in quotes" if "Invalid value" in str(problem) else ""
         raise SceneError(f"{file}: not valid TOML: {problem}{hint}") from None
+    except RecursionError:
+        raise SceneError(f"{file}: not valid TOML: nested too deeply") from None
 
 
 def entries(key, tables):

@@ -2,6 +2,18 @@
 
 import math
 
+from cosserat_fenicsx.storage import entries
+from cosserat_fenicsx.storage.entries import (
+    A_NUMBER,
+    A_POSITIVE,
+    A_TEXT,
+    A_WHOLE,
+    NUMBER_OR_NONE,
+    POSITIVE_OR_NONE,
+    SOME_NUMBERS,
+    SOME_TEXTS,
+)
+
 
 def checked(head):
     """The data of the file, if they are those of a motion.
@@ -9,15 +21,7 @@ def checked(head):
     Raises:
         ValueError: naming the first entry that is not as expected.
     """
-    for name, (accept, expected) in _ENTRIES.items():
-        value = head
-        for key in name.split("."):
-            if not isinstance(value, dict) or key not in value:
-                raise ValueError(f"{name} is missing")
-            value = value[key]
-        if not accept(value):
-            given = repr(value)
-            raise ValueError(f"{name} = {given if len(given) < 80 else given[:77] + '...'}: expected {expected}")
+    entries.checked(head, _ENTRIES)
     asked, told = head["asked"], head["told"]
     rule = told["rule"]
     for fits, words in (
@@ -33,28 +37,8 @@ def checked(head):
     return head
 
 
-def _number(value):
-    return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) < 1e300  # nor NaN, infinity
-
-
-def _positive(value):
-    return _number(value) and value > 0
-
-
-def _whole(value):
-    return isinstance(value, int) and not isinstance(value, bool) and 1 <= value < 10**9
-
-
-def _numbers(value):
-    return isinstance(value, list) and len(value) > 0 and all(map(_number, value))
-
-
 def _ascending(value):
-    return _numbers(value) and value[0] > 0 and sorted(value) == value
-
-
-def _texts(value):
-    return isinstance(value, list) and all(isinstance(text, str) for text in value)
+    return entries.numbers(value) and value[0] > 0 and sorted(value) == value
 
 
 def _plain(value):
@@ -72,43 +56,32 @@ def _fingerprint(value):
 
 def _ahead(value):
     return isinstance(value, list) and all(
-        isinstance(entry, list) and len(entry) == 2 and _number(entry[0]) and _fingerprint(entry[1]) for entry in value
+        isinstance(entry, list) and len(entry) == 2 and entries.number(entry[0]) and _fingerprint(entry[1])
+        for entry in value
     )
 
 
-def _or_none(accept):
-    return lambda value: value is None or accept(value)
-
-
-_A_NUMBER, _A_POSITIVE, _A_WHOLE = (
-    (_number, "a number"),
-    (_positive, "a positive number"),
-    (_whole, "a whole number above zero"),
-)
-_OR_NONE = _or_none(_positive), "a positive number or null"
-_A_TEXT = (lambda value: isinstance(value, str)), "a text"
-_SOME_NUMBERS = _numbers, "a list of numbers"
 _ENTRIES = {
-    "ranks": _A_WHOLE,
+    "ranks": A_WHOLE,
     "durations": (_ascending, "ascending positive numbers (s)"),
     "scene": (_fingerprint, "the numbers of a scene"),
-    "asked.duration": _A_POSITIVE,
-    "asked.tol": _OR_NONE,
-    "asked.dt": _OR_NONE,
-    "asked.scheme": _A_TEXT,
-    "asked.save_every": _OR_NONE,
-    "asked.load_factor": _A_NUMBER,
-    "asked.elements": _A_WHOLE,
-    "asked.degree": (lambda value: _whole(value) and value <= 4, "1, 2, 3 or 4"),
-    "asked.rho_inf": (_or_none(_number), "a number or null"),
+    "asked.duration": A_POSITIVE,
+    "asked.tol": POSITIVE_OR_NONE,
+    "asked.dt": POSITIVE_OR_NONE,
+    "asked.scheme": A_TEXT,
+    "asked.save_every": POSITIVE_OR_NONE,
+    "asked.load_factor": A_NUMBER,
+    "asked.elements": A_WHOLE,
+    "asked.degree": (lambda value: entries.whole(value) and value <= 4, "1, 2, 3 or 4"),
+    "asked.rho_inf": NUMBER_OR_NONE,
     "told.model": (lambda value: value in ("planar", "spatial"), "'planar' or 'spatial'"),
-    "told.degree": _A_WHOLE,
-    "told.unknowns": _A_WHOLE,
-    "told.why": (_texts, "a list of texts"),
-    "told.scheme": _A_TEXT,
-    "told.time_unit": _A_POSITIVE,
-    "told.rule.nodes": _SOME_NUMBERS,
-    "told.rule.gauss": _SOME_NUMBERS,
-    "told.rule.weights": _SOME_NUMBERS,
+    "told.degree": A_WHOLE,
+    "told.unknowns": A_WHOLE,
+    "told.why": SOME_TEXTS,
+    "told.scheme": A_TEXT,
+    "told.time_unit": A_POSITIVE,
+    "told.rule.nodes": SOME_NUMBERS,
+    "told.rule.gauss": SOME_NUMBERS,
+    "told.rule.weights": SOME_NUMBERS,
     "ahead": (_ahead, "a list of times with the numbers of the scene then"),
 }

@@ -7,6 +7,7 @@ row at most, and `numpy.load(file, mmap_mode="r")` opens the rest, with fields b
 import ast
 import os
 import struct
+import zlib
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +20,8 @@ _MAGIC = b"\x93NUMPY\x01\x00"
 #: `Ledger` follow.
 _OF_INSTANT = {"time": "<f8", "load_factor": "<f8", "steps": "<i8", "iterations": "<i8"}
 _ARRAYS = ("rq", "rates", "gauss_fields", "reactions", "tie_forces", "clamp_forces", "wall_forces")
+# Rows that are read at once for a checksum.
+_MANY = 64
 # Arrays that files of earlier releases lack.
 _NEW = ("wall_forces",)
 
@@ -35,6 +38,7 @@ class InstantFile:
 
     def __init__(self, file):
         self.file, self._dtype, self._rows = Path(file).absolute(), None, None
+        self._sum = (0, 0)  # a number of rows from the first on, and their checksum
         self.look()
 
     def __getstate__(self):
@@ -88,6 +92,17 @@ class InstantFile:
                     stream.truncate(place)
                 raise
             _write(stream, 0, _header(self._dtype, max(self._count, k + 1)))
+        count, total = self._sum
+        self._sum = (k + 1, zlib.crc32(row.tobytes(), total)) if k == count else (0, 0)
+
+    def checksum(self, count):
+        """The CRC-32 of the first `count` rows."""
+        if self._sum[0] != count:
+            total, rows = 0, self.rows
+            for k in range(0, count, _MANY):
+                total = zlib.crc32(rows[k : min(k + _MANY, count)].tobytes(), total)
+            self._sum = (count, total)
+        return self._sum[1]
 
     def settle(self):
         """Flush the rows to the disk (fsync), so that they survive a power failure."""

@@ -2,7 +2,7 @@
 
 motion.json    the arguments of `simulate`, versions, and the fingerprint of the scene
 scene.json     the scene as data, where it has that form: no folder can run code of its own
-instants.npy   the saved states, see `instantfile`
+instants.npy   the saved states, see `instantfile`; the checkpoints tell their checksum
 start.npz, checkpoint.npz   the data of all ranks that the solver continues from: at the start, and the latest
 """
 
@@ -12,11 +12,13 @@ import time
 from pathlib import Path
 
 from cosserat_fenicsx import __version__
-from cosserat_fenicsx.checks import instance
+from cosserat_fenicsx.checks import instance, warn
 from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.ranks import on_first
 from cosserat_fenicsx.scene.as_data import NotData, from_data, to_data
 from cosserat_fenicsx.storage import checkpoints
+from cosserat_fenicsx.storage.entries import AN_INDEX
+from cosserat_fenicsx.storage.entries import checked as checked_entries
 from cosserat_fenicsx.storage.fingerprint import difference, fingerprint, fingerprint_at, times_ahead
 from cosserat_fenicsx.storage.head import checked
 from cosserat_fenicsx.storage.lock import FolderLock
@@ -24,6 +26,9 @@ from cosserat_fenicsx.storage.lock import FolderLock
 #: Least time between checkpoints: in s, and as a multiple of the time that it takes to write one.
 APART, SELDOM = 2.0, 50
 _FORMAT = 2
+# The entry of a checkpoint that tells of the saved states.
+_STATES = "states"
+_OF_PARTS = {f"{_STATES}.rows": AN_INDEX, f"{_STATES}.crc32": (lambda value: type(value) is int, "a whole number")}
 _HEAD, _SCENE, _START, _LATEST = "motion.json", "scene.json", "start.npz", "checkpoint.npz"
 
 
@@ -198,7 +203,9 @@ class RunFolder:
         """
         began = time.monotonic()
         parts = self.comm.gather(memory)
-        history.settle(lambda: self._keep({str(rank): part for rank, part in enumerate(parts)}))
+        history.settle(
+            lambda: self._keep({_STATES: history.states(), **{str(rank): part for rank, part in enumerate(parts)}})
+        )
         self._last = time.monotonic()
         self._apart = max(APART, SELDOM * (self._last - began))
 
@@ -208,11 +215,25 @@ class RunFolder:
             checkpoints.write(self.place / _START, parts)
 
     def memories(self):
-        """The readable checkpoints of this rank, the latest first."""
+        """The readable checkpoints of this rank, the latest first: the data, what they say of the saved states (see
+        `StoredHistory.sound`), and why they cannot be used, "" where they can."""
         for name in (_LATEST, _START):
-            parts = checkpoints.read(self.place / name)
-            if parts is not None and str(self.comm.rank) in parts:
-                yield parts[str(self.comm.rank)]
+            memory, states, why = None, None, ""
+            try:
+                parts = checkpoints.read(self.place / name)
+                if parts is not None:
+                    memory = parts.get(str(self.comm.rank))
+                    if parts[checkpoints.CHECKSUM] is not None:
+                        states = checked_entries(parts, _OF_PARTS)[_STATES]
+                    elif self.comm.rank == 0:
+                        warn(f"{self.place / name} has no checksum, as those of earlier releases: numbers that were "
+                             "changed in it, or in the saved states, are not noticed")  # fmt: skip
+                    why = (
+                        "" if isinstance(memory, dict) else f"{self.place / name} has no data of rank {self.comm.rank}"
+                    )
+            except (checkpoints.Damaged, ValueError) as problem:
+                why = str(problem)
+            yield memory if not why else None, states, why
 
     def _on_first(self, action):
         try:

@@ -76,6 +76,20 @@ class StoredHistory(History):
         """
         self._try(lambda: (self._file.settle(), write()), "the state from which a motion resumes")
 
+    def sound(self, states):
+        """Whether the first states are those that a checkpoint tells of: a dict of their number and their checksum, or
+        None in checkpoints of releases before there was one. The same on all ranks.
+        """
+        sound = states is None or (
+            states["rows"] <= len(self)
+            and (self.comm.rank > 0 or self._file.checksum(states["rows"]) == states["crc32"])
+        )
+        return self.comm.bcast(sound)
+
+    def states(self):
+        """The number of the states so far and their checksum, for a checkpoint. On rank 0."""
+        return {"rows": self._done, "crc32": self._file.checksum(self._done)}
+
     def _try(self, action, what):
         try:
             on_first(self.comm, action)

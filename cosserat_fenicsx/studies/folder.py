@@ -12,12 +12,17 @@ import os
 from pathlib import Path
 
 from cosserat_fenicsx import __version__
-from cosserat_fenicsx.checks import instance
+from cosserat_fenicsx.checks import instance, warn
 from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.ranks import on_first
+from cosserat_fenicsx.storage import rows
+from cosserat_fenicsx.storage.entries import A_WHOLE, below, number
 from cosserat_fenicsx.storage.lock import FolderLock
+from cosserat_fenicsx.studies.values import from_data
 
 _FORMAT = 1
+# What a line must hold beside the number of the case.
+_ENTRIES = {"attempt": A_WHOLE, "seconds": (lambda value: number(value) and value >= 0, "a time (s)")}
 _HEAD, _OUTCOMES = "study.json", "outcomes.{}.jsonl"
 
 
@@ -48,15 +53,15 @@ class StudyFolder:
         Raises:
             SceneError: the folder holds another study, another process writes to it, or it cannot be made.
         """
-        rows = []
+        found = []
         try:
-            on_first(self._comm, lambda: rows.extend(self._open(task, _as_read(cases))))
+            on_first(self._comm, lambda: found.extend(self._open(task, _as_read(cases))))
         except OSError as problem:
             raise SceneError(
                 f"study.folder = {str(self.place)!r}: {problem.strerror or problem}: expected a folder that can be "
                 "written to"
             ) from None
-        return self._comm.bcast(rows)
+        return self._comm.bcast(found)
 
     def _open(self, task, cases):
         self.place.mkdir(parents=True, exist_ok=True)
@@ -110,10 +115,9 @@ class StudyFolder:
         """
         if self._stream is None:
             file = self.place / _OUTCOMES.format(self._comm.rank)
-            if file.exists():
-                os.truncate(file, file.read_bytes().rfind(b"\n") + 1)
+            rows.cut(file)
             self._stream = file.open("ab")
-        self._stream.write(json.dumps(row).encode() + b"\n")
+        self._stream.write(rows.line_of(row))
         self._stream.flush()
 
     def close(self):
@@ -125,15 +129,26 @@ class StudyFolder:
 
 
 def _rows(file, count):
-    """The outcomes in a file that are whole, of cases below `count`."""
-    for line in file.read_bytes().split(b"\n")[:-1]:
+    """The outcomes in a file that are whole, of cases below `count`; with a warning where others are left out."""
+    entries, lost, old = {**_ENTRIES, "case": below(count)}, [], False
+    for k, line in enumerate(file.read_bytes().split(b"\n")[:-1], start=1):
         try:
-            row = json.loads(line)
-            known = 0 <= row["case"] < count and row["attempt"] >= 1 and row["seconds"] >= 0
-        except (ValueError, KeyError, TypeError):  # such as after a power failure
+            row, whole = rows.row_in(line, entries, checksum=False)
+            from_data(row.get("result"))
+        except (ValueError, KeyError, TypeError, OverflowError, RecursionError, MemoryError) as problem:
+            lost.append(f"line {k}: {problem}")  # such as after a power failure
             continue
-        if known and ("result" in row) != ("failure" in row):
+        old = old or not whole
+        if ("result" in row) != ("failure" in row) and isinstance(row.get("failure", ""), str):
             yield row
+        else:
+            lost.append(f"line {k}: expected a result or a failure")
+    if lost:
+        more = f", and {len(lost) - 1} more" if len(lost) > 1 else ""
+        warn(f"{file}, {lost[0]}{more}: left out, and computed again")
+    if old:
+        warn(f"{file} has lines without a checksum, as those of earlier releases: numbers that were changed in them are "
+             "not noticed")  # fmt: skip
 
 
 def _as_read(data):

@@ -17,8 +17,8 @@ from cosserat_fenicsx.errors import CosseratError, InstallationError, Interrupte
 from cosserat_fenicsx.interrupts import obey
 from cosserat_fenicsx.progress import CaseProgress
 from cosserat_fenicsx.ranks import apart, communicator
+from cosserat_fenicsx.storage.described import NotDescribed, described, task_described
 from cosserat_fenicsx.studies.cases import cases_of, check_task, unshared
-from cosserat_fenicsx.studies.described import NotDescribed, described, task_described
 from cosserat_fenicsx.studies.folder import StudyFolder
 from cosserat_fenicsx.studies.outcome import Study
 from cosserat_fenicsx.studies.task_pool import TaskPool

@@ -10,7 +10,7 @@ from scipy.optimize import least_squares
 from scipy.stats import t as student
 
 from cosserat_fenicsx.annotations import File
-from cosserat_fenicsx.checks import instance, number, positive, refuse, store
+from cosserat_fenicsx.checks import instance, number, positive, refuse, store, warn
 from cosserat_fenicsx.errors import SceneError, SceneWarning
 from cosserat_fenicsx.well.hole import Borehole
 from cosserat_fenicsx.well.mud import Mud
@@ -213,7 +213,7 @@ def calibrate_friction(
             "be relied on",
             *_causes(hooks, computed, misfit, None if unknown_block else with_block),
         )
-        warnings.warn(f"calibrate_friction: {'; '.join(doubts)}", SceneWarning, stacklevel=2)
+        warn(f"calibrate_friction: {'; '.join(doubts)}")
     return FrictionFit(
         hole.with_friction(friction), friction, np.maximum(ends[:sections], 0.0), block,
         ends[-1] if unknown_block else np.full(2, np.nan), confidence, correlation,

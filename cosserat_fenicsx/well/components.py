@@ -49,7 +49,9 @@ class Component:
             instance(self, "stiffness", self.stiffness, Stiffness, "a Stiffness or None")
         if self.weight is None:
             refuse(self, "weight", None, "the weight in mud (N/m): a component without weight cannot be placed")
-        store(self, weight=number(self, "weight", self.weight, "a number (N/m)", math.isfinite))
+        store(
+            self, weight=number(self, "weight", self.weight, "a number from -1e6 to 1e6 (N/m)", lambda x: abs(x) <= 1e6)
+        )
         store(self, contact_radius=positive(self, "contact_radius", self.contact_radius, "m"))
 
 

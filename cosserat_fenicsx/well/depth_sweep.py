@@ -6,34 +6,31 @@ the mesh touch the wall. On the first mesh they were 21 to 23, and one start of 
 13 at 1 to 30 m, where the start by springs takes 24; the finer meshes, which take 60 % of the time, remain the same.
 """
 
-import hashlib
-import json
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 
 import numpy as np
 
 from cosserat_fenicsx.annotations import File, Numbers
 from cosserat_fenicsx.checks import finite_array, refuse
-from cosserat_fenicsx.errors import Interrupted, NotConverged, SceneError
+from cosserat_fenicsx.errors import Interrupted, NotConverged
 from cosserat_fenicsx.progress import Progress
-from cosserat_fenicsx.ranks import on_first, world
+from cosserat_fenicsx.ranks import world
 from cosserat_fenicsx.well.buckled import LockUp
 from cosserat_fenicsx.well.hole import Borehole
 from cosserat_fenicsx.well.mud import Mud
 from cosserat_fenicsx.well.operations import Operation
 from cosserat_fenicsx.well.pieces import pieces_of
 from cosserat_fenicsx.well.string import DrillString
+from cosserat_fenicsx.well.sweep_file import SweepFile
 from cosserat_fenicsx.well.tabular import Tabular
 from cosserat_fenicsx.well.torque_and_drag import AUTO, BUCKLED, ROD, SOFT, torque_and_drag
 
 #: Numbers that are kept of an answer; `locked` is where the string locks up, m, or NaN; `rung` the index of its model.
 KEPT = ("hook_load", "surface_torque", "error", "model_error", "locked", "rung")
 _RUNGS = (SOFT, BUCKLED, ROD)
-# Of the form of files, which are gone on with.
-_VERSION = 3
+_KINDS = {"rung": (lambda value: value in (None, *map(float, range(len(_RUNGS)))), "null or the index of a model")}
 
 
 @dataclass(frozen=True, eq=False)
@@ -170,13 +167,18 @@ def depth_sweep(
     shape = (len(operations), len(friction), len(depths))
     values = {name: np.full(shape, np.nan) for name in KEPT}
     sweep = DepthSweep(operations, depths, friction, values)
-    store = _Store(file, _mark(hole, string, operations, depths, friction, settings), sweep)
+    about = {"hole": hole, "string": string, "operations": operations, "depths": depths, "friction": friction}
+    store = SweepFile(file, {**about, **settings}, shape, KEPT, _KINDS)
+    for answer in store.kept:
+        _put(sweep, *answer)
     missing = np.argwhere(~sweep.done)
     try:
         with Progress([len(missing)], progress, world(), "answer") as bar:
             bar.start("depth sweep")
             for number, (i, j, k) in enumerate(missing, start=1):
-                store.keep((i, j, k), *_answer(holes[j], string, operations[i], float(depths[k]), settings))
+                found = _answer(holes[j], string, operations[i], float(depths[k]), settings)
+                _put(sweep, (i, j, k), *found)
+                store.keep((i, j, k), *found)
                 bar.reached(number)
     except KeyboardInterrupt:
         kept = "" if file is None else f"; they are kept in {os.fspath(file)}, from where the same call goes on"
@@ -184,6 +186,15 @@ def depth_sweep(
     finally:
         store.close()
     return sweep
+
+
+def _put(sweep, place, numbers, note):
+    """Put an answer into a sweep, at its indices."""
+    place = tuple(map(int, place))
+    for name, number in zip(KEPT, numbers, strict=True):
+        sweep.values[name][place] = number
+    if note:
+        sweep.notes[place] = note
 
 
 def _answer(hole, string, operation, depth, settings):
@@ -204,76 +215,3 @@ def _answer(hole, string, operation, depth, settings):
         notes += [answer.words, *why]
     numbers = (answer.hook_load, answer.surface_torque, answer.error, answer.model_error, np.nan)
     return (*numbers, float(_RUNGS.index(answer.model))), "; ".join(notes)
-
-
-class _Store:
-    """The answers of a sweep in a file, one a line: indices, then `KEPT`, then the note."""
-
-    def __init__(self, file, mark, sweep):
-        self._sweep, self._stream = sweep, None
-        if file is None:
-            return
-        comm, rows = world(), []
-        on_first(comm, lambda: rows.extend(self._open(Path(file), mark)))
-        for *row, note in comm.bcast(rows):
-            self._set(row[:3], row[3:], note)
-
-    def _open(self, file, mark):
-        """Open the file for more rows, and return those that are there."""
-        rows = self._read(file, mark)
-        new = not file.exists() or file.stat().st_size == 0
-        self._stream = file.open("a", encoding="utf-8")
-        if new:
-            self._write({"sweep": mark})
-        return rows
-
-    @staticmethod
-    def _read(file, mark):
-        text = file.read_text(encoding="utf-8") if file.exists() else ""
-        if text and not text.endswith("\n"):  # the run was ended while it wrote
-            text = text[: text.rfind("\n") + 1]
-            os.truncate(file, len(text.encode()))
-        if not text:
-            return []
-        try:
-            head, *rows = [json.loads(line) for line in text.splitlines()]
-            other = head["sweep"] != mark
-        except (ValueError, KeyError, TypeError):
-            other = True
-        if other:
-            raise SceneError(
-                f"depth_sweep.file = {str(file)!r}: it holds another sweep (hole, string, depths or settings "
-                "differ): expected the same call, or another file"
-            )
-        return rows
-
-    def keep(self, index, numbers, note):
-        """Take an answer, and write it."""
-        self._set(index, numbers, note)
-        if self._stream is not None:
-            self._write([*(int(i) for i in index), *numbers, note])
-
-    def _set(self, index, numbers, note):
-        index = tuple(int(i) for i in index)
-        for name, number in zip(KEPT, numbers, strict=True):
-            self._sweep.values[name][index] = number
-        if note:
-            self._sweep.notes[index] = note
-
-    def _write(self, row):
-        self._stream.write(json.dumps(row) + "\n")
-        self._stream.flush()
-
-    def close(self):
-        if self._stream is not None:
-            self._stream.close()
-
-
-def _mark(hole, string, operations, depths, friction, settings):
-    """A hash of everything that a sweep's numbers follow from."""
-    path = hole.path
-    survey = [array.tolist() for array in (path.md, path.inclination, path.azimuth)]
-    told = repr(
-        (_VERSION, survey, hole.sections, string, operations, depths.tolist(), [np.array(x).tolist() for x in friction])
-    )
-    return hashlib.sha256((told + repr(settings)).encode()).hexdigest()[:16]

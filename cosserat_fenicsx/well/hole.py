@@ -1,14 +1,13 @@
 """A hole along an axis: diameters and friction of its cased and open sections."""
 
-import warnings
 from copy import copy
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from cosserat_fenicsx import units
-from cosserat_fenicsx.checks import instance, number, positive, refuse, store
-from cosserat_fenicsx.errors import SceneError, SceneWarning
+from cosserat_fenicsx.checks import instance, number, positive, refuse, store, warn
+from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.well.path import WellPath
 
 # Survey and sections that differ by more than this part end at different depths.
@@ -40,9 +39,10 @@ class HoleSection:
         store(self, to=positive(self, "to", self.to, "m"), diameter=positive(self, "diameter", self.diameter, "m"))
         store(self, friction=number(self, "friction", self.friction, "a coefficient of friction from 0 to 5",
                                     lambda x: 0 <= x <= 5))  # fmt: skip
+        instance(self, "name", self.name, str, "a text")
         if self.diameter > _WIDEST:
-            warnings.warn(f"HoleSection.diameter = {self.diameter:g} m is wider than holes are: 8.5 in are "
-                          "8.5 * units.inch = 0.2159", SceneWarning, stacklevel=3)  # fmt: skip
+            warn(f"HoleSection.diameter = {self.diameter:g} m is wider than holes are: 8.5 in are "
+                          "8.5 * units.inch = 0.2159")  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -81,8 +81,8 @@ class Borehole:
         if abs(self.path.length - above) > _APART * self.length:
             ratio = max(self.path.length, above) * units.foot / self.length
             feet = ": 3.28 times as deep, as feet are that are taken for metres" if abs(ratio - 1) < 0.05 else ""
-            warnings.warn(f"Borehole: the survey ends at {self.path.length:.6g} m and the sections at {above:.6g} m; "
-                          f"the hole ends at the shallower one{feet}", SceneWarning, stacklevel=3)  # fmt: skip
+            warn(f"Borehole: the survey ends at {self.path.length:.6g} m and the sections at {above:.6g} m; "
+                          f"the hole ends at the shallower one{feet}")  # fmt: skip
 
     @property
     def length(self):

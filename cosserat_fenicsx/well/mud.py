@@ -1,14 +1,12 @@
 """The drilling fluid."""
 
 import math
-import warnings
 from dataclasses import dataclass
 from typing import ClassVar
 
 from cosserat_fenicsx.actions.added_mass import AddedMass
 from cosserat_fenicsx.actions.linear_drag import LinearDrag
-from cosserat_fenicsx.checks import number, positive, refuse, store
-from cosserat_fenicsx.errors import SceneWarning
+from cosserat_fenicsx.checks import number, positive, refuse, store, warn
 from cosserat_fenicsx.scene.rod import Rod
 from cosserat_fenicsx.scene.sections import Circle, Tube
 
@@ -51,11 +49,9 @@ class Mud:
                                lambda x: 0 <= x < math.inf)  # fmt: skip
                 store(self, **{field: value})
         if _NO_FLUID[0] < self.density < _NO_FLUID[1] or 0.5 < self.density < 3 or self.density > _HEAVIEST:
-            warnings.warn(
+            warn(
                 f"Mud.density = {self.density:g} kg/m^3 is hardly that of a mud: 1.2 g/cm^3 are 1200, 10 pounds per US "
-                "gallon 10 * units.ppg = 1198",
-                SceneWarning,
-                stacklevel=3,
+                "gallon 10 * units.ppg = 1198"
             )
 
     def along(self, rod: Rod, outer: float | None = None, inner: float | None = None) -> tuple:

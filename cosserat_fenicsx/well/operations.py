@@ -5,13 +5,11 @@ along the string (+1 where it moves up), e the part that acts around it.
 """
 
 import math
-import warnings
 from dataclasses import dataclass
 from typing import ClassVar
 
 from cosserat_fenicsx import units
-from cosserat_fenicsx.checks import number, positive, store
-from cosserat_fenicsx.errors import SceneWarning
+from cosserat_fenicsx.checks import number, positive, store, warn
 
 # Weights (N) and torques (N m) on bit below these are numbers in other units by all appearance.
 _HARDLY = {"weight": 500.0, "torque": 50.0}
@@ -30,11 +28,9 @@ class Operation:
             value = number(self, field, getattr(self, field), f"a number ({unit})", math.isfinite)
             store(self, **{field: value})
             if 0 < abs(value) < _HARDLY[field]:
-                warnings.warn(
+                warn(
                     f"{type(self).__name__}.{field} = {value:g} {unit} is hardly a {field} on bit: 25 kN are 25e3, 25 "
-                    "klbf 25 * units.kip; 5 kN m are 5e3, 4000 ft-lbf 4000 * units.ft_lbf",
-                    SceneWarning,
-                    stacklevel=4,
+                    "klbf 25 * units.kip; 5 kN m are 5e3, 4000 ft-lbf 4000 * units.ft_lbf"
                 )
 
     def direction(self, radius):
@@ -133,12 +129,10 @@ class _Reaming(Operation):
         super().__post_init__()
         store(self, speed=positive(self, "speed", self.speed, "m/s"), rpm=positive(self, "rpm", self.rpm, "1/min"))
         if self.rpm < _SLOW:
-            warnings.warn(
+            warn(
                 f"{type(self).__name__}.rpm = {self.rpm:g} 1/min is hardly a rotation: it is in revolutions a minute, "
                 "not in rad/s; 80 rev/min are 80, not 80 * units.rpm. "
-                f"{self.rpm:g} rad/s are {self.rpm / units.rpm:g}",
-                SceneWarning,
-                stacklevel=3,
+                f"{self.rpm:g} rad/s are {self.rpm / units.rpm:g}"
             )
 
     def direction(self, radius):

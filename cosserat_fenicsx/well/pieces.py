@@ -1,11 +1,11 @@
 """A string in its hole, cut where anything jumps: stations, components, friction."""
 
-import warnings
 from collections import namedtuple
 
 import numpy as np
 
-from cosserat_fenicsx.errors import SceneError, SceneWarning
+from cosserat_fenicsx.checks import warn
+from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.well.components import weight_in_mud
 
 #: Arrays over pieces, from the surface down. top, bottom: measured depths (m); component: index from the bit up;
@@ -38,7 +38,7 @@ def pieces_of(hole, string, operation, mud, depth):
     weights = np.array([weight_in_mud(place.component, mud) for place in laid])
     for place, weight in zip(laid, weights, strict=True):
         if weight < 0:
-            warnings.warn(f"{place.component.name} floats: it weighs {weight:g} N/m in mud", SceneWarning, stacklevel=3)
+            warn(f"{place.component.name} floats: it weighs {weight:g} N/m in mud")
     radii = np.array([place.component.contact_radius for place in laid])
     slip = np.array([operation.direction(radius) for radius in radii])
     _check_widths(hole, laid)

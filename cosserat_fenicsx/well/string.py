@@ -43,6 +43,8 @@ class DrillString:
         for part in given:
             if not all(hasattr(part, name) for name in ("length", "contact_radius", "stiffness", "weight", "name")):
                 refuse(self, "components", part, "components: DrillPipe, HeavyWeight, Collar, ..., or Component")
+            if not isinstance(part.name, str):
+                refuse(part, "name", part.name, "a text")
         if not given:
             refuse(self, "components", given, "at least one component")
         other = _ORDERS[1 - _ORDERS.index(self.order)]

@@ -2,15 +2,15 @@
 
 import csv
 import math
+import os
 import re
-import warnings
 from pathlib import Path
 
 import numpy as np
 
 from cosserat_fenicsx import units
-from cosserat_fenicsx.checks import finite_array, instance, positive, refuse
-from cosserat_fenicsx.errors import SceneError, SceneWarning, nearest
+from cosserat_fenicsx.checks import finite_array, instance, positive, refuse, text_of, warn
+from cosserat_fenicsx.errors import SceneError, nearest
 from cosserat_fenicsx.well.field_units import size_of
 
 _FULL = math.radians(360)
@@ -30,6 +30,8 @@ _ANGLES = {
     **dict.fromkeys(("rad", "radian", "radians"), False),
 }
 _UNITS = {*_LENGTHS, *_ANGLES}
+# Largest measured depth, and least distance of stations, m.
+_DEEPEST, _APART = 1e6, 1e-6
 # Doglegs (rad) above this are refused: the plane of the arc would be that of rounding errors.
 _MOST_DOGLEG = math.pi - 1e-6
 
@@ -66,7 +68,9 @@ def _check_depths(md):
         refuse(
             "WellPath", "md[0]", float(md[0]), "0 m: add the station (0, 0, azimuth) where the well starts vertically"
         )
-    bad = np.flatnonzero(np.diff(md) <= 0)
+    if md[-1] > _DEEPEST:
+        refuse("WellPath", "md[-1]", float(md[-1]), f"at most {_DEEPEST:g} m")
+    bad = np.flatnonzero(np.diff(md) < _APART)
     if len(bad):
         i = bad[0] + 1
         refuse(
@@ -83,7 +87,7 @@ def _doubt_degrees(inc, azi, degrees):
         "look like radians"
     )
     if degrees:
-        warnings.warn(f"WellPath: {text}; they are taken as degrees, as degrees=True says", SceneWarning, stacklevel=5)
+        warn(f"WellPath: {text}; they are taken as degrees, as degrees=True says")
     else:
         raise SceneError(
             f"WellPath: {text}. Say degrees=False if they are, degrees=True if they are not (in a scene file "
@@ -106,13 +110,17 @@ def read_columns(file, md, inc, azi, degrees, length_unit):
 
     What stands above the row of names is passed over; units may follow the names, or stand in a row below them.
     """
-    file = Path(file)
-    lines = [(i, line) for i, line in enumerate(_text_of(file).splitlines(), start=1) if line.strip()]
+    who = "WellPath.from_csv"
+    file = Path(instance(who, "file", file, str | os.PathLike, "the name of a .csv file"))
+    for field, name in (("md", md), ("inc", inc), ("azi", azi)):
+        instance(who, field, name, str, "the name of a column")
+    whole = text_of(file, "a survey as .csv")
+    lines = [(i, line) for i, line in enumerate(whole.splitlines(), start=1) if line.strip()]
     first, separator, heading, columns = _heading(file, lines, (md, inc, azi))
     says = [_split(heading[column])[1] for column in columns]
     values = []
     for k, (i, line) in enumerate(lines[first + 1 :]):
-        row = _cells(line, separator)
+        row = _cells(file, i, line, separator)
         cells = [row[column].strip() if column < len(row) else "" for column in columns]
         if k == 0 and all(cell.lower() in _UNITS for cell in cells):
             says = [cell.lower() for cell in cells]
@@ -125,7 +133,7 @@ def read_columns(file, md, inc, azi, degrees, length_unit):
             point = any("," in cell for cell in row) or len(row) > len(heading)
             hint = "; decimals stand behind a point, as in 10.5" if point else ""
             raise SceneError(
-                f"{file}: line {i}, {line!r}: expected numbers in {', '.join(heading[x] for x in columns)}, and no "
+                f"{file}: line {i}, {line!r:.100}: expected numbers in {', '.join(heading[x] for x in columns)}, and no "
                 f"more columns than names{hint}"
             ) from None
     if len(values) < 2:
@@ -135,28 +143,23 @@ def read_columns(file, md, inc, azi, degrees, length_unit):
     return depth, inclination, azimuth, _degrees(file, [heading[x] for x in columns[1:]], says[1:], degrees)
 
 
-def _text_of(file):
+def _cells(file, i, line, separator):
+    """The cells of line i."""
     try:
-        return file.read_text(encoding="utf-8-sig")
-    except OSError as problem:
-        raise SceneError(f"{file}: cannot be read ({problem.strerror}): expected a survey as .csv") from None
-    except UnicodeDecodeError as problem:
-        raise SceneError(f"{file}: not UTF-8 ({problem.reason} at byte {problem.start}): save it as UTF-8") from None
-
-
-def _cells(line, separator):
-    return next(csv.reader([line], delimiter=separator))
+        return next(csv.reader([line], delimiter=separator))
+    except csv.Error as problem:
+        raise SceneError(f"{file}: line {i} is no row of a .csv file ({problem})") from None
 
 
 def _heading(file, lines, wanted):
     """Of the row of names: its index in `lines`, the separator, the names, and the columns of those that are wanted."""
     likely = None
-    for k, (_, line) in enumerate(lines):
+    for k, (i, line) in enumerate(lines):
         separator = max(",;\t", key=line.count)
-        heading = _cells(line, separator)
-        columns = [_column(heading, name) for name in wanted]
-        if None not in columns:
-            return k, separator, heading, columns
+        heading = _cells(file, i, line, separator)
+        columns = [_columns(heading, name) for name in wanted]
+        if all(columns):
+            return k, separator, heading, _one_each(file, i, heading, wanted, columns)
         if sum(_is_number(cell) for cell in heading) > 1:
             break
         if likely is None or len(heading) > len(likely):
@@ -164,22 +167,39 @@ def _heading(file, lines, wanted):
     if likely is None or len(likely) < 2:
         raise SceneError(f"{file}: expected a row of names, such as 'MD (m),Inc (deg),Azi (deg)', above the stations")
     known = [_split(name)[0] for name in likely]
-    missing = next(name for name in wanted if _column(likely, name) is None)
+    missing = next(name for name in wanted if not _columns(likely, name))
     raise SceneError(
-        f"{file}: no column '{missing}' in {', '.join(likely)}: {nearest(missing.lower(), known)}. Expected the names "
-        "of the columns of measured depth, inclination and azimuth: columns = ['...', '...', '...'] in a scene file, "
+        f"{file}: no column '{missing}' in {', '.join(likely):.500}: {nearest(missing.lower(), known)}. Expected the "
+        "names of the columns of measured depth, inclination and azimuth: columns = ['...', '...', '...'] in a scene file, "
         "md=, inc=, azi= in Python"
     )
 
 
-def _column(heading, name):
-    """The column of a name, or of another usual one for the same; None where there is none, or more than one."""
-    names, name = [_split(x)[0] for x in heading], _split(name)[0]
-    if name in names:
-        return names.index(name)
-    same = next((group for group in _NAMES if name in group), ())
-    found = [i for i, x in enumerate(names) if x in same]
-    return found[0] if len(found) == 1 else None
+def _one_each(file, i, heading, wanted, columns):
+    """The column of each name, of lists of those that have it."""
+    for name, found in zip(wanted, columns, strict=True):
+        if len(found) > 1:
+            raise SceneError(
+                f"{file}: line {i}: columns {' and '.join(str(x + 1) for x in found)} are both named '{name}' "
+                f"({', '.join(heading[x].strip() for x in found)}): expected one, or that columns (in Python md, inc, "
+                "azi) say which, with its unit"
+            )
+    one = [found[0] for found in columns]
+    if len(set(one)) < len(one):
+        raise SceneError(f"{file}: {', '.join(wanted)}: expected three columns, each of another name")
+    return one
+
+
+def _columns(heading, name):
+    """The columns of a name: written as it is there, else without its unit, else under another usual name."""
+    whole, wanted = [" ".join(x.lower().split()) for x in heading], " ".join(name.lower().split())
+    names, short = [_split(x)[0] for x in heading], _split(name)[0]
+    same = next((group for group in _NAMES if short in group), ())
+    for found in ([x == wanted for x in whole], [x == short for x in names]):
+        if any(found):
+            return np.flatnonzero(found).tolist()
+    usual = [i for i, x in enumerate(names) if x in same]
+    return usual if len(usual) == 1 else []
 
 
 def _split(heading):

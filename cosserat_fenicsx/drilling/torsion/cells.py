@@ -71,7 +71,7 @@ def _step(times, dt):
         tried.append(time / np.arange(math.ceil(time / dt * (1 - 1e-12)), math.floor(time / (_LEAST * dt)) + 1))
     tried = np.unique(np.concatenate([np.atleast_1d(x) for x in tried]))[::-1]
     steps = times[:, None] / tried
-    off = np.abs(steps - np.round(steps)).max(axis=0)
+    off = np.abs(steps - np.round(steps)).max(axis=0, initial=0.0)  # of none where all are short
     return float(tried[np.argmax(off <= max(off.min(), _EXACT) * (1 + 1e-6))])
 
 

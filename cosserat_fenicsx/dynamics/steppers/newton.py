@@ -64,7 +64,7 @@ class StepNewton:
         """Discard the tangent and the statistics of its reuse, as before the first step."""
         self.problem.fresh = True
         # cost of the tangent and its iterations; steps it has served; steps left that start with a new tangent
-        self._spent = self._served = self._anew = 0
+        self._spent, self._served, self._anew = 0.0, 0, 0
 
     def solve(self, guesses):
         """Newton's method from the first guess with the current tangent; where that fails, from every guess with a new

@@ -4,10 +4,13 @@ import dataclasses
 import dis
 import functools
 import hashlib
+import inspect
 import os
 import types
 
 import numpy as np
+
+from cosserat_fenicsx.arguments import NAMED
 
 # Arrays with more entries than this are described by a hash.
 _LONGEST = 64
@@ -62,6 +65,7 @@ def task_described(task):
     if isinstance(task, types.MethodType):
         return {**task_described(task.__func__), "of": described(task.__self__)}
     if isinstance(task, types.FunctionType):
+        task = inspect.unwrap(task, stop=lambda f: not hasattr(f, NAMED))  # one of the package's own
         return {"function": _full_name(task), "code": _hash(repr(_code(task, set())).encode())}
     if isinstance(task, type | types.BuiltinFunctionType | np.ufunc):
         return {"function": _full_name(task)}
