@@ -171,9 +171,19 @@ class TieRows:
         Args:
             resistance: (tied nodes * block,) stiffness of the elements against these motions of the nodes.
         """
+        gradient, stiffness = self._springs(axes, eta, resistance)
+        return gradient.T @ (stiffness[:, None] * gradient)
+
+    def energies_of_springs(self, axes, eta, resistance, motions):
+        """(m,) the quadratic form of `springs` along motions of the tied nodes (m, tied nodes * block): sums of squares
+        of what the equations forbid, which rounding of the matrix would hide."""
+        gradient, stiffness = self._springs(axes, eta, resistance)
+        return np.square(motions @ gradient.T) @ stiffness
+
+    def _springs(self, axes, eta, resistance):
+        """Gradients (ties, tied nodes * block) of all equations, and stiffnesses (ties,) of their springs."""
         gradient = (self.ties.on_nodes(self._evaluate(eta)[1]) @ axes.T).reshape(-1, len(resistance))
-        stiffness = _HELD * (gradient * gradient * resistance).max(axis=1, keepdims=True)
-        return gradient.T @ (stiffness * gradient)
+        return gradient, _HELD * (gradient * gradient * resistance).max(axis=1)
 
     def _symmetric_change(self, eta):
         """The symmetric part of the derivative of the reactions, (tied nodes, 6, tied nodes, 6); evaluated once for all
