@@ -1,5 +1,9 @@
 """Linear buckling against closed forms and against the bifurcations that it estimates."""
 
+import pathlib
+import re
+import time
+
 import numpy as np
 import pytest
 from path_scenes import clamped_ring, shallow_arch
@@ -148,3 +152,48 @@ def test_critical_loads_of_slender_frames_scatter_little():
     )  # fmt: skip
     found = np.array([cf.buckling(scene, 1, elements=n).load_factors[0] for n in (8, 10, 12, 16, 24)])
     assert np.ptp(found) < 1e-6 * found.mean()
+
+
+@pytest.mark.parametrize("held", ["clamped", "hinged"])
+def test_rounding_of_slender_columns_is_small_and_told(held):
+    """L/d from 10^2 to 10^5 against Engesser's load with EA and GA, to first order in P/EA; EA L^2/EI is 10^11."""
+    for slender in (1e2, 1e4, 1e5):
+        EA = 16 * slender**2
+        section = cf.Stiffness((EA / 2.6,) * 2, EA, (1.0, 1.0), 1 / 1.3)
+        rod = cf.Rod(cf.Line((0, 0, 0), (0, 0, 1.0)), section)
+        guide = [cf.Hinge(rod.start, (1, 0, 0)), cf.Roller(rod.end, (1, 0, 0)), cf.Roller(rod.end, (0, 1, 0))]
+        supports, euler = (guide, np.pi**2) if held == "hinged" else ([cf.Clamp(rod.start)], np.pi**2 / 4)
+        found = cf.buckling(cf.Scene([rod], supports, [cf.Force(rod.end, (0, 0, -1.0))]))
+        x = 4 * euler / (EA / 2.6)
+        off = abs(found.load_factors[0] / (euler * 2 / (1 + np.sqrt(1 + x))) - 1)
+        assert off < 1e-9 and 0.8 * off <= found.error[0] < 2e-8, (slender, off, found.error)
+
+
+@pytest.mark.serial
+@pytest.mark.parametrize("share, length, foot", [(1e-2, 1.0, "clamp"), (1e-3, 5.0, "hinge"), (1e-4, 5.0, "clamp")])
+def test_a_thin_arm_beside_a_thick_column(share, length, foot):
+    """A column with a joined arm whose bending stiffness is 10^-8 to 10^-16 of its own, longer than it or not, and first
+    in the scene: the arm changes nothing, the units of the longest rod neither."""
+    column = cf.Rod(cf.Line((0, 0, 0), (0, 0, 3.0)), cf.Circle(0.1), STEEL, name="column")
+    arm = cf.Rod(cf.Line((0, 0, 3.0), (length, 0, 3.0)), cf.Circle(0.1 * share), STEEL, name="arm")
+    supports = [cf.Clamp(column.start)]
+    if foot == "hinge":  # free to bend out of the plane x-z, as if clamped
+        supports = [cf.Hinge(column.start, (0, 1, 0)), cf.Roller(column.end, (1, 0, 0))]
+    load, joint = cf.Force(column.end, (0, 0, -cf.euler_load(column))), cf.Joint(column.end, arm.start)
+    found = cf.buckling(cf.Scene([arm, column], supports, [load], [joint]))
+    alone = cf.buckling(cf.Scene([column], supports, [load]))
+    np.testing.assert_allclose(found.load_factors, alone.load_factors, rtol=1e-7)
+
+
+@pytest.mark.serial
+def test_a_taut_line_has_no_critical_load(tmp_path):
+    """The scene of README.md: two meshes and the words, not the largest mesh and a refusal."""
+    text = pathlib.Path(__file__).parents[1].joinpath("README.md").read_text()
+    file = tmp_path / "line.toml"
+    file.write_text(re.search(r"```toml\n(.*?)```", text, re.DOTALL)[1])
+    scene, _ = cf.read_scene(file)
+    found = cf.buckling(scene, 3)
+    assert len(found) == 0 and "no critical load factor up to 18.84, where linear" in repr(found)
+    before = time.process_time()
+    cf.buckling(scene, 3)  # compiled by now
+    assert time.process_time() - before < 2.0

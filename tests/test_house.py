@@ -87,6 +87,7 @@ FITTERS = {
         "circulatory",
         "critical",
         "critical_points",
+        "energies",
         "first_mesh",
         "grading",
         "linear_buckling",

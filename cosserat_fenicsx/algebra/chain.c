@@ -325,17 +325,27 @@ void backward(chain *s, const double *interface, double *x)
 
 /* ---- a small system as a whole ----------------------------------------------------------------------------------- */
 
-/* LU factors of F (n, n). Returns 0, or 1 if it is singular. */
-int factor_dense(double *F, int n, int *row, int *column, double zero, double *work)
+/* LU factors of F (n, n), whose rows are scaled first: those of thick and of thin rods and of constraint equations then
+   compete as pivots whatever their units. scale: (n,) of the rows, powers of two. Returns 0, or 1 if it is singular. */
+int factor_dense(double *F, int n, int *row, int *column, double zero, double *scale, double *work)
 {
-    for (int i = 0; i < n; i++) row[i] = column[i] = i;
+    for (int i = 0; i < n; i++) {
+        double *f = F + (size_t)i * n, largest = 0;
+        int power = 0;
+        for (int j = 0; j < n; j++) largest = fmax(largest, fabs(f[j]));
+        if (largest > 0 && isfinite(largest)) frexp(largest, &power);
+        scale[i] = ldexp(1, -power);
+        for (int j = 0; j < n; j++) f[j] *= scale[i];
+        row[i] = column[i] = i;
+    }
     return reduce(F, n, n, 0, row, column, zero, work) < n;
 }
 
 /* Replace b by the solution, by the factors. */
-void solve_dense(const double *F, int n, const int *row, const int *column, double *b, double *work)
+void solve_dense(const double *F, int n, const int *row, const int *column, const double *scale, double *b,
+                 double *work)
 {
-    for (int i = 0; i < n; i++) work[i] = b[row[i]];
+    for (int i = 0; i < n; i++) work[i] = scale[row[i]] * b[row[i]];
     for (int i = 1; i < n; i++) work[i] -= dot(F + (size_t)i * n, work, i);
     for (int i = n - 1; i >= 0; i--)
         work[i] = (work[i] - dot(F + (size_t)i * n + i + 1, work + i + 1, n - i - 1)) / F[(size_t)i * n + i];

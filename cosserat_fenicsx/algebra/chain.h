@@ -166,8 +166,9 @@ int eliminate(chain *s, kernel *k, const double *matrices);
 void count(chain *s, kernel *k);
 void forward(chain *s, const double *b, double *interface);
 void backward(chain *s, const double *interface, double *x);
-int factor_dense(double *F, int n, int *row, int *column, double zero, double *work);
-void solve_dense(const double *F, int n, const int *row, const int *column, double *b, double *work);
+int factor_dense(double *F, int n, int *row, int *column, double zero, double *scale, double *work);
+void solve_dense(const double *F, int n, const int *row, const int *column, const double *scale, double *b,
+                 double *work);
 
 int take_state(problem *p, const double *x);
 int residual(problem *p, const double *x, double *b);

@@ -60,18 +60,65 @@ def nearest_zero(K, pc, count, side=0):
     return 1 / values, vectors
 
 
-def largest_of_pencil(A, B, count):
+def largest_of_pencil(A, B, count, least):
     """The largest eigenvalues nu of A x = nu B x, A symmetric, B symmetric and positive definite.
 
+    How many are above `least` is counted first, by Sylvester's law of inertia: an iteration that looks for more of
+    them would go on among the others, which may lie close together.
+
+    Args:
+        count: how many to find; least: only eigenvalues above this positive number are wanted.
+
     Returns:
-        (values (n,), vectors), see `nearest_zero`; the largest first. Empty if A = 0.
+        (values (n,), vectors), see `nearest_zero`; the largest first, n <= count. Smaller ones than `least` may be
+        among them.
     """
     if A.norm() == 0:
         return np.empty(0), []
+    A, B, scale = _balanced(A, B)
+    B.setOption(PETSc.Mat.Option.SYMMETRIC, True)
+    count = min(count, _above(A, B, least))
+    if not count:
+        return np.empty(0), []
     solver, pc = _of_pencil(A, B, linear.factor_second_variation)
-    found = _solve(solver, SLEPc.EPS.ProblemType.GHEP, SLEPc.EPS.Which.LARGEST_REAL, count, A)
+    values, vectors = _solve(solver, SLEPc.EPS.ProblemType.GHEP, SLEPc.EPS.Which.LARGEST_REAL, count, A)
     pc.destroy()
-    return found
+    return values, _in_units(vectors, scale)
+
+
+def _above(A, B, least):
+    """How many eigenvalues of the symmetric pencil A x = nu B x are above `least` > 0."""
+    matrix, pc = A.copy(), PETSc.PC().create(A.comm)
+    matrix.aypx(-1 / least, B)  # B - A/least
+    matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
+    pc.setOperators(matrix)
+    linear.factor_constrained(pc, matrix)
+    pc.setUp()
+    negative = pc.getFactorMatrix().getInertia()[0]
+    pc.destroy()
+    return negative
+
+
+def _balanced(A, B):
+    """(D A D, D B D, D) with the diagonal D > 0, a vector, that makes the diagonal of B about 1.
+
+    The unknowns of thick and of thin rods then count alike, whatever their units: PETSc's Cholesky factorisation takes
+    small pivots for zero. D holds powers of two, so that nothing is rounded.
+    """
+    A, B, scale = A.copy(), B.copy(), B.getDiagonal()
+    sizes = np.abs(scale.array_r)
+    scale.array_w[:] = np.exp2(np.round(-0.5 * np.log2(np.where(sizes > 0, sizes, 1.0))))
+    for matrix in (A, B):
+        matrix.diagonalScale(scale, scale)
+    return A, B, scale
+
+
+def _in_units(vectors, scale):
+    """Eigenvectors D y, of unit norm, of those y of the balanced pencil."""
+    for vector in vectors:
+        vector.pointwiseMult(vector, scale)
+        vector.normalize()
+    return vectors
 
 
 def real_of_pencil(A, B, count):
@@ -83,13 +130,14 @@ def real_of_pencil(A, B, count):
     Returns:
         (values (n,), vectors), the largest first, n <= count; PETSc vectors of unit norm.
     """
+    A, B, scale = _balanced(A, B)
     (values, vectors), (others, _) = (
         _unsymmetric(a, b, count) for a, b in ((A, B), (A.copy().transpose(), B.copy().transpose()))
     )
     off = [max(abs(value.imag), np.abs(others - value).min(initial=np.inf)) for value in values]
     real = [k for k, value in enumerate(values) if off[k] <= _REAL * value.real]
     real.sort(key=lambda k: -values[k].real)
-    return values[real].real, [vectors[k] for k in real]
+    return values[real].real, _in_units([vectors[k] for k in real], scale)
 
 
 def _unsymmetric(A, B, count):

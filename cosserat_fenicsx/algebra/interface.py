@@ -99,9 +99,9 @@ class _Dense(Pointers):
     def __init__(self, size):
         super().__init__()
         self._size, self.room = size, size * size
-        self._factors, self._work = np.zeros(size * size), np.zeros(size)
+        self._factors, self._scale, self._work = np.zeros(size * size), np.zeros(size), np.zeros(size)
         self._order = np.zeros((2, size), dtype=np.int32)
-        self._double = [self.doubles(array) for array in (self._factors, self._work)]
+        self._double = [self.doubles(array) for array in (self._factors, self._scale, self._work)]
         self._int = [self.integers(array) for array in self._order]
 
     def entries(self, rows, columns):
@@ -109,11 +109,11 @@ class _Dense(Pointers):
 
     def factor(self, values, zero):
         self._factors[:] = values
-        return not self._lib.factor_dense(self._double[0], self._size, *self._int, zero, self._double[1])
+        return not self._lib.factor_dense(self._double[0], self._size, *self._int, zero, *self._double[1:])
 
     def solve(self, b):
-        self._lib.solve_dense(self._double[0], self._size, *self._int, self._ffi.from_buffer("double[]", b),
-                              self._double[1])  # fmt: skip
+        factors, scale, work = self._double
+        self._lib.solve_dense(factors, self._size, *self._int, scale, self._ffi.from_buffer("double[]", b), work)
 
     def signs(self, values):
         matrix = values.reshape(self._size, self._size)

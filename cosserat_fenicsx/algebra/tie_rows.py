@@ -177,10 +177,22 @@ class TieRows:
         Args:
             resistance: (tied nodes * block,) stiffness of the elements against these motions of the nodes.
         """
-        gradient, pattern = self._evaluate(eta)[1] @ axes.T, self._pattern
-        of_ends = pattern.of_ends(resistance.reshape(-1, len(axes)))
-        stiffness = _HELD * (gradient * gradient * of_ends).max(axis=(1, 2))
-        return pattern.sums(np.einsum("t,tia,tjb->tiajb", stiffness, gradient, gradient))
+        gradient, stiffness = self._springs(axes, eta, resistance)
+        return self._pattern.sums(np.einsum("t,tia,tjb->tiajb", stiffness, gradient, gradient))
+
+    def energies_of_springs(self, axes, eta, resistance, motions):
+        """(m,) the quadratic form of `springs` along motions of the tied nodes (m, nodes, block): sums of squares of
+        what the equations forbid, which rounding of the matrix would hide."""
+        gradient, stiffness = self._springs(axes, eta, resistance)
+        of_ends = np.stack([self._pattern.of_ends(motion) for motion in motions])
+        return np.square(np.einsum("tia,mtia->mt", gradient, of_ends)) @ stiffness
+
+    def _springs(self, axes, eta, resistance):
+        """Gradients (ties, 2, block) of all equations by the motions of their ends, and stiffnesses (ties,) of their
+        springs."""
+        gradient = self._evaluate(eta)[1] @ axes.T
+        of_ends = self._pattern.of_ends(resistance.reshape(-1, len(axes)))
+        return gradient, _HELD * (gradient * gradient * of_ends).max(axis=(1, 2))
 
     def diagonal(self, blocks):
         """(tied nodes * block,) the diagonal of what `second_variation` returned."""

@@ -28,8 +28,9 @@ class Buckling(Shapes):
         bound: no static bifurcation lies below this load factor, whether conservative or not. Where the loads have a
             potential it is the first of `load_factors`. Where they have none it is the load factor at which the
             symmetric part of the second variation becomes singular, which is neither an instability nor a bifurcation.
-            Where nothing is found it is the largest load factor that is considered: there the contact force of a rod
-            reaches the smallest of its axial and shear stiffnesses, or 1e8 EI/L^2.
+            Where nothing is found it is the largest load factor that is considered, where linear extrapolation ends: a
+            rod's tangent has changed by 1.5 there, the contact force of a rod has reached the smallest of its axial
+            and shear stiffnesses, or it or the contact moment 1e8 times EI/L^2 or EI/L of that rod.
     """
 
     load_factors: np.ndarray
@@ -71,6 +72,11 @@ class Buckling(Shapes):
         return self.sensitivity(standard_deviations).uncertainty(named, correlation)
 
     @property
+    def none(self):
+        """That there is no critical load factor, in words."""
+        return f"no critical load factor up to {self.bound:.4g}, where linear extrapolation of the state ends"
+
+    @property
     def caution(self):
         """The limits of the result, in a sentence; "" where the loads have a potential."""
         if self.conservative:
@@ -89,7 +95,7 @@ class Buckling(Shapes):
         if len(self):
             text = f"critical load factors {in_words(self.load_factors)}, {largest_error(self.error)}"
         else:
-            text = f"no critical load factor up to {self.bound:.7g}"
+            text = self.none
         text += f", from the load factor {self.load_factor:g}" if self.load_factor else ""
         return f"<Buckling: {text}. {self.caution}>" if self.caution else f"<Buckling: {text}>"
 

@@ -18,7 +18,7 @@ def buckling_table(found):
     )
     headings = ("critical load factor", "est. error")
     rows = [(f"{eta:.7g}", _error(error)) for eta, error in zip(found.load_factors, found.error, strict=True)]
-    text = _table(found, headings, rows, caption) if rows else "No buckling under positive load factors."
+    text = _table(found, headings, rows, caption) if rows else f"{found.none[0].upper()}{found.none[1:]}."
     lines = [text, actions_in_words(found.scene)]
     if found.conservative:
         lines.append(f"The loads have a potential: there is no static bifurcation below {found.bound:.7g} (bound).")

@@ -12,9 +12,9 @@ import numpy as np
 
 from cosserat_fenicsx.differences import PLACES, derivative
 from cosserat_fenicsx.errors import NotConverged, SceneError
-from cosserat_fenicsx.models.data_derivative import EnergyOfMotion, made_once
 from cosserat_fenicsx.results.sensitivity import Sensitivity
 from cosserat_fenicsx.scene.parameters import parameter_of
+from cosserat_fenicsx.statics.energies import Energies
 from cosserat_fenicsx.statics.path.follower import Follower
 from cosserat_fenicsx.statics.path.load_control import StepControl
 from cosserat_fenicsx.statics.sensitivity import Direct, check_scene, scenes_near
@@ -90,7 +90,7 @@ class _Quotient:
         if direct.problem.ties:
             part.form.refresh()
             part.assemble()  # for the springs in place of supports and joints
-        self._energies = Energies(direct, modes, part.resistance)
+        self._energies = Energies(direct.problem, modes, part.resistance)
 
     def here(self):
         """(modes,) the critical changes of the load factor."""
@@ -104,32 +104,6 @@ class _Quotient:
                 sides.append(self._energies.here(springs=False))
         direct.put((eta, numbers, None), slope, 0.0)
         return -stiff / derivative(sides, self._step)[0]
-
-
-class Energies:
-    """The second variation along modes at the state of a `Direct`, supports and joints included.
-
-    Args:
-        direct: the `Direct`; modes: each (N, 6), dimensionless.
-        resistance: see `Part`; None for modes that satisfy all constraint equations.
-    """
-
-    def __init__(self, direct, modes, resistance=None):
-        self._direct, self._modes, self._resistance = direct, modes, resistance
-        self._energy = made_once(direct.model, "energy_of_motion", EnergyOfMotion)
-        self._axes = direct.stability.whole.variation.axes
-
-    def here(self, springs=True):
-        """(modes,) dimensionless; springs: whether those in place of supports and joints count."""
-        ties, eta = self._direct.problem.ties, self._direct.problem.eta
-        found = np.array([self._energy.along(mode) for mode in self._modes])
-        if ties:
-            of_ties = ties.second_variation(self._axes, eta)
-            if springs and self._resistance is not None:
-                of_ties = of_ties + ties.springs(self._axes, eta, self._resistance)
-            tied = np.array([mode[self._direct.model.tied_slots] for mode in self._modes])
-            found += ties.energy(of_ties, tied)
-        return found
 
 
 def _relative(direct, quotient, parameter, rates):

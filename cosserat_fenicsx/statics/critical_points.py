@@ -22,7 +22,7 @@ from cosserat_fenicsx.errors import NotConverged, SceneError
 from cosserat_fenicsx.results.records import Event
 from cosserat_fenicsx.results.sensitivity import Sensitivity, called
 from cosserat_fenicsx.scene.parameters import parameter_of
-from cosserat_fenicsx.statics.critical import Energies
+from cosserat_fenicsx.statics.energies import Energies
 from cosserat_fenicsx.statics.path.follower import Follower
 from cosserat_fenicsx.statics.path.load_control import StepControl
 from cosserat_fenicsx.statics.sensitivity import Direct, check_scene, scenes_near, sensitivity
@@ -158,7 +158,7 @@ def _of_bifurcation(direct, crossing, parameters, rates):
     for parameter, each in zip(parameters, rates, strict=True):
         _check_perfect(direct.model, parameter, each)
     modes = _modes(direct, crossing)
-    energies = Energies(direct, modes)
+    energies = Energies(direct.problem, modes)
     by_load = np.mean([_by_load(direct, energies, point) for point in direct.points], axis=0)
     found, errors = [], []
     for parameter, each in zip(parameters, rates, strict=True):

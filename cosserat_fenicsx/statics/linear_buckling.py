@@ -24,19 +24,25 @@ from cosserat_fenicsx.statics.first_mesh import FIRST_ELEMENTS
 from cosserat_fenicsx.statics.grading import layers_of
 from cosserat_fenicsx.statics.path.follower import Follower
 from cosserat_fenicsx.statics.path.load_control import StepControl
+from cosserat_fenicsx.statics.quotients import quotients
 from cosserat_fenicsx.statics.shapes import shapes_of
 from cosserat_fenicsx.statics.solve import check_arguments
 from cosserat_fenicsx.statics.solvers import solvers_of
 
 _MOST_ELEMENTS = 256
-# Step of the load factor in the central difference of the second variation: first such that the load changes by this
-# much, in the units EI/L^2 and EI/L; then as a share of the lowest critical load factor, counted from the state.
-_STEP, _SHARE = 1e-3, 1e-2
-# Largest share of the error of bounded stiffnesses that remains after the correction by Rayleigh's quotient.
-_REMAINING = 0.1
-# Largest critical load, in the same units. It is also bounded by the load at which the force in a rod reaches the
-# smallest of its EA and GA: the shear-flexible column has a spurious root under tension at about GA.
-_HUGE = 1e8
+# Steps of the load factor in the central difference of the second variation: displacements over the unit of length and
+# rotations are at most the first, contact forces and moments at most the second in EI/L^2 and EI/L of their rod.
+_MOVED, _LOADED = 1e-4, 1e-2
+# Rounding errors below this share of the tolerance stay as they are.
+_NOTHING = 1e-2
+# Largest share of the error of bounded stiffnesses that remains after the correction by Rayleigh's quotient: what
+# remains is of second order, this number times the square at most, unless the true stiffness is infinite.
+_REMAINING, _SQUARED = 0.1, 100.0
+# Linear buckling extrapolates the state linearly. Its largest load factor is that at which r' has changed by _TURNED
+# (1: a deflection by half a right angle, or a stretch of 100 %), the contact force of a rod reaches the smallest of its
+# EA and GA (the shear-flexible column has a spurious root under tension at about GA), or the contact force or moment of
+# a rod reaches _HUGE times EI/L^2 or EI/L of that rod.
+_TURNED, _HUGE = 1.5, 1e8
 
 
 def buckling(
@@ -77,8 +83,8 @@ def buckling(
 
     Returns:
         Buckling. It holds fewer than `count` load factors where no more are positive (counted from eta) and below that
-        at which the contact force of a rod reaches the smallest of its EA and GA; or, without a potential, where the
-        others are rounding error.
+        at which linear extrapolation ends, see `Buckling.bound`; or, without a potential, where the others are rounding
+        error.
 
     Raises:
         SceneError: an argument outside its range.
@@ -95,9 +101,9 @@ def buckling(
         return np.abs(fine - coarse) / np.abs(fine - load_factor)
 
     with MeshProgress("buckling", tol, progress, comm) as bar:
-        (load_factors, _, state, shapes, softness, conservative, most), error, _ = until_two_meshes_agree(
+        (load_factors, _, state, shapes, shared, conservative, most), error, _ = until_two_meshes_agree(
             scene,
-            lambda layout: _critical(scene, layout, count, load_factor, degree, comm),
+            lambda layout: _critical(scene, layout, count, load_factor, tol, degree, comm),
             apart,
             tol,
             first=FIRST_ELEMENTS,
@@ -107,33 +113,38 @@ def buckling(
             progress=bar,
             advice="a larger tol",
         )
-    error = np.maximum(error, softness)  # an error that both meshes share; NaN stays
+    softness, rounding = shared
+    error = np.maximum(error, softness) + rounding  # what both meshes share; NaN stays
     if (error > tol).any():
+        why = (
+            "rounding errors alone may be" if (rounding > tol).any() else
+            "linear buckling bounds the stiffnesses against stretch and shear, which may leave an error of"
+        )  # fmt: skip
         raise NotConverged(
-            f"the accuracy tol = {tol:g} was not reached: linear buckling bounds the stiffnesses against stretch and "
-            f"shear, which may leave an error of {error.max():.2g}. Ask for a larger tol, or for the events of `solve`."
+            f"the accuracy tol = {tol:g} was not reached: {why} {error.max():.2g}. Ask for a larger tol, or for the "
+            "events of `solve`."
         )
     bound = float(load_factors[0]) if len(load_factors) else most
     found = slice(0 if conservative else 1, None)  # without a potential the first one is the bound alone
     return Buckling(state, shapes, error[found], conservative, comm, load_factors[found], bound, critical_sensitivity)
 
 
-def _critical(scene, layout, count, load_factor, degree, comm):
+def _critical(scene, layout, count, load_factor, tol, degree, comm):
     """The result on one mesh.
 
     Returns:
         Load factors (n,), the lengths of boundary layers or None, the `Equilibrium`, shapes (m, N, 6), relative errors
-        (n,) of bounded stiffnesses, whether the loads have a potential, and the largest load factor that is considered.
+        (2, n) of bounded stiffnesses and of rounding, whether the loads have a potential, and the largest load factor that is considered.
         With a potential n = m; else n = m + 1, and the bound comes first.
     """
     with (
         solvers_of(scene, layout, degree=degree, comm=comm) as solvers,
         circulatory_part(scene, layout, degree, comm) as circulatory,
     ):
-        return _critical_by(*solvers, circulatory, count, load_factor)
+        return _critical_by(*solvers, circulatory, count, load_factor, tol)
 
 
-def _critical_by(problem, newton, stability, circulatory, count, load_factor):
+def _critical_by(problem, newton, stability, circulatory, count, load_factor, tol):
     model = problem.model
     follower = Follower(problem, newton, stability, StepControl(), control="load")
     track = follower.track
@@ -150,30 +161,25 @@ def _critical_by(problem, newton, stability, circulatory, count, load_factor):
         """The skew-symmetric part of the second variation at the state; None for loads with a potential."""
         return None if conservative else circulatory.skew(model.snapshot()[0], problem.load_factor)
 
-    slope = track.slope()
-    unit = problem.load_derivative(problem.x).norm() or 1.0
+    rates, unit = problem.rates(track.slope()), problem.load_derivative(problem.x).norm() or 1.0
 
-    def pencil(change):
-        """-dK/deta by a central difference with this change of the load factor, that of the skew part, the largest
-        physical load factor, and the eigenvalues and modes of the symmetric pencil."""
-        sides, forces = [], []
-        for step in (change, -change):
-            numbers_there = [here.numbers[0] + step * slope, *(values.copy() for values in here.numbers[1:])]
-            if not track.at_load(numbers_there, load_factor + step).converged:
-                raise NotConverged(f"no equilibrium was found next to the load factor {load_factor:g}: {track.failure}")
-            stability.whole.assemble(stress_alone=True)
-            sides.append((stability.whole.K.copy(), skew()))
-            forces.append(model.snapshot()[1][..., : model.force_size])
-        slack, of_skew = (_decrease(*parts, change) for parts in zip(*sides, strict=True))
-        most = _most(model, (forces[0] - forces[1]) / (2 * change), unit)
-        track.restore()
-        stability.whole.assemble()
-        found = _below(most, *eigen.largest_of_pencil(slack, stability.whole.K, count + 2))
-        return slack, of_skew, most, *found
+    def moved(step):
+        """Put the state that is extrapolated linearly by a change of the load factor; its fields at Gauss points."""
+        numbers_there = [value + step * rate for value, rate in zip(here.numbers, rates, strict=True)]
+        track.put(numbers_there, load_factor + step)
+        problem.function(problem.x, problem.b)  # brings all that depends on the state up to date
+        return model.snapshot()[1]
 
-    slack, of_skew, most, symmetric, modes = pencil(_STEP / unit)
-    if len(symmetric) and not 0.3 < symmetric[0] * _STEP / (unit * _SHARE) < 3:
-        slack, of_skew, most, symmetric, modes = pencil(_SHARE / symmetric[0])
+    change, most = _extent(model, moved, rates[0], unit)
+    sides = []
+    for step in (change, -change):
+        moved(step)
+        stability.whole.assemble(stress_alone=True)
+        sides.append((stability.whole.K.copy(), skew()))
+    slack, of_skew = (_decrease(*parts, change) for parts in zip(*sides, strict=True))
+    moved(0.0)
+    stability.whole.assemble()
+    symmetric, modes = _below(most, *eigen.largest_of_pencil(slack, stability.whole.K, count + 2, 1 / most))
     if conservative:
         values, vectors = symmetric, modes
         critical, corrected = values[:count], np.ones(len(values[:count]), dtype=bool)
@@ -183,14 +189,20 @@ def _critical_by(problem, newton, stability, circulatory, count, load_factor):
         values, vectors = _below(most, *found)
         critical = np.append(symmetric[:1], values)
         corrected = np.arange(len(critical)) < 1
-    softness = _softness(stability.whole, [*([] if conservative else modes[:1]), *vectors][: len(critical)])
-    # For a symmetric pencil, Rayleigh's quotient without that share of the energy is more accurate.
-    critical = np.where(corrected, 1 + softness, 1.0) / critical
-    softness = np.where(corrected, _REMAINING, 1.0) * softness
+    chosen = [*([] if conservative else modes[:1]), *vectors][: len(critical)]
+    found = quotients(problem, stability.whole, slack, chosen, _NOTHING * tol)
+    # For a symmetric pencil, Rayleigh's quotient is more accurate than the eigenvalue.
+    critical = np.where(corrected, found.values, 1 / critical)
+    rounding = np.where(corrected, found.rounding, found.of_unsymmetric)
+    remaining = _REMAINING
+    if np.isfinite(model.section.K).all():
+        remaining = np.minimum(_REMAINING, _SQUARED * found.softness)
+    softness = np.where(corrected, remaining, 1.0) * found.softness
     whole = [np.concatenate(model.comm.allgather(vector.array_r)) for vector in vectors]
     shapes = shapes_of(whole, values, model.rows_of_nodes, model.scales.length)[:count]
     state = Equilibrium.of(model, load_factor)
-    return load_factor + critical, layers, state, shapes, softness, conservative, load_factor + most
+    errors = np.array([softness, rounding])
+    return load_factor + critical, layers, state, shapes, errors, conservative, load_factor + most
 
 
 def _decrease(ahead, behind, change):
@@ -202,15 +214,25 @@ def _decrease(ahead, behind, change):
     return ahead
 
 
-def _most(model, rates, unit):
-    """The largest change of the load factor for which critical loads are physical.
+def _extent(model, moved, slope, unit):
+    """The step of the load factor for difference quotients, and the largest change of it for which critical loads are
+    physical.
 
     Args:
-        rates: (elements, points, 3) derivative of the contact force by the load factor, dimensionless; unit: the size
-            of the loads.
+        moved: (step) -> fields at the Gauss points of the state there, see `Snapshots.snapshot`.
+        slope: (owned unknowns,) derivative of the unknowns by the load factor; unit: size of the loads.
     """
-    rates = np.maximum(np.linalg.norm(rates, axis=2), 1e-300)
-    return float(min(_HUGE / unit, (np.minimum(model.section.K, _HUGE).min(axis=2) / rates).min()))
+    fastest = max(model.largest(slope), 1e-200)  # rods without extension do not move
+    step = min(_MOVED / fastest, 1 / unit)
+    rates = (moved(step) - moved(-step)) / (2 * step)
+    force, moment, tangent = (np.maximum(np.linalg.norm(part, axis=2), 1e-200) for part in np.split(rates, 3, axis=2))
+    lengths = [rod.length / model.scales.length for rod in model.scene.rods]
+    L = np.repeat(lengths, model.layout.counts)[:, None]
+    EI = model.section.J[:, :, :2].max(axis=2)
+    loaded = max((force * L**2 / EI).max(), (moment * L / EI).max())
+    strength = np.minimum(model.section.K.min(axis=2), _HUGE * EI / L**2)
+    most = min((strength / force).min(), (_HUGE * EI / L / moment).min(), (_TURNED / tangent).min())
+    return min(_MOVED / fastest, _LOADED / loaded), float(most)
 
 
 def _below(most, values, vectors):
@@ -220,22 +242,3 @@ def _below(most, values, vectors):
     """
     values = values[values * most > 1]
     return values, vectors[: len(values)]
-
-
-def _softness(part, vectors):
-    """(n,) shares of the modes' energies in stretch and shear that are due to the bounds of these stiffnesses.
-
-    Args:
-        part: the `Part` of the second variation, assembled at the state.
-        vectors: modes, PETSc vectors in its numbering.
-    """
-    model, whole = part.model, part.K.copy()
-    bound = model.bounded_stiffness()
-    model.stiffen(bound * (2 - bound / model.section.K))  # increases the energy by the excess of bounded stiffnesses
-    part.load()
-    part.assemble()
-    part.K.axpy(-1.0, whole)
-    energies = [((part.K * v).dot(v), (whole * v).dot(v)) for v in vectors]
-    model.stiffen(model.bounded_K)
-    part.load()
-    return np.array([of_excess / of_all for of_excess, of_all in energies])

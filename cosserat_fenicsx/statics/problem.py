@@ -146,6 +146,26 @@ class Problem(Equations):
             self.ties.put(self.x, multipliers)
         self.set_state(self.x)
 
+    def rates(self, slope):
+        """The changes of all arrays of `numbers` along a change of the unknowns (owned entries), to first order.
+
+        The change of the carried contact force follows from the linearised strains: the small difference of two states
+        of a slender rod would lose the digits that those keep.
+        """
+        if not self.c.advance:
+            return [slope]
+        model, (live,) = self.model, self._live
+        vector, carried, sides = self.numbering.vector(), live.copy(), []
+        model.before.x.array[:] = self._state
+        for values in (0.0, slope):
+            vector.array_w[:] = values
+            model.step.x.array[:] = 0.0
+            self.numbering.to_local(vector, model.step.x.array)
+            self._lib.put_values(self._advance.c, self.c.advance_dofs, self.c.carried)
+            sides.append(live.copy())
+            live[:] = carried
+        return [slope, sides[1] - sides[0]]
+
     def assemble_data_derivative(self, form, clamped, vector):
         """The change of the residual at the state, without supports and joints, with data and with clamped nodes.
 
