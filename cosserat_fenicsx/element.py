@@ -68,6 +68,20 @@ class ElementRule:
         vandermonde = np.vander(support, increasing=True)
         return np.vander(2 * self.nodes - 1, len(support), increasing=True) @ np.linalg.inv(vandermonde)
 
+    @cached_property
+    def contact_from_fields(self):
+        """(p + 1, gauss) matrix from n (or m) at the Gauss points to the part of it at the nodes that does not depend
+        on the element's length, see `results.recovery`."""
+        ends = self.weights * self.slopes[:, [0, -1]].T * [[-1], [1]]
+        return self.from_ends_and_gauss @ np.concatenate([ends[:1], np.eye(len(self.gauss)), ends[1:]])
+
+    @cached_property
+    def contact_from_densities(self):
+        """(p + 1, gauss) matrix from the force (or moment with r' x n) per length, times the element's length, at the
+        Gauss points to the rest of n (or m) at the nodes."""
+        ends = self.weights * self.at_gauss[:, [0, -1]].T * [[1], [-1]]
+        return self.from_ends_and_gauss[:, [0, -1]] @ ends
+
     def between_gauss(self, x):
         """(len(x), gauss) Lagrange polynomials of the Gauss points, at x in [0, 1]."""
         points, x = 2 * self.gauss - 1, 2 * np.asarray(x) - 1

@@ -41,8 +41,9 @@ def test_every_point_of_a_path(scene, etas, tol):
     truth = positions(cf.solve(scene, list(etas), model=path.model, degree=4, elements=3 * max(path.elements)))
     sizes = np.linalg.norm(truth, axis=2).max(axis=1)
     off, nothing = np.linalg.norm(positions(path) - truth, axis=2).max(axis=1) / sizes, 1e-11 * sizes.max() / sizes
-    assert (off <= np.maximum(path.error, nothing)).all() and path.error.max() <= tol
-    assert (path.error <= 30 * np.maximum(off, nothing)).all()
+    told = path.errors.position
+    assert (off <= np.maximum(told, nothing)).all() and path.error.max() <= tol
+    assert (told <= 30 * np.maximum(off, nothing)).all()
 
 
 @pytest.mark.parametrize(
@@ -71,7 +72,7 @@ def test_a_smooth_rod_does_not_hide_another():
     etas = np.linspace(-0.98, 1, 20).tolist()
     path, truth = cf.solve(scene, etas, tol=1e-6), positions(cf.solve(scene, etas, elements=64))
     off = np.linalg.norm(positions(path) - truth, axis=2).max(axis=1) / np.linalg.norm(truth, axis=2).max(axis=1)
-    assert (off <= np.maximum(path.error, 1e-11)).all() and path.error.max() <= 1e-6
+    assert (off <= np.maximum(path.errors.position, 1e-11)).all() and path.error.max() <= 1e-6
 
 
 def test_an_interrupted_search_hands_over_what_is_complete(monkeypatch):

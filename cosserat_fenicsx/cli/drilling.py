@@ -23,7 +23,7 @@ from cosserat_fenicsx.well.field_units import in_si
 
 _TAKEN = ("duration", "dt", "elements", "model", "save_every")
 # Options of the command line that are for rods alone.
-_OTHERS = ("load_factors", "tol", "degree", "formulation", "control", "branch", "scheme", "start", "station", "at",
+_OTHERS = ("load_factors", "tol", "bound", "degree", "formulation", "control", "branch", "scheme", "start", "station", "at",
            "color", "magnify")  # fmt: skip
 
 

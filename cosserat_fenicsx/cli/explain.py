@@ -9,6 +9,7 @@ from cosserat_fenicsx.models.formulations import formulation_of
 from cosserat_fenicsx.models.rodmesh import Layout
 from cosserat_fenicsx.models.signature import Signature
 from cosserat_fenicsx.results.accuracy import FEW
+from cosserat_fenicsx.results.compared import NAMES
 from cosserat_fenicsx.scene.curves import Line, Spline
 from cosserat_fenicsx.scene.describe import actions_in_words, describe
 from cosserat_fenicsx.scene.magnitudes import check_magnitudes
@@ -39,7 +40,8 @@ def explain(scene, load_factors, settings):
     formulation = formulation_of(settings.get("formulation"))
     elements, tol = settings.get("elements"), settings.get("tol", 1e-6)
     degree = settings.get("degree", formulation.default_degree)
-    check_arguments(scene, tol, elements)
+    bound = settings.get("bound", NAMES)
+    check_arguments(scene, tol, elements, bound)
     check_magnitudes(scene, np.abs(load_factors).max())
     follows = settings.get("branch") is not None or settings.get("control") == "arc"
     choice = choose(scene, model=settings.get("model", "auto"), formulation=formulation, degree=degree, follows=follows)
@@ -71,7 +73,7 @@ def explain(scene, load_factors, settings):
     else:
         lines.append(
             f"Mesh: elements of degree {degree}, from {first} per rod ({unknowns} unknowns) refined until two meshes "
-            f"agree to tol = {tol:g}."
+            f"agree to tol = {tol:g} in {', '.join(f'{name}s' for name in bound)}."
         )
     if isinstance(load_factors, tuple):
         lines.append(f"Path: load factor {load_factors[0]:g} to {load_factors[1]:g} in steps the solver chooses.")

@@ -75,7 +75,7 @@ def _settings(options):
     from cosserat_fenicsx.scene.scenefile import load_factors_in, read_scene
 
     scene, settings = read_scene(options.scene)
-    for name in ("tol", "elements", "degree", "formulation", "model", "control", "branch"):
+    for name in ("tol", "bound", "elements", "degree", "formulation", "model", "control", "branch"):
         if getattr(options, name) is not None:
             settings[name] = getattr(options, name)
     if options.load_factors is not None:

@@ -5,7 +5,7 @@ from cosserat_fenicsx.errors import SceneError
 #: Options of a motion, and those of an equilibrium path, by the names of the arguments of `simulate` and `solve`.
 MOTION, PATH = (
     ("duration", "dt", "scheme", "save_every", "start", "folder"),
-    ("load_factors", "formulation", "control", "branch"),
+    ("load_factors", "bound", "formulation", "control", "branch"),
 )
 _BOTH = ("tol", "elements", "degree", "model")
 

@@ -59,6 +59,8 @@ def _eigenvalues(parser, name, count, tol):
     parser.add_argument("--count", type=int, default=count, help=f"how many [{count}]")
     parser.add_argument("--load-factor", type=float, default=0.0, help="of the equilibrium [0: the unloaded rods]")
     parser.add_argument("--tol", type=float, help=f"estimated relative error of the eigenvalues [{tol}]")
+    parser.add_argument("--bound", metavar="A,B,...", type=lambda text: text.split(","),
+                        help="what --tol bounds of an equilibrium path: position,rotation,force,moment [all]")  # fmt: skip
     parser.add_argument("--elements", type=int, help="elements per rod; fixes the mesh, no error estimate")
     parser.add_argument("--degree", type=int, help="polynomial degree of r and q, 1 to 4 [4]")
     parser.add_argument(
@@ -123,9 +125,12 @@ def _common(parser):
                         help="0:1.5 lets the solver choose its steps, 0.5,0.9,1 reaches each exactly; negative ones "
                         "with =, --load-factors=-1:1")  # fmt: skip
     parser.add_argument("--tol", type=float,
-                        help="estimated error of positions over the largest displacement [1e-6]; of a motion that of "
+                        help="estimated error of positions, rotations, contact forces and moments, each over its "
+                        "largest [1e-6]; of a motion that of "
                         "its steps, over the longest rod's length [1e-3]; of a string in a well that of hook load and "
                         "torque [1e-4]")  # fmt: skip
+    parser.add_argument("--bound", metavar="A,B,...", type=lambda text: text.split(","),
+                        help="what --tol bounds of an equilibrium path: position,rotation,force,moment [all]")  # fmt: skip
     parser.add_argument("--elements", type=int, help="elements per rod; fixes the mesh, no error estimate")
     parser.add_argument("--degree", type=int, help="polynomial degree of r and q, 1 to 4 [4]")
     parser.add_argument("--formulation", help="mixed, displacement or multiplier [mixed]")

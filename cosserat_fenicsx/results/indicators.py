@@ -3,6 +3,7 @@
 import numpy as np
 
 from cosserat_fenicsx.quaternions import conjugate_product, directors
+from cosserat_fenicsx.results.compared import POSITION
 from cosserat_fenicsx.results.places import halfway
 
 # Largest length of an element next to a support, load or kink, over the length of the boundary layer there.
@@ -66,6 +67,23 @@ def winding_lengths(path):
     return lengths
 
 
+def turns_of(path, most):
+    """For every rod (elements,): the largest angle, rad, by which the moments at the Gauss points turn sections along
+    an element, relative to the rest state, at any point of a path; None where none is larger than `most`."""
+    m = path._stacked("gauss_fields")[..., 3:6]
+    of_rods = list(zip(path.scene.rods, path.layout.breaks, strict=True))
+    softness = [path.scales.moment * rod.length / rod.profile.range[0].J.min() for rod, _ in of_rods]
+    largest = max(np.diff(breaks).max() * soft for (_, breaks), soft in zip(of_rods, softness, strict=True))
+    if np.sqrt(3) * np.abs(m).max(initial=0.0) * largest <= most:
+        return None
+    m = (np.linalg.norm(m, axis=3) @ path.rule.weights).max(axis=0)
+    found, first = [], 0
+    for (_, breaks), soft in zip(of_rods, softness, strict=True):
+        cells = slice(first, first := first + len(breaks) - 1)
+        found.append(m[cells] * np.diff(breaks) * soft)
+    return found if max(turns.max() for turns in found) > most else None
+
+
 def unresolved(scene, layout, lengths):
     """Whether elements at the ends of pieces (see `rodmesh`) are too long for boundary layers there."""
     for breaks, pieces, layers in zip(layout.breaks, layout.pieces(scene), lengths, strict=True):
@@ -97,7 +115,7 @@ def element_differences(fine, coarse):
         For every rod (elements of the coarse mesh,): maximum over all points, relative to the largest displacement of
         each point.
     """
-    sizes = fine._reference.largest
+    sizes = fine._reference.sizes[POSITION]
     n = coarse._stacked("gauss_fields")[..., :3]
     forces = np.sqrt(np.square(n).sum(axis=3).max(axis=2))
     found, first, p, scales = [], 0, fine.degree, fine.scales

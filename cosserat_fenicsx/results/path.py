@@ -8,7 +8,9 @@ from typing import Self
 
 import numpy as np
 
-from cosserat_fenicsx.results.accuracy import leading_of, sizes_of
+from cosserat_fenicsx.results.accuracy import leading_of
+from cosserat_fenicsx.results.compared import NAMES, Errors, sizes_of
+from cosserat_fenicsx.results.places import all_cell_nodes
 from cosserat_fenicsx.results.records import Event, Record, Records
 from cosserat_fenicsx.results.recovery import element_contact
 from cosserat_fenicsx.results.result import Result
@@ -30,8 +32,10 @@ class Path(Result):
             singular. Where the loads have no potential (see `conservative`) its symmetric part is used, which does not
             detect flutter.
         stable: (n,) bool.
-        error: (n,) estimated error of the positions, relative to the largest displacement; NaN where not estimated.
-        rounding: the error of the positions that the rounding of the residual alone may cause, likewise relative.
+        errors: the estimated errors of position, rotation, force and moment, each (n,), see there.
+        error: (n,) the largest of those that `tol` bounds; NaN where not estimated.
+        bounded: names of those that `tol` bounds.
+        rounding: the error of positions and rotations that the rounding of the residual alone may cause, relative.
         events: every `Event` of the path in order: limit points and bifurcations.
         left: whether the path continues on a branch from its first bifurcation.
         control: "load", or "arc" where the path, or a part of it, was followed in arc length.
@@ -40,7 +44,7 @@ class Path(Result):
     axis = "load factor"
     #: whether the formulation's virtual rotations are those of changes of q instead of independent small rotations
     galerkin = False
-    _computed = (*Result._computed, "_records", "_contact", "conservative", "_reference", "_roughness")
+    _computed = (*Result._computed, "_records", "_contact", "conservative", "_reference", "_roughness", "_in_elements")
     # functions of a path that compute its `conservative` and its `sensitivity`
     _potential = _differentiated = None
 
@@ -48,7 +52,8 @@ class Path(Result):
         super().__init__(*args, **more)
         self.events: list[Event] = []
         self.control, self.left = "load", False
-        self.rounding, self._error = 0.0, None
+        self.rounding, self.bounded = 0.0, NAMES
+        self._errors = self.by_mesh = None
         self._expanded: Records | None = None
 
     @classmethod
@@ -84,6 +89,12 @@ class Path(Result):
         return [] if self._all is None else self._all.listed()
 
     @cached_property
+    def _in_elements(self):
+        """(points, elements, nodes per element, 13) `_motion`, n and m."""
+        nodal = self._motion[:, all_cell_nodes(self.layout, self.degree)]
+        return np.concatenate([nodal, self._contact], axis=3)
+
+    @cached_property
     def _reference(self):
         return sizes_of(self)
 
@@ -112,7 +123,10 @@ class Path(Result):
             which: their indices.
         """
         part = super().at_points(which)
-        part.events, part._error = [], None if self._error is None else self._error[which]
+        part.events = []
+        for name in ("_errors", "by_mesh"):
+            values = getattr(self, name)
+            setattr(part, name, None if values is None else values[:, which])
         return part
 
     def with_points(self, others, which):
@@ -214,13 +228,41 @@ class Path(Result):
         return f"{self.load_factors[k]:.3g}" + ("" if self.stable[k] else " (unstable)")
 
     @property
-    def error(self) -> np.ndarray:
-        """(n,) estimated error, see the class."""
-        return np.full(len(self), np.nan) if self._error is None else self._error
+    def errors(self) -> Errors:
+        """Estimated errors of what queries return anywhere along the rods, each (n,), relative; NaN where not known.
 
-    def set_error(self, error):
-        """Set the estimated error, which is at least that of rounding."""
-        self._error = np.maximum(error, self.rounding)
+        position: over the largest displacement at that point of the path (where sections mainly rotate, over their
+        rotation times the radius of gyration). rotation: the angle (rad) over the largest rotation, 2 sin(angle/2), or
+        the largest displacement over the length of the longest rod if that is more. force: of n, over the largest |n|,
+        or the largest |m| over that length if that is more. moment: of m, over the largest |m|. Rounding is included:
+        that of n is large on slender rods which bend without a large n.
+        """
+        return Errors(*(np.full((4, len(self)), np.nan) if self._errors is None else self._errors))
+
+    @property
+    def error(self) -> np.ndarray:
+        """(n,) the largest estimated error of those that are `bounded`, see `errors`."""
+        return np.full(len(self), np.nan) if self._errors is None else self._errors[self.bounds].max(axis=0)
+
+    @property
+    def bounds(self):
+        """Indices of what is `bounded`."""
+        return [NAMES.index(name) for name in self.bounded]
+
+    @property
+    def worst(self):
+        """(n,) as `error`, without the rounding of n and m, which no mesh reduces; NaN where unknown."""
+        return np.full(len(self), np.nan) if self.by_mesh is None else self.by_mesh[self.bounds].max(axis=0)
+
+    def set_errors(self, errors):
+        """Set the estimated errors (4, n) that the mesh causes; they are at least those of rounding."""
+        self.by_mesh = np.maximum(errors, self.rounding)
+        self._errors = np.maximum(self.by_mesh, self.rounding_errors)
+
+    @property
+    def rounding_errors(self):
+        """(4, n) errors of n and m by rounding, relative; 0 for the others, see `rounding`."""
+        return self._reference.rounding / self._reference.sizes
 
     def mode(self, event: Event, rod: RodOrName | None = None) -> np.ndarray:
         """(nodes, 3) the mode of an event at the nodes of a rod (default the first), see `Event`."""
@@ -229,7 +271,7 @@ class Path(Result):
     @cached_property
     def _contact(self):
         """(points, elements, nodes per element, 6) n and m, dimensionless; they jump at point loads."""
-        return np.array([element_contact(self, record) for record in self._records])
+        return element_contact(self, self._all)
 
     def _at_clamp(self, point, joined):
         """See `Reactions`: from the contact forces and moments at the ends of the elements there."""

@@ -33,20 +33,44 @@ class Places(NamedTuple):
 
 
 class Compared(NamedTuple):
-    """Where two meshes are compared: at the coarse nodes and half way between them; ends: (places,) whether at an end
-    of a coarse element."""
+    """Where two meshes are compared: at the nodes of every element of the coarse one and half way between them.
 
-    coarse: Places
-    fine: Places
+    inside: (places per element, nodes per element) weights of a coarse element's nodes, the same in all elements;
+    cells (places,), weights (places, nodes per element): of the fine elements, on the same side of a jump;
+    ends: (places,) whether at an end of a coarse element; rods: for every rod the slice of its places.
+    """
+
+    inside: np.ndarray
+    cells: np.ndarray
+    weights: np.ndarray
     ends: np.ndarray
+    rods: tuple
+
+
+# Distance from the end of an element, over its length, at which a place surely belongs to it.
+_INWARDS = 1e-6
 
 
 @lru_cache(maxsize=16)
 def compared(coarse, fine, rule):
     """`Compared` for two `Layout`s with elements of the same `ElementRule`."""
-    xs = [halfway(nodes) for nodes in coarse.node_s(rule.nodes)]
-    ends = np.concatenate([np.isin(x, breaks) for x, breaks in zip(xs, coarse.breaks, strict=True)])
-    return Compared(Places.on(coarse, rule, xs), Places.on(fine, rule, xs), ends)
+    local = halfway(rule.nodes)
+    ends = (local == local[0]) | (local == local[-1])
+    near = np.clip(local, _INWARDS, 1 - _INWARDS)
+    found, rods, first, start = [], [], 0, 0
+    for breaks, x, sure in zip(fine.breaks, coarse.inside(local), coarse.inside(near), strict=True):
+        cells, _ = rule.locate_all(breaks, sure.ravel())
+        of_cells = (x.ravel() - breaks[cells]) / np.diff(breaks)[cells]
+        found.append((first + cells, rule.basis(np.clip(of_cells, 0.0, 1.0)), np.tile(ends, len(x))))
+        rods.append(slice(start, start + x.size))
+        first, start = first + len(breaks) - 1, start + x.size
+    return Compared(rule.basis(local), *map(np.concatenate, zip(*found, strict=True)), tuple(rods))
+
+
+@lru_cache(maxsize=32)
+def all_cell_nodes(layout, degree):
+    """(elements, degree + 1) the nodes of the elements of all rods one after another."""
+    return np.concatenate([nodes for nodes, _ in cell_nodes(layout, degree)])
 
 
 @lru_cache(maxsize=16)

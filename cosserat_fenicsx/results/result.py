@@ -133,7 +133,14 @@ class Result(Exports, Extremes, Reactions, Stresses, States):
     @cached_property
     def _moved(self):
         """(points, nodes, 3) displacements of the nodes, dimensionless."""
-        return self._all_rq[:, :, :3] - self._rest
+        return self._motion[:, :, :3]
+
+    @cached_property
+    def _motion(self):
+        """(points, nodes, 7) displacements of the nodes, dimensionless, and q."""
+        motion = self._all_rq.copy()
+        motion[:, :, :3] -= self._rest
+        return motion
 
     @property
     def _turned(self):

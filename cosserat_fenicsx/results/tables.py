@@ -29,7 +29,7 @@ def path_table(path, station=None):
         title=f"{title}{path.model} model, {path.formulation} formulation, degree {path.degree}, "
         f"{' + '.join(map(str, path.elements))} elements, {path.unknowns} unknowns",
         caption=f"dx, dy, dz, size of the rotation: of {station}. stable: 'no (2)' has two negative modes.\n"
-        "iterations: Newton's, since the row above. est. error: of positions, relative to the largest displacement.\n"
+        f"iterations: Newton's, since the row above. est. error: the largest of {_bounded(path)}.\n"
         f"{actions_in_words(path.scene)}",
     )
     headings = ("load factor", "dx (m)", "dy (m)", "dz (m)", "rotation (rad)", "stable", "iterations", "est. error")
@@ -61,8 +61,28 @@ def path_table(path, station=None):
             "bifurcation."
         )
     return "\n".join(
-        [*lines, largest_in_words(path), *reactions_in_words(path), f"{path.model} model: {'; '.join(path.why)}."]
+        [
+            *lines,
+            *errors_in_words(path),
+            largest_in_words(path),
+            *reactions_in_words(path),
+            f"{path.model} model: {'; '.join(path.why)}.",
+        ]
     )
+
+
+def errors_in_words(path):
+    """A sentence on the largest estimated errors; none where they are unknown."""
+    known = [(name, values.max()) for name, values in path.errors._asdict().items() if not np.isnan(values).any()]
+    if known and len(path):
+        told = ", ".join(f"{name}s {worst:.1e}" for name, worst in known)
+        yield f"largest estimated errors, each relative to the largest of its kind: {told}"
+
+
+def _bounded(path):
+    """What `tol` bounds, in words."""
+    *names, last = [f"{name}s" for name in path.bounded]
+    return f"{', '.join(names)} and {last}, relative" if names else f"{last}, relative"
 
 
 def _shown(path):

@@ -71,6 +71,7 @@ SOLVE_KEYS = {
     "model": (str,),
     "formulation": (str,),
     "tol": (int, float),
+    "bound": (list,),
     "elements": (int,),
     "degree": (int,),
     "control": (str,),

@@ -5,12 +5,14 @@ import math
 import numpy as np
 
 from cosserat_fenicsx.results.accuracy import leading_coefficients
-from cosserat_fenicsx.results.indicators import element_differences, layer_lengths, unresolved
+from cosserat_fenicsx.results.indicators import element_differences, layer_lengths, turns_of, unresolved
 
 # Largest length of an element next to a support, load or kink, over the length of the boundary layer there.
 _RESOLVED = 2.0
 # Smallest length of an element over that of its rod.
 _SHORTEST = 1e-6
+# Largest angle by which an element of high degree may turn relative to its rest state, rad.
+_TURNED = 2.0
 # A mesh is graded only if that needs less than this share of the elements of uniform refinement, and uniform
 # refinement needs at least so many elements.
 _WORTH, _MANY = 0.5, 32
@@ -38,6 +40,19 @@ def with_layers(scene, layout, lengths):
     return layout.with_short_ends(scene, [_RESOLVED * layers for layers in lengths])
 
 
+def with_turns(scene, path):
+    """The layout whose elements turn by little between their ends; None where all do.
+
+    An element that turns by more than half a turn may have another number of turns than the rod, and finer meshes
+    repeat that.
+    """
+    most = min(_TURNED, path.degree / 2)
+    turns = turns_of(path, most)
+    if turns is None:
+        return None
+    return path.layout.resized(scene, [np.maximum(1.0, np.ceil(found / most)) for found in turns])
+
+
 def balanced(fine, coarse, above):
     """A layout that, with all elements halved, has the target error, equidistributed over the elements.
 
@@ -50,7 +65,7 @@ def balanced(fine, coarse, above):
     layout, order = coarse.layout, coarse.degree + 1
     if sum(fine.elements) * above ** (1 / order) < _MANY:
         return None
-    rough = np.concatenate([found.max(axis=0) for found in leading_coefficients(fine)])
+    rough = np.concatenate([found.max(axis=0) for found in leading_coefficients(fine, fine._moved)])
     if _even(rough ** (1 / coarse.degree)):
         return None
     differences = element_differences(fine, coarse)

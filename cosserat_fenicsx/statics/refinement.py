@@ -19,10 +19,11 @@ from cosserat_fenicsx.results.accuracy import (
     order_of,
     spread_error,
 )
+from cosserat_fenicsx.results.compared import NAMES, POSITION
 from cosserat_fenicsx.results.indicators import of_path, resolves, winding_lengths
 from cosserat_fenicsx.results.same_events import find_again, keep_confirmed
 from cosserat_fenicsx.statics.first_mesh import resolving
-from cosserat_fenicsx.statics.grading import balanced, with_layers
+from cosserat_fenicsx.statics.grading import balanced, with_layers, with_turns
 from cosserat_fenicsx.statics.path.recorder import Promoted
 
 _MOST_ELEMENTS = 1024
@@ -40,8 +41,8 @@ _MOST_BALANCINGS = 4
 _CHEAP = 800
 
 
-def refine(trace, correct, scene, layout, tol, degree, usual=None):
-    """A path whose estimated error is at most `tol`.
+def refine(trace, correct, scene, layout, tol, bound, degree, usual=None):
+    """A path whose estimated errors are at most `tol`.
 
     Args:
         trace: (layout, path or None) -> path followed from the unloaded state, through the points of the given path.
@@ -50,14 +51,14 @@ def refine(trace, correct, scene, layout, tol, degree, usual=None):
         scene: the scene; layout: the first mesh.
         usual: where that one is coarser than usual, the mesh to begin with again unless the path on it is plain: load
             control, no events, no negative modes, elements shorter than boundary layers.
-        tol: largest error of positions relative to the largest displacement.
+        tol: largest estimated error, relative; bound: names of what it bounds, see `Path.errors`.
         degree: of the elements.
 
     Raises:
         NotConverged: two meshes in a row cannot be solved, or the accuracy is not reached.
         Promoted: the path leaves the plane; the spatial model is needed.
     """
-    search = _Search(trace, correct, scene, tol, degree, usual)
+    search = _Search(trace, correct, scene, tol, bound, degree, usual)
     try:
         while True:
             try:
@@ -81,8 +82,9 @@ class _Search:
         accurate: the last path with accurate positions whose events differ from those of the mesh before; or None.
     """
 
-    def __init__(self, trace, correct, scene, tol, degree, usual):
+    def __init__(self, trace, correct, scene, tol, bound, degree, usual):
         self._trace, self._correct, self._scene, self._tol, self._degree = trace, correct, scene, tol, degree
+        self._bound = bound
         self._usual, self._next = usual, None  # `_next`: the next mesh and its refinement factor, where it is known
         self._begin()
 
@@ -91,8 +93,8 @@ class _Search:
         self._apart, self._apart_of_whole = None, None  # their differences to the mesh before, and those of all points
         self._level, self._level_of_whole = -1, -2
         self._plain = False  # see `_plain`, of the complete path
-        # Assumed order of the error in h; refinement factor over the mesh before, None where the meshes are not nested.
-        self._order, self._factor = 1.0, 2.0
+        # Assumed orders of the errors in h; refinement factor over the mesh before, None where the meshes are not nested.
+        self._order, self._factor = np.ones(4), 2.0
         self._failed, self._promoted, self._best = False, None, math.inf
         self.accurate, self._meshes_for_events, self._lost_events = None, _FOR_EVENTS, []
         self._halved = None  # sample points on this mesh and on the one before, if this one halves its elements
@@ -130,11 +132,11 @@ class _Search:
             self._plain = _plain(found, layers)
             if self._usual is not None and not self._plain:
                 return self._begin_again()
-        self._layered = with_layers(self._scene, found.layout, layers)
+        self._layered = with_layers(self._scene, found.layout, layers) or with_turns(self._scene, found)
         if found.rounding > self._tol:  # refinement would increase it
             raise NotConverged(_rounding_hides(self._tol, found.rounding, elements, found.formulation), found)
-        if np.isfinite(found.error).all():
-            reached = float(found.error.max())
+        if np.isfinite(found.worst).all():
+            reached = float(found.worst.max())
             if reached <= self._tol and found is self.whole and self._layered is None:
                 if elements >= _MOST_ELEMENTS or self._events_agree(found) or not self._meshes_for_events:
                     return self.confirmed(found)
@@ -148,7 +150,7 @@ class _Search:
             self._best = min(self._best, reached)
         if found is self.whole:
             self._few, self._which = hardest(found)
-            self._apart = None if self._apart_of_whole is None else self._apart_of_whole[self._which]
+            self._apart = None if self._apart_of_whole is None else self._apart_of_whole[:, self._which]
         return None
 
     def _begin_again(self):
@@ -160,7 +162,12 @@ class _Search:
         return all(event.error <= max(self._tol, _LOCATED) for event in path.events)
 
     def confirmed(self, path):
-        """A path without the events that were not found on two meshes."""
+        """A path without the events that were not found on two meshes, and with what rounding leaves of its bounds."""
+        by_rounding = path.rounding_errors.max(axis=1, initial=0.0)
+        hidden = [name for name in path.bounded if by_rounding[NAMES.index(name)] > self._tol]
+        if hidden:
+            path.bounded = tuple(name for name in path.bounded if name not in hidden)
+            path.why.extend(_rounding_leaves(self._tol, name, by_rounding[NAMES.index(name)]) for name in hidden)
         keep_confirmed(path, max(self._tol, _LOCATED), self._lost_events if path is self.whole else [])
         return path
 
@@ -178,10 +185,10 @@ class _Search:
         layered, self._layered = self._layered, None
         if layered is not None:
             return self._restarted(layered)
-        known = self._few is not None and np.isfinite(self._few.error).all() and self._few.error.max() > self._tol
+        known = self._few is not None and np.isfinite(self._few.worst).all() and self._few.worst.max() > self._tol
         self._factor = 2.0
         if known:
-            above = float(self._few.error.max()) / (_AIM * self._tol)
+            above = float(self._few.worst.max()) / (_AIM * self._tol)
             if self._halved is not None and self._balancings < _MOST_BALANCINGS:
                 even = balanced(*self._halved, above)
                 if even is not None:
@@ -202,12 +209,12 @@ class _Search:
         All points on the mesh before where the sample points show that it suffices; None where a mesh that is coarser
         than usual does not resolve them.
         """
-        few = None if self._few is None else self._correct(layout, self._few)
+        few = None if self._few is None else self._corrected(layout, self._few)
         apart = None if few is None else self._judge(few, self._few, self._apart)
-        if few is None or apart.max() > _RESOLVED:
+        if few is None or apart[POSITION].max() > _RESOLVED:
             if self._usual is not None and self.whole is not None:
                 return None
-            whole, apart = self._trace(layout, self.whole), None
+            whole, apart = self._traced(layout), None
             if self._level == self._level_of_whole + 1:
                 apart = self._judge(whole, self.whole, self._apart_of_whole)
             return self._keep(whole, apart)
@@ -217,16 +224,28 @@ class _Search:
         coarse, self._few, self._apart = self._few, few, apart
         traced = self._level == self._level_of_whole + 1  # all points are known on the mesh before
         if self._error_before is not None and (self._plain or not traced):
-            coarse.set_error(self._error_before)
+            coarse.set_errors(self._error_before)
             judged = coarse
-            if coarse.error.max() <= self._tol:
+            if coarse.worst.max() <= self._tol:
                 judged = self._all_judged(coarse) if traced else self._all_points(coarse.layout, coarse)
-                if judged.error.max() <= self._tol:
+                if judged.worst.max() <= self._tol:
                     return judged
-            if few.error.max() <= self._tol and max(layout.counts) < _MOST_ELEMENTS and self._saves(few, judged):
+            if few.worst.max() <= self._tol and max(layout.counts) < _MOST_ELEMENTS and self._saves(few, judged):
                 self._few, self._apart = coarse, None
                 return few
-        return self._all_points(layout, few) if few.error.max() <= self._tol else few
+        return self._all_points(layout, few) if few.worst.max() <= self._tol else few
+
+    def _corrected(self, layout, like):
+        return self._bounding(self._correct(layout, like))
+
+    def _traced(self, layout):
+        return self._bounding(self._trace(layout, self.whole))
+
+    def _bounding(self, path):
+        """The path, which knows what `tol` bounds."""
+        if path is not None:
+            path.bounded = self._bound
+        return path
 
     def _all_judged(self, few):
         """All points of the last mesh with the errors that those of the sample points tell."""
@@ -235,7 +254,8 @@ class _Search:
 
     def _factor_for(self, path):
         """The refinement factor, at most 2, that is to make the errors of a path small enough."""
-        wanted = min(2.0, (float(path.error.max()) / (_AIM * self._tol)) ** (1 / self._order))
+        above = path.by_mesh.max(axis=1) / (_AIM * self._tol)
+        wanted = min(2.0, float((above ** (1 / self._order))[path.bounds].max()))
         return math.ceil(_QUARTERS * wanted) / _QUARTERS
 
     def _saves(self, few, coarse):
@@ -249,7 +269,7 @@ class _Search:
         return True
 
     def _judge(self, fine, coarse, before):
-        """Set the errors of points from their differences (points,) to the mesh before, and return these."""
+        """Set the errors of points from their differences (4, points) to the mesh before, and return these."""
         self._halved = self._error_before = None
         if self._factor is None:
             return compare(fine, coarse)
@@ -270,8 +290,8 @@ class _Search:
         """All points on a mesh where the sample points are known."""
         others = np.ones(len(self.whole), dtype=bool)
         others[self._which] = False
-        rest = self._correct(layout, self.whole.at_points(np.flatnonzero(others)))
-        whole = self._trace(layout, self.whole) if rest is None else few.with_points(rest, others)
+        rest = self._corrected(layout, self.whole.at_points(np.flatnonzero(others)))
+        whole = self._traced(layout) if rest is None else few.with_points(rest, others)
         spread_error(whole, few, self._which, self.whole)
         return self._keep(whole, None)
 
@@ -282,6 +302,13 @@ def _plain(path, layers):
     """
     followed = path.control == "load" and not path.events and not path.negative_modes.any()
     return followed and resolves(path.layout, layers) and resolves(path.layout, winding_lengths(path))
+
+
+def _rounding_leaves(tol, name, rounding):
+    return (
+        f"rounding leaves an error of up to {rounding:.2g} in the contact {name}s of rods as slender as these, more "
+        f"than tol = {tol:g}, which bounds the rest: see errors.{name}"
+    )
 
 
 def _rounding_hides(tol, rounding, elements, formulation):

@@ -6,7 +6,7 @@ import contextlib
 import itertools
 import math
 import numbers
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -15,6 +15,7 @@ from mpi4py import MPI
 from cosserat_fenicsx.checks import instance
 from cosserat_fenicsx.models.choose import choose
 from cosserat_fenicsx.results.accuracy import FEW
+from cosserat_fenicsx.results.compared import NAMES
 from cosserat_fenicsx.statics.path.load_control import StepControl
 from cosserat_fenicsx.errors import NotConverged, SceneError, nearest
 from cosserat_fenicsx.statics.path.follower import CONTROLS
@@ -33,6 +34,8 @@ from cosserat_fenicsx.scene.statical import check_no_mechanism
 from cosserat_fenicsx.scene.supports import Prescribed
 from cosserat_fenicsx.statics.path.recorder import Promoted, Tracing
 
+# What `tol` bounds where contact forces oscillate.
+_MOTION = ("position", "rotation")
 # Largest change of a prescribed rotation in one step, rad: rotations that differ by a full turn are indistinguishable.
 _LARGEST_TURN = 1.0
 
@@ -44,6 +47,7 @@ def solve(
     model: str = "auto",
     formulation: str | None = None,
     tol: float = 1e-6,
+    bound: Sequence[str] = NAMES,
     elements: int | None = None,
     degree: int | None = None,
     gauss_points: int | None = None,
@@ -64,9 +68,13 @@ def solve(
         model: "determinate", "planar" or "spatial"; or "auto", the cheapest one that suffices, which changes to
             "spatial" where a planar solution buckles sideways. `Path.why` gives the reasons.
         formulation: "mixed" (default), "displacement" or "multiplier": see docs/models.md.
-        tol: largest estimated error of the positions along the rods, relative to the largest displacement of the
-            scene at that load factor. Elements are refined until the estimate is below it, unless `elements` is given.
-        elements: elements per rod; fixes the mesh, and `Path.error` is then not estimated (NaN).
+        tol: largest estimated error of positions, rotations, contact forces and contact moments anywhere along the
+            rods, each relative to its own size at that load factor (see `Path.errors`). Elements are refined until the
+            estimates are below it, unless `elements` is given.
+        bound: what `tol` bounds, of "position", "rotation", "force" and "moment"; the errors of the others are
+            estimated all the same. Forces are left out where rounding alone exceeds `tol`, as on very slender rods that
+            bend: `Path.bounded` and `Path.why` tell.
+        elements: elements per rod; fixes the mesh, and errors are then not estimated (NaN).
         degree: 1 to 4, of r and q; default 4 (2 for "displacement").
         gauss_points: per element; default `degree`, which does not lock. More of them lock (docs/models.md).
         steps: a `StepControl`.
@@ -93,7 +101,7 @@ def solve(
     targets, free = _targets(load_factors)
     formulation = formulation_of(formulation)
     degree = formulation.default_degree if degree is None else degree
-    check_arguments(scene, tol, elements)
+    check_arguments(scene, tol, elements, bound)
     check_magnitudes(scene, max(map(abs, targets)))
     if comm.rank == 0:
         scene.warn()
@@ -112,6 +120,9 @@ def solve(
     elif _turn(scene):
         follow["steps"] = replace(steps, largest=min(steps.largest or math.inf, _LARGEST_TURN / _turn(scene)))
 
+    oscillates = elements is None and gauss_points is not None and gauss_points > degree
+    if oscillates:
+        bound = tuple(name for name in bound if name in _MOTION) or _MOTION
     in_order = path_dependent(scene)
     simple = not (branch or control == "arc" or until or in_order) and steps.adaptive
 
@@ -154,7 +165,7 @@ def solve(
             return trace(Layout.of(scene, elements))
         many = free or len(targets) > FEW
         layout, usual = meshes_for(scene, degree, tol, many) if simple else (first_layout(scene, degree), None)
-        return refine(trace, correct, scene, layout, tol, degree, usual)
+        return refine(trace, correct, scene, layout, tol, tuple(bound), degree, usual)
 
     with Progress(targets, progress, comm) as bar:
         try:
@@ -162,6 +173,11 @@ def solve(
         except Promoted as found:
             path = take(choice.in_space(found.reason), bar)
     path.why.extend(_not_located(path))
+    if oscillates:
+        path.why.append(
+            "with more Gauss points than the degree contact forces and moments oscillate inside elements: tol bounds "
+            f"{' and '.join(f'{name}s' for name in bound)} alone"
+        )
     return path
 
 
@@ -244,7 +260,7 @@ def _targets(load_factors):
     return [float(value) for value in values], free
 
 
-def check_arguments(scene, tol, elements):
+def check_arguments(scene, tol, elements, bound=NAMES):
     """Refuse arguments of `solve` outside their range.
 
     Raises:
@@ -273,6 +289,11 @@ def check_arguments(scene, tol, elements):
     check_no_mechanism(scene)
     if isinstance(tol, bool) or not isinstance(tol, numbers.Real) or not 1e-12 <= tol < 1:
         raise SceneError(f"tol = {tol!r}: expected a number from 1e-12 to below 1")
+    if isinstance(bound, str) or not isinstance(bound, Sequence) or not bound:
+        raise SceneError(f"bound = {bound!r}: expected a list of some of {', '.join(map(repr, NAMES))}")
+    for name in bound:
+        if name not in NAMES:
+            raise SceneError(f"bound: {name!r}: {nearest(name, NAMES)}")
     if elements is not None and (
         isinstance(elements, bool) or not isinstance(elements, numbers.Integral) or elements < 1
     ):

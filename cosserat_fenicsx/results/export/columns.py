@@ -16,7 +16,7 @@ _MOMENTA = {"linear_momentum": "linear momentum (kg m/s)", "angular_momentum": "
 def over_states(result, station=None):
     """{heading: (n,)} over load factors or time.
 
-    Of a path: load factor, negative modes, iterations, estimated error. Of a motion: time, steps, energies, momenta.
+    Of a path: load factor, negative modes, iterations, estimated errors. Of a motion: time, steps, energies, momenta.
     Then displacement, quaternion, contact force n and moment m, of a motion velocities too, all inertial, at both ends
     of every rod, where loads and supports act, and at one more station. n and m act from the part of larger s on the
     part of smaller s: the reaction of a support at the start is their opposite.
@@ -34,6 +34,7 @@ def _of_points(path):
         "negative_modes": path.negative_modes,
         "iterations": path.iterations,
         "estimated_error": path.error,
+        **{f"estimated_error_{name}": values for name, values in path.errors._asdict().items()},
     }
 
 

@@ -1,6 +1,7 @@
 """All that a result holds, named, with units and dimensions, for files and other libraries."""
 
 from collections import namedtuple
+from operator import attrgetter
 
 import numpy as np
 
@@ -39,7 +40,7 @@ def of_states(result):
     """{name: `Variable`} of what belongs to every state; the first is the load factor or the time."""
     table = OF_HISTORY if result.axis == "time" else OF_PATH
     return {
-        name: _variable(("point",), getattr(result, attribute), quantity)
+        name: _variable(("point",), attrgetter(attribute)(result), quantity)
         for name, (attribute, quantity) in table.items()
     }
 

@@ -35,7 +35,11 @@ OF_PATH = {
     "negative_modes": ("negative_modes", Quantity("negative modes")),
     "stable": ("stable", Quantity("stable")),
     "iterations": ("iterations", Quantity("Newton iterations")),
-    "error": ("error", Quantity("estimated error")),
+    "error": ("error", Quantity("largest estimated error of those that tol bounds")),
+    "error_position": ("errors.position", Quantity("estimated error of positions over the largest displacement")),
+    "error_rotation": ("errors.rotation", Quantity("estimated error of rotations over the largest one")),
+    "error_force": ("errors.force", Quantity("estimated error of contact forces over the largest one")),
+    "error_moment": ("errors.moment", Quantity("estimated error of contact moments over the largest one")),
 }
 OF_HISTORY = {
     "time": ("times", Quantity("time", "s")),

@@ -21,6 +21,7 @@ from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.results.export import contents
 from cosserat_fenicsx.results.export.arrays import h5py_for, new_hdf5
 from cosserat_fenicsx.results.export.beside import replaced
+from cosserat_fenicsx.results.compared import NAMES
 from cosserat_fenicsx.results.history import History, Instant, Ledger
 from cosserat_fenicsx.results.path import Path
 from cosserat_fenicsx.results.records import Event, Record, Records
@@ -34,6 +35,7 @@ _OF_POINT = _OF_RECORD | {"clamp_loads": "C6"}
 _OF_INSTANT = _OF_RECORD | {"time": "", "rates": "N6", "clamp_forces": "C6", "wall_forces": "*3"}
 _OF_LEDGER = {name: "3" if "momentum" in name else "" for name in Ledger._fields}
 _DENSITIES = {"densities_at_gauss_points": "EG6", "densities_at_nodes": "EP6"}
+_OF_PATH = ("control", "left", "rounding", "galerkin")
 _OF_EVENT = ("load_factor", "after", "residual", "error")
 
 
@@ -79,7 +81,7 @@ def _write_variables(place, variables):
 
 def _settings(result):
     names = ["model", "formulation", "degree", "unknowns", "why"]
-    names += ["scheme", "time_unit"] if result.axis == "time" else ["control", "left", "rounding", "galerkin"]
+    names += ["scheme", "time_unit"] if result.axis == "time" else [*_OF_PATH, "bounded"]
     scales = {name: getattr(result.scales, name) for name in ("length", "force", "moment")}
     return {name: getattr(result, name) for name in names} | {"elements": list(result.elements), "scales": scales}
 
@@ -95,7 +97,8 @@ def _solution(result):
         found |= {name: [getattr(record.ledger, name) for record in records] for name in Ledger._fields}
     else:
         found |= {name: [record.densities[i] for record in records] for i, name in enumerate(_DENSITIES)}
-        found["error"] = result._error
+        if result._errors is not None:
+            found |= {"error": result.error, "errors": result._errors}
         found |= {f"event_{name}": [getattr(event, name) for event in result.events] for name in _OF_EVENT}
         found["event_mode"] = [event.mode for event in result.events] or np.empty((0, result._rest.shape[0], 3))
         found["event_is_limit"] = [event.kind == "limit" for event in result.events]
@@ -180,10 +183,21 @@ def _restored(kind, scene, settings, numbers, assemble, comm):
     if moving:
         result.scheme, result._time_unit = settings["scheme"], settings["time_unit"]
     else:
-        for name in ("control", "left", "rounding", "galerkin"):
+        for name in _OF_PATH:
             setattr(result, name, settings[name])
-        result._error, result.events = numbers.get("error"), _events(numbers)
+        result._errors, result.events = _errors(numbers, states), _events(numbers)
+        result.bounded = tuple(settings.get("bounded", NAMES[:1]))
     return result
+
+
+def _errors(numbers, states):
+    """(4, states) estimated errors, or None; older files have those of positions alone."""
+    if "errors" in numbers:
+        _check_shape("errors", numbers["errors"].shape, (len(NAMES), states))
+        return numbers["errors"]
+    if "error" not in numbers:
+        return None
+    return np.concatenate([numbers["error"][None], np.full((len(NAMES) - 1, states), np.nan)])
 
 
 def _check_shape(name, shape, expected):
