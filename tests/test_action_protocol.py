@@ -11,8 +11,6 @@ import cosserat_fenicsx as cf
 from cosserat_fenicsx.models.traits import traits_of
 from cosserat_fenicsx.scene import action
 
-pytestmark = pytest.mark.few_ranks
-
 SECTION = cf.Stiffness((1e6, 1e6), 1e6, (1.0, 1.0), 0.8, mass=1.0, inertia=(1e-8, 1e-8, 2e-8))
 ROD = cf.Rod(cf.Line((0, 0, 0), (1.0, 0, 0)), SECTION, name="beam")
 

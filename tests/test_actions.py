@@ -9,8 +9,6 @@ import pytest
 
 import cosserat_fenicsx as cf
 
-pytestmark = pytest.mark.few_ranks
-
 EI, RHO = 1.0, 1.0
 SECTION = cf.Stiffness(shear=(1e6, 1e6), axial=1e6, bending=(EI, EI), torsion=0.8, mass=RHO, inertia=(1e-8, 1e-8, 2e-8))
 ROD = cf.Rod(cf.Line((0, 0, 0), (1.0, 0, 0)), SECTION, name="beam")

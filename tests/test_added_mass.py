@@ -7,8 +7,6 @@ import cosserat_fenicsx as cf
 from cosserat_fenicsx.actions.added_mass import AddedMass
 from cosserat_fenicsx.actions.linear_drag import LinearDrag
 
-pytestmark = pytest.mark.few_ranks
-
 SECTION = cf.Stiffness((1e8, 1e8), 1e8, (1e5, 1e5), 1e5, mass=2.0, inertia=(0.1, 0.15, 0.2))
 ROD = cf.Rod(cf.Line((0, 0, 0), (1, 2, 2)), SECTION, name="rod")
 TANGENT, ACROSS = np.array([1, 2, 2]) / 3, np.array([2, 1, -2]) / 3

@@ -57,7 +57,6 @@ class Odd(Exception):
         super().__init__(f"{one} and {two}")
 
 
-@pytest.mark.few_ranks
 @pytest.mark.parametrize(
     ("problem", "other"),
     [(OSError(28, "full", "file"), OSError), (Odd(1, 2), RuntimeError), (MemoryError("x"), MemoryError)],
@@ -72,7 +71,6 @@ def test_what_the_first_rank_raises_for_all_is_raised_by_all(problem, other):
     assert str(problem) in str(raised.value)
 
 
-@pytest.mark.few_ranks
 def test_a_writer_that_fails_for_any_reason_fails_on_all_ranks(tmp_path_all, monkeypatch):
     from cosserat_fenicsx.results.export import xdmf
 

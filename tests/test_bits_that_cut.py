@@ -10,7 +10,7 @@ from axial_scenes import column, hanging, unbalanced
 import cosserat_fenicsx as cf
 from cosserat_fenicsx.drilling.axial_torsional.model import AxialTorsional
 
-pytestmark = pytest.mark.serial
+pytestmark = [pytest.mark.serial, pytest.mark.once]
 BLADES, PSI, RATE = 4, 13.9, 0.5
 WORN = cf.Cutting(a=0.108, epsilon=60e6, zeta=0.6, blades=4, wear=cf.Wear(60e6, 0.011, 0.6))
 

@@ -8,7 +8,7 @@ import pytest
 import cosserat_fenicsx as cf
 from cosserat_fenicsx.scene.sections import inverse
 
-pytestmark = pytest.mark.serial
+pytestmark = [pytest.mark.serial, pytest.mark.once]
 STEEL = cf.Material(E=210e9, nu=0.3, density=7850.0)
 _STEEL = SimpleNamespace(elastic_modulus=210e9, poissons_ratio=0.3, density=7850.0)
 _STEEL_MM = SimpleNamespace(elastic_modulus=210e3, poissons_ratio=0.3, density=7.85e-6)

@@ -6,8 +6,6 @@ from conftest import column
 
 import cosserat_fenicsx as cf
 
-pytestmark = pytest.mark.few_ranks
-
 ROUND_OFF = 2e-13
 
 

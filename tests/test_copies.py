@@ -11,8 +11,6 @@ from moving_scenes import SPAGHETTI
 
 import cosserat_fenicsx as cf
 
-pytestmark = pytest.mark.few_ranks
-
 PATH = ("load_factors", "iterations", "negative_modes", "stable", "error", "along_axis")
 HISTORY = ("times", "steps", "iterations", "kinetic", "strain", "work", "dissipated", "balance", "linear_momentum",
            "angular_momentum", "along_axis")  # fmt: skip

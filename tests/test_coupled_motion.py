@@ -6,8 +6,6 @@ from test_coupled_sections import ANGLE, L, straight, turned_and_plain
 
 import cosserat_fenicsx as cf
 
-pytestmark = pytest.mark.few_ranks
-
 MOVING = dict(mass=1.0, inertia=(1e-3, 1e-3, 2e-3))
 STEADY = pytest.mark.serial
 

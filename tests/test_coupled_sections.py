@@ -5,8 +5,6 @@ import pytest
 
 import cosserat_fenicsx as cf
 
-pytestmark = pytest.mark.few_ranks
-
 L = 1.3
 ANGLE = 0.6
 #: Principal stiffnesses of a section with rotated principal axes, or with rotated directors.

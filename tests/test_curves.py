@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 import cosserat_fenicsx as cf
 
-pytestmark = pytest.mark.serial  # independent of ranks
+pytestmark = [pytest.mark.serial, pytest.mark.once]
 
 BEND = [(0, 0, 0), (1.0, 0.2, 0.1), (1.8, 1.1, 0.7), (2.0, 2.3, 0.4), (1.2, 3.0, -0.9), (0.1, 3.1, -1.0)]
 RING = [(1.0, 0, 0), (0.8, 0.9, 0.5), (-0.3, 1.2, -0.2), (-1.1, 0.1, 0.6), (-0.2, -1.3, 0.3)]

@@ -18,6 +18,7 @@ def demos_on_the_path(monkeypatch):
     monkeypatch.setattr(sys, "path", [str(DEMOS), *sys.path])
 
 
+@pytest.mark.ranks
 def test_eccentric_cantilever(tmp_path_all, capsys):
     import eccentric_cantilever
 
@@ -39,6 +40,7 @@ def test_eccentric_cantilever(tmp_path_all, capsys):
     COMM.barrier()
 
 
+@pytest.mark.ranks
 def test_eccentric_cantilever_in_one_way(tmp_path_all):
     """The options of the command line choose the formulation, the degree and the mesh."""
     import eccentric_cantilever
@@ -77,6 +79,7 @@ def test_motion_quick(capsys):
     assert all(demo.__name__ in printed for demo in motion.DEMOS) and len(motion.DEMOS) == 7
 
 
+@pytest.mark.ranks
 def test_motion(tmp_path_all, capsys):
     """The shortest motion, with its picture, on any number of processes."""
     import motion

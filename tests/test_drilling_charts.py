@@ -8,7 +8,7 @@ import cosserat_fenicsx as cf
 from cosserat_fenicsx.drilling.pictures.shown import advance_unit
 
 pytest.importorskip("matplotlib")
-pytestmark = pytest.mark.serial
+pytestmark = [pytest.mark.serial, pytest.mark.once]
 
 
 @pytest.fixture

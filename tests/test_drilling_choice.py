@@ -9,7 +9,7 @@ from fake_string import scene
 import cosserat_fenicsx as cf
 from cosserat_fenicsx.drilling.choose import BOTH, TORSION, chosen
 
-pytestmark = pytest.mark.serial
+pytestmark = [pytest.mark.serial, pytest.mark.once]
 STRAIGHT = cf.WellPath.from_survey([0, 2000], [0, 0], [0, 0])
 BENT = cf.WellPath.from_survey([0, 500, 1100, 3500], [0, 0, 60, 60], [0, 0, 0, 0])
 MUD = cf.Mud(1200.0)

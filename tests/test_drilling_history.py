@@ -8,7 +8,7 @@ import cosserat_fenicsx as cf
 from cosserat_fenicsx.drilling.history import DrillingHistory
 from cosserat_fenicsx.drilling.protocol import LEDGER, PROFILE, SERIES
 
-pytestmark = pytest.mark.serial
+pytestmark = [pytest.mark.serial, pytest.mark.once]
 rpm = cf.units.rpm
 
 

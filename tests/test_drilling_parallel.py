@@ -1,10 +1,13 @@
 """Drill-strings in motion on several ranks: each computes the same motion, and one writes."""
 
 import numpy as np
+import pytest
 from fake_string import scene
 
 import cosserat_fenicsx as cf
 from cosserat_fenicsx.drilling import folder as storage
+
+pytestmark = pytest.mark.ranks
 
 
 def test_ranks_share_a_folder(tmp_path_all, monkeypatch):

@@ -14,7 +14,7 @@ from cosserat_fenicsx.drilling.bit_laws import LAWS
 from cosserat_fenicsx.drilling.scenefile import KEYS, MORE_UNITS
 from cosserat_fenicsx.drilling.top_drive import CONTROLS
 
-pytestmark = pytest.mark.serial
+pytestmark = [pytest.mark.serial, pytest.mark.once]
 ROOT = Path(__file__).parent.parent
 FILE = """
 title = "Drilling in an inclined hole"

@@ -272,7 +272,6 @@ def test_slender_rods_with_hinges_are_stable(length, elements):
         assert stability.count() == 0
 
 
-@pytest.mark.few_ranks
 @pytest.mark.parametrize("name", ["hinge", "rigid tree", "lattice", "ring of three"])
 def test_ranks_share_the_elimination(name):
     """The same solution and count on all ranks together as on each alone."""

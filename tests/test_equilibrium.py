@@ -10,7 +10,7 @@ from cosserat_fenicsx.forms.law import DiagonalLaw
 from cosserat_fenicsx.forms.point import variation
 from cosserat_fenicsx.forms.rotation import rotation_vector
 
-pytestmark = pytest.mark.serial
+pytestmark = [pytest.mark.serial, pytest.mark.once]
 VECTOR = ufl.as_vector
 
 

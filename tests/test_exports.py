@@ -12,8 +12,6 @@ from moving_scenes import SPAGHETTI
 
 import cosserat_fenicsx as cf
 
-pytestmark = pytest.mark.few_ranks
-
 
 @pytest.fixture(scope="module")
 def path():

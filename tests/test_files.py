@@ -107,6 +107,7 @@ def test_one_state_in_other_formats(ending, solved, tmp_path):
     assert data["quaternion"].shape == (17, 4)
 
 
+@pytest.mark.ranks
 def test_unwritable_and_unknown_files(solved, tmp_path_all):
     _, path = solved
     (tmp_path_all / "folder.xdmf").mkdir(exist_ok=True)
@@ -117,6 +118,7 @@ def test_unwritable_and_unknown_files(solved, tmp_path_all):
         path.write(tmp_path_all / "state.xyzzy")
 
 
+@pytest.mark.ranks
 def test_an_empty_path_is_not_written(solved, tmp_path_all):
     _, scene = column()
     with pytest.raises(cf.NotConverged) as refusal:
@@ -125,6 +127,7 @@ def test_an_empty_path_is_not_written(solved, tmp_path_all):
         refusal.value.path.write(tmp_path_all / "path.xdmf")
 
 
+@pytest.mark.ranks
 def test_picture(solved, tmp_path_all):
     """The rods are visible in more than one colour, the title of the colour bar is black on white."""
     _, path = solved

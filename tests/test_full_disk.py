@@ -46,7 +46,6 @@ FILES = {
 }
 
 
-@pytest.mark.few_ranks
 @pytest.mark.parametrize("name", FILES)
 def test_a_full_disk(name, results, tmp_path_all):
     if COMM.rank == 0:

@@ -72,6 +72,7 @@ def rich_scene():
         )
 
 
+@pytest.mark.ranks
 def test_number_of_ranks_changes_nothing():
     """All ranks together against every rank alone (trivial with one process)."""
     cases = [column(), *rich_scene()]
@@ -89,6 +90,7 @@ def test_number_of_ranks_changes_nothing():
                 np.testing.assert_allclose(a[name], b[name], atol=1e-9 * np.abs(b[name]).max(), err_msg=name)
 
 
+@pytest.mark.ranks
 @pytest.mark.parametrize("elements", [1, 2])
 def test_ranks_without_an_element(elements):
     for rod, scene in (column(), *rich_scene()):

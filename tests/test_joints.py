@@ -86,6 +86,7 @@ def test_balance_at_a_joint_of_four(release):
         assert np.linalg.norm(transmitted) > 1e-3
 
 
+@pytest.mark.ranks
 @pytest.mark.parametrize("release", [None, (0.3, 1.0, -0.2)])
 def test_ranks_agree_on_branching_structures(release):
     rods, scene, elements = star(release)

@@ -9,8 +9,6 @@ from mpi4py import MPI
 
 import cosserat_fenicsx as cf
 
-pytestmark = pytest.mark.few_ranks
-
 
 def shell(n, released=False):
     """A grid shell; released: every other joint at the end of a rod is a ball joint."""

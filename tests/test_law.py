@@ -13,7 +13,7 @@ from ufl.algorithms.apply_derivatives import apply_derivatives
 from cosserat_fenicsx.models import laws
 from cosserat_fenicsx.scene.profiles import Stiffnesses
 
-pytestmark = pytest.mark.serial
+pytestmark = [pytest.mark.serial, pytest.mark.once]
 
 
 def random_matrix(seed):

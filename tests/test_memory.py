@@ -47,7 +47,6 @@ def meshes(monkeypatch):
     gc.enable()
 
 
-@pytest.mark.few_ranks
 @pytest.mark.parametrize("work", WORK)
 def test_what_leaves_the_cache_is_freed_at_once(work, small_cache, meshes):
     _, scene = column()

@@ -183,6 +183,7 @@ def test_equal_elements_where_the_error_is_everywhere():
             assert np.ptp(sizes(cf.solve(scene, [0.9], tol=tol, model="planar"))) < 1e-12
 
 
+@pytest.mark.ranks
 def test_ranks_make_the_same_mesh():
     scene, rod, *_ = taut_wire(1e3)
     places = np.linspace(0, 1, 101)

@@ -10,8 +10,6 @@ from scipy.optimize import brentq
 
 import cosserat_fenicsx as cf
 
-pytestmark = pytest.mark.few_ranks
-
 LINE = cf.Line((0, 0, 0), (1, 0, 0), d1=(0, 0, 1))
 
 

@@ -19,8 +19,6 @@ from cosserat_fenicsx.models.spatial import SpatialModel
 from cosserat_fenicsx.statics.problem import Problem
 from cosserat_fenicsx.statics.stability import NegativeModes
 
-pytestmark = pytest.mark.few_ranks
-
 SECTION = cf.Stiffness(shear=(3e3, 5e3), axial=8e3, bending=(1.0, 2.5), torsion=0.7, mass=1.0)
 
 

@@ -57,7 +57,6 @@ def by_objects():
     )
 
 
-@pytest.mark.few_ranks
 def test_names_and_objects_are_the_same():
     named, plain = (cf.solve(scene, [1.0], elements=2, degree=2) for scene in (by_names(), by_objects()))
     np.testing.assert_array_equal(named.position("beam.end"), plain.position("beam.end"))
@@ -121,7 +120,6 @@ def test_refused(case):
     assert words in str(refusal.value)
 
 
-@pytest.mark.few_ranks
 def test_what_a_file_says_is_what_solve_takes(tmp_path):
     file = tmp_path / "post.toml"
     file.write_text(FRAME)

@@ -12,8 +12,6 @@ from mpi4py import MPI
 import cosserat_fenicsx as cf
 from cosserat_fenicsx.algebra.pool import PROBLEMS, ProblemPool
 
-pytestmark = pytest.mark.few_ranks
-
 HOPELESS = cf.StepControl(adaptive=False, max_iterations=5)
 MOTION = {"dt": 0.05, "elements": 4, "degree": 2, "progress": False}
 
@@ -164,6 +162,7 @@ def used(pool, key, comm=MPI.COMM_WORLD, error=None):
     return problem
 
 
+@pytest.mark.ranks
 def test_a_busy_problem_is_not_lent():
     pool = ProblemPool()
     with pool.lend("a", COMM, object) as one, pool.lend("a", COMM, object) as other:
@@ -171,6 +170,7 @@ def test_a_busy_problem_is_not_lent():
     assert used(pool, "a") is one and pool.made == 2  # the one given back last
 
 
+@pytest.mark.ranks
 def test_what_is_idle_is_bounded():
     """The work of one rank alone does not influence what all ranks create together."""
     pool = ProblemPool(most_idle=2)
@@ -193,6 +193,7 @@ def test_what_may_be_half_way_is_not_kept():
     assert used(pool, "a", error=KeyboardInterrupt()) is a and used(pool, "a") is not a
 
 
+@pytest.mark.ranks
 def test_on_a_communicator_of_the_users_own_nothing_is_kept():
     pool, comm = ProblemPool(), COMM.Dup()
     assert used(pool, "a", comm) is not used(pool, "a", comm)

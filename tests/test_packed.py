@@ -9,6 +9,8 @@ from cosserat_fenicsx.algebra.packed import Packed
 from cosserat_fenicsx.models.rodmesh import Layout
 from cosserat_fenicsx.statics import solvers
 
+pytestmark = pytest.mark.ranks
+
 
 @pytest.mark.parametrize("formulation", ["mixed", "displacement", "multiplier"])
 @pytest.mark.parametrize("degree", [1, 3])

@@ -16,8 +16,6 @@ from path_scenes import (
 
 import cosserat_fenicsx as cf
 
-pytestmark = pytest.mark.few_ranks
-
 STEEL = cf.Material(E=210e9, nu=0.3, density=7850.0)
 
 

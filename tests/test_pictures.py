@@ -186,7 +186,6 @@ def test_a_scene_is_drawn_without_a_solver(tmp_path):
     assert done.stdout.strip() == "set()" and file.stat().st_size > 10_000, done.stderr
 
 
-@pytest.mark.few_ranks
 def test_one_rank_writes_the_scene(tmp_path_all):
     _, scene = column()
     scene.plot(tmp_path_all / "scene.png")

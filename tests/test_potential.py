@@ -11,8 +11,6 @@ import pytest
 
 import cosserat_fenicsx as cf
 
-pytestmark = pytest.mark.few_ranks
-
 ROUND = cf.Stiffness((1e6, 1e6), 1e6, (1.0, 1.0), 1.0, mass=1.0, inertia=(1e-3, 1e-3, 2e-3))
 BLADE = cf.Stiffness((1e7, 1e7), 1e7, (1e4, 1.0), 0.7)
 ALONG = (0, 0, 1.0)

@@ -12,6 +12,8 @@ import cosserat_fenicsx as cf
 from cosserat_fenicsx.models.moving import Moving
 from cosserat_fenicsx.storage import runfolder
 
+pytestmark = pytest.mark.ranks
+
 ASKED = {"duration": 2, "dt": 0.05, "elements": 4, "degree": 2}
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from cosserat_fenicsx.drilling.rock_surface import RockSurface
 
-pytestmark = pytest.mark.serial
+pytestmark = [pytest.mark.serial, pytest.mark.once]
 
 
 def test_steady_drilling_cuts_the_advance_of_a_blade():

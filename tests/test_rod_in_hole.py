@@ -23,7 +23,6 @@ from cosserat_fenicsx.well.rod.rod_in_hole import solve_in_hole
 from cosserat_fenicsx.well.rod.smoothed import apart_mostly
 from cosserat_fenicsx.well.rod.starts import on_axis
 
-pytestmark = pytest.mark.few_ranks
 FOLDER = Path(__file__).parent / "reference"
 KNOWN = json.loads((FOLDER / "rod_in_hole.json").read_text(encoding="utf-8"))
 WELLS = json.loads((FOLDER / "wells.json").read_text(encoding="utf-8"))

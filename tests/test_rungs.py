@@ -8,8 +8,6 @@ from plane_scenes import SCENES, STEEL, Drawn, thin_cantilever, tree
 
 import cosserat_fenicsx as cf
 
-pytestmark = pytest.mark.few_ranks
-
 
 def same(found, truth, tolerance):
     """Compare all fields of all rods at all points, relative to their size, and to their rounding errors: strains are

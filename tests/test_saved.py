@@ -10,7 +10,6 @@ from moving_scenes import SPAGHETTI
 
 import cosserat_fenicsx as cf
 
-pytestmark = pytest.mark.few_ranks
 OF_PATH = (
     "load_factors",
     "negative_modes",

@@ -10,7 +10,7 @@ import cosserat_fenicsx as cf
 from cosserat_fenicsx.scene import action
 from cosserat_fenicsx.scene.as_data import NotData, from_data, to_data
 
-pytestmark = pytest.mark.serial
+pytestmark = [pytest.mark.serial, pytest.mark.once]
 STEEL = cf.Material(E=210e9, nu=0.3, density=7850.0)
 MATRIX = np.diag([3e6, 4e6, 9e6, 5.0, 6.0, 7.0]) + np.diag([0.1] * 3, 3) + np.diag([0.1] * 3, -3)
 

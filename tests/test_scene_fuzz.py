@@ -11,7 +11,7 @@ import pytest
 import cosserat_fenicsx as cf
 from cosserat_fenicsx.scene import toml_tables
 
-pytestmark = pytest.mark.serial
+pytestmark = [pytest.mark.serial, pytest.mark.once]
 FILES = sorted((Path(__file__).parent.parent / "demos").glob("**/*.toml"))
 VALUES = [
     [], {}, "", "x", "column.end", True, 0, -1, 1e308, -1e308, 1e-308, float("nan"), float("inf"), 10**400, [0, 0, 0],

@@ -5,6 +5,8 @@ import pytest
 
 import cosserat_fenicsx as cf
 
+pytestmark = pytest.mark.ranks
+
 E, DIAMETER = "rods.column.material.E", "rods.column.section.diameter"
 
 

@@ -13,8 +13,6 @@ from cosserat_fenicsx import interrupts, progress
 from cosserat_fenicsx.cli import main as cli
 from cosserat_fenicsx.pictures.shapes import Drawn
 
-pytestmark = pytest.mark.few_ranks
-
 # Pinned at both ends, weak about x: Euler's column with the critical load pi^2, and a mass of 1 kg/m.
 PINNED = """
 title = "A [/red] column"

@@ -5,7 +5,6 @@ import pytest
 
 import cosserat_fenicsx as cf
 
-pytestmark = pytest.mark.few_ranks
 STIFF = cf.Stiffness((1.35359e8, 1.35359e8), 7.03868e8, (1228200.0, 1228200.0), 9.4e5)
 PIPE = cf.Component(None, STIFF, 241.13, 0.0635, name="pipe")
 MUD = cf.Mud(1200.0)

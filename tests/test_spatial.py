@@ -6,8 +6,6 @@ from strong_form import shoot
 
 import cosserat_fenicsx as cf
 
-pytestmark = pytest.mark.few_ranks
-
 STEEL = cf.Material(E=210e9, nu=0.3, density=7850.0)
 SCENES = {
     # section, loads as (place over the length, force over EI1/L^2, moment over EI1/L, arm over L)

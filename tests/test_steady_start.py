@@ -8,7 +8,7 @@ import cosserat_fenicsx as cf
 from cosserat_fenicsx.drilling.axial_torsional.model import AxialTorsional
 from cosserat_fenicsx.drilling.torsion.model import TorsionWaves
 
-pytestmark = pytest.mark.serial
+pytestmark = [pytest.mark.serial, pytest.mark.once]
 LAW = cf.Stribeck(6000.0, 4000.0, 3.0)
 SPEED = 100 * cf.units.rpm
 

@@ -11,7 +11,7 @@ from cosserat_fenicsx.drilling.axial_torsional.model import AxialTorsional
 from cosserat_fenicsx.drilling.step_errors import cycle_of, step_errors
 from cosserat_fenicsx.drilling.torsion.model import TorsionWaves
 
-pytestmark = pytest.mark.serial
+pytestmark = [pytest.mark.serial, pytest.mark.once]
 
 
 def test_a_rotation_to_the_left_is_the_mirror_image():

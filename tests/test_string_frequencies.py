@@ -12,7 +12,7 @@ import cosserat_fenicsx as cf
 from cosserat_fenicsx.drilling.linear.impedances import axial, torsional
 from cosserat_fenicsx.drilling.linear.roots import Box, all_roots
 
-pytestmark = pytest.mark.serial
+pytestmark = [pytest.mark.serial, pytest.mark.once]
 
 
 @pytest.mark.parametrize("case", [x for x in GIVEN["natural_Hz"] if x != "hook"])

@@ -12,7 +12,7 @@ from cosserat_fenicsx.drilling.protocol import PROFILE
 from cosserat_fenicsx.drilling.step_errors import cycle_of
 from cosserat_fenicsx.drilling.torsion.model import TorsionWaves
 
-pytestmark = pytest.mark.serial
+pytestmark = [pytest.mark.serial, pytest.mark.once]
 STRAIGHT = [0.0, 1500.0], [60.0, 60.0]
 ACROSS = WEIGHT * np.sin(np.pi / 3)
 

@@ -11,7 +11,7 @@ import cosserat_fenicsx as cf
 from cosserat_fenicsx.drilling.linear.impedances import axial, torsional
 from cosserat_fenicsx.drilling.single_valued import check_bit
 
-pytestmark = pytest.mark.serial
+pytestmark = [pytest.mark.serial, pytest.mark.once]
 BAND = 60 / (2 * math.pi)  # Hz, of the reference
 
 

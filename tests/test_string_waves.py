@@ -12,7 +12,7 @@ from cosserat_fenicsx.drilling.axial_torsional.model import AxialTorsional
 from cosserat_fenicsx.drilling.protocol import PROFILE
 from cosserat_fenicsx.drilling.step_errors import cycle_of
 
-pytestmark = pytest.mark.serial
+pytestmark = [pytest.mark.serial, pytest.mark.once]
 
 # Of the pipe and the collars, Hz, from the transcendental equation.
 FREQUENCIES = {

@@ -47,6 +47,7 @@ def equal(a, b):
     return type(a) is type(b) and np.array_equal(a, b)
 
 
+@pytest.mark.ranks
 def test_a_grid_in_its_order():
     found = cf.study(product, {"a": [1, 2], "b": (10, 20, 30)})
     assert [(case["a"], case["b"]) for case in found.cases] == [(1, 10), (1, 20), (1, 30), (2, 10), (2, 20), (2, 30)]
@@ -58,6 +59,7 @@ def test_a_grid_in_its_order():
     assert COMM.allgather(str(found)) == [str(found)] * COMM.size
 
 
+@pytest.mark.ranks
 def test_all_ranks_compute_and_longer_cases_do_not_hold_up_the_others():
     def where(i):
         time.sleep(0.4 if i == 0 else 0.02)
@@ -68,6 +70,7 @@ def test_all_ranks_compute_and_longer_cases_do_not_hold_up_the_others():
     assert COMM.size == 1 or found.results.count(found.results[0]) == 1
 
 
+@pytest.mark.ranks
 def test_equal_results_on_any_number_of_ranks():
     cases = [{"eta": eta, "elements": n} for n in (2, 4) for eta in (0.3, 0.9, 1.2)]
     cases.append({"eta": 1.0, "elements": 0})
@@ -78,14 +81,15 @@ def test_equal_results_on_any_number_of_ranks():
     assert cf.solve(scene, [0.5], elements=2).comm == MPI.COMM_WORLD  # as before
 
 
+@pytest.mark.ranks
 def test_torque_and_drag():
     cases = [{"depth": depth, "friction": mu, "model": "soft"} for depth in (900.0, 2500.0) for mu in (0.1, 0.3)]
     together, alone = cf.study(hook_load, cases), cf.study(hook_load, cases, comm=MPI.COMM_SELF)
     assert not together.failures and all(map(equal, together.results, alone.results))
 
 
+@pytest.mark.ranks
 @pytest.mark.slow
-@pytest.mark.few_ranks
 def test_the_rod_in_contact():
     """It has a communicator of its own."""
     cases = {"depth": [650.0, 700.0, 900.0], "friction": [0.2], "model": ["rod"]}
@@ -94,6 +98,7 @@ def test_the_rod_in_contact():
     assert together.results[0]["model"] == "rod"
 
 
+@pytest.mark.ranks
 def test_a_case_cannot_ask_for_the_other_ranks():
     def asks(eta):
         return cf.solve(column()[1], [eta], elements=2, comm=MPI.COMM_WORLD).load_factors
@@ -126,6 +131,7 @@ def test_a_study_within_a_case():
     assert cf.study(sums, {"n": [1, 2, 3, 4]}).results == [1, 3, 6, 10]
 
 
+@pytest.mark.ranks
 @pytest.mark.parametrize(
     "value",
     [1.0 / 3.0, 7, True, None, "text", np.nan, -np.inf, 1 - 2j, np.float32(0.1), [1.5, np.nan], np.eye(2, dtype=int),
@@ -168,12 +174,14 @@ def test_refusals(task, cases, words):
         cf.study(task, cases)
 
 
+@pytest.mark.ranks
 @pytest.mark.skipif(COMM.size == 1, reason="needs several ranks")
 def test_ranks_with_other_cases_are_refused():
     with pytest.raises(cf.SceneError, match="differ between ranks"):
         cf.study(product, {"a": [COMM.rank], "b": [1]})
 
 
+@pytest.mark.ranks
 def test_the_study_alone_shows_progress(capsys):
     def solves(eta):
         return cf.solve(column()[1], [eta], elements=2, progress=True).error[0]
@@ -184,6 +192,7 @@ def test_the_study_alone_shows_progress(capsys):
     assert "load factor" not in said
 
 
+@pytest.mark.ranks
 def test_a_bar_in_a_terminal(monkeypatch):
     class Terminal(io.StringIO):
         def isatty(self):
@@ -197,6 +206,7 @@ def test_a_bar_in_a_terminal(monkeypatch):
     assert (f" of {4 * COMM.size} cases" in screen.getvalue()) == (COMM.rank == 0)
 
 
+@pytest.mark.ranks
 def test_an_interrupt_of_one_rank_ends_all_and_says_how_to_go_on(tmp_path_all):
     def stops(i):
         time.sleep(0.02)
@@ -213,6 +223,7 @@ def test_an_interrupt_of_one_rank_ends_all_and_says_how_to_go_on(tmp_path_all):
         cf.study(stops, {"i": range(5, 40)})
 
 
+@pytest.mark.ranks
 def test_a_full_disk_ends_all_ranks(tmp_path_all, monkeypatch):
     from cosserat_fenicsx.studies.folder import StudyFolder
 

@@ -71,6 +71,7 @@ def test_killed_and_gone_on_with(tmp_path):
     assert "case 2 failed: ValueError: two" in after
 
 
+@pytest.mark.ranks
 def test_all_ranks_go_on_with_what_one_has_begun(tmp_path_all):
     if COMM.rank == 0:
         STOPS.append(7)
@@ -89,6 +90,7 @@ def test_all_ranks_go_on_with_what_one_has_begun(tmp_path_all):
     assert again.failures == found.failures and (again.seconds == found.seconds).all()
 
 
+@pytest.mark.ranks
 def test_failures_are_tried_again_where_this_is_asked_for(tmp_path_all):
     STOPS.append("nothing")
 
@@ -108,6 +110,7 @@ def test_failures_are_tried_again_where_this_is_asked_for(tmp_path_all):
     assert len(lines_in(tmp_path_all)) == 6
 
 
+@pytest.mark.ranks
 @pytest.mark.parametrize("damage", [b"{}", b"[1]", b"\xff", b'{"case": 99, "attempt": 1, "seconds": 1, "result": 0}'])
 def test_lines_that_no_study_wrote_are_left_out(damage, tmp_path_all):
     found = cf.study(third, CASES, folder=tmp_path_all)
@@ -134,6 +137,7 @@ def heaviness():
     return 9.81 * MUD.density
 
 
+@pytest.mark.ranks
 def test_another_study_is_refused(tmp_path_all, monkeypatch):
     cf.study(third, CASES, folder=tmp_path_all)
     COMM.barrier()
@@ -155,6 +159,7 @@ def test_another_study_is_refused(tmp_path_all, monkeypatch):
     assert len(cf.study(third, CASES, folder=tmp_path_all)) == 12
 
 
+@pytest.mark.ranks
 def test_what_a_task_does_not_use_is_not_compared(tmp_path_all, monkeypatch):
     """Numbers that have the name of an attribute, or that the task itself counts with, may be others at every call."""
     here = sys.modules[__name__]
@@ -171,6 +176,7 @@ def counted(i):
     return i.real
 
 
+@pytest.mark.ranks
 def test_what_a_task_uses_is_compared(tmp_path_all, monkeypatch):
     cf.study(pressure, {"depth": [1.0]}, folder=tmp_path_all)
     COMM.barrier()
@@ -182,6 +188,7 @@ def test_what_a_task_uses_is_compared(tmp_path_all, monkeypatch):
     assert cf.study(pressure, {"depth": [1.0]}, folder=tmp_path_all).results == [9.81 * 1200.0]
 
 
+@pytest.mark.ranks
 def test_what_cannot_be_compared_is_refused_with_a_folder_alone(tmp_path_all):
     for task, cases in ((lambda x: 1, [{"x": object()}]), (Call(), [{"x": 1}])):
         assert cf.study(task, cases).results == [1]
@@ -194,6 +201,7 @@ class Call:
         return 1
 
 
+@pytest.mark.ranks
 def test_parts_of_scenes_are_compared(tmp_path_all):
     def weight(mud, operation):
         return mud.density
@@ -205,6 +213,7 @@ def test_parts_of_scenes_are_compared(tmp_path_all):
         cf.study(weight, {**cases, "mud": [cf.Mud(1200.0), cf.Mud(1400.0)]}, folder=tmp_path_all)
 
 
+@pytest.mark.ranks
 def test_places_that_cannot_be_written_to(tmp_path_all):
     if COMM.rank == 0:
         (tmp_path_all / "file").write_text("")

@@ -5,7 +5,7 @@ import pytest
 
 import cosserat_fenicsx as cf
 
-pytestmark = pytest.mark.serial
+pytestmark = [pytest.mark.serial, pytest.mark.once]
 
 
 def product(a, b):

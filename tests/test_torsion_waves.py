@@ -27,7 +27,7 @@ from cosserat_fenicsx.drilling.step_errors import cycle_of, step_errors
 from cosserat_fenicsx.drilling.torsion.cells import cells_of
 from cosserat_fenicsx.drilling.torsion.model import TorsionWaves
 
-pytestmark = pytest.mark.serial
+pytestmark = [pytest.mark.serial, pytest.mark.once]
 PIPE_IMPEDANCE = 296.3752962822167
 ANGLE, STICKING = PROFILE.index("angle"), PROFILE.index("sticking")
 #: Of the lower end off bottom after 1, 2, ... 60 s, rad, by exact waves in cells of 2.5 m with friction at their ends.

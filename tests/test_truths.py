@@ -11,7 +11,7 @@ import pytest
 from random_scenes import draw
 from strong_form import matrix, shoot
 
-pytestmark = pytest.mark.serial
+pytestmark = [pytest.mark.serial, pytest.mark.once]
 STRAIGHT = np.eye(3)
 
 

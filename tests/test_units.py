@@ -7,7 +7,7 @@ import pytest
 import cosserat_fenicsx as cf
 from cosserat_fenicsx import units
 
-pytestmark = pytest.mark.serial
+pytestmark = [pytest.mark.serial, pytest.mark.once]
 
 #: NIST Special Publication 811, appendix B: conversion factors, to all digits given there.
 TABULATED = {

@@ -147,6 +147,7 @@ def test_a_ring_touches_alone():
     assert deepest == pytest.approx(0.5 * np.sqrt(mass / 1e5), rel=1e-3)
 
 
+@pytest.mark.ranks
 def test_all_numbers_of_ranks_agree():
     def run(comm):
         rod, scene = in_hole(VERTICAL, (0.9, 0.3, 0), (0, 0, 3.0), stiffness=1e9, friction=0.3, damping=0.1)

@@ -10,7 +10,7 @@ from scipy.optimize import minimize_scalar
 import cosserat_fenicsx as cf
 from cosserat_fenicsx.well import criteria
 
-pytestmark = pytest.mark.serial
+pytestmark = [pytest.mark.serial, pytest.mark.once]
 LOCK_UP, CRITICAL = WELLS["lock-up"], WELLS["critical"]
 
 

@@ -6,7 +6,7 @@ from conftest import COMM
 
 import cosserat_fenicsx as cf
 
-pytestmark = pytest.mark.few_ranks
+pytestmark = pytest.mark.ranks
 
 
 def test_a_sweep_is_kept_by_one_rank_and_goes_on_for_all(tmp_path_all):

@@ -9,7 +9,7 @@ from reference_wells import WELLS
 
 import cosserat_fenicsx as cf
 
-pytestmark = pytest.mark.serial
+pytestmark = [pytest.mark.serial, pytest.mark.once]
 
 
 def arc(angle, radius, azimuth=30.0):

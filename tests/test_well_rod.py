@@ -13,7 +13,6 @@ from reference_wells import in_build_section, well
 import cosserat_fenicsx as cf
 from cosserat_fenicsx.well.rod import rod_in_hole
 
-pytestmark = pytest.mark.few_ranks
 KNOWN = json.loads((Path(__file__).parent / "reference" / "rod_in_hole.json").read_text(encoding="utf-8"))
 EI = 1228200.0
 STIFF = cf.Stiffness((1.35359e8, 1.35359e8), 7.03868e8, (EI, EI), 9.4e5)

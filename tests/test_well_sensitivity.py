@@ -9,7 +9,7 @@ from reference_wells import well
 import cosserat_fenicsx as cf
 from cosserat_fenicsx.differences import PLACES, derivative
 
-pytestmark = pytest.mark.serial
+pytestmark = [pytest.mark.serial, pytest.mark.once]
 PATH = well("P")
 COLLAR = cf.Collar(200.0, outer_diameter=0.165, inner_diameter=0.07)
 PIPE = cf.DrillPipe(outer_diameter=0.127, inner_diameter=0.1086)

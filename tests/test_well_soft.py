@@ -10,7 +10,7 @@ from scipy.integrate import solve_ivp
 
 import cosserat_fenicsx as cf
 
-pytestmark = pytest.mark.serial
+pytestmark = [pytest.mark.serial, pytest.mark.once]
 PIPE = cf.Component(weight=241.13, contact_radius=0.0635)
 
 

@@ -7,8 +7,6 @@ from scipy.optimize import brentq
 
 import cosserat_fenicsx as cf
 
-pytestmark = pytest.mark.few_ranks
-
 STEEL = cf.Material(E=210e9, nu=0.3, density=7850.0)
 
 
