@@ -85,7 +85,8 @@ class Interface:
         self._solver.solve(b)
 
     def signs(self, of_nodes):
-        """(negative, zero) numbers of eigenvalues of the system, which is symmetric."""
+        """(negative, zero) numbers of eigenvalues of the system, which is symmetric, and the logarithm of the product
+        of the absolute values of those that are not zero."""
         return self._solver.signs(self._values(of_nodes))
 
 
@@ -115,12 +116,15 @@ class _Dense(Pointers):
         matrix = values.reshape(self._size, self._size)
         scale = _scale(np.diag(matrix))
         matrix = scale[:, None] * matrix * scale
+        units = 2 * float(np.log(scale).sum())
         with contextlib.suppress(np.linalg.LinAlgError):
-            np.linalg.cholesky(matrix)  # of small eigenvalues it tells the sign more accurately than their values do
-            return 0, 0
+            # of small eigenvalues it tells the sign more accurately than their values do
+            factor = np.linalg.cholesky(matrix)
+            return 0, 0, 2 * float(np.log(np.diag(factor)).sum()) - units
         values = np.linalg.eigvalsh(matrix)
         zero = np.abs(values) <= _ROUNDING
-        return int((values[~zero] < 0).sum()), int(zero.sum())
+        logarithm = float(np.log(np.abs(values[~zero])).sum()) - units
+        return int((values[~zero] < 0).sum()), int(zero.sum()), logarithm
 
 
 class _Sparse:
@@ -165,11 +169,12 @@ class _Sparse:
             factors = splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
             pivots = factors.U.diagonal()
             if (factors.perm_r == factors.perm_c).all() and np.abs(pivots).min() > _ROUNDING:
-                return int((pivots < 0).sum()), 0
+                logarithm = float(np.log(np.abs(pivots)).sum() - 2 * np.log(scale.diagonal()).sum())
+                return int((pivots < 0).sum()), 0, logarithm
         except RuntimeError:
             pass
-        dense = _Dense(self._size)
-        return dense.signs(matrix.toarray().ravel())
+        negative, zero, logarithm = _Dense(self._size).signs(matrix.toarray().ravel())
+        return negative, zero, logarithm - 2 * float(np.log(scale.diagonal()).sum())
 
 
 def _scale(diagonal):
