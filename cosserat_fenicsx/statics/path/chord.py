@@ -15,8 +15,9 @@ from cosserat_fenicsx.statics.path.track import bends, through
 _FINE, _MOST = 1e-8, 25
 # Coordinates at which a step is checked for negative modes that appear and vanish within it.
 _PROBES = (1 / 3, 2 / 3)
-# Largest imaginary part of the root of a determinant (1: the length of the step) that almost vanishes.
-_NEARLY = 0.3
+# Largest imaginary part of the roots of a determinant that almost vanishes, and their largest distance from the step,
+# over its length.
+_NEARLY = 0.35
 # Number of iterations after which the bracket of a root is bisected instead of interpolated.
 _OFTEN = 6
 # Distances on both sides of a critical point at which the path is solved for, and the largest length between these two
@@ -210,8 +211,8 @@ def _dips(counts, logarithms):
         return False
     values = (-1.0) ** np.array(counts) * np.exp(np.array(logarithms) - max(logarithms))
     roots = np.roots(np.polyfit([0.0, *_PROBES, 1.0], values, 3))
-    near = roots[(np.abs(roots.real - 0.5) < 0.5) & (np.abs(roots.imag) < _NEARLY)]
-    return len(near) > int((np.diff(np.sign(values)) != 0).sum())
+    near = roots[(np.abs(roots.real - 0.5) < 0.5 + _NEARLY) & (np.abs(roots.imag) < _NEARLY)]
+    return len(near) > 1 + int((np.diff(np.sign(values)) != 0).sum())
 
 
 def zero_of(function, low, high):
