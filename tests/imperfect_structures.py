@@ -355,7 +355,9 @@ def main(count=60, first=0):
             print(f"{seed:4d}  {given.kind}, {given.imperfection:.1e}: no truth: {error}", flush=True)
             continue
         told = _listed([k for k, *_ in truth.events], _levels(truth))
-        print(f"{seed:4d}  {given.kind}, {given.imperfection:.1e}, to {given.top:.4g}: {told}; {len(truth.path)} points")
+        print(
+            f"{seed:4d}  {given.kind}, {given.imperfection:.1e}, to {given.top:.4g}: {told}; {len(truth.path)} points"
+        )
         for control in CONTROLS:
             verdict, words, seconds = outcome(given, truth, control)
             kinds[f"{control} | {verdict}"] += 1

@@ -159,9 +159,12 @@ static int reduce(double *restrict F, int n, int m, int most, int *row, int *col
 }
 
 /* Signs of the pivots of the first m rows and columns of a symmetric F (n, n), the largest on the diagonal first; whole:
-   their diagonal before, against which zero is judged, whatever the scale of an unknown. */
-static void signs(double *F, int n, int m, double *whole, int *negative, int *zero)
+   their diagonal before, against which zero is judged, whatever the scale of an unknown. Returns the logarithm of the
+   product of their absolute values. */
+static double signs(double *F, int n, int m, double *whole, int *negative, int *zero)
 {
+    double product = 1;
+    int power = 0, exponent;
     for (int i = 0; i < m; i++) whole[i] = fabs(F[(size_t)i * n + i]);
     for (int k = 0; k < m; k++) {
         int at = k;
@@ -176,8 +179,10 @@ static void signs(double *F, int n, int m, double *whole, int *negative, int *ze
             continue;
         }
         *negative += pivot < 0;
+        product = frexp(product * pivot, &exponent), power += exponent;
         subtract_pivot(F, n, k);
     }
+    return log(fabs(product)) + power * log(2);
 }
 
 static inline double dot(const double *restrict a, const double *restrict b, int n)
@@ -265,13 +270,13 @@ void count(chain *s, kernel *k)
 {
     const double *before = 0;
     int n_before = 0, k_before = 0;
-    s->negative = s->zero = 0;
+    s->negative = s->zero = 0, s->logarithm = 0;
     take_constants(k);
     for (int t = 0; t < s->elements; t++) {
         const int *shape = s->shape + 4 * t, m = shape[0] + shape[1], n = m + shape[2] + shape[3];
         double *F = s->front + (size_t)(t % 2) * s->room * s->room; /* of the others nothing is needed any more */
         assemble(s, k, 0, F, t, 0, before, n_before, k_before);
-        signs(F, n, m, s->work, &s->negative, &s->zero);
+        s->logarithm += signs(F, n, m, s->work, &s->negative, &s->zero);
         before = F, n_before = n, k_before = m;
         if (s->ends[t] != -1) condense(s, t, F, n, m, 0), before = 0;
     }

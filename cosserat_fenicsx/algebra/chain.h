@@ -49,6 +49,7 @@ typedef struct {
     double *diagonal;              /* (interface,) sum of the elements' diagonals there */
     double *carry, *work;          /* (room,) each */
     int negative, zero;            /* pivots, after `count` */
+    double logarithm;              /* of the product of their absolute values, after `count` */
     double zero_pivot;             /* of `eliminate`, relative to the largest number in the column; smaller ones are zero */
 } chain;
 
@@ -134,6 +135,7 @@ typedef struct {
     kernel *form[2];
     chain *chain[2];
     int sideways[2];                /* whether a part leaves the plane */
+    double logarithm;               /* of the absolute value of the determinant, after a count */
     void *self;                     /* for the hook */
 } second_variation;
 

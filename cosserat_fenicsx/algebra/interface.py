@@ -1,6 +1,7 @@
 """The unknowns where rods meet, in one small system that every rank solves as a whole."""
 
 import contextlib
+import math
 
 import numpy as np
 from petsc4py import PETSc
@@ -89,7 +90,8 @@ class Interface:
         self._solver.solve(b)
 
     def signs(self, of_nodes):
-        """(negative, zero) numbers of eigenvalues of the system, which is symmetric."""
+        """(negative, zero) numbers of eigenvalues of the system, which is symmetric, and the logarithm of the product
+        of the absolute values of those that are not zero."""
         return self._solver.signs(self._values(of_nodes))
 
 
@@ -119,12 +121,15 @@ class _Dense(Pointers):
         matrix = values.reshape(self._size, self._size)
         scale = _scale(np.diag(matrix))
         matrix = scale[:, None] * matrix * scale
+        units = 2 * float(np.log(scale).sum())
         with contextlib.suppress(np.linalg.LinAlgError):
-            np.linalg.cholesky(matrix)  # of small eigenvalues it tells the sign more accurately than their values do
-            return 0, 0
+            # of small eigenvalues it tells the sign more accurately than their values do
+            factor = np.linalg.cholesky(matrix)
+            return 0, 0, 2 * float(np.log(np.diag(factor)).sum()) - units
         values = np.linalg.eigvalsh(matrix)
         zero = np.abs(values) <= _ROUNDING
-        return int((values[~zero] < 0).sum()), int(zero.sum())
+        logarithm = float(np.log(np.abs(values[~zero])).sum()) - units
+        return int((values[~zero] < 0).sum()), int(zero.sum()), logarithm
 
 
 class _Sparse:
@@ -169,25 +174,31 @@ class _Sparse:
             factors = splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
             pivots = factors.U.diagonal()
             if (factors.perm_r == factors.perm_c).all() and np.abs(pivots).min() > _ROUNDING:
-                return int((pivots < 0).sum()), 0
+                logarithm = float(np.log(np.abs(pivots)).sum() - 2 * np.log(scale.diagonal()).sum())
+                return int((pivots < 0).sum()), 0, logarithm
         except RuntimeError:
             pass
-        return _inertia(matrix.tocsr())
+        negative, zero, logarithm = _inertia(matrix.tocsr())
+        return negative, zero, logarithm - 2 * float(np.log(scale.diagonal()).sum())
 
 
 def _inertia(matrix):
-    """(negative, zero) numbers of eigenvalues of a symmetric scipy matrix, by factors with pivots of two rows too."""
+    """(negative, zero) numbers of eigenvalues of a symmetric scipy matrix, by factors with pivots of two rows too, and
+    the logarithm of the absolute value of its determinant, NaN where it is singular."""
     matrix.sort_indices()
     parts = matrix.indptr.astype(PETSc.IntType), matrix.indices.astype(PETSc.IntType), matrix.data
     A, pc = PETSc.Mat().createAIJ(matrix.shape, csr=parts, comm=PETSc.COMM_SELF), PETSc.PC().create(PETSc.COMM_SELF)
     A.setOption(PETSc.Mat.Option.SYMMETRIC, True)
     pc.setOperators(A)
     linear.factor_constrained(pc, A, _ROUNDING)
+    pc.getFactorMatrix().setMumpsIcntl(33, 1)  # the determinant, RINFOG(12) times 2 to the power INFOG(34)
     pc.setUp()
-    negative, zero, _ = pc.getFactorMatrix().getInertia()
+    factor = pc.getFactorMatrix()
+    negative, zero, _ = factor.getInertia()
+    part, power = abs(factor.getMumpsRinfog(12)), factor.getMumpsInfog(34)
     pc.destroy()
     A.destroy()
-    return negative, zero
+    return negative, zero, math.log(part) + power * math.log(2) if part and not zero else math.nan
 
 
 def _scale(diagonal):

@@ -23,12 +23,12 @@ static double now(void)
 int negative_modes(second_variation *v, int *sideways)
 {
     int negative = 0, zero = 0;
-    *sideways = 0;
+    *sideways = 0, v->logarithm = 0;
     for (int k = 0; k < v->parts; k++) {
         chain *s = v->chain[k];
         count(s, v->form[k]);
         if (v->hooked && python_hook(v->self, COUNT + k, 0, 0)) return FAILED_COUNT;
-        negative += s->negative, zero += s->zero;
+        negative += s->negative, zero += s->zero, v->logarithm += s->logarithm;
         if (v->sideways[k]) *sideways += s->negative;
     }
     return zero ? -1 : negative;

@@ -5,6 +5,7 @@ dead moment in space is not conservative and makes the tangent unsymmetric; the 
 counted. In a plane model the second variation decouples into motions in the plane and motions out of it.
 """
 
+import math
 from functools import cached_property
 
 import numpy as np
@@ -29,12 +30,13 @@ class NegativeModes(Called):
         parts: the `Part`s of the second variation.
         c: the C structure `second_variation`.
         sideways: of the last count, the number of negative eigenvalues of motions out of the plane; 0 in space.
+        logarithm: of the last count, that of the absolute value of the determinant; NaN with a neutral motion.
     """
 
     def __init__(self, problem):
         super().__init__()
         self.parts = [Part(problem, i) for i in range(len(problem.model.second_variations))]
-        self.sideways, self._sideways = 0, self._ffi.new("int *")
+        self.sideways, self._sideways, self.logarithm = 0, self._ffi.new("int *"), math.nan
         self.c = variation = self._ffi.new("second_variation *")
         variation.parts, variation.self = len(self.parts), self._handle
         variation.hooked = any(part.interface for part in self.parts)
@@ -66,11 +68,12 @@ class NegativeModes(Called):
         Returns:
             int, or -1 where the second variation is singular to rounding.
         """
+        self.logarithm = math.nan
         if neutral:
             return self.whole.count_without_neutral()
         found = self._lib.negative_modes(self.c, self._sideways)
         self.raise_failure()
-        self.sideways = self._sideways[0]
+        self.sideways, self.logarithm = self._sideways[0], self.c.logarithm
         return found
 
 
@@ -153,14 +156,13 @@ class Part:
     def complete(self):
         """Complete the numbers of negative and zero pivots, which C has counted along this rank's rods."""
         comm, chain = self.model.comm, self.elimination.c
-        negative, zero = chain.negative, chain.zero
+        found = np.array([chain.negative, chain.zero, chain.logarithm])
         if comm.size > 1:
-            negative, zero = comm.allreduce(np.array([negative, zero]))
+            found = comm.allreduce(found)
         if self.interface:
             of_ties = self._of_ties() if self.problem.ties else np.empty(0)
-            further = self.interface.signs(of_ties)
-            negative, zero = negative + further[0], zero + further[1]
-        chain.negative, chain.zero = int(negative), int(zero)
+            found = found + self.interface.signs(of_ties)
+        chain.negative, chain.zero, chain.logarithm = int(found[0]), int(found[1]), found[2]
 
     def count_without_neutral(self):
         """See `NegativeModes.count`."""

@@ -66,8 +66,9 @@ class ArcLength:
             if point is not None:
                 try:
                     landing, crossings = self._locator.between(
-                        track.here, point, target, self._weight, probe=not branching, explained=self._counts
-                    )
+                        track.here, point, target, self._weight,
+                        probe=not branching, explained=self._counts, short=self._plain(point),
+                    )  # fmt: skip
                 except Lost as lost:
                     track.failure = lost.reason
                     if branching:
@@ -115,6 +116,8 @@ class ArcLength:
         track = self.track
         here = track.here
         track.restore()
+        track.stability.count(neutral=track.neutral is not None)
+        here.logarithm = track.stability.logarithm
         slope = track.slope()
         self._weigh(slope)
         if len(track.history) == 1:  # towards the target

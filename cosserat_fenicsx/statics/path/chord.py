@@ -15,6 +15,9 @@ from cosserat_fenicsx.statics.path.track import bends, through
 _FINE, _MOST = 1e-8, 25
 # Coordinates at which a step is checked for negative modes that appear and vanish within it.
 _PROBES = (1 / 3, 2 / 3)
+# Largest imaginary part of the roots of a determinant that almost vanishes, and their largest distance from the step,
+# over its length.
+_NEARLY = 0.35
 # Number of iterations after which the bracket of a root is bisected instead of interpolated.
 _OFTEN = 6
 # Distances on both sides of a critical point at which the path is solved for, and the largest length between these two
@@ -33,7 +36,14 @@ class Chord:
         track: the `Track`, which stands at a.
         a, b: the `PathPoint`s.
         weight: of the load factor in the metric.
+
+    Attributes:
+        dips: whether the determinant of the second variation almost vanishes between, more often than the number of
+            negative modes changes: two eigenvalues that change their signs together, in opposite directions, change
+            neither that number nor the determinant's sign.
     """
+
+    dips = False
 
     def __init__(self, track, a, b, weight):
         self.track, self._weight = track, weight
@@ -98,14 +108,16 @@ class Chord:
     def comes_and_goes(self):
         """A coordinate where the number of negative modes is outside the range of its end values, or not monotonic.
 
-        It is counted at interpolated states; None where it is monotonic along the segment.
+        It is counted at interpolated states; None where it is monotonic along the segment. Sets `dips`.
         """
-        track = self.track
-        counts = [self.known[0][1].negative_modes]
+        track, (_, a), (_, b) = self.track, self.known[0], self.known[-1]
+        counts, logarithms = [a.negative_modes], [a.logarithm]
         for place in _PROBES:
             track.put(*self.guess(place))
             counts.append(track.stability.count(neutral=track.neutral is not None))
-        counts.append(self.known[-1][1].negative_modes)
+            logarithms.append(track.stability.logarithm)
+        counts.append(b.negative_modes)
+        self.dips = track.model.carries_force and _dips(counts, [*logarithms, b.logarithm])
         changes = np.diff(counts)
         if min(counts) < 0 or (changes >= 0).all() or (changes <= 0).all():
             return None
@@ -191,6 +203,16 @@ def _nearest(places, place, always=()):
         if len(chosen) < 4 + len(always) and all(abs(at - other) >= _APART for other in chosen):
             chosen.append(at)
     return chosen
+
+
+def _dips(counts, logarithms):
+    """See `Chord.dips`; by the cubic through four values of the determinant, of given signs and logarithms."""
+    if min(counts) < 0 or not np.isfinite(logarithms).all():
+        return False
+    values = (-1.0) ** np.array(counts) * np.exp(np.array(logarithms) - max(logarithms))
+    roots = np.roots(np.polyfit([0.0, *_PROBES, 1.0], values, 3))
+    near = roots[(np.abs(roots.real - 0.5) < 0.5 + _NEARLY) & (np.abs(roots.imag) < _NEARLY)]
+    return len(near) > 1 + int((np.diff(np.sign(values)) != 0).sum())
 
 
 def zero_of(function, low, high):

@@ -28,6 +28,7 @@ _SINGULAR = 1e-5
 _ALIKE, _ONE_PLACE = 0.7, 1e-2
 #: Why a step is shortened, in words.
 UNEXPLAINED = "the number of negative modes changes otherwise than the critical points that were located tell"
+NEARLY = "two modes are almost neutral together"
 ASIDE = "the path turns off just before the tangent becomes singular"
 
 
@@ -78,7 +79,7 @@ class Locator:
     def __init__(self, track):
         self.track = track
 
-    def between(self, a, b, target, weight, *, probe=True, explained=True):
+    def between(self, a, b, target, weight, *, probe=True, explained=True, short=False):
         """The critical points and the requested load factor between two points.
 
         Args:
@@ -87,6 +88,7 @@ class Locator:
             weight: of the load factor in the metric.
             probe: whether to check for negative modes that appear and vanish between them.
             explained: whether the number of negative modes must change as the critical points tell.
+            short: whether the step is too short to lead to another path unnoticed.
 
         Returns:
             (landing, crossings): the first `PathPoint` with the load factor `target` after a, or None; the `Crossing`s
@@ -110,6 +112,8 @@ class Locator:
         crossings = self.crossings(chord, limits)
         if probe and explained and not self._explained(a, b, crossings):
             raise Lost(0.5, UNEXPLAINED)
+        if chord.dips and not short and sum(crossing.kind == "bifurcation" for crossing in crossings) < 2:
+            raise Lost(0.5, NEARLY)
         if landing is not None:
             crossings = [crossing for crossing in crossings if crossing.place <= place]
         return landing, crossings

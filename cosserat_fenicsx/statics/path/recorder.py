@@ -307,7 +307,9 @@ class Tracing:
         try:
             crossings = self._follower.locator.crossings(Chord(self.track, a, b, weight))
         except Lost as lost:
-            raise NotConverged(f"an event of the path was not found on a finer mesh: {lost.reason}", self.path) from None
+            raise NotConverged(
+                f"an event of the path was not found on a finer mesh: {lost.reason}", self.path
+            ) from None
         for crossing in crossings:
             self._meet(crossing)
 

@@ -31,6 +31,7 @@ class PathPoint:
         iterations: Newton iterations of its solution.
         rise: d eta/d arc, positive where the load factor grows along the path; None where it was not computed.
         along: owned entries of dx/d arc; None where it was not computed.
+        logarithm: see `NegativeModes`; NaN where it was not computed.
     """
 
     load_factor: float
@@ -39,6 +40,7 @@ class PathPoint:
     iterations: int
     rise: float | None = None
     along: np.ndarray | None = field(default=None, repr=False)
+    logarithm: float = math.nan
 
 
 class Track:
@@ -134,7 +136,9 @@ class Track:
     def point(self, solved):
         """The state as a `PathPoint`, with its negative modes."""
         negative = self.stability.count(neutral=self.neutral is not None)
-        return PathPoint(self.problem.load_factor, self.problem.numbers(), negative, solved.iterations)
+        point = PathPoint(self.problem.load_factor, self.problem.numbers(), negative, solved.iterations)
+        point.logarithm = self.stability.logarithm
+        return point
 
     def set_tangent(self, point, slope, moved, change, weight):
         """Set the unit tangent (`along`, `rise`) of a point from dx/d eta, oriented along an increment of the path.
