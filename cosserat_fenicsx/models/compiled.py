@@ -178,7 +178,7 @@ def action_work(model, dx, test, point_at, unknowns, accepted_at=None, test_at=N
 
 def action_densities(model, point_at):
     """Force and moment per length of all distributed actions, UFL (6,): at the Gauss points, and at the nodes for
-    actions integrated there; None where there are none."""
+    actions integrated there; None where there are none, or only such as resist velocities, in statics."""
     factors = {"load": model.load_factor, "permanent": model.permanent_factor, "full": 1}
     found = []
     for place in ("line", "node"):
@@ -187,7 +187,7 @@ def action_densities(model, point_at):
         for term in terms:
             force, moment = resultants(term.work, point_at(place, term.rest, term.frame))
             total += factors[term.kind.scaled] * ufl.as_vector([*force, *moment])
-        found.append(total if terms else None)
+        found.append(total if terms and not isinstance(total, ufl.constantvalue.Zero) else None)
     return tuple(found)
 
 
