@@ -1,5 +1,6 @@
 """Linear buckling against closed forms and against the bifurcations that it estimates."""
 
+import math
 import pathlib
 import re
 import time
@@ -167,6 +168,27 @@ def test_rounding_of_slender_columns_is_small_and_told(held):
         x = 4 * euler / (EA / 2.6)
         off = abs(found.load_factors[0] / (euler * 2 / (1 + np.sqrt(1 + x))) - 1)
         assert off < 1e-9 and 0.8 * off <= found.error[0] < 2e-8, (slender, off, found.error)
+
+
+def test_rounding_of_a_slender_column_at_a_spring_or_under_load():
+    """A spring at the top, which acts in full at the load factor 0: tan a = a - a^3/k with P = a^2, again without shear
+    at L/d = 10^5. About a loaded state contact forces are rounded by eps EA: that is told, or refused."""
+    k, a = 5.0, 2.5
+    for _ in range(50):  # Newton's method
+        a -= (math.tan(a) - a + a**3 / k) / (math.tan(a) ** 2 + 3 * a**2 / k)
+    for slender, share in ((1e5, 0.0), (1e3, 0.9), (1e5, 0.9)):
+        EA = 16 * slender**2
+        rod = cf.Rod(cf.Line((0, 0, 0), (0, 0, 1.0)), cf.Stiffness((EA / 2.6,) * 2, EA, (1.0, 1.0), 1 / 1.3))
+        loads = [cf.Force(rod.end, (0, 0, -1.0)), *([] if share else [cf.Spring(rod.end, k)])]
+        euler = np.pi**2 / 4 if share else a * a
+        scene = cf.Scene([rod], [cf.Clamp(rod.start)], loads)
+        if share and slender > 1e4:
+            with pytest.raises(cf.NotConverged, match="accuracy"):
+                cf.buckling(scene, load_factor=share * euler)
+            continue
+        found = cf.buckling(scene, load_factor=share * euler)
+        off = abs(found.load_factors[0] / (euler * 2 / (1 + np.sqrt(1 + 4 * euler / (EA / 2.6)))) - 1)
+        assert off < (1e-6 if share else 1e-9) and 0.8 * off <= found.error[0] < 1e-6, (slender, off, found.error)
 
 
 @pytest.mark.serial

@@ -9,6 +9,7 @@ import pytest
 from scipy.optimize import brentq
 
 import cosserat_fenicsx as cf
+from cosserat_fenicsx.results.shape_tables import modes_table
 
 LINE = cf.Line((0, 0, 0), (1, 0, 0), d1=(0, 0, 1))
 
@@ -187,3 +188,46 @@ def test_a_vibration_keeps_its_amplitude_over_a_thousand_periods():
     x = first.displacement(rod.end) @ np.sign(first.displacement(rod.end)[50])
     turns = np.flatnonzero((x[:-1] < 0) & (x[1:] >= 0))
     assert first.times[turns[-1]] == pytest.approx(len(turns) * period, rel=5e-3)
+
+
+def test_a_sagged_cable_whose_mesh_has_short_elements():
+    """100 m on two hinges: the boundary layers need elements of 6e-5 of the length, on which pivots of rotations are
+    small beside the forces against shear; they are not zero. A permanent weight, and one times a load factor."""
+    sag, span = 2.0, 100.0
+    R = (span**2 / 4 + sag**2) / 2 / sag
+    cable = cf.Arc((0, 0, R - sag), (-span / 2, 0, 0), 2 * math.asin(span / 2 / R), (0, -1, 0))
+    section = cf.Stiffness((1e7, 1e7), 1e6, (1.0, 1.0), 1.0, mass=10.0, inertia=(1e-4, 1e-4, 2e-4))
+    rod = cf.Rod(cable, section)
+    ends = [cf.Hinge(rod.start, (0, 1, 0)), cf.Hinge(rod.end, (0, 1, 0))]
+    found = cf.modes(cf.Scene([rod], ends, [cf.Weight(permanent=True)]), 2, tol=1e-4)
+    again = cf.modes(cf.Scene([rod], ends, [cf.Weight()]), 2, tol=1e-4, load_factor=1.0)
+    np.testing.assert_allclose(found.squares, again.squares, rtol=1e-7)
+    # f = sqrt(T/m)/(2 l) of a swinging cable with the mean tension H at a sag of 7.95 m, within its slope squared
+    H = 10.0 * 9.80665 * span**2 / 8 / 7.9498
+    assert found.frequencies[0] == pytest.approx(math.sqrt(H / 10.0) / 2 / span, rel=0.02)
+
+
+def test_what_resists_velocities_is_left_out_and_told():
+    """The frequencies are the undamped ones, and the result says so wherever it is shown."""
+
+    section = cf.Stiffness((1e4, 1e4), 1e4, (1.0, 2.0), 1.0, mass=1.0, inertia=(1e-3, 1e-3, 2e-3))
+
+    def modes(damping=None, loads=lambda rod: []):
+        rod = cf.Rod(LINE, section, damping=damping, name="reed")
+        return cf.modes(cf.Scene([rod], [cf.Clamp(rod.start)], loads(rod)), 1, elements=2)
+
+    undamped = modes()
+    assert undamped.left_out == () and undamped.caution == ""
+    assert modes(cf.Damping()).left_out == ()
+    resisting = [cf.Dashpot, cf.LinearDrag]
+    for damping, kinds, told in (
+        (cf.Damping(Kt=(1.0, 1.0, 1.0)), [], "Damping of reed"),
+        (cf.Damping(time=0.01), resisting, "Damping of reed, Dashpot at reed.end, LinearDrag on reed"),
+    ):
+        found = modes(
+            damping, lambda rod, kinds=kinds: [kind(rod.end if kind is cf.Dashpot else rod, 3.0) for kind in kinds]
+        )
+        assert ", ".join(found.left_out) == told
+        np.testing.assert_allclose(found.squares, undamped.squares, rtol=1e-10)
+        for text in (found.caution, repr(found), found._repr_html_(), modes_table(found)):
+            assert "left out" in text.lower() and told in text.replace("\n", " "), text

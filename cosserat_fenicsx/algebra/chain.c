@@ -111,21 +111,43 @@ static inline void subtract_pivot(double *F, int n, int k)
     }
 }
 
-/* LU factors of the first m rows and columns of F (n, n) with row exchanges among them, and the rest reduced. Columns
-   without an acceptable pivot are tried again after the others; at most `most` may be left over. Returns how many were
-   eliminated, -1 if F is singular: pivots are zero that are smaller than `zero` times the largest number in the column
-   before elimination. whole: (m,) work space for these. */
-static int reduce(double *restrict F, int n, int m, int most, int *row, int *column, double zero,
-                  double *restrict whole)
+/* whole: (m,) the largest numbers in the columns of F (n, n). */
+static void find_largest(const double *restrict F, int n, int m, double *restrict whole)
 {
-    int k = 0, last = m, before = 0; /* the columns from `last` on were refused since `before` were eliminated */
-    double share = most ? SMALLEST_PIVOT : 0;
     for (int j = 0; j < m; j++) whole[j] = 0;
     for (int i = 0; i < n; i++)
         for (int j = 0; j < m; j++) {
             const double size = fabs(F[(size_t)i * n + j]);
             whole[j] = size > whole[j] ? size : whole[j]; /* fmax is four times slower */
         }
+}
+
+/* The same where each row is multiplied by its scale, one over the sum of its numbers; scale: (n,). */
+static void find_scales(const double *F, int n, int m, double *scale, double *whole)
+{
+    for (int j = 0; j < m; j++) whole[j] = 0;
+    for (int i = 0; i < n; i++) {
+        double sum = 0;
+        for (int j = 0; j < n; j++) sum += fabs(F[(size_t)i * n + j]);
+        scale[i] = sum > 0 ? 1 / sum : 1;
+        for (int j = 0; j < m; j++) whole[j] = fmax(whole[j], scale[i] * fabs(F[(size_t)i * n + j]));
+    }
+}
+
+/* LU factors of the first m rows and columns of F (n, n) with row exchanges among them, and the rest reduced. Columns
+   without an acceptable pivot are tried again after the others; at most `most` may be left over. Returns how many were
+   eliminated, -1 if F is singular: pivots are zero that are smaller than `zero` times the largest number in the column
+   before elimination, where `scale` is given with all rows scaled by their sums. scale: (n,) work space for these, or 0;
+   whole: (m,) work space. */
+static int reduce(double *restrict F, int n, int m, int most, int *row, int *column, double zero,
+                  double *restrict scale, double *restrict whole)
+{
+    int k = 0, last = m, before = 0; /* the columns from `last` on were refused since `before` were eliminated */
+    double share = most ? SMALLEST_PIVOT : 0;
+    if (scale)
+        find_scales(F, n, m, scale, whole);
+    else
+        find_largest(F, n, m, whole);
     while (k < m) {
         if (k == last) {
             if (k == before) {
@@ -142,7 +164,7 @@ static int reduce(double *restrict F, int n, int m, int most, int *row, int *col
             if (size > best) best = size, at = i;
         }
         for (int i = m; share > 0 && i < n; i++) largest = fmax(largest, fabs(F[(size_t)i * n + k]));
-        if (!(best > zero * whole[k]) || best < share * largest) {
+        if (!((scale ? scale[at] : 1) * best > zero * whole[k]) || best < share * largest) {
             last--;
             swap(F + k, F + last, n, n);
             swap(whole + k, whole + last, 1, 1);
@@ -151,6 +173,7 @@ static int reduce(double *restrict F, int n, int m, int most, int *row, int *col
         }
         if (at != k) {
             swap(F + (size_t)k * n, F + (size_t)at * n, n, 1);
+            if (scale) swap(scale + k, scale + at, 1, 1);
             swap_numbers(row + k, row + at);
         }
         subtract_pivot(F, n, k++);
@@ -202,13 +225,13 @@ static inline int carried_to(int i, int ahead, const int *shape)
     return i < ahead ? i : i + shape[1] + shape[2];
 }
 
-/* The front F of the element in turn, with `d` delayed unknowns and what is carried from the front of the one before. */
+/* The front F of the element in turn, with `d` delayed unknowns and what is carried from the front of the one before.
+   diagonal: 0, or where to sum the diagonal of the interface. */
 static void assemble(chain *s, kernel *k, const double *matrices, double *F, int t, int d, const double *before,
-                     int n_before, int k_before)
+                     int n_before, int k_before, double *diagonal)
 {
     const int *shape = s->shape + 4 * t, *place = s->place + (size_t)t * s->width, w = s->width, e = s->order[t];
     const int n = d + shape[0] + shape[1] + shape[2] + shape[3], ahead = d + shape[0];
-    if (t == 0) memset(s->diagonal, 0, s->kept * sizeof *s->diagonal);
     memset(F, 0, (size_t)n * n * sizeof *F);
     const double *A = matrices ? matrices + (size_t)e * w * w : element(k, e, k->A);
     for (int i = 0; i < w; i++) {
@@ -217,7 +240,7 @@ static void assemble(chain *s, kernel *k, const double *matrices, double *F, int
         for (int j = 0; j < w; j++)
             if (place[j] >= 0) row[place[j]] += A[i * w + j];
         const int number = s->rows[(size_t)t * s->room + place[i]];
-        if (number >= s->size) s->diagonal[number - s->size] += A[i * w + i];
+        if (diagonal && number >= s->size) diagonal[number - s->size] += A[i * w + i];
     }
     for (int i = k_before; before && i < n_before; i++) {
         double *row = F + (size_t)carried_to(i - k_before, ahead, shape) * n;
@@ -251,12 +274,18 @@ int eliminate(chain *s, kernel *k, const double *matrices)
         int *row = s->row + (size_t)t * s->room, *column = s->column + (size_t)t * s->room;
         const int last = s->ends[t] != -1;
         double *F = s->front + (size_t)t * s->room * s->room;
-        assemble(s, k, matrices, F, t, d, before, n_before, k_before);
-        for (int i = 0; i < n; i++) row[i] = i;
-        for (int i = 0; i < d; i++) column[i] = s->column[(size_t)(t - 1) * s->room + k_before + i];
-        memcpy(column + d, s->rows + (size_t)t * s->room, (n - d) * sizeof *column);
-        k_before = reduce(F, n, m, last && s->ends[t] < 0 ? 0 : s->delays, row, column, s->zero_pivot,
-                          s->work);
+        int eliminated = -1;
+        /* A pivot that seems to be zero is judged again with rows scaled: in the column of a rotation the forces against
+           shear of a slender rod exceed all moments, and the more the shorter the element. */
+        for (int scaled = 0; scaled < 2 && eliminated < 0; scaled++) {
+            assemble(s, k, matrices, F, t, d, before, n_before, k_before, 0);
+            for (int i = 0; i < n; i++) row[i] = i;
+            for (int i = 0; i < d; i++) column[i] = s->column[(size_t)(t - 1) * s->room + k_before + i];
+            memcpy(column + d, s->rows + (size_t)t * s->room, (n - d) * sizeof *column);
+            eliminated = reduce(F, n, m, last && s->ends[t] < 0 ? 0 : s->delays, row, column, s->zero_pivot,
+                                scaled ? s->carry : 0, s->work);
+        }
+        k_before = eliminated;
         s->done[2 * t] = n, s->done[2 * t + 1] = k_before;
         if (k_before < 0) return 1;
         d = m - k_before, before = F, n_before = n;
@@ -271,11 +300,12 @@ void count(chain *s, kernel *k)
     const double *before = 0;
     int n_before = 0, k_before = 0;
     s->negative = s->zero = 0, s->logarithm = 0;
+    memset(s->diagonal, 0, s->kept * sizeof *s->diagonal);
     take_constants(k);
     for (int t = 0; t < s->elements; t++) {
         const int *shape = s->shape + 4 * t, m = shape[0] + shape[1], n = m + shape[2] + shape[3];
         double *F = s->front + (size_t)(t % 2) * s->room * s->room; /* of the others nothing is needed any more */
-        assemble(s, k, 0, F, t, 0, before, n_before, k_before);
+        assemble(s, k, 0, F, t, 0, before, n_before, k_before, s->diagonal);
         s->logarithm += signs(F, n, m, s->work, &s->negative, &s->zero);
         before = F, n_before = n, k_before = m;
         if (s->ends[t] != -1) condense(s, t, F, n, m, 0), before = 0;
@@ -343,7 +373,7 @@ int factor_dense(double *F, int n, int *row, int *column, double zero, double *s
         for (int j = 0; j < n; j++) f[j] *= scale[i];
         row[i] = column[i] = i;
     }
-    return reduce(F, n, n, 0, row, column, zero, work) < n;
+    return reduce(F, n, n, 0, row, column, zero, 0, work) < n;
 }
 
 /* Replace b by the solution, by the factors. */

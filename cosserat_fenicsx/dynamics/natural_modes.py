@@ -14,6 +14,7 @@ from cosserat_fenicsx.checks import instance, number, refuse
 from cosserat_fenicsx.element import lobatto_weights
 from cosserat_fenicsx.errors import NotConverged, SceneError
 from cosserat_fenicsx.models.nodal_inertia import check_inertia, nodal_inertia, nodal_lateral, nodal_offsets
+from cosserat_fenicsx.models.traits import traits_of
 from cosserat_fenicsx.progress import MeshProgress
 from cosserat_fenicsx.quaternions import directors
 from cosserat_fenicsx.ranks import communicator
@@ -53,7 +54,8 @@ def modes(
     """Natural frequencies and shapes of small undamped vibrations about a static state.
 
     K x = omega^2 M x under the constraints of supports and joints, with K the second variation in (r, theta) and M the
-    inertia of the sections. Where the loads have no potential (`Modes.conservative`) the symmetric part of K is used,
+    inertia of the sections. What depends on velocities (damping of rods, dashpots, drag, friction, walls that act in
+    motions) is left out, and named in `Modes.left_out`. Where the loads have no potential (`Modes.conservative`) the symmetric part of K is used,
     which does not detect flutter.
 
     Args:
@@ -116,7 +118,14 @@ def modes(
             f"the accuracy tol = {tol:g} is out of reach: rounding alone may change the squares by {error.max():.2g} "
             "of themselves, since the rods are so slender. Ask for a larger tol."
         )
-    return Modes(state, shapes, error, conservative, comm, squares, negative)
+    return Modes(state, shapes, error, conservative, comm, squares, negative, _left_out(scene))
+
+
+def _left_out(scene):
+    """What depends on velocities in a scene, in words."""
+    damped = [rod for rod in scene.rods if rod.damping is not None and np.any(rod.damping.sizes)]
+    acting = [x for x in scene.actions if x.touches or x.resists or traits_of(x, scene.rods).rates]
+    return (*(f"Damping of {rod.name}" for rod in damped), *map(describe, acting))
 
 
 def _on_mesh(scene, layout, count, load_factor, degree, comm):

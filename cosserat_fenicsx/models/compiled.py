@@ -236,7 +236,9 @@ def action_densities(model, point_at):
     for term in model.actions.terms:
         if term.kind.place in found:
             force, moment = resultants(term.work, point_at(term.kind.place, term.rest, term.frame))
-            found[term.kind.place].append(factors[term.kind.scaled] * ufl.as_vector([*force, *moment]))
+            density = factors[term.kind.scaled] * ufl.as_vector([*force, *moment])
+            if not isinstance(density, ufl.constantvalue.Zero):  # as of what resists velocities, in statics
+                found[term.kind.place].append(density)
     return tuple(found.values())
 
 

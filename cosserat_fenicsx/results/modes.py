@@ -7,6 +7,9 @@ import numpy as np
 
 from cosserat_fenicsx.results.shapes import Shapes, in_words, largest_error
 
+# Largest number of things that are left out to name in a sentence.
+_NAMED = 6
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Modes(Shapes):
@@ -21,22 +24,33 @@ class Modes(Shapes):
         conservative: whether the loads have a potential near that state, for all motions that the supports allow. Where
             they have none, `squares` are those of the symmetric part of K: the smallest is a lower bound of the real
             parts of omega^2, but the vibrations differ, and flutter is not detected.
+        left_out: what resists or follows velocities, in words: the vibrations are those without it. () where the scene
+            has nothing of the kind.
     """
 
     squares: np.ndarray
     negative_modes: int
+    left_out: tuple[str, ...] = ()
 
     title = "Natural vibrations"
 
     @property
     def caution(self):
-        """The limits of the result, in a sentence; "" where the loads have a potential."""
-        if self.conservative:
-            return ""
-        return (
-            "The loads have no potential: these are the vibrations of the symmetric part of the stiffness alone, and "
-            "the structure may flutter, which a motion shows (`simulate`)."
-        )
+        """The limits of the result, in sentences; "" where the loads have a potential and nothing is left out."""
+        told = []
+        if self.left_out:
+            more = len(self.left_out) - _NAMED
+            names = ", ".join(self.left_out[:_NAMED]) + (f" and {more} more" if more > 0 else "")
+            told.append(
+                f"Left out: {names}. These are the vibrations without what depends on velocities; how they decay or "
+                "grow with it, a motion shows (`simulate`)."
+            )
+        if not self.conservative:
+            told.append(
+                "The loads have no potential: these are the vibrations of the symmetric part of the stiffness alone, "
+                "and the structure may flutter, which a motion shows (`simulate`)."
+            )
+        return " ".join(told)
 
     def __repr__(self):
         text = f"{in_words(self.frequencies, 'Hz')}, squares with {largest_error(self.error)}"
@@ -56,7 +70,7 @@ class Modes(Shapes):
 
     @property
     def growth(self):
-        """(n,) rates 1/s: unstable modes grow as exp(growth t); 0 for stable modes."""
+        """(n,) rates 1/s: unstable modes grow as exp(growth t); 0 for stable ones. Without what is `left_out`."""
         return np.sqrt(np.maximum(-self.squares, 0.0))
 
     def label(self, k):

@@ -64,6 +64,11 @@ class Damping:
         )
         return cls(time=2 * ratio / (one + two), drag=2 * ratio * one * two / (one + two))
 
+    @property
+    def sizes(self):
+        """All its numbers, zero where nothing is damped."""
+        return (self.time, self.drag, *(self.Kt or ()), *(self.Jt or ()))
+
     def viscosity(self, stiffnesses):
         """The viscosities as `Stiffnesses` (times s), from the elastic ones."""
         Kt, Jt = (

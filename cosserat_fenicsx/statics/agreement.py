@@ -29,14 +29,22 @@ def until_two_meshes_agree(scene, on_mesh, apart, tol, *, first, most, elements,
         (what `on_mesh` returned, estimated relative errors (n,) or NaN, layout).
 
     Raises:
-        NotConverged: the accuracy is not reached.
+        NotConverged: the accuracy is not reached, or two meshes in a row cannot be solved.
     """
     layout, coarse, best, worse = Layout.of(scene, elements or first), None, math.inf, 0
+    failed = False  # whether the last mesh could not be solved
     before = coarse_layout = None  # relative differences of the halving before; the mesh of `coarse`
     while True:
         obey()
         progress.on(max(layout.counts), best)
-        found = on_mesh(layout)
+        try:
+            found = on_mesh(layout)
+        except NotConverged:
+            if elements or failed or max(layout.counts) >= most:
+                raise
+            failed, coarse, before, layout = True, None, None, layout.finer(scene, 2)
+            continue
+        failed = False
         numbers, lengths = found[:2]
         error = np.full(len(numbers), np.nan)
         layered = None if elements else with_layers(scene, layout, lengths)

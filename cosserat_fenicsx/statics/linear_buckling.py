@@ -35,6 +35,8 @@ _MOST_ELEMENTS = 256
 _MOVED, _LOADED = 1e-4, 1e-2
 # Rounding errors below this share of the tolerance stay as they are.
 _NOTHING = 1e-2
+# Bound on the error by rounding of the state over a sample of it.
+_SAMPLED = 5.0
 # Largest share of the error of bounded stiffnesses that remains after the correction by Rayleigh's quotient: what
 # remains is of second order, this number times the square at most, unless the true stiffness is infinite.
 _REMAINING, _SQUARED = 0.1, 100.0
@@ -146,9 +148,12 @@ def _critical(scene, layout, count, load_factor, tol, degree, comm):
 
 def _critical_by(problem, newton, stability, circulatory, count, load_factor, tol):
     model = problem.model
+    at_rest = problem.numbers()
     follower = Follower(problem, newton, stability, StepControl(), control="load")
     track = follower.track
     follower.begin()
+    if not load_factor and not has_permanent(model.scene):
+        _stay_at(track, at_rest)
     if load_factor and not follower.to(load_factor, abs(load_factor)):
         raise NotConverged(f"no equilibrium was found at the load factor {load_factor:g}: {track.failure}")
     here = track.here
@@ -191,9 +196,10 @@ def _critical_by(problem, newton, stability, circulatory, count, load_factor, to
         corrected = np.arange(len(critical)) < 1
     chosen = [*([] if conservative else modes[:1]), *vectors][: len(critical)]
     found = quotients(problem, stability.whole, slack, chosen, _NOTHING * tol)
+    of_state = _of_state(problem, stability.whole, chosen)
     # For a symmetric pencil, Rayleigh's quotient is more accurate than the eigenvalue.
     critical = np.where(corrected, found.values, 1 / critical)
-    rounding = np.where(corrected, found.rounding, found.of_unsymmetric)
+    rounding = np.where(corrected, found.rounding, found.of_unsymmetric) + of_state
     remaining = _REMAINING
     if np.isfinite(model.section.K).all():
         remaining = np.minimum(_REMAINING, _SQUARED * found.softness)
@@ -203,6 +209,43 @@ def _critical_by(problem, newton, stability, circulatory, count, load_factor, to
     state = Equilibrium.of(model, load_factor)
     errors = np.array([softness, rounding])
     return load_factor + critical, layers, state, shapes, errors, conservative, load_factor + most
+
+
+def _stay_at(track, at_rest):
+    """Return to the reference where it is in equilibrium: Newton's method, which actions that are not scaled begin
+    with, leaves a contact force of rounded strains there."""
+    problem = track.problem
+    found = problem.numbers()
+    track.put(at_rest, 0.0)
+    problem.function(problem.x, problem.b)
+    if problem.b.norm() <= problem.model.round_off:
+        track.begin_here()
+    else:
+        track.put(found, 0.0)
+        problem.function(problem.x, problem.b)
+
+
+def _of_state(problem, part, vectors):
+    """(n,) relative errors of critical load factors by the rounding of the contact force at the state, from that of
+    the strains.
+
+    Args:
+        part: the `Part` of the second variation, assembled at the state, as it is again afterwards; vectors: modes.
+    """
+    mismatch, numbers = problem.mismatch(), problem.numbers()
+    stressed = mismatch is not None and problem.model.comm.allreduce(bool(numbers[1].any()), MPI.LOR)
+    if not stressed or not vectors:
+        return np.zeros(len(vectors))
+    whole = np.array([(part.K * v).dot(v) for v in vectors])
+    sides = []
+    for sign in (1, -1):
+        problem.put([numbers[0], numbers[1] + sign * mismatch])
+        part.assemble(stress_alone=True)
+        sides.append(np.array([(part.K * v).dot(v) for v in vectors]))
+    problem.put(numbers)
+    part.assemble()
+    off = np.abs(sides[0] - sides[1]) / 2 / np.abs(whole)
+    return np.full(len(off), _SAMPLED * off.max())  # one sample of a random number a mode
 
 
 def _decrease(ahead, behind, change):

@@ -154,17 +154,23 @@ class Problem(Equations):
         """
         if not self.c.advance:
             return [slope]
-        model, (live,) = self.model, self._live
-        vector, carried, sides = self.numbering.vector(), live.copy(), []
-        model.before.x.array[:] = self._state
-        for values in (0.0, slope):
-            vector.array_w[:] = values
-            model.step.x.array[:] = 0.0
-            self.numbering.to_local(vector, model.step.x.array)
-            self._lib.put_values(self._advance.c, self.c.advance_dofs, self.c.carried)
-            sides.append(live.copy())
-            live[:] = carried
-        return [slope, sides[1] - sides[0]]
+        behind, ahead = (self._advanced(step) for step in (0.0, slope))
+        return [slope, ahead - behind]
+
+    def mismatch(self):
+        """By how much the contact force that the strains give differs from the one that is carried, an array like the
+        latter; zero but for the rounding of strains, times the stiffness; None where no force is carried."""
+        return self._advanced(0.0) - self._live[0] if self.c.advance else None
+
+    def _advanced(self, step):
+        """The carried contact force after a step from the state (owned entries)."""
+        model, vector, (live,) = self.model, self.numbering.vector(), self._live
+        before, vector.array_w[:] = live.copy(), step
+        model.before.x.array[:], model.step.x.array[:] = self._state, 0.0
+        self.numbering.to_local(vector, model.step.x.array)
+        self._lib.put_values(self._advance.c, self.c.advance_dofs, self.c.carried)
+        found, live[:] = live.copy(), before
+        return found
 
     def assemble_data_derivative(self, form, clamped, vector):
         """The change of the residual at the state, without supports and joints, with data and with clamped nodes.
