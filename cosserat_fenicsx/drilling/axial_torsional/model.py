@@ -94,7 +94,8 @@ class AxialTorsional(Pointers):
         self._set_chain()
         self._set_wall(scene.friction)
         self._set_bit(scene.bit)
-        self._signals = self._axial * [self._set_hook(scene.hook)] + [self._set_drive(scene.drive)]
+        self._signals = [self._set_hook(scene.hook)] if self._axial else []
+        self._signals.append(self._set_drive(scene.drive))
         self._lib.limits(self._m)
         m, held = self._m, self._kept["held"]
         held[self._kept["limit"][:, 0] > 0] = 3 if self._axial else 2
