@@ -144,8 +144,8 @@ static double settle(model *m, int d)
     return on_last;
 }
 
-/* The weight on bit of a step from the momentum (N s) that a rigid rock gave the bit in it. A bit that comes down on the
-   rock takes its velocity at once: the impulse of the bit's mass has no duration, and is told as such, not as a force
+/* The weight on bit of a step from the momentum (N s) that a rigid rock gave the bit in it. A bit that comes down on
+   the rock takes its velocity at once: the impulse of the bit's mass has no duration, and is told as such, not as a force
    that would be the larger the shorter the step. The half element beside it, which the mesh stops at once, too, is one
    that a wave stops by the force Z (change of velocity): as long as that takes. */
 static void weigh(model *m, double h, double momentum, int stood, double before)
