@@ -1,8 +1,8 @@
 """Torsion of a string with friction along its hole, by numpy alone: an independent check of `TorsionWaves`.
 
 Cells hold the waves P = M + Z om and Q = M - Z om, which move on by one cell in a step, exactly; then the friction of a
-cell, which is set-valued at rest, brakes its speed, implicitly. At the ends waves pass from cells of one parity to those
-of the other, so that none is left to itself.
+cell, which is set-valued at rest, brakes its speed, implicitly. At the ends waves pass from cells of one parity to
+those of the other, so that none is left to itself.
 """
 
 import numpy as np
@@ -13,8 +13,8 @@ def turn(parts, friction, drive, drag, dx, duration):
 
     Args:
         parts: (length, impedance, rho J) from the top down, of one speed of waves.
-        friction: function of measured depths (m) and of the numbers of their parts that gives the static and the kinetic
-            torque per length (N m/m), and the decay (rad/s).
+        friction: function of measured depths (m) and of the numbers of their parts that gives the static and the
+            kinetic torque per length (N m/m), and the decay (rad/s).
         drive: (I, Kp, Ki, speed). drag: 1/s. dx: m, of a cell.
     """
     counts = [round(part[0] / dx) for part in parts]

@@ -8,6 +8,7 @@ from axial_scenes import column, hanging, unbalanced
 from scipy.integrate import solve_ivp
 
 import cosserat_fenicsx as cf
+from cosserat_fenicsx.drilling.as_data import from_data, to_data
 from cosserat_fenicsx.drilling.axial_torsional.model import AxialTorsional
 
 pytestmark = pytest.mark.serial
@@ -151,3 +152,23 @@ def test_lobes_shake_the_weight_less_where_the_rock_gives_way(rpm, stiffness):
 def test_refusals(given, words):
     with pytest.raises(cf.SceneError, match=words):
         cf.BitOnRock(**({"law": cf.Stribeck(1e3, 1e3)} | given))
+
+
+def test_rock_in_a_scene_file(tmp_path):
+    """With a unit; and what is stored of a scene has it, too."""
+    text = """
+        depth = 1000.0
+        [string]
+        components = [{ type = "DrillPipe", size = "5 in 19.50 lb/ft" }]
+        [drive]
+        speed = "60 rpm"
+        [bit]
+        weight = "50 kN"
+        mass = 300.0
+        rock_stiffness = "40 MN/m"
+        law = { type = "Lobes", count = 3, amplitude = 0.004 }
+    """
+    file = tmp_path / "bounce.toml"
+    file.write_text(text, encoding="utf-8")
+    scene = cf.read_drilling_scene(file).scene
+    assert scene.bit.rock_stiffness == 4e7 and from_data(to_data(scene)).bit == scene.bit

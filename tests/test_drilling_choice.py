@@ -1,6 +1,7 @@
 """Which model a drill-string in motion takes, and why."""
 
 import re
+import warnings
 
 import numpy as np
 import pytest
@@ -135,3 +136,14 @@ def test_more_weight_on_bit_than_the_string_has_along_the_hole_is_told():
 def long():
     return cf.DrillString([cf.Collar(300.0, outer_diameter=0.2032, inner_diameter=0.0714),
                            cf.DrillPipe(1700.0, size="5 in 19.50 lb/ft")])  # fmt: skip
+
+
+def test_a_small_torque_that_follows_from_the_weight_is_no_mistake_in_units():
+    law = cf.Stribeck(0.06, 0.05, 3.0, radius=0.1)
+    inclined = scene(bit=cf.BitOnRock(law, weight=6e3), hole=hole(BENT), mud=MUD, depth=2000.0)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert chosen(inclined)[0] == TORSION
+    given = scene(bit=cf.BitOnRock(cf.Stribeck(5.0, 5.0), weight=6e3), hole=hole(BENT), mud=MUD, depth=2000.0)
+    with pytest.warns(cf.SceneWarning, match="torque = 5 N m is hardly a torque on bit"):
+        chosen(given)

@@ -210,3 +210,11 @@ def test_what_is_refused():
     discs = cf.Discs((100.0, 100.0), (500.0,))
     with pytest.raises(cf.SceneError, match="impedance"):
         AxialTorsional(cf.Drilling(discs, cf.TopDrive(1.0, control=cf.Matched())))
+
+
+def test_torsion_alone_does_not_feel_the_hook():
+    """Nor does a drive without inertia, whose node the hook would hold."""
+    drive = cf.TopDrive(3.0, control=cf.Matched())
+    rows = [AxialTorsional(hanging(hook, drive), 0.005, 100, axial=False).advance(300)
+            for hook in (None, cf.Hook(5e6, 0.5))]  # fmt: skip
+    np.testing.assert_array_equal(*rows)

@@ -1,11 +1,13 @@
 """Which model a drill-string in motion takes, why, and what that leaves out."""
 
+import warnings
+
 import numpy as np
 
 from cosserat_fenicsx.drilling.bit_laws import Cutting, Lobes, Stribeck
 from cosserat_fenicsx.drilling.discs import Discs
 from cosserat_fenicsx.drilling.wall_friction import coefficients
-from cosserat_fenicsx.errors import NotConverged, SceneError, nearest
+from cosserat_fenicsx.errors import NotConverged, SceneError, SceneWarning, nearest
 from cosserat_fenicsx.well import criteria
 from cosserat_fenicsx.well.operations import RotaryDrilling, RotateOffBottom, TripIn, TripOut
 from cosserat_fenicsx.well.torque_and_drag import torque_and_drag
@@ -112,11 +114,19 @@ def _operations(scene):
     law = getattr(scene.bit, "law", None)
     law = law.law if isinstance(law, Lobes) else law
     torque = law.torques(weight)[1] if isinstance(law, Stribeck) else 0.0
-    yield RotaryDrilling(weight, torque) if weight > 0 else RotateOffBottom()
+    yield _drills(weight, torque, getattr(law, "radius", None) is not None) if weight > 0 else RotateOffBottom()
     if scene.hook is not None:
         signal = scene.hook.signal()
         speeds = [signal(t) for t in (0.0, *signal.jumps)]
         yield from (kind(weight) for kind, there in ((TripIn, min(speeds) < 0), (TripOut, max(speeds) > 0)) if there)
+
+
+def _drills(weight, torque, follows):
+    """Rotary drilling; a torque that follows from the weight may be small, and is no mistake in units."""
+    with warnings.catch_warnings():
+        if follows:
+            warnings.filterwarnings("ignore", r"RotaryDrilling\.torque", SceneWarning)
+        return RotaryDrilling(weight, torque)
 
 
 def _with_friction(scene):

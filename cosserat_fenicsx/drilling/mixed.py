@@ -160,3 +160,7 @@ def _why(drilling, top):
         if drilling.hole.wall_stiffness is None:
             yield f"the wall has a stiffness of {_WALL:g} N/m^2"
     yield "mud adds no mass to sideways motions of the rod"
+    if drilling.bit is not None and drilling.bit.weight is not None:
+        yield "the weight on bit is constant: the bit does not leave the rock"
+    if drilling.bit is not None and drilling.bit.mass > 0:
+        yield f"the mass of the bit, {drilling.bit.mass:g} kg, is left out"

@@ -11,8 +11,8 @@ import numpy as np
 
 #: What is recorded at the end of every step. drive_speed, bit_speed: rad/s; drive_angle, bit_angle: rad;
 #: surface_torque: M at the top, torque_on_bit: against the rotation of the bit, N m; hook_load, weight_on_bit: N;
-#: bit_velocity: m/s, bit_advance: m, downwards; impulse_on_bit: of all impacts on rigid rock since the start, N s, which
-#: weight_on_bit leaves out.
+#: bit_velocity: m/s, bit_advance: m, downwards; impulse_on_bit: of all impacts on rigid rock since the start, N s,
+#: which weight_on_bit leaves out.
 SERIES = (
     "drive_speed", "drive_angle", "surface_torque", "bit_speed", "bit_angle", "torque_on_bit", "hook_load",
     "bit_velocity", "bit_advance", "weight_on_bit", "impulse_on_bit",

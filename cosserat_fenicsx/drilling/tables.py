@@ -22,8 +22,8 @@ _SHOWN = (
 )
 _CAPTION = (
     "A row holds for the end of a step, forces and torques in it are means over the step, or of torsion alone over two "
-    "(at the first one, the time before the start counts with zero): history.mean_times. The motion begins at t = 0, and ends with the "
-    "step that reaches its duration."
+    "(at the first one, the time before the start counts with zero): history.mean_times. The motion begins at t = 0, "
+    "and ends with the step that reaches its duration."
 )
 
 
@@ -67,5 +67,7 @@ def _impacts(history):
     if not len(told) or told[-1] == 0:
         return []
     each = np.diff(told, prepend=0.0)
-    return [f"Impacts of the bit on rigid rock: the largest impulse {each.max():.4g} N s, at t = "
-            f"{history.times[each.argmax()]:.5g} s, together {told[-1]:.4g} N s; the weight on bit is without them."]
+    return [
+        f"Impacts of the bit on rigid rock: the largest impulse {each.max():.4g} N s, at t = "
+        f"{history.times[each.argmax()]:.5g} s, together {told[-1]:.4g} N s; the weight on bit is without them."
+    ]

@@ -29,7 +29,7 @@ typedef struct {
     double slowed, slowing;         /* momentum of the last element that the told weight lacks, N s; its force, N */
     double impulse;                 /* of all impacts on rigid rock since the start, N s */
     double floor, sinking;          /* place of the rock's face at the end of the step, and its velocity downwards */
-    double face, middle;            /* its place at the end and in the middle of the part of a step that is being done */
+    double face, middle;            /* its place at the end and in the middle of the part of a step being done */
     double factor;                  /* of the next step, on the law's torques */
 } lower;
 

@@ -44,8 +44,8 @@ class AxialTorsional(Pointers):
     weight stands on a rock, rigid or of a stiffness, with the hook lowered until it bears that weight; without one the
     string hangs off bottom. The rock pushes the bit but does not pull it; the torque of a bit whose law has a `radius`
     follows the weight on bit of the step before. A bit that comes down on rigid rock is stopped by an impulse, which is
-    told as such: the weight on bit, and the torque by it, leave it out. Speeds, forces and torques that are told are means over the last step, but for speeds of discs,
-    which are those at its end.
+    told as such: the weight on bit, and the torque by it, leave it out. Speeds, forces and torques that are told are
+    means over the last step, but for speeds of discs, which are those at its end.
 
     Args:
         scene: a `Drilling`.
@@ -94,7 +94,8 @@ class AxialTorsional(Pointers):
         self._set_chain()
         self._set_wall(scene.friction)
         self._set_bit(scene.bit)
-        self._signals = self._axial * [self._set_hook(scene.hook)] + [self._set_drive(scene.drive)]
+        self._signals = [self._set_hook(scene.hook)] if self._axial else []
+        self._signals.append(self._set_drive(scene.drive))
         self._lib.limits(self._m)
         m, held = self._m, self._kept["held"]
         held[self._kept["limit"][:, 0] > 0] = 3 if self._axial else 2

@@ -144,8 +144,8 @@ static double settle(model *m, int d)
     return on_last;
 }
 
-/* The weight on bit of a step from the momentum (N s) that a rigid rock gave the bit in it. A bit that comes down on the
-   rock takes its velocity at once: the impulse of the bit's mass has no duration, and is told as such, not as a force
+/* The weight on bit of a step from the momentum (N s) that a rigid rock gave the bit in it. A bit that comes down on
+   the rock takes its velocity at once: the impulse of the bit's mass has no duration, and is told as such, not as a force
    that would be the larger the shorter the step. The half element beside it, which the mesh stops at once, too, is one
    that a wave stops by the force Z (change of velocity): as long as that takes. */
 static void weigh(model *m, double h, double momentum, int stood, double before)
@@ -160,10 +160,11 @@ static void weigh(model *m, double h, double momentum, int stood, double before)
         bit->slowed += impulse * (1 - bit->mass / whole);
         bit->slowing = sqrt(2 * half * m->spring[2 * last - 2]) * change;
     }
-    const double wave = fmin(bit->slowed, h * bit->slowing);
-    bit->slowed -= wave;
+    /* a step in which the bit leaves the rock may end with a little too much momentum: it is taken off later */
+    const double wave = fmin(bit->slowed, h * bit->slowing), sum = momentum - impulse + wave;
+    bit->slowed -= wave + fmax(-sum, 0);
     bit->weight = momentum / h;
-    bit->told[0] = (momentum - impulse + wave) / h;
+    bit->told[0] = fmax(sum, 0) / h;
     bit->share = momentum > 0 ? bit->told[0] / bit->weight : 1;
 }
 

@@ -41,9 +41,9 @@ def stability_table(answer):
     drive = own or type(answer.scene.drive.control).__name__
     table = Table(
         caption="growth: in 1/s. fastest: the largest of all cases. at: the middle one of those in which the mode "
-        f"grows, its frequency and growth there, with the drive of the scene, {drive}. mode: counted from 0 by frequency "
-        f"there. To the right the growth with {'each drive' if own else 'other drives'}: {_words(names)}. gone: with that "
-        "drive no mode is near."
+        f"grows, its frequency and growth there, with the drive of the scene, {drive}. mode: counted from 0 by "
+        f"frequency there. To the right the growth with {'each drive' if own else 'other drives'}: {_words(names)}. "
+        "gone: with that drive no mode is near."
     )
     headings = [f"{name} (own)" if name == own else name for name in names]
     for heading in ("mode", "grows in", "fastest", "at rpm", "kN", "frequency (Hz)", "growth", *headings):

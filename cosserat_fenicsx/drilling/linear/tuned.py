@@ -76,5 +76,5 @@ def _matched(name, string, inertia, depth, bit_inertia):
 
 
 def with_rule(control: PI, rule: str) -> PI:
-    """The control of a rule, tuned to the same mode of the same string as one that has a rule: itself, or of another."""
+    """The control of a rule, tuned to the same mode of the same string as one that has a rule, which may be itself."""
     return control if rule == control.rule else PI(control.Kp * RULES[rule] / RULES[control.rule], control.Ki, rule)
