@@ -4,7 +4,7 @@ import time
 
 import numpy as np
 import pytest
-from frames import grid_shell
+from frame_scenes import grid_shell
 from mpi4py import MPI
 
 import cosserat_fenicsx as cf

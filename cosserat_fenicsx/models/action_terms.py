@@ -173,19 +173,23 @@ class Term:
         inside = np.clip(along, _INSIDE, 1 - _INSIDE) if self.kind.place == "node" else along
         s = (begin[cells] * lengths[rods.cell_rod])[:, None] + size[cells][:, None] * inside
         weight = np.zeros(self.weight.x.array.shape)
-        # (action, rod, rows of the values, arc lengths, mask over elements and points, starts and lengths of elements)
+        in_turn = np.argsort(rods.cell_rod, kind="stable")  # this rank's elements, rod by rod
+        bounds = np.searchsorted(rods.cell_rod[in_turn], np.arange(len(scene.rods) + 1))
+        counts, starts, sizes = layout.counts, begin[cells] * lengths[rods.cell_rod], size[cells]
+        # (action, rod, rows of the values, arc lengths, their elements and points, starts and lengths of elements)
         self._where = []
         for action, rod, vertex in members:
-            here = np.broadcast_to((rods.cell_rod == rod)[:, None], s.shape)
-            value = 1.0
+            mine, value = in_turn[bounds[rod] : bounds[rod + 1]], 1.0
+            here = np.ones((len(mine), s.shape[1]), dtype=bool)
             if vertex is not None:
-                inner = min(vertex, layout.counts[rod] - 1)
-                here = here & (rods.cell_inner == inner)[:, None] & (np.abs(along - (vertex - inner)) < _SAME)
+                inner = min(vertex, counts[rod] - 1)
+                here = (rods.cell_inner[mine] == inner)[:, None] & (np.abs(along[mine] - (vertex - inner)) < _SAME)
                 value = 2 * model.scales.length / size[first[rod] + inner]
-            weight[numbers[here]] = value
-            mine = here.any(axis=1)
-            elements = (begin[cells] * lengths[rods.cell_rod])[mine], size[cells][mine]
-            self._where.append((action, scene.rods[rod], numbers[here], s[here], here, elements))
+            i, points = np.nonzero(here)
+            at_points, mine = (mine[i], points), mine[here.any(axis=1)]
+            weight[numbers[at_points]] = value
+            elements = starts[mine], sizes[mine]
+            self._where.append((action, scene.rods[rod], numbers[at_points], s[at_points], at_points, elements))
         self.weight.x.array[:] = weight
         self.moves = any(signals_of(action) for action, _, _ in members)
         for k, function in enumerate((*self.data, *self.memory)):
@@ -204,7 +208,7 @@ class Term:
             self._rest.x.array.reshape(-1, 3)[numbers] = self._interpolated(model.positions_at_rest()) @ model.axes.T
         if self._frame is not None:
             for i, rod in enumerate(scene.rods):
-                here = rods.cell_rod == i
+                here = in_turn[bounds[i] : bounds[i + 1]]
                 frames = model.axes @ rod.curve.frame(s[here].ravel())
                 self._frame.x.array.reshape(-1, 9)[numbers[here].ravel()] = frames.reshape(-1, 9)
 

@@ -131,7 +131,7 @@ TermKind = namedtuple("TermKind", "work place sizes memory scaled evolve refresh
 def place_actions(scene, layout):
     """Terms of the actions: [(`TermKind`, [(action, rod index, vertex or None)])]. Actions of one kind share a term if
     they act at different places."""
-    terms = []
+    terms, taken = [], []
     for action in scene.actions:
         work = work_of(action)
         if work is None:
@@ -139,18 +139,20 @@ def place_actions(scene, layout):
         if action.station is not None:
             places, place = [layout.vertex(scene, action.station)], "point"
         else:
-            places = [(rod, None) for rod, which in enumerate(scene.rods) if action.acts_on(which)]
+            places = [(scene.number(rod), None) for rod in scene.rods_of(action)]
             place = "node" if action.at_nodes else "line"
         data = at(action, 0.0).data(scene.rods[places[0][0]], np.zeros(1))
         scaled = "load" if action.scaled else "permanent" if action.permanent else "full"
         sizes, memory = (tuple(datum.size for datum in data) for data in (data, action.memory))
         kind = TermKind(work, place, sizes, memory, scaled, action.evolve, action.refreshed is not None,
                         traits_of(action, scene.rods).dead)  # fmt: skip
-        for known, members in terms:
-            if known == kind and not {(rod, vertex) for _, rod, vertex in members} & set(places):
+        for (known, members), there in zip(terms, taken, strict=True):
+            if known == kind and there.isdisjoint(places):
                 break
         else:
-            members = []
+            members, there = [], set()
             terms.append((kind, members))
+            taken.append(there)
         members.extend((action, *where) for where in places)
+        there.update(places)
     return sorted(terms, key=lambda term: (term[0].work.__qualname__, term[0].place, term[0].scaled))

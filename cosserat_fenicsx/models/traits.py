@@ -60,7 +60,8 @@ def traits_of(action, rods):
 def found_traits(action, rods):
     """The `Traits` of an action with a virtual work, found from it."""
     work = work_of(action)
-    rod = action.station.rod if action.station is not None else next(rod for rod in rods if action.acts_on(rod))
+    named = action.station.rod if action.station is not None else action.rod
+    rod = named or next(rod for rod in rods if action.acts_on(rod))
     kinds = tuple((datum.size, is_axial(datum.unit)) for datum in data_of(action, rod, np.zeros(1)))
     return _traits(work, kinds)
 

@@ -56,14 +56,13 @@ def _sampled(item, until):
 def _force(load, scene, length):
     """The size of a load, N: moments are divided by the longest length, loads per length multiplied by it."""
     size = 0.0
-    for rod in scene.rods:
-        if load.acts_on(rod) if load.station is None else load.station.rod is rod:
-            s = np.zeros(1) if load.station is not None else np.linspace(0.0, rod.length, _SAMPLES)
-            for datum in load.data(rod, s):
-                force, lengths, _ = powers(datum.unit)
-                if force:
-                    values = np.linalg.norm(np.atleast_2d(datum.value), axis=-1)
-                    size = max(size, float(values.max()) / length**lengths)
+    for rod in scene.rods_of(load):
+        s = np.zeros(1) if load.station is not None else np.linspace(0.0, rod.length, _SAMPLES)
+        for datum in load.data(rod, s):
+            force, lengths, _ = powers(datum.unit)
+            if force:
+                values = np.linalg.norm(np.atleast_2d(datum.value), axis=-1)
+                size = max(size, float(values.max()) / length**lengths)
     return size
 
 

@@ -11,11 +11,11 @@ _SHIFT = 1e-12
 # The smallest singular values are all found once one beyond them is found that is larger than this, over the largest.
 _GAP = 1e-4
 # Vectors that are iterated first, and by how many times more where these do not reach the gap.
-_BLOCK, _GROWTH = 8, 4
+_BLOCK, _GROWTH = 8, 8
 # An iteration damps what belongs to singular values beyond the gap to _SHIFT / _GAP**2 of its size.
 _ITERATIONS = 5
 #: More vectors than this are not searched for in a matrix of more than `_DENSE` columns.
-MOST = 128
+MOST = 64
 
 
 def null_space(row, column, value, shape):

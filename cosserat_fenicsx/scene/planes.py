@@ -142,10 +142,9 @@ def _vectors(scene, load):
         if now.station is not None:
             given += now.data(now.station.rod, np.array([now.station.s]))
             continue
-        for rod in scene.rods:
-            if now.acts_on(rod):
-                origin = scene.origin(rod)
-                given += [_from(origin, datum) for datum in now.data(rod, np.linspace(0, rod.length, _SAMPLES))]
+        for rod in scene.rods_of(now):
+            origin = scene.origin(rod)
+            given += [_from(origin, datum) for datum in now.data(rod, np.linspace(0, rod.length, _SAMPLES))]
     vectors = [datum for datum in given if datum.size == 3]
     inside, across = (
         [v for x in vectors if is_axial(x.unit) == axial for v in x.value.reshape(-1, 3)] for axial in (False, True)

@@ -111,9 +111,8 @@ class Scene:
             return
         if load.rod is not None:
             self._check_rod(field, load.rod, load.rod)
-        for rod in self.rods:
-            if load.acts_on(rod):
-                load.check_rod(rod)
+        for rod in self.rods_of(load):
+            load.check_rod(rod)
 
     def _check_rod(self, field, place, rod):
         if rod not in self._numbers:
@@ -132,6 +131,14 @@ class Scene:
     def number(self, rod: Rod) -> int:
         """The place of a rod of the scene in `rods`."""
         return self._numbers[rod]
+
+    def rods_of(self, action: Action) -> Sequence[Rod]:
+        """The rods that an action acts on or along."""
+        if action.station is not None:
+            return (action.station.rod,)
+        if type(action).acts_on is Action.acts_on:  # the one rod that it names
+            return (action.rod,) if action.rod in self._numbers else ()
+        return tuple(rod for rod in self.rods if action.acts_on(rod))
 
     def leader(self, rod: Rod) -> Rod:
         """The first rod of the structure that a rod belongs to."""
@@ -180,17 +187,20 @@ class Scene:
     def stations(self, rod):
         """All stations of a rod that supports, loads and joints refer to, and those where its loads are not smooth."""
         named, along = self._named
-        breaks = {s for load in along if load.acts_on(rod) for s in load.breaks(rod)}
+        breaks = {s for load in along.get(rod, ()) for s in load.breaks(rod)}
         return [*named.get(rod, ()), *(rod.at(s) for s in sorted(breaks) if 0 < s < rod.length)]
 
     @cached_property
     def _named(self):
-        """{rod: its stations that supports, loads and joints refer to}, and the loads along rods."""
-        named = {}
+        """{rod: its stations that supports, loads and joints refer to}, and {rod: the loads along it}."""
+        named, along = {}, {}
         stations = [x.station for x in (*self.supports, *self.loads) if x.station is not None]
         for station in (*stations, *(end for joint in self.joints for end in (joint.first, joint.second))):
             named.setdefault(station.rod, []).append(station)
-        return named, [load for load in self.loads if load.station is None]
+        for load in self.loads:
+            for rod in self.rods_of(load) if load.station is None else ():
+                along.setdefault(rod, []).append(load)
+        return named, along
 
     @property
     def cautions(self) -> list[str]:
