@@ -194,7 +194,9 @@ def test_ctrl_c_keeps_what_is_done(tmp_path):
     )
     command = [sys.executable, "-m", "cosserat_fenicsx", "run", str(scene), "-o", str(tmp_path), "--no-picture"]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, encoding="utf-8", cwd=ROOT)
-    time.sleep(5)
+    while "cosserat_chain" not in Path(f"/proc/{process.pid}/maps").read_text():  # nothing is left to compile then
+        time.sleep(0.02)
+    time.sleep(1)
     process.send_signal(signal.SIGINT)
     out, err = process.communicate(timeout=60)
     assert process.returncode == 130 and "interrupted" in err and "Traceback" not in err

@@ -40,7 +40,7 @@ def test_a_terminal_that_is_closed(tmp_path):
     head, _, _ = DEMO.read_text(encoding="utf-8").partition("[solve]")
     scene = tmp_path / "scene.toml"
     factors = [k / 20000 for k in range(1, 20000)]
-    scene.write_text(f"{head}[solve]\nload_factors = {factors}\nelements = 16\nmodel = 'spatial'\n", encoding="utf-8")
+    scene.write_text(f"{head}[solve]\nload_factors = {factors}\nelements = 64\nmodel = 'spatial'\n", encoding="utf-8")
     process, terminal = pty.fork()
     if not process:
         signal.signal(signal.SIGHUP, signal.SIG_DFL)
