@@ -29,6 +29,7 @@ _ALIKE, _ONE_PLACE = 0.7, 1e-2
 #: Why a step is shortened, in words.
 UNEXPLAINED = "the number of negative modes changes otherwise than the critical points that were located tell"
 NEARLY = "two modes are almost neutral together"
+EXCHANGED = "a negative mode is exchanged for another one"
 ASIDE = "the path turns off just before the tangent becomes singular"
 
 
@@ -114,6 +115,8 @@ class Locator:
             raise Lost(0.5, UNEXPLAINED)
         if chord.dips and not short and sum(crossing.kind == "bifurcation" for crossing in crossings) < 2:
             raise Lost(0.5, NEARLY)
+        if chord.varies and not short and not self.track.keeps_modes(a, b):
+            raise Lost(0.5, EXCHANGED)
         if landing is not None:
             crossings = [crossing for crossing in crossings if crossing.place <= place]
         return landing, crossings
