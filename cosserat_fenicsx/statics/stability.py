@@ -222,6 +222,17 @@ class Part:
             return float(side * found[needed - 1])
         return float(self._nearest(1)[0][0])  # zero to rounding: factorisation and eigensolver differ in its sign
 
+    def negative_space(self, count):
+        """Orthonormal eigenvectors of the `count` negative eigenvalues at the problem's state, (owned entries, count);
+        None where the eigensolver finds another number."""
+        self._factor()
+        if self._negative != count:
+            return None
+        values, vectors = self._nearest(count, -1)
+        if (values < 0).sum() != count:
+            return None
+        return np.array([vector.array_r.copy() for vector in vectors]).T
+
     def modes(self, count, side=0):
         """The modes of the eigenvalues nearest zero, oriented by `oriented`.
 

@@ -15,6 +15,8 @@ from cosserat_fenicsx.statics.path.track import bends, through
 _FINE, _MOST = 1e-8, 25
 # Coordinates at which a step is checked for negative modes that appear and vanish within it.
 _PROBES = (1 / 3, 2 / 3)
+# Largest change of the determinant within a step in which no eigenvalue comes close to zero.
+_VARIES = 4.0
 # Largest imaginary part of the roots of a determinant that almost vanishes, and their largest distance from the step,
 # over its length.
 _NEARLY = 0.35
@@ -41,9 +43,10 @@ class Chord:
         dips: whether the determinant of the second variation almost vanishes between, more often than the number of
             negative modes changes: two eigenvalues that change their signs together, in opposite directions, change
             neither that number nor the determinant's sign.
+        varies: whether the determinant changes by more than a factor of `_VARIES`.
     """
 
-    dips = False
+    dips = varies = False
 
     def __init__(self, track, a, b, weight):
         self.track, self._weight = track, weight
@@ -117,7 +120,9 @@ class Chord:
             counts.append(track.stability.count(neutral=track.neutral is not None))
             logarithms.append(track.stability.logarithm)
         counts.append(b.negative_modes)
-        self.dips = track.model.carries_force and _dips(counts, [*logarithms, b.logarithm])
+        logarithms.append(b.logarithm)
+        self.dips = track.model.carries_force and _dips(counts, logarithms)
+        self.varies = not max(logarithms) - min(logarithms) <= math.log(_VARIES)
         changes = np.diff(counts)
         if min(counts) < 0 or (changes >= 0).all() or (changes <= 0).all():
             return None

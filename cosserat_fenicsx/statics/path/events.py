@@ -26,9 +26,12 @@ _SINGULAR = 1e-5
 # Two events are the same where the cosine of their null vectors is above the first number and their coordinates on the
 # chord differ by less than the second.
 _ALIKE, _ONE_PLACE = 0.7, 1e-2
+# Largest change of the logarithm of the bordered tangent's determinant within a step without a bifurcation.
+_BORDERED = math.log(30.0)
 #: Why a step is shortened, in words.
 UNEXPLAINED = "the number of negative modes changes otherwise than the critical points that were located tell"
 NEARLY = "two modes are almost neutral together"
+EXCHANGED = "a negative mode is exchanged for another one"
 ASIDE = "the path turns off just before the tangent becomes singular"
 
 
@@ -112,8 +115,11 @@ class Locator:
         crossings = self.crossings(chord, limits)
         if probe and explained and not self._explained(a, b, crossings):
             raise Lost(0.5, UNEXPLAINED)
-        if chord.dips and not short and sum(crossing.kind == "bifurcation" for crossing in crossings) < 2:
+        located = sum(crossing.kind == "bifurcation" for crossing in crossings)
+        if probe and not short and ((chord.dips and located < 2) or (not located and _near_bifurcation(a, b))):
             raise Lost(0.5, NEARLY)
+        if chord.varies and not short and not self.track.keeps_modes(a, b):
+            raise Lost(0.5, EXCHANGED)
         if landing is not None:
             crossings = [crossing for crossing in crossings if crossing.place <= place]
         return landing, crossings
@@ -307,6 +313,16 @@ class Locator:
             else:
                 high, after = place, point
         raise Lost(0.5)
+
+
+def _near_bifurcation(a, b):
+    """Whether the tangent bordered with the path's direction comes close to singular at one of two points, or not from
+    the other one's distance: its determinant, that of the tangent over the rise of the load factor, is regular at limit
+    points."""
+    if not a.rise or not b.rise:
+        return False
+    change = b.logarithm - a.logarithm - math.log(abs(b.rise / a.rise))
+    return abs(change) > _BORDERED  # not where it is unknown
 
 
 def _in_order(crossings):

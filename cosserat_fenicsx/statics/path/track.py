@@ -14,6 +14,8 @@ FAR, INTENDED = 0.5, 0.1
 #: Largest angle (rad) between the tangents of the path at the two ends of a step, and largest distance of the step's
 #: direction from the mean of these tangents, all of unit length: zero on a line and on a circle.
 TURN, CORNER = 0.9, 0.12
+# Smallest cosine of the angle between the negative modes of two neighbouring points.
+_SAME_MODE = 0.5
 #: Motions below this are rounding (rad, rod lengths): an inextensible column does not move until it buckles.
 NOTHING = 1e-8
 #: Newton iterations of a step beyond which the next step does not grow, and from which on it is halved.
@@ -32,6 +34,7 @@ class PathPoint:
         rise: d eta/d arc, positive where the load factor grows along the path; None where it was not computed.
         along: owned entries of dx/d arc; None where it was not computed.
         logarithm: see `NegativeModes`; NaN where it was not computed.
+        space: see `Part.negative_space`; None where it was not computed.
     """
 
     load_factor: float
@@ -41,6 +44,7 @@ class PathPoint:
     rise: float | None = None
     along: np.ndarray | None = field(default=None, repr=False)
     logarithm: float = math.nan
+    space: np.ndarray | None = field(default=None, repr=False)
 
 
 class Track:
@@ -153,6 +157,24 @@ class Track:
         size = math.sqrt(self.product(slope, slope) + weight)
         point.rise = math.copysign(1.0, along) / size
         point.along = point.rise * slope
+
+    def keeps_modes(self, a, b):
+        """Whether the negative modes of two points are the same motions, apart from those that the point with more of
+        them has in addition.
+
+        Where two eigenvalues change their signs in opposite directions, a mode is exchanged for another one.
+        """
+        shared = min(a.negative_modes, b.negative_modes)
+        if shared < 1 or self.neutral is not None:
+            return True
+        for point in (a, b):
+            if point.space is None:
+                self.put(point.numbers, point.load_factor)
+                point.space = self.stability.whole.negative_space(point.negative_modes)
+            if point.space is None:
+                return True
+        overlap = self.model.comm.allreduce(a.space.T @ b.space)
+        return bool(np.linalg.svd(overlap, compute_uv=False)[shared - 1] >= _SAME_MODE)
 
     # -- where the tangent is singular ---------------------------------------------------------------------------------
 
