@@ -5,6 +5,7 @@ The numbers in reference/rod_in_hole.json are of strong forms without any mesh, 
 
 import json
 import math
+import pickle
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +15,7 @@ from reference_wells import in_build_section
 import cosserat_fenicsx as cf
 from cosserat_fenicsx.element import lobatto_weights
 from cosserat_fenicsx.well.rod.resultants import contacts_along
+from cosserat_fenicsx.well.rod.rod_in_hole import solve_in_hole
 
 pytestmark = pytest.mark.serial
 KNOWN = json.loads((Path(__file__).parent / "reference" / "rod_in_hole.json").read_text(encoding="utf-8"))
@@ -64,6 +66,64 @@ def test_an_assembly_through_the_public_face(case):
     assert length - tangency[0] == pytest.approx(exact["arc_length_to_tangency"], abs=1e-3)
     assert tangency[2] == pytest.approx(exact["reaction_at_tangency"], rel=1e-4)
     assert at_bit[2] == pytest.approx(exact["bit_side_force"], rel=1e-4) and is_balanced(found)
+
+
+#: A slick assembly at 3 degrees with 250 kN, of small slopes (a beam without a mesh): EI, weight, clearance, distance from
+#: the bit to the tangency, and force there.
+SLICK = (1.7e7, 2050.0, 0.0508, 17.919140838675947, 1639.0117496314479)
+
+
+@pytest.mark.parametrize("tol", [1e-4, 1e-6])
+def test_a_force_behind_which_the_string_rises(tol):
+    """In a stiff wall the contact splits behind it: the force is not that of the first part alone, 8 % more."""
+    EI, weight, clearance, at, force = SLICK
+    length, path = 120.0, cf.WellPath.from_survey([0, 140], np.radians([3.0, 3.0]), [0, 0], degrees=False)
+    solved = solve_in_hole(
+        path, [length], cf.Stiffness((1e12,) * 2, 1e12, (EI, EI), EI), weight, 0.1, radius=0.1 + clearance,
+        bottom_tension=-250e3, rings=[(length, 0.0, 0.1)], tol=tol,
+    )  # fmt: skip
+    *_, tangency, at_bit = (x for x in solved.contacts if x.start == x.end)
+    assert length - tangency.start == pytest.approx(at, abs=2e-3)
+    assert abs(tangency.force - force) < min(tangency.error, 5e-4 * force) and tangency.error < 5e-3 * force
+    assert at_bit.force == pytest.approx(283.51, rel=5e-3) and not solved.rough
+
+
+@pytest.mark.parametrize("case", KNOWN["stiff build"][:2], ids=lambda case: case["name"])
+def test_a_smaller_tol_makes_forces_at_points_more_accurate(case):
+    """The wall is made stiffer, and the contact splits behind the forces."""
+    given, alpha = case["input"], math.radians(case["input"]["alpha"])
+    md = np.cumsum([0, given["h"], given["R"] * alpha, given["D"] + 50.0])
+    path = cf.WellPath.from_survey(md, np.degrees([0, 0, alpha, alpha]), [0, 0, 0, 0])
+    solved = solve_in_hole(
+        path, [case["rod_length"]], cf.Stiffness((1e12,) * 2, 1e12, (given["EI"],) * 2, given["EI"]), given["w"], 0.06,
+        radius=0.06 + given["r"], friction=given["mu"], slip=(float(given["c"]), 0.0), bottom_tension=given["T0"],
+        hinge=(0, 1, 0), has_arm=False, wall_stiffness=1e12, elements=2048,
+    )  # fmt: skip
+    points = [x for x in solved.contacts if x.start == x.end]
+    for point, k in zip(points, (3, 2, 1), strict=True):
+        exact = case[f"point_force_{k}"]
+        assert abs(point.force - exact) < min(2e-4 * exact, 3 * point.error) and point.error < 2e-2 * exact
+
+
+def test_errors_of_forces_at_points_are_with_the_contacts():
+    case = KNOWN["stiff build"][0]
+    found = in_build_section(case)
+    for point, k in zip(points_of(found), (3, 2, 1), strict=True):
+        assert abs(point.force - case[f"point_force_{k}"]) < point.error < 5e-3 * point.force
+    assert all(np.isnan(x.error) for x in found.contacts if not x.at_point)
+    assert pickle.loads(pickle.dumps(point)).error == point.error and len(point) == 4
+
+
+def test_a_force_near_the_end_of_its_contact_says_so():
+    """The part that is left behind it is shorter than what its peak and the rise behind it need."""
+    EI, weight, clearance, _, force = SLICK
+    length, path = 60.0, cf.WellPath.from_survey([0, 140], np.radians([3.0, 3.0]), [0, 0], degrees=False)
+    solved = solve_in_hole(
+        path, [length], cf.Stiffness((1e12,) * 2, 1e12, (EI, EI), EI), weight, 0.1, radius=0.1 + clearance,
+        bottom_tension=-250e3, rings=[(length, 0.0, 0.1)],
+    )  # fmt: skip
+    tangency = [x for x in solved.contacts if x.start == x.end][-2]
+    assert tangency in solved.rough and abs(tangency.force - force) < tangency.error < force
 
 
 def wall(pressure, start=20.0, end=60.0, h=0.3):

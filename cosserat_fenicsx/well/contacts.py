@@ -1,27 +1,40 @@
 """Where a string touches the wall, and how much each stretch on one side carries."""
 
-from typing import NamedTuple
+import math
+from typing import NamedTuple, Self
 
 import numpy as np
 
 from cosserat_fenicsx.well.softstring import UP_TO
 
+#: Forces at points are rough where their estimated error is above this part of them.
+ROUGH = 5e-3
 _SIDES = ("high", "right", "low", "left")
 
 
-class WallContact(NamedTuple):
-    """Where a string touches the wall, and how much it bears there.
+class _Stretch(NamedTuple):
+    top: float
+    bottom: float
+    force: float
+    side: str
+
+
+class WallContact(_Stretch):
+    """Where a string touches the wall, and how much it bears there: a tuple (top, bottom, force, side).
 
     Attributes:
         top, bottom: measured depths, m; equal for a force at a point.
         force: on the wall, across the hole, N: of the whole stretch.
         side: "high", "right", "low" or "left", looking down the hole; "wall" where it is vertical.
+        error: estimated, of a force at a point from that in a rigid wall, N; NaN of a stretch.
     """
 
-    top: float
-    bottom: float
-    force: float
-    side: str
+    error: float = math.nan
+
+    def __new__(cls, top: float, bottom: float, force: float, side: str, error: float = math.nan) -> Self:
+        made = super().__new__(cls, top, bottom, force, side)
+        made.error = error
+        return made
 
     @property
     def at_point(self) -> bool:

@@ -8,7 +8,7 @@ from rich.table import Table
 from cosserat_fenicsx.results.tables import as_text
 from cosserat_fenicsx.well import criteria
 from cosserat_fenicsx.well.components import DrillPipe
-from cosserat_fenicsx.well.contacts import stretches
+from cosserat_fenicsx.well.contacts import ROUGH, stretches
 
 # Notes of a sweep that are shown; more are counted.
 _NOTES = 12
@@ -102,8 +102,8 @@ def summary(answer):
             places = ", ".join(f"{np.interp(x.start, answer.solved.s, answer.md):.5g}" for x in rough[:_PLACES])
             more = f" and {len(rough) - _PLACES} more" if len(rough) > _PLACES else ""
             lines.append(
-                f"of these forces, those at md = {places}{more} m are ROUGH, some off by a factor of three: the mesh "
-                "is fine enough for tol, not for them, and a smaller tol makes it finer"
+                f"of these forces, those at md = {places}{more} m are ROUGH, with estimated errors above "
+                f"{100 * ROUGH:g} % of them, up to {max(x.error for x in rough):.2g} N (contacts[i].error)"
             )
     states = answer.buckling
     for state in (criteria.SNAKE, criteria.HELIX):
@@ -158,6 +158,8 @@ def answer_columns(answer):
 def contact_columns(answer):
     """{heading: (contacts,)} of the forces on the wall."""
     names = {"top": "from md (m)", "bottom": "to md (m)", "force": "force (N)", "side": "side"}
+    if any(math.isfinite(x.error) for x in answer.contacts):
+        names["error"] = "error (N)"
     columns = {heading: [getattr(x, name) for x in answer.contacts] for name, heading in names.items()}
     return columns | {"component": [_parts(answer, x) for x in answer.contacts]}
 

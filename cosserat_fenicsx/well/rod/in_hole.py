@@ -41,7 +41,7 @@ class InHole(OnWall):
         ring_forces: (rings, 3) on the string, with friction, N.
         contacts: [`Contact`] resultants, from the top down, see `contacts_along`. distributed_force: `side_force`
             without the peaks of those that are concentrated, N/m: its integral and these are the `wall_force`. rough:
-            the concentrated ones that the mesh does not resolve, which may be off by a factor of three.
+            the concentrated ones whose estimated error is above 0.5 % of them.
         stretch: m, twist: rad, of the string by tension and torque, from the true stiffness (NaN where a section has
             none); an `extensible` string has them in its state.
         factor: stiffness of the wall that it was solved with, over that in the scene; wall_stiffness: N/m^2, with it.
@@ -64,7 +64,7 @@ class InHole(OnWall):
         self.string, self.path, self.scene, self.factor = string, path, path.scene, factor
         self.steps, self.negative_modes = int(path.iterations[0]), int(path.negative_modes[0])
         self.estimates, self.errors, self.error, self.of_stiffness = None, {}, np.inf, np.inf
-        self._coarser = None
+        self._coarser, self._mesh_before = None, None
 
     def estimate(self, values, before):
         """Set the errors.
@@ -78,6 +78,7 @@ class InHole(OnWall):
         self.errors, self.error, self.of_stiffness = found.errors, found.error, found.of_stiffness
         if before:
             self.steps += before.steps
+        self._mesh_before = coarser
         if coarser:
             self._coarser = before.s, {name: getattr(before, name) for name in _ALONG}
 

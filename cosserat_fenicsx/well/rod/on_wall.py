@@ -4,13 +4,10 @@ from functools import cached_property
 
 import numpy as np
 
-from cosserat_fenicsx.well.rod.resultants import contacts_along
+from cosserat_fenicsx.well.contacts import ROUGH
+from cosserat_fenicsx.well.rod.resultants import contacts_along, with_errors
 from cosserat_fenicsx.well.rod.smoothed import along_elements
-from cosserat_fenicsx.well.rod.string_scene import bending_of
 
-# Elements of up to so many lengths of the layer in the wall resolve a concentrated force: forces on longer ones were
-# found to be off by a factor of up to three, most of those on shorter ones by less than 5 %.
-_RESOLVES = 10.0
 # Forces below this part of the largest one are none.
 _ROUNDING = 1e-10
 
@@ -93,10 +90,21 @@ class OnWall:
         """N."""
         return float(self.node_force.sum() + self._ring_pressures.sum())
 
-    def _layer(self, of):
-        """Length of the layer in the wall of the stiffest (`max`) or softest (`min`) section, m."""
-        EI = of(bending_of(section) for section in self.string.sections)
+    @cached_property
+    def _layer(self):
+        """(elements,) length of the layer in the wall, m."""
+        ends = self.s[:: self.path.degree]
+        EI = self.string.bending[self.string.section_at((ends[1:] + ends[:-1]) / 2)]
         return (4 * EI / self.wall_stiffness) ** 0.25
+
+    @cached_property
+    def _kinks(self):
+        """Arc lengths at which the pressure of what lies on the wall may jump: stations of the survey, ends of sections
+        of the string and of the hole, m."""
+        string, length = self.string, float(self.string.ends[-1])
+        stations = np.interp(string.path.md, self.md, self.s, left=np.nan, right=np.nan)
+        found = np.concatenate([stations, string.ends[:-1], list(string.wall.breaks(string.rod))])
+        return np.unique(found[(found > 0) & (found < length)])
 
     @cached_property
     def _resultants(self):
@@ -107,21 +115,25 @@ class OnWall:
             if pressed
         ]
         s, side = self.s[self._nodes], self.side[self._nodes]
-        return contacts_along(s, self._of_nodes, self.element_pressures, side, self._layer(max), rings)
+        return contacts_along(s, self._of_nodes, self.element_pressures, side, self._layer, rings, self._kinks)
 
-    @property
+    @cached_property
     def contacts(self):
-        """[`Contact`], without those of rounding size."""
+        """[`Contact`], without those of rounding size; errors of forces at points with what the mesh before tells
+        of them, see `with_errors`."""
         largest = max((x.force for x in self._resultants[0]), default=0.0)
-        return [x for x in self._resultants[0] if x.force > _ROUNDING * largest]
+        known = [x for x in self._resultants[0] if x.force > _ROUNDING * largest]
+        other = self._mesh_before
+        reach = other and 2 * float(other._layer.max()) + float(np.ptp(other.s[other._nodes], axis=1).max())
+        return with_errors(known, other and other._resultants[0], reach, self._layer_at)
+
+    def _layer_at(self, s):
+        return self._layer[np.clip(np.searchsorted(self.s[:: self.path.degree], s) - 1, 0, len(self._layer) - 1)]
 
     @property
     def rough(self):
-        """[`Contact`] on elements too long for it."""
-        at_rings, ends = [ring.station.s for ring in self.string.rings], self.s[:: self.path.degree]
-        points = [x for x in self.contacts if x.start == x.end and x.start not in at_rings]
-        i = np.clip(np.searchsorted(ends, [x.start for x in points]), 1, len(ends) - 1)
-        return [x for x, h in zip(points, ends[i] - ends[i - 1], strict=True) if h > _RESOLVES * self._layer(min)]
+        """[`Contact`] at points whose error is above `ROUGH` of the force."""
+        return [x for x in self.contacts if x.start == x.end and x.error > ROUGH * x.force]
 
     @cached_property
     def distributed_force(self):

@@ -146,7 +146,7 @@ class RodInContact(TorqueAndDrag):
         """See `TorqueAndDrag`: forces at points, and what lies on the wall between them."""
         depths = [np.interp([x.start, x.end], self.solved.s, self.md) for x in self.solved.contacts]
         leans = [self.hole.path.inclination_at(ends.mean()) > _VERTICAL for ends in depths]
-        return [WallContact(float(a), float(b), x.force, name_of_side(x.side if leaning else np.nan))
+        return [WallContact(float(a), float(b), x.force, name_of_side(x.side if leaning else np.nan), x.error)
                 for (a, b), x, leaning in zip(depths, self.solved.contacts, leans, strict=True)]  # fmt: skip
 
     def plot_from_side(self, file: File | None = None, length: float | None = None):
@@ -195,6 +195,8 @@ def _found(flexible, solved, differences):
         f"{solved.errors_along['bending_moment']:.2g} N m on {100 * MOSTLY:g} % of the string, which do not count in "
         "what is enough"
     )
+    if flexible.hole.wall_stiffness is not None:
+        yield "forces at points are those of a rigid wall; side force is that of the wall with wall_stiffness"
     scales = scales_of(flexible.solved, flexible.pieces)
     for name, apart in differences.items():
         shares = ", ".join(f"{value:+.4g} {unit}, {share(abs(value), scale):.1e}, in the {what}"
