@@ -21,6 +21,10 @@ class SceneError(CosseratError, ValueError):
     path = None
 
 
+class LibraryMissing(SceneError):
+    """A library for pictures is missing, which nothing else needs; says how to install it."""
+
+
 class SceneWarning(UserWarning):
     """A probable mistake in a scene, such as a unit that is not SI; `warnings.simplefilter` silences it."""
 

@@ -1,23 +1,33 @@
 """Printing and writing of the results of a command, also of partial ones."""
 
-import sys
 import tempfile
 from pathlib import Path
 
 from cosserat_fenicsx.cli.ended import ended
+from cosserat_fenicsx.cli.files import Files, keep_inputs
 from cosserat_fenicsx.cli.say import BAD_INPUT, INTERRUPTED, first_rank, in_words, say
 from cosserat_fenicsx.cli.together import together
 from cosserat_fenicsx.errors import NotConverged, SceneError
-from cosserat_fenicsx.interrupts import obey, patience
+from cosserat_fenicsx.interrupts import patience
 
 
-def deliver(computed, options, moving):
+def _names(name, *more):
+    """Names of the files of a path or of a motion."""
+    return f"{name}.csv", f"{name}.xdmf", f"{name}.h5", "result.h5", "rods.png", "rods.html", *more
+
+
+# By whether it is a motion.
+_NAMES = {False: _names("path"), True: _names("motion", "energy.png")}
+
+
+def deliver(computed, options, moving, tables=None):
     """Compute, then print and write the result, or the partial result where the computation fails or is interrupted.
 
     Args:
         computed: function without arguments that returns a Path or a History.
         options: of the command line.
         moving: whether it is a motion.
+        tables: of the scene file, where there is one.
 
     Returns:
         the exit code.
@@ -26,10 +36,12 @@ def deliver(computed, options, moving):
     from cosserat_fenicsx.pictures.colours import colour_of
 
     out, at = None, _numbers(options.at)
+    _check_film(options, moving)
     if options.output:
         out = Path(options.output)
+        if tables is not None:
+            keep_inputs(out, [*_NAMES[moving], *([options.animate] if options.animate else [])], options.scene, tables)
         prepare(out)  # fail before the computation, not after it
-    _check_film(options, moving)
     magnify = 1.0 if options.magnify is None else positive("plot", "magnify", options.magnify, "-")
     color = options.color or "bending_moment"
     colour_of(color)
@@ -131,17 +143,13 @@ def _write(path, out, station, *, picture, stops, magnify, shown, film, speed, c
         "energy.png": picture and moving and len(path) > 1 and path.plot_energy,
         film: film and len(path) > 1 and (lambda file: path.animate(file, speed=speed, magnify=magnify)),
     }
-    written = []
+    written = Files(out, stops)
     try:
         for file, write in files.items():
-            if stops:
-                obey()
             if write:
-                write(out / file)
-                written += [file, f"{name}.h5"] if file.endswith(".xdmf") else [file]
+                written.put(file, write, *([f"{name}.h5"] if file.endswith(".xdmf") else []))
     finally:
-        if written:
-            say(f"written to {out}/: {', '.join(written)}", file=sys.stdout)
+        written.tell()
 
 
 def _numbers(text):

@@ -8,6 +8,7 @@ from pathlib import Path
 from cosserat_fenicsx import units
 from cosserat_fenicsx.cli.deliver import prepare
 from cosserat_fenicsx.cli.ended import ended
+from cosserat_fenicsx.cli.files import Files, keep_inputs
 from cosserat_fenicsx.cli.say import DONE, INTERRUPTED, NOT_CONVERGED, say, warnings_in_words
 from cosserat_fenicsx.drilling.bit_laws import Stribeck
 from cosserat_fenicsx.drilling.choose import chosen
@@ -18,10 +19,12 @@ from cosserat_fenicsx.drilling.pictures.shown import turns
 from cosserat_fenicsx.drilling.scenefile import drilling_in
 from cosserat_fenicsx.drilling.simulate import check_arguments, resume_drilling
 from cosserat_fenicsx.errors import NotConverged, SceneError
-from cosserat_fenicsx.interrupts import obey, patience
+from cosserat_fenicsx.interrupts import patience
 from cosserat_fenicsx.well.field_units import in_si
 
 _TAKEN = ("duration", "dt", "elements", "model", "save_every")
+# Files that may be written.
+_NAMES = ("drilling.csv", "drilling.png", "energy.png", "phase.png", "map.png", "stability.csv", "stability.png")
 # Options of the command line that are for rods alone.
 _OTHERS = ("load_factors", "tol", "bound", "degree", "formulation", "control", "branch", "scheme", "start", "station", "at",
            "color", "magnify")  # fmt: skip
@@ -47,6 +50,10 @@ def run_drilling(options, tables):
     if found.title:
         say(found.title, file=sys.stdout)
     _check_folder(options.folder, found.scene)
+    if options.output:
+        keep_inputs(
+            Path(options.output), [*_NAMES, *([options.animate] if options.animate else [])], options.scene, tables
+        )
     code = DONE
     if "duration" in found.settings or not found.speeds:
         code = _deliver(lambda: found.simulate(folder=options.folder), options)
@@ -71,13 +78,13 @@ def _stability(found, options):
         return NOT_CONVERGED
     say(str(answer), file=sys.stdout)
     if options.output:
-        out, names = Path(options.output), ["stability.csv"]
+        out = Path(options.output)
         prepare(out)
-        answer.write(out / "stability.csv")
+        written = Files(out, stops=False)
+        written.put("stability.csv", answer.write)
         if not options.no_picture:
-            answer.plot(out / "stability.png")
-            names.append("stability.png")
-        say(f"written to {out}/: {', '.join(names)}", file=sys.stdout)
+            written.put("stability.png", answer.plot)
+        written.tell()
     return DONE
 
 
@@ -123,16 +130,12 @@ def _write(history, out, pictures, film, speed, stops):
             files |= {"map.png": history.plot_map}
     if film and len(history.profile_times) > 1:
         files[film] = lambda file: history.animate(file, speed=speed)
-    written = []
+    written = Files(out, stops)
     try:
         for name, write in files.items():
-            if stops:
-                obey()
-            write(out / name)
-            written.append(name)
+            written.put(name, write)
     finally:
-        if written:
-            say(f"written to {out}/: {', '.join(written)}", file=sys.stdout)
+        written.tell()
 
 
 @warnings_in_words()

@@ -4,9 +4,10 @@ import sys
 from pathlib import Path
 
 from cosserat_fenicsx.cli.deliver import prepare
+from cosserat_fenicsx.cli.files import Files, keep_inputs
 from cosserat_fenicsx.cli.say import DONE, INTERRUPTED, NOT_CONVERGED, say
 from cosserat_fenicsx.errors import NotConverged
-from cosserat_fenicsx.interrupts import obey, patience
+from cosserat_fenicsx.interrupts import patience
 
 
 def run_buckling(options):
@@ -28,10 +29,13 @@ def run_modes(options):
 def _deliver(options, compute, table):
     """Compute, print the table and write the files; returns the exit code."""
     from cosserat_fenicsx.scene.scenefile import read_scene
+    from cosserat_fenicsx.scene.toml_tables import tables_of
 
     scene, _ = read_scene(options.scene)
     out = Path(options.output) if options.output else None
     if out is not None:
+        names = [f"{options.command}.{ending}" for ending in ("csv", "xdmf", "h5", "png")]
+        keep_inputs(out, names, options.scene, tables_of(options.scene))
         prepare(out)  # fail before the computation, not after it
     for caution in scene.doubts:
         say(f"cosserat: warning: {caution}")
@@ -49,19 +53,15 @@ def _deliver(options, compute, table):
 
 def _write(found, out, name, *, picture):
     """Write the table, and the shapes where there are any; returns the exit code."""
-    tasks = [(f"{name}.csv", found.write)]
+    files = {f"{name}.csv": found.write}
     if len(found):
-        tasks.append((f"{name}.xdmf", found.write))
-        if picture:
-            tasks.append((f"{name}.png", found.plot))
-    written = []
+        files |= {f"{name}.xdmf": found.write} | ({f"{name}.png": found.plot} if picture else {})
+    written = Files(out)
     try:
-        for file, task in tasks:
-            obey()
-            task(out / file)
-            written.append(f"{file} with .h5" if file.endswith(".xdmf") else file)
+        for file, write in files.items():
+            written.put(file, write, *([f"{name}.h5"] if file.endswith(".xdmf") else []))
     except KeyboardInterrupt:
-        say(f"cosserat: interrupted; completely written to {out}/: {', '.join(written) or 'nothing'}")
+        say(f"cosserat: interrupted; completely written to {out}/: {', '.join(written.names) or 'nothing'}")
         return INTERRUPTED
-    say(f"written to {out}/: {', '.join(written)}", file=sys.stdout)
+    written.tell()
     return DONE

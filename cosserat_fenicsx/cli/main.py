@@ -116,7 +116,7 @@ def _run(options):
 
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", SceneWarning)  # said above, in the words of the command line
-        return deliver(computed, options, bool(moving))
+        return deliver(computed, options, bool(moving), tables)
 
 
 @warnings_in_words()

@@ -9,6 +9,7 @@ import numpy as np
 
 from cosserat_fenicsx import units
 from cosserat_fenicsx.cli.deliver import prepare
+from cosserat_fenicsx.cli.files import Files, keep_inputs
 from cosserat_fenicsx.cli.say import DONE, INTERRUPTED, say, warnings_in_words
 from cosserat_fenicsx.errors import Interrupted, SceneError
 from cosserat_fenicsx.ranks import on_first, world
@@ -18,6 +19,7 @@ from cosserat_fenicsx.well.scenefile import well_in
 # Options of the command line that are for rods alone.
 _OTHERS = ("load_factors", "bound", "elements", "degree", "formulation", "control", "branch", "duration", "dt", "scheme",
            "save_every", "start", "folder", "station", "at", "animate", "speed", "color", "magnify")  # fmt: skip
+_OF_SWEEPS = ("depth_sweep.csv", "depth_sweep.jsonl", "depth_sweep.png")
 _SOFT = (
     "the soft string by a differential equation along the axis, and what that leaves out is estimated with each answer."
 )
@@ -44,16 +46,19 @@ def _scene(options, tables):
 def run_well(options, tables):
     """`cosserat run` of the tables of a scene file; returns the exit code."""
     scene, out = _scene(options, tables), Path(options.output) if options.output else None
+    stems = _stems(scene.operations)
     if out is not None:
+        names = [f"{stem}{ending}" for stem in stems for ending in (".csv", "_contacts.csv", ".png", "_3d.png")]
+        keep_inputs(out, [*names, *_OF_SWEEPS], options.scene, tables)
         prepare(out)
     if scene.title:
         say(scene.title, file=sys.stdout)
-    written = []
-    for operation, stem in zip(scene.operations, _stems(scene.operations), strict=True):
+    written = Files(out, stops=False)
+    for operation, stem in zip(scene.operations, stems, strict=True):
         answer = scene.answer(operation)
         say(str(answer), file=sys.stdout)
         if out is not None:
-            written += _write(answer, out, stem, not options.no_picture)
+            _write(answer, written, stem, not options.no_picture)
     code = DONE
     try:
         sweep = scene.depth_sweep(out / "depth_sweep.jsonl" if out is not None else None)
@@ -65,13 +70,10 @@ def run_well(options, tables):
         if out is not None:
             if code == DONE:  # complete: another run begins anew
                 on_first(world(), lambda: (out / "depth_sweep.jsonl").unlink(missing_ok=True))
-            sweep.write(out / "depth_sweep.csv")
-            written.append("depth_sweep.csv")
+            written.put("depth_sweep.csv", sweep.write)
             if not options.no_picture and len(sweep):
-                sweep.plot(out / "depth_sweep.png")
-                written.append("depth_sweep.png")
-    if written:
-        say(f"written to {out}/: {', '.join(written)}", file=sys.stdout)
+                written.put("depth_sweep.png", sweep.plot)
+    written.tell()
     return code
 
 
@@ -81,14 +83,12 @@ def _stems(operations):
     return [name + (f"_{names[:i].count(name) + 1}" if name in names[:i] else "") for i, name in enumerate(names)]
 
 
-def _write(answer, out, stem, pictures):
-    """Write the files of an answer; returns their names."""
-    files = {f"{stem}.csv": answer.write}
+def _write(answer, written, stem, pictures):
+    """Write the files of an answer, see `Files`."""
+    written.put(f"{stem}.csv", answer.write, f"{stem}_contacts.csv")
     if pictures:
-        files |= {f"{stem}.png": answer.plot, f"{stem}_3d.png": answer.plot_3d}
-    for name, write in files.items():
-        write(out / name)
-    return [f"{stem}_contacts.csv", *files]  # which `TorqueAndDrag.write` writes too
+        written.put(f"{stem}.png", answer.plot)
+        written.put(f"{stem}_3d.png", answer.plot_3d)
 
 
 @warnings_in_words()

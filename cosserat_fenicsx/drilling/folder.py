@@ -41,6 +41,7 @@ from cosserat_fenicsx.storage.entries import (
 )
 from cosserat_fenicsx.storage.fingerprint import difference
 from cosserat_fenicsx.storage.lock import FolderLock
+from cosserat_fenicsx.storage.vacant import check_vacant
 
 #: Least time between checkpoints: in s, and as a multiple of the time that it takes to write one.
 APART, SELDOM = 2.0, 20
@@ -118,6 +119,7 @@ class DrillingFolder:
                     "name, or that it is removed first; "
                     f"cosserat_fenicsx.resume_drilling({str(self.place)!r}) continues it"
                 )
+            check_vacant(self.place, "simulate_drilling.folder", _HEAD, (_SCENE, _SERIES, _PROFILES, _LATEST))
             self.place.mkdir(parents=True, exist_ok=True)
             for name in (_SERIES, _PROFILES):
                 (self.place / name).write_bytes(b"")

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from cosserat_fenicsx.checks import number, positive, refuse
-from cosserat_fenicsx.errors import SceneError
+from cosserat_fenicsx.errors import LibraryMissing, SceneError
 from cosserat_fenicsx.interrupts import obey
 from cosserat_fenicsx.pictures.between import Between
 from cosserat_fenicsx.pictures.drawing import add_body, at_rest, frame, load_pyvista, points_of, prefix, thickening
@@ -252,7 +252,7 @@ def _pillow():
     try:
         from PIL import Image
     except ImportError:
-        raise SceneError("films as .gif need Pillow: pip install 'cosserat-fenicsx[pictures]'") from None
+        raise LibraryMissing("films as .gif need Pillow: pip install 'cosserat-fenicsx[pictures]'") from None
     return Image
 
 
@@ -313,7 +313,7 @@ def _ffmpeg():
     except (ImportError, RuntimeError):
         found = shutil.which("ffmpeg")
     if found is None:
-        raise SceneError(
+        raise LibraryMissing(
             "films as .mp4 need ffmpeg: pip install 'cosserat-fenicsx[films]', or apt install ffmpeg; a .gif needs "
             "neither"
         )

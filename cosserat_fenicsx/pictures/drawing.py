@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cosserat_fenicsx.errors import SceneError
+from cosserat_fenicsx.errors import LibraryMissing
 from cosserat_fenicsx.pictures.axes import axes_of, draw_axes, round_step
 from cosserat_fenicsx.pictures.colours import BENDING
 from cosserat_fenicsx.pictures.labels import Labels
@@ -40,7 +40,7 @@ def load_pyvista():
         import pyvista
         import pyvista.plotting  # loads VTK's windows and the system's libraries, which may be missing
     except ImportError as missing:
-        raise SceneError(
+        raise LibraryMissing(
             f"pictures need pyvista ({missing}): pip install 'cosserat-fenicsx[pictures]', and on Debian "
             "apt install libegl1 libgl1 libxrender1"
         ) from None

@@ -3,7 +3,7 @@
 import io
 from pathlib import Path
 
-from cosserat_fenicsx.errors import SceneError
+from cosserat_fenicsx.errors import LibraryMissing, SceneError
 from cosserat_fenicsx.ranks import on_first
 from cosserat_fenicsx.results.export.beside import replaced
 
@@ -18,7 +18,9 @@ def empty_figure(width, height):
         from matplotlib.backends.backend_agg import FigureCanvasAgg
         from matplotlib.figure import Figure
     except ImportError:
-        raise SceneError("charts need matplotlib: pip install matplotlib") from None
+        raise LibraryMissing(
+            "charts need matplotlib: pip install 'cosserat-fenicsx[pictures]', or pip install matplotlib"
+        ) from None
     figure = Figure(figsize=(width, height), layout="constrained")
     FigureCanvasAgg(figure)
     return figure

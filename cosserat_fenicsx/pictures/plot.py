@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from cosserat_fenicsx.checks import positive
-from cosserat_fenicsx.errors import SceneError
+from cosserat_fenicsx.errors import LibraryMissing, SceneError
 from cosserat_fenicsx.pictures.colours import colour_of, known, peak_of
 from cosserat_fenicsx.pictures.drawing import (
     add_body,
@@ -245,7 +245,7 @@ def chart(file, curves, *, xlabel, ylabel, title, ylim=None):
     try:
         from matplotlib.figure import Figure
     except ImportError as missing:
-        raise SceneError(f"charts need matplotlib ({missing}): pip install 'cosserat-fenicsx[pictures]'") from None
+        raise LibraryMissing(f"charts need matplotlib ({missing}): pip install 'cosserat-fenicsx[pictures]'") from None
     figure = Figure(figsize=(8, 5.5), layout="constrained")
     axes = figure.add_subplot()
     for x, y, label, style in curves:

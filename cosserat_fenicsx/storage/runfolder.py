@@ -15,6 +15,7 @@ from cosserat_fenicsx import __version__
 from cosserat_fenicsx.checks import instance, warn
 from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.ranks import on_first
+from cosserat_fenicsx.results.export.beside import replaced
 from cosserat_fenicsx.scene.as_data import NotData, from_data, to_data
 from cosserat_fenicsx.storage import checkpoints
 from cosserat_fenicsx.storage.entries import AN_INDEX
@@ -22,10 +23,12 @@ from cosserat_fenicsx.storage.entries import checked as checked_entries
 from cosserat_fenicsx.storage.fingerprint import difference, fingerprint, fingerprint_at, times_ahead
 from cosserat_fenicsx.storage.head import checked
 from cosserat_fenicsx.storage.lock import FolderLock
+from cosserat_fenicsx.storage.vacant import check_vacant
 
 #: Least time between checkpoints: in s, and as a multiple of the time that it takes to write one.
 APART, SELDOM = 2.0, 50
 _FORMAT = 2
+_STATES_FILE = "instants.npy"
 # The entry of a checkpoint that tells of the saved states.
 _STATES = "states"
 _OF_PARTS = {f"{_STATES}.rows": AN_INDEX, f"{_STATES}.crc32": (lambda value: type(value) is int, "a whole number")}
@@ -84,15 +87,19 @@ class RunFolder:
                 f"simulate.folder = {str(place)!r}: it holds a motion already: expected another name, or that it is "
                 f"removed first; cosserat_fenicsx.resume({str(place)!r}), or `cosserat resume {place}`, continues it"
             )
+        check_vacant(place, "simulate.folder", _HEAD, (_HEAD, _SCENE))
+        if not (place / _HEAD).exists():
+            check_vacant(place, "simulate.folder", _HEAD, (_STATES_FILE, _START, _LATEST))
         place.mkdir(parents=True, exist_ok=True)
-        for name in ("instants.npy", _SCENE, _START, _LATEST):
+        for name in (_STATES_FILE, _SCENE, _START, _LATEST):
             (place / name).unlink(missing_ok=True)
         try:
             data = to_data(scene)
         except NotData as problem:
             data = {"missing": str(problem)}
-        (place / _SCENE).write_text(_text(data), encoding="utf-8")
-        (place / _HEAD).write_text(head, encoding="utf-8")
+        for name, text in ((_SCENE, _text(data)), (_HEAD, head)):
+            with replaced(place / name) as fresh:
+                fresh.write_text(text, encoding="utf-8")
         self._lock.take()
 
     def open(self):
@@ -165,9 +172,8 @@ class RunFolder:
         self._head["ahead"] = _ahead(scene, duration)
 
         def rewrite():
-            fresh = self.place / f"{_HEAD}.new"
-            fresh.write_text(_text(self._head), encoding="utf-8")
-            fresh.replace(self.place / _HEAD)
+            with replaced(self.place / _HEAD) as fresh:
+                fresh.write_text(_text(self._head), encoding="utf-8")
 
         self._on_first(rewrite)
 

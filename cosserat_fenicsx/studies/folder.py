@@ -18,6 +18,7 @@ from cosserat_fenicsx.ranks import on_first
 from cosserat_fenicsx.storage import rows
 from cosserat_fenicsx.storage.entries import A_WHOLE, below, number
 from cosserat_fenicsx.storage.lock import FolderLock
+from cosserat_fenicsx.storage.vacant import check_vacant
 from cosserat_fenicsx.studies.values import from_data
 
 _FORMAT = 1
@@ -72,6 +73,8 @@ class StudyFolder:
                 return [
                     row for file in sorted(self.place.glob(_OUTCOMES.format("*"))) for row in _rows(file, len(cases))
                 ]
+            outcomes = [file.name for file in self.place.glob(_OUTCOMES.format("*"))]
+            check_vacant(self.place, "study.folder", _HEAD, outcomes)
             head = {"format": _FORMAT, "cosserat_fenicsx": __version__, "task": task, "cases": cases}
             fresh = self.place / f"{_HEAD}.new"
             fresh.write_text(json.dumps(head), encoding="utf-8")

@@ -9,6 +9,7 @@ from cosserat_fenicsx.annotations import File
 from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.ranks import on_first, world
 from cosserat_fenicsx.results.export.beside import replaced
+from cosserat_fenicsx.results.export.columns import plain_text
 from cosserat_fenicsx.results.export.exports import import_library
 
 
@@ -48,7 +49,7 @@ def _write(file, columns):
     def written():
         with replaced(file) as fresh, open(fresh, "w", newline="", encoding="utf-8") as stream:
             writer = csv.writer(stream, lineterminator="\n")
-            writer.writerow(columns)
+            writer.writerow(map(plain_text, columns))
             writer.writerows(map(_row, zip(*columns.values(), strict=True)))
 
     on_first(world(), written)
@@ -56,4 +57,4 @@ def _write(file, columns):
 
 def _row(values):
     """Texts of a row; empty for what is not known."""
-    return [x if isinstance(x, str) else "" if math.isnan(x) else f"{x:.9g}" for x in values]
+    return [plain_text(x) if isinstance(x, str) else "" if math.isnan(x) else f"{x:.9g}" for x in values]

@@ -9,6 +9,8 @@ from cosserat_fenicsx.results.export.beside import replaced
 from cosserat_fenicsx.results.export.quantities import FIELDS, headings
 from cosserat_fenicsx.results.tables import most_displaced
 
+# How texts begin that spreadsheet programs take for formulas.
+_FORMULAS = ("=", "+", "-", "@", "\t", "\r")
 _ENERGIES = ("kinetic", "strain", "work", "dissipated", "balance")
 _MOMENTA = {"linear_momentum": "linear momentum (kg m/s)", "angular_momentum": "angular momentum (kg m^2/s)"}
 
@@ -84,6 +86,11 @@ def table(result, k=None, rod=None, station=None):
     return along_rods(result, -1 if k is None else k, result.scene.rods if rod is None else [result.rod(rod)])
 
 
+def plain_text(text):
+    """A text for a table, with a quote before it where a spreadsheet program would take it for a formula."""
+    return f"'{text}" if text.startswith(_FORMULAS) else text
+
+
 def write_csv(result, file, k=None, rod=None, station=None):
     """Write the columns of `table` as CSV."""
     write_columns(file, table(result, k, rod, station))
@@ -93,8 +100,12 @@ def write_columns(file, columns):
     """Write columns {heading: (n,)} as CSV; a file that was there is replaced once the new one is complete."""
     with replaced(file) as fresh, open(fresh, "w", newline="", encoding="utf-8") as stream:
         writer = csv.writer(stream)
-        writer.writerow(columns)
-        writer.writerows(zip(*(column.tolist() for column in columns.values()), strict=True))
+        writer.writerow(map(plain_text, columns))
+        writer.writerows(zip(*map(_cells, columns.values()), strict=True))
+
+
+def _cells(column):
+    return list(map(plain_text, column.tolist())) if column.dtype.kind == "U" else column.tolist()
 
 
 def _split(values, quantity, before=""):
