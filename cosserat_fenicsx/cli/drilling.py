@@ -24,8 +24,8 @@ from cosserat_fenicsx.well.field_units import in_si
 
 _TAKEN = ("duration", "dt", "elements", "model", "save_every")
 # Options of the command line that are for rods alone.
-_OTHERS = ("load_factors", "tol", "bound", "degree", "formulation", "control", "branch", "scheme", "start", "station", "at",
-           "color", "magnify")  # fmt: skip
+_OTHERS = ("load_factors", "tol", "bound", "degree", "formulation", "control", "branch", "scheme", "start", "station",
+           "at", "color", "magnify")  # fmt: skip
 
 
 def _scene(options, tables):
