@@ -33,12 +33,8 @@ def true_errors(path, rod, drawn, truth):
     rotation = max(2 * size(exact["q"][1:].T), displacement / drawn.length)
     n, m = (np.array([query(rod.at(x))[-1] for x in s]) for query in (path.force, path.moment))
     force = max(size(exact["n"].T), size(exact["m"].T) / drawn.length)
-    return np.array([
-        size(off) / displacement,
-        turned / rotation,
-        size(n - exact["n"].T) / force,
-        size(m - exact["m"].T) / size(exact["m"].T),
-    ])  # fmt: skip
+    errors = [size(off) / displacement, turned / rotation, size(n - exact["n"].T) / force]
+    return np.array([*errors, size(m - exact["m"].T) / size(exact["m"].T)])
 
 
 def size(vectors, *, largest=True):

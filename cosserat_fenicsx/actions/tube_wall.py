@@ -111,7 +111,7 @@ class TubeWall(_Confined, LineAction):
     has_arm: bool = True
     stage: Stage = field(default_factory=Stage, init=False, repr=False, compare=False)
 
-    at_nodes, unit = True, "N/m^2"
+    at_nodes, presses, unit = True, True, "N/m^2"
 
     def __post_init__(self):
         self._check("N/m^2")

@@ -25,8 +25,8 @@ class Wall(LineAction):
     per unit of reference length towards the straight axis, rho the distance from it.
 
     It is integrated with the nodes as quadrature points, which resolves contact pressures best. It is not multiplied by
-    the load factor. Where contact begins the pressure has a kink inside an element, so that errors fall slowly with the
-    mesh: a `tol` below 1e-4 or so takes many elements. A softer wall is easier to solve.
+    the load factor. The pressure has a kink where contact begins: meshes that `solve` refines have element ends there,
+    for up to a dozen places in all points of a path; more of them take many elements. A softer wall is easier to solve.
 
     Args:
         rod: the rod.
@@ -44,7 +44,7 @@ class Wall(LineAction):
     clearance: float
     stiffness: float = 1e9
 
-    scaled, at_nodes = False, True
+    scaled, at_nodes, presses = False, True, True
 
     def __post_init__(self):
         store(

@@ -26,8 +26,8 @@ _TAKEN = ("duration", "dt", "elements", "model", "save_every")
 # Files that may be written.
 _NAMES = ("drilling.csv", "drilling.png", "energy.png", "phase.png", "map.png", "stability.csv", "stability.png")
 # Options of the command line that are for rods alone.
-_OTHERS = ("load_factors", "tol", "bound", "degree", "formulation", "control", "branch", "scheme", "start", "station", "at",
-           "color", "magnify")  # fmt: skip
+_OTHERS = ("load_factors", "tol", "bound", "degree", "formulation", "control", "branch", "scheme", "start", "station",
+           "at", "color", "magnify")  # fmt: skip
 
 
 def _scene(options, tables):

@@ -15,7 +15,7 @@ from cosserat_fenicsx.scene.describe import actions_in_words, describe
 from cosserat_fenicsx.scene.magnitudes import check_magnitudes
 from cosserat_fenicsx.scene.rolled import Profile
 from cosserat_fenicsx.scene.sections import Rectangle, Stiffness
-from cosserat_fenicsx.statics.first_mesh import first_layout, meshes_for
+from cosserat_fenicsx.statics.first_mesh import first_layout, meshes_for, resolving_turns
 from cosserat_fenicsx.statics.solve import check_arguments
 
 #: What the unknowns of a model are, in a plane (True) or in space.
@@ -50,6 +50,7 @@ def explain(scene, load_factors, settings):
         layout = Layout.of(scene, elements) if elements else first_layout(scene, degree)
     else:
         layout, _ = meshes_for(scene, degree, tol, many)
+        layout = resolving_turns(scene, layout, float(np.abs(load_factors).max())) or layout
     first = elements or max(layout.counts)
 
     def signature_of(model):

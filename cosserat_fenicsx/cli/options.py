@@ -59,8 +59,6 @@ def _eigenvalues(parser, name, count, tol):
     parser.add_argument("--count", type=int, default=count, help=f"how many [{count}]")
     parser.add_argument("--load-factor", type=float, default=0.0, help="of the equilibrium [0: the unloaded rods]")
     parser.add_argument("--tol", type=float, help=f"estimated relative error of the eigenvalues [{tol}]")
-    parser.add_argument("--bound", metavar="A,B,...", type=lambda text: text.split(","),
-                        help="what --tol bounds of an equilibrium path: position,rotation,force,moment [all]")  # fmt: skip
     parser.add_argument("--elements", type=int, help="elements per rod; fixes the mesh, no error estimate")
     parser.add_argument("--degree", type=int, help="polynomial degree of r and q, 1 to 4 [4]")
     parser.add_argument(
@@ -130,7 +128,7 @@ def _common(parser):
                         "its steps, over the longest rod's length [1e-3]; of a string in a well that of hook load and "
                         "torque [1e-4]")  # fmt: skip
     parser.add_argument("--bound", metavar="A,B,...", type=lambda text: text.split(","),
-                        help="what --tol bounds of an equilibrium path: position,rotation,force,moment [all]")  # fmt: skip
+                        help="what --tol bounds of a path: position, rotation, force, moment [all]")  # fmt: skip
     parser.add_argument("--elements", type=int, help="elements per rod; fixes the mesh, no error estimate")
     parser.add_argument("--degree", type=int, help="polynomial degree of r and q, 1 to 4 [4]")
     parser.add_argument("--formulation", help="mixed, displacement or multiplier [mixed]")

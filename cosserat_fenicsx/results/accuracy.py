@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from cosserat_fenicsx.results.compared import POSITION, ROUNDING, differences
+from cosserat_fenicsx.results.compared import FORCE, POSITION, ROUNDING, differences
 from cosserat_fenicsx.results.places import cell_nodes, transferred
 from cosserat_fenicsx.results.result import resting
 
@@ -10,18 +10,25 @@ from cosserat_fenicsx.results.result import resting
 FEW = 3
 # Ratios of the largest difference to that at the element ends, above which the superconvergence of the ends is evident.
 _AHEAD, _FAR_AHEAD = 4, 30
+# The same ratio, below which the error is that of the element ends.
+_OF_ENDS = 2
 # Safety of the assumed gain in accuracy, and that of differences below which convergence is asymptotic.
 _SAFETY, _SAFETY_BELOW, _ASYMPTOTIC = 4, 2, 1e-3
+# Error of the finer of two meshes over their difference that is assumed where a kink lies inside elements; what the
+# assumed gain is divided by where it is at their ends.
+_ROUGH, _NEARLY = 2.0, 4.0
 # Error of the finer of two meshes over its estimate that is assumed for the estimate of the coarser one; factor from an
 # assumed gain in accuracy to the likely one.
 _CAUTION, _LIKELY = 2, 1.5
+# Largest ratio of the lengths of the elements of a rod that are about equal.
+_UNEQUAL = 1.9
 # Exponents of an error as a function of what indicates it, below and above what is known.
 _BELOW, _ABOVE = 0.7, 1.4
 # Factor of an error that is interpolated over leading coefficients, as a power of their ratio to those of the nearest
 # sample point; the largest one.
 _WIDENED, _WIDEST = 0.5, 2.0
-# Factor of all errors that are interpolated.
-_BETWEEN = 1.25
+# Factors of all errors that are interpolated, of positions, rotations, n and m.
+_BETWEEN = (1.25, 1.25, 2.0, 1.25)
 # Largest ratio of the leading coefficients of sample points without another one between them.
 _APART = 10.0
 # Ratio of leading coefficients below which a second, smoother point is sampled, since its error may converge otherwise.
@@ -30,7 +37,7 @@ _SMOOTHER = 0.1
 _SEEN = 1e-3
 
 
-def estimate_error(fine, coarse, before=None):
+def estimate_error(fine, coarse, before=None, *, smooth=True):
     """Estimate the errors of a path from the same points on the mesh of elements twice as long; sets `fine.errors`.
 
     An error is the difference of the two meshes, see `compared.differences`, over an assumed gain in accuracy. The gain
@@ -40,9 +47,15 @@ def estimate_error(fine, coarse, before=None):
       least 1;
     - without: that part if the element ends, whose order is 2 p, are much more accurate than the rest, 2^(p - 3) if
       they are moderately more accurate, else 1. Splines and sections that are functions of s may reduce the order: for
-      these at most 2^(p - 3).
+      these at most 2^(p - 3). A quarter at most where that does not hold for every quantity, and on elements of
+      unequal length, as in boundary layers.
 
     Each quantity is judged by itself, relative to its own size, see `compared.sizes_of`.
+
+    Args:
+        smooth: of scenes with walls: False where an edge of contact lies inside elements. No gain is assumed then, and
+            the error is taken to be twice the difference, since two meshes may err in the same direction. Otherwise a
+            quarter of the gain, since the edges are found to some accuracy alone.
 
     Returns:
         (4, n) the relative differences, which are `before` in the next halving; and (4, n) the assumed gains.
@@ -52,14 +65,25 @@ def estimate_error(fine, coarse, before=None):
     part = np.where(relative < _ASYMPTOTIC, 1 / _SAFETY_BELOW, 1 / _SAFETY)
     if before is None:
         ahead, far = difference > _AHEAD * at_ends, difference > _FAR_AHEAD * at_ends
+        # n is constant where no loads act along rods, so that all of its error is that of the ends
+        far[FORCE] |= far[:FORCE].all(axis=0) & (difference[FORCE] <= _OF_ENDS * at_ends[FORCE])
+        sure = (far | (relative == 0)).all(axis=0) & _equal(fine.layout)
+        part = np.where(sure, part, 1 / _SAFETY)
         uniform = all(rod.uniform for rod in fine.scene.rods)
         gain = np.where(far & uniform, part * 2.0 ** (p + 1), np.where(ahead, max(1.0, 2.0 ** (p - 3)), 1.0))
     else:
         seen = before / np.maximum(relative, 1e-300)
         gain = np.clip(part * (seen - 1), 1, part * 2.0 ** (p + 1))
+    if any(action.presses for action in fine.scene.actions):
+        gain = np.maximum(gain / _NEARLY, 1.0) if smooth else np.full_like(gain, 1 / _ROUGH)
     gain[relative == 0] = 2.0 ** (p + 1) / _SAFETY_BELOW
     fine.set_errors(relative / gain)
     return relative, gain
+
+
+def _equal(layout):
+    """Whether the elements of every rod are about as long as each other, but for pieces."""
+    return all(np.diff(breaks).max() <= _UNEQUAL * np.diff(breaks).min() for breaks in layout.breaks)
 
 
 def error_before(apart, gain):
@@ -164,17 +188,18 @@ def spread_error(path, few, which, coarse=None):
     told = differences(path, coarse)[0] if coarse is not None else path._roughness.max(axis=1)[[0, 1, 1, 1]]
     found = np.array([
         _spread(*numbers, which, of_mesh=coarse is not None)
-        for numbers in zip(told, sizes, few.by_mesh, strict=True)
+        for numbers in zip(told, sizes, few.by_mesh, _BETWEEN, strict=True)
     ])  # fmt: skip
     found[:, which] = few.by_mesh
     path.set_errors(found)
 
 
-def _spread(told, sizes, errors, which, *, of_mesh):
+def _spread(told, sizes, errors, between, which, *, of_mesh):
     """(n,) errors of one quantity at all points from those at the sample points, relative to its sizes.
 
     Args:
-        told: (n,) what indicates them; sizes: (n,); errors: (samples,); which: indices of the samples.
+        told: (n,) what indicates them; sizes: (n,); errors: (samples,); between: factor of
+            those of the others; which: indices of the samples.
         of_mesh: whether `told` are differences of two meshes.
     """
     known, absolute = told[which], errors * sizes[which]
@@ -193,7 +218,7 @@ def _spread(told, sizes, errors, which, *, of_mesh):
             np.abs(relative[:, None] - relative[which][usable]).min(axis=1),
         )
         beyond += np.minimum(_WIDENED * unlike, np.log(_WIDEST))
-    found = _BETWEEN * np.exp(np.interp(told, known, absolute) + beyond) / sizes
+    found = between * np.exp(np.interp(told, known, absolute) + beyond) / sizes
     found[still] = 0.0
     return found
 

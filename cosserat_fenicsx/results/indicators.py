@@ -8,6 +8,8 @@ from cosserat_fenicsx.results.places import halfway
 
 # Largest length of an element next to a support, load or kink, over the length of the boundary layer there.
 _COARSE = 4.0
+# Largest number of nodes in contact that pressure is extrapolated from.
+_EXTRAPOLATED = 4
 
 
 def layer_lengths(scene, scales, layout, rule, n):
@@ -82,6 +84,39 @@ def turns_of(path, most):
         cells = slice(first, first := first + len(breaks) - 1)
         found.append(m[cells] * np.diff(breaks) * soft)
     return found if max(turns.max() for turns in found) > most else None
+
+
+def contact_edges(path):
+    """For every rod the places where contact with a wall begins or ends, over its length, ascending, at all points of a
+    path; None where the scene has no walls. The pressure is extrapolated from the last nodes in contact."""
+    if not any(action.presses for action in path.scene.actions):
+        return None
+    pressures = np.linalg.norm(path._stacked("densities")[1][..., :3], axis=3)
+    found = []
+    for i, x in enumerate(path.layout.node_s(path.rule.nodes)):
+        of_rod = pressures[:, path._cells(i)]
+        nodal = np.concatenate([of_rod[:, :, :-1].reshape(len(path), -1), of_rod[:, -1:, -1]], axis=1)
+        edges = []
+        for p in nodal:
+            touching = p > 0
+            for k in np.flatnonzero(touching[1:] != touching[:-1]).tolist():
+                last, step = (k, -1) if touching[k] else (k + 1, 1)
+                edges.append(_vanishes(x, p, last, step, x[last - step]))
+        found.append(np.unique(edges))
+    return found
+
+
+def _vanishes(x, p, last, step, beyond):
+    """Where a pressure p at nodes x vanishes between x[last] and `beyond`, from the nodes in contact; `step`: to the
+    next one of these."""
+    nodes = [last]
+    while len(nodes) < _EXTRAPOLATED and 0 <= nodes[-1] + step < len(x) and p[nodes[-1] + step] > 0:
+        nodes.append(nodes[-1] + step)
+    unit = beyond - x[last]
+    places = (x[nodes] - x[last]) / unit  # 0 at the last node in contact, 1 beyond
+    fitted = np.polynomial.Polynomial.fit(places, p[nodes], len(nodes) - 1, domain=[-1, 1], window=[-1, 1])
+    roots = [z.real for z in fitted.roots() if abs(z.imag) < 1e-9 and 0 <= z.real <= 1] if len(nodes) > 1 else []
+    return x[last] + unit * (min(roots) if roots else 0.5)
 
 
 def unresolved(scene, layout, lengths):

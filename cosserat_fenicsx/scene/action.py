@@ -99,11 +99,13 @@ class Action:
             work. It then has `stiffness` (N/m^2; N/m at a station), `damping` (s/m), `begins` (m) and a method
             `tube_around` (arc lengths s (n,), points (n, 3) of the rod, measured depths (n,) near them) -> the
             `hole_wall.Around` of the points.
+        presses: whether it is a wall with a force on the parts of rods that touch it alone, which has a kink where
+            contact begins.
         traits: None; or a dict of the fields of `models.traits.Traits`, where it takes long to find them from `work`.
     """
 
     at_nodes, scaled, permanent, follows, memory, evolve, traits = False, True, False, False, (), None, None
-    delayed, resists, touches = None, None, False
+    delayed, resists, touches, presses = None, None, False, False
 
     def acts_on(self, rod):
         """Whether it acts along a rod."""

@@ -16,6 +16,9 @@ FIRST_ELEMENTS = 4
 # flexibilities 1/EI and the loads, and the rod's length over the longest step of the quadrature that it is compared
 # with, and over the shortest element.
 _INTEGRATED, _SAMPLED, _SHORTEST = 1e-3, 256, 1024
+# Angle, rad, by which an element of the first mesh may turn, where rods turn by more than the second; most elements of a
+# rod that are made for that.
+_TURNS, _MANY_TURNS, _MOST_FOR_TURNS = 2.5, 6.3, 512
 # Elements are halved where their quadrature error exceeds this share of the largest one.
 _LARGE = 0.1
 # Smallest mean ratio of chord to arc over a quarter of an element, or over an element where the mesh is coarser than
@@ -50,6 +53,34 @@ def meshes_for(scene, degree, tol, many):
         return usual, None  # which asks less of curves
     coarser = any(a < b for a, b in zip(layout.counts, usual.counts, strict=True))
     return layout, usual if coarser else None
+
+
+def resolving_turns(scene, layout, largest):
+    """A mesh whose elements turn by little where rotations that are prescribed at a rod, or the moments on it, turn it
+    by many radians; None where `layout` is one.
+
+    On others the path itself may be lost: a P4 element that turns by more than half a turn has equilibria of its own.
+
+    Args:
+        largest: the largest load factor, in size.
+    """
+    wanted = []
+    for rod, breaks in zip(scene.rods, layout.breaks, strict=True):
+        here = [x for x in (*scene.supports, *scene.loads) if getattr(getattr(x, "station", None), "rod", None) is rod]
+        turn = max((_size(getattr(x, "rotation", None)) for x in here), default=0.0)
+        moment = sum(_size(getattr(x, "moment", None)) for x in here)
+        turn = largest * max(turn, moment * rod.length / rod.profile.range[0].J.min())
+        turn = turn if turn > _MANY_TURNS else 0.0
+        wanted.append(np.maximum(1.0, np.minimum(turn / _TURNS * np.diff(breaks), _MOST_FOR_TURNS / len(breaks))))
+    return layout.resized(scene, wanted) if max(map(np.max, wanted)) > 1 else None
+
+
+def _size(vector):
+    """The size of a vector; 0 of what is none, such as a function of time."""
+    try:
+        return float(np.linalg.norm(np.asarray(vector, dtype=float))) if vector is not None else 0.0
+    except (TypeError, ValueError):
+        return 0.0
 
 
 @per_scene

@@ -4,8 +4,9 @@ import math
 
 import numpy as np
 
+from cosserat_fenicsx.models.rodmesh import Layout
 from cosserat_fenicsx.results.accuracy import leading_coefficients
-from cosserat_fenicsx.results.indicators import element_differences, layer_lengths, turns_of, unresolved
+from cosserat_fenicsx.results.indicators import contact_edges, element_differences, layer_lengths, turns_of, unresolved
 
 # Largest length of an element next to a support, load or kink, over the length of the boundary layer there.
 _RESOLVED = 2.0
@@ -13,6 +14,9 @@ _RESOLVED = 2.0
 _SHORTEST = 1e-6
 # Largest angle by which an element of high degree may turn relative to its rest state, rad.
 _TURNED = 2.0
+# Largest distance of an edge of contact from the end of an element, over its length; most edges of one rod that elements
+# end at.
+_BESIDE, _MOST_EDGES = 3e-4, 12
 # A mesh is graded only if that needs less than this share of the elements of uniform refinement, and uniform
 # refinement needs at least so many elements.
 _WORTH, _MANY = 0.5, 32
@@ -51,6 +55,40 @@ def with_turns(scene, path):
     if turns is None:
         return None
     return path.layout.resized(scene, [np.maximum(1.0, np.ceil(found / most)) for found in turns])
+
+
+def with_edges(scene, path):
+    """The layout with element ends where contact with walls begins and ends at the points of a path.
+
+    Near ends of elements are moved there; new ones are made where these are prescribed. None where all edges of contact
+    are at element ends, or there are too many of them.
+    """
+    edges = contact_edges(path)
+    if edges is None or not loose_edges(path, edges) or max(map(len, edges)) > _MOST_EDGES:
+        return None
+    breaks, layout = [], path.layout
+    for i, pieces in enumerate(layout.pieces(scene)):
+        moved, taken = layout.breaks[i].copy(), {piece.start for piece in pieces} | {len(layout.breaks[i]) - 1}
+        more = []
+        for x in edges[i].tolist():
+            near = int(np.argmin(np.abs(layout.breaks[i] - x)))
+            if near not in taken:
+                moved[near] = x
+                taken.add(near)
+            elif abs(moved[near] - x) > _BESIDE * np.diff(layout.breaks[i]).min():
+                more.append(x)
+        breaks.append(np.sort(np.concatenate([moved, more])))
+    return Layout(tuple(breaks))
+
+
+def loose_edges(path, edges):
+    """Whether an edge of contact (see `contact_edges`) is not at the end of an element."""
+    for breaks, found in zip(path.layout.breaks, edges, strict=True):
+        cells = np.clip(np.searchsorted(breaks, found) - 1, 0, len(breaks) - 2)
+        off = np.minimum(np.abs(found - breaks[cells]), np.abs(found - breaks[cells + 1]))
+        if (off > _BESIDE * np.diff(breaks)[cells]).any():
+            return True
+    return False
 
 
 def balanced(fine, coarse, above):

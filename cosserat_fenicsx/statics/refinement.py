@@ -20,10 +20,10 @@ from cosserat_fenicsx.results.accuracy import (
     spread_error,
 )
 from cosserat_fenicsx.results.compared import NAMES, POSITION
-from cosserat_fenicsx.results.indicators import of_path, resolves, winding_lengths
+from cosserat_fenicsx.results.indicators import contact_edges, of_path, resolves, winding_lengths
 from cosserat_fenicsx.results.same_events import find_again, keep_confirmed
 from cosserat_fenicsx.statics.first_mesh import resolving
-from cosserat_fenicsx.statics.grading import balanced, with_layers, with_turns
+from cosserat_fenicsx.statics.grading import balanced, loose_edges, with_edges, with_layers, with_turns
 from cosserat_fenicsx.statics.path.recorder import Promoted
 
 _MOST_ELEMENTS = 1024
@@ -37,6 +37,8 @@ _QUARTERS, _AIM = 4, 0.8
 _LOCATED, _FOR_EVENTS = 1e-6, 2
 # Largest number of times that the error is equidistributed over the elements.
 _MOST_BALANCINGS = 4
+# Largest number of times that element ends are moved to the edges of contact with walls, before elements are halved.
+_MOST_MOVES = 3
 # Largest number of unknowns, of all points together, that is cheaper to solve than another mesh is to make.
 _CHEAP = 800
 
@@ -84,7 +86,7 @@ class _Search:
 
     def __init__(self, trace, correct, scene, tol, bound, degree, usual):
         self._trace, self._correct, self._scene, self._tol, self._degree = trace, correct, scene, tol, degree
-        self._bound = bound
+        self._bound, self._presses = bound, any(action.presses for action in scene.actions)
         self._usual, self._next = usual, None  # `_next`: the next mesh and its refinement factor, where it is known
         self._begin()
 
@@ -100,7 +102,7 @@ class _Search:
         self._halved = None  # sample points on this mesh and on the one before, if this one halves its elements
         self._error_before = None  # errors of the latter
         self._layered = None  # the next mesh where the last one does not resolve the boundary layers
-        self._balancings = 0
+        self._balancings = self._moved = 0
 
     def on(self, layout):
         """Solve on the next mesh; the path where it is accurate, else None."""
@@ -133,6 +135,9 @@ class _Search:
             if self._usual is not None and not self._plain:
                 return self._begin_again()
         self._layered = with_layers(self._scene, found.layout, layers) or with_turns(self._scene, found)
+        if self._layered is None and self._presses and self._moved < _MOST_MOVES:
+            self._layered = with_edges(self._scene, found)
+            self._moved += self._layered is not None
         if found.rounding > self._tol:  # refinement would increase it
             raise NotConverged(_rounding_hides(self._tol, found.rounding, elements, found.formulation), found)
         if np.isfinite(found.worst).all():
@@ -185,6 +190,7 @@ class _Search:
         layered, self._layered = self._layered, None
         if layered is not None:
             return self._restarted(layered)
+        self._moved = 0
         known = self._few is not None and np.isfinite(self._few.worst).all() and self._few.worst.max() > self._tol
         self._factor = 2.0
         if known:
@@ -194,7 +200,7 @@ class _Search:
                 if even is not None:
                     self._balancings += 1
                     return self._restarted(resolving(self._scene, even, self._degree))
-            self._factor = self._factor_for(self._few)
+            self._factor = 2.0 if self._presses else self._factor_for(self._few)
         return layout.finer(self._scene, self._factor)
 
     def _restarted(self, layout):
@@ -261,6 +267,8 @@ class _Search:
     def _saves(self, few, coarse):
         """Whether a mesh between those of two paths is accurate enough, and all points on it are cheaper; it is the
         next one then."""
+        if self._presses:  # only halvings keep element ends at the edges of contact
+            return False
         factor = self._factor_for(coarse)
         others = len(self.whole) - len(few)
         if few.unknowns * ((2 - factor) / 2 * others - factor / 2 * len(few)) <= _CHEAP:
@@ -275,7 +283,8 @@ class _Search:
             return compare(fine, coarse)
         if self._factor < 2:
             return carry_error(fine, coarse, self._factor, self._order, before)
-        apart, gain = estimate_error(fine, coarse, before)
+        smooth = not (self._presses and loose_edges(fine, contact_edges(fine)))
+        apart, gain = estimate_error(fine, coarse, before, smooth=smooth)
         self._halved, self._order = (fine, coarse), order_of(gain, fine.degree)
         self._error_before = error_before(apart, gain)
         return apart

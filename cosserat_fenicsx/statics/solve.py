@@ -24,7 +24,7 @@ from cosserat_fenicsx.models.rodmesh import Layout
 from cosserat_fenicsx.results.path import Path
 from cosserat_fenicsx.progress import Progress
 from cosserat_fenicsx.ranks import communicator
-from cosserat_fenicsx.statics.first_mesh import first_layout, meshes_for
+from cosserat_fenicsx.statics.first_mesh import first_layout, meshes_for, resolving_turns
 from cosserat_fenicsx.statics.solvers import solvers_of
 from cosserat_fenicsx.statics.refinement import refine
 from cosserat_fenicsx.scene.action import path_dependent
@@ -165,6 +165,8 @@ def solve(
             return trace(Layout.of(scene, elements))
         many = free or len(targets) > FEW
         layout, usual = meshes_for(scene, degree, tol, many) if simple else (first_layout(scene, degree), None)
+        turning = resolving_turns(scene, layout, max(map(abs, targets)))
+        layout, usual = (layout, usual) if turning is None else (turning, None)
         return refine(trace, correct, scene, layout, tol, tuple(bound), degree, usual)
 
     with Progress(targets, progress, comm) as bar:

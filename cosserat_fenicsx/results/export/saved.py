@@ -18,10 +18,10 @@ import numpy as np
 from cosserat_fenicsx import __version__
 from cosserat_fenicsx.element import ElementRule
 from cosserat_fenicsx.errors import SceneError
+from cosserat_fenicsx.results.compared import NAMES
 from cosserat_fenicsx.results.export import contents
 from cosserat_fenicsx.results.export.arrays import h5py_for, new_hdf5
 from cosserat_fenicsx.results.export.beside import replaced
-from cosserat_fenicsx.results.compared import NAMES
 from cosserat_fenicsx.results.history import History, Instant, Ledger
 from cosserat_fenicsx.results.path import Path
 from cosserat_fenicsx.results.records import Event, Record, Records
