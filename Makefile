@@ -28,7 +28,7 @@ help:
 	@echo "make string  drill-strings in motion: stick-slip, waves, a map of stability, each with pictures and numbers that must come out; writes out/strings/ (a minute)"
 	@echo "make whirl   a collar in its hole from forward to backward whirl, and a map of whirl over speed and friction; writes out/whirl/ (five minutes)"
 	@echo "make docs    the documentation as a site that needs no network; writes out/docs/index.html"
-	@echo "make test    all tests on one, two and four processes"
+	@echo "make test    all tests, the serial ones on two workers"
 	@echo "make tables  the tables of accuracy and cost in docs/, measured anew and put there"
 	@echo "make figure3 every curve of the paper's Figure 3, and what was found; writes out/ (about 4 minutes)"
 	@echo "make work-precision  speed against accuracy, beside Exudyn, OpenSeesPy, PyElastica, CalculiX, welleng and torque-drag (half an hour at most)"
