@@ -172,3 +172,16 @@ def test_rock_in_a_scene_file(tmp_path):
     file.write_text(text, encoding="utf-8")
     scene = cf.read_drilling_scene(file).scene
     assert scene.bit.rock_stiffness == 4e7 and from_data(to_data(scene)).bit == scene.bit
+
+
+@pytest.mark.parametrize("stiffness", [1e6, 1e8, math.inf])
+def test_the_weight_of_a_hook_that_is_lowered_is_that_of_springs_in_a_row(stiffness):
+    """Lines, string and rock; and in steady rotation on rock that gives way nothing changes."""
+    down = cf.Table([0.0, 1.0, 2.0, 60.0], [(0.0,), (-0.01,), (0.0,), (0.0,)])
+    bit = cf.BitOnRock(cf.Stribeck(0.0, 0.0), 6e4, rock_stiffness=stiffness)
+    scene = hanging(cf.Hook(6e6, down), bit=bit, weight=300.0, drag=cf.ViscousDrag(0.0, 3.0))
+    history = cf.simulate_drilling(scene, 25.0, dt=5e-3)
+    give = sum(x.length / x.EA for x in scene.segments) + 1 / 6e6 + 1 / stiffness
+    assert history.weight_on_bit[-1] - 6e4 == pytest.approx(0.01 / give, rel=1e-6)
+    turning = bouncing(stiffness, height=1e-12, start="steady", drag=cf.ViscousDrag(0.3, 0.3))
+    assert np.ptp(cf.simulate_drilling(turning, 1.0, dt=5e-3).weight_on_bit) < 1.0
