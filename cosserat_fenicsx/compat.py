@@ -5,7 +5,6 @@ All other modules call the functions below and contain no version checks.
 """
 
 import contextlib
-import functools
 import logging
 import math
 import platform
@@ -217,13 +216,13 @@ def _from_cache(name, objects, folder, timeout):
     return [getattr(module.lib, x) for x in objects], module
 
 
-def _compiled(kind, objects):
+def _compiled(kind, objects, level="-O3"):
     """FFCx's (compiled objects, module, code) of a list of UFL's, all in one module, from the cache or compiled.
 
     Modules are compiled for speed: a tenth more to compile than by default, and from a sixth to half of the running
     time less. The macro among the flags gives them names of their own: no other program makes them.
     """
-    flags = ["-O3", "-g0", *instructions(), "-DCOSSERAT_FENICSX", *code_cache.more_flags()]
+    flags = [level, "-g0", *instructions(), "-DCOSSERAT_FENICSX", *code_cache.more_flags()]
 
     def found(folder):
         return getattr(ffcx_compiler, f"compile_{kind}")(objects, cache_dir=folder, cffi_extra_compile_args=flags)
@@ -272,16 +271,21 @@ def expressions(mesh, given):
     return [None if a is None else _constructed(lambda a=a, x=x: fem.Expression(a, x), next(found)) for a, x in given]
 
 
+# (elements, what `_compiled` gives for them) of this process, where the release compiles elements.
+_ELEMENTS = []
+
+
 @rank_0_first
-@functools.cache
 def _element(element):
     """(compiled, module, code) of an element, for releases that compile elements: with others of its degree, since a
     module of one takes as long as one of thirty."""
-    p = (element.degree() + 1) // 2 if element.family() == "Quadrature" else element.degree()
-    usual = _usual_elements(max(1, p))
-    for elements in (usual, [element]) if element in usual else ([element],):
-        found, module, code = _compiled("elements", elements)
-        return found[elements.index(element)], module, code
+    if not any(element in elements for elements, _ in _ELEMENTS):
+        p = (element.degree() + 1) // 2 if element.family() == "Quadrature" else element.degree()
+        usual = _usual_elements(max(1, p))
+        elements = usual if element in usual else [element]
+        _ELEMENTS.append((elements, _compiled("elements", elements, "-O0")))
+    elements, (found, module, code) = next(known for known in _ELEMENTS if element in known[0])
+    return found[elements.index(element)], module, code
 
 
 def on_rows(expressions):

@@ -186,6 +186,7 @@ def test_velocities_along_a_rod():
     assert history.kinetic[0] > 0 and SPAGHETTI.mass == 1
 
 
+@pytest.mark.slow
 def test_files_and_pictures(tmp_path):
     import meshio
 

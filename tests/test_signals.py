@@ -35,6 +35,7 @@ sys.exit(main())"""
     assert (done.returncode, done.stdout, done.stderr) == (130, "", "cosserat: interrupted\n")
 
 
+@pytest.mark.slow
 def test_a_terminal_that_is_closed(tmp_path):
     """The path so far is written, although nothing can be printed any more."""
     head, _, _ = DEMO.read_text(encoding="utf-8").partition("[solve]")

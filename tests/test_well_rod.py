@@ -93,6 +93,7 @@ def test_a_build_section_against_its_strong_form(case):
     assert found.hook_load == pytest.approx(case["hook_load_vertical"], rel=2e-4)
 
 
+@pytest.mark.slow
 def test_a_string_that_would_buckle_is_not_enough():
     """In a vertical hole it stays straight on the axis, far beyond the load at which it buckles."""
     path = cf.WellPath.from_survey([0, 600], [0, 0], [0, 0])
@@ -309,6 +310,7 @@ def test_a_string_in_a_vertical_hole_is_a_helix_and_not_straight():
     assert rate == pytest.approx(np.sqrt(-answer.tension[wound] / (2 * EI)), rel=5e-3)
 
 
+@pytest.mark.slow
 def test_a_string_that_stays_straight_where_there_is_a_helix_is_not_enough():
     """In a vertical hole with friction: what the helix rubs is the error of the model."""
     path = cf.WellPath.from_survey([0, 400], [0, 0], [0, 0])
