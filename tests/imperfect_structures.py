@@ -336,8 +336,10 @@ def outcome(given, truth, control, **arguments):
     kinds, levels = ([getattr(event, name) for event in path.events] for name in ("kind", "load_factor"))
     off = differences(path, kinds, levels, truth, given, whole=refusal is None)
     told = [said for said in path.why if "negative modes go" in said or "not listed" in said]
-    if refusal is not None:
-        return ("wrong" if off else "in words"), f"{refusal} {off}".strip(), spent
+    if refusal is not None:  # words that say what happened
+        right = not off or "changed to another branch" in str(refusal)
+        right = right and ("the path is closed" not in str(refusal))
+        return ("in words" if right else "wrong"), f"{refusal} {off}".strip(), spent
     if off:
         return ("in words" if told else "wrong"), "; ".join([off, *told]), spent
     return "right", "", spent

@@ -22,6 +22,14 @@ _BESIDE, _SAME = 0.1, 1e-4
 # A step that is shorter than the first number times the length of the path from the unloaded state, and turns by less
 # than the second (rad), is on the path whatever the number of negative modes.
 _SHORT, _STRAIGHT = 3e-3, 0.05
+# Largest relative difference of the load factors of two limit points that are the same one; its root for the states.
+_MET = 1e-7
+_CLOSED = "the path is closed: it returned to an earlier point without reaching that load factor"
+# A path that has begun at the unloaded state returns to an earlier point only after passing that state again.
+_CHANGED = (
+    "the path has changed to another branch: it returned to an earlier point without passing the unloaded state "
+    "(smaller steps, by StepControl(largest=...), may stay on the path)"
+)
 # Smallest first step, over the length of the path from the unloaded state.
 _FIRST = 0.02
 
@@ -37,7 +45,7 @@ class ArcLength:
 
     def __init__(self, track, control, locator):
         self.track, self.control, self._locator = track, control, locator
-        self._step = None
+        self._step, self._branched = None, False
         # Whether the number of negative modes changes as the critical points tell. The second variation that is counted
         # has bounded stiffnesses, and under some loads it is the symmetric part of the tangent: once that has been seen
         # in a step that is plain, the number tells nothing about later ones.
@@ -60,14 +68,15 @@ class ArcLength:
             self._set_out(target)
         else:
             self._branch_off(first, slope)
-        begin, steps = first, 0
+        begin, steps, limits, home = first, 0, [], first is not None or self._branched
+        self._branched = home
         for _ in range(self.control.most_steps):
             branching, point, first = first is not None, first or self._attempt(), None
             if point is not None:
                 try:
                     landing, crossings = self._locator.between(
                         track.here, point, target, self._weight,
-                        probe=not branching, explained=self._counts, short=self._plain(point),
+                        probe=not branching, explained=self._counts, short=not branching and self._plain(point),
                     )  # fmt: skip
                 except Lost as lost:
                     track.failure = lost.reason
@@ -83,10 +92,15 @@ class ArcLength:
                     return False
                 continue
             begin, steps = begin or point, steps + 1
+            home = home or self._share(track.origin, track.here, point) is not None
             if steps > 3 and self._passes(begin, track.here, point):
-                track.failure = "the path is closed: it returned to an earlier point without reaching that load factor"
+                track.failure = _CLOSED if home else _CHANGED
                 return track.restore()
             for crossing in crossings:
+                if crossing.kind == "limit" and any(self._again(crossing, other) for other in limits):
+                    track.failure = _CHANGED
+                    return track.restore()
+                limits += [crossing] * (crossing.kind == "limit")
                 if on_event and on_event(crossing):
                     track.restore()
                     return True
@@ -178,10 +192,8 @@ class ArcLength:
         chord, change = b.numbers[0] - a.numbers[0], b.load_factor - a.load_factor
         moved, gain = place.numbers[0] - a.numbers[0], place.load_factor - a.load_factor
         size = track.product(chord, chord) + w * change**2
-        along = track.product(moved, chord) + w * gain * change
-        beside = track.product(moved, moved) + w * gain**2 - along**2 / size
         onward = track.product(place.along, chord) + w * place.rise * change
-        if not (0 <= along < size and beside < (_BESIDE**2) * size and onward > 0):
+        if onward <= 0 or self._share(place, a, b) is None:
             return False
         share = (track.product(place.along, moved) + w * place.rise * gain) / onward  # in the plane of the place
         guess = [u + share * (v - u) for u, v in zip(a.numbers, b.numbers, strict=True)]
@@ -189,6 +201,23 @@ class ArcLength:
         off, gap = track.problem.numbers()[0] - place.numbers[0], track.problem.load_factor - place.load_factor
         same = solved.converged and track.product(off, off) + w * gap**2 <= (_SAME**2) * size
         return same and track.point(solved).negative_modes == place.negative_modes
+
+    def _share(self, place, a, b):
+        """The share of the step from a to b after which it passes beside an earlier point; None where it does not."""
+        track, w = self.track, self._weight
+        chord, change = b.numbers[0] - a.numbers[0], b.load_factor - a.load_factor
+        moved, gain = place.numbers[0] - a.numbers[0], place.load_factor - a.load_factor
+        size = track.product(chord, chord) + w * change**2
+        along = track.product(moved, chord) + w * gain * change
+        beside = track.product(moved, moved) + w * gain**2 - along**2 / size
+        return along / size if 0 <= along < size and beside < (_BESIDE**2) * size else None
+
+    def _again(self, limit, other):
+        """Whether two limit points are the same one, passed in the same direction."""
+        track, a, b = self.track, limit.point, other.point
+        apart = track.distance(a.numbers, b.numbers)
+        near = abs(a.load_factor - b.load_factor) <= _MET * max(abs(a.load_factor), abs(b.load_factor))
+        return near and apart <= _MET**0.5 and track.product(limit.direction, other.direction) > 0
 
     def _length(self, a, b):
         moved, change = b.numbers[0] - a.numbers[0], b.load_factor - a.load_factor

@@ -38,6 +38,7 @@ class Chord:
         track: the `Track`, which stands at a.
         a, b: the `PathPoint`s.
         weight: of the load factor in the metric.
+        short: whether the segment is too short to lead from one path to another unnoticed.
 
     Attributes:
         dips: whether the determinant of the second variation almost vanishes between, more often than the number of
@@ -48,8 +49,8 @@ class Chord:
 
     dips = varies = False
 
-    def __init__(self, track, a, b, weight):
-        self.track, self._weight = track, weight
+    def __init__(self, track, a, b, weight, *, short=False):
+        self.track, self._weight, self._short = track, weight, short
         self.known = [(0.0, a), (1.0, b)]
         self.normal, self.change = b.numbers[0] - a.numbers[0], b.load_factor - a.load_factor
         self.length = math.sqrt(track.product(self.normal, self.normal) + weight * self.change**2)
@@ -138,6 +139,8 @@ class Chord:
             place: the coordinate.
             turning: whether the load factor turns there; else it is monotonic.
         """
+        if self._short:  # points at these distances would differ by little more than rounding
+            return True
         for apart in _BESIDE:
             before, after = (self._point(place + aside) for aside in (-apart, apart))
             if before is None or after is None or (before.rise * after.rise < 0) != turning:

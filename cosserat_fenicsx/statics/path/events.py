@@ -101,7 +101,7 @@ class Locator:
             Lost: the point at `target` was not found, negative modes appear and vanish between a and b, or their number
                 changes otherwise than the critical points tell.
         """
-        chord = Chord(self.track, a, b, weight)
+        chord = Chord(self.track, a, b, weight, short=short)
         place = chord.comes_and_goes() if probe else None
         if place is not None:
             raise Lost(place)
