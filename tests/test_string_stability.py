@@ -1,6 +1,7 @@
 """Growth of modes of strings that drill: against roots, limits and counts found independently of this package."""
 
 import math
+import warnings
 from dataclasses import replace
 
 import numpy as np
@@ -276,3 +277,16 @@ def test_other_drives():
     assert set(answer.with_drives(0)) == {"matched"}  # no inertia to tune
     own = answer.with_drives(0, 0, {"own": drive_of("rigid")})["own"]
     assert own == pytest.approx(answer.growth[0, 0], rel=1e-12)
+
+
+def test_speeds_in_revolutions_a_minute_are_doubted():
+    """120 typed for 120 * units.rpm would be 1146 rev/min."""
+    with pytest.warns(cf.SceneWarning, match=r"TopDrive.speed = 120 rad/s are 1146 rev/min.*120 \* units.rpm"):
+        fast = cf.TopDrive(120)
+    assert fast.speed == 120
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        drive = cf.TopDrive(250 * cf.units.rpm)
+        scene = cf.Drilling(cf.Discs((930.0, 2782.0), (700.0,)), drive, cf.BitOnRock(cf.Stribeck(8000.0, 5000.0)))
+    with pytest.warns(cf.SceneWarning, match="stability.speeds = 180 rad/s"):
+        cf.stability(scene, [90.0, 180.0], None)

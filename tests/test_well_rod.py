@@ -4,6 +4,7 @@ import json
 import math
 import types
 from dataclasses import replace
+from unittest.mock import patch
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +13,7 @@ from reference_wells import in_build_section, well
 
 import cosserat_fenicsx as cf
 from cosserat_fenicsx.well.rod import rod_in_hole
+from cosserat_fenicsx.well.rod.rod_answer import _found
 
 KNOWN = json.loads((Path(__file__).parent / "reference" / "rod_in_hole.json").read_text(encoding="utf-8"))
 EI = 1228200.0
@@ -311,6 +313,36 @@ def test_a_string_in_a_vertical_hole_is_a_helix_and_not_straight():
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("torque", [6000.0, -6000.0])
+def test_a_helix_has_the_hand_that_torque_favours(torque):
+    """Closed forms of a long helix with small slopes: 0.6423 rad/m and 1611 N/m, of the other hand 0.6278 and 1516."""
+    EI = 3.1e5
+    string = cf.DrillString([cf.Component(None, cf.Stiffness((5.6e7,) * 2, 2.9e8, (EI, EI), EI), 1.0, 0.05)])
+    where = cf.Borehole(cf.WellPath.from_survey([0, 130], [0, 0], [0, 0]), cf.HoleSection(130.0, 2 * 0.081, 0.0))
+    answer = cf.torque_and_drag(where, string, cf.Static(250e3, torque), depth=120.0, model="rod")
+    inside = (answer.md > 50) & (answer.md < 70)
+    rate = np.polyfit(answer.solved.s[inside], np.unwrap(answer.solved.side[inside]), 1)[0]
+    assert rate * torque < 0 and abs(rate) == pytest.approx(0.6423, rel=0.02)
+    assert answer.side_force[inside].mean() == pytest.approx(1611, rel=5e-3)
+    assert answer.enough and answer.solved.negative_modes == 0
+    (said,) = (line for line in answer.why if "the hand that the torque favours" in line)
+    assert "has -24.9" in said and "of the other hand -23.5" in said
+
+
+def test_a_torque_of_a_string_that_does_not_turn_is_not_more_than_was_estimated(out):
+    """A helix and the side of the contact make a few N m; the estimates are about the hook load alone."""
+    soft = cf.torque_and_drag(hole(build()), STRING, cf.TripIn(), model="soft")
+    assert not out.solved.string.turns
+    assert not any("MORE" in line for line in _found(soft, out.solved, {"soft": (0.0, 21.0)}))
+    assert any("MORE" in line for line in _found(soft, out.solved, {"soft": (1e6, 0.0)}))
+
+
+def test_an_unknown_number_of_negative_modes_is_not_enough(out):
+    assert out.enough
+    with patch.object(out.solved, "negative_modes", -1):
+        assert not out.enough
+
+
 def test_a_string_that_stays_straight_where_there_is_a_helix_is_not_enough():
     """In a vertical hole with friction: what the helix rubs is the error of the model."""
     path = cf.WellPath.from_survey([0, 400], [0, 0], [0, 0])

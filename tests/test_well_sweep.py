@@ -256,11 +256,23 @@ def test_the_chart_of_a_sweep_marks_lock_up_and_thrusts_beyond_all_others():
     operations, depths = (cf.TripIn(), cf.RotateOffBottom()), np.arange(1e3, 6e3, 1e3)
     found = cf.DepthSweep(operations, depths, (None,), values, {(0, 0, 4): "locks up"})
     hook, torque = found.plot().axes
-    assert [text.get_text() for text in hook.texts] == ["-70,000 kN", "locks up at 90 m"]
+    thrust, locked = (text.get_text() for text in hook.texts)
+    assert thrust == "-70,000 kN, beyond the axis: close to lock-up"
+    assert locked == "bit at 5000 m: locks up, from md = 90 m of the string on"
     assert -1e3 < hook.get_xlim()[0] < -300 and 300 < hook.get_xlim()[1] < 1e3
     told = [text.get_text() for text in hook.get_legend().get_texts()]
     assert told == ["trip in", "rotate off bottom", "by the exact rod, others soft", "locks up, or no answer"]
     assert hook.figure.get_suptitle().endswith("7 of 10 answers so far") and len(torque.lines) == 2
+
+
+def test_the_largest_error_of_a_sweep_names_its_quantity_and_place():
+    values = {name: np.full((2, 1, 3), 1e-3) for name in module.KEPT}
+    values["rung"][:] = 1
+    operations, depths = (cf.TripIn(), cf.RotateOffBottom()), np.array([1e3, 2e3, 5409.0])
+    for worst, told in ((0.5, "5e-01"), (np.inf, "without a bound: it may lock up")):
+        values["model_error"][0, 0, 1] = worst
+        last = str(cf.DepthSweep(operations, depths, (None,), values, {})).splitlines()[-1]
+        assert "hook load and surface torque" in last and last.endswith(f"{told} (trip in, bit at 2000 m)")
 
 
 @pytest.mark.slow

@@ -5,7 +5,25 @@ import numbers
 
 import numpy as np
 
-from cosserat_fenicsx.checks import call, number, refuse
+from cosserat_fenicsx import units
+from cosserat_fenicsx.checks import call, number, refuse, warn
+
+# Speeds of rotation (rad/s) above this are revolutions a minute by all appearance: 300 rev/min are 31.4 rad/s.
+_FAST = 32.0
+
+
+def doubt_speed(owner: object, field: str, speed: float) -> None:
+    """Warn of a speed of a drive (rad/s) that looks like revolutions a minute.
+
+    Args:
+        owner: whose number it is, or the name of the function.
+    """
+    if abs(speed) > _FAST:
+        name = owner if isinstance(owner, str) else type(owner).__name__
+        warn(
+            f"{name}.{field} = {speed:g} rad/s are {speed / units.rpm:.0f} rev/min, faster than drives turn a string: "
+            f"{speed:g} rev/min are {speed:g} * units.rpm = {speed * units.rpm:.4g} rad/s"
+        )
 
 
 class ScalarSignal:

@@ -13,7 +13,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from cosserat_fenicsx.checks import instance, number, positive, refuse, store
-from cosserat_fenicsx.drilling.signals import ScalarSignal
+from cosserat_fenicsx.drilling.signals import ScalarSignal, doubt_speed
 
 #: Rules that choose the gains of a `PI` control, and its Kp over the impedance of the string: see `linear.tuned`.
 RULES = {"SoftTorque": 1.0, "SoftSpeed": 4.0}
@@ -112,7 +112,7 @@ class TopDrive:
     Args:
         speed: asked for, rad/s (`60 * units.rpm`): a number, from the start on, or a function of time, such as
             `Ramp(...)` or `Table(...)`, whose attribute `jumps` holds the times where it is not smooth. None for a
-            `Motor`.
+            `Motor`. Numbers above 32 look like revolutions a minute: they are taken, with a warning.
         inertia: of the drive, at the string's speed, kg m^2.
         control: `Stiff()`, `PI(Kp, Ki)`, `Matched()` or `Motor(torque)`.
 
@@ -138,7 +138,9 @@ class TopDrive:
         elif self.speed is None:
             refuse(self, "speed", None, "the speed asked for (rad/s), such as 60 * units.rpm")
         else:
-            self.signal()
+            signal = self.signal()
+            if signal.constant:
+                doubt_speed(self, "speed", signal(0.0))
 
     def signal(self) -> ScalarSignal:
         """The speed asked for at every time, rad/s."""

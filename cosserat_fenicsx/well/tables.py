@@ -186,10 +186,14 @@ def sweep_table(sweep):
     lines += notes[:_NOTES]
     if len(notes) > _NOTES:
         lines.append(f"and {len(notes) - _NOTES} more, see `notes`")
-    told = sweep.values["model_error"][~np.isnan(sweep.values["model_error"])]
-    if len(told):
-        worst = "without a bound: it may lock up" if np.isinf(told).any() else f"{told.max():.0e}"
-        lines.append(f"largest estimated relative error of the model {worst}")
+    told = sweep.values["model_error"]
+    if not np.isnan(told).all():
+        i, j, k = np.unravel_index(np.nanargmax(told), told.shape)
+        worst = "without a bound: it may lock up" if np.isinf(told[i, j, k]) else f"{told[i, j, k]:.0e}"
+        lines.append(
+            "largest relative error of hook load and surface torque by what the model leaves out, estimated: "
+            f"{worst} ({sweep.label(i, j)}, bit at {sweep.depths[k]:.6g} m)"
+        )
     return "\n".join(lines)
 
 

@@ -10,6 +10,7 @@ from cosserat_fenicsx.drilling.bit_laws import Cutting
 from cosserat_fenicsx.drilling.discs import Discs
 from cosserat_fenicsx.drilling.linear.characteristic import FallingTorque, Regenerative
 from cosserat_fenicsx.drilling.linear.impedances import axial, torsional
+from cosserat_fenicsx.drilling.signals import doubt_speed
 from cosserat_fenicsx.drilling.single_valued import refuse_several_speeds, slope, stribeck_of
 from cosserat_fenicsx.drilling.steady_start import penetration
 
@@ -78,6 +79,7 @@ def speeds_and_weights(owner, scene, speeds, weights):
     speeds = np.atleast_1d(finite_array(owner, "speeds", speeds, "positive numbers (rad/s)"))
     if speeds.ndim != 1 or not speeds.size or (speeds <= 0).any():
         refuse(owner, "speeds", speeds.tolist(), "positive numbers (rad/s)")
+    doubt_speed(owner, "speeds", float(speeds.max()))
     if weights is None:
         own = scene.bit.weight if scene.bit else None
         return speeds, np.array([np.nan if own is None else own])

@@ -45,7 +45,8 @@ def sweep_figure(sweep):
         for j in range(len(sweep.friction)):
             look = {"color": _COLOURS[i % len(_COLOURS)], "linestyle": _STYLES[j % len(_STYLES)]}
             drawn = {**look, "label": sweep.label(i, j), "marker": "." if len(sweep.depths) < 30 else None}
-            panels = [(axes[0], sweep.hook_load[i, j] / 1e3)]
+            hook = sweep.hook_load[i, j] / 1e3
+            panels = [(axes[0], np.where((hook < low) | (hook > high), np.nan, hook))]
             if turns and operation.direction(1.0)[1]:
                 panels.append((axes[1], sweep.surface_torque[i, j] / 1e3))
             for panel, loads in panels:
@@ -94,7 +95,7 @@ def _without_answer(axes, sweep, i, j, limits, colour):
         left = loads[k] < limits[0]
         at = limits[0] if left else limits[1]
         axes.plot(at, depths[k], "<" if left else ">", color=colour, clip_on=False)
-        axes.annotate(f"{loads[k]:,.0f} kN", (at, depths[k]), (8, 0) if left else (-8, 0),
+        axes.annotate(f"{loads[k]:,.0f} kN, beyond the axis: close to lock-up", (at, depths[k]), (8, 0) if left else (-8, 0),
                       ha="left" if left else "right", **note)  # fmt: skip
     order = np.argsort(depths)
     shown = None
@@ -107,7 +108,8 @@ def _without_answer(axes, sweep, i, j, limits, colour):
             axes.plot(0.02 if shown is None else shown, depths[k], "X", color=colour, clip_on=False, **at)
             locked = sweep.values["locked"][i, j, k]
             if shown is not None and np.isfinite(locked):
-                axes.annotate(f"locks up at {locked:.5g} m", (shown, depths[k]), (8, 0), **note)
+                told = f"bit at {depths[k]:.6g} m: locks up, from md = {locked:.5g} m of the string on"
+                axes.annotate(told, (shown, depths[k]), (8, 0), **note)
 
 
 def fit_figure(fit):

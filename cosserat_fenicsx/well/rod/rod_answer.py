@@ -204,7 +204,8 @@ def _found(flexible, solved, differences):
                            zip(("hook load", "surface torque"), ("N", "N m"), apart, scales, strict=True)
                            if share(abs(value), scale) > 1e-9)  # fmt: skip
         yield f"it differs from the {name} string by {shares or 'nothing'}"
-        most = max(share(abs(value), scale) for value, scale in zip(apart, scales, strict=True))
+        counted = 2 if solved.string.turns else 1  # the estimates are about the torque only where the string turns
+        most = max(share(abs(value), scale) for value, scale in list(zip(apart, scales, strict=True))[:counted])
         if name == flexible.model and most > flexible.model_error + flexible.error + solved.error:
             yield f"this is MORE than was estimated for the {name} string, {flexible.model_error:.1e}: look at both"
     if solved.negative_modes:

@@ -7,11 +7,14 @@ Their bodies, and all other components, touch with their contact radius along th
 
 import contextlib
 
+import numpy as np
+
 from cosserat_fenicsx.checks import refuse
 from cosserat_fenicsx.errors import NotConverged, SceneError
 from cosserat_fenicsx.well.components import weight_in_mud
 from cosserat_fenicsx.well.rings import is_ring, ring_of
 from cosserat_fenicsx.well.rod.rod_answer import RodInContact
+from cosserat_fenicsx.well.rod.starts import energy_of_helix, turns_of_helix
 
 
 def rod_in_contact(flexible, decided, progress=None, exact=True):
@@ -67,11 +70,27 @@ def rod_in_contact(flexible, decided, progress=None, exact=True):
                     *decided,
                     "begun as a helix: from the axis an equilibrium was found that would buckle, "
                     f"{solved.negative_modes} negative eigenvalues of the second variation",
+                    *_of_hand(helix),
                 )
                 solved, short = helix, shorter
     if short is not None:
         decided = (*decided, f"NOT ENOUGH for tol = {flexible.tol:g}: {short}")
     return RodInContact._of(flexible, solved, decided)
+
+
+def _of_hand(solved):
+    """A sentence on the hand of a helix, and its energy beside that of the other one, where it is most compressed."""
+    at = int(np.argmin(solved.tension))
+    EI = solved.string.bending[solved.string.section_at(solved.s[at])]
+    compression, torque, hand = max(-solved.tension[at], 0.0), solved.torque[at], solved.string.hand
+    energies = [energy_of_helix(EI, compression, torque, solved.string.clearance,
+                                turns_of_helix(EI, compression, torque, h)) for h in (hand, -hand)]  # fmt: skip
+    yield (
+        f"the helix was begun {'clockwise' if hand > 0 else 'counterclockwise'} looking down the hole, "
+        f"{'the hand that the torque favours' if abs(torque) > 0 else 'as the other hand is equal'}: with the largest "
+        f"compression, {compression:.4g} N, and {torque:.4g} N m a long helix has {energies[0]:.5g} J/m more than the "
+        f"straight string, of the other hand {energies[1]:.5g} J/m"
+    )
 
 
 def check_rod(hole, laid, operation, mud, torque_convention):

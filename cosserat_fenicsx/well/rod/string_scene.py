@@ -39,7 +39,8 @@ class StringScene:
         path: the `WellPath`; scene: with one `rod`, its `support`, the `wall` and the `rings`.
         sections: the true `Stiffness` of each section; ends: (n,) their lower ends, m.
         weight: (n,) N/m; bottom: force at the lower end (3,), N.
-        clearance: the smallest one of the wall, m. turns: whether torque is applied, or friction exerts one.
+        clearance: the smallest one of the wall, m. torque: at the lower end, against the rotation of drilling, N m.
+        turns: whether torque is applied, or friction exerts one.
         words: what was simplified, as text.
     """
 
@@ -54,12 +55,20 @@ class StringScene:
     weight: np.ndarray
     bottom: np.ndarray
     clearance: float
+    torque: float
     turns: bool
     words: str
 
     def section_at(self, s):
         """(n,) indices of the sections at arc lengths s (n,)."""
         return np.searchsorted(self.ends[:-1], s)
+
+    @property
+    def hand(self):
+        """That of the helix which torque, or else the friction of rotation, favours: -1 where the angle round the axis
+        falls down the hole, 1 where it grows, and where there is neither."""
+        around = self.torque or sum(across for _, (_, across) in self.wall.slip)
+        return -1 if around > 0 else 1
 
     @cached_property
     def bending(self):
@@ -156,7 +165,7 @@ def string_in(path, lengths, stiffness, weight, contact_radius, radius, friction
     words = "the string's lengths are those under load" if not extensible else "the string stretches"
     turns = bool(torque or any(across for _, (_, across) in wall.slip))
     return StringScene(path, Scene([rod], [support], [*loads, wall, *around]), rod, support, wall, around, sections,
-                       ends, weight, pull * t, wall.clearance, turns, words)  # fmt: skip
+                       ends, weight, pull * t, wall.clearance, torque, turns, words)  # fmt: skip
 
 
 def _numbers(name, value, count, expected, accept):
