@@ -78,9 +78,8 @@ def with_errors(contacts, coarser, reach, layer):
     """The `Contact`s with estimated errors of the forces at points from those in a rigid wall, N.
 
     The largest of what the length that holds the peak changes, and of what is left of the change from the coarser mesh;
-    and what is left of the wall's softness, 2.5 times the square of the layer over the free span beside
-    the force. These covered
-    96 % of the errors of forces in random wells.
+    and what is left of the wall's softness, 2.5 times the square of the layer over the free span beside the force. The
+    factors were chosen by forces of reference strings and of a few wells; they are no bounds.
 
     Args:
         contacts: from `contacts_along`; coarser: those on the coarser mesh, or None without one. reach: distance in
