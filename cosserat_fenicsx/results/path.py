@@ -233,9 +233,9 @@ class Path(Result):
 
         position: over the largest displacement at that point of the path (where sections mainly rotate, over their
         rotation times the radius of gyration). rotation: the angle (rad) over the largest rotation, 2 sin(angle/2), or
-        the largest displacement over the length of the longest rod if that is more. force: of n, over the largest |n|,
-        or the largest |m| over that length if that is more. moment: of m, over the largest |m|. Rounding is included:
-        that of n is large on slender rods which bend without a large n.
+        over the largest displacement over the length of the longest rod if that is more. force: of n, over the largest
+        size of n, or that of m over that length if that is more. moment: of m, over its largest size. Rounding is
+        included: that of n is large on slender rods which bend without a large n.
         """
         return Errors(*(np.full((4, len(self)), np.nan) if self._errors is None else self._errors))
 
