@@ -48,7 +48,8 @@ def compare(drawn, tolerances=TOLERANCES):
 
     Returns:
         (verdict of the reference, [(tol, outcome, true errors (4,), estimates (4,), (4,) which estimates are those
-        of rounding, seconds of processor time)]). Where several equilibria exist, the reference is the one nearest to the package's result, and the outcome is "other branch".
+        of rounding, seconds of processor time)]). Where several equilibria exist, the reference is the one
+        nearest to the package's result, and the outcome is "other branch".
     """
     rod, scene = drawn.scene()
     problem, rows = drawn.problem(), []

@@ -155,6 +155,12 @@ def test_rounding_of_the_forces_of_slender_rods_is_told_and_not_refined_for():
     assert (true_errors(path, fine)[:, 0] <= 3 * np.array(path.errors)[:, 0]).all()  # the finer one rounds more
 
 
+def test_a_path_that_begins_without_load_bounds_forces_too():
+    path = cf.solve(in_space(), (0.0, 1.0))
+    assert path.bounded == ("position", "rotation", "force", "moment") and path.load_factors[0] == 0
+    assert np.array(path.errors).max() <= 1e-6
+
+
 def test_errors_are_saved(tmp_path):
     h5py = pytest.importorskip("h5py")
     path = cf.solve(in_space(), [0.5, 1.0], tol=1e-4, bound=["position", "moment"])

@@ -233,9 +233,10 @@ class Path(Result):
 
         position: over the largest displacement at that point of the path (where sections mainly rotate, over their
         rotation times the radius of gyration). rotation: the angle (rad) over the largest rotation, 2 sin(angle/2), or
-        the largest displacement over the length of the longest rod if that is more. force: of n, over the largest |n|,
-        or the largest |m| over that length if that is more. moment: of m, over the largest |m|. Rounding is included:
-        that of n is large on slender rods which bend without a large n.
+        over the largest displacement over the length of the longest rod if that is more. force: of n, over the largest
+        size of n, or that of m over that length if that is more. moment: of m, over its largest size. Rounding is
+        included, over the largest size on the path, since it is the same at small loads: that of n is large on slender
+        rods which bend without a large n.
         """
         return Errors(*(np.full((4, len(self)), np.nan) if self._errors is None else self._errors))
 
@@ -261,8 +262,10 @@ class Path(Result):
 
     @property
     def rounding_errors(self):
-        """(4, n) errors of n and m by rounding, relative; 0 for the others, see `rounding`."""
-        return self._reference.rounding / self._reference.sizes
+        """(4, n) errors of n and m by rounding, over their largest sizes on the path; 0 for the others, see
+        `rounding`."""
+        sizes = self._reference.sizes
+        return self._reference.rounding / sizes.max(axis=1, initial=1e-300)[:, None]
 
     def mode(self, event: Event, rod: RodOrName | None = None) -> np.ndarray:
         """(nodes, 3) the mode of an event at the nodes of a rod (default the first), see `Event`."""

@@ -16,8 +16,8 @@ FIRST_ELEMENTS = 4
 # flexibilities 1/EI and the loads, and the rod's length over the longest step of the quadrature that it is compared
 # with, and over the shortest element.
 _INTEGRATED, _SAMPLED, _SHORTEST = 1e-3, 256, 1024
-# Angle, rad, by which an element of the first mesh may turn, where rods turn by more than the second; most elements of a
-# rod that are made for that.
+# Angle, rad, by which an element of the first mesh may turn, where rods turn by more than the second; most elements of
+# a rod that are made for that.
 _TURNS, _MANY_TURNS, _MOST_FOR_TURNS = 2.5, 6.3, 512
 # Elements are halved where their quadrature error exceeds this share of the largest one.
 _LARGE = 0.1

@@ -14,8 +14,8 @@ _RESOLVED = 2.0
 _SHORTEST = 1e-6
 # Largest angle by which an element of high degree may turn relative to its rest state, rad.
 _TURNED = 2.0
-# Largest distance of an edge of contact from the end of an element, over its length; most edges of one rod that elements
-# end at.
+# Largest distance of an edge of contact from the end of an element, over its length; most edges of one rod that
+# elements end at.
 _BESIDE, _MOST_EDGES = 3e-4, 12
 # A mesh is graded only if that needs less than this share of the elements of uniform refinement, and uniform
 # refinement needs at least so many elements.

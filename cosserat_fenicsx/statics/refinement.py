@@ -95,7 +95,7 @@ class _Search:
         self._apart, self._apart_of_whole = None, None  # their differences to the mesh before, and those of all points
         self._level, self._level_of_whole = -1, -2
         self._plain = False  # see `_plain`, of the complete path
-        # Assumed orders of the errors in h; refinement factor over the mesh before, None where the meshes are not nested.
+        # Assumed orders of the errors in h; refinement factor over the mesh before, None where meshes are not nested.
         self._order, self._factor = np.ones(4), 2.0
         self._failed, self._promoted, self._best = False, None, math.inf
         self.accurate, self._meshes_for_events, self._lost_events = None, _FOR_EVENTS, []
