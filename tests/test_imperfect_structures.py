@@ -65,3 +65,12 @@ def test_structures_follow_small_steps(seed):
     for control in imperfect_structures.CONTROLS:
         verdict, words, _ = imperfect_structures.outcome(given, truth, control, elements=8)
         assert verdict == "right", f"{given.kind}, {control}: {words}"
+
+
+def test_load_control_does_not_step_over_a_limit_point():
+    """It went on at 5.98 on another path with a negative mode."""
+    given = imperfect_structures.structure(103)
+    by_load, by_arc = (cf.solve(given.scene, (0, given.top), elements=8, control=c) for c in ("auto", "arc"))
+    assert [event.kind for event in by_load.events] == ["limit", "limit"] and by_load.stable[-1]
+    apex = given.stations[0]
+    np.testing.assert_allclose(by_load.displacement(apex)[-1], by_arc.displacement(apex)[-1], atol=1e-8)

@@ -46,10 +46,10 @@ class ArcLength:
     def __init__(self, track, control, locator):
         self.track, self.control, self._locator = track, control, locator
         self._step, self._branched = None, False
-        # Whether the number of negative modes changes as the critical points tell. The second variation that is counted
+        #: Whether the number of negative modes changes as the critical points tell. The second variation that is counted
         # has bounded stiffnesses, and under some loads it is the symmetric part of the tangent: once that has been seen
         # in a step that is plain, the number tells nothing about later ones.
-        self._counts = True
+        self.counts = True
 
     def to(self, target, *, first=None, slope=None, on_step=None, on_event=None):
         """Advance to the next point of the path with the load factor `target`, solved at exactly that load factor.
@@ -76,14 +76,14 @@ class ArcLength:
                 try:
                     landing, crossings = self._locator.between(
                         track.here, point, target, self._weight,
-                        probe=not branching, explained=self._counts, short=not branching and self._plain(point),
+                        probe=not branching, explained=self.counts, short=not branching and self._plain(point),
                     )  # fmt: skip
                 except Lost as lost:
                     track.failure = lost.reason
                     if branching:
                         return track.restore()
                     if lost.reason == UNEXPLAINED and self._plain(point):
-                        self._counts = False
+                        self.counts = False
                     else:
                         self._step = self._length(track.here, point)
                     point = self._shorten(lost.share)

@@ -132,6 +132,10 @@ class Locator:
         """
         if (a.rise * b.rise < 0) != any(crossing.kind == "limit" for crossing in crossings):
             return False
+        return self.counts_agree(a, b, crossings)
+
+    def counts_agree(self, a, b, crossings):
+        """Whether the numbers of negative modes of two points agree with the critical points between them."""
         counts = a.negative_modes, b.negative_modes
         if min(counts) < 0 or self.track.without_potential:
             return True

@@ -5,7 +5,7 @@ from dataclasses import replace
 from cosserat_fenicsx.errors import NotConverged
 from cosserat_fenicsx.statics.path.arclength import ArcLength
 from cosserat_fenicsx.statics.path.chord import Chord
-from cosserat_fenicsx.statics.path.events import Locator, Lost
+from cosserat_fenicsx.statics.path.events import UNEXPLAINED, Locator, Lost
 from cosserat_fenicsx.statics.path.load_control import Continuation
 from cosserat_fenicsx.statics.path.sweep import Sweep
 from cosserat_fenicsx.statics.path.track import INTENDED, Track
@@ -151,7 +151,7 @@ class Follower:
             self.fork = crossing
         return self.fork is not None and not self.left
 
-    def _watch(self, a, b):
+    def _watch(self, a, b, plain):
         """Report the bifurcations within a step of load control.
 
         Returns:
@@ -164,6 +164,9 @@ class Follower:
             crossings = self.locator.bifurcations(Chord.balanced(self.track, a, b))
         except Lost as lost:
             self.track.failure = lost.reason
+            return None
+        if self._auto and self._arc.counts and not plain and not self.locator.counts_agree(a, b, crossings):
+            self.track.failure = UNEXPLAINED  # arc length finds out whether the path has turned
             return None
         self.track.put(b.numbers, b.load_factor)
         return not any(self._meet(crossing) for crossing in crossings)

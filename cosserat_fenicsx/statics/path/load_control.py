@@ -26,6 +26,8 @@ FIRST_REJECTIONS = 3
 # second once steps are below a thousandth of the way: the path is smooth there, so that it crosses a bifurcation
 # without a change of branch.
 _SMOOTH, _NEAR = 0.01, 0.3
+# The same distance below which such a change is accepted although no event explains it.
+_EXPECTED = 1e-4
 
 
 @dataclass(frozen=True)
@@ -76,8 +78,9 @@ class Continuation:
     Args:
         track: a `Track`.
         control: a `StepControl`.
-        watch: called as watch(a, b) with the two points of a step, before b is accepted; False ends the continuation
-            at a, None rejects the step.
+        watch: called as watch(a, b, plain) with the two points of a step, before b is accepted, and whether b is where
+            the path was expected although the number of negative modes changes; False ends the continuation at a, None
+            rejects the step.
 
     Attributes:
         step: the next step of the load factor; None where it is still to be chosen.
@@ -173,7 +176,8 @@ class Continuation:
         if adaptive and changed and not self._smooth(numbers[0], predicted[0], _SMOOTH if guard else _NEAR):
             track.failure = "the step crossed a point where stability changes"
             return track.restore()
-        if adaptive and self._watch and not (onward := self._watch(here, point)):
+        plain = changed and self._smooth(numbers[0], predicted[0], _EXPECTED)
+        if adaptive and self._watch and not (onward := self._watch(here, point, plain)):
             self._refused = onward is False
             return track.restore()
         taken = abs(eta - here.load_factor)
