@@ -2,6 +2,7 @@
 
 import json
 import os
+import subprocess
 import sys
 from pathlib import Path
 
@@ -21,6 +22,17 @@ COMM = MPI.COMM_WORLD
 def pytest_configure(config):
     if COMM.rank != 0:
         config.pluginmanager.get_plugin("terminalreporter")._tw._file = open(os.devnull, "w")  # noqa: SIM115
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_setupnodes():
+    """Workers get the environment that this process began with: MPI has changed it behind Python's back."""
+    for line in subprocess.run(["env", "-0"], capture_output=True, check=True).stdout.split(b"\0"):
+        name = os.fsdecode(line.partition(b"=")[0])
+        if name and name not in os.environ:
+            os.unsetenv(name)
+    for name, value in os.environ.items():
+        os.putenv(name, value)
 
 
 def pytest_collection_modifyitems(items):
