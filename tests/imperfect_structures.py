@@ -113,10 +113,8 @@ def bent(draw, imperfection):
     side = -1.0 if draw.random() < 0.5 else 1.0
     loads = [cf.Force(column.end, (0, 0, -1.0)), cf.Moment(column.end, (0, side * imperfection, 0))]
     top = draw.uniform(0.7, 1.6) * 14.0
-    return Structure(
-        f"bent {side:+.0f}", imperfection, cf.Scene([column, beam], supports, loads, [cf.Joint(column.end, beam.start)]),
-        top, [column.end, column.at(0.5)],
-    )  # fmt: skip
+    scene = cf.Scene([column, beam], supports, loads, [cf.Joint(column.end, beam.start)])
+    return Structure(f"bent {side:+.0f}", imperfection, scene, top, [column.end, column.at(0.5)])
 
 
 def strut(draw, imperfection):

@@ -194,8 +194,8 @@ def test_rounding_of_a_slender_column_at_a_spring_or_under_load():
 @pytest.mark.serial
 @pytest.mark.parametrize("share, length, foot", [(1e-2, 1.0, "clamp"), (1e-3, 5.0, "hinge"), (1e-4, 5.0, "clamp")])
 def test_a_thin_arm_beside_a_thick_column(share, length, foot):
-    """A column with a joined arm whose bending stiffness is 10^-8 to 10^-16 of its own, longer than it or not, and first
-    in the scene: the arm changes nothing, the units of the longest rod neither."""
+    """A column with a joined arm whose bending stiffness is 10^-8 to 10^-16 of its own, longer than it or not, and
+    first in the scene: the arm changes nothing, the units of the longest rod neither."""
     column = cf.Rod(cf.Line((0, 0, 0), (0, 0, 3.0)), cf.Circle(0.1), STEEL, name="column")
     arm = cf.Rod(cf.Line((0, 0, 3.0), (length, 0, 3.0)), cf.Circle(0.1 * share), STEEL, name="arm")
     supports = [cf.Clamp(column.start)]

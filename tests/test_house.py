@@ -168,7 +168,7 @@ def test_one_place_says_which_ranks_work_together():
     """Within a study a rank is alone: what takes all ranks by itself would wait for the others for ever."""
     for file in PACKAGE.rglob("*.py"):
         if file.parent.name != "cli" and file.name not in ("aborting.py", "ranks.py", "pool.py"):
-            assert "MPI.COMM_WORLD" not in file.read_text(encoding="utf-8"), f"{file}: expected ranks.communicator(comm)"
+            assert "MPI.COMM_WORLD" not in file.read_text(encoding="utf-8"), f"{file}: use ranks.communicator(comm)"
 
 
 def test_files_stay_small():

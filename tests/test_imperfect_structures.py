@@ -19,7 +19,7 @@ def hinged_arch(sideways):
     return crown, cf.Scene([rod], supports, [cf.Force(crown, (sideways, 0, -1.0))])
 
 
-#: By small steps (and, of 1e-2, by shooting of the strong form): the limit points, and the crown at the load factor 0.6.
+#: By small steps (and, of 1e-2, by shooting of the strong form): the limit points, and the crown at load factor 0.6.
 ARCH = {
     3e-2: ((0.18983433, -0.10203886), (4.12838e-4, 0, -3.692597)),
     1e-2: ((0.19421969, -0.10447634), (1.37607e-4, 0, -3.692603)),

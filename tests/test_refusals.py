@@ -1,4 +1,4 @@
-"""Input that is refused in words: files that are none, names written as lists, numbers beyond sense, wrong arguments."""
+"""Input that is refused in words: what is no file, names written as lists, numbers beyond sense, wrong arguments."""
 
 import copy
 import os
@@ -59,13 +59,16 @@ def written(folder, survey=STATIONS, more="", weight=241.0, on_bit=0.0):
 SURVEYS = {
     "not of one column each": ('survey = "s.csv"\ncolumns = ["MD", ["Inc"], "Azi"]', "MD,Inc,Azi\n0,0,0\n1000,0,0\n",
                                r"inc = \['Inc'\]: expected the name of a column"),
-    "a column twice": ('survey = "s.csv"', "MD,MD,Inc,Azi\n0,0,0,0\n1000,2000,10,0\n", "columns 1 and 2 are both named 'md'"),
+    "a column twice": ('survey = "s.csv"', "MD,MD,Inc,Azi\n0,0,0,0\n1000,2000,10,0\n",
+                       "columns 1 and 2 are both named 'md'"),
     "a column in two units": ('survey = "s.csv"', "MD (m),MD (ft),Inc,Azi\n0,0,0,0\n1000,3281,10,0\n",
                               r"both named 'md' \(MD \(m\), MD \(ft\)\): expected one, or that columns"),
-    "two usual names": ('survey = "s.csv"', "Depth MD,Measured Depth,Inc,Azi\n0,0,0,0\n1,2,3,4\n", "no column 'md' in Depth MD, Measured Depth"),
+    "two usual names": ('survey = "s.csv"', "Depth MD,Measured Depth,Inc,Azi\n0,0,0,0\n1,2,3,4\n",
+                        "no column 'md' in Depth MD, Measured Depth"),
     "one column for two": ('survey = "s.csv"\ncolumns = ["MD", "Inc", "Inc"]', "MD,Inc,Azi\n0,0,0\n1000,0,0\n",
                            "expected three columns, each of another name"),
-    "a long field": ('survey = "s.csv"', "MD,Inc,Azi," + "x" * 200_000 + "\n0,0,0,\n", "line 1 is no row of a .csv file"),
+    "a long field": ('survey = "s.csv"', "MD,Inc,Azi," + "x" * 200_000 + "\n0,0,0,\n",
+                     "line 1 is no row of a .csv file"),
     "an endless device": ('survey = "/dev/zero"', "", "/dev/zero: no plain file: expected a survey as .csv"),
     "a folder": ('survey = "."', "", "Is a directory"),
     "a null character": (r'survey = "s\u0000.csv"', "", "cannot be read .*null"),
@@ -160,7 +163,8 @@ def test_a_step_longer_than_all_parts(tmp_path, capsys):
         (lambda: cf.solve(None, load_factor=[1.0]), "solve has no argument 'load_factor': did you mean 'load_factors'"),
         (lambda: cf.Material(E=1.0, rho=3.0), "Material has no argument 'rho': did you mean 'density'"),
         (lambda: cf.TripOut(wieght=3.0), "TripOut has no argument 'wieght': did you mean 'weight'"),
-        (lambda: cf.Circle(), r"Circle: missing a required argument: 'diameter': expected Circle\(diameter, shear_factor=...\)"),
+        (lambda: cf.Circle(),
+         r"Circle: missing a required argument: 'diameter': expected Circle\(diameter, shear_factor=...\)"),
         (lambda: cf.Circle(1.0, 2.0, 3.0), "Circle: too many positional arguments: expected"),
     ],
 )  # fmt: skip

@@ -68,8 +68,8 @@ def test_an_assembly_through_the_public_face(case):
     assert at_bit[2] == pytest.approx(exact["bit_side_force"], rel=1e-4) and is_balanced(found)
 
 
-#: A slick assembly at 3 degrees with 250 kN, of small slopes (a beam without a mesh): EI, weight, clearance, distance from
-#: the bit to the tangency, and force there.
+#: A slick assembly at 3 degrees with 250 kN, of small slopes (a beam without a mesh): EI, weight, clearance, distance
+#: from the bit to the tangency, and force there.
 SLICK = (1.7e7, 2050.0, 0.0508, 17.919140838675947, 1639.0117496314479)
 
 

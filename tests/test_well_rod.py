@@ -4,8 +4,8 @@ import json
 import math
 import types
 from dataclasses import replace
-from unittest.mock import patch
 from pathlib import Path
+from unittest.mock import patch
 
 import numpy as np
 import pytest

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+from eccentric_collar import AMPLITUDES, CLEARANCE, FIRST_CONTACT, Collar
 from moving_scenes import drift
 from scipy.optimize import brentq
-from eccentric_collar import AMPLITUDES, CLEARANCE, FIRST_CONTACT, Collar
 
 import cosserat_fenicsx as cf
 from cosserat_fenicsx.actions.added_mass import AddedMass

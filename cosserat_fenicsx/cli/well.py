@@ -18,7 +18,8 @@ from cosserat_fenicsx.well.scenefile import well_in
 
 # Options of the command line that are for rods alone.
 _OTHERS = ("load_factors", "bound", "elements", "degree", "formulation", "control", "branch", "duration", "dt",
-           "scheme", "save_every", "start", "folder", "station", "at", "animate", "speed", "color", "magnify")  # fmt: skip
+           "scheme", "save_every", "start", "folder", "station", "at", "animate", "speed", "color",
+           "magnify")  # fmt: skip
 _OF_SWEEPS = ("depth_sweep.csv", "depth_sweep.jsonl", "depth_sweep.png")
 _SOFT = (
     "the soft string by a differential equation along the axis, and what that leaves out is estimated with each answer."

@@ -347,7 +347,7 @@ class DrillingFolder:
         return memory
 
     def unlike(self, memory, running):
-        """Why what a checkpoint remembers is not of the kind of what a `StringModel` does, in words; None where it is."""
+        """Why what a checkpoint remembers is not of the kind of what a `StringModel` does, in words, or None."""
         found = checkpoints.unlike(memory["model"], running.memory())
         return found and f"{self.place / _LATEST}: {found}"
 

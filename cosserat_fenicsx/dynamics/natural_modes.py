@@ -55,8 +55,8 @@ def modes(
 
     K x = omega^2 M x under the constraints of supports and joints, with K the second variation in (r, theta) and M the
     inertia of the sections. What depends on velocities (damping of rods, dashpots, drag, friction, walls that act in
-    motions) is left out, and named in `Modes.left_out`. Where the loads have no potential (`Modes.conservative`) the symmetric part of K is used,
-    which does not detect flutter.
+    motions) is left out, and named in `Modes.left_out`. Where the loads have no potential (`Modes.conservative`) the
+    symmetric part of K is used, which does not detect flutter.
 
     Args:
         scene: a `Scene`; every rod needs a mass and inertia. Without a load factor it may be free to move.

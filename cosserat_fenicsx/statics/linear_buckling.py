@@ -136,7 +136,8 @@ def _critical(scene, layout, count, load_factor, tol, degree, comm):
 
     Returns:
         Load factors (n,), the lengths of boundary layers or None, the `Equilibrium`, shapes (m, N, 6), relative errors
-        (2, n) of bounded stiffnesses and of rounding, whether the loads have a potential, and the largest load factor that is considered.
+        (2, n) of bounded stiffnesses and of rounding, whether the loads have a potential, and the largest load factor
+        that is considered.
         With a potential n = m; else n = m + 1, and the bound comes first.
     """
     with (

@@ -150,8 +150,8 @@ def _rows(file, count):
         more = f", and {len(lost) - 1} more" if len(lost) > 1 else ""
         warn(f"{file}, {lost[0]}{more}: left out, and computed again")
     if old:
-        warn(f"{file} has lines without a checksum, as those of earlier releases: numbers that were changed in them are "
-             "not noticed")  # fmt: skip
+        warn(f"{file} has lines without a checksum, as those of earlier releases: numbers that were changed in them "
+             "are not noticed")  # fmt: skip
 
 
 def _as_read(data):

@@ -133,8 +133,8 @@ def read_columns(file, md, inc, azi, degrees, length_unit):
             point = any("," in cell for cell in row) or len(row) > len(heading)
             hint = "; decimals stand behind a point, as in 10.5" if point else ""
             raise SceneError(
-                f"{file}: line {i}, {line!r:.100}: expected numbers in {', '.join(heading[x] for x in columns)}, and no "
-                f"more columns than names{hint}"
+                f"{file}: line {i}, {line!r:.100}: expected numbers in {', '.join(heading[x] for x in columns)}, and "
+                f"no more columns than names{hint}"
             ) from None
     if len(values) < 2:
         raise SceneError(f"{file}: {len(values)} stations below the row of names, expected at least two")
@@ -170,8 +170,8 @@ def _heading(file, lines, wanted):
     missing = next(name for name in wanted if not _columns(likely, name))
     raise SceneError(
         f"{file}: no column '{missing}' in {', '.join(likely):.500}: {nearest(missing.lower(), known)}. Expected the "
-        "names of the columns of measured depth, inclination and azimuth: columns = ['...', '...', '...'] in a scene file, "
-        "md=, inc=, azi= in Python"
+        "names of the columns of measured depth, inclination and azimuth: columns = ['...', '...', '...'] in a scene "
+        "file, md=, inc=, azi= in Python"
     )
 
 

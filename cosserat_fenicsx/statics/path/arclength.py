@@ -46,9 +46,9 @@ class ArcLength:
     def __init__(self, track, control, locator):
         self.track, self.control, self._locator = track, control, locator
         self._step, self._branched = None, False
-        #: Whether the number of negative modes changes as the critical points tell. The second variation that is counted
-        # has bounded stiffnesses, and under some loads it is the symmetric part of the tangent: once that has been seen
-        # in a step that is plain, the number tells nothing about later ones.
+        #: Whether the number of negative modes changes as the critical points tell. The second variation that is
+        # counted has bounded stiffnesses, and under some loads it is the symmetric part of the tangent: once that has
+        # been seen in a step that is plain, the number tells nothing about later ones.
         self.counts = True
 
     def to(self, target, *, first=None, slope=None, on_step=None, on_event=None):

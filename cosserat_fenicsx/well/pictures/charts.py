@@ -95,8 +95,8 @@ def _without_answer(axes, sweep, i, j, limits, colour):
         left = loads[k] < limits[0]
         at = limits[0] if left else limits[1]
         axes.plot(at, depths[k], "<" if left else ">", color=colour, clip_on=False)
-        axes.annotate(f"{loads[k]:,.0f} kN, beyond the axis: close to lock-up", (at, depths[k]), (8, 0) if left else (-8, 0),
-                      ha="left" if left else "right", **note)  # fmt: skip
+        axes.annotate(f"{loads[k]:,.0f} kN, beyond the axis: close to lock-up", (at, depths[k]),
+                      (8, 0) if left else (-8, 0), ha="left" if left else "right", **note)  # fmt: skip
     order = np.argsort(depths)
     shown = None
     for k in order:

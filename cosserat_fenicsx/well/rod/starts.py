@@ -14,7 +14,7 @@ def on_axis(rod, path, s):
 
 
 def turns_of_helix(EI, compression, torque, hand):
-    """(n,) rate h b, rad per m, of a long helix along a wall with small slopes. Of one hand h, b makes its energy least:
+    """(n,) rate h b, rad per m, of a long helix along a wall with small slopes. For a hand h, b makes its energy least:
 
         U/length = r^2 (EI b^4 - F b^2 + h Q b^3)/2,   b = (-1.5 h Q + (2.25 Q^2 + 8 EI F)^(1/2))/(4 EI),
 
