@@ -91,7 +91,7 @@ class Interface:
 
     def signs(self, of_nodes):
         """(negative, zero) numbers of eigenvalues of the system, which is symmetric, and the logarithm of the product
-        of the absolute values of those that are not zero."""
+        of the absolute values of those that are not zero (of large systems NaN where some are)."""
         return self._solver.signs(self._values(of_nodes))
 
 

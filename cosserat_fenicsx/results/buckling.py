@@ -31,10 +31,13 @@ class Buckling(Shapes):
             Where nothing is found it is the largest load factor that is considered, where linear extrapolation ends: a
             rod's tangent has changed by 1.5 there, the contact force of a rod has reached the smallest of its axial
             and shear stiffnesses, or it or the contact moment 1e8 times EI/L^2 or EI/L of that rod.
+        extent: that largest load factor; missing: how many load factors were asked for and not found up to it.
     """
 
     load_factors: np.ndarray
     bound: float
+    extent: float
+    missing: int
     _differentiated: Callable | None = None
 
     title = "Linear buckling"
@@ -78,18 +81,25 @@ class Buckling(Shapes):
 
     @property
     def caution(self):
-        """The limits of the result, in a sentence; "" where the loads have a potential."""
+        """The limits of the result, in sentences; "" where all that was asked for is found and the loads have a
+        potential."""
+        fewer = ""
+        if self.missing and len(self):
+            fewer = (
+                f"{len(self)} of the {len(self) + self.missing} load factors asked for: no others are found up to "
+                f"{self.extent:.4g}, where linear extrapolation of the state ends."
+            )
         if self.conservative:
-            return ""
+            return fewer
         found = (
             "the load factors are those of its static bifurcations (divergence) alone"
             if len(self.load_factors)
             else "no static bifurcation (divergence) was found"
         )
         return (
-            f"The loads have no potential: {found}, and there is none below {self.bound:.7g}. The structure may "
-            "flutter at a lower load, which a motion shows (`simulate`), and linear buckling does not."
-        )
+            f"{fewer} The loads have no potential: {found}, and there is none below {self.bound:.7g}. The structure "
+            "may flutter at a lower load, which a motion shows (`simulate`), and linear buckling does not."
+        ).lstrip()
 
     def __repr__(self):
         if len(self):

@@ -84,9 +84,9 @@ def buckling(
         progress: True, False, or None to show it in runs of more than two seconds.
 
     Returns:
-        Buckling. It holds fewer than `count` load factors where no more are positive (counted from eta) and below that
-        at which linear extrapolation ends, see `Buckling.bound`; or, without a potential, where the others are rounding
-        error.
+        Buckling. It holds fewer than `count` load factors, and says so, where no more are positive (counted from eta)
+        and below that at which linear extrapolation ends, `Buckling.extent`; or, without a potential, where the others
+        are rounding error.
 
     Raises:
         SceneError: an argument outside its range.
@@ -128,7 +128,11 @@ def buckling(
         )
     bound = float(load_factors[0]) if len(load_factors) else most
     found = slice(0 if conservative else 1, None)  # without a potential the first one is the bound alone
-    return Buckling(state, shapes, error[found], conservative, comm, load_factors[found], bound, critical_sensitivity)
+    load_factors = load_factors[found]
+    return Buckling(
+        state, shapes, error[found], conservative, comm, load_factors, bound, most, count - len(load_factors),
+        critical_sensitivity,
+    )  # fmt: skip
 
 
 def _critical(scene, layout, count, load_factor, tol, degree, comm):
