@@ -26,6 +26,7 @@ try:
     import _cffi_backend
     import dolfinx
     import ffcx.codegeneration.jit as ffcx_compiler
+    import ffcx.naming as ffcx_names
     import ufl
     from dolfinx import fem, jit
     from dolfinx import mesh as dolfinx_mesh
@@ -216,16 +217,44 @@ def _from_cache(name, objects, folder, timeout):
     return [getattr(module.lib, x) for x in objects], module
 
 
-def _compiled(kind, objects, level="-O3"):
+@contextlib.contextmanager
+def _with_expressions(given):
+    """While FFCx compiles forms, it adds code for (UFL expression, points) to their module."""
+    real = ffcx_compiler._compile_objects
+
+    def all_of_them(decl, forms, names, module_name, *others, **more):
+        beside = _names_of(given, module_name)
+        decl += ffcx_compiler.UFC_EXPRESSION_DECL + "".join(f"extern ufcx_expression {name};\n" for name in beside)
+        return real(decl, [*forms, *given], [*names, *beside], module_name, *others, **more)
+
+    with _replaced(ffcx_compiler, "_compile_objects", all_of_them if given else real):
+        yield
+
+
+def _names_of(given, module_name):
+    """FFCx's names of compiled (UFL expression, points) in a module."""
+    return [ffcx_names.expression_name(pair, module_name) for pair in given]
+
+
+def _compiled(kind, objects, level="-O3", beside=()):
     """FFCx's (compiled objects, module, code) of a list of UFL's, all in one module, from the cache or compiled.
 
     Modules are compiled for speed: a tenth more to compile than by default, and from a sixth to half of the running
     time less. The macro among the flags gives them names of their own: no other program makes them.
+
+    Args:
+        kind: "forms", "expressions" or "elements". level: of optimisation.
+        beside: (UFL expression, points) that are compiled with forms, into the same module; they come last.
     """
-    flags = [level, "-g0", *instructions(), "-DCOSSERAT_FENICSX", *code_cache.more_flags()]
+    mark = "=" + ffcx_names.compute_signature(beside, "") if beside else ""
+    flags = [level, "-g0", *instructions(), f"-DCOSSERAT_FENICSX{mark}", *code_cache.more_flags()]
 
     def found(folder):
-        return getattr(ffcx_compiler, f"compile_{kind}")(objects, cache_dir=folder, cffi_extra_compile_args=flags)
+        with _with_expressions(beside):
+            compiled, module, code = getattr(ffcx_compiler, f"compile_{kind}")(
+                objects, cache_dir=folder, cffi_extra_compile_args=flags
+            )
+        return [*compiled, *(getattr(module.lib, name) for name in _names_of(beside, module.__name__))], module, code
 
     def cached():
         with _replaced(ffcx_compiler, "get_cached_module", _from_cache):
@@ -252,23 +281,34 @@ def _constructed(make, found):
 
 
 @rank_0_first
-def _compiled_one_by_one(kind, objects):
-    """(compiled, module, code) of each of `objects`, which are in one module."""
-    found, module, code = _compiled(kind, objects) if objects else ((), None, None)
+def _compiled_one_by_one(forms, pairs):
+    """(compiled, module, code) of each form and of each (UFL expression, points), which are in one module."""
+    if not forms and not pairs:
+        return []
+    found, module, code = _compiled("forms", forms, beside=pairs) if forms else _compiled("expressions", pairs)
     return [(compiled, module, code) for compiled in found]
+
+
+def together(mesh, forms, expressions):
+    """dolfinx's forms of a list of UFL's, and Expressions of a list of (UFL expression, points (m,)), compiled into one
+    module; each form and each expression may be None, and gives None."""
+    pairs = [(a, np.reshape(points, (-1, 1))) for a, points in expressions]
+    given = [form for form in forms if form is not None], [pair for pair in pairs if pair[0] is not None]
+    found = iter(_compiled_one_by_one(mesh.comm, *given))
+    return (
+        [None if form is None else _constructed(lambda form=form: fem.form(form), next(found)) for form in forms],
+        [None if a is None else _constructed(lambda a=a, x=x: fem.Expression(a, x), next(found)) for a, x in pairs],
+    )
 
 
 def forms(mesh, given):
     """dolfinx's forms of a list of UFL's, or None for None, compiled together."""
-    found = iter(_compiled_one_by_one(mesh.comm, "forms", [form for form in given if form is not None]))
-    return [None if form is None else _constructed(lambda form=form: fem.form(form), next(found)) for form in given]
+    return together(mesh, given, [])[0]
 
 
 def expressions(mesh, given):
     """dolfinx's Expressions of a list of (UFL expression or None, points (m,)), or None for None, compiled together."""
-    given = [(a, np.reshape(points, (-1, 1))) for a, points in given]
-    found = iter(_compiled_one_by_one(mesh.comm, "expressions", [pair for pair in given if pair[0] is not None]))
-    return [None if a is None else _constructed(lambda a=a, x=x: fem.Expression(a, x), next(found)) for a, x in given]
+    return together(mesh, [], given)[1]
 
 
 # (elements, what `_compiled` gives for them) of this process, where the release compiles elements.

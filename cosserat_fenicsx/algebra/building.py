@@ -3,6 +3,7 @@
 Only a C compiler and Python's headers are needed, which dolfinx needs as well.
 """
 
+import contextlib
 import ctypes
 import functools
 import hashlib
@@ -10,6 +11,7 @@ import os
 import shlex
 import subprocess
 import sysconfig
+import threading
 from pathlib import Path
 
 import cffi
@@ -38,24 +40,46 @@ def module(*sources):
         InstallationError: there is no C compiler that works, or the cache cannot be used.
     """
     with compiling():
-        flags = [*_FLAGS, *instructions(), f"-DKERNEL_ARGUMENTS={compat.KERNEL_ARGUMENTS}"]
-        flags.append(f"-DPetscInt=int{8 * np.dtype(PETSc.IntType).itemsize}_t")
-        flags += code_cache.more_flags()
-        sources = sources or SOURCES
-        header = sources[0].with_suffix(".h")
-        contents = [file.read_bytes() for file in (*sources, header)]
-        key = hashlib.sha256(repr((contents, flags, code_cache.SUFFIX, cffi.__version__)).encode())
-        name = f"cosserat_{sources[0].stem}_{key.hexdigest()[:20]}"
+        name, *task = _task(sources or SOURCES)
         made = code_cache.load(name)
         if made is None:
             with code_cache.alone_with(name) as part:
                 made = code_cache.load(name)
                 if made is None:
-                    code_cache.install(_build(name, part, sources, header, flags))
+                    code_cache.install(_build(name, part, *task))
                     made = code_cache.load(name)
         if made is None:
             raise ImportError(f"{name}: what was compiled cannot be loaded")
         return made.ffi, made.lib
+
+
+@functools.cache
+def begin():
+    """Let a thread compile the files of this folder where that is not done yet; the caller has forms compiled meanwhile.
+
+    Whatever fails there, `module` will tell.
+    """
+    with contextlib.suppress(Exception):
+        name, *task = _task(SOURCES)
+        if not (code_cache.folder() / (name + code_cache.SUFFIX)).exists():
+            threading.Thread(target=_compile, args=(name, *task), daemon=True).start()
+
+
+def _compile(name, *task):
+    # not within `compiling`, which changes what all threads share
+    with contextlib.suppress(Exception), code_cache.alone_with(name) as part:
+        code_cache.install(_build(name, part, *task))
+
+
+def _task(sources):
+    """Name of the module, files, header and flags."""
+    flags = [*_FLAGS, *instructions(), f"-DKERNEL_ARGUMENTS={compat.KERNEL_ARGUMENTS}"]
+    flags.append(f"-DPetscInt=int{8 * np.dtype(PETSc.IntType).itemsize}_t")
+    flags += code_cache.more_flags()
+    header = sources[0].with_suffix(".h")
+    contents = [file.read_bytes() for file in (*sources, header)]
+    key = hashlib.sha256(repr((contents, flags, code_cache.SUFFIX, cffi.__version__)).encode())
+    return f"cosserat_{sources[0].stem}_{key.hexdigest()[:20]}", sources, header, flags
 
 
 def undisturbed(name, *pointers):
@@ -80,7 +104,7 @@ def _build(name, folder, sources, header, flags):
     command = [*_linker(), "-fPIC", *(f"-I{path}" for path in headers), *flags, str(glue), "-o", str(made), "-lm"]
     try:
         done = subprocess.run(
-            command, stdin=subprocess.DEVNULL, capture_output=True, encoding="utf-8", errors="replace"
+            command, stdin=subprocess.DEVNULL, capture_output=True, encoding="utf-8", errors="replace", cwd=folder
         )
     except OSError as problem:
         raise cffi.VerificationError(str(problem)) from problem

@@ -5,6 +5,7 @@ import threading
 
 from mpi4py import MPI
 
+from cosserat_fenicsx.algebra.building import begin
 from cosserat_fenicsx.algebra.release import release, sweep
 
 #: Largest number of idle problems kept for each communicator; the least recently used one is dropped first.
@@ -45,6 +46,7 @@ class ProblemPool:
         idle = self._idle_on(comm)
         problem = self._take(idle, key)
         if problem is None:
+            begin()
             problem = make()
         try:
             yield problem

@@ -5,7 +5,7 @@ that would differ and miss the code cache, which costs a second.
 """
 
 from collections import namedtuple
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from dataclasses import fields as fields_of
 
 import basix
@@ -21,9 +21,9 @@ Measures = namedtuple("Measures", "gauss nodes ends")
 #: Virtual work of the actions: {number of the term: its form}, of the dead ones per unit of the load factor and of the
 #: permanent factor; and a list of `Live` for the others.
 ActionWork = namedtuple("ActionWork", "dead permanent live")
-#: Virtual work that depends on the state: its form, its factor (UFL), its measure, its point, and its integrand, a
-#: function (point, test).
-Live = namedtuple("Live", "form factor measure point work")
+#: Virtual work that depends on the state: the number of its term, its form, its factor (UFL), its measure, its point, and
+#: its integrand, a function (point, test).
+Live = namedtuple("Live", "number form factor measure point work")
 
 #: What an action adds to the residual, to the tangent and to every second variation: UFL forms, None where nothing.
 LiveParts = namedtuple("LiveParts", "residual tangent seconds")
@@ -72,7 +72,7 @@ class CompiledForms:
 
 def compile_all(
     model, residual, tangent, acting, seconds, derivative, *, variations=(), fields=None, advance=None, forces=None,
-    densities=((), ()), unknowns=None, contact=None,
+    densities=None, unknowns=None, contact=None,
 ):  # fmt: skip
     """The `CompiledForms` of UFL forms and expressions.
 
@@ -85,59 +85,83 @@ def compile_all(
         unknowns, contact: see `Symbols`, of models in statics.
     """
     seconds = [_symmetric(second) for second in seconds]
-    forces = forces or ActionWork({}, {}, [])
-    lives = [_live_parts(live, derivative, variations) for live in acting.live]
-    loads = acting.dead, acting.permanent, forces.dead, forces.permanent
-    groups = [[residual, tangent, *seconds], *([live.residual, live.tangent, *live.seconds] for live in lives)]
-    numbers = sorted({number for forms in loads for number in forms})
-    groups += [[forms.get(number) for forms in loads] for number in numbers]
-    (core, *others) = compile_groups(model, groups)
-    of_lives, of_loads = others[: len(lives)], others[len(lives) :]
-    residual_forms, tangent_forms, *second_forms = (tuple(filter(None, forms)) for forms in zip(core, *of_lives))
-    dead, permanent, force, permanent_force = (
-        tuple(filter(None, (group[i] for group in of_loads))) for i in range(len(loads))
-    )
-    points, weights = basix.make_quadrature(basix.CellType.interval, 2 * model.signature.points - 1)
-    fields_there, advance_there = compat.expressions(model.mesh, [(fields, points), (advance, points)])
-    density, node_density = (
-        tuple(compat.expressions(model.mesh, [(a, places)])[0] for a in given)
-        for given, places in zip(densities, (points, model.nodes), strict=True)
-    )
-    for live in lives:
+    lives = {live.number: live_parts(live, derivative, variations) for live in acting.live}
+    core = [residual, tangent, *seconds]
+    found, _, _ = compile_parts(model, core, lives, acting, fields, advance, forces, densities)
+    for live in lives.values():
         residual += live.residual
         seconds = [a if b is None else a + b for a, b in zip(seconds, live.seconds, strict=True)]
-    return CompiledForms(
+    symbols = unknowns and Symbols(_balance(model, residual, acting), contact, unknowns, seconds)
+    return replace(found, symbols=symbols)
+
+
+def compile_parts(
+    model, core, lives, acting, fields, advance=None, forces=None, densities=None, *, others=(), of_terms=None
+):
+    """`CompiledForms` without symbols. What the model needs whatever acts on it is one module, and what a term of the
+    actions adds is another.
+
+    Args:
+        core: [residual, tangent, *second variations], without actions; lives: {number of a term: `LiveParts`}.
+        acting, fields, advance, forces, densities: see `compile_all`.
+        others: more forms of the core; of_terms: {number: list of more forms or None}, equally long.
+
+    Returns:
+        the `CompiledForms`; the compiled `others`; and a list of those of `of_terms`.
+    """
+    forces, densities, of_terms = forces or ActionWork({}, {}, []), densities or {}, of_terms or {}
+    points, weights = basix.make_quadrature(basix.CellType.interval, 2 * model.signature.points - 1)
+    places = {"line": points, "node": model.nodes}
+    loads = acting.dead, acting.permanent, forces.dead, forces.permanent
+    numbers = sorted({*lives, *densities, *of_terms, *(number for works in loads for number in works)})
+    groups = [([*core, *others], [(fields, points), (advance, points)])]
+    for number in numbers:
+        live, (place, density) = lives.get(number), densities.get(number, ("line", None))
+        parts = [None] * len(core) if live is None else [live.residual, live.tangent, *live.seconds]
+        parts += [works.get(number) for works in loads] + of_terms.get(number, [])
+        groups.append((parts, [(density, places[place])]))
+    for form in (form for parts, _ in groups for form in parts):
+        if form is not None:
+            form.signature()
+    (core_forms, core_fields), *others_there = (compat.together(model.mesh, *group) for group in groups)
+
+    def of_all(i):
+        return tuple(parts[i] for parts, _ in others_there if parts[i])
+
+    n, terms = len(core), list(zip(numbers, others_there, strict=True))
+    density, node_density = (
+        tuple(compiled for number, (_, (compiled,)) in terms if compiled and densities[number][0] == place)
+        for place in ("line", "node")
+    )
+    residual_forms, tangent_forms, *second_forms = (
+        tuple(filter(None, (form, *of_all(i)))) for i, form in enumerate(core_forms[:n])
+    )
+    dead, permanent, force, permanent_force = (of_all(n + i) for i in range(len(loads)))
+    found = CompiledForms(
         residual_forms,
         tangent_forms,
         dead,
         permanent,
         tuple(second_forms),
-        fields_there,
+        core_fields[0],
         0 if fields is None else len(fields),
-        advance_there,
+        core_fields[1],
         force,
         permanent_force,
         density,
         node_density,
         points[:, 0],
         weights,
-        unknowns and Symbols(_balance(model, residual, acting), contact, unknowns, seconds),
+        None,
     )
-
-
-def compile_groups(model, groups):
-    """dolfinx's forms of lists of UFL forms or None, one module for each list."""
-    for form in (form for group in groups for form in group):
-        if form is not None:
-            form.signature()
-    return [compat.forms(model.mesh, group) for group in groups]
+    return found, core_forms[n:], [parts[n + len(loads) :] for number, (parts, _) in terms if number in of_terms]
 
 
 def _symmetric(form):
     return 0.5 * (form + ufl.adjoint(form))
 
 
-def _live_parts(live, derivative, variations):
+def live_parts(live, derivative, variations):
     tangent, seconds = nonzero(derivative(live.form)), []
     tangent = None if tangent is None else -live.factor * tangent
     for pair in variations:
@@ -220,7 +244,7 @@ def action_work(model, dx, test, point_at, unknowns, accepted_at=None, test_at=N
             continue  # such as a force in a determinate model, or a dashpot in statics
         form = integrand * measure
         if set(unknowns) & set(form.coefficients()) or kind.memory or kind.refreshed:
-            live.append(Live(form, factors[kind.scaled], measure, point, term.work))
+            live.append(Live(number, form, factors[kind.scaled], measure, point, term.work))
         else:
             dead["load" if kind.scaled == "load" else "permanent"][number] = form
         if kind.memory and term not in (known for known, _ in model.evolving):
@@ -229,17 +253,18 @@ def action_work(model, dx, test, point_at, unknowns, accepted_at=None, test_at=N
 
 
 def action_densities(model, point_at):
-    """Force and moment per length of the distributed actions, UFL (6,), one of each term: lists of those at the Gauss
-    points, and of those at the nodes, for actions integrated there."""
+    """Force and moment per length of the distributed actions: {number of the term: (place, UFL (6,))}, place "line"
+    (Gauss points) or "node" (for actions integrated there)."""
     factors = {"load": model.load_factor, "permanent": model.permanent_factor, "full": 1}
-    found = {"line": [], "node": []}
-    for term in model.actions.terms:
-        if term.kind.place in found:
-            force, moment = resultants(term.work, point_at(term.kind.place, term.rest, term.frame))
+    found = {}
+    for number, term in enumerate(model.actions.terms):
+        place = term.kind.place
+        if place != "point":
+            force, moment = resultants(term.work, point_at(place, term.rest, term.frame))
             density = factors[term.kind.scaled] * ufl.as_vector([*force, *moment])
             if not isinstance(density, ufl.constantvalue.Zero):  # as of what resists velocities, in statics
-                found[term.kind.place].append(density)
-    return tuple(found.values())
+                found[number] = place, density
+    return found
 
 
 def varied_actions(acting, test, direction):

@@ -13,9 +13,9 @@ from cosserat_fenicsx.forms.rotation import small_rotation
 from cosserat_fenicsx.models.compiled import (
     CompiledForms,
     action_work,
-    compile_all,
-    compile_groups,
+    compile_parts,
     derivative_in,
+    live_parts,
     measures,
     nonzero,
 )
@@ -269,7 +269,7 @@ class SpatialStep(StepForms):
 
 
 def compile_motion(model, residual, acting, derivative, fields, others, of_step, working=None, *, turned=False):
-    """`MotionForms` of UFL forms; all signatures are computed before the first is compiled, see `compiled`.
+    """`MotionForms` of UFL forms; see `compile_parts`.
 
     Args:
         residual: without actions; acting: the `ActionWork` in it; derivative: see `compile_all`.
@@ -277,22 +277,21 @@ def compile_motion(model, residual, acting, derivative, fields, others, of_step,
         working: the `ActionWork` in the energy balance, where it is another one.
         turned: whether the live part of `working` has a tangent of its own.
     """
-    lives = [] if working is None else working.live
-    booked = [(-live.factor * live.form, derivative(live.form) if turned else None) for live in lives]
-    tangents = [None if change is None else nonzero(change) for _, change in booked]
-    groups = [list(others.values())]
-    groups += [
-        [work, None if change is None else -live.factor * change]
-        for live, (work, _), change in zip(lives, booked, tangents, strict=True)
-    ]
-    for form in (form for group in groups for form in group):
-        if form is not None:
-            form.signature()
-    steady = compile_all(model, residual, derivative(residual), acting, [], derivative, fields=fields)
-    of_others, *of_lives = compile_groups(model, groups)
-    live, live_tangent = (tuple(group[i] for group in of_lives if group[i]) for i in range(2))
+    booked = {} if working is None else {live.number: _booked(live, derivative, turned) for live in working.live}
+    lives = {live.number: live_parts(live, derivative, ()) for live in acting.live}
+    core = [residual, derivative(residual)]
+    steady, of_others, of_lives = compile_parts(
+        model, core, lives, acting, fields, others=list(others.values()), of_terms=booked
+    )
+    live, live_tangent = (tuple(pair[i] for pair in of_lives if pair[i]) for i in range(2))
     step, step_at_nodes = compat.expressions(model.mesh, zip(of_step, (steady.gauss, model.nodes), strict=True))
     return MotionForms(
         **vars(steady), **dict(zip(others, of_others, strict=True)), of_step=step, of_step_at_nodes=step_at_nodes,
         live=steady.residual[1:] if working is None else live, live_tangent=live_tangent,
     )  # fmt: skip
+
+
+def _booked(live, derivative, turned):
+    """[form, its derivative or None] of a `Live` of the energy balance."""
+    change = nonzero(derivative(live.form)) if turned else None
+    return [-live.factor * live.form, None if change is None else -live.factor * change]
