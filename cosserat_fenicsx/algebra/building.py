@@ -55,7 +55,7 @@ def module(*sources):
 
 @functools.cache
 def begin():
-    """Let a thread compile the files of this folder where that is not done yet; the caller has forms compiled meanwhile.
+    """Let a thread compile the files of this folder where they are not; the caller has forms compiled meanwhile.
 
     Whatever fails there, `module` will tell.
     """

@@ -21,8 +21,8 @@ Measures = namedtuple("Measures", "gauss nodes ends")
 #: Virtual work of the actions: {number of the term: its form}, of the dead ones per unit of the load factor and of the
 #: permanent factor; and a list of `Live` for the others.
 ActionWork = namedtuple("ActionWork", "dead permanent live")
-#: Virtual work that depends on the state: the number of its term, its form, its factor (UFL), its measure, its point, and
-#: its integrand, a function (point, test).
+#: Virtual work that depends on the state: the number of its term, its form, its factor (UFL), its measure, its point,
+#: and its integrand, a function (point, test).
 Live = namedtuple("Live", "number form factor measure point work")
 
 #: What an action adds to the residual, to the tangent and to every second variation: UFL forms, None where nothing.
