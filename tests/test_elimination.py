@@ -233,7 +233,7 @@ def slender():
 COUNTED = {
     "clamped at its end": (held_at("end"), {}), "at both": (held_at("start", "end"), {"formulation": "displacement"}),
     "hinge": (hinged_in_the_middle(), {"degree": 2}), "rigid tree": (branches(RIGID), {}),
-    "ring of one": (ring(1), {"formulation": "multiplier"}), "lattice": (lattice(), {"degree": 3}),
+    "ring of one": (ring(1), {"formulation": "multiplier"}), "lattice": (lattice(), {}),
     "in a plane": (in_a_plane(), {"model": "planar"}), "determinate": (column(), {"model": "determinate"}),
     "soft on stiff": (soft_on_stiff(), {}), "slender": (slender(), {}),
 }  # fmt: skip

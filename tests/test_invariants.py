@@ -77,7 +77,7 @@ def test_number_of_ranks_changes_nothing():
     """All ranks together against every rank alone (trivial with one process)."""
     cases = [column(), *rich_scene()]
     for rod, scene in cases:
-        arguments = dict(elements=9, degree=3)
+        arguments = dict(elements=9)
         together = cf.solve(scene, (0.0, 1.3), **arguments)
         alone = cf.solve(scene, (0.0, 1.3), comm=MPI.COMM_SELF, **arguments)
         assert together.unknowns == alone.unknowns

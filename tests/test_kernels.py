@@ -30,7 +30,7 @@ def model_of(formulation, *, rigid=False):
         rod, scene = column(arm=True, section=section)
     scene = replace(scene, loads=[*scene.loads, cf.LineForce(rod, (0, 1e3, 0))])
     layout = Layout.of(scene, 3)
-    model = SpatialModel(MPI.COMM_SELF, Signature.of(scene, layout, formulation=formulation, degree=3))
+    model = SpatialModel(MPI.COMM_SELF, Signature.of(scene, layout, formulation=formulation, degree=4))
     model.load(scene, layout)
     random = np.random.default_rng(1)
     model.mesh.geometry.x[:, 0] *= np.linspace(0.7, 1.3, len(model.mesh.geometry.x))

@@ -153,18 +153,18 @@ def test_paths_and_vibrations_say_so_too():
         (dead, "determinate", True), (arm, "planar", True), (arm, "spatial", True), (moment, "determinate", False),
         (moment, "spatial", False), (follower, "planar", False), (line, "planar", False)
     ):  # fmt: skip
-        path = cf.solve(scene, [0.0, 1.0], model=model, elements=4, degree=2)
+        path = cf.solve(scene, [0.0, 1.0], model=model, elements=4)
         assert path.conservative == conservative, (scene.loads, model)
         assert path.at_points([0]).conservative, "nothing acts there"
     springs = held(clamped, lambda rod: [cf.Force(rod.end, (0.5, 0.2, 0)), cf.Spring(rod.end, 3.0, rotational=2.0),
                                          cf.Foundation(rod, 5.0)])  # fmt: skip
-    assert cf.solve(springs, [1.0], elements=4, degree=2).conservative
+    assert cf.solve(springs, [1.0], elements=4).conservative
     twisted = held(clamped, lambda rod: [cf.Force(rod.end, (0.5, 0, 0)), cf.Moment(rod.end, ALONG, permanent=True)])
-    assert not cf.solve(twisted, [0.0], elements=4, degree=2).conservative
-    assert cf.modes(follower, elements=4, degree=2).conservative
-    found = cf.modes(follower, load_factor=1.0, elements=4, degree=2)
+    assert not cf.solve(twisted, [0.0], elements=4).conservative
+    assert cf.modes(follower, elements=4).conservative
+    found = cf.modes(follower, load_factor=1.0, elements=4)
     assert not found.conservative and "may flutter" in repr(found)
-    assert "potential" not in repr(cf.modes(arm, load_factor=1.0, elements=4, degree=2))
+    assert "potential" not in repr(cf.modes(arm, load_factor=1.0, elements=4))
 
 
 @pytest.mark.serial

@@ -132,7 +132,7 @@ def test_a_stored_history_answers_as_one_in_memory(tmp_path):
 def test_neither_tol_nor_dt(tmp_path):
     """The default tolerance; a folder may be prolonged."""
     _, scene = flying_in_space()
-    history = cf.simulate(scene, 0.02, folder=tmp_path / "flight", elements=1, degree=1)
+    history = cf.simulate(scene, 0.02, folder=tmp_path / "flight", elements=1, degree=2)
     assert (cf.read_history(tmp_path / "flight").times == history.times).all()
     assert cf.resume(tmp_path / "flight", duration=0.04).times[-1] == 0.04
 

@@ -77,7 +77,7 @@ def assert_same(one, other, names):
 
 
 @pytest.mark.parametrize("solved", [
-    lambda: cf.solve(frame(), [0.5, 1.0], elements=2, degree=3),
+    lambda: cf.solve(frame(), [0.5, 1.0], elements=2),
     lambda: cf.solve(column()[1], [0.3, 0.6], tol=1e-4),
     lambda: cf.solve(buckled(), (0.5, 1.1), elements=4, model="spatial", branch=1),
 ])  # fmt: skip
