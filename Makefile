@@ -74,13 +74,14 @@ test: setup
 tables: setup
 	$(PYTHON) demos/evidence/accuracy.py
 	$(PYTHON) demos/evidence/overhead.py
+	$(PYTHON) demos/evidence/first_runs.py
 	$(PYTHON) demos/evidence/rungs.py
 	$(PYTHON) demos/evidence/choice.py
 	$(PYTHON) demos/evidence/scaling.py
 	$(PYTHON) demos/evidence/ranks.py
 	$(PYTHON) demos/evidence/steps.py
 	$(PYTHON) demos/evidence/orders.py
-	$(PYTHON) demos/evidence/put_in_docs.py accuracy overhead rungs choice scaling ranks steps orders
+	$(PYTHON) demos/evidence/put_in_docs.py accuracy overhead first_runs rungs choice scaling ranks steps orders
 
 # What an interrupted run has finished is kept: the same command goes on from there.
 figure3: setup

@@ -24,6 +24,14 @@ def test_overhead_quick(tmp_path):
     assert np.max(difference) < 1e-10
 
 
+def test_first_runs_quick(tmp_path):
+    """Elements, forms and two kinds of loads of a column, and the package's own C; the next run compiles nothing."""
+    import first_runs
+
+    ((first, following, files),) = first_runs.main(runs=1, out=tmp_path, kinds=["a column in a plane"]).values()
+    assert files == 5 and first[0] > following[0] > 0
+
+
 @pytest.mark.slow
 def test_accuracy_quick(tmp_path):
     import accuracy

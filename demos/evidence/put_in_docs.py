@@ -27,6 +27,7 @@ PAGES = {
     "ranks": ("speed.md",),
     "steps": ("speed.md",),
     "overhead": ("speed.md",),
+    "first_runs": ("speed.md",),
     "work_precision": ("speed.md", "work_precision_sweep.png"),
     "work_precision_motion": ("speed.md", "work_precision_motion.png"),
     "work_precision_string": ("speed.md", "work_precision_string.png"),
