@@ -1,6 +1,6 @@
 """What a first run of each kind of scene takes where nothing is compiled yet, and the next run.
 
-    python demos/evidence/first_runs.py            medians of 3 runs, each with an empty cache, and of the runs after them
+    python demos/evidence/first_runs.py            medians of 3 runs with an empty cache, and of the runs after them
     python demos/evidence/first_runs.py --quick    one scene, once
 
 Processor time holds that of the C compiler; wall-clock time is that of the whole process, from its start to the table.
@@ -63,7 +63,7 @@ def main(runs=3, out="out", kinds=tuple(RUNS), package=ROOT):
     lines = [
         f"{compat.version()}; medians of {runs} run(s); processor time, and wall-clock time on {os.cpu_count()} cores.",
         "",
-        "| scene | compiled files | first run: processor (s) | wall clock (s) | next run: processor (s) | wall clock (s) |",
+        "| scene | compiled files | first: processor (s) | wall clock (s) | next: processor (s) | wall clock (s) |",
         "|---|---|---|---|---|---|",
     ]
     found = {}
