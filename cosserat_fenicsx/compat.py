@@ -220,9 +220,10 @@ def _compiled(kind, objects, level="-O3"):
     """FFCx's (compiled objects, module, code) of a list of UFL's, all in one module, from the cache or compiled.
 
     Modules are compiled for speed: a tenth more to compile than by default, and from a sixth to half of the running
-    time less. The macro among the flags gives them names of their own: no other program makes them.
+    time less. The macro among the flags gives them names of their own: no other program makes them. Warnings are off:
+    FFCx's C has variables that it does not use.
     """
-    flags = [level, "-g0", *instructions(), "-DCOSSERAT_FENICSX", *code_cache.more_flags()]
+    flags = [level, "-g0", "-w", *instructions(), "-DCOSSERAT_FENICSX", *code_cache.more_flags()]
 
     def found(folder):
         return getattr(ffcx_compiler, f"compile_{kind}")(objects, cache_dir=folder, cffi_extra_compile_args=flags)
