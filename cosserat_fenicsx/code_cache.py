@@ -22,7 +22,7 @@ import warnings
 from functools import cache as once
 from pathlib import Path
 
-from cosserat_fenicsx.errors import InstallationError
+from cosserat_fenicsx.errors import CacheWarning, InstallationError
 
 #: How the name of a compiled module ends.
 SUFFIX = importlib.machinery.EXTENSION_SUFFIXES[0]
@@ -31,6 +31,7 @@ _DIGEST_SIZE = _DIGEST().digest_size
 # Longest time (s) to wait for another process that makes the same file; then it is made twice, which does no harm.
 _PATIENCE = 300
 _OTHERS_MAY_WRITE = stat.S_IWGRP | stat.S_IWOTH
+_WRITABLE = "can be written to by others"
 
 
 def folder():
@@ -53,13 +54,14 @@ def folder():
             f"compiled code would be loaded from {shared}, which {problem}, or from {own}, which {why_unsafe(own)}: "
             "set XDG_CACHE_HOME to a folder that is yours alone"
         )
-    _say(f"the cache of compiled code {shared} is not used, because it {problem}; {own} takes its place")
+    end = f" (`chmod go-w {shared}` ends this)" if problem == _WRITABLE else ""
+    _say(f"the cache of compiled code {shared} is not used, because it {problem}; {own} takes its place{end}")
     return own
 
 
 @once
 def _say(words):
-    warnings.warn(words, RuntimeWarning, stacklevel=3)
+    warnings.warn(words, CacheWarning, stacklevel=3)
 
 
 def more_flags():
@@ -75,7 +77,7 @@ def why_unsafe(path):
         return None
     if found.st_uid != os.geteuid():
         return f"belongs to another user (number {found.st_uid})"
-    return "can be written to by others" if found.st_mode & _OTHERS_MAY_WRITE else None
+    return _WRITABLE if found.st_mode & _OTHERS_MAY_WRITE else None
 
 
 def make(path):

@@ -29,6 +29,10 @@ class SceneWarning(UserWarning):
     """A probable mistake in a scene, such as a unit that is not SI; `warnings.simplefilter` silences it."""
 
 
+class CacheWarning(RuntimeWarning):
+    """The folder of compiled code is not used, and another one is."""
+
+
 class NotConverged(CosseratError, RuntimeError):
     """A solver did not converge.
 
@@ -59,12 +63,13 @@ class Interrupted(KeyboardInterrupt):
 
     Attributes:
         path: the result up to the last converged point.
+        words: how much was done and where it is kept, for the command line.
     """
 
     def __init__(self, path, kept=""):
-        plural = "" if len(path) == 1 else "s"
-        super().__init__(f"interrupted after {len(path)} {path.axis}{plural}, which the exception's `path` holds{kept}")
-        self.path = path
+        done = f"interrupted after {len(path)} {path.axis}{'' if len(path) == 1 else 's'}"
+        super().__init__(f"{done}, which the exception's `path` holds{kept}")
+        self.path, self.words = path, done + kept
 
 
 def nearest(word, known):

@@ -80,6 +80,23 @@ def test_labels_keep_off_each_other_and_off_the_edge():
         assert a[2] <= b[0] or b[2] <= a[0] or a[3] <= b[1] or b[3] <= a[1]
 
 
+@pytest.mark.serial
+def test_labels_that_are_close_are_all_drawn():
+    """VTK would leave one of these out."""
+    pyvista = pytest.importorskip("pyvista")
+    view = View.of(np.array([[0.0, 0, 0], [10, 0, 5]]), np.array([10.0, 0, 5]), (700, 500))
+    labels = Labels(view)
+    for text, x in (("1.3 (unstable)", 6.0), ("1.85", 3.5)):
+        assert labels.near(text, np.array([x, 0, 2.5]), np.array([0.0, 0, 1]), size=20)
+    plotter = pyvista.Plotter(off_screen=True, window_size=view.window)
+    labels.draw(plotter, pyvista)
+    view.place(plotter)
+    dark = plotter.screenshot(return_img=True).max(axis=2) < 128
+    plotter.close()
+    for x0, y0, x1, y1 in np.array(labels.boxes).astype(int):
+        assert dark[500 - y1 : 500 - y0, x0:x1].sum() > 20
+
+
 def test_loads_are_read_by_their_units():
     rod = cf.Rod(cf.Line((0, 0, 0), (2, 0, 0)), cf.Circle(0.05), STEEL, name="r")
     loads = [

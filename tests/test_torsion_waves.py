@@ -231,7 +231,7 @@ def test_a_wave_goes_through_parts_of_any_length():
         t, rows = run(model, 5)
         s = np.maximum(t - travel, 0)
         errors.append(np.abs(rows[:, COLUMN["bit_angle"]] - (s - np.sin(4 * s) / 4)).max())
-        assert "parts shorter than 1.5 cells" in " ".join(model.why) and "no whole" not in " ".join(model.why)
+        assert "shorter than 1.5 cells" in " ".join(model.why) and "no whole" not in " ".join(model.why)
         assert imbalance(rows) < 1e-12
     assert errors[0] < 1e-5 and errors[1] < errors[0] / 2
 

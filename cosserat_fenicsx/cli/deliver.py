@@ -67,7 +67,7 @@ def deliver(computed, options, moving, tables=None):
                 say(f"cosserat: {in_words(problem)}")
                 code = code or BAD_INPUT
     if trouble is not None:
-        say(f"cosserat: {trouble}")
+        say(f"cosserat: {getattr(trouble, 'words', trouble)}")
         if options.folder and not isinstance(trouble, NotConverged | SceneError):
             say(f"cosserat: `cosserat resume {options.folder}` continues from there")
         elif moving and code == INTERRUPTED:

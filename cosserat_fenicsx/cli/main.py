@@ -36,7 +36,8 @@ def main(arguments=None):
         if hasattr(stream, "reconfigure"):
             stream.reconfigure(errors="backslashreplace")
     try:
-        return together(lambda: options.do(options))
+        with warnings_in_words():
+            return together(lambda: options.do(options))
     except KeyboardInterrupt:  # of commands without partial results; `deliver` handles paths and motions
         say("cosserat: interrupted")
         return INTERRUPTED
@@ -119,7 +120,6 @@ def _run(options):
         return deliver(computed, options, bool(moving), tables)
 
 
-@warnings_in_words()
 def _resume(options):
     folder = Path(options.folder)
     if not folder.is_dir():

@@ -15,7 +15,8 @@ def parser(do):
     whole = argparse.ArgumentParser(
         prog="cosserat",
         description="Geometrically exact rods on FEniCSx: equilibrium path or motion of a scene described in a TOML "
-        "file; a motion where the file has a [simulate] table, or --duration is given.",
+        "file; a motion where the file has a [simulate] table, or --duration is given. A file with a [well] is a "
+        "string in its well, one with a [drive] a drill-string in motion.",
         epilog="Exit codes: 0 done, 1 not converged, 2 bad input, 130 interrupted; after 1 and 130 the partial result "
         "is printed and written. "
         "In parallel: mpirun -n 2 cosserat run scene.toml",

@@ -1,9 +1,11 @@
 """Messages of the command line, printed by one MPI rank alone, and its exit codes."""
 
+import logging
 import sys
 import warnings
 from contextlib import contextmanager
 
+from cosserat_fenicsx.errors import CacheWarning, SceneWarning
 from cosserat_fenicsx.ranks import launched
 
 #: Exit codes.
@@ -26,18 +28,17 @@ def say(text, file=None):
 
 @contextmanager
 def warnings_in_words():
-    """Say each warning about a scene once, without the place in the code that it comes from."""
-    from cosserat_fenicsx.errors import SceneWarning
-
+    """Say each warning about a scene, or the cache, once, without the place in the code that it comes from."""
     said = set()
 
     def show(message, category, *where, **more):
-        if not issubclass(category, SceneWarning):
+        if not issubclass(category, SceneWarning | CacheWarning):
             usual(message, category, *where, **more)
         elif str(message) not in said:
             said.add(str(message))
             say(f"cosserat: warning: {message}")
 
+    logging.captureWarnings(True)  # FFCx does when it is imported, which must not take the place of `show`
     with warnings.catch_warnings():
         usual, warnings.showwarning = warnings.showwarning, show
         warnings.simplefilter("always", SceneWarning)

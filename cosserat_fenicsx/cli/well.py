@@ -65,7 +65,7 @@ def run_well(options, tables):
         sweep = scene.depth_sweep(out / "depth_sweep.jsonl" if out is not None else None)
     except Interrupted as stop:
         sweep, code = stop.path, INTERRUPTED
-        say(f"cosserat: {stop}")
+        say(f"cosserat: {stop.words}")
     if sweep is not None:
         say(str(sweep), file=sys.stdout)
         if out is not None:

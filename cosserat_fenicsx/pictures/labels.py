@@ -71,13 +71,12 @@ class Labels:
             ends = np.concatenate(self._leaders) + self._view.half * self._view.to_camera  # in front of the rods
             plotter.add_mesh(pyvista.line_segments_from_points(ends), color="darkgrey", line_width=1)
             plotter.reset_camera_clipping_range()
-        key = lambda label: label[2:]
-        for (size, colour), group in itertools.groupby(sorted(self._texts, key=key), key):
-            texts, points = zip(*((text, point) for text, point, *_ in group), strict=True)
+        # one by one: of labels that are added together VTK leaves out those near others, by rules of its own
+        for text, point, size, colour in self._texts:
             plotter.add_point_labels(
-                list(points), [plain(text) for text in texts], font_size=size, text_color=colour, shape=None,
-                show_points=False, always_visible=True, bold=False, justification_horizontal="center",
-                justification_vertical="center",
+                [point], [plain(text)], font_size=size, text_color=colour, shape=None, show_points=False,
+                always_visible=True, bold=False, justification_horizontal="center", justification_vertical="center",
+                render=False,
             )  # fmt: skip
 
     def _keep(self, text, point, box, size, colour):

@@ -142,7 +142,8 @@ class Path(Result):
 
     def __repr__(self):
         reach = f"load factors {self.load_factors[0]:g} .. {self.load_factors[-1]:g}" if len(self) else "empty"
-        return f"<Path: {len(self)} points, {reach}, {self.model}, {self.unknowns} unknowns>"
+        points = f"{len(self)} point{'' if len(self) == 1 else 's'}"
+        return f"<Path: {points}, {reach}, {self.model}, {self.unknowns} unknowns>"
 
     @property
     def load_factors(self) -> np.ndarray:

@@ -7,6 +7,7 @@ from rich import box
 from rich.console import Console
 from rich.table import Table
 
+from cosserat_fenicsx.results.compared import NAMES
 from cosserat_fenicsx.results.extremes import largest_in_words
 from cosserat_fenicsx.results.reactions import reactions_in_words
 from cosserat_fenicsx.scene.describe import actions_in_words
@@ -75,8 +76,11 @@ def errors_in_words(path):
     """A sentence on the largest estimated errors; none where they are unknown."""
     known = [(name, values.max()) for name, values in path.errors._asdict().items() if not np.isnan(values).any()]
     if known and len(path):
-        told = ", ".join(f"{name}s {worst:.1e}" for name, worst in known)
-        yield f"largest estimated errors, each relative to the largest of its kind: {told}"
+        by_rounding = dict(zip(NAMES, path.rounding_errors.max(axis=1), strict=True))
+        told = ", ".join(
+            f"{name}s {worst:.1e}{' (rounding)' if 0 < worst <= by_rounding[name] else ''}" for name, worst in known
+        )
+        yield f"Estimated errors, each relative to the largest of its kind, are at most: {told}."
 
 
 def _bounded(path):

@@ -149,9 +149,7 @@ class _Search:
             elif elements >= _MOST_ELEMENTS or (reached > self._best and self._best < 1e-8):
                 if found is not self.whole:
                     found = self._all_points(layout, found)
-                raise NotConverged(
-                    _not_accurate(self._tol, min(reached, self._best), elements, self._degree, found), found
-                )
+                raise NotConverged(_not_accurate(self._tol, reached, self._best, elements, self._degree, found), found)
             self._best = min(self._best, reached)
         if found is self.whole:
             self._few, self._which = hardest(found)
@@ -172,7 +170,7 @@ class _Search:
         hidden = [name for name in path.bounded if by_rounding[NAMES.index(name)] > self._tol]
         if hidden:
             path.bounded = tuple(name for name in path.bounded if name not in hidden)
-            path.why.extend(_rounding_leaves(self._tol, name, by_rounding[NAMES.index(name)]) for name in hidden)
+            path.why.extend(_rounding_leaves(self._tol, name, path) for name in hidden)
         keep_confirmed(path, max(self._tol, _LOCATED), self._lost_events if path is self.whole else [])
         return path
 
@@ -313,10 +311,14 @@ def _plain(path, layers):
     return followed and resolves(path.layout, layers) and resolves(path.layout, winding_lengths(path))
 
 
-def _rounding_leaves(tol, name, rounding):
+def _rounding_leaves(tol, name, path):
+    """`name` is "force" or "moment"."""
+    which, unit = NAMES.index(name), {"force": "N", "moment": "N m"}[name]
+    size = path._reference.rounding[which].max() * getattr(path.scales, name)
     return (
-        f"rounding leaves an error of up to {rounding:.2g} in the contact {name}s of rods as slender as these, more "
-        f"than tol = {tol:g}, which bounds the rest: see errors.{name}"
+        f"rounding leaves an error of up to {size:.2g} {unit} in the contact {name}s, "
+        f"{path.rounding_errors[which].max():.2g} of the largest, more than tol = {tol:g}, which bounds the rest: "
+        f"see errors.{name}"
     )
 
 
@@ -328,13 +330,15 @@ def _rounding_hides(tol, rounding, elements, formulation):
     )
 
 
-def _not_accurate(tol, reached, elements, degree, path):
+def _not_accurate(tol, reached, best, elements, degree, path):
+    """`reached` and `best`: the estimated errors on the last mesh, and the least one on those before."""
     advice = "a larger tol" if degree == 4 else "a larger tol, or degree 4"
     if any(action.at_nodes for action in path.scene.actions):
         advice += " (the pressure at a wall has kinks, which meshes resolve slowly), or a softer wall"
     if path.scene.doubts:
         advice = f"{advice}, but first: {'; '.join(path.scene.doubts)}"
+    stays = f"is {reached:.2g}, and was {best:.2g} on a coarser mesh" if reached > best else f"stays at {reached:.2g}"
     return (
         f"the accuracy tol = {tol:g} was not reached with {elements} elements of degree {degree} per rod: "
-        f"the estimated error stays at {reached:.2g}. Ask for {advice}."
+        f"the estimated error {stays}. Ask for {advice}."
     )

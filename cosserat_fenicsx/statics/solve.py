@@ -72,8 +72,8 @@ def solve(
             rods, each relative to its own size at that load factor (see `Path.errors`). Elements are refined until the
             estimates are below it, unless `elements` is given.
         bound: what `tol` bounds, of "position", "rotation", "force" and "moment"; the errors of the others are
-            estimated all the same. Forces are left out where rounding alone exceeds `tol`, as on very slender rods that
-            bend: `Path.bounded` and `Path.why` tell.
+            estimated all the same. Forces and moments are left out where rounding alone exceeds `tol`, as on very
+            slender rods that bend, and moments on straight ones: `Path.bounded` and `Path.why` tell.
         elements: elements per rod; fixes the mesh, and errors are then not estimated (NaN).
         degree: 1 to 4, of r and q; default 4 (2 for "displacement").
         gauss_points: per element; default `degree`, which does not lock. More of them lock (docs/models.md).

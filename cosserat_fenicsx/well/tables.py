@@ -49,11 +49,12 @@ def _at_the_lower_end(answer):
     if top == answer.depth or not any(contact.at_point for contact in contacts):
         return
     table = Table(title=f"where the string touches the wall below md = {top:.6g} m")
-    for heading in ("from md (m)", "to md (m)", "force (kN)", "side", "component"):
+    for heading in ("from md (m)", "to md (m)", "force (kN)", "est. error (kN)", "side", "component"):
         table.add_column(heading, justify="left" if heading in ("side", "component") else "right")
     for contact in contacts:
         below = "at this point" if contact.at_point else f"{contact.bottom:.6g}"
-        table.add_row(f"{contact.top:.6g}", below, f"{contact.force / 1e3:.3f}", contact.side, _parts(answer, contact))
+        table.add_row(f"{contact.top:.6g}", below, f"{contact.force / 1e3:.3f}", _known(contact.error, 1e-3, ".3f"),
+                      contact.side, _parts(answer, contact))  # fmt: skip
     yield as_text(table)
 
 
@@ -84,7 +85,7 @@ def summary(answer):
     ]
     lines += _on_bit(answer)
     more = [f"{name} {value:.4g} {unit}" for name, value, unit in (
-        ("stretch", answer.stretch, "m"), ("twist", answer.twist / (2 * math.pi), "turns"),
+        ("stretch", answer.stretch, "m"), ("twist", round(answer.twist / (2 * math.pi), 9) + 0.0, "turns"),
         ("neutral point at", answer.neutral_point, "m")) if math.isfinite(value)]  # fmt: skip
     if more:
         lines.append(", ".join(more))
@@ -101,9 +102,13 @@ def summary(answer):
         if rough:
             places = ", ".join(f"{np.interp(x.start, answer.solved.s, answer.md):.5g}" for x in rough[:_PLACES])
             more = f" and {len(rough) - _PLACES} more" if len(rough) > _PLACES else ""
+            which = f"of these forces, those at md = {places}{more} m"
+            if len(rough) == len(at_points):
+                which = "all of these forces"
             lines.append(
-                f"of these forces, those at md = {places}{more} m are ROUGH, with estimated errors above "
-                f"{100 * ROUGH:g} % of them, up to {max(x.error for x in rough):.2g} N (contacts[i].error)"
+                f"{which} are ROUGH, with estimated errors above {100 * ROUGH:g} % of them, up to "
+                f"{max(x.error for x in rough) / 1e3:.2g} kN (contacts[i].error): a smaller tol helps, but not where "
+                "the end of a contact or component, or a survey station, is near"
             )
     states = answer.buckling
     for state in (criteria.SNAKE, criteria.HELIX):
@@ -133,7 +138,8 @@ def _on_bit(answer):
     if any(abs(x) > 1e-3 * np.abs(y).max() for x, y in zip(more, (answer.tension, answer.torque), strict=True)):
         yield (
             f"on the bit {weight / 1e3:.3f} kN and {torque / 1e3:.3f} kN m, as asked; the bit's own friction on the "
-            f"wall adds {more[0] / 1e3:+.3f} kN to the tension and {more[1] / 1e3:+.3f} kN m to the torque above it"
+            f"wall adds {round(more[0] / 1e3, 3) + 0.0:+.3f} kN to the tension and "
+            f"{round(more[1] / 1e3, 3) + 0.0:+.3f} kN m to the torque above it"
         )
 
 

@@ -128,8 +128,8 @@ class TorsionWaves(Pointers):
         )
         if cells.joined:
             yield (
-                f"{cells.joined} parts shorter than 1.5 cells are joined with pieces of their neighbours, with the "
-                "same inertia and compliance"
+                f"{cells.joined} part{' is' if cells.joined == 1 else 's are'} shorter than 1.5 cells, and joined with "
+                "pieces of the neighbours, with the same inertia and compliance"
             )
         if cells.unfit > _TOLD:
             yield (

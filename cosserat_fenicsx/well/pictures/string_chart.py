@@ -213,7 +213,7 @@ def _at_points(panel, answer, _):
     places = [md for md, *_ in numbered]
     for y, (md, force, side) in zip(_apart(places, panel), numbered, strict=True):
         panel.plot([force / 1e3, 1.12 * most, 1.2 * most], [md, y, y], color=_GREY, linewidth=0.4)
-        text = f"{force / 1e3:.3g} kN, {md:.6g} m"
+        text = f"{force / 1e3:.3g} kN, {md:.5g} m"
         panel.text(1.22 * most, y, text, fontsize=7, va="center", color=SIDES[side],
                    bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.3})  # fmt: skip
     panel.set_xlim(0.0, 2.5 * most)
