@@ -35,8 +35,8 @@ _MOST_ELEMENTS = 256
 _MOVED, _LOADED = 1e-4, 1e-2
 # Rounding errors below this share of the tolerance stay as they are.
 _NOTHING = 1e-2
-# Bound on the error by rounding of the state over a sample of it.
-_SAMPLED = 5.0
+# Bound on the error by rounding of the state, over what its sample at every Gauss point makes with one sign.
+_SAMPLED = 1.5
 # Largest share of the error of bounded stiffnesses that remains after the correction by Rayleigh's quotient: what
 # remains is of second order, this number times the square at most, unless the true stiffness is infinite.
 _REMAINING, _SQUARED = 0.1, 100.0
@@ -244,13 +244,13 @@ def _of_state(problem, part, vectors):
     whole = np.array([(part.K * v).dot(v) for v in vectors])
     sides = []
     for sign in (1, -1):
-        problem.put([numbers[0], numbers[1] + sign * mismatch])
+        problem.put([numbers[0], numbers[1] + sign * np.abs(mismatch)])  # of one sign: nothing cancels along the rods
         part.assemble(stress_alone=True)
         sides.append(np.array([(part.K * v).dot(v) for v in vectors]))
     problem.put(numbers)
     part.assemble()
     off = np.abs(sides[0] - sides[1]) / 2 / np.abs(whole)
-    return np.full(len(off), _SAMPLED * off.max())  # one sample of a random number a mode
+    return np.full(len(off), _SAMPLED * off.max())
 
 
 def _decrease(ahead, behind, change):
