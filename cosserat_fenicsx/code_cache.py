@@ -18,10 +18,10 @@ import shutil
 import stat
 import tempfile
 import time
-import warnings
 from functools import cache as once
 from pathlib import Path
 
+from cosserat_fenicsx.checks import warn
 from cosserat_fenicsx.errors import InstallationError
 
 #: How the name of a compiled module ends.
@@ -33,6 +33,10 @@ _PATIENCE = 300
 _OTHERS_MAY_WRITE = stat.S_IWGRP | stat.S_IWOTH
 
 
+class CacheWarning(RuntimeWarning):
+    """Another folder is used than that which dolfinx takes."""
+
+
 def folder():
     """The folder of compiled forms, and of our own C, whether it exists or not: dolfinx's, or one of the user's own
     beside it where that belongs to another user or others may write to it.
@@ -41,9 +45,8 @@ def folder():
         InstallationError: neither of them belongs to the user alone.
     """
     given = Path(os.environ.get("XDG_CACHE_HOME") or "")
-    base = (
-        given if given.is_absolute() else Path.home() / ".cache"
-    )  # a relative one is to be ignored, says its standard
+    # a relative one is to be ignored, says its standard
+    base = given if given.is_absolute() else Path.home() / ".cache"
     shared, own = base / "fenics", base / f"fenics-{os.geteuid()}"
     problem = why_unsafe(shared)
     if problem is None:
@@ -59,7 +62,7 @@ def folder():
 
 @once
 def _say(words):
-    warnings.warn(words, RuntimeWarning, stacklevel=3)
+    warn(words, CacheWarning)
 
 
 def more_flags():

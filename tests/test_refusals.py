@@ -108,6 +108,21 @@ def test_other_files_are_plain_ones_too(tmp_path):
         cf.Spline(tmp_path / "points.csv")
 
 
+def test_a_whole_number_of_too_many_digits(tmp_path):
+    (tmp_path / "s.toml").write_text(f"a = {'9' * 5000}\n", encoding="utf-8")
+    with pytest.raises(cf.SceneError, match="s.toml: not valid TOML: .*digits"):
+        cf.read_scene(tmp_path / "s.toml")
+
+
+def test_too_little_memory_in_words(monkeypatch, capsys):
+    def explain(options):
+        raise MemoryError("Unable to allocate 153. MiB for an array")
+
+    monkeypatch.setattr("cosserat_fenicsx.cli.main._explain", explain)
+    assert main(["explain", "scene.toml"]) == 2
+    assert capsys.readouterr().err.startswith("cosserat: not enough memory (Unable to allocate 153. MiB for an array)")
+
+
 def test_scenes_may_come_from_a_pipe():
     """As from `cosserat explain <(make_scene)`, but not without end."""
     text = (DEMOS / "eccentric_cantilever.toml").read_text(encoding="utf-8")

@@ -36,7 +36,8 @@ def main(arguments=None):
         if hasattr(stream, "reconfigure"):
             stream.reconfigure(errors="backslashreplace")
     try:
-        return together(lambda: options.do(options))
+        with warnings_in_words(of_scenes=False):
+            return together(lambda: options.do(options))
     except KeyboardInterrupt:  # of commands without partial results; `deliver` handles paths and motions
         say("cosserat: interrupted")
         return INTERRUPTED
@@ -44,6 +45,9 @@ def main(arguments=None):
         if interrupts.asked():  # Ctrl-C also ends a compiler at work, and imports in C raise other exceptions then
             say("cosserat: interrupted")
             return INTERRUPTED
+        if isinstance(problem, MemoryError):
+            say(f"cosserat: not enough memory ({in_words(problem)}): expected a smaller problem, or more memory")
+            return BAD_INPUT
         if not isinstance(problem, CosseratError | OSError):
             raise
         say(f"cosserat: {in_words(problem)}")

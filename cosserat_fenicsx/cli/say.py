@@ -25,14 +25,16 @@ def say(text, file=None):
 
 
 @contextmanager
-def warnings_in_words():
-    """Say each warning about a scene once, without the place in the code that it comes from."""
+def warnings_in_words(of_scenes=True):
+    """Say each warning about the cache of compiled code, and about a scene, once, without the place in the code that it
+    comes from."""
+    from cosserat_fenicsx.code_cache import CacheWarning
     from cosserat_fenicsx.errors import SceneWarning
 
-    said = set()
+    said, kinds = set(), (CacheWarning, SceneWarning) if of_scenes else CacheWarning
 
     def show(message, category, *where, **more):
-        if not issubclass(category, SceneWarning):
+        if not issubclass(category, kinds):
             usual(message, category, *where, **more)
         elif str(message) not in said:
             said.add(str(message))
@@ -40,7 +42,8 @@ def warnings_in_words():
 
     with warnings.catch_warnings():
         usual, warnings.showwarning = warnings.showwarning, show
-        warnings.simplefilter("always", SceneWarning)
+        if of_scenes:
+            warnings.simplefilter("always", SceneWarning)
         yield
 
 
