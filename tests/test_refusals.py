@@ -69,6 +69,7 @@ SURVEYS = {
                            "expected three columns, each of another name"),
     "a long field": ('survey = "s.csv"', "MD,Inc,Azi," + "x" * 200_000 + "\n0,0,0,\n",
                      "line 1 is no row of a .csv file"),
+    "a number of Python's": ('survey = "s.csv"', "MD,Inc,Azi\n0,0,0\n10_00,10,0\n", "line 3, '10_00,10,0': expected num"),
     "an endless device": ('survey = "/dev/zero"', "", "/dev/zero: no plain file: expected a survey as .csv"),
     "a folder": ('survey = "."', "", "Is a directory"),
     "a null character": (r'survey = "s\u0000.csv"', "", "cannot be read .*null"),
