@@ -1,9 +1,11 @@
-"""Under mpirun: a rank that ends with an exception, or by `sys.exit` with a failure, ends all ranks.
+"""Under mpirun: a rank that ends with an exception, also a thread that does, or by `sys.exit` with a failure, ends all
+ranks.
 
 The others would wait for it in MPI for ever, since Python's end waits for them in MPI_Finalize. `python -m mpi4py` does
 the same for scripts that are started with it. Nothing happens where all ranks fail: each ends by itself.
 """
 
+import builtins
 import os
 import sys
 import time
@@ -26,6 +28,8 @@ def watch():
         sys.excepthook = _after(sys.excepthook)
         threading.excepthook = _after(threading.excepthook)
         sys.exit = _exit
+        if hasattr(builtins, "exit"):  # of the module site
+            builtins.exit = builtins.quit = _exit
 
 
 def leave():

@@ -37,12 +37,12 @@ def refuse(owner, field, value, expected):
     raise SceneError(f"{where}.{field} = {given}: expected {expected}")
 
 
-def warn(text):
-    """Give a `SceneWarning`, at the line outside the package from which it was called."""
+def warn(text, kind=SceneWarning):
+    """Give a warning, at the line outside the package from which it was called."""
     frame, level = sys._getframe(1), 2
     while frame is not None and frame.f_globals.get("__name__", "").partition(".")[0] == "cosserat_fenicsx":
         frame, level = frame.f_back, level + 1
-    warnings.warn(text, SceneWarning, stacklevel=2 if frame is None else level)
+    warnings.warn(text, kind, stacklevel=2 if frame is None else level)
 
 
 def number(owner, field, value, expected, accept):

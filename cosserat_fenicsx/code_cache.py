@@ -18,10 +18,10 @@ import shutil
 import stat
 import tempfile
 import time
-import warnings
 from functools import cache as once
 from pathlib import Path
 
+from cosserat_fenicsx.checks import warn
 from cosserat_fenicsx.errors import CacheWarning, InstallationError
 
 #: How the name of a compiled module ends.
@@ -42,9 +42,8 @@ def folder():
         InstallationError: neither of them belongs to the user alone.
     """
     given = Path(os.environ.get("XDG_CACHE_HOME") or "")
-    base = (
-        given if given.is_absolute() else Path.home() / ".cache"
-    )  # a relative one is to be ignored, says its standard
+    # a relative one is to be ignored, says its standard
+    base = given if given.is_absolute() else Path.home() / ".cache"
     shared, own = base / "fenics", base / f"fenics-{os.geteuid()}"
     problem = why_unsafe(shared)
     if problem is None:
@@ -61,7 +60,7 @@ def folder():
 
 @once
 def _say(words):
-    warnings.warn(words, CacheWarning, stacklevel=3)
+    warn(words, CacheWarning)
 
 
 def more_flags():

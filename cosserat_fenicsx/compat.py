@@ -9,6 +9,7 @@ import logging
 import math
 import platform
 import threading
+import warnings
 
 import numpy as np
 
@@ -22,6 +23,7 @@ _HOW_TO_INSTALL = (
     "or with conda ('conda install -c conda-forge fenics-dolfinx'). In a checkout, 'make setup' does it all."
 )
 
+_show_warnings = warnings.showwarning
 try:
     import _cffi_backend
     import dolfinx
@@ -33,6 +35,9 @@ try:
     from petsc4py import PETSc
 except ImportError as missing:
     raise InstallationError(f"dolfinx cannot be imported ({missing}). {_HOW_TO_INSTALL}") from missing
+
+if warnings.showwarning is not _show_warnings:  # FFCx sends all warnings of a program to its log, also our own
+    logging.captureWarnings(False)
 
 interrupts.renew()
 

@@ -65,7 +65,8 @@ class Pendulum:
         return {**{name: getattr(self, name) for name in names}, "delayed": self.delayed.copy(), "counts": self.counts}
 
     def recall(self, memory):
-        vars(self).update(memory, delayed=np.array(memory["delayed"]))
+        self.delayed[:] = memory["delayed"]
+        vars(self).update({name: value for name, value in memory.items() if name != "delayed"})
 
 
 def scene(**changed):

@@ -141,6 +141,12 @@ def test_lobes_shake_the_weight_less_where_the_rock_gives_way(rpm, stiffness):
     assert math.hypot(sine, cosine) == pytest.approx(expected, rel=4e-3) and mean == pytest.approx(80e3, rel=1e-3)
 
 
+def test_a_rock_in_other_units_is_doubted():
+    """1000 kN/mm, say, as a number of 1e3 N/m."""
+    with pytest.warns(cf.SceneWarning, match="BitOnRock.rock_stiffness = 1000 N/m: 60000 N press the bit by 60 m into"):
+        cf.BitOnRock(cf.Lobes(3, 8e-3), weight=6e4, rock_stiffness=1e3)
+
+
 @pytest.mark.parametrize(
     ("given", "words"),
     [

@@ -141,6 +141,21 @@ def test_a_folder_of_others_is_not_used(cache, damage):
         product()
 
 
+def test_the_command_line_says_so_without_the_place_in_the_code(cache):
+    """Also after FFCx has been imported, which sends all warnings of a program to its log."""
+    cache.mkdir(0o770)
+    cache.chmod(0o770)
+    code = (
+        "import warnings\nfrom cosserat_fenicsx.cli.say import warnings_in_words\nfrom cosserat_fenicsx import "
+        "code_cache\nwith warnings_in_words():\n    import cosserat_fenicsx.compat\n    code_cache.folder()"
+    )
+    done = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, encoding="utf-8", cwd=ROOT)
+    assert done.stderr == (
+        f"cosserat: warning: the cache of compiled code {cache} is not used, because it can be written to by others; "
+        f"{cache}-{os.geteuid()} takes its place\n"
+    )
+
+
 def test_a_relative_path_is_ignored(tmp_path, monkeypatch):
     monkeypatch.setenv("HOME", str(tmp_path))
     for given in ("", "here", "./here"):

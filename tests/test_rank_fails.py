@@ -58,9 +58,10 @@ def run(program, folder, size=2):
         (SOLVE, 1, "ValueError: one rank"),
         ("rank == 1 and sys.exit(7)\nwait()", 7, "rank 1 of 2 alone ended with a failure"),
         ("rank == 0 and sys.exit('no input')\nwait()", 1, "no input\n"),
+        ("rank == 1 and exit(7)\nwait()", 7, "rank 1 of 2 alone ended with a failure"),
         ("rank == 1 and threading.Thread(target=lambda: 1 / 0).start()\nrank == 0 and wait()", 1, "ZeroDivisionError"),
     ],
-    ids=["depth_sweep", "solve", "exit", "exit with words", "thread"],
+    ids=["depth_sweep", "solve", "exit", "exit with words", "exit of site", "thread"],
 )
 def test_one_rank_fails(program, code, said, tmp_path):
     done, seconds = run(program, tmp_path)

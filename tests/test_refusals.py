@@ -69,6 +69,7 @@ SURVEYS = {
                            "expected three columns, each of another name"),
     "a long field": ('survey = "s.csv"', "MD,Inc,Azi," + "x" * 200_000 + "\n0,0,0,\n",
                      "line 1 is no row of a .csv file"),
+    "a number of Python's": ('survey = "s.csv"', "MD,Inc,Azi\n0,0,0\n10_00,10,0\n", "line 3, '10_00,10,0': expected num"),
     "an endless device": ('survey = "/dev/zero"', "", "/dev/zero: no plain file: expected a survey as .csv"),
     "a folder": ('survey = "."', "", "Is a directory"),
     "a null character": (r'survey = "s\u0000.csv"', "", "cannot be read .*null"),
@@ -106,6 +107,21 @@ def test_other_files_are_plain_ones_too(tmp_path):
     os.symlink("/dev/zero", tmp_path / "points.csv")
     with pytest.raises(cf.SceneError, match="points.csv: no plain file"):
         cf.Spline(tmp_path / "points.csv")
+
+
+def test_a_whole_number_of_too_many_digits(tmp_path):
+    (tmp_path / "s.toml").write_text(f"a = {'9' * 5000}\n", encoding="utf-8")
+    with pytest.raises(cf.SceneError, match="s.toml: not valid TOML: .*digits"):
+        cf.read_scene(tmp_path / "s.toml")
+
+
+def test_too_little_memory_in_words(monkeypatch, capsys):
+    def explain(options):
+        raise MemoryError("Unable to allocate 153. MiB for an array")
+
+    monkeypatch.setattr("cosserat_fenicsx.cli.main._explain", explain)
+    assert main(["explain", "scene.toml"]) == 2
+    assert capsys.readouterr().err.startswith("cosserat: not enough memory (Unable to allocate 153. MiB for an array)")
 
 
 def test_scenes_may_come_from_a_pipe():

@@ -11,6 +11,7 @@ from fake_string import scene, use
 
 import cosserat_fenicsx as cf
 from cosserat_fenicsx.drilling import folder as drilling_folder
+from cosserat_fenicsx.drilling.history import COLUMNS
 from cosserat_fenicsx.storage import checkpoints
 
 pytestmark = pytest.mark.serial
@@ -96,11 +97,14 @@ CHANGES = {
     "profiles 0.5": top_of("profiles", 0.5),
     "sums missing": top_of("sums", None),
     "sums a number": top_of("sums", 1),
+    "sums of arrays": top_of("sums", {"series.f64": np.zeros(3), "profiles.f64": np.zeros(3)}),
     "speed missing": memory_of("speed", None),
     "speed a text": memory_of("speed", "fast"),
     "speed an array": memory_of("speed", np.zeros(3)),
     "speed a dict": memory_of("speed", {"a": 1}),
     "delayed of another length of one": memory_of("delayed", np.zeros(1)),
+    "delayed of three": memory_of("delayed", np.zeros(3)),
+    "delayed missing": memory_of("delayed", None),
     "delayed a number": memory_of("delayed", 0.0),
     "delayed of texts": memory_of("delayed", np.array(["a"] * 10)),
     "counts a number": memory_of("counts", 1),
@@ -123,6 +127,34 @@ def test_a_string_goes_on_to_the_same_digits(change, strings, tmp_path, monkeypa
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         assert len(cf.read_drilling(folder)) == 1000
+
+
+ROW = 8 * len(COLUMNS)
+UNREADABLE = {
+    "a row taken out": lambda file: file.write_bytes(file.read_bytes()[:ROW] + file.read_bytes()[2 * ROW :]),
+    "a byte taken out": lambda file: file.write_bytes(file.read_bytes()[:777] + file.read_bytes()[778:]),
+    "zeros at the end": lambda file: file.write_bytes(file.read_bytes() + bytes(3 * ROW)),
+    "the last rows again": lambda file: file.write_bytes(file.read_bytes() + file.read_bytes()[-3 * ROW :]),
+    "missing": lambda file: file.unlink(),
+}
+
+
+@pytest.mark.parametrize("change", UNREADABLE)
+def test_rows_that_are_not_those_of_the_motion_are_not_read(change, strings, tmp_path, monkeypatch):
+    use(monkeypatch)
+    folder = shutil.copytree(strings / "part", tmp_path / "copy")
+    UNREADABLE[change](folder / "series.f64")
+    with pytest.raises(cf.SceneError, match="series.f64"):
+        cf.read_drilling(folder)
+
+
+def test_rows_of_a_motion_that_is_being_computed_again_are_read(strings, tmp_path, monkeypatch):
+    use(monkeypatch, stops_at=100)
+    folder = shutil.copytree(strings / "part", tmp_path / "copy")
+    changed_byte(folder / "series.f64", 1001)
+    with pytest.warns(cf.SceneWarning, match=AGAIN), pytest.raises(cf.Interrupted):
+        cf.resume_drilling(folder, progress=False)
+    assert len(cf.read_drilling(folder)) <= 100
 
 
 def test_folders_without_checksums_are_gone_on_with_in_words(strings, tmp_path, monkeypatch):
@@ -225,6 +257,8 @@ OF_RODS = {
     "stepper a number": of_rank("0/stepper", 1.0),
     "newton missing": of_rank("0/stepper/newton", None),
     "x of one number": of_rank("0/stepper/problem/x", np.zeros(1)),
+    "x of three numbers": of_rank("0/stepper/problem/x", np.zeros(3)),
+    "books missing": of_rank("0/stepper/books", None),
     "past of texts": of_rank("0/stepper/books", np.array(["a", "b"])),
     "rank missing": of_rank("0", None),
     "rank a number": of_rank("0", 1),

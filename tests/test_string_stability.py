@@ -284,6 +284,9 @@ def test_speeds_in_revolutions_a_minute_are_doubted():
     with pytest.warns(cf.SceneWarning, match=r"TopDrive.speed = 120 rad/s are 1146 rev/min.*120 \* units.rpm"):
         fast = cf.TopDrive(120)
     assert fast.speed == 120
+    for function in (cf.Ramp((120.0,), 1.0, 5.0), lambda t: 120.0):
+        with pytest.warns(cf.SceneWarning, match=r"TopDrive.speed = 120 rad/s are 1146 rev/min"):
+            cf.TopDrive(function)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         drive = cf.TopDrive(250 * cf.units.rpm)

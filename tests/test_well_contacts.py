@@ -88,6 +88,24 @@ def test_a_force_behind_which_the_string_rises(tol):
     assert at_bit.force == pytest.approx(283.51, rel=5e-3) and not solved.rough
 
 
+#: An assembly at 88 degrees with 250 kN and three stabilisers: distances from the bit and clearances, m; forces at the
+#: lower stabiliser and at the bit (a beam of small slopes in a rigid wall, 6000 elements).
+STABILISED = ((29.0, 0.003), (11.0, 0.003), (2.0, 0.0016)), (3536.43, 4185.51)
+
+
+def test_forces_of_rings_next_to_each_other():
+    """No wall is between them whose softness would count: the next wall is 18 m away."""
+    (rings, forces), (EI, weight, clearance, *_) = STABILISED, SLICK
+    length, path = 120.0, cf.WellPath.from_survey([0, 140], [88.0, 88.0], [0, 0])
+    solved = solve_in_hole(
+        path, [length], cf.Stiffness((1e12,) * 2, 1e12, (EI, EI), EI), weight, 0.1, radius=0.1 + clearance,
+        bottom_tension=-250e3, rings=[*((length - d, room, 0.1) for d, room in rings), (length, 0.0, 0.1)],
+    )  # fmt: skip
+    *_, stabiliser, at_bit = (x for x in solved.contacts if x.start == x.end)
+    for found, force in zip((stabiliser, at_bit), forces, strict=True):
+        assert abs(found.force - force) < found.error < 5e-3 * force and found not in solved.rough
+
+
 @pytest.mark.parametrize("case", KNOWN["stiff build"][:2], ids=lambda case: case["name"])
 def test_a_smaller_tol_makes_forces_at_points_more_accurate(case):
     """The wall is made stiffer, and the contact splits behind the forces."""

@@ -265,6 +265,17 @@ def test_the_chart_of_a_sweep_marks_lock_up_and_thrusts_beyond_all_others():
     assert hook.figure.get_suptitle().endswith("7 of 10 answers so far") and len(torque.lines) == 2
 
 
+def test_notes_in_the_chart_of_a_sweep_do_not_cover_each_other():
+    """Of lines that lock up at the same depth."""
+    pytest.importorskip("matplotlib")
+    values = {name: np.full((1, 3, 2), np.nan) for name in module.KEPT}
+    values["hook_load"][0, :, 0], values["locked"][0, :, 1] = (1e5, 2e5, 3e5), (10.0, 20.0, 30.0)
+    notes = {(0, j, 1): "locks up" for j in range(3)}
+    (hook,) = cf.DepthSweep((cf.TripIn(),), np.array([1e3, 2e3]), (0.1, 0.2, 0.3), values, notes).plot().axes
+    assert [text.xy[1] for text in hook.texts] == [2e3] * 3
+    assert min(np.diff(sorted(text.xyann[1] for text in hook.texts))) > hook.texts[0].get_fontsize()
+
+
 def test_the_largest_error_of_a_sweep_names_its_quantity_and_place():
     values = {name: np.full((2, 1, 3), 1e-3) for name in module.KEPT}
     values["rung"][:] = 1

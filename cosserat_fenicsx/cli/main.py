@@ -45,6 +45,9 @@ def main(arguments=None):
         if interrupts.asked():  # Ctrl-C also ends a compiler at work, and imports in C raise other exceptions then
             say("cosserat: interrupted")
             return INTERRUPTED
+        if isinstance(problem, MemoryError):
+            say(f"cosserat: not enough memory ({in_words(problem)}): expected a smaller problem, or more memory")
+            return BAD_INPUT
         if not isinstance(problem, CosseratError | OSError):
             raise
         say(f"cosserat: {in_words(problem)}")

@@ -1,6 +1,5 @@
 """Messages of the command line, printed by one MPI rank alone, and its exit codes."""
 
-import logging
 import sys
 import warnings
 from contextlib import contextmanager
@@ -38,7 +37,6 @@ def warnings_in_words():
             said.add(str(message))
             say(f"cosserat: warning: {message}")
 
-    logging.captureWarnings(True)  # FFCx does when it is imported, which must not take the place of `show`
     with warnings.catch_warnings():
         usual, warnings.showwarning = warnings.showwarning, show
         warnings.simplefilter("always", SceneWarning)

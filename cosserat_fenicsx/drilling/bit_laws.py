@@ -8,7 +8,10 @@ blade to blade. `Lobes`: a rock whose face is wavy.
 import math
 from dataclasses import dataclass
 
-from cosserat_fenicsx.checks import instance, number, positive, refuse, stiffness, store
+from cosserat_fenicsx.checks import instance, number, positive, refuse, stiffness, store, warn
+
+# Depths (m) beyond this to which a weight presses a bit are those of a stiffness in other units by all appearance.
+_DEEP = 0.1
 
 
 def _not_negative(owner, field, unit):
@@ -177,5 +180,11 @@ class BitOnRock:
             _not_negative(self, field, unit)
         if self.weight is not None:
             store(self, weight=positive(self, "weight", self.weight, "N"))
+            pressed = self.weight / self.rock_stiffness
+            if pressed > _DEEP:
+                warn(
+                    f"BitOnRock.rock_stiffness = {self.rock_stiffness:g} N/m: {self.weight:g} N press the bit by "
+                    f"{pressed:g} m into the rock; 60 kN/mm are 60e6"
+                )
         elif isinstance(self.law, Lobes) or getattr(self.law, "radius", None) is not None:
             refuse(self, "weight", None, "the weight on bit (N), which the law needs")

@@ -70,7 +70,14 @@ _OF_MEMORY = {
     "profiles": AN_INDEX,
     "model": (lambda value: isinstance(value, dict), "what the model remembers"),
 }
-_SUMS_OF_FILES = {"sums": (lambda value: isinstance(value, dict), "checksums of the rows")}
+_SUMS_OF_FILES = {
+    "sums": (
+        lambda value: isinstance(value, dict) and all(type(value.get(name)) is int for name in _FILES),
+        "checksums of the rows",
+    )
+}
+# Relative differences of times below this are rounding.
+_ROUNDING = 1e-9
 
 
 class DrillingFolder:
@@ -251,10 +258,12 @@ class DrillingFolder:
         }
 
     def cut(self, rows, profiles):
-        """Leave the first rows alone, before a motion is continued."""
+        """Leave the first rows alone, before a motion is continued; without rows no checkpoint, which tells of some."""
         sizes = self._sizes(rows, profiles)
 
         def done():
+            if not rows:
+                (self.place / _LATEST).unlink(missing_ok=True)
             for name, size in sizes.items():
                 os.truncate(self.place / name, size)
                 self._sums[name] = _checksum(self.place / name, size)
@@ -269,14 +278,28 @@ class DrillingFolder:
         def compared():
             told = memory.get("sums")
             for name, size in self._sizes(memory["rows"], memory["profiles"]).items():
-                if (self.place / name).stat().st_size < size:
-                    return f"{self.place / name} has fewer rows than its checkpoint tells of"
-                if told and told.get(name) != _checksum(self.place / name, size):
-                    return f"{self.place / name}: its numbers are not those that were written"
+                try:
+                    if (self.place / name).stat().st_size < size:
+                        return f"{self.place / name} has fewer rows than its checkpoint tells of"
+                    if told and told.get(name) != _checksum(self.place / name, size):
+                        return f"{self.place / name}: its numbers are not those that were written"
+                except OSError as problem:
+                    return f"{self.place / name} cannot be read ({problem.strerror})"
             return None
 
         comm = world()
         return comm.bcast(compared() if comm.rank == 0 else None)
+
+    def not_in_order(self, history):
+        """Why rows after those of the checkpoint are none of this motion, in words: their times; None where they are."""
+        apart = self.head["apart"]
+        for name, times, steps in (
+            (_SERIES, history.times, apart["save_every"]), (_PROFILES, history.profile_times, apart["profile_every"])
+        ):  # fmt: skip
+            expected = self.head["dt"] * steps * np.arange(1, len(times) + 1)
+            if not np.allclose(times, expected, rtol=_ROUNDING, atol=0):
+                return f"{self.place / name}: the times of its rows are not those of the motion"
+        return None
 
     def add(self, history, rows, profiles):
         """Append rows to the files.
@@ -346,9 +369,10 @@ class DrillingFolder:
             memory.pop("sums", None)
         return memory
 
-    def unlike(self, memory, running):
-        """Why what a checkpoint remembers is not of the kind of what a `StringModel` does, in words, or None."""
+    def not_recalled(self, memory, running):
+        """Let a `StringModel` go on from what a checkpoint remembers. Why it cannot, in words, or None."""
         found = checkpoints.unlike(memory["model"], running.memory())
+        found = found or checkpoints.not_recalled(running.recall, memory["model"])
         return found and f"{self.place / _LATEST}: {found}"
 
     def tell_lost(self, why):

@@ -126,16 +126,14 @@ def _go_on(kept, scene, duration, progress):
     if duration > kept.asked:
         check_step(scene, running.dt, duration, kept.head["apart"]["save_every"] * running.dt)
         kept.extend(duration, scene)
-    why = memory and (kept.wrong(memory) or kept.unlike(memory, running))
+    why = memory and (kept.wrong(memory) or kept.not_recalled(memory, running))
     if why:
         kept.tell_lost(why)
-        memory = None
+        running, memory = _running(kept, scene), None
     rows, profiles = (memory["rows"], memory["profiles"]) if memory else (0, 0)
     history = kept.history(scene, rows, profiles)
     kept.cut(rows, profiles)
     loop = TimeLoop(running, history, kept, **kept.head["apart"], turn=_turn_to_watch(scene))
-    if memory:
-        loop.recall(memory)
     return loop.until(duration, progress)
 
 
@@ -172,12 +170,15 @@ def read_drilling(folder: File, scene: Drilling | None = None) -> DrillingHistor
     """
     kept = DrillingFolder(folder).open()
     scene, memory = kept.scene(scene), kept.memory(tell=False)  # before the rows, which another process may be writing
-    why = memory and kept.wrong(memory)
-    if why and "fewer" not in why:
+    why, history = memory and kept.wrong(memory), None
+    if not why:
+        history = kept.history(scene)
+        why = kept.not_in_order(history)
+    if why:
         raise SceneError(
             f"{why}: expected the files as they were; cosserat_fenicsx.resume_drilling computes them again"
         )
-    return kept.history(scene)
+    return history
 
 
 def check_arguments(scene, duration, dt=None, elements=None, save_every=None, profile_every=None):

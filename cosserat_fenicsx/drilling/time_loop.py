@@ -34,10 +34,6 @@ class TimeLoop:
         """What it takes to go on from here: that of the model, and the numbers of rows."""
         return {"rows": self._rows, "profiles": self._profiles, "model": self.model.memory()}
 
-    def recall(self, memory):
-        """Restore what `memory` returned."""
-        self.model.recall(memory["model"])
-
     def until(self, duration, progress=None):
         """Advance to a time (s), and return the history.
 

@@ -112,7 +112,8 @@ class TopDrive:
     Args:
         speed: asked for, rad/s (`60 * units.rpm`): a number, from the start on, or a function of time, such as
             `Ramp(...)` or `Table(...)`, whose attribute `jumps` holds the times where it is not smooth. None for a
-            `Motor`. Numbers above 32 look like revolutions a minute: they are taken, with a warning.
+            `Motor`. Numbers above 32, at the start or at a jump, look like revolutions a minute: they are taken, with a
+            warning.
         inertia: of the drive, at the string's speed, kg m^2.
         control: `Stiff()`, `PI(Kp, Ki)`, `Matched()` or `Motor(torque)`.
 
@@ -139,8 +140,7 @@ class TopDrive:
             refuse(self, "speed", None, "the speed asked for (rad/s), such as 60 * units.rpm")
         else:
             signal = self.signal()
-            if signal.constant:
-                doubt_speed(self, "speed", signal(0.0))
+            doubt_speed(self, "speed", max((signal(t) for t in (0.0, *signal.jumps)), key=abs))
 
     def signal(self) -> ScalarSignal:
         """The speed asked for at every time, rad/s."""

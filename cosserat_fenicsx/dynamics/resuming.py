@@ -119,7 +119,6 @@ def _go_on(kept, scene, until, comm, progress):
                 "computed with"
             )
         history.go_on_after(memory["saved"])
-        motion.recall(memory)
         if until > kept.durations[-1]:
             kept.extend(until, scene)
         return motion.over(marks, asked["save_every"] is None, progress)
@@ -178,15 +177,15 @@ def _memory(kept, history, motion=None):
     """The latest checkpoint of this rank before which all states are saved.
 
     Args:
-        motion: the `TimeLoop` that will recall it, whose data it must be like.
+        motion: the `TimeLoop` that recalls it, whose data it must be like.
 
     Raises:
         SceneError: there is none.
     """
-    lost = []
+    lost, like = [], {} if motion is None else motion.memory()
     for memory, states, why in kept.memories():
         if memory is not None:
-            why = _wrong(memory, motion)
+            why = _wrong(memory, like)
         missing = memory is None and not why
         reasons = [text for text in history.comm.allgather(why) if text]
         if history.comm.allreduce(missing, op=MPI.LOR) or reasons:
@@ -195,6 +194,8 @@ def _memory(kept, history, motion=None):
             continue
         elif not history.sound(states):
             lost.append(f"{history.folder}: the numbers of saved states are not those that were written")
+        elif motion is not None and (found := _not_recalled(motion, memory)):
+            lost.append(f"checkpoint: {found}")
         else:
             if lost and motion is not None and history.comm.rank == 0:
                 warn(f"{lost[0]}: the motion is continued from its start, which computes them again")
@@ -206,13 +207,22 @@ def _memory(kept, history, motion=None):
     )
 
 
-def _wrong(memory, motion):
-    """What is wrong with the data of a checkpoint, "" where nothing is."""
+def _not_recalled(motion, memory):
+    """Let a `TimeLoop` go on from a checkpoint; why it cannot, in words, or None. Of several ranks one cannot fail alone,
+    since this is collective: there all exceptions are raised."""
+    if motion.model.comm.size == 1:
+        return checkpoints.not_recalled(motion.recall, memory)
+    motion.recall(memory)
+    return None
+
+
+def _wrong(memory, like):
+    """What is wrong with the data of a checkpoint, which should be like others, "" where nothing is."""
     try:
         entries.checked(memory, {"saved": entries.AN_INDEX, "t": entries.A_NUMBER})
     except ValueError as problem:
         return f"checkpoint: {problem}"
     if not isinstance(memory.get("nodes"), np.ndarray):
         return "checkpoint: nodes is missing"
-    found = checkpoints.unlike(memory, {} if motion is None else motion.memory())
+    found = checkpoints.unlike(memory, like)
     return f"checkpoint: {found}" if found else ""

@@ -20,6 +20,8 @@ def tables_of(file):
     except tomllib.TOMLDecodeError as problem:
         hint = "; text, and a number with its unit, stand in quotes" if "Invalid value" in str(problem) else ""
         raise SceneError(f"{file}: not valid TOML: {problem}{hint}") from None
+    except ValueError as problem:  # of a whole number of thousands of digits
+        raise SceneError(f"{file}: not valid TOML: {str(problem).partition(';')[0]}") from None
     except RecursionError:
         raise SceneError(f"{file}: not valid TOML: nested too deeply") from None
 

@@ -81,7 +81,7 @@ def unlike(memory, like, where=""):
     for name, expected in like.items():
         what = f"{where}{name}"
         if name not in memory:
-            if expected == {}:  # which leaves no trace in a file
+            if isinstance(expected, dict) and not expected:  # which leaves no trace in a file
                 continue
             return f"{what} is missing"
         found = memory[name]
@@ -99,6 +99,16 @@ def unlike(memory, like, where=""):
                 return f"{what} is of another kind"
         elif expected.size and (found.shape[1:] != expected.shape[1:] or found.size == 1 < expected.size):
             return f"{what} has the shape {found.shape}, where {expected.shape} is expected"
+    return None
+
+
+def not_recalled(recall, memory):
+    """Call `recall` with the data of a checkpoint that is like those of a model, see `unlike`; why it fails, in words,
+    such as by arrays of another length, or None."""
+    try:
+        recall(memory)
+    except (ValueError, TypeError, LookupError, AttributeError, OverflowError) as problem:
+        return f"its data do not fit the motion ({problem})"
     return None
 
 

@@ -90,7 +90,7 @@ class StudyFolder:
             head = json.loads((self.place / _HEAD).read_text(encoding="utf-8"))
             version, old_task, old_cases = head["format"], head["task"], list(head["cases"])
             names = [told["function"] for told in (old_task, task)]
-        except (ValueError, KeyError, TypeError):
+        except (ValueError, KeyError, TypeError, RecursionError):
             raise SceneError(f"{self.place / _HEAD} is damaged: expected the file that study wrote") from None
         if version != _FORMAT:
             raise SceneError(f"{self.place}: its format is {version}: expected {_FORMAT}, that of this release")

@@ -128,7 +128,7 @@ def read_columns(file, md, inc, azi, degrees, length_unit):
         try:
             if any(cell.strip() for cell in row[len(heading) :]):
                 raise ValueError
-            values.append([float(cell) for cell in cells])
+            values.append([_number(cell) for cell in cells])
         except ValueError:
             point = any("," in cell for cell in row) or len(row) > len(heading)
             hint = "; decimals stand behind a point, as in 10.5" if point else ""
@@ -212,9 +212,15 @@ def _split(heading):
     return " ".join(words), last
 
 
+def _number(cell):
+    if "_" in cell or not cell.isascii():  # Python takes 10_00 for a number, and digits of all scripts
+        raise ValueError
+    return float(cell)
+
+
 def _is_number(cell):
     try:
-        return math.isfinite(float(cell))
+        return math.isfinite(_number(cell))
     except ValueError:
         return False
 

@@ -89,6 +89,11 @@ def _without_answer(axes, sweep, i, j, limits, colour):
     lock-up."""
     loads, depths = sweep.hook_load[i, j] / 1e3, sweep.depths
     note = {"fontsize": 7, "color": colour, "va": "center", "textcoords": "offset points"}
+
+    def offset(depth, right):
+        """In points: notes at one depth are below each other."""
+        return right, -9 * sum(text.xy[1] == depth for text in axes.texts)
+
     if np.isfinite(limits).all():
         axes.set_xlim(*limits)
     for k in np.flatnonzero((loads < limits[0]) | (loads > limits[1])):
@@ -96,7 +101,7 @@ def _without_answer(axes, sweep, i, j, limits, colour):
         at = limits[0] if left else limits[1]
         axes.plot(at, depths[k], "<" if left else ">", color=colour, clip_on=False)
         axes.annotate(f"{loads[k]:,.0f} kN, beyond the axis: close to lock-up", (at, depths[k]),
-                      (8, 0) if left else (-8, 0), ha="left" if left else "right", **note)  # fmt: skip
+                      offset(depths[k], 8 if left else -8), ha="left" if left else "right", **note)  # fmt: skip
     order = np.argsort(depths)
     shown = None
     for k in order:
@@ -109,7 +114,7 @@ def _without_answer(axes, sweep, i, j, limits, colour):
             locked = sweep.values["locked"][i, j, k]
             if shown is not None and np.isfinite(locked):
                 told = f"bit at {depths[k]:.6g} m: locks up, from md = {locked:.5g} m of the string on"
-                axes.annotate(told, (shown, depths[k]), (8, 0), **note)
+                axes.annotate(told, (shown, depths[k]), offset(depths[k], 8), **note)
 
 
 def fit_figure(fit):

@@ -125,7 +125,8 @@ class OnWall:
         known = [x for x in self._resultants[0] if x.force > _ROUNDING * largest]
         other = self._mesh_before
         reach = other and 2 * float(other._layer.max()) + float(np.ptp(other.s[other._nodes], axis=1).max())
-        return with_errors(known, other and other._resultants[0], reach, self._layer_at)
+        rings = [ring.station.s for ring in self.string.rings]
+        return with_errors(known, other and other._resultants[0], reach, self._layer_at, rings)
 
     def _layer_at(self, s):
         return self._layer[np.clip(np.searchsorted(self.s[:: self.path.degree], s) - 1, 0, len(self._layer) - 1)]
