@@ -74,3 +74,30 @@ def test_load_control_does_not_step_over_a_limit_point():
     assert [event.kind for event in by_load.events] == ["limit", "limit"] and by_load.stable[-1]
     apex = given.stations[0]
     np.testing.assert_allclose(by_load.displacement(apex)[-1], by_arc.displacement(apex)[-1], atol=1e-8)
+
+
+def test_two_paths_beside_each_other_are_no_bifurcation():
+    """Two arches whose crowns are tied: at its tenth limit point the path turns off by 3e-4 of the load factor before a
+    bifurcation of the path beside it."""
+    half, gap, axis, load = 0.38413884, 2.9, (0, 1, 0), 1.00076
+    R = 1 / half
+    section = imperfect_structures._section(880.0, 2.0)
+    rods = [
+        cf.Rod(cf.Arc((x, 0, 0), (x - R * np.sin(half), 0, R * np.cos(half)), 2 * half, axis), section, name=f"at {x}")
+        for x in (0.0, gap)
+    ]
+    tie = cf.Rod(cf.Line((0, 0, R), (gap, 0, R), d1=axis), imperfect_structures._section(880.0, gap), name="tie")
+    crowns = [rod.at(rod.length / 2) for rod in rods]
+    scene = cf.Scene(
+        [*rods, tie],
+        [cf.Hinge(end, axis) for rod in rods for end in (rod.start, rod.end)],
+        [cf.Force(crowns[0], (0, 0, -load)), cf.Force(crowns[1], (0, 0, -1.0))],
+        [cf.Joint(crowns[0], tie.start), cf.Joint(crowns[1], tie.end)],
+    )
+    path, small = (
+        cf.solve(scene, (0, 18), elements=8, control="arc", until=lambda path: len(path.events) == 12, steps=steps)
+        for steps in (None, cf.StepControl(largest=0.5))
+    )
+    assert {event.kind for event in path.events} == {"limit"}
+    found, true = ([event.load_factor for event in each.events] for each in (path, small))
+    np.testing.assert_allclose(found, true, rtol=1e-6)

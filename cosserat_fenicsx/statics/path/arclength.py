@@ -46,10 +46,9 @@ class ArcLength:
     def __init__(self, track, control, locator):
         self.track, self.control, self._locator = track, control, locator
         self._step, self._branched = None, False
-        #: Whether the number of negative modes changes as the critical points tell. The second variation that is
-        # counted has bounded stiffnesses, and under some loads it is the symmetric part of the tangent: once that has
-        # been seen in a step that is plain, the number tells nothing about later ones.
-        self.counts = True
+        # Whether the number of negative modes may change in the next step otherwise than the critical points tell: the
+        # second variation that is counted has bounded stiffnesses, so that it may do so in a step that is plain.
+        self._excused = False
 
     def to(self, target, *, first=None, slope=None, on_step=None, on_event=None):
         """Advance to the next point of the path with the load factor `target`, solved at exactly that load factor.
@@ -76,14 +75,14 @@ class ArcLength:
                 try:
                     landing, crossings = self._locator.between(
                         track.here, point, target, self._weight,
-                        probe=not branching, explained=self.counts, short=not branching and self._plain(point),
+                        probe=not branching, explained=not self._excused, short=not branching and self._plain(point),
                     )  # fmt: skip
                 except Lost as lost:
                     track.failure = lost.reason
                     if branching:
                         return track.restore()
                     if lost.reason == UNEXPLAINED and self._plain(point):
-                        self.counts = False
+                        self._excused = True
                     else:
                         self._step = self._length(track.here, point)
                     point = self._shorten(lost.share)
@@ -105,6 +104,7 @@ class ArcLength:
                     track.restore()
                     return True
             self._accept(landing or point, point)
+            self._excused = False
             if on_step:
                 on_step(track.here)
             if landing is not None:
