@@ -41,9 +41,9 @@ class Extremes(OnNodes):
         """The largest contact forces, moments and stresses over all points of a path (or times of a motion) and all
         rods.
 
-        Both sides of jumps are included, and places between the nodes. Values are those of the mesh used: `tol` limits
-        the error of positions only. With t = d_3: bending ``|m - (m.t) t|``, twisting ``|m.t|``, shear
-        ``|n - (n.t) t|``, tension ``n.t``, compression ``-n.t``.
+        Both sides of jumps are included, and places between the nodes. Values are those of the mesh used, and their
+        errors are those of n and m: of a path, see `Path.errors`. With t = d_3: bending ``|m - (m.t) t|``, twisting
+        ``|m.t|``, shear ``|n - (n.t) t|``, tension ``n.t``, compression ``-n.t``.
 
         Returns:
             {quantity: `Largest`}, the quantities "bending moment", "twisting moment" (N m), "shear force", "tension",
@@ -116,7 +116,7 @@ def largest_in_words(path):
         f"{what} {x.size:.4g} {_UNITS[what]} ({x.station}, {where} {path.along_axis[x.point]:.4g}{unit})"
         for what, x in path.largest().items()
     ]
-    line = f"Largest on this mesh (tol limits errors of positions only): {'; '.join(told) or 'no force or moment'}."
+    line = f"Largest on this mesh: {'; '.join(told) or 'no force or moment'}."
     return "\n".join([line, *_unknown_in_words(path)])
 
 
