@@ -24,6 +24,8 @@ _BESIDE, _SAME = 0.1, 1e-4
 _SHORT, _STRAIGHT = 3e-3, 0.05
 # Largest relative difference of the load factors of two limit points that are the same one; its root for the states.
 _MET = 1e-7
+# Number of plain steps in which negative modes may change without an event before their number is no longer compared.
+_EXCUSES = 4
 _CLOSED = "the path is closed: it returned to an earlier point without reaching that load factor"
 # A path that has begun at the unloaded state returns to an earlier point only after passing that state again.
 _CHANGED = (
@@ -47,8 +49,9 @@ class ArcLength:
         self.track, self.control, self._locator = track, control, locator
         self._step, self._branched = None, False
         # Whether the number of negative modes may change in the next step otherwise than the critical points tell: the
-        # second variation that is counted has bounded stiffnesses, so that it may do so in a step that is plain.
-        self._excused = False
+        # second variation that is counted has bounded stiffnesses, so that it may do so in a step that is plain. Where
+        # it has done so often, the number tells nothing about any step.
+        self._excused, self._excuses = False, 0
 
     def to(self, target, *, first=None, slope=None, on_step=None, on_event=None):
         """Advance to the next point of the path with the load factor `target`, solved at exactly that load factor.
@@ -82,7 +85,7 @@ class ArcLength:
                     if branching:
                         return track.restore()
                     if lost.reason == UNEXPLAINED and self._plain(point):
-                        self._excused = True
+                        self._excused, self._excuses = True, self._excuses + 1
                     else:
                         self._step = self._length(track.here, point)
                     point = self._shorten(lost.share)
@@ -104,7 +107,7 @@ class ArcLength:
                     track.restore()
                     return True
             self._accept(landing or point, point)
-            self._excused = False
+            self._excused = self._excuses > _EXCUSES
             if on_step:
                 on_step(track.here)
             if landing is not None:
