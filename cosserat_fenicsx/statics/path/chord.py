@@ -27,8 +27,9 @@ _OFTEN = 6
 _BESIDE, _STEEP = (1e-3, 1e-4), 2.0
 # Largest distance of the direction between these two points from the mean of their tangents, over the angle between the
 # tangents; on a smooth path it is of second order in their distance, while points beside each other with parallel
-# tangents lie on two paths. Distance beside each other that may be rounding (rad, rod lengths).
-_ASTRIDE, _ROUNDING = 0.1, 1e-8
+# tangents lie on two paths. How far they are beside each other by rounding, times their distance (rad, rod lengths):
+# Newton's method loses accuracy along the mode in inverse proportion to that.
+_ASTRIDE, _ROUNDING = 0.1, 1e-9
 # Smallest distance of the coordinates of two interpolation points.
 _APART = 1e-5
 # Offsets of the coordinate, tried in turn until Newton's method converges.
@@ -150,9 +151,8 @@ class Chord:
             if before is None or after is None or (before.rise * after.rise < 0) != turning:
                 continue
             steep = bends(self.track, before, after, self._weight)
-            astride = (steep.corner - _ASTRIDE * steep.turn) * steep.length > _ROUNDING
-            if steep.resolved and not astride and steep.length <= _STEEP * 2 * apart * self.length:
-                return True
+            if steep.resolved and steep.length <= _STEEP * 2 * apart * self.length:
+                return (steep.corner - _ASTRIDE * steep.turn) * steep.length**2 <= _ROUNDING
         return False
 
     def neighbours(self, place):
