@@ -11,7 +11,7 @@ from cosserat_fenicsx.results.places import cell_nodes, compared
 #: Of the quantities that errors are estimated of: positions, rotations, contact forces n and contact moments m.
 Errors = namedtuple("Errors", "position rotation force moment")
 NAMES = Errors._fields
-POSITION, FORCE = 0, 2
+POSITION, ROTATION, FORCE = 0, 1, 2
 
 # Differences of positions and of rotations up to this are rounding alone, in units of the scales' length and rad.
 ROUNDING = 1e-14
