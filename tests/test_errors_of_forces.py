@@ -221,5 +221,6 @@ def test_rotations_between_the_sample_points(draw, tol):
     """Observed before: estimates 0.65 and 0.52 of the true error, where differences of two meshes change sign."""
     scene = draw()
     path = cf.solve(scene, (0.0, 1.0), tol=tol)
-    off = true_errors(path, cf.solve(scene, path.load_factors, elements=32))[1, 1:]
+    with np.errstate(invalid="ignore"):  # nothing moves at the load factor 0
+        off = true_errors(path, cf.solve(scene, path.load_factors, elements=32))[1, 1:]
     assert (path.errors.rotation[1:] >= 0.8 * off).all()
