@@ -25,11 +25,11 @@ def test_overhead_quick(tmp_path):
 
 
 def test_first_runs_quick(tmp_path):
-    """Elements, forms and two kinds of loads of a column, and the package's own C; the next run compiles nothing."""
+    """Elements (in older releases of dolfinx), forms and two kinds of loads of a column, and the package's own C."""
     import first_runs
 
     ((first, following, files),) = first_runs.main(runs=1, out=tmp_path, kinds=["a column in a plane"]).values()
-    assert files == 5 and first[0] > following[0] > 0
+    assert files in (4, 5) and first[0] > following[0] > 0
 
 
 @pytest.mark.slow

@@ -5,6 +5,8 @@ import numpy as np
 import pytest
 
 import cosserat_fenicsx as cf
+from cosserat_fenicsx.statics.path.events import Locator
+from cosserat_fenicsx.statics.path.track import PathPoint
 
 pytestmark = pytest.mark.serial
 
@@ -74,3 +76,57 @@ def test_load_control_does_not_step_over_a_limit_point():
     assert [event.kind for event in by_load.events] == ["limit", "limit"] and by_load.stable[-1]
     apex = given.stations[0]
     np.testing.assert_allclose(by_load.displacement(apex)[-1], by_arc.displacement(apex)[-1], atol=1e-8)
+
+
+@pytest.mark.slow
+def test_two_paths_beside_each_other_are_no_bifurcation():
+    """Two arches whose crowns are tied: at its tenth limit point the path turns off by 3e-4 of the load factor before a
+    bifurcation of the path beside it."""
+    half, gap, axis, load = 0.38413884, 2.9, (0, 1, 0), 1.00076
+    R = 1 / half
+    section = imperfect_structures._section(880.0, 2.0)
+    rods = [
+        cf.Rod(cf.Arc((x, 0, 0), (x - R * np.sin(half), 0, R * np.cos(half)), 2 * half, axis), section, name=f"at {x}")
+        for x in (0.0, gap)
+    ]
+    tie = cf.Rod(cf.Line((0, 0, R), (gap, 0, R), d1=axis), imperfect_structures._section(880.0, gap), name="tie")
+    crowns = [rod.at(rod.length / 2) for rod in rods]
+    scene = cf.Scene(
+        [*rods, tie],
+        [cf.Hinge(end, axis) for rod in rods for end in (rod.start, rod.end)],
+        [cf.Force(crowns[0], (0, 0, -load)), cf.Force(crowns[1], (0, 0, -1.0))],
+        [cf.Joint(crowns[0], tie.start), cf.Joint(crowns[1], tie.end)],
+    )
+    path = cf.solve(scene, (0, 18), elements=8, control="arc", until=lambda path: len(path.events) == 10)
+    assert {event.kind for event in path.events} == {"limit"}
+    assert path.events[-1].load_factor == pytest.approx(-3.1996880, abs=1e-6)  # by small steps
+
+
+def test_load_control_does_not_step_over_two_limit_points():
+    """A gable frame whose ridge snaps through from 7.24 to 7.13: one step of load control was as long as that."""
+    rise, height, axis = 0.3945717, 0.7556963, (0, 1, 0)
+    rafter = cf.Stiffness((6931.0, 6931.0), 20793.5, (1.0, 100.0), 100.0)
+    post = cf.Stiffness((146830.0, 146830.0), 146830.0, (14.683, 1468.3), 1468.3)
+    apex = (0, 0, height + rise)
+    left, right = (
+        cf.Rod(cf.Line(*ends, d1=axis), rafter, name=name)
+        for name, ends in (("left", ((-1, 0, height), apex)), ("right", (apex, (1, 0, height))))
+    )
+    posts = [cf.Rod(cf.Line((x, 0, 0), (x, 0, height), d1=axis), post, name=f"at {x}") for x in (-1, 1)]
+    joints = [cf.Joint(posts[0].end, left.start), cf.Joint(left.end, right.start), cf.Joint(right.end, posts[1].end)]
+    load = cf.Force(left.end, (0.01089104, 0, -1.0))
+    scene = cf.Scene([posts[0], left, right, posts[1]], [cf.Clamp(x.start) for x in posts], [load], joints)
+    path = cf.solve(scene, (0, 19.029), elements=8)
+    assert [event.kind for event in path.events] == ["limit", "limit"]
+    np.testing.assert_allclose([event.load_factor for event in path.events], [7.2426, 7.1325], atol=1e-3)
+
+
+@pytest.mark.parametrize(("end", "follows"), [(8.71102, True), (8.71139, False)])
+def test_the_load_factor_changes_in_the_direction_of_the_path(end, follows):
+    """Of two arches that cross at their crowns: a step led upwards between two points where the load factor falls."""
+
+    class Straight:
+        without_potential = False
+
+    a, b = (PathPoint(eta, [], 1, 3, rise=rise) for eta, rise in ((8.71115, -0.025), (end, -0.069)))
+    assert Locator(Straight())._explained(a, b, []) is follows

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from cosserat_fenicsx.results.compared import FORCE, POSITION, ROUNDING, differences
+from cosserat_fenicsx.results.compared import FORCE, POSITION, ROTATION, ROUNDING, differences
 from cosserat_fenicsx.results.places import cell_nodes, transferred
 from cosserat_fenicsx.results.result import resting
 
@@ -190,8 +190,24 @@ def spread_error(path, few, which, coarse=None):
         _spread(*numbers, which, of_mesh=coarse is not None)
         for numbers in zip(told, sizes, few.by_mesh, _BETWEEN, strict=True)
     ])  # fmt: skip
+    least = _as_positions(found * sizes, few.by_mesh * sizes[:, which], which) / sizes[ROTATION]
+    found[ROTATION] = np.maximum(found[ROTATION], least)
     found[:, which] = few.by_mesh
     path.set_errors(found)
+
+
+def _as_positions(found, known, which):
+    """(n,) the least errors of rotations: relative to those of positions as at the sample points around, since the
+    differences of rotations on two meshes may almost vanish at a point where they change their sign.
+
+    Args:
+        found: (4, n) absolute errors; known: (4, samples) those of the sample points; which: their indices.
+    """
+    usable = (known[[POSITION, ROTATION]] > ROUNDING).all(axis=0)
+    if not usable.any():
+        return np.zeros(found.shape[1])
+    ratios = np.log(known[ROTATION, usable] / known[POSITION, usable])
+    return found[POSITION] * np.exp(np.interp(np.arange(found.shape[1]), which[usable], ratios))
 
 
 def _spread(told, sizes, errors, between, which, *, of_mesh):

@@ -11,12 +11,16 @@ from cosserat_fenicsx.results.places import cell_nodes, compared
 #: Of the quantities that errors are estimated of: positions, rotations, contact forces n and contact moments m.
 Errors = namedtuple("Errors", "position rotation force moment")
 NAMES = Errors._fields
-POSITION, FORCE = 0, 2
+POSITION, ROTATION, FORCE = 0, 1, 2
 
 # Differences of positions and of rotations up to this are rounding alone, in units of the scales' length and rad.
 ROUNDING = 1e-14
 # Sizes, in the scales' units, below which a quantity is taken to vanish; and the least moment over n times the length.
 _NOTHING, _LEAST_MOMENT = 1e-9, 1e-9
+# Least size of positions and of rotations over the largest of the path: unloaded states differ by rounding.
+_AT_REST = 1e-6
+# Moments up to this multiple of their rounding at all points of a path vanish, as those of straight bars do.
+_VANISHING = 10.0
 # Rounding of n over that of one difference of positions, times stiffness; differences of n and of m on two meshes up to
 # this multiple of their rounding are rounding alone.
 _OF_FORCE, _NOISE = 4.0, 2.0
@@ -32,8 +36,9 @@ def sizes_of(path):
 
     positions: the largest displacement; where sections mainly rotate, their rotation times the radius of gyration.
     rotations: the largest rotation, in rad (2 sin of half of it), at least the displacement over the longest length.
+    Both at least 1e-6 of those of the whole path.
     n: the largest |n|, at least the largest |m| over the longest length. m: the largest |m|, at least 1e-9 of |n| times
-    that length.
+    that length; |n| times that length where m is rounding alone on the whole path.
     """
     gyrations, length = _of_scene(path.scene, path.scales)
     squares = np.add.reduceat(np.square(path._motion), (0, 3, 4), axis=2)
@@ -44,9 +49,11 @@ def sizes_of(path):
     squares = np.add.reduceat(np.square(path._stacked("gauss_fields")[..., :6]), (0, 3), axis=3)
     force, moment = np.sqrt(squares.max(axis=(1, 2))).T
     force = np.maximum(np.maximum(force, moment / length), _NOTHING)
-    moment = np.maximum(np.maximum(moment, _LEAST_MOMENT * length * force), _NOTHING)
     noise = np.array([0.0, 0.0, *_noise(path)])[:, None]
+    least = 1.0 if (moment <= _VANISHING * noise[3]).all() else _LEAST_MOMENT
+    moment = np.maximum(np.maximum(moment, least * length * force), _NOTHING)
     sizes = np.array([np.maximum(moved, turned), rotation, force, moment])
+    sizes[:2] = np.maximum(sizes[:2], _AT_REST * sizes[:2].max(axis=1, initial=0.0)[:, None])
     return Sizes(sizes, turned > moved, np.broadcast_to(noise, sizes.shape))
 
 

@@ -235,9 +235,10 @@ class Path(Result):
         position: over the largest displacement at that point of the path (where sections mainly rotate, over their
         rotation times the radius of gyration). rotation: the angle (rad) over the largest rotation, 2 sin(angle/2), or
         over the largest displacement over the length of the longest rod if that is more. force: of n, over the largest
-        size of n, or that of m over that length if that is more. moment: of m, over its largest size. Rounding is
-        included, over the largest size on the path, since it is the same at small loads: that of n is large on slender
-        rods which bend without a large n.
+        size of n, or that of m over that length if that is more. moment: of m, over its largest size (over that of n
+        times that length where m is nothing but rounding). Positions and rotations: over at least 1e-6 of the largest
+        of the path. Rounding is included, over the largest size on the path, since it is the same at small loads: that
+        of n is large on slender rods which bend without a large n.
         """
         return Errors(*(np.full((4, len(self)), np.nan) if self._errors is None else self._errors))
 

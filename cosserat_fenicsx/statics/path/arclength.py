@@ -24,6 +24,8 @@ _BESIDE, _SAME = 0.1, 1e-4
 _SHORT, _STRAIGHT = 3e-3, 0.05
 # Largest relative difference of the load factors of two limit points that are the same one; its root for the states.
 _MET = 1e-7
+# Number of plain steps in which negative modes may change without an event before their number is no longer compared.
+_EXCUSES = 4
 _CLOSED = "the path is closed: it returned to an earlier point without reaching that load factor"
 # A path that has begun at the unloaded state returns to an earlier point only after passing that state again.
 _CHANGED = (
@@ -46,10 +48,10 @@ class ArcLength:
     def __init__(self, track, control, locator):
         self.track, self.control, self._locator = track, control, locator
         self._step, self._branched = None, False
-        #: Whether the number of negative modes changes as the critical points tell. The second variation that is
-        # counted has bounded stiffnesses, and under some loads it is the symmetric part of the tangent: once that has
-        # been seen in a step that is plain, the number tells nothing about later ones.
-        self.counts = True
+        # Whether the number of negative modes may change in the next step otherwise than the critical points tell: the
+        # second variation that is counted has bounded stiffnesses, so that it may do so in a step that is plain. Where
+        # it has done so often, the number tells nothing about any step.
+        self._excused, self._excuses = False, 0
 
     def to(self, target, *, first=None, slope=None, on_step=None, on_event=None):
         """Advance to the next point of the path with the load factor `target`, solved at exactly that load factor.
@@ -76,14 +78,14 @@ class ArcLength:
                 try:
                     landing, crossings = self._locator.between(
                         track.here, point, target, self._weight,
-                        probe=not branching, explained=self.counts, short=not branching and self._plain(point),
+                        probe=not branching, explained=not self._excused, short=not branching and self._plain(point),
                     )  # fmt: skip
                 except Lost as lost:
                     track.failure = lost.reason
                     if branching:
                         return track.restore()
                     if lost.reason == UNEXPLAINED and self._plain(point):
-                        self.counts = False
+                        self._excused, self._excuses = True, self._excuses + 1
                     else:
                         self._step = self._length(track.here, point)
                     point = self._shorten(lost.share)
@@ -105,6 +107,7 @@ class ArcLength:
                     track.restore()
                     return True
             self._accept(landing or point, point)
+            self._excused = self._excuses > _EXCUSES
             if on_step:
                 on_step(track.here)
             if landing is not None:

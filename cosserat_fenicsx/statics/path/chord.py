@@ -25,6 +25,11 @@ _OFTEN = 6
 # Distances on both sides of a critical point at which the path is solved for, and the largest length between these two
 # points, over their distance along the chord.
 _BESIDE, _STEEP = (1e-3, 1e-4), 2.0
+# Largest distance of the direction between these two points from the mean of their tangents, over the angle between the
+# tangents; on a smooth path it is of second order in their distance, while points beside each other with parallel
+# tangents lie on two paths. How far they are beside each other by rounding, times their distance (rad, rod lengths):
+# Newton's method loses accuracy along the mode in inverse proportion to that.
+_ASTRIDE, _ROUNDING = 0.1, 1e-9
 # Smallest distance of the coordinates of two interpolation points.
 _APART = 1e-5
 # Offsets of the coordinate, tried in turn until Newton's method converges.
@@ -147,7 +152,7 @@ class Chord:
                 continue
             steep = bends(self.track, before, after, self._weight)
             if steep.resolved and steep.length <= _STEEP * 2 * apart * self.length:
-                return True
+                return (steep.corner - _ASTRIDE * steep.turn) * steep.length**2 <= _ROUNDING
         return False
 
     def neighbours(self, place):

@@ -26,6 +26,8 @@ _SINGULAR = 1e-5
 # Two events are the same where the cosine of their null vectors is above the first number and their coordinates on the
 # chord differ by less than the second.
 _ALIKE, _ONE_PLACE = 0.7, 1e-2
+# Relative difference of two load factors that may be rounding.
+_LEVEL = 1e-10
 # Largest change of the logarithm of the bordered tangent's determinant within a step without a bifurcation.
 _BORDERED = math.log(30.0)
 #: Why a step is shortened, in words.
@@ -127,11 +129,17 @@ class Locator:
     def _explained(self, a, b, crossings):
         """Whether two points agree with the critical points between them.
 
-        The load factor turns at a limit point alone. Each critical point changes the number of negative modes by one;
-        under loads without a potential the number tells nothing about them.
+        The load factor turns at a limit point alone, and elsewhere changes in the direction of the path. Each critical
+        point changes the number of negative modes by one; under loads without a potential the number tells nothing
+        about them.
         """
-        if (a.rise * b.rise < 0) != any(crossing.kind == "limit" for crossing in crossings):
+        limits = [crossing.point for crossing in crossings if crossing.kind == "limit"]
+        if (a.rise * b.rise < 0) != bool(limits):
             return False
+        parts = [(a, limits[0], a.rise), (limits[0], b, b.rise)] if limits else [(a, b, a.rise)]
+        for begin, end, rise in parts:
+            if (end.load_factor - begin.load_factor) * math.copysign(1.0, rise) < -_LEVEL * abs(end.load_factor):
+                return False
         return self.counts_agree(a, b, crossings)
 
     def counts_agree(self, a, b, crossings):

@@ -165,7 +165,7 @@ class Follower:
         except Lost as lost:
             self.track.failure = lost.reason
             return None
-        if self._auto and self._arc.counts and not plain and not self.locator.counts_agree(a, b, crossings):
+        if self._auto and not plain and not self.locator.counts_agree(a, b, crossings):
             self.track.failure = UNEXPLAINED  # arc length finds out whether the path has turned
             return None
         self.track.put(b.numbers, b.load_factor)

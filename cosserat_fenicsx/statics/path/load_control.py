@@ -19,7 +19,7 @@ from cosserat_fenicsx.statics.path.track import FAR, INTENDED, NOTHING, Track, g
 #: Distance from the predictor (rad, rod lengths) below which direction and length of a step are not checked.
 SLIGHT = 1e-3
 #: Distance from the predictor, over the predicted increment, above which a step may have jumped over a limit point.
-LEAP = 2.0
+LEAP = 1.0
 #: Number of rejected steps from the first point after which the step is limited by the stiffness there.
 FIRST_REJECTIONS = 3
 # Largest distance from the predictor, over the step's length, at which the number of negative modes may change; the
