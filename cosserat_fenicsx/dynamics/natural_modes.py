@@ -38,6 +38,8 @@ from cosserat_fenicsx.statics.solvers import solvers_of
 _MOST_ELEMENTS = 128
 # Newton iterations allowed after the added constraints of a mechanism are removed.
 _CORRECTIONS = 10
+# Relative change of positions where the first start meets an exactly singular tangent.
+_BESIDE = 1e-9
 
 
 def modes(
@@ -180,10 +182,15 @@ def _loaded(scene, layout, load_factor, degree, comm):
     with solvers_of(scene, layout, degree=degree, comm=comm) as (problem, newton, stability):
         problem.end_beginning()
         problem.set_load_factor(load_factor)
-        problem.begin_at(problem.model.unknowns_of(rq), n[..., :3], np.zeros(len(problem.multipliers())))
-        newton.allow(_CORRECTIONS)
-        solved = newton.solve()
-        if not solved.converged:
+        # The tangent of a mechanism is singular but for rounding, which may leave a zero: then again from beside.
+        for beside in (0.0, _BESIDE):
+            start = np.concatenate([(1 + beside) * rq[:, :3], rq[:, 3:]], axis=1)
+            problem.begin_at(problem.model.unknowns_of(start), n[..., :3], np.zeros(len(problem.multipliers())))
+            newton.allow(_CORRECTIONS)
+            solved = newton.solve()
+            if solved.converged:
+                break
+        else:
             _give_up(load_factor, f"{solved.reason} next to the reference, where the scene is a mechanism")
         yield problem, stability
 
