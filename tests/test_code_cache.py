@@ -152,7 +152,7 @@ def test_the_command_line_says_so_without_the_place_in_the_code(cache):
     done = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, encoding="utf-8", cwd=ROOT)
     assert done.stderr == (
         f"cosserat: warning: the cache of compiled code {cache} is not used, because it can be written to by others; "
-        f"{cache}-{os.geteuid()} takes its place\n"
+        f"{cache}-{os.geteuid()} takes its place (`chmod go-w {cache}` ends this)\n"
     )
 
 

@@ -291,7 +291,7 @@ class DrillingFolder:
         return comm.bcast(compared() if comm.rank == 0 else None)
 
     def not_in_order(self, history):
-        """Why rows after those of the checkpoint are none of this motion, in words: their times; None where they are."""
+        """Why rows after those of the checkpoint are none of this motion, in words: their times; or None."""
         apart = self.head["apart"]
         for name, times, steps in (
             (_SERIES, history.times, apart["save_every"]), (_PROFILES, history.profile_times, apart["profile_every"])

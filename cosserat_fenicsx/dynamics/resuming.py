@@ -208,8 +208,8 @@ def _memory(kept, history, motion=None):
 
 
 def _not_recalled(motion, memory):
-    """Let a `TimeLoop` go on from a checkpoint; why it cannot, in words, or None. Of several ranks one cannot fail alone,
-    since this is collective: there all exceptions are raised."""
+    """Let a `TimeLoop` go on from a checkpoint; why it cannot, in words, or None. One of several ranks cannot fail
+    alone, since this is collective: there all exceptions are raised."""
     if motion.model.comm.size == 1:
         return checkpoints.not_recalled(motion.recall, memory)
     motion.recall(memory)
