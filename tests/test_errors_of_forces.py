@@ -156,15 +156,6 @@ def test_rounding_of_the_forces_of_slender_rods_is_told_and_not_refined_for():
     assert (true_errors(path, fine)[:, 0] <= 3 * np.array(path.errors)[:, 0]).all()  # the finer one rounds more
 
 
-def test_moments_of_a_straight_column_are_told_to_be_rounding():
-    rod = cf.Rod(cf.Line((0, 0, 0), (0, 0, 10.0)), cf.Circle(0.05), cf.Material(210e9, nu=0.3), name="column")
-    scene = cf.Scene([rod], [cf.Clamp(rod.start)], [cf.Force(rod.end, (0, 0, -1e3))])
-    path = cf.solve(scene, (0, 3))
-    assert "moment" not in path.bounded and path.error.max() <= 1e-6
-    (told,) = (sentence for sentence in path.why if "rounding leaves an error" in sentence)
-    assert float(told.split("up to ")[1].split(" N m")[0]) < 1e-4 and "(rounding)" in path_table(path)
-
-
 def test_a_path_that_begins_without_load_bounds_forces_too():
     path = cf.solve(in_space(), (0.0, 1.0))
     assert path.bounded == ("position", "rotation", "force", "moment") and path.load_factors[0] == 0

@@ -38,7 +38,7 @@ from cosserat_fenicsx.statics.solvers import solvers_of
 _MOST_ELEMENTS = 128
 # Newton iterations allowed after the added constraints of a mechanism are removed.
 _CORRECTIONS = 10
-# Relative change of positions where the first start meets an exactly singular tangent.
+# Change of (r, q), dimensionless, where the first start meets an exactly singular tangent.
 _BESIDE = 1e-9
 
 
@@ -184,7 +184,7 @@ def _loaded(scene, layout, load_factor, degree, comm):
         problem.set_load_factor(load_factor)
         # The tangent of a mechanism is singular but for rounding, which may leave a zero: then again from beside.
         for beside in (0.0, _BESIDE):
-            start = np.concatenate([(1 + beside) * rq[:, :3], rq[:, 3:]], axis=1)
+            start = rq + beside * np.arange(rq.size).reshape(rq.shape) / rq.size
             problem.begin_at(problem.model.unknowns_of(start), n[..., :3], np.zeros(len(problem.multipliers())))
             newton.allow(_CORRECTIONS)
             solved = newton.solve()
