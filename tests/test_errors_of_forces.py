@@ -5,7 +5,6 @@ import pytest
 from conftest import column
 
 import cosserat_fenicsx as cf
-from cosserat_fenicsx.results.tables import path_table
 
 pytestmark = pytest.mark.serial
 _BAR = cf.Stiffness((1e5, 1e5), 1e5, (1.0, 1.0), 1.0)
