@@ -38,8 +38,6 @@ from cosserat_fenicsx.statics.solvers import solvers_of
 _MOST_ELEMENTS = 128
 # Newton iterations allowed after the added constraints of a mechanism are removed.
 _CORRECTIONS = 10
-# Change of (r, q), dimensionless, where the first start meets an exactly singular tangent.
-_BESIDE = 1e-9
 
 
 def modes(
@@ -182,20 +180,11 @@ def _loaded(scene, layout, load_factor, degree, comm):
     with solvers_of(scene, layout, degree=degree, comm=comm) as (problem, newton, stability):
         problem.end_beginning()
         problem.set_load_factor(load_factor)
-        # The tangent of a mechanism is singular to rounding: where that is noticed, again from beside, and pivots that are
-        # nothing but rounding serve, since what a free motion does is of no consequence.
-        chain = problem.elimination.c
-        usual = chain.zero_pivot
-        for beside, chain.zero_pivot in ((0.0, usual), (_BESIDE, 0.0)):
-            start = rq + beside * np.arange(rq.size).reshape(rq.shape) / rq.size
-            problem.begin_at(problem.model.unknowns_of(start), n[..., :3], np.zeros(len(problem.multipliers())))
-            newton.allow(_CORRECTIONS)
-            solved = newton.solve()
-            if solved.converged:
-                break
-        else:
+        problem.begin_at(problem.model.unknowns_of(rq), n[..., :3], np.zeros(len(problem.multipliers())))
+        newton.allow(_CORRECTIONS)
+        solved = newton.solve()
+        if not solved.converged:
             _give_up(load_factor, f"{solved.reason} next to the reference, where the scene is a mechanism")
-        chain.zero_pivot = usual
         yield problem, stability
 
 
