@@ -1,6 +1,5 @@
 """What editors and type checkers see of the public interface."""
 
-import ast
 import inspect
 import sys
 from pathlib import Path
@@ -11,17 +10,6 @@ import cosserat_fenicsx as cf
 
 pytestmark = pytest.mark.serial
 HERE = Path(__file__).parent
-
-
-def test_the_block_and_the_table_of_names_agree():
-    (block,) = (
-        node
-        for node in ast.parse(Path(cf.__file__).read_text(encoding="utf-8")).body
-        if isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING"
-    )
-    seen = {name.asname: (line.module, name.name) for line in block.body for name in line.names}
-    assert seen == {name: ("cosserat_fenicsx" + (f".{home}" if home else ""), name) for name, home in cf._HOME.items()}
-    assert (Path(cf.__file__).parent / "py.typed").is_file()
 
 
 @pytest.mark.parametrize("name", [name for name in cf.__all__ if inspect.isfunction(getattr(cf, name))])
