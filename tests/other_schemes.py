@@ -3,10 +3,9 @@
 Both have the velocities, the momenta and the constraint of the momentum scheme, but another stress.
 """
 
-from cosserat_fenicsx.forms.equilibrium import balance, contact
-
 from cosserat_fenicsx.dynamics import solvers
 from cosserat_fenicsx.dynamics.steppers.momentum import Momentum
+from cosserat_fenicsx.forms.equilibrium import balance, contact
 from cosserat_fenicsx.models.moving import MovingSpatial
 from cosserat_fenicsx.models.moving_forms import SpatialStep, compile_momentum
 

@@ -4,6 +4,7 @@ differences, and the planar against the spatial model."""
 import numpy as np
 import pytest
 import ufl
+
 from cosserat_fenicsx.forms import determinate, equilibrium, loads, planar, spatial
 from cosserat_fenicsx.forms.equilibrium import VirtualMotion
 from cosserat_fenicsx.forms.law import DiagonalLaw

@@ -6,12 +6,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from cosserat_fenicsx.forms import truncated
 from numpy.polynomial import Legendre
 from scipy.optimize import least_squares
 
 import cosserat_fenicsx as cf
 from cosserat_fenicsx import analytic
+from cosserat_fenicsx.forms import truncated
 
 pytestmark = pytest.mark.serial
 sys.path.append(str(Path(__file__).parent.parent / "demos" / "evidence"))

@@ -106,7 +106,6 @@ FITTERS = {
         "solvers",
         "initial_equilibrium",
         "start",
-        "marks",
         "resolution",
     },
 }

@@ -5,11 +5,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import ufl
-from cosserat_fenicsx.forms import determinate, equilibrium, law
 from test_equilibrium import VECTOR, Point, central, value
 from ufl.algorithms.apply_algebra_lowering import apply_algebra_lowering
 from ufl.algorithms.apply_derivatives import apply_derivatives
 
+from cosserat_fenicsx.forms import determinate, equilibrium, law
 from cosserat_fenicsx.models import laws
 from cosserat_fenicsx.scene.profiles import Stiffnesses
 

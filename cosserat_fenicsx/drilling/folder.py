@@ -39,7 +39,7 @@ from cosserat_fenicsx.storage.entries import (
     or_none,
     whole,
 )
-from cosserat_fenicsx.storage.fingerprint import difference
+from cosserat_fenicsx.storage.described import difference
 from cosserat_fenicsx.storage.lock import FolderLock
 from cosserat_fenicsx.storage.vacant import check_vacant
 

@@ -14,7 +14,7 @@ from cosserat_fenicsx.dynamics.simulate import check_counts, pace_of, positive_t
 from cosserat_fenicsx.dynamics.solvers import solvers_of
 from cosserat_fenicsx.dynamics.steppers import SCHEMES
 from cosserat_fenicsx.errors import SceneError, nearest
-from cosserat_fenicsx.dynamics.marks import marks_of
+from cosserat_fenicsx.dynamics.time_loop import marks_of
 from cosserat_fenicsx.models.connections import Connections
 from cosserat_fenicsx.models.rodmesh import Layout
 from cosserat_fenicsx.models.scales import Scales

@@ -13,7 +13,7 @@ from cosserat_fenicsx.annotations import File
 from cosserat_fenicsx.ranks import communicator
 from cosserat_fenicsx.results.history import History
 from cosserat_fenicsx.results.path import Path
-from cosserat_fenicsx.dynamics.marks import marks_of
+from cosserat_fenicsx.dynamics.time_loop import marks_of
 from cosserat_fenicsx.models.rodmesh import Layout
 from cosserat_fenicsx.dynamics.time_loop import TimeLoop
 from cosserat_fenicsx.dynamics.pace import Adaptive, Fixed

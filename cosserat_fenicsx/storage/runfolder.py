@@ -18,9 +18,9 @@ from cosserat_fenicsx.ranks import on_first
 from cosserat_fenicsx.results.export.beside import replaced
 from cosserat_fenicsx.scene.as_data import NotData, from_data, to_data
 from cosserat_fenicsx.storage import checkpoints
+from cosserat_fenicsx.storage.described import difference, fingerprint, fingerprint_at, times_ahead
 from cosserat_fenicsx.storage.entries import AN_INDEX
 from cosserat_fenicsx.storage.entries import checked as checked_entries
-from cosserat_fenicsx.storage.fingerprint import difference, fingerprint, fingerprint_at, times_ahead
 from cosserat_fenicsx.storage.head import checked
 from cosserat_fenicsx.storage.lock import FolderLock
 from cosserat_fenicsx.storage.vacant import check_vacant

@@ -1,6 +1,8 @@
 """`study`: a task for many cases, each computed by one rank alone."""
 
 import gc
+import inspect
+import itertools
 import json
 import os
 import time
@@ -9,20 +11,18 @@ from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from mpi4py import MPI
 
 from cosserat_fenicsx.annotations import File
-from cosserat_fenicsx.checks import instance
+from cosserat_fenicsx.checks import instance, refuse
 from cosserat_fenicsx.errors import CosseratError, InstallationError, Interrupted, NotStored, SceneError
 from cosserat_fenicsx.interrupts import obey
 from cosserat_fenicsx.progress import CaseProgress
 from cosserat_fenicsx.ranks import apart, communicator
 from cosserat_fenicsx.storage.described import NotDescribed, described, task_described
-from cosserat_fenicsx.studies.cases import cases_of, check_task, unshared
-from cosserat_fenicsx.studies.folder import StudyFolder
+from cosserat_fenicsx.studies.folder import StudyFolder, from_data, to_data
 from cosserat_fenicsx.studies.outcome import Study
-from cosserat_fenicsx.studies.task_pool import TaskPool
-from cosserat_fenicsx.studies.values import from_data, to_data
 
 _COMPARABLE = "numbers, texts, arrays, functions, parts of scenes and of wells, lists and dicts of these"
 
@@ -239,3 +239,156 @@ def _raise_first(own, troubles, found, folder):
     if name == InstallationError.__name__:
         raise InstallationError(text) from own
     raise own or RuntimeError(text)
+
+
+def cases_of(cases):
+    """(list of dicts of arguments, {name: list of values} of their grid or None).
+
+    Args:
+        cases: an iterable of dicts; or a dict of lists of values, whose product is taken: the last name runs fastest.
+
+    Raises:
+        SceneError: they are something else, or there is none.
+    """
+    if isinstance(cases, Mapping):
+        grid = {_name(name): _values(name, values) for name, values in cases.items()}
+        if not grid:
+            refuse("study", "cases", cases, "at least one name with a list of values")
+        return [dict(zip(grid, values, strict=True)) for values in itertools.product(*grid.values())], grid
+    expected = "dicts of arguments by name, or one dict of lists of values by name"
+    if not isinstance(cases, Iterable) or isinstance(cases, str | bytes):
+        refuse("study", "cases", cases, expected)
+    found = list(cases)
+    if not found:
+        refuse("study", "cases", cases, "at least one case")
+    for i, case in enumerate(found):
+        if not isinstance(case, Mapping):
+            refuse("study", f"cases[{i}]", case, expected)
+    return [{_name(name): value for name, value in case.items()} for case in found], None
+
+
+def _name(name):
+    if not isinstance(name, str):
+        refuse("study", "cases", name, "names of the task's arguments, as texts")
+    return name
+
+
+def _values(name, values):
+    if isinstance(values, np.ndarray) and values.ndim == 1:
+        values = values.tolist()  # Python's numbers, as those of a list are
+    if isinstance(values, str | bytes | Mapping) or not isinstance(values, Iterable):
+        refuse("study", f"cases['{name}']", values, "a list of values")
+    values = list(values)
+    if not values:
+        refuse("study", f"cases['{name}']", values, "at least one value")
+    return values
+
+
+def unshared(value):
+    """A case, or a part of one, with lists, dicts and arrays of its own, which a task may change: those given belong to
+    several cases."""
+    if isinstance(value, np.ndarray):
+        return value.copy()
+    if type(value) in (list, tuple):
+        return type(value)(map(unshared, value))
+    return {name: unshared(part) for name, part in value.items()} if type(value) is dict else value
+
+
+def check_task(task, cases):
+    """Refuse a task that cannot be called with its cases, before any of them is computed.
+
+    Raises:
+        SceneError: it is no function, or has no such arguments.
+    """
+    if not callable(task):
+        refuse("study", "task", task, "a function of the arguments of a case")
+    try:
+        signature = inspect.signature(task)
+    except ValueError:  # some functions written in C do not tell
+        return
+    for i, case in enumerate(cases):
+        try:
+            signature.bind(**case)
+        except TypeError as problem:
+            raise SceneError(
+                f"study.cases: case {i} has the names {', '.join(case) or '(none)'}, and the task refuses them "
+                f"({problem}): expected the arguments of the task, {signature}"
+            ) from None
+
+
+# Time (s) between looks of a rank that has nothing left to do and waits for the others.
+_LOOK = 0.005
+_NEXT, _DONE, _FAILED = range(3)
+
+
+class TaskPool:
+    """Hands out the numbers below `count`, each to one rank, in ascending order.
+
+    The numbers are counted in memory of rank 0 by one-sided operations of MPI, which it need not answer: it computes
+    as the others do. Ranks that share a computer, or a network with remote access to memory, do not wait for it; on
+    other networks a rank waits until rank 0 next enters MPI, which is the end of its task at the latest.
+
+    Every rank makes it, iterates over it until it ends, calls `meet`, and then `close`.
+
+    Args:
+        comm: MPI communicator; count: number of tasks.
+    """
+
+    def __init__(self, comm, count):
+        self._comm, self._count, self._met, self._window = comm, count, None, None
+        self._counters = np.zeros(3, np.int64)
+        if comm.size > 1:
+            from mpi4py import MPI
+
+            size = self._counters.itemsize
+            self._window = MPI.Win.Allocate(len(self._counters) * size if comm.rank == 0 else 0, size, comm=comm)
+            if comm.rank == 0:
+                self._counters = np.frombuffer(self._window.tomemory(), np.int64)
+                self._counters[:] = 0
+            comm.Barrier()
+            self._window.Lock_all()
+
+    def __iter__(self):
+        while (number := self._add(_NEXT, 1)) < self._count:
+            yield number
+
+    def _add(self, counter, amount):
+        """Add to a counter and return what it was."""
+        if self._window is None:
+            before = int(self._counters[counter])
+            self._counters[counter] += amount
+            return before
+        added, before = np.array([amount], np.int64), np.empty(1, np.int64)
+        self._window.Fetch_and_op(added, before, 0, counter)
+        self._window.Flush(0)
+        return int(before[0])
+
+    def tell(self, failed):
+        """This rank has done a task."""
+        self._add(_FAILED, int(failed))
+        self._add(_DONE, 1)
+
+    def counts(self):
+        """(tasks done, those of them that failed) on all ranks; on rank 0 alone."""
+        return int(self._counters[_DONE]), int(self._counters[_FAILED])
+
+    def stop(self):
+        """Hand out no more, to no rank."""
+        self._add(_NEXT, self._count)
+
+    def meet(self):
+        """Wait until no rank has more to do. Unlike a barrier of MPI it leaves the processor to others, and can be
+        interrupted and called again."""
+        if self._window is None:
+            return
+        self._met = self._met or self._comm.Ibarrier()
+        while not self._met.Test():
+            time.sleep(_LOOK)
+
+    def close(self):
+        """Give the memory back. Collective."""
+        if self._window is not None:
+            self._counters = self._counters.copy()
+            self._window.Unlock_all()
+            self._window.Free()
+            self._window = None
