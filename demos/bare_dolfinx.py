@@ -2,13 +2,13 @@
 
 import numpy as np
 import ufl
-from cosserat_fenicsx.forms import equilibrium, law, spatial
 from dolfinx import fem, mesh
 from dolfinx.fem.petsc import assemble_matrix, assemble_vector, create_matrix
 from mpi4py import MPI
 from petsc4py.PETSc import SNES, InsertMode, Options, ScatterMode, Sys, Vec
 
 from cosserat_fenicsx import analytic, compat
+from cosserat_fenicsx.forms import equilibrium, law, spatial
 
 e, EA, GA, GJ = 0.01, 16 * 100.0**2, 3 * 16 * 100.0**2 / (7 + 6 * 0.3), 1 / (1 + 0.3)  # circle, L/d = 100, nu = 0.3
 

@@ -22,7 +22,7 @@ from rich.table import Table
 
 import cosserat_fenicsx as cf
 from cosserat_fenicsx import analytic
-from cosserat_fenicsx.pictures import plot
+from cosserat_fenicsx.pictures.charts import empty_figure, save
 from cosserat_fenicsx.results.tables import as_text, stability
 
 L, DIAMETER, ECCENTRICITY = 20.0, 0.2, 0.2  # m
@@ -171,14 +171,15 @@ def draw(rod, path, file):
         (path.load_factors, path.displacement(rod.end)[:, 0], "cosserat_fenicsx",
          {"color": "tab:blue", "marker": "o", "ls": ""}),
     ]  # fmt: skip
-    plot.chart(
-        file,
-        curves,
-        xlabel=r"load factor $\eta = F / P_{cr}$",
-        ylabel=r"transverse tip displacement $\delta$ (m)",
-        title="Eccentrically compressed cantilever, e = L/100",
-        ylim=(0, 18),
-    )
+    figure = empty_figure(8, 5.5)
+    axes = figure.subplots()
+    for x, y, label, style in curves:
+        axes.plot(x, y, label=label, **style)
+    axes.set(xlabel=r"load factor $\eta = F / P_{cr}$", ylabel=r"transverse tip displacement $\delta$ (m)")
+    axes.set(title="Eccentrically compressed cantilever, e = L/100", ylim=(0, 18))
+    axes.grid(alpha=0.3)
+    axes.legend()
+    save(figure, file)
 
 
 def main(out="out", load_factors=TABULATED, formulation=None, **mesh):

@@ -3,7 +3,7 @@
 import numpy as np
 
 import cosserat_fenicsx as cf
-from cosserat_fenicsx.pictures.figures import empty_figure, save
+from cosserat_fenicsx.pictures.charts import empty_figure, save
 
 #: Operations of the hook loads, their colours, and for how many depths of the bit the rod is solved.
 OPERATIONS, COLOURS, DEPTHS = (cf.TripOut(), cf.TripIn()), ("tab:blue", "tab:orange"), 9

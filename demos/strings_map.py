@@ -18,7 +18,7 @@ from known_numbers import Check, report, verdict
 from mpi4py import MPI
 
 import cosserat_fenicsx as cf
-from cosserat_fenicsx.pictures.figures import empty_figure, save
+from cosserat_fenicsx.pictures.charts import empty_figure, save
 
 FOUND = cf.read_drilling_scene(Path(__file__).parent / "strings" / "stability_map.toml")
 #: A bit whose speed has this severity at the end does not rotate steadily; modes that grow faster than this (1/s) have

@@ -10,7 +10,7 @@ from moving_scenes import flying_in_space
 
 import cosserat_fenicsx as cf
 from cosserat_fenicsx.pictures import animation
-from cosserat_fenicsx.pictures.between import Between
+from cosserat_fenicsx.pictures.animation import Between
 
 pytestmark = pytest.mark.serial
 SMALL = {"size": (320, 240), "fps": 4, "speed": 1}

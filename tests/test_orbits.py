@@ -6,7 +6,7 @@ from rolling_collar import ARM, AXIS, CLEARANCE, COLLAR, LENGTH, rolling
 
 import cosserat_fenicsx as cf
 from cosserat_fenicsx.actions.hole_wall import HoleWall
-from cosserat_fenicsx.pictures.campbell_chart import draw_campbell, spectra
+from cosserat_fenicsx.pictures.motion_charts import draw_campbell, spectra
 from cosserat_fenicsx.results.orbits import Orbit
 from cosserat_fenicsx.results.whirl import whirl_of
 
@@ -163,8 +163,7 @@ def test_what_is_refused_in_words(collar):
 
 def test_a_film_enlarges_the_clearance(collar, tmp_path):
     pytest.importorskip("pyvista")
-    from cosserat_fenicsx.pictures.between import Between
-    from cosserat_fenicsx.pictures.enlarged import Enlarged
+    from cosserat_fenicsx.pictures.animation import Between, Enlarged
 
     rod, _, history = collar
     x = np.array([0.0, 0.5, 1.0])

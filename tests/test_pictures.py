@@ -10,13 +10,10 @@ import pytest
 from conftest import COMM, column
 
 import cosserat_fenicsx as cf
-from cosserat_fenicsx.pictures import marks
-from cosserat_fenicsx.pictures.axes import axes_of
 from cosserat_fenicsx.pictures.colours import colour_of, known, peak_of
 from cosserat_fenicsx.pictures.drawing import quantity
-from cosserat_fenicsx.pictures.labels import Labels
-from cosserat_fenicsx.pictures.signs import without_sign
-from cosserat_fenicsx.pictures.view import View
+from cosserat_fenicsx.pictures.signs import has_sign, loads_of, without_sign
+from cosserat_fenicsx.pictures.view import Labels, View, axes_of
 
 STEEL = cf.Material(E=210e9, nu=0.3, density=7850.0)
 
@@ -110,7 +107,7 @@ def test_loads_are_read_by_their_units():
         cf.Force(rod.end, cf.Step((0, 7, 0), start=0.25)),
     ]
     scene = cf.Scene([rod], [cf.Clamp(rod.start)], loads)
-    kinds = [marks.loads_of(load, scene, factor=2.0, time=0.0) for load in loads]
+    kinds = [loads_of(load, scene, factor=2.0, time=0.0) for load in loads]
     assert [[mark.kind for mark in found] for found in kinds] == [
         ["force"], ["moment"], ["line force"], ["line force"], ["spring"], ["mass"], [], [],
     ]  # fmt: skip
@@ -120,9 +117,9 @@ def test_loads_are_read_by_their_units():
     assert moment.turns and not force.turns and weight.rod is None
     np.testing.assert_allclose(line.vector[:, 2], -2 * np.linspace(0, 2, 33))
     np.testing.assert_allclose(weight.vector[0, 2], -9.81 * 7850 * np.pi * 0.05**2 / 4)  # not times the load factor
-    (largest,) = marks.loads_of(loads[-1], scene)
+    (largest,) = loads_of(loads[-1], scene)
     np.testing.assert_allclose(largest.vector, [0, 7, 0])
-    assert [load for load in loads if not marks.has_sign(load, scene)] == [loads[6]]
+    assert [load for load in loads if not has_sign(load, scene)] == [loads[6]]
 
 
 def colours_near(image, colour, place, reach):

@@ -15,9 +15,9 @@ from cosserat_fenicsx.drilling.choose import chosen
 from cosserat_fenicsx.drilling.discs import Discs
 from cosserat_fenicsx.drilling.folder import DrillingFolder
 from cosserat_fenicsx.drilling.models import model_of
-from cosserat_fenicsx.drilling.pictures.shown import turns
 from cosserat_fenicsx.drilling.scenefile import drilling_in
 from cosserat_fenicsx.drilling.simulate import check_arguments, resume_drilling
+from cosserat_fenicsx.drilling.tables import turns
 from cosserat_fenicsx.errors import NotConverged, SceneError
 from cosserat_fenicsx.interrupts import patience
 from cosserat_fenicsx.well.field_units import in_si

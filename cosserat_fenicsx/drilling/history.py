@@ -207,7 +207,7 @@ class DrillingHistory(Tabular):
         Raises:
             SceneError: matplotlib is missing, an unknown ending, or fewer than two times.
         """
-        from cosserat_fenicsx.drilling.pictures.charts import draw_over_time
+        from cosserat_fenicsx.drilling.charts import draw_over_time
 
         return draw_over_time(self, file, between)
 
@@ -222,7 +222,7 @@ class DrillingHistory(Tabular):
         Raises:
             SceneError: see `plot`; a quantity that the model does not have.
         """
-        from cosserat_fenicsx.drilling.pictures.maps import draw_map
+        from cosserat_fenicsx.drilling.charts import draw_map
 
         return draw_map(self, file, what, between)
 
@@ -233,13 +233,13 @@ class DrillingHistory(Tabular):
             since: s; None for the second half.
             file: see `plot`.
         """
-        from cosserat_fenicsx.drilling.pictures.charts import draw_phase
+        from cosserat_fenicsx.drilling.charts import draw_phase
 
         return draw_phase(self, file, since)
 
     def plot_energy(self, file: File | None = None):
         """Draw the ledger of energy, and what it does not account for, over time; `file`: see `plot`."""
-        from cosserat_fenicsx.drilling.pictures.charts import draw_energy
+        from cosserat_fenicsx.drilling.charts import draw_energy
 
         return draw_energy(self, file)
 
@@ -254,7 +254,7 @@ class DrillingHistory(Tabular):
         Raises:
             SceneError: matplotlib, Pillow or ffmpeg is missing, another ending, or fewer than two profiles.
         """
-        from cosserat_fenicsx.drilling.pictures.film import film
+        from cosserat_fenicsx.drilling.charts import film
 
         film(self, file, speed, fps, progress)
 

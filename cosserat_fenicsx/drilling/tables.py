@@ -3,7 +3,6 @@
 import numpy as np
 from rich.table import Table
 
-from cosserat_fenicsx.drilling.pictures.shown import advance_unit, alias
 from cosserat_fenicsx.results.tables import as_text
 
 # Rows that are shown.
@@ -71,3 +70,24 @@ def _impacts(history):
         f"Impacts of the bit on rigid rock: the largest impulse {each.max():.4g} N s, at t = "
         f"{history.times[each.argmax()]:.5g} s, together {told[-1]:.4g} N s; the weight on bit is without them."
     ]
+
+
+def advance_unit(metres):
+    """(unit, factor from m) of a way: mm up to a metre."""
+    return ("m", 1.0) if np.nan_to_num(np.abs(metres)).max(initial=0.0) >= 1 else ("mm", 1e3)
+
+
+def alias(history):
+    """Words where profiles along the string are further apart than half the period of stick-slip; else ""."""
+    if len(history) <= 5 or len(history.profile_times) < 3:
+        return ""
+    apart, period = float(np.diff(history.profile_times).max()), history.stick_slip().period
+    if not apart > period / 2:  # also where there is none
+        return ""
+    return (f"profiles are {apart:.3g} s apart, and the period of stick-slip is {period:.3g} s: maps and films show a "
+            f"pattern that is not there; profile_every = {period / 10:.2g} (s) avoids it")  # fmt: skip
+
+
+def turns(history):
+    """Whether drive or bit turn."""
+    return bool(np.any(history.drive_speed) or np.any(history.bit_speed))

@@ -6,17 +6,28 @@ import shutil
 import socket
 import subprocess
 import textwrap
+from dataclasses import replace
+from functools import lru_cache
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 
 from cosserat_fenicsx.checks import number, positive, refuse
 from cosserat_fenicsx.errors import LibraryMissing, SceneError
 from cosserat_fenicsx.interrupts import obey
-from cosserat_fenicsx.pictures.between import Between
-from cosserat_fenicsx.pictures.drawing import add_body, at_rest, frame, load_pyvista, points_of, prefix, thickening
-from cosserat_fenicsx.pictures.enlarged import Enlarged
-from cosserat_fenicsx.pictures.labels import plain
+from cosserat_fenicsx.pictures.drawing import (
+    add_body,
+    add_wall,
+    at_rest,
+    body_of,
+    frame,
+    load_pyvista,
+    points_of,
+    prefix,
+    thickening,
+)
+from cosserat_fenicsx.pictures.view import plain
 from cosserat_fenicsx.progress import Progress
 from cosserat_fenicsx.ranks import Alone, on_first
 from cosserat_fenicsx.results.export.beside import replaced
@@ -321,3 +332,135 @@ def _ffmpeg():
 
 
 _WRITERS = {".gif": _Gif, ".mp4": _Mp4}
+
+
+# Cubic interpolation is used where the trapezoidal rule on the velocities at both ends of an interval gives the change
+# of position to this relative error (a full turn saved six times does) or to this share of the longest rod, which is
+# invisible.
+_AGREEMENT, _INVISIBLE = 0.1, 2e-3
+
+
+class Between:
+    """A `History` at any time of its duration.
+
+    Between two saved states, positions and quaternions are cubic Hermite polynomials by the values and velocities
+    there. Where the velocities do not agree with the change of position, because states were saved too seldom,
+    interpolation is linear, and where a section turns by more than half a turn the nearest state is taken.
+
+    Args:
+        history: a `History` with at least two times.
+    """
+
+    def __init__(self, history):
+        self._history, self._times = history, history.times
+        self._saved = lru_cache(maxsize=2)(self._read)  # few: all states of a stored motion may exceed the memory
+        self._smooth = [self._fits(k) for k in range(len(history) - 1)]
+
+    def _read(self, k):
+        """r and q of the saved state k, (N, 7), and their rates, (N, 7), 1/s."""
+        record = self._history._records[k]
+        rates = record.rates / self._history.time_unit
+        return record.rq, np.concatenate([rates[:, :3], _turning(record.rq[:, 3:], rates[:, 3:])], axis=1)
+
+    @property
+    def smooth(self):
+        """The share of the duration where states were saved often enough for cubic interpolation."""
+        steps = np.diff(self._times)
+        return float(steps[self._smooth].sum() / steps.sum())
+
+    def bodies(self, t, x, magnify=1.0):
+        """The `Body` of every rod at t (s), at arc lengths x (n,) over its length."""
+        k = int(np.clip(np.searchsorted(self._times, t, side="right") - 1, 0, len(self._times) - 2))
+        h = self._times[k + 1] - self._times[k]
+        z = float(np.clip((t - self._times[k]) / h, 0.0, 1.0))
+        state, history = SimpleNamespace(rq=self._state(k, z, h)), self._history
+        made = []
+        for rod in history.scene.rods:
+            line, directors = history.sample(state, rod, x)
+            moments = []
+            for i in (k, k + 1):
+                fields = history.fields(i, rod)
+                moments.append(np.interp(x, fields["s"] / rod.length, fields["bending_moment"]))
+            made.append(body_of(rod, x, line, directors, (1 - z) * moments[0] + z * moments[1], magnify))
+        return made
+
+    def _fits(self, k):
+        """Whether the change of position agrees with the velocities between the saved states k and k + 1."""
+        h = self._times[k + 1] - self._times[k]
+        (one, slope), (two, slope_there) = self._saved(k), self._saved(k + 1)
+        moved, before, after = two - one, h * slope, h * slope_there
+        for part in (slice(0, 3), slice(3, 7)):
+            off, *sizes = (
+                np.linalg.norm(v[:, part], axis=1).max() for v in ((before + after) / 2 - moved, before, after, moved)
+            )
+            if off > _AGREEMENT * max(sizes) + _INVISIBLE:
+                return False
+        return True
+
+    def _state(self, k, z, h):
+        """(N, 7) r and q at the share z in [0, 1] of the interval k, of length h (s)."""
+        (one, slope), (two, slope_there) = self._saved(k), self._saved(k + 1)
+        if self._smooth[k]:
+            slopes = z * (1 - z) ** 2 * h * slope - z**2 * (1 - z) * h * slope_there
+            return (1 + 2 * z) * (1 - z) ** 2 * one + z**2 * (3 - 2 * z) * two + slopes
+        if (np.einsum("ni,ni->n", one[:, 3:], two[:, 3:]) <= 0).any():
+            return two if z >= 0.5 else one
+        return (1 - z) * one + z * two
+
+
+def _turning(q, omega):
+    """dq/dt = (0, omega) q/2 of quaternions q (..., 4) with angular velocities omega (..., 3), inertial."""
+    a, v = q[..., :1], q[..., 1:]
+    scalar = -np.einsum("...i,...i->...", omega, v)[..., None]
+    return np.concatenate([scalar, a * omega + np.cross(omega, v)], axis=-1) / 2
+
+
+class Enlarged:
+    """What enlarges the clearance of rods in the holes of a scene, for pictures.
+
+    Args:
+        scene: the scene; where: the name of the function that is called, for messages.
+        factor: of the distance between the axis of the hole and that of a rod. Rods without a wall stay as they are.
+
+    Raises:
+        SceneError: no positive number; or none of the rods is in a hole, and the factor is not 1.
+    """
+
+    def __init__(self, scene, factor, where):
+        self.factor = positive(where, "enlarge", factor, "-")
+        self._walls = {}
+        for wall in (action for action in scene.loads if action.touches):
+            for rod in scene.rods:
+                if wall.acts_on(rod) if wall.station is None else wall.station.rod is rod:
+                    self._walls.setdefault(rod, wall)
+        self._scene = scene
+        if self.factor != 1 and not self._walls:
+            refuse(where, "enlarge", factor, "1, since no rod is in a hole with a wall of motions, such as a HoleWall")
+
+    def bodies(self, bodies, x):
+        """The `Body` of every rod with its line moved away from the axis of its hole; x: (n,) the arc lengths over the
+        rod's length."""
+        if self.factor == 1:
+            return bodies
+        return [self._moved(rod, body, x) for rod, body in zip(self._scene.rods, bodies, strict=True)]
+
+    def _moved(self, rod, body, x):
+        wall = self._walls.get(rod)
+        if wall is None:
+            return body
+        s = np.asarray(x) * rod.length
+        axis = wall.path.nearest(body.line, s + wall.begins).position
+        return replace(body, line=axis + self.factor * (body.line - axis))
+
+    def add_holes(self, plotter, pyvista, radii):
+        """Draw the walls, translucent, around rods with these radii (m), in the order of the scene."""
+        drawn = dict(zip(self._scene.rods, radii, strict=True))
+        for load in self._scene.loads:
+            if (tube := load.tube()) is not None:
+                rod = load.rod if load.station is None else load.station.rod
+                add_wall(plotter, pyvista, tube[0], self.factor * tube[1] + drawn[rod])
+
+    @property
+    def note(self):
+        """A line for the picture, or none."""
+        return [f"distances from the axis of the hole enlarged {self.factor:g} times"] if self.factor != 1 else []

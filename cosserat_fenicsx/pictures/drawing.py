@@ -7,10 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from cosserat_fenicsx.errors import LibraryMissing
-from cosserat_fenicsx.pictures.axes import axes_of, draw_axes, round_step
 from cosserat_fenicsx.pictures.colours import BENDING
-from cosserat_fenicsx.pictures.labels import Labels
-from cosserat_fenicsx.pictures.view import View
+from cosserat_fenicsx.pictures.view import Labels, View, axes_of, draw_axes, round_step
 from cosserat_fenicsx.scene.materials import Material
 from cosserat_fenicsx.scene.sections import Circle
 

@@ -1,4 +1,4 @@
-"""Pictures: the rods in space by pyvista (off-screen), deformed or before anything is solved; charts by matplotlib."""
+"""Pictures of the rods in space by pyvista (off-screen), deformed or before anything is solved."""
 
 import math
 import textwrap
@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from cosserat_fenicsx.checks import positive
-from cosserat_fenicsx.errors import LibraryMissing, SceneError
+from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.pictures.colours import colour_of, known, peak_of
 from cosserat_fenicsx.pictures.drawing import (
     add_body,
@@ -20,9 +20,8 @@ from cosserat_fenicsx.pictures.drawing import (
     swept,
     thickening,
 )
-from cosserat_fenicsx.pictures.figures import save
-from cosserat_fenicsx.pictures.labels import Labels, plain
 from cosserat_fenicsx.pictures.signs import Deformed, Resting, signs_of, without_sign
+from cosserat_fenicsx.pictures.view import Labels, plain
 from cosserat_fenicsx.ranks import communicator, on_first
 from cosserat_fenicsx.results.export.beside import replaced
 
@@ -227,33 +226,6 @@ def _thicker(factors):
 def _undrawn(scene, tubes):
     words = without_sign(scene, tubes)
     return [f"(not drawn: {textwrap.shorten(words, _TITLE_WIDTH, placeholder=' ...')})"] if words else []
-
-
-def chart(file, curves, *, xlabel, ylabel, title, ylim=None):
-    """A chart of several curves.
-
-    Args:
-        file: where to write it; under mpirun, call it on one rank.
-        curves: list of (x, y, label, dict of matplotlib's line properties).
-        xlabel, ylabel, title: words, with units.
-        ylim: limits of the ordinate.
-
-    Raises:
-        SceneError: matplotlib is missing.
-        OSError: the file cannot be written.
-    """
-    try:
-        from matplotlib.figure import Figure
-    except ImportError as missing:
-        raise LibraryMissing(f"charts need matplotlib ({missing}): pip install 'cosserat-fenicsx[pictures]'") from None
-    figure = Figure(figsize=(8, 5.5), layout="constrained")
-    axes = figure.add_subplot()
-    for x, y, label, style in curves:
-        axes.plot(x, y, label=label, **style)
-    axes.set(xlabel=xlabel, ylabel=ylabel, title=title, ylim=ylim)
-    axes.grid(alpha=0.3)
-    axes.legend()
-    save(figure, file)
 
 
 def _spread(path, most=5):

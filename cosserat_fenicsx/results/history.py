@@ -173,9 +173,9 @@ class History(Result):
         Args:
             file: a .png or .pdf; None returns matplotlib's Figure.
         """
-        from cosserat_fenicsx.pictures import energy_chart
+        from cosserat_fenicsx.pictures import motion_charts
 
-        return energy_chart.draw(self, file)
+        return motion_charts.draw_energy(self, file)
 
     def animate(self, file, *, fps=25, speed=None, magnify=1.0, enlarge=1.0, size=(960, 720), progress=None):
         """Film of the rods, coloured by bending moment, at a constant rate of frames; see `animation.film`.
@@ -246,9 +246,9 @@ class History(Result):
             station, wall: see `orbit`.
             file: a .png or .pdf; None returns matplotlib's Figure.
         """
-        from cosserat_fenicsx.pictures import orbit_chart
+        from cosserat_fenicsx.pictures import motion_charts
 
-        return orbit_chart.draw_orbit(self, orbit_of(self, station, wall), self.station(station), file)
+        return motion_charts.draw_orbit(self, orbit_of(self, station, wall), self.station(station), file)
 
     def plot_whirl(self, station: StationOrName, wall: Action | None = None, file: File | None = None):
         """Chart over time of a section's distance from the axis of the hole, of its rates of whirl and spin, and of the
@@ -256,9 +256,9 @@ class History(Result):
 
         Args: see `plot_orbit`.
         """
-        from cosserat_fenicsx.pictures import orbit_chart
+        from cosserat_fenicsx.pictures import motion_charts
 
-        return orbit_chart.draw_whirl(self, orbit_of(self, station, wall), self.station(station), file)
+        return motion_charts.draw_whirl(self, orbit_of(self, station, wall), self.station(station), file)
 
     def plot_campbell(self, station: StationOrName, wall: Action | None = None, file: File | None = None):
         """Campbell diagram of a section over a run-up: amplitude of whirl and its spectrum, forward and backward, over
@@ -269,9 +269,9 @@ class History(Result):
         Raises:
             SceneError: the speed of rotation hardly changes, or too few times are saved.
         """
-        from cosserat_fenicsx.pictures import campbell_chart
+        from cosserat_fenicsx.pictures import motion_charts
 
-        return campbell_chart.draw_campbell(self, orbit_of(self, station, wall), self.station(station), file)
+        return motion_charts.draw_campbell(self, orbit_of(self, station, wall), self.station(station), file)
 
     def _at_clamp(self, point, joined):
         return self._stacked("clamp_forces")[:, point]

@@ -301,7 +301,7 @@ class TorqueAndDrag(Differentiated, Tabular):
         Raises:
             SceneError: matplotlib is missing, or the ending is unknown; depths that the string has not.
         """
-        from cosserat_fenicsx.well.pictures.string_chart import draw_answer
+        from cosserat_fenicsx.well.charts import draw_answer
 
         return draw_answer(self, file, between)
 
@@ -320,7 +320,7 @@ class TorqueAndDrag(Differentiated, Tabular):
         Raises:
             SceneError: pyvista is missing, or the name does not end in .png; depths that the string has not.
         """
-        from cosserat_fenicsx.well.pictures.in_space import draw_in_space
+        from cosserat_fenicsx.well.in_space import draw_in_space
 
         draw_in_space(self, file, enlarge, between)
 

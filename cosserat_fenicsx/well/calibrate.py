@@ -103,7 +103,7 @@ class FrictionFit:
         Raises:
             SceneError: matplotlib is missing, or the ending is unknown.
         """
-        from cosserat_fenicsx.well.pictures.charts import draw_fit
+        from cosserat_fenicsx.well.charts import draw_fit
 
         return draw_fit(self, file)
 

@@ -104,7 +104,7 @@ class DepthSweep(Tabular):
         Raises:
             SceneError: matplotlib is missing, or the ending is unknown.
         """
-        from cosserat_fenicsx.well.pictures.charts import draw_sweep
+        from cosserat_fenicsx.well.charts import draw_sweep
 
         return draw_sweep(self, file)
 

@@ -56,7 +56,7 @@ class BitBounce(Tabular):
             SceneError: matplotlib is missing, or the file's ending is unknown.
             OSError: the file cannot be written.
         """
-        from cosserat_fenicsx.drilling.pictures.stability_charts import draw_bounce
+        from cosserat_fenicsx.drilling.charts import draw_bounce
 
         return draw_bounce(self, file)
 

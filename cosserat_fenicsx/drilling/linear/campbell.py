@@ -44,7 +44,7 @@ class Campbell(Tabular):
             SceneError: matplotlib is missing, or the file's ending is unknown.
             OSError: the file cannot be written.
         """
-        from cosserat_fenicsx.drilling.pictures.stability_charts import draw_campbell
+        from cosserat_fenicsx.drilling.charts import draw_campbell
 
         return draw_campbell(self, file)
 

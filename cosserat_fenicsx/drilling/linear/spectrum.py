@@ -108,7 +108,7 @@ class Stability(Tabular):
             SceneError: matplotlib is missing, there is no such mode, or the file's ending is unknown.
             OSError: the file cannot be written.
         """
-        from cosserat_fenicsx.drilling.pictures.stability_charts import draw_stability
+        from cosserat_fenicsx.drilling.charts import draw_stability
 
         if mode is not None:
             self._known(mode)

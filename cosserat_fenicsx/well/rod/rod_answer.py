@@ -160,7 +160,7 @@ class RodInContact(TorqueAndDrag):
         Raises:
             SceneError: matplotlib is missing, or the ending is unknown.
         """
-        from cosserat_fenicsx.well.pictures.side_view import draw_from_side
+        from cosserat_fenicsx.well.charts import draw_from_side
 
         return draw_from_side(self, file, length)
 

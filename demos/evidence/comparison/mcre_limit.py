@@ -2,7 +2,6 @@
 
 import numpy as np
 import ufl
-from cosserat_fenicsx.forms import truncated
 from dolfinx import fem
 from dolfinx.fem import petsc as fem_petsc
 from mpi4py import MPI
@@ -11,6 +10,7 @@ from scipy.sparse.linalg import splu
 
 from comparison.column import CRITICAL, Column
 from cosserat_fenicsx import compat
+from cosserat_fenicsx.forms import truncated
 
 
 class TruncatedColumn:

@@ -10,7 +10,6 @@ stresses in units of EI/L^4, for the EI of the circle.
 import basix
 import numpy as np
 import ufl
-from cosserat_fenicsx.forms import solid
 from dolfinx import fem
 from dolfinx import mesh as dolfinx_mesh
 from dolfinx.fem import petsc as fem_petsc
@@ -22,6 +21,7 @@ from comparison.bar_mesh import half_disc, moments, swept
 from comparison.column import CRITICAL, Column
 from cosserat_fenicsx import compat
 from cosserat_fenicsx.checks import refuse
+from cosserat_fenicsx.forms import solid
 
 _GAUSS_POINTS = {"quadrature_degree": 5}  # three in each direction
 

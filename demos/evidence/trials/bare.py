@@ -10,13 +10,13 @@ from types import SimpleNamespace
 
 import numpy as np
 import ufl
-from cosserat_fenicsx.forms import equilibrium
-from cosserat_fenicsx.forms import spatial as eq
 from dolfinx import fem
 from dolfinx.fem import petsc as fem_petsc
 from petsc4py import PETSc
 
 from cosserat_fenicsx import compat
+from cosserat_fenicsx.forms import equilibrium
+from cosserat_fenicsx.forms import spatial as eq
 from cosserat_fenicsx.models.laws import as_matrix, law_of
 from cosserat_fenicsx.models.rodmesh import Layout
 from cosserat_fenicsx.statics import solvers

@@ -11,9 +11,6 @@ from dataclasses import dataclass
 import basix
 import numpy as np
 import ufl
-from cosserat_fenicsx.forms import equilibrium
-from cosserat_fenicsx.forms.law import DiagonalLaw
-from cosserat_fenicsx.forms.spatial import rotation_tests_of
 from dolfinx import fem
 from dolfinx.fem import petsc as fem_petsc
 from mpi4py import MPI
@@ -22,6 +19,9 @@ from scipy.sparse.linalg import splu
 from scipy.spatial.transform import Rotation
 
 from cosserat_fenicsx import compat
+from cosserat_fenicsx.forms import equilibrium
+from cosserat_fenicsx.forms.law import DiagonalLaw
+from cosserat_fenicsx.forms.spatial import rotation_tests_of
 from cosserat_fenicsx.models.rod_data import gauss_function
 from trials import problems
 from trials.cells import Answer, NotForIt, Stopped

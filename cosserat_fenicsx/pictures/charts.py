@@ -7,6 +7,11 @@ from cosserat_fenicsx.errors import LibraryMissing, SceneError
 from cosserat_fenicsx.ranks import on_first
 from cosserat_fenicsx.results.export.beside import replaced
 
+#: Colours and styles of lines, in their order; of what is not the subject.
+COLOURS = ("tab:blue", "tab:orange", "tab:green", "tab:red", "tab:purple", "tab:brown", "tab:pink", "tab:gray")
+STYLES = ("-", "--", ":", "-.")
+GREY = "0.45"
+
 
 def empty_figure(width, height):
     """A Figure (inches) that needs no screen.

@@ -7,18 +7,10 @@ import numpy as np
 
 from cosserat_fenicsx.checks import positive
 from cosserat_fenicsx.errors import SceneError
-from cosserat_fenicsx.pictures.axes import Axis, draw_axes, round_step, text_of
 from cosserat_fenicsx.pictures.drawing import load_pyvista
-from cosserat_fenicsx.pictures.labels import Labels
-from cosserat_fenicsx.pictures.view import View
+from cosserat_fenicsx.pictures.view import Axis, Labels, View, draw_axes, round_step, text_of
 from cosserat_fenicsx.ranks import on_first, world
-from cosserat_fenicsx.well.pictures.shown import (
-    SIDES,
-    depths_between,
-    points_between,
-    rows_between,
-    usual_side_force,
-)
+from cosserat_fenicsx.well.charts import SIDES, depths_between, points_between, rows_between, usual_side_force
 
 # Pixels: height of the drawing, bounds of its width, margins at the left (numbers of depths), right (colour bar), above
 # (title) and below (names of axes).

@@ -1,1 +1,0 @@
-"""Charts and films of a drill-string in motion."""

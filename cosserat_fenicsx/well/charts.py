@@ -1,0 +1,496 @@
+"""Charts of torque and drag over the measured depth, which runs downwards, by matplotlib; and the lower end of a string
+in its hole from the side, where depth runs to the right and the high side of the hole is up."""
+
+import numpy as np
+
+from cosserat_fenicsx.checks import finite_array, positive, refuse
+from cosserat_fenicsx.pictures.charts import COLOURS, GREY, STYLES, draw_chart, empty_figure
+from cosserat_fenicsx.pictures.view import round_step
+from cosserat_fenicsx.ranks import world
+from cosserat_fenicsx.well import criteria
+from cosserat_fenicsx.well.components import Bit, Stabiliser
+from cosserat_fenicsx.well.contacts import high_side, name_of_side, stretches
+
+#: Colours of the sides of the hole, the same in all pictures.
+SIDES = {"low": "tab:blue", "high": "tab:red", "left": "tab:green", "right": "tab:orange", "wall": "dimgray"}
+
+#: Inclinations (rad) below this have no high side.
+VERTICAL = 1e-9
+# What remains is cut off beyond so many times what this part of the string has.
+_USUAL, _MOSTLY = 1.5, 0.995
+
+
+def depths_between(where, between, depth):
+    """(top, bottom), m, of the depths that a picture shows, at most from 0 to the depth of the bit.
+
+    Raises:
+        SceneError: they are not two depths of the string, the upper one first.
+    """
+    if between is None:
+        return 0.0, float(depth)
+    ends = finite_array(where, "between", between, "two measured depths (m), such as (3000, 3400)")
+    if ends.shape != (2,) or not 0 <= ends[0] < min(ends[1], depth):
+        refuse(where, "between", between, f"two measured depths of the string, from 0 to {depth:.10g} m, ascending")
+    return float(ends[0]), float(min(ends[1], depth))
+
+
+def rows_between(md, top, bottom):
+    """A slice of ascending depths that holds those from top to bottom, and one more at each end."""
+    first, last = np.searchsorted(md, (top, bottom), side="left"), np.searchsorted(md, (top, bottom), side="right")
+    return slice(max(0, int(first[0]) - 1), int(last[1]) + 1)
+
+
+def sides_along(answer):
+    """(n,) names of the sides that the string touches at `md`, see `SIDES`; "" where it touches none."""
+    names = np.array([name_of_side(side) for side in answer.contact_side])
+    vertical = (answer.inclination < VERTICAL) & (answer.side_force > 0)
+    return np.where(np.isfinite(answer.contact_side) | vertical, names, "")
+
+
+def points_between(answer, top, bottom):
+    """[(md, force, side)] of the wall's forces at points, m and N."""
+    at = [contact for contact in answer.contacts if contact.at_point and top <= contact.top <= bottom]
+    return [(contact.top, contact.force, contact.side) for contact in at]
+
+
+def usual_side_force(answer, force, md):
+    """N/m, up to which axes and colours reach, of a regular side force (n,) at depths (n,): of the rod less than the
+    largest where some short part of it has much more, such as what is left of a peak."""
+    known = np.isfinite(force)
+    most = float(force[known].max(initial=0.0))
+    if answer.model != "rod" or not most > 0:
+        return most
+    values, lengths = force[known], np.gradient(md)[known]
+    order = np.argsort(values)
+    so_far = np.cumsum(lengths[order])
+    at = min(int(np.searchsorted(so_far, _MOSTLY * so_far[-1])), len(order) - 1)
+    return min(most, _USUAL * float(values[order][at]))
+
+
+# Loads beyond so many times the median are not what the axis is for.
+_UNUSUAL = 10.0
+
+
+def draw_sweep(sweep, file):
+    """See `DepthSweep.plot`."""
+    return draw_chart(lambda: sweep_figure(sweep), file, world())
+
+
+def draw_fit(fit, file):
+    """See `FrictionFit.plot`."""
+    return draw_chart(lambda: fit_figure(fit), file, world())
+
+
+def depth_axes(width, columns=None, width_ratios=None):
+    """A Figure (width in inches) and axes side by side that share the depth, which runs downwards."""
+    figure = empty_figure(width, 7.5)
+    axes = figure.subplots(
+        1, columns or len(width_ratios), sharey=True, squeeze=False, gridspec_kw={"width_ratios": width_ratios}
+    )[0]
+    axes[0].invert_yaxis()
+    for panel in axes:
+        panel.grid(alpha=0.3)
+    return figure, axes
+
+
+def sweep_figure(sweep):
+    """Hook load and surface torque over the depth of the bit, with marks where there is no answer."""
+    turns = any(operation.direction(1.0)[1] for operation in sweep.operations)
+    figure, axes = depth_axes(6.5 * (1 + bool(turns)), 1 + bool(turns))
+    low, high = _usual_range(sweep.hook_load / 1e3)
+    by_rod = sweep.models == "rod"
+    both = (by_rod.any(), (np.isfinite(sweep.hook_load) & ~by_rod).any()) == (True, True)
+    for i, operation in enumerate(sweep.operations):
+        for j in range(len(sweep.friction)):
+            look = {"color": COLOURS[i % len(COLOURS)], "linestyle": STYLES[j % len(STYLES)]}
+            drawn = {**look, "label": sweep.label(i, j), "marker": "." if len(sweep.depths) < 30 else None}
+            hook = sweep.hook_load[i, j] / 1e3
+            panels = [(axes[0], np.where((hook < low) | (hook > high), np.nan, hook))]
+            if turns and operation.direction(1.0)[1]:
+                panels.append((axes[1], sweep.surface_torque[i, j] / 1e3))
+            for panel, loads in panels:
+                panel.plot(loads, sweep.depths, **drawn)
+                if both:
+                    here = by_rod[i, j]
+                    panel.plot(
+                        loads[here], sweep.depths[here], "s", color=look["color"], markersize=7, fillstyle="none"
+                    )
+            _without_answer(axes[0], sweep, i, j, (low, high), look["color"])
+    axes[0].set(xlabel="hook load (kN)", ylabel="measured depth of the bit (m)")
+    if turns:
+        axes[1].set_xlabel("surface torque (kN m)")
+    if both:
+        axes[0].plot([], [], "s", color=GREY, markersize=7, fillstyle="none", label="by the exact rod, others soft")
+    if (sweep.done & np.isnan(sweep.hook_load)).any():
+        axes[0].plot([], [], "X", color=GREY, linestyle="none", label="locks up, or no answer")
+    for panel in axes:
+        if panel.get_legend_handles_labels()[0]:
+            panel.legend(fontsize=8)
+    part = "" if sweep.done.all() else f", {len(sweep)} of {sweep.done.size} answers so far"
+    what = "Hook load and torque" if turns else "Hook load"
+    figure.suptitle(f"{what} over the depth of the bit{part}")
+    return figure
+
+
+def _usual_range(loads):
+    """Ends of the axis of loads; infinite where all of them are of a usual size. Before it locks up a string may take a
+    thrust far beyond all others."""
+    known = np.abs(loads[np.isfinite(loads)])
+    if not len(known) or known.max() <= _UNUSUAL * np.median(known):
+        return -np.inf, np.inf
+    usual = loads[np.isfinite(loads) & (np.abs(loads) <= _UNUSUAL * np.median(known))]
+    room = 0.15 * np.ptp(usual)
+    return min(usual.min(), 0.0) - room, max(usual.max(), 0.0) + room
+
+
+def _without_answer(axes, sweep, i, j, limits, colour):
+    """Marks where a line's loads are beyond the axis, with their numbers, and where it has none, with the place of
+    lock-up."""
+    loads, depths = sweep.hook_load[i, j] / 1e3, sweep.depths
+    note = {"fontsize": 7, "color": colour, "va": "center", "textcoords": "offset points"}
+
+    def offset(depth, right):
+        """In points: notes at one depth are below each other."""
+        return right, -9 * sum(text.xy[1] == depth for text in axes.texts)
+
+    if np.isfinite(limits).all():
+        axes.set_xlim(*limits)
+    for k in np.flatnonzero((loads < limits[0]) | (loads > limits[1])):
+        left = loads[k] < limits[0]
+        at = limits[0] if left else limits[1]
+        axes.plot(at, depths[k], "<" if left else ">", color=colour, clip_on=False)
+        axes.annotate(f"{loads[k]:,.0f} kN, beyond the axis: close to lock-up", (at, depths[k]),
+                      offset(depths[k], 8 if left else -8), ha="left" if left else "right", **note)  # fmt: skip
+    order = np.argsort(depths)
+    shown = None
+    for k in order:
+        if np.isfinite(loads[k]):
+            shown = np.clip(loads[k], *limits)
+        elif sweep.done[i, j, k]:
+            # below the load at the depth before
+            at = {"transform": axes.get_yaxis_transform()} if shown is None else {}
+            axes.plot(0.02 if shown is None else shown, depths[k], "X", color=colour, clip_on=False, **at)
+            locked = sweep.values["locked"][i, j, k]
+            if shown is not None and np.isfinite(locked):
+                told = f"bit at {depths[k]:.6g} m: locks up, from md = {locked:.5g} m of the string on"
+                axes.annotate(told, (shown, depths[k]), offset(depths[k], 8), **note)
+
+
+def fit_figure(fit):
+    """Measured loads and those computed with the coefficients found, over the depth of the bit."""
+    loads = [(m, "hook load (kN)", m.hook_load, m.hook_load_sd) for m in fit.measurements if m.hook_load is not None]
+    loads += [(m, "surface torque (kN m)", m.torque, m.torque_sd) for m in fit.measurements if m.torque is not None]
+    names = list(dict.fromkeys(name for _, name, *_ in loads))
+    operations = list(dict.fromkeys(m.operation for m in fit.measurements))
+    figure, axes = depth_axes(6.5 * len(names), len(names))
+    for panel, name in zip(axes, names, strict=True):
+        panel.set_xlabel(name)
+        for i, operation in enumerate(operations):
+            rows = sorted(
+                (m.depth, value / 1e3, sd / 1e3, (value - residual * sd) / 1e3)
+                for (m, what, value, sd), residual in zip(loads, fit.residuals, strict=True)
+                if what == name and m.operation == operation
+            )
+            if rows:
+                depth, measured, sd, computed = np.array(rows).T
+                told = operation.name + (f", {operation.weight / 1e3:g} kN on bit" if operation.weight else "")
+                look = {"color": COLOURS[i % len(COLOURS)]}
+                panel.errorbar(measured, depth, xerr=sd, fmt="o", markersize=5, label=told, **look)
+                panel.plot(computed, depth, "-x", linewidth=1, **look)
+        panel.plot([], [], "-x", color=GREY, linewidth=1, label="computed")
+        panel.legend(fontsize=8, title="measured, with standard deviations", title_fontsize=8)
+    axes[0].set_ylabel("measured depth of the bit (m)")
+    told = [f"{section.name or f'to {section.to:g} m'} {mu:.3f} ({low:.3f} to {high:.3f})" for section, mu, (low, high)
+            in zip(fit.hole.sections, fit.friction, fit.interval, strict=True)]  # fmt: skip
+    block = f", block {fit.block_weight / 1e3:.1f} kN" if fit.block_weight else ""
+    figure.suptitle(f"Friction: {', '.join(told)}\nmisfit {fit.misfit:.3g}{block}", fontsize=10)
+    return figure
+
+
+# A torque below this part of the largest tension times the contact radius is not drawn.
+_LITTLE_TORQUE = 1e-4
+# Smallest ranges of the axes: side force (N/m), forces at points and moment (kN, kN m).
+_LEAST_SIDE, _LEAST = 1.0, 0.1
+# Most forces at points with numbers; distance of labels over the height of a panel.
+_LABELS, _LINE = 20, 0.0235
+# Stretches that are buckled: colours and names.
+_BUCKLED = {criteria.SNAKE: ("gold", "sinusoidal buckling"), criteria.HELIX: ("tab:pink", "helical buckling")}
+_PARTS = ("0.55", "0.75")
+
+
+def draw_answer(answer, file, between=None):
+    """See `TorqueAndDrag.plot`."""
+    ends = depths_between("plot", between, answer.depth)
+    return draw_chart(lambda: answer_figure(answer, *ends), file, world())
+
+
+def answer_figure(answer, top, bottom):
+    """The string in the hole; tension with the loads of buckling; torque where there is some; side force per length,
+    and at points where there are such forces; bending moment where it is known: from one measured depth (m) to another.
+    """
+    points = points_between(answer, top, bottom)
+    turns = np.abs(answer.torque).max() > _LITTLE_TORQUE * np.abs(answer.tension).max() * answer.pieces.radius.max()
+    bends = np.nanmax(answer.bending_moment, initial=0.0) > 0
+    draws = [_string, _tension, *([_torque] if turns else []), _side_force]
+    draws += [*([_at_points] if points else []), *([_bending] if bends else [])]
+    widths = [{_string: 0.8, _at_points: 1.15}.get(drawn, 1.0) for drawn in draws]
+    figure, axes = depth_axes(2.7 * sum(widths), width_ratios=widths)
+    axes[0].set_ylim(bottom + 0.01 * (bottom - top), top - 0.01 * (bottom - top))
+    rows = rows_between(answer.md, top, bottom)
+    for panel, drawn in zip(axes, draws, strict=True):
+        drawn(panel, answer, rows)
+        _stretches(panel, answer)
+    _shoes(axes, answer, top, bottom)
+    _legend(axes)
+    part = "" if (top, bottom) == (0.0, answer.depth) else f", from {top:g} to {bottom:g} m"
+    figure.suptitle(
+        f"{answer.operation.name}, bit at {answer.depth:g} m, {answer.words}{part}\nhook load "
+        f"{answer.hook_load / 1e3:.1f} kN, surface torque {round(answer.surface_torque / 1e3, 2) + 0.0:.2f} kN m"
+    )
+    return figure
+
+
+def _shoes(axes, answer, top, bottom):
+    """Lines where the sections of the hole end, with their names."""
+    for section in answer.hole.sections[:-1]:
+        if top < section.to < bottom:
+            for panel in axes:
+                panel.axhline(section.to, color="tab:brown", linewidth=0.9, linestyle=(0, (6, 3)))
+            axes[1].annotate(
+                f"{section.name or 'section'} ends, {section.to:g} m", (0.02, section.to), (0, 2), fontsize=7,
+                xycoords=axes[1].get_yaxis_transform(), textcoords="offset points", color="tab:brown", va="bottom",
+                bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 0.5}, zorder=4,
+            )  # fmt: skip
+
+
+def _stretches(panel, answer):
+    for state, (colour, name) in _BUCKLED.items():
+        for a, b in stretches(answer.md, _to_next(answer.buckling == state)):
+            panel.axhspan(a, b, color=colour, alpha=0.25, linewidth=0, label=name)
+
+
+def _to_next(where):
+    """True at the place after each stretch too, which the stretch reaches to in a picture."""
+    return where | np.append(False, where[:-1])
+
+
+def _legend(axes):
+    """One legend above each panel that has names; those that several panels have, once."""
+    told = set()
+    for panel in axes:
+        handles = dict(zip(*panel.get_legend_handles_labels()[::-1], strict=True))
+        new = {name: handle for name, handle in handles.items() if name not in told}
+        told |= set(new)
+        if new:
+            panel.legend(new.values(), new.keys(), fontsize=7, loc="lower center", bbox_to_anchor=(0.5, 1.0),
+                         frameon=False, borderaxespad=0.2)  # fmt: skip
+
+
+def _string(panel, answer, rows):
+    """The string in the hole, seen across its plane of high and low side, or across north where it is vertical."""
+    md, hole = answer.md[rows], answer.hole.at(answer.md[rows], "diameter") / 2
+    high = high_side(answer.hole.path.tangent(md))
+    vertical = not high.any()
+    across = answer.offset[rows][:, 0] if vertical else (answer.offset[rows] * high).sum(axis=1)
+    panel.fill_betweenx(md, -1e3 * hole, 1e3 * hole, color="bisque", linewidth=0)
+    panel.plot(-1e3 * hole, md, color="tab:brown", linewidth=1.2)
+    panel.plot(1e3 * hole, md, color="tab:brown", linewidth=1.2)
+    most, (bottom, top) = 1e3 * float(hole.max()), panel.get_ylim()
+    names, middles = [], []
+    for k, place in enumerate(answer.laid):
+        a, b = max(place.top, top), min(place.bottom, bottom)
+        if b <= a:
+            continue
+        at = np.unique(np.concatenate([[a, b], md[(md > a) & (md < b)]]))
+        x, radius = 1e3 * np.interp(at, md, across), 1e3 * place.component.contact_radius
+        panel.fill_betweenx(at, x - radius, x + radius, facecolor=_PARTS[k % 2], edgecolor="black", linewidth=0.5)
+        names.append(place.component.name)
+        middles.append((a + b) / 2)
+    panel.set_xlim(-1.1 * most, 4.2 * most)
+    for y, middle, name in zip(_apart(middles, panel), middles, names, strict=True):
+        panel.plot([0.8 * most, 1.35 * most], [middle, y], color=GREY, linewidth=0.5)
+        panel.text(1.4 * most, y, name, fontsize=7, va="center", clip_on=True)
+    panel.set_xticks([-round(most), 0, round(most)])
+    panel.tick_params(axis="x", labelsize=7)
+    panel.set_xlabel("south ← → north (mm)" if vertical else "low side ← → high side (mm)")
+    panel.set_ylabel("measured depth (m)")
+    panel.grid(visible=False)
+
+
+def _apart(places, panel):
+    """Depths of labels near places, ascending or descending, so far apart that they can be read."""
+    (bottom, top), order = panel.get_ylim(), np.argsort(places, kind="stable")
+    line = _LINE * (bottom - top)
+    found = np.array(places, dtype=float)[order]
+    for k in range(1, len(found)):
+        found[k] = max(found[k], found[k - 1] + line)
+    found[-1:] = np.minimum(found[-1:], bottom - line / 2)
+    for k in range(len(found) - 1, 0, -1):
+        found[k - 1] = min(found[k - 1], found[k] - line)
+    result = np.empty(len(found))
+    result[order] = found
+    return result
+
+
+def _tension(panel, answer, rows):
+    md, tension = answer.md[rows], answer.tension[rows]
+    panel.plot(tension / 1e3, md, color="black", label="effective tension")
+    if np.isfinite(answer.true_tension).any():
+        panel.plot(answer.true_tension[rows] / 1e3, md, color=GREY, linestyle="--", label="true tension")
+    low = min(tension.min(), 0.0) * 1.5 - 0.1 * np.abs(answer.tension).max()
+    # what decides for the state: in a vertical hole Lubinski's load, which is the greater one there
+    inclined = (answer.inclination > VERTICAL) | (answer.dogleg_severity > 0)  # without a wall force: Lubinski's alone
+    in_hole = np.where(inclined, answer.critical_load("He-Kyllingstad"), 0.0)
+    critical = -np.maximum(in_hole, answer.critical_load("Lubinski"))[rows]
+    far = critical <= low
+    critical = np.where(far, np.nan, critical)  # a picture of what is near
+    if np.isfinite(critical).any():
+        label = "tension at which it buckles (He-Kyllingstad, Lubinski)"
+        label += ", elsewhere it is farther left" if far.any() else ""
+        panel.plot(
+            critical / 1e3, md, color="tab:orange", label=label.replace(" (", "\n(").replace(", else", ",\nelse")
+        )
+    panel.axvline(0.0, color="black", linewidth=0.6)
+    panel.set_xlabel("tension (kN)")
+
+
+def _torque(panel, answer, rows):
+    panel.plot(answer.torque[rows] / 1e3, answer.md[rows], color="black")
+    panel.set_xlabel(f"torque (kN m)\nconvention: {answer.torque_convention}")
+
+
+def _bending(panel, answer, rows):
+    panel.plot(answer.bending_moment[rows] / 1e3, answer.md[rows], color="black")
+    panel.set_xlim(0.0, max(1.05 * np.nanmax(answer.bending_moment[rows], initial=0.0) / 1e3, _LEAST))
+    panel.set_xlabel("bending moment (kN m)")
+
+
+def _side_force(panel, answer, rows):
+    """Per length, without the peaks by which the rod has forces at points."""
+    md, force = answer.md[rows], answer.distributed_force[rows]
+    sides = sides_along(answer)[rows]
+    for side, colour in SIDES.items():
+        if (sides == side).any():
+            panel.fill_betweenx(md, 0.0, force, where=_to_next(sides == side) & np.isfinite(force), color=colour,
+                                alpha=0.35, linewidth=0, label=_words(side))  # fmt: skip
+    panel.plot(force, md, color="black", linewidth=1.0)
+    most = np.nanmax(force, initial=0.0)
+    shown = usual_side_force(answer, force, md)
+    panel.set_xlim(0.0, max(1.05 * shown, _LEAST_SIDE))
+    cut = f"\ncut off: up to {most:.3g} N/m" if most > 1.05 * shown else ""
+    panel.set_xlabel(f"side force per length (N/m){cut}")
+    if not most > 0:
+        panel.text(0.5, 0.5, "none", ha="center", transform=panel.transAxes, color=GREY)
+
+
+def _words(side):
+    return "wall of a vertical hole" if side == "wall" else f"on the {side} side"
+
+
+def _at_points(panel, answer, _):
+    """Forces at points, with their numbers beside them."""
+    bottom, top = panel.get_ylim()
+    points = points_between(answer, top, bottom)
+    most = max(max(force for _, force, _ in points) / 1e3, _LEAST)
+    for side, colour in SIDES.items():
+        here = np.array([(md, force / 1e3) for md, force, name in points if name == side]).reshape(-1, 2)
+        if len(here):
+            panel.hlines(here[:, 0], 0.0, here[:, 1], color=colour, linewidth=1.2)
+            panel.plot(here[:, 1], here[:, 0], "o", color=colour, markersize=3.5, label=_words(side))
+    numbered = sorted(sorted(points, key=lambda point: -point[1])[:_LABELS])
+    places = [md for md, *_ in numbered]
+    for y, (md, force, side) in zip(_apart(places, panel), numbered, strict=True):
+        panel.plot([force / 1e3, 1.12 * most, 1.2 * most], [md, y, y], color=GREY, linewidth=0.4)
+        text = f"{force / 1e3:.3g} kN, {md:.5g} m"
+        panel.text(1.22 * most, y, text, fontsize=7, va="center", color=SIDES[side],
+                   bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.3})  # fmt: skip
+    panel.set_xlim(0.0, 2.5 * most)
+    panel.set_xticks(np.arange(0.0, most, round_step(most, 3)))
+    more = f"\nthe {_LABELS} largest numbered" if len(points) > _LABELS else ""
+    panel.set_xlabel(f"forces at points (kN){more}")
+
+
+_ROCK, _BODY, _BLADES, _BIT, _FORCE = "#e4d3bd", "#9db4cc", "#5f7f9f", "#4d5b6b", "tab:red"
+# Length of the longest arrow, heights of the names, in turn, and of the picture's edges, over the width of the hole.
+_ARROW, _NAMES, _LOW, _HIGH = 0.35, (1.1, 1.32), 1.1, 1.6
+# Forces below this share of the largest one have no arrow.
+_LITTLE_FORCE = 0.01
+
+
+def draw_from_side(answer, file, length):
+    """See `RodInContact.plot_from_side`."""
+    if length is not None:
+        positive("plot_from_side", "length", length, "m")
+    return draw_chart(lambda: side_figure(answer, length), file, world())
+
+
+def side_figure(answer, length=None):
+    """The Figure."""
+    top = max(0.0, answer.depth - (length or answer.depth))
+    figure = empty_figure(11, 5.5)
+    axes = figure.subplots()
+    md = np.linspace(top, answer.depth, 801)
+    wall = 1e3 * answer.hole.at(md, "diameter") / 2
+    width = 2 * wall.max()
+    for sign in (1, -1):
+        axes.fill_between(md, sign * wall, sign * _HIGH * width, color=_ROCK, linewidth=0)
+        axes.plot(md, sign * wall, color="black", linewidth=1.0)
+    axes.axhline(0.0, color="gray", linewidth=0.6, linestyle=(0, (8, 4)))
+    high = 1e3 * np.interp(md, answer.md, _towards_high_side(answer))
+    for i, place in enumerate(answer.laid):
+        if place.bottom > top:
+            _draw_component(axes, place, md, high, _NAMES[i % 2] * width)
+    _draw_forces(axes, answer, top, width)
+    pad = 0.025 * (answer.depth - top)
+    axes.set(xlim=(top - pad, answer.depth + 2 * pad), ylim=(-_LOW * width, _HIGH * width))
+    axes.set(xlabel="measured depth (m)", ylabel="from the hole's axis towards its high side (mm)")
+    operation = answer.operation
+    figure.suptitle(
+        f"{operation.name}, weight on bit {operation.weight / 1e3:g} kN, bit at {answer.depth:g} m: the string in its "
+        "hole from the side, forces of the wall on it"
+    )
+    return figure
+
+
+def _towards_high_side(answer):
+    """(n,) distance of the string from the hole's axis towards the high side (north, where there is none), m."""
+    high = high_side(answer.hole.path.tangent(answer.md))
+    high[~high.any(axis=1)] = (1.0, 0.0, 0.0)
+    return (answer.offset * high).sum(axis=1)
+
+
+def _draw_component(axes, place, md, high, name):
+    """Its body along the string, blades or a bit over it, and its name at a height (mm)."""
+    part, here = place.component, (md >= place.top) & (md <= place.bottom)
+    at = np.concatenate([[max(place.top, md[0])], md[here], [place.bottom]])
+    middle = np.interp(at, md, high)
+    body = 1e3 * (part.outer_diameter / 2 if part.outer_diameter else part.contact_radius)
+    axes.fill_between(at, middle - body, middle + body, color=_BODY, linewidth=0)
+    if isinstance(part, Bit | Stabiliser):
+        blades = 1e3 * part.contact_radius
+        colour = _BIT if isinstance(part, Bit) else _BLADES
+        for sign in (1, -1):
+            axes.fill_between(at, middle + sign * body, middle + sign * blades, color=colour, linewidth=0)
+    axes.plot([at[0], at[0]], [middle[0], name], color="gray", linewidth=0.6)
+    axes.text((at[0] + at[-1]) / 2, name, part.name, ha="center", va="bottom", fontsize=9, color="#333333")
+
+
+def _draw_forces(axes, answer, top, width):
+    """Arrows of the forces at points, from the wall to the string, and lines where it lies on the wall."""
+    shown = [(start, end, force, side) for start, end, force, side in answer.contacts if end >= top and force > 0]
+    points = [contact for contact in shown if contact[0] == contact[1] and contact[3] in ("high", "low")]
+    most = max((force for _, _, force, _ in points), default=0.0)
+    for start, end, force, side in shown:
+        sign = 1 if side == "high" else -1
+        wall = 1e3 * sign * float(answer.hole.at((start + end) / 2, "diameter")) / 2
+        if start < end:
+            axes.plot([max(start, top), end], [wall, wall], color=_FORCE, linewidth=3, solid_capstyle="butt")
+            words, at = f"{force / 1e3:.3g} kN from {start:.1f} to {end:.1f} m", (max(start, top) + end) / 2
+            if side in ("high", "low"):
+                axes.text(at, wall + sign * 0.05 * width, words, ha="center", va="bottom" if sign > 0 else "top",
+                          fontsize=8, color=_FORCE)  # fmt: skip
+        elif side in ("high", "low") and force > _LITTLE_FORCE * most:
+            tail = wall + sign * _ARROW * width * max(force / most, 0.3)
+            axes.annotate("", (start, wall), (start, tail), arrowprops={"arrowstyle": "-|>", "color": _FORCE, "lw": 2})
+            axes.text(start, tail + sign * 0.02 * width, f"{force / 1e3:.2f} kN", ha="center",
+                      va="bottom" if sign > 0 else "top", fontsize=9, color=_FORCE)  # fmt: skip

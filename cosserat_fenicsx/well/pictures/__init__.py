@@ -1,1 +1,0 @@
-"""Charts and pictures of strings in wells."""
