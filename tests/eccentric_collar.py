@@ -8,8 +8,8 @@ speed.
 import numpy as np
 
 import cosserat_fenicsx as cf
-from cosserat_fenicsx.actions.added_mass import AddedMass
 from cosserat_fenicsx.actions.centrifugal import Centrifugal
+from cosserat_fenicsx.actions.fluids import AddedMass
 
 LENGTH, OUTER, INNER, ECCENTRICITY, CLEARANCE = 12.0, 0.1714, 0.0714, 0.0127, 0.02225
 E, G, DENSITY, MUD, ADDED, SHEAR = 206e9, 79.3e9, 7850.0, 1200.0, 1.7, 756104382.6990502

@@ -6,8 +6,7 @@ Both have the velocities, the momenta and the constraint of the momentum scheme,
 from cosserat_fenicsx.dynamics import solvers
 from cosserat_fenicsx.dynamics.steppers.momentum import Momentum
 from cosserat_fenicsx.forms.equilibrium import balance, contact
-from cosserat_fenicsx.models.moving import MovingSpatial
-from cosserat_fenicsx.models.moving_forms import SpatialStep, compile_momentum
+from cosserat_fenicsx.models.moving import MovingSpatial, SpatialStep, compile_momentum
 
 
 def at(motion, section, test):

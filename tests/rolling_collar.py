@@ -9,7 +9,7 @@ import ufl
 from scipy.interpolate import CubicSpline
 
 import cosserat_fenicsx as cf
-from cosserat_fenicsx.actions.hole_wall import HoleRing
+from cosserat_fenicsx.actions.walls import HoleRing
 from cosserat_fenicsx.scene import action
 
 #: d_whirl.json, without axial compression, as far as these tests need it.

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 import cosserat_fenicsx as cf
-from cosserat_fenicsx.actions.added_mass import AddedMass
-from cosserat_fenicsx.actions.linear_drag import LinearDrag
+from cosserat_fenicsx.actions.fluids import AddedMass, LinearDrag
 
 SECTION = cf.Stiffness((1e8, 1e8), 1e8, (1e5, 1e5), 1e5, mass=2.0, inertia=(0.1, 0.15, 0.2))
 ROD = cf.Rod(cf.Line((0, 0, 0), (1, 2, 2)), SECTION, name="rod")

@@ -9,8 +9,7 @@ from conftest import column
 from mpi4py import MPI
 
 import cosserat_fenicsx as cf
-from cosserat_fenicsx.models.formulations import DISPLACEMENT, MIXED, MULTIPLIER
-from cosserat_fenicsx.models.formulations.contact_force import OF_MOTION
+from cosserat_fenicsx.models.formulation import DISPLACEMENT, MIXED, MULTIPLIER, OF_MOTION
 from cosserat_fenicsx.models.rodmesh import Layout
 from cosserat_fenicsx.models.signature import Signature
 from cosserat_fenicsx.models.spatial import SpatialModel

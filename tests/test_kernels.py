@@ -13,7 +13,7 @@ from mpi4py import MPI
 
 import cosserat_fenicsx as cf
 from cosserat_fenicsx import compat
-from cosserat_fenicsx.models.formulations import DISPLACEMENT, MIXED
+from cosserat_fenicsx.models.formulation import DISPLACEMENT, MIXED
 from cosserat_fenicsx.models.rodmesh import Layout
 from cosserat_fenicsx.models.signature import Signature
 from cosserat_fenicsx.models.spatial import SpatialModel

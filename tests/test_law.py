@@ -10,7 +10,7 @@ from ufl.algorithms.apply_algebra_lowering import apply_algebra_lowering
 from ufl.algorithms.apply_derivatives import apply_derivatives
 
 from cosserat_fenicsx.forms import determinate, equilibrium, law
-from cosserat_fenicsx.models import laws
+from cosserat_fenicsx.models import rod_data
 from cosserat_fenicsx.scene.profiles import Stiffnesses
 
 pytestmark = [pytest.mark.serial, pytest.mark.once]
@@ -79,10 +79,10 @@ def test_numbers_of_a_matrix_make_its_law(seed):
     M = random_matrix(seed)
     P, _ = np.linalg.qr(np.random.default_rng(seed).normal(size=(3, 3)))
     along = Stiffnesses(np.zeros((1, 1, 3)), np.zeros((1, 1, 3)), None, None, M[None, None])
-    data = laws.law_data(along, SimpleNamespace(force=2.0, length=3.0), coupled=True)
-    data = laws.turned(data, P[None, None])
+    data = rod_data.law_data(along, SimpleNamespace(force=2.0, length=3.0), coupled=True)
+    data = rod_data.turned(data, P[None, None])
     bound = np.minimum(data.K, 1.0)
-    K, K_inv, K_stiff, J, G = (a[0, 0].reshape(3, 3) for a in laws.field_values(data, bound))
+    K, K_inv, K_stiff, J, G = (a[0, 0].reshape(3, 3) for a in rod_data.field_values(data, bound))
     back = np.diag([1, 1, 1, 3, 3, 3]) @ np.kron(np.eye(2), P.T)  # to the first axes and to units
     made = np.block([[K, K @ G], [G.T @ K, J + G.T @ K @ G]])
     np.testing.assert_allclose(2 * back @ made @ back.T, M, rtol=1e-12)
@@ -90,8 +90,8 @@ def test_numbers_of_a_matrix_make_its_law(seed):
     assert np.linalg.eigvalsh(K_stiff) == pytest.approx(np.sort(bound[0, 0]))
     np.testing.assert_allclose(K_stiff @ K, K @ K_stiff, atol=1e-12)
     n, k = np.random.default_rng(seed).normal(size=(2, 1, 1, 3))
-    np.testing.assert_allclose(laws.strain(data, n, k)[0, 0], K_inv @ n[0, 0] - G @ k[0, 0], rtol=1e-12)
-    np.testing.assert_allclose(laws.moment(data, n, k)[0, 0], G.T @ n[0, 0] + J @ k[0, 0], rtol=1e-12)
+    np.testing.assert_allclose(rod_data.strain(data, n, k)[0, 0], K_inv @ n[0, 0] - G @ k[0, 0], rtol=1e-12)
+    np.testing.assert_allclose(rod_data.moment(data, n, k)[0, 0], G.T @ n[0, 0] + J @ k[0, 0], rtol=1e-12)
 
 
 @pytest.mark.parametrize("seed", range(3))

@@ -11,8 +11,7 @@ from path_scenes import LEE_LIMITS, lees_frame
 
 import cosserat_fenicsx as cf
 from cosserat_fenicsx.algebra.newton import Newton
-from cosserat_fenicsx.models.formulations import MULTIPLIER, formulation_of
-from cosserat_fenicsx.models.formulations.contact_force import OF_MOTION
+from cosserat_fenicsx.models.formulation import MULTIPLIER, OF_MOTION, formulation_of
 from cosserat_fenicsx.models.rodmesh import Layout
 from cosserat_fenicsx.models.signature import Signature
 from cosserat_fenicsx.models.spatial import SpatialModel

@@ -5,7 +5,7 @@ import pytest
 from rolling_collar import ARM, AXIS, CLEARANCE, COLLAR, LENGTH, rolling
 
 import cosserat_fenicsx as cf
-from cosserat_fenicsx.actions.hole_wall import HoleWall
+from cosserat_fenicsx.actions.walls import HoleWall
 from cosserat_fenicsx.pictures.motion_charts import draw_campbell, spectra
 from cosserat_fenicsx.results.orbits import Orbit
 from cosserat_fenicsx.results.whirl import whirl_of

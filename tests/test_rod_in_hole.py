@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import cosserat_fenicsx as cf
-from cosserat_fenicsx.actions.tube_wall import TubeRing, TubeWall
+from cosserat_fenicsx.actions.walls import TubeRing, TubeWall
 from cosserat_fenicsx.models.rodmesh import Layout
 from cosserat_fenicsx.models.traits import found_traits, traits_of
 from cosserat_fenicsx.statics.settling import settle, stages_from

@@ -7,9 +7,8 @@ from mpi4py import MPI
 
 import cosserat_fenicsx as cf
 from cosserat_fenicsx.dynamics.solvers import solvers_of as moving_solvers
+from cosserat_fenicsx.models.connections import TiePattern, Ties
 from cosserat_fenicsx.models.rodmesh import Layout
-from cosserat_fenicsx.models.tie_pattern import TiePattern
-from cosserat_fenicsx.models.ties import Ties
 from cosserat_fenicsx.scene.ties import AngleTie, PositionTie, TurnTie
 from cosserat_fenicsx.statics.solvers import solvers_of as static_solvers
 

@@ -10,7 +10,7 @@ from mpi4py import MPI
 from scipy.integrate import simpson
 
 import cosserat_fenicsx as cf
-from cosserat_fenicsx.actions.hole_wall import HoleRing, HoleWall
+from cosserat_fenicsx.actions.walls import HoleRing, HoleWall
 from cosserat_fenicsx.models.moving import Moving
 from cosserat_fenicsx.storage import runfolder
 

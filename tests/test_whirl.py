@@ -7,9 +7,8 @@ from moving_scenes import drift
 from scipy.optimize import brentq
 
 import cosserat_fenicsx as cf
-from cosserat_fenicsx.actions.added_mass import AddedMass
 from cosserat_fenicsx.actions.centrifugal import Centrifugal
-from cosserat_fenicsx.actions.linear_drag import LinearDrag
+from cosserat_fenicsx.actions.fluids import AddedMass, LinearDrag
 
 pytestmark = pytest.mark.serial
 

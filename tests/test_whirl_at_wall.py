@@ -5,7 +5,7 @@ import pytest
 from rolling_collar import ARM, AXIS, CLEARANCE, COLLAR, LENGTH, collar, rolling, whirl
 
 import cosserat_fenicsx as cf
-from cosserat_fenicsx.actions.hole_wall import HoleWall
+from cosserat_fenicsx.actions.walls import HoleWall
 
 pytestmark = [pytest.mark.slow, pytest.mark.serial]
 SPIN = 100 * np.pi / 30

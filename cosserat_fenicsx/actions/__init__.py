@@ -1,7 +1,6 @@
-"""Actions on rods that depend on their state, one file each: springs, foundations, dashpots, drag, walls, point masses.
+"""Actions on rods that depend on their state: springs, fluids, walls, the inertia of a rotation.
 
 Each holds its data and its virtual work in UFL; no solver, model or time stepper refers to it by name
-(scene/action.py).
-"""
+(scene/action.py)."""
 
 import cosserat_fenicsx.compat  # noqa: F401  it raises a readable error if dolfinx is missing

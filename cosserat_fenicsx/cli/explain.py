@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 
 from cosserat_fenicsx.models.choose import choose, fitting
-from cosserat_fenicsx.models.formulations import formulation_of
+from cosserat_fenicsx.models.formulation import formulation_of
 from cosserat_fenicsx.models.rodmesh import Layout
 from cosserat_fenicsx.models.signature import Signature
 from cosserat_fenicsx.results.accuracy import FEW

@@ -5,7 +5,7 @@ from cosserat_fenicsx.dynamics.initial_equilibrium import before
 from cosserat_fenicsx.dynamics.simulate import DEGREE, ELEMENTS, TOL, pace_of
 from cosserat_fenicsx.dynamics.solvers import chosen_model
 from cosserat_fenicsx.dynamics.steppers import SCHEMES
-from cosserat_fenicsx.models.nodal_inertia import check_inertia
+from cosserat_fenicsx.models.rod_data import check_inertia
 from cosserat_fenicsx.models.rodmesh import Layout
 from cosserat_fenicsx.models.signature import Signature
 from cosserat_fenicsx.scene.describe import describe

@@ -26,6 +26,7 @@ from cosserat_fenicsx.ranks import on_first, world
 from cosserat_fenicsx.results.export.beside import replaced
 from cosserat_fenicsx.scene.as_data import NotData
 from cosserat_fenicsx.storage import checkpoints
+from cosserat_fenicsx.storage.described import difference
 from cosserat_fenicsx.storage.entries import (
     A_NUMBER,
     A_POSITIVE,
@@ -39,7 +40,6 @@ from cosserat_fenicsx.storage.entries import (
     or_none,
     whole,
 )
-from cosserat_fenicsx.storage.described import difference
 from cosserat_fenicsx.storage.lock import FolderLock
 from cosserat_fenicsx.storage.vacant import check_vacant
 

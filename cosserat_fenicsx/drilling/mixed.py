@@ -5,8 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from cosserat_fenicsx.actions.hole_wall import HoleWall
-from cosserat_fenicsx.actions.tube_wall import TubeWall
+from cosserat_fenicsx.actions.walls import HoleWall, TubeWall
 from cosserat_fenicsx.checks import instance, number, refuse
 from cosserat_fenicsx.drilling.bit_laws import Stribeck
 from cosserat_fenicsx.drilling.bit_torque import BitTorque

@@ -13,7 +13,7 @@ from cosserat_fenicsx.algebra.pencil import Pencil
 from cosserat_fenicsx.checks import instance, number, refuse
 from cosserat_fenicsx.element import lobatto_weights
 from cosserat_fenicsx.errors import NotConverged, SceneError
-from cosserat_fenicsx.models.nodal_inertia import check_inertia, nodal_inertia, nodal_lateral, nodal_offsets
+from cosserat_fenicsx.models.rod_data import check_inertia, nodal_inertia, nodal_lateral, nodal_offsets
 from cosserat_fenicsx.models.traits import traits_of
 from cosserat_fenicsx.progress import MeshProgress
 from cosserat_fenicsx.quaternions import directors

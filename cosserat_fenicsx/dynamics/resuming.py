@@ -17,7 +17,7 @@ from cosserat_fenicsx.errors import SceneError, nearest
 from cosserat_fenicsx.dynamics.time_loop import marks_of
 from cosserat_fenicsx.models.connections import Connections
 from cosserat_fenicsx.models.rodmesh import Layout
-from cosserat_fenicsx.models.scales import Scales
+from cosserat_fenicsx.models.base import Scales
 from cosserat_fenicsx.dynamics.time_loop import TimeLoop
 from cosserat_fenicsx.ranks import communicator
 from cosserat_fenicsx.results.export import saved

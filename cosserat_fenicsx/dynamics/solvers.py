@@ -8,8 +8,7 @@ from cosserat_fenicsx.dynamics.steppers import SCHEMES
 from cosserat_fenicsx.errors import NotConverged, SceneError, nearest
 from cosserat_fenicsx.models.choose import not_flat
 from cosserat_fenicsx.models.collocated import CollocatedPlanar, CollocatedSpatial
-from cosserat_fenicsx.models.conserving import ConservingSpatial
-from cosserat_fenicsx.models.eccentric import EccentricSpatial
+from cosserat_fenicsx.models.directors import ConservingSpatial, EccentricSpatial
 from cosserat_fenicsx.models.moving import MovingSpatial
 from cosserat_fenicsx.models.moving_planar import MovingPlanar
 from cosserat_fenicsx.models.signature import Signature

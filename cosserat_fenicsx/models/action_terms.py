@@ -1,14 +1,109 @@
-"""The Functions that hold the data of a scene's actions on a mesh, one term for each kind of virtual work."""
+"""The data of a scene's actions on a mesh: a term for each kind of virtual work, and its Functions."""
+
+from collections import namedtuple
 
 import numpy as np
 import ufl
 from dolfinx import fem
 
 from cosserat_fenicsx import compat
-from cosserat_fenicsx.models.projection import nearest_polynomials
 from cosserat_fenicsx.models.rod_data import gauss_function
 from cosserat_fenicsx.models.signature import place_actions
+from cosserat_fenicsx.quaternions import directors
 from cosserat_fenicsx.scene.signals import at, signals_of, values_at, with_values
+
+# Quadrature on an interval between kinks: exact for data that are linear there, up to p = 4.
+_PLACES, _WEIGHTS = np.polynomial.legendre.leggauss(3)
+
+
+def nearest_polynomials(action, rod, s, starts, lengths):
+    """The action's `Datum`s at the Gauss points, as the nearest polynomials on elements with kinks inside.
+
+    Gauss points may miss a narrow peak. The polynomial of degree p - 1 that is nearest in the mean square has the same
+    integrals against polynomials of degree p - 1, the total and the moment of a load among them, and its values at the
+    p Gauss points are integrals against the Lagrange polynomials through these points, which are orthogonal.
+
+    Args:
+        action, rod: an action along the rod.
+        s: (elements * p,) arc lengths of the Gauss points, element by element, m.
+        starts, lengths: (elements,), m.
+    """
+    given = action.data(rod, s)
+    if not len(starts):
+        return given
+    p = len(s) // len(starts)
+    at_gauss = (s.reshape(-1, p) - starts[:, None]) / lengths[:, None]
+    order = np.argsort(starts)
+    ends = np.concatenate([starts, starts + lengths, action.kinks(rod)])
+    edges = np.unique(ends[(ends >= starts.min()) & (ends <= (starts + lengths).max())])
+    middles, sizes = (edges[1:] + edges[:-1]) / 2, np.diff(edges)
+    owner = order[np.searchsorted(starts[order], middles, side="right") - 1]
+    inside = middles < starts[owner] + lengths[owner]  # a rank need not own neighbouring elements
+    owner, middles, sizes = owner[inside], middles[inside], sizes[inside]
+    places = middles[:, None] + sizes[:, None] * _PLACES / 2
+    local = (places - starts[owner][:, None]) / lengths[owner][:, None]
+    basis = np.ones((*local.shape, p))
+    for q in range(p):
+        for other in set(range(p)) - {q}:
+            x_q, x_other = at_gauss[owner, q, None], at_gauss[owner, other, None]
+            basis[:, :, q] *= (local - x_other) / (x_q - x_other)
+    weights = (sizes / lengths[owner])[:, None] * _WEIGHTS / 2
+    gauss = np.polynomial.legendre.leggauss(p)[1] / 2  # symmetric: reversed elements have the same
+    found = []
+    for datum, sampled in zip(given, action.data(rod, places.ravel()), strict=True):
+        if len(np.reshape(datum.value, (-1, datum.size))) != len(s):  # a constant
+            found.append(datum)
+            continue
+        values = np.zeros((len(starts), p, datum.size))
+        parts = np.einsum("kg,kgq,kgi->kqi", weights, basis, sampled.value.reshape(*local.shape, datum.size))
+        np.add.at(values, owner, parts)
+        found.append(datum._replace(value=(values / gauss[:, None]).reshape(-1, datum.size)))
+    return tuple(found)
+
+
+class Densities:
+    """The densities of the actions of a model's current scene."""
+
+    def load(self, model):
+        """Prepare for the model's scene. Dead densities are evaluated once, per unit of each of the two factors."""
+        self._model, self._dead = model, None
+        if not model.forms.density or model.signature.lives_along_rods:
+            return
+        factors = model.load_factor, model.permanent_factor
+        before = [float(factor.value) for factor in factors]
+        self._dead = []
+        for i in range(2):
+            for j, factor in enumerate(factors):
+                factor.value = float(i == j)
+            self._dead.append(self._at(model.forms.density, len(model.forms.gauss)))
+        for factor, value in zip(factors, before, strict=True):
+            factor.value = value
+
+    def at(self, load_factors):
+        """`here` at several load factors (k,), for dead densities: (k, elements, points, 6) or None, and None."""
+        if self._dead is None:
+            return None, None
+        of_load, of_permanent = self._dead
+        permanent = float(self._model.permanent_factor.value) * of_permanent
+        return np.multiply.outer(load_factors, of_load) + permanent, None
+
+    def here(self):
+        """The densities at the model's state, inertial, dimensionless, (elements, points, 6) each or None: at the Gauss
+        points, and at the nodes for actions integrated there."""
+        model, at_gauss = self._model, None
+        if self._dead is not None:
+            factors = (float(factor.value) for factor in (model.load_factor, model.permanent_factor))
+            at_gauss = sum(factor * of_unit for factor, of_unit in zip(factors, self._dead, strict=True))
+        elif model.forms.density:
+            at_gauss = self._at(model.forms.density, len(model.forms.gauss))
+        if not model.forms.node_density:
+            return at_gauss, None
+        return at_gauss, self._at(model.forms.node_density, len(model.nodes))
+
+    def _at(self, expressions, points):
+        values = sum(self._model.gathered(each, points, 6) for each in expressions).reshape(-1, points, 2, 3)
+        return (values @ self._model.axes).reshape(-1, points, 6)
+
 
 # Points of an element, in [0, 1], that are closer than this are the same.
 _SAME = 1e-9
@@ -272,3 +367,94 @@ class Term:
         values = values.reshape(len(self._rods.cells), -1, sum(sizes))
         for function, part in zip(self.memory, np.split(values, np.cumsum(sizes)[:-1], axis=2), strict=True):
             function.x.array.reshape(-1, part.shape[2])[compat.cell_nodes(function.function_space)] = part
+
+
+#: At a station, inertial: displacement (m) and rotation vector (rad, below a full turn) from the reference, velocity
+#: (m/s), angular velocity (rad/s), and the rotation R from the reference (3, 3).
+StationMotion = namedtuple("StationMotion", "displacement rotation velocity angular_velocity R")
+
+
+class StationNode:
+    """The node of a station.
+
+    Args:
+        model: a spatial moving model, loaded; station: a station of its scene.
+    """
+
+    def __init__(self, model, station):
+        self._model = model
+        slot = model.slot_of(station)
+        here = np.flatnonzero(model.slots[: model.owned_nodes] == slot)
+        self._dofs = model.dofs_of_nodes[here[0]] if len(here) else None
+        self._rest = model.reference[slot]
+
+    def _everywhere(self, *functions):
+        """(functions, 7) values at the node."""
+        found = np.zeros((len(functions), 7))
+        if self._dofs is not None:
+            found[:] = [function.x.array[self._dofs] for function in functions]
+        comm = self._model.comm
+        return comm.allreduce(found) if comm.size > 1 else found
+
+    def now(self):
+        """The `StationMotion` of the state."""
+        model = self._model
+        w, rates = self._everywhere(model.state, model.velocity)
+        return self._motion(w, model.rates()(w, rates))
+
+    def of_step(self, h):
+        """The `StationMotion` halfway through the step of length h (dimensionless) from `start` to the state: means."""
+        model = self._model
+        w, before = self._everywhere(model.state, model.start)
+        middle = (w + before) / 2
+        return self._motion(middle, model.rates()(middle, (w - before) / h))
+
+    def _motion(self, w, rates):
+        model = self._model
+        length, q = model.scales.length, w[3:] / np.linalg.norm(w[3:])
+        v, omega = rates[:3] * length / model.time, rates[3:] / model.time
+        size = np.linalg.norm(q[1:])
+        turned = 2 * np.arctan2(size, q[0]) / size * q[1:] if size else np.zeros(3)
+        return StationMotion((w[:3] - self._rest) * length, turned, v, omega, directors(q[None])[0])
+
+
+class Delays:
+    """The actions of a moving model that depend on the earlier motion of their stations, see `Action.delayed`.
+
+    Args:
+        model: a moving model, loaded.
+
+    Attributes:
+        longest: the longest step that they allow, s.
+    """
+
+    def __init__(self, model):
+        self._model, actions = model, [x for x in model.scene.actions if x.delayed is not None]
+        self._all = [(action.delayed(), StationNode(model, action.station)) for action in actions]
+        self.longest = min((delayed.longest for delayed, _ in self._all), default=np.inf)
+        if actions:
+            model.actions.follow({id(x): delayed for x, (delayed, _) in zip(actions, self._all, strict=True)})
+
+    def begin(self):
+        """Begin at the model's state, at the time 0."""
+        for delayed, node in self._all:
+            delayed.begin(node.now())
+
+    def accept(self, t, h):
+        """Accept the step from t to t + h (s) to the model's state."""
+        for delayed, node in self._all:
+            delayed.accept(t, h, node.of_step(h / self._model.time))
+
+    def undo(self):
+        """Take back the last step."""
+        for delayed, _ in self._all:
+            delayed.undo()
+
+    def memory(self):
+        """See `Stepper.memory`."""
+        return {str(i): delayed.memory() for i, (delayed, _) in enumerate(self._all)}
+
+    def recall(self, memory):
+        """Restore what `memory` returned."""
+        for i, (delayed, _) in enumerate(self._all):
+            delayed.recall(memory[str(i)])

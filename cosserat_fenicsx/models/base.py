@@ -1,7 +1,8 @@
-"""The base of all models: mesh, numbering of unknowns, data of a scene, and what solvers evaluate."""
+"""The base of all models: units, mesh, unknowns, data of a scene, and what solvers evaluate."""
 
 import math
 from collections import namedtuple
+from dataclasses import dataclass
 
 import numpy as np
 from dolfinx import fem
@@ -11,17 +12,80 @@ from cosserat_fenicsx import compat
 from cosserat_fenicsx.compiling import compiling
 from cosserat_fenicsx.element import ElementRule
 from cosserat_fenicsx.forms.law import stiffness_for
-from cosserat_fenicsx.models.action_terms import ActionTerms
-from cosserat_fenicsx.models.clamps import Clamps
-from cosserat_fenicsx.models.connections import ties_of
-from cosserat_fenicsx.models.densities import Densities
-from cosserat_fenicsx.models.laws import stretch_values
-from cosserat_fenicsx.models.numbering import Numbering
-from cosserat_fenicsx.models.rod_data import bending_lengths, bounded, fill_fields, gauss_function, rod_data, rod_fields
-from cosserat_fenicsx.models.rodmesh import Gather, RodMesh
-from cosserat_fenicsx.models.scales import Scales
-from cosserat_fenicsx.models.snapshots import Snapshots
-from cosserat_fenicsx.models.ties import Ties
+from cosserat_fenicsx.models.action_terms import ActionTerms, Densities
+from cosserat_fenicsx.models.connections import Clamps, Ties, ties_of
+from cosserat_fenicsx.models.rod_data import (
+    bending_lengths,
+    bounded,
+    fill_fields,
+    gauss_function,
+    rod_data,
+    rod_fields,
+    stretch_values,
+)
+from cosserat_fenicsx.models.rodmesh import Gather, Numbering, RodMesh
+from cosserat_fenicsx.scene.action import powers
+
+
+@dataclass(frozen=True)
+class Scales:
+    """Units of length (m), force (N) and moment (N m): L, EI/L^2 and EI/L of the longest rod.
+
+    One tolerance then suits every scene.
+    """
+
+    length: float
+    force: float
+    moment: float
+
+    @classmethod
+    def of(cls, scene, EI=None):
+        """Scales of the longest rod of a scene; EI (N m^2) instead of that rod's largest."""
+        rod = max(scene.rods, key=lambda rod: rod.length)
+        EI, L = EI or float(rod.profile.range[1].J[:2].max()), rod.length
+        return cls(L, EI / L**2, EI / L)
+
+    def of_unit(self, unit, time=1.0):
+        """The scale of a unit of `scene.action`, for a unit of time (s)."""
+        force, length, times = powers(unit)
+        return self.force**force * self.length**length * time**times
+
+
+class Snapshots:
+    """Mixin of `RodModel`: copies of a state for results, of the nodes' unknowns and of fields at the Gauss points."""
+
+    def snapshot(self):
+        """The input of `expansion`: the nodes' unknowns (N, components), and the fields at the Gauss points (cells,
+        points, k) or None; in the scene's order, on all ranks, dimensionless."""
+        nodal = self._gather_nodes(self.state.x.array[self._nodal[: self._owned_nodes]])
+        if self.forms.fields is None:
+            return nodal, None
+        return nodal, self.gathered(self.forms.fields, len(self.forms.gauss), self.forms.fields_size)
+
+    def snapshots(self, x, fields):
+        """`snapshot` at several states of one process: from its unknowns (k, unknowns), and the values of the fields
+        (k, elements, n) or None."""
+        numbering = self.numbering
+        state = np.tile(self._rest_state, (len(x), 1))
+        state[:, numbering.free] = x[:, numbering.of_free]
+        nodal = np.empty((len(x), *self._nodal.shape))
+        nodal[:, self._slots] = state[:, self._nodal]
+        if fields is None:
+            return nodal, None
+        values = fields.reshape(*fields.shape[:2], len(self.forms.gauss), -1).copy()
+        values[:, self.rods.reversed] = values[:, self.rods.reversed][:, :, ::-1]
+        found = np.empty_like(values)
+        found[:, self.rods.cells] = values
+        return nodal, found
+
+    def gathered(self, expression, points, size):
+        """(elements, points, size) values of a compiled expression, in the scene's order, on all ranks."""
+        owned = len(self._owned_cells)
+        values = compat.evaluate(expression, self.mesh, self._owned_cells).reshape(owned, points, size)
+        reverse = self.rods.reversed[:owned]
+        values[reverse] = values[reverse][:, ::-1]
+        return self._gather_cells(values.reshape(owned, points * size)).reshape(-1, points, size)
+
 
 #: One part of the second variation, decoupled from the others: its compiled form, its `Numbering`, the local degrees of
 #: freedom of every element of this rank, the rows of the tied nodes (see `RodModel.rows_of_tied`), the inertial

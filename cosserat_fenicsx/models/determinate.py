@@ -1,16 +1,231 @@
 """The determinate models: unknown theta in a plane, q in space, in P_p; statics gives n, and r follows."""
 
 import numpy as np
+import ufl
 from dolfinx import cpp
 
 from cosserat_fenicsx import compat
+from cosserat_fenicsx.forms import determinate as eq
+from cosserat_fenicsx.forms import planar, spatial
+from cosserat_fenicsx.forms.equilibrium import Section, VirtualMotion
+from cosserat_fenicsx.forms.point import NONE, Point
+from cosserat_fenicsx.forms.rotation import rotation_matrix, rotation_vector
 from cosserat_fenicsx.models.base import RodModel
-from cosserat_fenicsx.models.determinate_forms import compile_in_plane, compile_in_space
-from cosserat_fenicsx.models.laws import moment, strain
+from cosserat_fenicsx.models.compiled import action_densities, action_work, compile_all, derivative_in, measures
 from cosserat_fenicsx.models.planar import PlaneModel, in_space
-from cosserat_fenicsx.models.rod_data import gauss_function
-from cosserat_fenicsx.models.trees import Tree
+from cosserat_fenicsx.models.rod_data import as_matrix, gauss_function, law_of, moment, strain
 from cosserat_fenicsx.quaternions import conjugate_product, directors
+
+
+def compile_in_plane(model, displacements, rotations, N, N_permanent):
+    """The `CompiledForms` of a `DeterminateInPlane`; its second variations: in the plane and out of it.
+
+    Args:
+        model: supplies mesh, spaces, data and the terms of the actions.
+        displacements: space of three components per node, on which the forces do work.
+        rotations: space of two components per node, the small rotations about axes in the plane.
+        N, N_permanent: the contact force at the Gauss points per unit of the load factor and of the permanent one, two
+            components; the latter None where there is no permanent load.
+    """
+    U = model.state
+    U_node = compat.alias(U)
+    data, dx = model.data, measures(model)
+
+    def ds(a):
+        return a * dx.gauss
+
+    def along(w):
+        return w.dx(0)  # the mesh is the line of arc length
+
+    def about_normal(w):
+        return eq.tests_of(planar.along_normal(w[0]), planar.along_normal(along(w)[0]))
+
+    def about_plane(w):
+        return eq.tests_of(planar.in_plane(w), planar.in_plane(along(w)))
+
+    section = planar.section_of(law_of(data.K, data.K_inv, data.J, data.G), data.R_R, data.v_R)
+    motion = planar.motion_of((0, 0), U[0], along(U)[0])
+    n = planar.in_plane(_known_force(model, N, N_permanent))
+    phi, trial = ufl.TestFunction(model.space), ufl.TrialFunction(model.space)
+    test = about_normal(phi)
+    derivative = derivative_in(trial, U, U_node)
+
+    def point_at(place, rest, frame):
+        theta = (U if place == "line" else U_node)[0]
+        return Point(None, None, planar.rotation_matrix(theta), planar.along_normal(theta), rest=rest, frame=frame)
+
+    acting = action_work(model, dx, test, point_at, (U, U_node))
+    internal = eq.moments(n, motion, section, test, ds)
+    tangent = derivative(internal)
+
+    psi, w = ufl.TestFunction(rotations), ufl.TrialFunction(rotations)
+    rigid, direction = about_plane(psi), about_plane(w)
+    sideways = ds(eq.second_variation(n, motion, section, rigid, direction))
+    return _compiled(
+        model, internal, tangent, acting, [tangent, sideways], derivative, [None, (rigid, direction)], dx,
+        displacements, point_at, (U, U_node),
+    )  # fmt: skip
+
+
+def compile_in_space(model, displacements, rotations, N, N_permanent):
+    """The `CompiledForms` of a `DeterminateInSpace`.
+
+    Args:
+        model: supplies mesh, spaces, data and the terms of the actions.
+        displacements: space of three components per node, on which the forces do work.
+        rotations: space of three components per node, the small rotations.
+        N, N_permanent: the contact force at the Gauss points per unit of the load factor and of the permanent one; the
+            latter None where there is no permanent load.
+    """
+    U = model.state
+    U_node = compat.alias(U)
+    data, dx = model.data, measures(model)
+
+    def ds(a):
+        return a * dx.gauss
+
+    def along(w):
+        return w.dx(0)
+
+    section = Section(law_of(data.K, data.K_inv, data.J, data.G), as_matrix(data.R_R), data.v_R)
+    motion = spatial.motion_of(ufl.as_vector([0, 0, 0]), U, along(U), U_node)
+    n = _known_force(model, N, N_permanent)
+    phi, trial = ufl.TestFunction(model.space), ufl.TrialFunction(model.space)
+    test = eq.quaternion_tests_of(phi, along(phi))
+    derivative = derivative_in(trial, U, U_node)
+
+    def point_at(place, rest, frame):
+        q = U if place == "line" else U_node
+        return Point(None, None, rotation_matrix(q), rotation_vector(q), rest=rest, frame=frame)
+
+    acting = action_work(model, dx, test, point_at, (U, U_node))
+    internal = eq.moments(n, motion, section, test, ds) + spatial.unit_quaternion(motion, test) * dx.nodes
+    tangent = derivative(internal)
+
+    psi, w = ufl.TestFunction(rotations), ufl.TrialFunction(rotations)
+    rigid, direction = eq.tests_of(psi, along(psi)), eq.tests_of(w, along(w))
+    second = ds(eq.second_variation(n, motion, section, rigid, direction))
+    return _compiled(
+        model, internal, tangent, acting, [second], derivative, [(rigid, direction)], dx, displacements, point_at,
+        (U, U_node),
+    )  # fmt: skip
+
+
+def _known_force(model, N, N_permanent):
+    n = model.load_factor * N
+    return n if N_permanent is None else n + model.permanent_factor * N_permanent
+
+
+def _compiled(
+    model, residual, tangent, acting, seconds, derivative, variations, dx, displacements, point_at, unknowns
+):
+    """The `CompiledForms`, with the virtual work of the dead forces on displacements."""
+    moved = VirtualMotion(ufl.TestFunction(displacements), NONE)
+    forces = action_work(model, dx, moved, point_at, ())
+    densities = action_densities(model, point_at)
+    return compile_all(
+        model, residual, tangent, acting, seconds, derivative, variations=variations, forces=forces,
+        densities=densities, unknowns=unknowns,
+    )  # fmt: skip
+
+
+class Tree:
+    """The rods of a signature, in order from their clamps outwards.
+
+    Args:
+        signature: a `Signature` whose rods are trees, each with one clamped point and rigid joints alone.
+
+    Attributes:
+        cell_nodes: (elements, p + 1) nodes of every element, the scene's order.
+    """
+
+    def __init__(self, signature):
+        self._p, self._counts = signature.degree, signature.counts
+        p = signature.degree
+        self._first_cell = np.concatenate([[0], np.cumsum(signature.counts)])
+        self._first_node = self._first_cell * p + np.arange(len(signature.counts) + 1)
+        rod = np.repeat(np.arange(len(signature.counts)), signature.counts)
+        self.cell_nodes = (np.arange(self._first_cell[-1]) * p + rod)[:, None] + np.arange(p + 1)
+        self._order = self._walk(signature.connections)
+
+    def _walk(self, links):
+        """[(rod, its element end towards the clamp, the node of the previous rod there, or None)], clamps first."""
+        points = {vertex: {vertex} for vertex in links.clamped}
+        for vertex, leader in links.leaders:
+            points.setdefault(leader, {leader}).add(vertex)
+        order, waiting, seen = [], [(clamp, None) for clamp in links.clamped], set()
+        while waiting:
+            point, before = waiting.pop(0)
+            for rod, entry in sorted(points[point]):
+                if rod in seen:
+                    continue
+                seen.add(rod)
+                order.append((rod, entry, before))
+                for other, members in points.items():
+                    here = [vertex for which, vertex in members if which == rod]
+                    if other != point and here:
+                        waiting.append((other, self._node(rod, here[0])))
+        return order
+
+    def _node(self, rod, vertex):
+        return int(self._first_node[rod] + vertex * self._p)
+
+    def _rods(self, order):
+        """For every rod: nodes and elements (slices), its element end towards the clamp, the previous rod's node."""
+        for rod, entry, before in order:
+            nodes = slice(self._first_node[rod], self._first_node[rod + 1])
+            yield nodes, slice(self._first_cell[rod], self._first_cell[rod + 1]), entry, before
+
+    def forces(self, nodal, rule):
+        """The contact force at the Gauss points that balances dead forces.
+
+        Solves the discrete balance (n, l_i') = f_i for all nodes of an element except the one towards the clamp; at its
+        other end acts the sum of all forces beyond it.
+
+        Args:
+            nodal: (N, d) forces on the nodes; rule: the `ElementRule`.
+
+        Returns:
+            (elements, points, d).
+        """
+        p, nodal = self._p, nodal.copy()
+        gradient = rule.weights * rule.slopes.T  # (p + 1, points)
+        n = np.empty((len(self.cell_nodes), len(rule.gauss), nodal.shape[1]))
+        for nodes, cells, entry, before in self._rods(reversed(self._order)):
+            f, mine = nodal[nodes], n[cells]
+            ends, inner = f[::p], f[:-1].reshape(-1, p, f.shape[1])[:, 1:]
+            sums = inner.sum(axis=1)
+            carried = np.cumsum((ends[:0:-1] + np.pad(sums[:0:-1], ((1, 0), (0, 0)))), axis=0)[::-1]
+            beyond = np.concatenate([inner, carried[:, None]], axis=1)
+            carried = np.cumsum(ends[:-1] + np.pad(sums[:-1], ((1, 0), (0, 0))), axis=0)
+            behind = np.concatenate([carried[:, None], inner], axis=1)
+            mine[entry:] = np.linalg.solve(gradient[1:], beyond[entry:])
+            mine[:entry] = np.linalg.solve(gradient[:-1], behind[:entry])
+            if before is not None:
+                nodal[before] += f.sum(axis=0)
+        return n
+
+    def positions(self, tangents, rest, rule):
+        """Positions of all nodes from r' at the Gauss points.
+
+        Args:
+            tangents: (k, elements, points, d) r' times the length of its element.
+            rest: (N, d) positions at rest, where the clamps stay.
+            rule: the `ElementRule`.
+
+        Returns:
+            (k, N, d).
+        """
+        within = np.einsum("jg,kcgi->kcji", rule.from_slopes, tangents)
+        r = np.empty((len(tangents), *rest.shape))
+        for nodes, cells, entry, before in self._rods(self._order):
+            steps = within[:, cells]
+            ends = np.concatenate([np.zeros_like(steps[:, :1, 0]), np.cumsum(steps[:, :, -1], axis=1)], axis=1)
+            at = r[:, before] if before is not None else rest[nodes.start + entry * self._p]
+            ends += (at - ends[:, entry])[:, None]
+            r[:, nodes][:, :-1] = (ends[:, :-1, None] + steps[:, :, :-1]).reshape(len(r), -1, rest.shape[1])
+            r[:, nodes.stop - 1] = ends[:, -1]
+        return r
 
 
 class _KnownForce(RodModel):

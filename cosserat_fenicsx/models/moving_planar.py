@@ -6,10 +6,9 @@ import ufl
 from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.forms import inertia
 from cosserat_fenicsx.forms import planar as eq
-from cosserat_fenicsx.models.laws import law_of
-from cosserat_fenicsx.models.moving import Moving
-from cosserat_fenicsx.models.moving_forms import StepForms, along, compile_momentum
+from cosserat_fenicsx.models.moving import Moving, StepForms, along, compile_momentum
 from cosserat_fenicsx.models.planar import PlanarModel
+from cosserat_fenicsx.models.rod_data import law_of
 from cosserat_fenicsx.scene.action import is_axial
 from cosserat_fenicsx.scene.describe import describe
 from cosserat_fenicsx.scene.signals import signals_of

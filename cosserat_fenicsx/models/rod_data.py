@@ -1,12 +1,132 @@
-"""The data of a scene's rods at the Gauss points: their law, reference frame and reference strain."""
+"""The data of a scene's rods: law, reference frame and strain at the Gauss points, mass and inertia at the nodes.
+
+K are the principal values of the stiffness A against stretch and shear, J those of the stiffness S against bending and
+torsion where there is no contact force, see forms/law.py. Diagonal sections need no more; where a section of the scene
+couples strains, the principal axes of A and S and the coupling G are stored too.
+
+At a jump of mass or inertia each element has the value of its side."""
 
 from collections import namedtuple
 
 import numpy as np
+import ufl
 from dolfinx import fem
 
 from cosserat_fenicsx import compat
-from cosserat_fenicsx.models.laws import LawData, field_values, law_data
+from cosserat_fenicsx.checks import refuse
+from cosserat_fenicsx.element import lobatto_weights
+from cosserat_fenicsx.errors import SceneError
+from cosserat_fenicsx.forms.law import CoupledLaw, DiagonalLaw
+
+#: Arrays (.., 3) K and J, which may be infinite in K; and (.., 3, 3), or None where all sections are diagonal: the
+#: principal axes of A and of S as columns, and G. Dimensionless.
+LawData = namedtuple("LawData", "K J A_axes S_axes G", defaults=(None, None, None))
+
+
+def law_data(along, scales, *, coupled):
+    """The `LawData` of `Stiffnesses`.
+
+    Args:
+        scales: anything with the units `force` and `length`.
+        coupled: whether to return full matrices, also for diagonal sections.
+    """
+    force, length = scales.force, scales.length
+    K, J = along.K / force, along.J / (force * length**2)
+    if not coupled:
+        return LawData(K, J)
+    if along.matrix is None:
+        axes = np.broadcast_to(np.eye(3), (*K.shape, 3))
+        return LawData(K, J, axes, axes, np.zeros(axes.shape))
+    M = along.matrix / force
+    B, D = M[..., :3, 3:] / length, M[..., 3:, 3:] / length**2
+    K, A_axes = np.linalg.eigh(M[..., :3, :3])
+    with np.errstate(divide="ignore"):
+        K_inv = np.where(K > 0, 1 / K, 0.0)  # a viscosity may be zero
+    G = spread(K_inv, A_axes) @ B
+    S = D - np.swapaxes(B, -1, -2) @ G
+    J, S_axes = np.linalg.eigh((S + np.swapaxes(S, -1, -2)) / 2)
+    return LawData(K, J, A_axes, S_axes, G)
+
+
+def spread(values, axes):
+    """(.., 3, 3) the symmetric matrices with these principal values and axes."""
+    return (axes * values[..., None, :]) @ np.swapaxes(axes, -1, -2)
+
+
+def turned(data, P):
+    """`LawData` (or what has its fields) with components along other axes: a becomes P a, P (.., 3, 3)."""
+    G = P @ data.G @ np.swapaxes(P, -1, -2)
+    return data._replace(A_axes=P @ data.A_axes, S_axes=P @ data.S_axes, G=G)
+
+
+def strain(data, n, k):
+    """v - v_R (.., 3) where the contact force n is known, material."""
+    if data.G is None:
+        return n / data.K
+    return _times(spread(1 / data.K, data.A_axes), n) - _times(data.G, k)
+
+
+def moment(data, n, k):
+    """m (.., 3) where the contact force n is known, material."""
+    if data.G is None:
+        return data.J * k
+    return _times(np.swapaxes(data.G, -1, -2), n) + _times(spread(data.J, data.S_axes), k)
+
+
+def _times(matrix, a):
+    return np.einsum("...ij,...j->...i", matrix, a)
+
+
+def field_values(data, stiff):
+    """What the Functions K, K_inv, K_stiff, J and G hold, (elements, points, k) each: diagonals, or matrices row by
+    row.
+
+    Args:
+        data: the `LawData`; stiff: the bounded K for the second variation.
+    """
+    finite = np.where(np.isinf(data.K), 0.0, data.K)
+    K, K_inv, K_stiff = (stretch_values(data, values) for values in (finite, 1 / data.K, stiff))
+    return K, K_inv, K_stiff, _numbers(data.J, data.S_axes), _rows(data.G)
+
+
+def stretch_values(data, K):
+    """Values of the Function of a stretch and shear stiffness with the principal values K."""
+    return _numbers(K, data.A_axes)
+
+
+def viscous_values(data):
+    """Values of the Functions of a viscous law, in the order of `law_of`; the inverse is None."""
+    return stretch_values(data, data.K), None, _numbers(data.J, data.S_axes), _rows(data.G)
+
+
+def _numbers(values, axes):
+    return values if axes is None else _rows(spread(values, axes))
+
+
+def _rows(matrix):
+    return None if matrix is None else matrix.reshape(*matrix.shape[:-2], 9)
+
+
+def law_of(K, K_inv, J, G):
+    """The law used in forms, from Functions filled by `field_values`; G is None where it is diagonal."""
+    if G is None:
+        return DiagonalLaw(K, K_inv, J)
+    return CoupledLaw(*(a if a is None else as_matrix(a) for a in (K, K_inv, J, G)))
+
+
+def stiff_enough(n, data):
+    """The law of the second variation at a contact force n: bounded stiffnesses, raised where n requires it.
+
+    Args:
+        data: the `RodFields`.
+    """
+    return law_of(data.K_stiff, data.K_inv, data.J, data.G).raised(ufl.sqrt(ufl.dot(n, n)))
+
+
+def as_matrix(a):
+    """The 3 x 3 matrix of nine numbers, row by row."""
+    return ufl.as_matrix([[a[3 * i + j] for j in range(3)] for i in range(3)])
+
 
 # EA and GA are bounded in the second variation, of which only the signs of the eigenvalues matter: with larger values,
 # rounding errors would exceed the eigenvalues of bending of slender rods and of weak modes of thin blades. The bound is
@@ -54,7 +174,7 @@ def joined(parts):
     return type(parts[0])(*fields)
 
 
-#: The same as dolfinx Functions, see `laws.field_values`; K_inv is zero where K is infinite, K_stiff is bounded. In a
+#: The same as dolfinx Functions, see `field_values`; K_inv is zero where K is infinite, K_stiff is bounded. In a
 #: plane R_R is the tangent.
 RodFields = namedtuple("RodFields", "K K_inv K_stiff J G R_R v_R")
 
@@ -98,3 +218,109 @@ def fill_fields(fields, rods, data, stiff):
     for function, array in zip(fields, (*field_values(data, stiff), data.R_R, data.v_R), strict=True):
         if function is not None:
             rods.fill(function, array)
+
+
+def check_inertia(scene):
+    """Raise an error for a rod without inertia, or for an action that stands for inertia.
+
+    Raises:
+        SceneError: a rod without mass or inertia, or such an action.
+    """
+    for i, load in enumerate(scene.loads):
+        if load.of_inertia:
+            raise SceneError(
+                f"Scene.loads[{i}] ({type(load).__name__}) stands for the inertia of a motion: expected a scene "
+                "without it, which may start from an equilibrium with it (simulate(start=path), Scene.velocities)"
+            )
+    for rod in scene.rods:
+        low = rod.profile.range[0]
+        for field, value in (("mass", low.mass), ("inertia", low.inertia)):
+            if value is None:
+                owner, name = ("Stiffness", field) if rod.material is None else ("Material", "density")
+                refuse(f"Rod '{rod.name}': {owner}", name, None, "a value, which a motion needs")
+
+
+def nodal_inertia(scene, layout, nodes):
+    """Mass (elements, p + 1), kg/m, Jrho about d_1, d_2, d_3 (elements, p + 1, 3), kg m, and frames at rest (elements,
+    p + 1, 3, 3). Masses that move with the axis count; point masses are added to one of the adjacent elements."""
+    parts, weights = [], lobatto_weights(nodes)
+    for i, (rod, s) in enumerate(_nodes_of(scene, layout, nodes)):
+        along, frames = _by_side(rod.stiffness_at, s), rod.curve.frame(s.ravel()).reshape(*s.shape, 3, 3)
+        mass, J = (_own(along, name) for name in ("mass", "inertia"))
+        mass = mass + sum(across for across, _ in _added(scene, rod, s))
+        for action in scene.loads:
+            body = action.inertia(rod) if action.station is not None and action.station.rod is rod else None
+            if body is not None:  # divided by the node's quadrature weight, which multiplies it again
+                vertex = layout.vertex(scene, action.station)[1]
+                cell = min(vertex, layout.counts[i] - 1)
+                at = cell, -1 if vertex > cell else 0
+                length = weights[at[1]] * (layout.breaks[i][cell + 1] - layout.breaks[i][cell]) * rod.length
+                mass[at] += body[0] / length
+                J[at] += body[1] / length
+        parts.append((mass, J, frames))
+    return tuple(np.concatenate(part) for part in zip(*parts, strict=True))
+
+
+def nodal_offsets(scene, layout, nodes, mass):
+    """What eccentricity adds to `nodal_inertia`, inertial at rest.
+
+    The mass of a rod lies at the offset a, masses that are added to it on its axis. Together they are a mass m at the
+    offset a m_rod/m, and a moment of inertia m_rod (m - m_rod)/m (a.a - a a) besides that of the section.
+
+    Args:
+        mass: of `nodal_inertia`.
+
+    Returns:
+        Offsets (elements, p + 1, 3), m, and moments of inertia (elements, p + 1, 3, 3), kg m.
+    """
+    arms, own = [], []
+    for rod, s in _nodes_of(scene, layout, nodes):
+        own.append(_own(_by_side(rod.stiffness_at, s), "mass"))
+        offsets = _pick(*_by_side(rod.mass_centre.at, s)) if rod.mass_centre else np.zeros((*s.shape, 3))
+        frames = rod.curve.frame(s.ravel()).reshape(*s.shape, 3, 3)
+        arms.append(np.einsum("...ij,...j->...i", frames, offsets))
+    arm, own = np.concatenate(arms), np.concatenate(own)
+    apart = own * (mass - own) / mass
+    squares = np.einsum("...i,...i->...", arm, arm)[..., None, None] * np.eye(3)
+    return arm * (own / mass)[..., None], apart[..., None, None] * (squares - arm[..., :, None] * arm[..., None, :])
+
+
+def nodal_lateral(scene, layout, nodes):
+    """(elements, p + 1, 3) tangents at rest times the square root of the mass, kg/m, that does not move along them."""
+    parts = []
+    for rod, s in _nodes_of(scene, layout, nodes):
+        left_out = sum((across - along for across, along in _added(scene, rod, s)), np.zeros(s.shape))
+        tangents = rod.curve.frame(s.ravel())[..., 2].reshape(*s.shape, 3)
+        parts.append(np.sqrt(left_out)[..., None] * tangents)
+    return np.concatenate(parts)
+
+
+def _nodes_of(scene, layout, nodes):
+    """(rod, arc lengths (elements, p + 1) of the nodes, m) of every rod."""
+    for rod, x in zip(scene.rods, layout.inside(nodes), strict=True):
+        yield rod, x * rod.length
+
+
+def _added(scene, rod, s):
+    """(across, along) masses that move with the axis, each (elements, p + 1), of every action along a rod."""
+    for action in scene.loads:
+        if action.station is None and action.acts_on(rod):
+            after, before = _by_side(lambda s, side, action=action: action.added_mass(rod, s, side), s)
+            if after is not None:
+                yield tuple(_pick(a, b) for a, b in zip(after, before, strict=True))
+
+
+def _by_side(function, s):
+    """Values at the nodes of elements as limits from above, and from below."""
+    return tuple(function(s, side) for side in ("right", "left"))
+
+
+def _own(along, name):
+    """A field of `Stiffnesses` at the nodes of every element."""
+    return _pick(*(getattr(side, name) for side in along))
+
+
+def _pick(after, before):
+    """At the first node of every element the limit from above, at all others that from below."""
+    first = np.arange(after.shape[1]) == 0
+    return np.where(first.reshape(-1, *(1,) * (after.ndim - 2)), after, before)

@@ -8,8 +8,7 @@ import numpy as np
 
 from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.models.connections import Connections
-from cosserat_fenicsx.models.formulations import formulation_of
-from cosserat_fenicsx.models.formulations.formulation import Formulation
+from cosserat_fenicsx.models.formulation import Formulation, formulation_of
 from cosserat_fenicsx.models.traits import traits_of, work_of
 from cosserat_fenicsx.remember import per_scene
 from cosserat_fenicsx.scene.signals import at

@@ -1,15 +1,90 @@
-"""The spatial model: r and q in P_p, dimensionless."""
+"""The spatial model: r and q in P_p, dimensionless; and the form of circulatory actions on its unknowns."""
 
 import contextlib
+from functools import partial
 
 import numpy as np
+import ufl
 from dolfinx import fem
 
+from cosserat_fenicsx import compat
+from cosserat_fenicsx.forms import equilibrium
+from cosserat_fenicsx.forms import spatial as eq
+from cosserat_fenicsx.forms.equilibrium import VirtualMotion
+from cosserat_fenicsx.forms.point import NONE
 from cosserat_fenicsx.models.base import RodModel
-from cosserat_fenicsx.models.spatial_forms import compile_forms
+from cosserat_fenicsx.models.compiled import (
+    action_densities,
+    action_work,
+    compile_all,
+    compile_single,
+    derivative_in,
+    measures,
+    varied_actions,
+)
+from cosserat_fenicsx.models.rod_data import as_matrix, law_of, stiff_enough
 from cosserat_fenicsx.quaternions import small_rotations
 
-_SAME = np.eye(3)
+
+def compile_spatial(model, rotations):
+    """The `CompiledForms` of a `SpatialModel`.
+
+    Args:
+        model: supplies mesh, spaces, data and the terms of the actions.
+        rotations: space of (r, theta) for the second variation.
+    """
+    formulation = model.signature.formulation
+    U, before, step = model.state, model.before, model.step
+    U_node = compat.alias(U)
+    data, dx = model.data, measures(model)
+
+    def ds(a):
+        return a * dx.gauss
+
+    def along(w):
+        return w.dx(0)  # the mesh is the line of arc length
+
+    law = law_of(data.K, data.K_inv, data.J, data.G)
+    section = equilibrium.Section(law, as_matrix(data.R_R), data.v_R)
+    state = eq.state_of(U, along(U), U_node)
+    phi, trial = ufl.TestFunction(model.space), ufl.TrialFunction(model.space)
+    test = formulation.unit_length.tests(phi, along(phi), state.q, state.q_s)
+    derivative = derivative_in(trial, U, U_node)
+
+    n, phi_n = (None if a is None else ufl.as_vector(a) for a in formulation.force.symbols(model, U, phi))
+    state_before = eq.state_of(before, along(before), before)
+    along_step = partial(ufl.derivative, coefficient=before, argument=step)
+    weak = formulation.force.weak_form(n, phi_n, state, state_before, section, test, ds, derivative, along_step)
+    held = formulation.unit_length.equations(state, test, U_node, phi) * dx.nodes
+    internal, tangent = weak.internal + held, weak.tangent + derivative(held)
+
+    def names_at(place):
+        return (U, along(U)) if place == "line" else (U_node, along(U_node))
+
+    def point_at(place, rest, frame):
+        return eq.point_of(*names_at(place), rest=rest, frame=frame)
+
+    def test_at(place):
+        at = eq.state_of(*names_at(place), U_node)
+        return formulation.unit_length.tests(phi, along(phi), at.q, at.q_s)
+
+    acting = action_work(model, dx, test, point_at, (U, U_node), test_at=test_at)
+
+    # The second variation in (r, theta) satisfies |q| = 1 by construction.
+    psi, w = ufl.TestFunction(rotations), ufl.TrialFunction(rotations)
+    rigid, direction = eq.rotation_tests_of(psi, along(psi)), eq.rotation_tests_of(w, along(w))
+    stiff = section._replace(law=stiff_enough(weak.n, data))
+    second = ds(equilibrium.second_variation(weak.n, state, stiff, rigid, direction, model.stiffness))
+    fields = ufl.as_vector([*weak.n, *equilibrium.contact_moment(weak.n, state, section), *state.r_s])
+    densities = action_densities(model, point_at)
+    contact = equilibrium.contact(state, section)[0] if model.carried else None
+    return compile_all(
+        model, internal, tangent, acting, [second], derivative, variations=[(rigid, direction)], fields=fields,
+        advance=weak.advance, densities=densities, unknowns=(U, U_node), contact=contact,
+    )  # fmt: skip
+
+
+_EYE = np.eye(3)
 
 
 class SpatialModel(RodModel):
@@ -26,7 +101,7 @@ class SpatialModel(RodModel):
 
     def _compile(self, spaces):
         self.stiffness = fem.Constant(self.mesh, np.float64(1))  # of the second variation, see `stress_alone`
-        return compile_forms(self, *spaces)
+        return compile_spatial(self, *spaces)
 
     def _at_rest(self):
         others = [1.0, 0, 0, 0, *self.multipliers * [0.0]]
@@ -48,7 +123,7 @@ class SpatialModel(RodModel):
         size, q = self.components, values[:, 3:7]
         of_moments = self.signature.formulation.unit_length.rows_of_moments(q)
         trial, test = np.zeros((len(values), 6, size)), np.zeros((len(of_moments), size, 6))
-        trial[:, :3, :3] = test[:, :3, :3] = _SAME
+        trial[:, :3, :3] = test[:, :3, :3] = _EYE
         test[:, 3:, 3:] = of_moments
         trial[:, 3:, 3:7] = small_rotations(q)
         return trial, test
@@ -106,3 +181,57 @@ class SpatialModel(RodModel):
     def expansion(self):
         """See `RodModel`."""
         return lambda load_factors, nodal, gauss: (nodal[..., :7], gauss)
+
+
+class CirculatoryModel(SpatialModel):
+    """A `SpatialModel` whose only form shows whether the actions on rods have a potential.
+
+    The virtual work of the actions is a one-form omega on the configurations. If its exterior derivative d omega
+    vanishes for all motions that the supports allow, the actions have a potential near that state, and the second
+    variation is symmetric. Otherwise -d omega/2 is the skew-symmetric part of the second variation (circulatory forces,
+    Ziegler). The form is h of `_form`, stored as the second variation. h is None, and nothing is compiled, if the
+    actions have a potential in every state, as dead forces have.
+    """
+
+    def _compile(self, spaces):
+        return compile_single(self, self._form(*spaces))
+
+    def _form(self, rotations):
+        """h with d omega(w, psi) = h(w, psi) - h(psi, w): h(w, psi) = D_w omega(psi) + omega(w x psi)/2, because the
+        Lie bracket of two fields of inertial rotations is their cross product. h is assembled, rather than d omega,
+        because its norm gives the rounding error of d omega."""
+        U, U_node, dx = self.state, compat.alias(self.state), measures(self)
+        psi, w = ufl.TestFunction(rotations), ufl.TrialFunction(rotations)
+        test, direction = eq.rotation_tests_of(psi, psi.dx(0)), eq.rotation_tests_of(w, w.dx(0))
+
+        def point_at(place, rest, frame):
+            state = U if place == "line" else U_node
+            return eq.point_of(state, state.dx(0), rest=rest, frame=frame)
+
+        work = partial(action_work, self, dx, point_at=point_at, unknowns=(U, U_node))
+        form = varied_actions(work(test), test, direction)
+        of_bracket = work(VirtualMotion(NONE, ufl.cross(direction.phi, test.phi), NONE, NONE))
+        for factor, part in (
+            *((self.load_factor, part) for part in of_bracket.dead.values()),
+            *((self.permanent_factor, part) for part in of_bracket.permanent.values()),
+            *((live.factor, live.form) for live in of_bracket.live),
+        ):
+            form += 0.5 * factor * part
+        return form or None
+
+    @property
+    def remembers(self):
+        """Whether an action has memory: its work then depends on the path, and it has no potential."""
+        return any(kind.memory for kind in self.signature.terms)
+
+    def take(self, rq, load_factor):
+        """Set the state from (r, q) of all nodes (N, 7), dimensionless, in the scene's order, and a load factor."""
+        self.set_motion(self.unknowns_of(rq), np.zeros((sum(self.signature.counts), len(self.forms.gauss), 3)))
+        self.load_factor.value = load_factor
+        self.actions.refresh()
+
+    def held(self, rq, load_factor):
+        """Gradients of the constraint equations of supports and joints, (equations, tied nodes, 6)."""
+        if not self.ties:
+            return np.zeros((0, 0, 6))
+        return self.ties.on_nodes(self.ties.evaluate(rq[self.tied_slots], load_factor)[1])

@@ -10,8 +10,8 @@ from scipy import sparse
 from cosserat_fenicsx.algebra.packed import Packed
 from cosserat_fenicsx.algebra.pool import PROBLEMS
 from cosserat_fenicsx.errors import NotConverged
-from cosserat_fenicsx.models.circulatory import CirculatoryModel
 from cosserat_fenicsx.models.signature import Signature
+from cosserat_fenicsx.models.spatial import CirculatoryModel
 
 # Relative size below which d omega counts as zero: rounding error over the terms that cancel in it.
 _ROUNDING = 1e-10

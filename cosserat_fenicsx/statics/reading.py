@@ -7,7 +7,7 @@ from mpi4py import MPI
 from cosserat_fenicsx.annotations import File
 from cosserat_fenicsx.models.connections import Connections
 from cosserat_fenicsx.models.rodmesh import Layout
-from cosserat_fenicsx.models.scales import Scales
+from cosserat_fenicsx.models.base import Scales
 from cosserat_fenicsx.ranks import communicator
 from cosserat_fenicsx.results.export import saved
 from cosserat_fenicsx.results.path import Path

@@ -19,7 +19,7 @@ from cosserat_fenicsx.results.compared import NAMES
 from cosserat_fenicsx.statics.path.load_control import StepControl
 from cosserat_fenicsx.errors import NotConverged, SceneError, nearest
 from cosserat_fenicsx.statics.path.follower import CONTROLS
-from cosserat_fenicsx.models.formulations import formulation_of
+from cosserat_fenicsx.models.formulation import formulation_of
 from cosserat_fenicsx.models.rodmesh import Layout
 from cosserat_fenicsx.results.path import Path
 from cosserat_fenicsx.progress import Progress

@@ -4,8 +4,7 @@ import math
 from dataclasses import dataclass
 from typing import ClassVar
 
-from cosserat_fenicsx.actions.added_mass import AddedMass
-from cosserat_fenicsx.actions.linear_drag import LinearDrag
+from cosserat_fenicsx.actions.fluids import AddedMass, LinearDrag
 from cosserat_fenicsx.checks import number, positive, refuse, store, warn
 from cosserat_fenicsx.scene.rod import Rod
 from cosserat_fenicsx.scene.sections import Circle, Tube

@@ -6,7 +6,7 @@ from functools import cached_property
 
 import numpy as np
 
-from cosserat_fenicsx.actions.tube_wall import TubeRing, TubeWall
+from cosserat_fenicsx.actions.walls import TubeRing, TubeWall
 from cosserat_fenicsx.checks import finite_array, number, refuse
 from cosserat_fenicsx.scene.along import AlongPieces
 from cosserat_fenicsx.scene.curves import Line

@@ -17,7 +17,7 @@ from petsc4py import PETSc
 from cosserat_fenicsx import compat
 from cosserat_fenicsx.forms import equilibrium
 from cosserat_fenicsx.forms import spatial as eq
-from cosserat_fenicsx.models.laws import as_matrix, law_of
+from cosserat_fenicsx.models.rod_data import as_matrix, law_of
 from cosserat_fenicsx.models.rodmesh import Layout
 from cosserat_fenicsx.statics import solvers
 from trials import problems

@@ -6,7 +6,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 import cosserat_fenicsx as cf
-from cosserat_fenicsx.models.formulations import formulation_of
+from cosserat_fenicsx.models.formulation import formulation_of
 from cosserat_fenicsx.statics import solvers
 from trials import problems
 from trials.cells import Answer, NotForIt, Stopped, load_factor_in

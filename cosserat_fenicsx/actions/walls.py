@@ -1,15 +1,97 @@
-"""The wall of a curved tube around rods, such as that of a borehole, with friction in a known direction of slip."""
+"""Walls around rods, such as that of a borehole.
 
+`Wall` is straight and has no friction; `TubeWall` and `TubeRing` have friction in a known direction of slip; `HoleWall`
+and `HoleRing`, in motions, set-valued friction.
+"""
+
+from collections import namedtuple
 from dataclasses import dataclass, field
 
 import numpy as np
+import ufl
 
 from cosserat_fenicsx.annotations import Numbers
-from cosserat_fenicsx.checks import number, positive, refuse, store, vector
+from cosserat_fenicsx.checks import direction, number, positive, refuse, store, vector
+from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.forms.contact import wall_work
 from cosserat_fenicsx.scene import action
 from cosserat_fenicsx.scene.action import LineAction, PointAction
 from cosserat_fenicsx.scene.rod import Rod, RodOrName, Station, StationOrName, is_known
+
+# Places along a rod, and share of its length by which it may lie outside the clearance at rest, for rounding.
+_SAMPLES, _OUTSIDE = 257, 1e-9
+# Distances from the axis below this fraction of the clearance are replaced by it: the radial direction is undefined on
+# the axis, and there is no contact there.
+_ON_AXIS = 1e-6
+
+
+@dataclass(frozen=True)
+class Wall(LineAction):
+    """A frictionless cylindrical wall that confines a rod's centreline by a penalty: a force kp max(rho - clearance, 0)
+    per unit of reference length towards the straight axis, rho the distance from it.
+
+    It is integrated with the nodes as quadrature points, which resolves contact pressures best. It is not multiplied by
+    the load factor. The pressure has a kink where contact begins: meshes that `solve` refines have element ends there,
+    for up to a dozen places in all points of a path; more of them take many elements. A softer wall is easier to solve.
+
+    Args:
+        rod: the rod.
+        point: a point of the axis, m, inertial; direction: that of the axis.
+        clearance: radius of the hole minus that of the rod, m.
+        stiffness: kp, N/m^2. The penetration is the force per unit length over kp; rock and steel have 1e9 and more.
+
+    Raises:
+        SceneError: not a rod, no direction, numbers that are not positive, or a rod that lies outside the wall at rest.
+    """
+
+    rod: RodOrName
+    point: Numbers
+    direction: Numbers
+    clearance: float
+    stiffness: float = 1e9
+
+    scaled, at_nodes, presses = False, True, True
+
+    def __post_init__(self):
+        store(
+            self, point=vector(self, "point", self.point, "m"), direction=direction(self, "direction", self.direction)
+        )
+        store(self, clearance=positive(self, "clearance", self.clearance, "m"))
+        store(self, stiffness=positive(self, "stiffness", self.stiffness, "N/m^2"))
+        if is_known(self, "rod", Rod):
+            self._check_inside()
+
+    def _check_inside(self):
+        s = np.linspace(0.0, self.rod.length, _SAMPLES)
+        away = self.rod.curve.position(s) - self.point
+        rho = np.linalg.norm(away - np.outer(away @ self.direction, self.direction), axis=1)
+        worst = int(np.argmax(rho))
+        if rho[worst] > self.clearance + _OUTSIDE * self.rod.length:
+            raise SceneError(
+                f"Wall: rod '{self.rod.name}' lies outside it at rest, at s = {s[worst]:.6g} m by "
+                f"{rho[worst] - self.clearance:.4g} m: expected a point and a direction of the axis, and a clearance, "
+                "such that all of the rod is inside"
+            )
+
+    def data(self, rod, s):
+        """See `Action`."""
+        axis = action.vector(self.point, "m from origin"), action.vector(self.direction, "1")
+        return (*axis, action.scalar(self.clearance, "m"), action.scalar(self.stiffness, "N/m^2"))
+
+    def holds(self, scene):
+        """See `Action`: it confines the rod across the axis."""
+        across = np.linalg.svd(np.array([self.direction]))[2][1:]
+        return [(station, np.r_[row, 0, 0, 0]) for station in (self.rod.start, self.rod.end) for row in across]
+
+    @staticmethod
+    def work(point, test, a, t, clearance, kp):
+        """See `Action`."""
+        d = point.r - a
+        away = d - ufl.dot(d, t) * t
+        rho = ufl.sqrt(ufl.max_value(ufl.dot(away, away), (_ON_AXIS * clearance) ** 2))
+        pressure = kp * ufl.max_value(rho - clearance, 0)
+        return -pressure / rho * ufl.dot(away, test.phi_r)
+
 
 # Half the length over which sizes and coefficients of the tube change at a jump, over its smallest radius; and over the
 # shortest piece, at most.
@@ -276,3 +358,92 @@ def _of_pairs(owner, name, value, expected, checked):
 def value_at(given, x):
     """(n, ..) values of `pieces` at x (n,); at an end that of the piece before it."""
     return np.array([value for _, value in given])[np.searchsorted([end for end, _ in given], x)]
+
+
+#: Of a tube, near points of a rod: measured depth (n,), m; point of the axis (n, 3), m, inertial; unit tangent (n, 3);
+#: clearance (n,), m; radius of the rod's surface where friction acts (n,), m; friction coefficient (n,).
+Around = namedtuple("Around", "md position tangent clearance arm friction")
+
+
+class _InMotion:
+    """What walls of motions share."""
+
+    touches, work, refreshed = True, None, None
+
+    def _check(self, unit):
+        super()._check(unit)
+        expected = "a number of zero or more (s/m)"
+        store(self, damping=number(self, "damping", self.damping, expected, lambda x: 0 <= x < np.inf))
+        store(self, kinetic=number(self, "kinetic", self.kinetic, "a number from 0 to 1", lambda x: 0 <= x <= 1))
+        store(self, speed=positive(self, "speed", self.speed, "m/s"))
+
+    def data(self, rod, s):
+        """See `Action`."""
+        return ()
+
+    def tube_around(self, s, points, md):
+        """See `Action.touches`."""
+        near = self.path.nearest(points, md)
+        return Around(near.md, near.position, near.tangent, *self.sizes(s, near.md))
+
+
+@dataclass(frozen=True)
+class HoleWall(_InMotion, TubeWall):
+    """The wall of a hole around a rod in motion: the normal force of a spring, with damping, and Coulomb friction.
+
+    It acts at the nodes of the mesh, on the share of the rod's length that belongs to a node. The normal force of a
+    node with the penetration p is ``stiffness p (1 + damping p')`` per length, never adhesion (Hunt & Crossley 1975,
+    doi:10.1115/1.3423596). Friction is set-valued: a node sticks as long as a force of at most `friction` times the
+    normal force can keep it so, else it slips and the force opposes the slip. Slip is that of the rod's surface where
+    it touches: along the axis, and round it with the spin of the rod; its force acts there, and so has a moment about
+    the centreline.
+
+    In `simulate` alone; for an equilibrium take a `TubeWall`, which may be that of another scene with the same rods,
+    given as `start`. It is not multiplied by the load factor. Its stored energy is counted as work, with its sign
+    changed, and what friction and damping dissipate as dissipated, in the energy balance of a motion.
+
+    Args:
+        rod: the rod.
+        path: the axis of the hole, a `WellPath`, m, inertial.
+        radius: of the hole, m; or pieces [(md_end, radius)] along the axis.
+        contact_radius: of the rod's surface, m; or pieces [(s_end, radius)] along the rod.
+        stiffness: of the wall, N/m^2: the penetration is the force per length over it.
+        friction: friction coefficient; or pieces [(md_end, coefficient)] along the axis.
+        begins: measured depth near which the rod's start lies, m.
+        damping: s/m, over the speed of penetration.
+        kinetic: friction in fast slip over that at rest; the coefficient is ``friction (kinetic + (1 - kinetic)
+            exp(-v/speed))`` with the speed v of slip in the step before, so that a step has one solution.
+        speed: m/s, see `kinetic`.
+
+    Raises:
+        SceneError: numbers outside their range, or a rod as wide as the hole.
+    """
+
+    slip: Numbers = field(default=(0.0, 0.0), init=False, repr=False, compare=False)
+    has_arm: bool = field(default=True, init=False, repr=False, compare=False)
+    damping: float = 0.0
+    kinetic: float = 1.0
+    speed: float = 0.1
+
+
+@dataclass(frozen=True)
+class HoleRing(_InMotion, TubeRing):
+    """The wall of a hole around one station of a rod in motion, such as a stabiliser; see `HoleWall`.
+
+    Args:
+        station: where.
+        path: the axis of the hole, a `WellPath`.
+        clearance: radius of the hole minus that of the ring, m.
+        contact_radius: radius of the ring, m, the arm of its friction.
+        stiffness: N/m.
+        friction: friction coefficient.
+        begins, damping, kinetic, speed: see `HoleWall`.
+
+    Raises:
+        SceneError: numbers outside their range.
+    """
+
+    slip: Numbers = field(default=(0.0, 0.0), init=False, repr=False, compare=False)
+    damping: float = 0.0
+    kinetic: float = 1.0
+    speed: float = 0.1

@@ -1,0 +1,277 @@
+"""Formulations of eq. (1): how the contact force n is represented, and how |q| = 1 is imposed."""
+
+from collections import namedtuple
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from cosserat_fenicsx import compat
+from cosserat_fenicsx.errors import SceneError, nearest
+from cosserat_fenicsx.forms import equilibrium, spatial
+from cosserat_fenicsx.quaternions import small_rotations
+
+#: The contact force that goes into fields and the second variation, the left side of eq. (1), its tangent, and the next
+#: carried n or None.
+WeakForm = namedtuple("WeakForm", "n internal tangent advance")
+
+
+@dataclass(frozen=True)
+class ContactForce:
+    """A representation of n.
+
+    Attributes:
+        words: the same as text.
+        carried: whether n at the Gauss points is stored separately from the unknowns and updated in every Newton step.
+        unknown: whether n is a field of unknowns.
+        of_motion: whether n is a function of the motion alone.
+        stiff: bound on K in the second variation, in EI/L^2 of the rod (`rod_data.bounded`).
+        rounding: the error of positions over `RodModel.round_off`.
+    """
+
+    words: str
+    carried: bool = False
+    unknown: bool = False
+    of_motion: bool = False
+    stiff: float = np.inf
+    rounding: float = 0.0
+
+    def elements(self, mesh, degree, size):
+        """Finite elements in addition to the nodal one; `size`: components of n."""
+        return [compat.lagrange(mesh, degree - 1, size, discontinuous=True)] if self.unknown else []
+
+    def symbols(self, model, U, phi):
+        """Components of n and of its test function in the unknowns or among the carried Functions, or None."""
+        return None, None
+
+    def put(self, model, n):
+        """Take n at the Gauss points, (elements, points, force_size), the scene's order, along the model's axes."""
+
+    def weak_form(self, n, phi_n, motion, before, section, test, ds, derivative, along_step):
+        """The `WeakForm` of eq. (1).
+
+        Args:
+            n, phi_n: see `symbols`, as vectors of three components.
+            motion, before: the `equilibrium.Motion`, now and before the step.
+            section, test, ds: see forms/equilibrium.py.
+            derivative: that of a form or expression in the direction of the trial function.
+            along_step: that of an expression at `before` along the step.
+        """
+        raise NotImplementedError
+
+
+class _OfMotion(ContactForce):
+    def weak_form(self, n, phi_n, motion, before, section, test, ds, derivative, along_step):
+        """See `ContactForce`."""
+        internal = equilibrium.displacement(motion, section, test, ds)
+        n, _ = equilibrium.contact(motion, section)
+        return WeakForm(n, internal, derivative(internal), None)
+
+
+class _Carried(ContactForce):
+    def symbols(self, model, U, phi):
+        """See `ContactForce`."""
+        (n,) = model.carried
+        return [n[i] for i in range(model.force_size)], None
+
+    def put(self, model, n):
+        """See `ContactForce`."""
+        model.rods.fill(model.carried[0], n)
+
+    def weak_form(self, n, phi_n, motion, before, section, test, ds, derivative, along_step):
+        """See `ContactForce`: the residual uses n by the law; the carried n_k enters only the tangent."""
+        internal = equilibrium.displacement(motion, section, test, ds)
+        tangent = equilibrium.carried_force_tangent(n, motion, section, test, ds, derivative)
+        return WeakForm(n, internal, tangent, equilibrium.carried_force_update(n, before, section, along_step))
+
+
+class _Unknown(ContactForce):
+    def symbols(self, model, U, phi):
+        """See `ContactForce`: the components of n come after those of the nodal unknowns."""
+        places = range(model.components, model.components + model.force_size)
+        return [U[i] for i in places], [phi[i] for i in places]
+
+    def put(self, model, n):
+        """See `ContactForce`: the polynomial through the Gauss points."""
+        p, x, rods = model.signature.degree, model.force_nodes, model.rods
+        dofs = compat.cell_nodes(model.space)[:, model.components * (p + 1) :]
+        for reverse in (False, True):
+            cells = np.flatnonzero(rods.reversed == reverse)
+            along = model.rule.between_gauss(1 - x if reverse else x)
+            values = np.einsum("jg,cgi->cji", along, n[rods.cells[cells]])
+            model.state.x.array[dofs[cells]] = values.reshape(len(cells), model.force_size * p)
+
+    def weak_form(self, n, phi_n, motion, before, section, test, ds, derivative, along_step):
+        """See `ContactForce`."""
+        internal = equilibrium.mixed(n, motion, section, test, phi_n, ds)
+        return WeakForm(n, internal, derivative(internal), None)
+
+
+#: n by the law: on slender rods the rounding error of the residual then affects the solution.
+OF_MOTION = _OfMotion("the contact force is that of the motion", of_motion=True, stiff=1e6, rounding=0.1)
+CARRIED = _Carried("the contact force is carried at the Gauss points", carried=True, stiff=1e6)
+UNKNOWN = _Unknown("a stiffness is infinite or next to it, so the contact force is an unknown", unknown=True, stiff=1e5)
+#: for the determinate models, which have separate forms
+KNOWN = ContactForce("the contact force follows from statics alone")
+
+
+_LAST_ROWS = np.eye(4)[None, :, 1:]
+
+
+class UnitLength:
+    """One equation |q|^2 = 1 per node, in the row of the scalar component of q.
+
+    Attributes:
+        unknowns: number of a node's unknowns after r and q.
+        galerkin: whether virtual rotations are those of changes of q.
+    """
+
+    unknowns, galerkin = 0, False
+
+    def __eq__(self, other):
+        return type(self) is type(other)
+
+    def __hash__(self):
+        return hash(type(self))
+
+    def tests(self, phi, phi_s, q, q_s):
+        """The `VirtualMotion` of the test functions phi at q."""
+        return spatial.tests_of(phi, phi_s)
+
+    def equations(self, state, test, U_node, phi):
+        """Residual terms added to eq. (1), integrated at the nodes; U_node: alias of the unknowns for that rule."""
+        return spatial.unit_quaternion(state, test)
+
+    def rows_of_moments(self, q):
+        """(nodes, components after r, 3): matrices from moments at nodes with q (nodes, 4) to residual rows; only one
+        where all nodes have the same."""
+        return _LAST_ROWS
+
+    def turned_rows(self, q, moments):
+        """(nodes, c, c), c the components after r: derivative by q of the residual rows of moments (nodes, 3), where
+        `galerkin`."""
+        raise NotImplementedError
+
+
+#: Eq. (1) as in the paper: small rotations are test functions.
+AT_NODES = UnitLength()
+
+
+@dataclass(frozen=True)
+class Formulation:
+    """A formulation of eq. (1). Other code uses these attributes, and never tests the name.
+
+    Attributes:
+        name: as `solve` takes it.
+        default_degree: polynomial degree of r and q.
+        force: the representation of the contact force n.
+        rigid_force: the same where a stiffness is infinite, or so large that rounding requires it; None if not
+            supported.
+        unit_length: how |q| = 1 is imposed in the spatial model.
+        models: names of the models that have it.
+        advice: what else to try if it does not converge.
+        says: text for `Path.why` in front of how n is represented.
+    """
+
+    name: str
+    default_degree: int
+    force: ContactForce
+    rigid_force: ContactForce | None = None
+    unit_length: UnitLength = AT_NODES
+    models: tuple = ("spatial",)
+    advice: str = "the formulation 'mixed'"
+    says: str = ""
+
+    def for_stiffness(self, infinite, rounding):
+        """The formulation for a mesh.
+
+        Args:
+            infinite: whether a stiffness is infinite.
+            rounding: rounding error of the tangent's largest entries over the bending stiffness.
+
+        Raises:
+            SceneError: an infinite stiffness where there is no `rigid_force`.
+        """
+        if infinite and self.rigid_force is None:
+            raise SceneError(
+                f"formulation = '{self.name}' cannot take an infinite stiffness: expected 'mixed', "
+                "which carries the contact force as an unknown"
+            )
+        return replace(self, force=self.rigid_force) if self.rigid_force and (infinite or rounding > 1.0) else self
+
+    def with_known_force(self):
+        """The formulation where statics gives n."""
+        return replace(self, force=KNOWN)
+
+    @property
+    def words(self):
+        """How n is represented and |q| = 1 imposed, as text."""
+        return f"{self.says}{self.force.words} (formulation '{self.name}')"
+
+
+MIXED = Formulation(
+    "mixed",
+    default_degree=4,
+    force=CARRIED,
+    rigid_force=UNKNOWN,
+    models=("determinate", "planar", "spatial"),
+    advice="a larger tol",
+)
+
+
+DISPLACEMENT = Formulation("displacement", default_degree=2, force=OF_MOTION)
+
+
+class ByMultiplier(UnitLength):
+    """lambda is the unknown after r and q; virtual rotations are those of changes of q."""
+
+    unknowns, galerkin = 1, True
+
+    def tests(self, phi, phi_s, q, q_s):
+        """See `UnitLength`."""
+        return spatial.variations_of(phi, phi_s, q, q_s)
+
+    def equations(self, state, test, U_node, phi):
+        """See `UnitLength`."""
+        return spatial.multiplier(U_node[7], phi[7], state.q_node, phi)
+
+    def rows_of_moments(self, q):
+        """See `UnitLength`: a moment does work on the small rotation of a change of q."""
+        rows = np.zeros((len(q), 5, 3))
+        rows[:, :4] = small_rotations(q).swapaxes(1, 2)
+        return rows
+
+    def turned_rows(self, q, moments):
+        """See `UnitLength`."""
+        squared = (q * q).sum(axis=1)[:, None, None]
+        by_basis = np.einsum("jai,na->nij", small_rotations(np.eye(4)), moments)
+        along_q = np.einsum("nai,na->ni", small_rotations(q), moments)
+        turned = np.zeros((len(q), 5, 5))
+        turned[:, :4, :4] = (by_basis - 2 * along_q[:, :, None] * q[:, None, :]) / squared
+        return turned
+
+
+MULTIPLIER = Formulation(
+    "multiplier",
+    default_degree=4,
+    force=CARRIED,
+    rigid_force=UNKNOWN,
+    unit_length=ByMultiplier(),
+    says="a multiplier at every node holds |q| = 1; ",
+)
+
+
+FORMULATIONS = {formulation.name: formulation for formulation in (MIXED, DISPLACEMENT, MULTIPLIER)}
+
+
+def formulation_of(name=None):
+    """The `Formulation` of a name, the default for None; one that is given is returned as it is.
+
+    Raises:
+        SceneError: an unknown name.
+    """
+    if isinstance(name, Formulation):
+        return name
+    name = MIXED.name if name is None else name
+    if not isinstance(name, str) or name not in FORMULATIONS:
+        raise SceneError(f"formulation = {name!r}: {nearest(name, FORMULATIONS)}")
+    return FORMULATIONS[name]
