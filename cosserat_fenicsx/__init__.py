@@ -7,7 +7,7 @@ cosserat_fenicsx` and --help stay instant.
 import importlib
 from os import path as _path
 
-from cosserat_fenicsx.aborting import watch as _watch
+from cosserat_fenicsx.ranks import watch as _watch
 
 __version__ = "0.1.0"
 
@@ -35,7 +35,7 @@ def __getattr__(name):
         raise AttributeError(f"module 'cosserat_fenicsx' has no attribute '{name}'")
     if _HOME[name] == __name__:  # a public module
         return importlib.import_module(f"{__name__}.{name}")
-    from cosserat_fenicsx.arguments import in_words
+    from cosserat_fenicsx.checks import in_words
 
     home = importlib.import_module(_HOME[name])
     value = globals()[name] = in_words(getattr(home, name))

@@ -8,13 +8,13 @@ import sys
 def main():
     """Entry point; returns the exit code, see `cli.main`."""
     try:
-        from cosserat_fenicsx import aborting, interrupts
+        from cosserat_fenicsx import interrupts, ranks
 
         interrupts.listen()
         from cosserat_fenicsx.cli.main import main as whole
 
         code = whole()
-        aborting.leave()  # ranks that come here have the same code
+        ranks.leave()  # ranks that come here have the same code
         interrupts.ignore()
     except KeyboardInterrupt:  # while modules are imported
         sys.stderr.write("cosserat: interrupted\n")

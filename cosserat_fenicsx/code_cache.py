@@ -5,10 +5,13 @@ the user, and nobody else may write to them; what does not is not loaded.
 
 A file is made in a folder of its own and moved to its place when it is complete, so a process that is ended meanwhile
 leaves nothing that others would take for compiled code, or would wait for.
+
+Compiled code depends on the processor's `instructions`, flags of the C compiler.
 """
 
 import contextlib
 import fcntl
+import functools
 import hashlib
 import importlib.machinery
 import importlib.util
@@ -18,7 +21,6 @@ import shutil
 import stat
 import tempfile
 import time
-from functools import cache as once
 from pathlib import Path
 
 from cosserat_fenicsx.checks import warn
@@ -58,7 +60,7 @@ def folder():
     return own
 
 
-@once
+@functools.cache
 def _say(words):
     warn(words, CacheWarning)
 
@@ -159,3 +161,20 @@ def load(name):
             spec.loader.exec_module(made)
             return made
     return None
+
+
+# The instructions of the level x86-64-v3 (most processors since 2013), as Linux names them.
+_LEVEL_3 = {"avx", "avx2", "bmi1", "bmi2", "f16c", "fma", "abm", "movbe", "xsave"}
+
+
+@functools.cache
+def instructions():
+    """Flags that let the compiler use the instructions of this processor; none where it is not known.
+
+    They belong to the key of whatever is kept on disk: computers of different age may share a home directory.
+    """
+    with contextlib.suppress(OSError), open("/proc/cpuinfo", encoding="ascii", errors="replace") as lines:
+        for line in lines:
+            if line.startswith("flags"):
+                return ("-march=x86-64-v3",) if _LEVEL_3 <= set(line.split()) else ()
+    return ()

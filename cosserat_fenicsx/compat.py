@@ -14,8 +14,8 @@ import warnings
 import numpy as np
 
 from cosserat_fenicsx import code_cache, interrupts
-from cosserat_fenicsx.errors import InstallationError
-from cosserat_fenicsx.processor import instructions
+from cosserat_fenicsx.code_cache import instructions
+from cosserat_fenicsx.errors import CosseratError, InstallationError
 
 _HOW_TO_INSTALL = (
     "Install it with the system's packages (Debian and Ubuntu: 'apt install python3-dolfinx', then run the "
@@ -78,6 +78,33 @@ def quiet_compiler():
         yield
     finally:
         logging.disable(before)
+
+
+@contextlib.contextmanager
+def compiling():
+    """Context manager in which C is compiled or loaded from the cache of compiled forms.
+
+    Raises:
+        InstallationError: the cache cannot be written or read, or there is no C compiler that works.
+    """
+    try:
+        with quiet_compiler():
+            yield
+    except CosseratError:
+        raise
+    except Exception as problem:
+        said = str(problem).strip().partition("\n")[0] or type(problem).__name__
+        if type(problem).__name__ == "VerificationError" or "VerificationError" in said or "CompileError" in said:
+            raise InstallationError(
+                f"the C compiler has failed ({said}): expected one that works, such as by 'apt "
+                f"install gcc python3-dev', room for its files in {code_cache.folder()}, and no CC set to another"
+            ) from problem
+        if isinstance(problem, OSError | ImportError) or "just-in-time" in said:
+            raise InstallationError(
+                f"the cache of compiled forms in {code_cache.folder()} cannot be used ({said}): make room there, "
+                "remove what is damaged, or set XDG_CACHE_HOME to a folder that can be written to"
+            ) from problem
+        raise
 
 
 if _VERSION < (0, 8):

@@ -1,12 +1,25 @@
-"""Which MPI ranks work together, and work that one of them does for all: files and pictures."""
+"""Which MPI ranks work together, what one of them does for all (files and pictures), and how they end together.
 
+Under mpirun a rank that ends with an exception, also a thread that does, or by `sys.exit` with a failure, ends all
+ranks: the others would wait for it in MPI for ever, since Python's end waits for them in MPI_Finalize. `python -m
+mpi4py` does the same for scripts that are started with it. Nothing happens where all ranks fail: each ends by itself.
+"""
+
+import builtins
 import contextlib
 import os
-import pickle
+import sys
+import time
 
 from cosserat_fenicsx.errors import SceneError
 
+#: Time (s) within which the other ranks get here where all of them fail.
+PATIENCE = 3.0
+#: Numbers of processes, as launchers tell them: Open MPI, Hydra of MPICH and of Intel, MVAPICH, Slurm's srun.
+SIZES = ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "MV2_COMM_WORLD_SIZE", "SLURM_STEP_NUM_TASKS")
+
 _apart = False
+_watched = None  # the process that `watch` was called in
 
 
 class Alone:
@@ -84,8 +97,107 @@ def on_first(comm, action):
 
 
 def _that_can_be_sent(problem):
+    import pickle  # here, since this module is imported with the package
+
     try:
         pickle.loads(pickle.dumps(problem))
         return problem
     except Exception:  # of the user's own
         return RuntimeError(f"{type(problem).__name__}: {problem}")
+
+
+def watch():
+    """Watch how this process ends, if it is one of several."""
+    global _watched
+    if _watched is None and any(os.environ.get(name, "1") != "1" for name in SIZES):
+        import threading  # here, since this module is imported with the package
+
+        _watched = os.getpid()  # not those that it forks
+        sys.excepthook = _after(sys.excepthook)
+        threading.excepthook = _after(threading.excepthook)
+        sys.exit = _exit
+        if hasattr(builtins, "exit"):  # of the module site
+            builtins.exit = builtins.quit = _exit
+
+
+def leave():
+    """Watch no longer: the program itself sees to it that ranks end together."""
+    global _watched
+    _watched = 0
+
+
+def end_all(code=1):
+    """End all ranks at once."""
+    from mpi4py import MPI
+
+    for stream in (sys.stdout, sys.stderr):
+        try:
+            stream.flush()
+        except (OSError, ValueError, AttributeError):  # it is closed
+            continue
+    MPI.COMM_WORLD.Abort(code)
+
+
+def all_are_here(comm, patience=None):
+    """Whether all ranks call this within `patience` (s; None for `PATIENCE`)."""
+    met, until = comm.Ibarrier(), time.monotonic() + (PATIENCE if patience is None else patience)
+    while not met.Test():
+        if time.monotonic() > until:
+            return False
+        time.sleep(0.01)
+    return True
+
+
+def _after(hook):
+    """A hook for exceptions that nothing catches, which ends all ranks after what another one does."""
+
+    def hooked(*given):
+        hook(*given)
+        _end_unless_all_end("an exception")
+
+    return hooked
+
+
+def _end_unless_all_end(what, code=1):
+    """End all ranks, unless each of them fails now. Without MPI at work this process just ends, which launchers see."""
+    interactive = hasattr(sys, "ps1") or sys.flags.interactive
+    if _watched != os.getpid() or interactive or "mpi4py.MPI" not in sys.modules:
+        return
+    from mpi4py import MPI
+
+    world = MPI.COMM_WORLD if MPI.Is_initialized() and not MPI.Is_finalized() else None
+    if world is None or world.size == 1 or all_are_here(world):
+        return
+    print(f"cosserat_fenicsx: rank {world.rank} of {world.size} alone ended with {what}: all ranks are ended, which "
+          "would wait for it", file=sys.stderr, flush=True)  # fmt: skip
+    end_all(code)
+
+
+class _Exit(SystemExit):
+    """What `sys.exit` raises: Python asks it for its `code`, from no function, where nothing has caught it."""
+
+    @property
+    def code(self):
+        code = SystemExit.code.__get__(self)
+        if code not in (None, 0) and _is_asked_by_python():
+            if not isinstance(code, int):
+                print(code, file=sys.stderr)
+            _end_unless_all_end("a failure", code if isinstance(code, int) and 0 < code < 256 else 1)
+            return code if isinstance(code, int) else 1
+        return code
+
+    def __reduce__(self):
+        return SystemExit, self.args
+
+
+def _exit(status=None, /):
+    """Exit the interpreter by raising SystemExit(status), as `sys.exit` of Python does."""
+    raise _Exit(*(() if status is None else status if isinstance(status, tuple) else (status,)))
+
+
+def _is_asked_by_python():
+    try:
+        sys._getframe(2)  # that of the caller of `code`
+    except ValueError:
+        return True
+    return False

@@ -13,7 +13,7 @@ import pytest
 from mpi4py import MPI
 
 import cosserat_fenicsx as cf
-from cosserat_fenicsx.aborting import end_all
+from cosserat_fenicsx.ranks import end_all
 
 COMM = MPI.COMM_WORLD
 

@@ -7,7 +7,7 @@ import pytest
 from conftest import column
 
 import cosserat_fenicsx as cf
-from cosserat_fenicsx.compiling import compiling
+from cosserat_fenicsx.compat import compiling
 
 pytestmark = pytest.mark.serial
 

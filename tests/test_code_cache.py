@@ -14,7 +14,7 @@ import ufl
 
 import cosserat_fenicsx as cf
 from cosserat_fenicsx import code_cache, compat
-from cosserat_fenicsx.compiling import compiling
+from cosserat_fenicsx.compat import compiling
 
 pytestmark = pytest.mark.serial
 ROOT = Path(__file__).parent.parent

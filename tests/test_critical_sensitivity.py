@@ -5,7 +5,7 @@ import pytest
 from path_scenes import shallow_arch
 
 import cosserat_fenicsx as cf
-from cosserat_fenicsx.differences import PLACES, derivative
+from cosserat_fenicsx.numerics import PLACES, derivative
 
 pytestmark = pytest.mark.serial
 E, DIAMETER, LOAD = "rods.column.material.E", "rods.column.section.diameter", "loads[0].force[2]"

@@ -5,7 +5,7 @@ import pytest
 from moving_scenes import drift
 
 import cosserat_fenicsx as cf
-from cosserat_fenicsx.quaternions import directors
+from cosserat_fenicsx.numerics import directors
 from cosserat_fenicsx.scene.as_data import from_data, to_data
 
 pytestmark = pytest.mark.serial

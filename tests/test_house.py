@@ -43,22 +43,14 @@ def test_forms_know_ufl_alone():
 
 #: Modules that all subpackages may import; and the other subpackages that each subpackage may import.
 SHARED = {
-    "aborting",
     "analytic",
-    "annotations",
-    "arguments",
     "checks",
     "code_cache",
     "compat",
-    "compiling",
-    "differences",
-    "element",
     "errors",
     "interrupts",
-    "processor",
+    "numerics",
     "progress",
-    "quadrature",
-    "quaternions",
     "ranks",
     "remember",
     "units",
@@ -166,7 +158,7 @@ def test_only_compat_asks_for_a_version():
 def test_one_place_says_which_ranks_work_together():
     """Within a study a rank is alone: what takes all ranks by itself would wait for the others for ever."""
     for file in PACKAGE.rglob("*.py"):
-        if file.parent.name != "cli" and file.name not in ("aborting.py", "ranks.py", "pool.py"):
+        if file.parent.name != "cli" and file.name not in ("ranks.py", "pool.py"):
             assert "MPI.COMM_WORLD" not in file.read_text(encoding="utf-8"), f"{file}: use ranks.communicator(comm)"
 
 

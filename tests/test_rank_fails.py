@@ -10,17 +10,17 @@ from pathlib import Path
 
 import pytest
 
-from cosserat_fenicsx import aborting
+from cosserat_fenicsx import ranks
 
 pytestmark = [pytest.mark.serial, pytest.mark.skipif(shutil.which("mpirun") is None, reason="needs mpirun")]
 ROOT = Path(__file__).parent.parent
 BEGIN = """
 import sys, threading, time
 import cosserat_fenicsx as cf
-from cosserat_fenicsx import aborting
+from cosserat_fenicsx import ranks
 assert "mpi4py" not in sys.modules
 from mpi4py import MPI
-aborting.PATIENCE = 0.5
+ranks.PATIENCE = 0.5
 rank, wait = MPI.COMM_WORLD.rank, MPI.COMM_WORLD.barrier
 """
 SWEEP = """
@@ -88,8 +88,8 @@ def test_ranks_that_end_together_or_well_are_left_alone(program, code, said, tmp
 def test_one_process_is_not_watched():
     """Nor is MPI loaded by an import; each launcher is known by its variables."""
     code = "import sys, cosserat_fenicsx; print(sys.excepthook is sys.__excepthook__, 'mpi4py' in sys.modules)"
-    clean = {name: value for name, value in os.environ.items() if name not in aborting.SIZES}
-    for more, said in [({}, "True False"), *(({name: "2"}, "False False") for name in aborting.SIZES)]:
+    clean = {name: value for name, value in os.environ.items() if name not in ranks.SIZES}
+    for more, said in [({}, "True False"), *(({name: "2"}, "False False") for name in ranks.SIZES)]:
         done = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, encoding="utf-8", cwd=ROOT,
                               env={**clean, **more})  # fmt: skip
         assert done.stdout.strip() == said, more
@@ -103,7 +103,7 @@ def test_what_exit_raises_is_what_python_raises():
         ((1, 2), (1, 2), (1, 2)),
     ):
         with pytest.raises(SystemExit) as stop:
-            aborting._exit(status)
+            ranks._exit(status)
         try:
             sys.__dict__["exit"](status)
         except SystemExit as usual:

@@ -13,7 +13,7 @@ import pytest
 from reference_wells import in_build_section
 
 import cosserat_fenicsx as cf
-from cosserat_fenicsx.element import lobatto_weights
+from cosserat_fenicsx.numerics import lobatto_weights
 from cosserat_fenicsx.well.rod.resultants import contacts_along
 from cosserat_fenicsx.well.rod.rod_in_hole import solve_in_hole
 

@@ -7,7 +7,7 @@ import pytest
 from reference_wells import well
 
 import cosserat_fenicsx as cf
-from cosserat_fenicsx.differences import PLACES, derivative
+from cosserat_fenicsx.numerics import PLACES, derivative
 
 pytestmark = [pytest.mark.serial, pytest.mark.once]
 PATH = well("P")

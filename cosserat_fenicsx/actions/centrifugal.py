@@ -5,8 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 import ufl
 
-from cosserat_fenicsx.annotations import Numbers
-from cosserat_fenicsx.checks import refuse, store, vector
+from cosserat_fenicsx.checks import Numbers, refuse, store, vector
 from cosserat_fenicsx.scene import action
 from cosserat_fenicsx.scene.action import LineAction, PointAction
 from cosserat_fenicsx.scene.initial import InitialVelocity

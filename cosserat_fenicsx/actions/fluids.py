@@ -7,8 +7,7 @@ import numpy as np
 import ufl
 
 from cosserat_fenicsx.actions.springs import store_coefficients
-from cosserat_fenicsx.annotations import Numbers
-from cosserat_fenicsx.checks import instance, number, positive, refuse, store, vector
+from cosserat_fenicsx.checks import Numbers, instance, number, positive, refuse, store, vector
 from cosserat_fenicsx.scene import action
 from cosserat_fenicsx.scene.action import LineAction, scalar
 from cosserat_fenicsx.scene.along import FunctionAlong, along_or_vector, breaks_of, kinks_of, values_of

@@ -5,8 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 import ufl
 
-from cosserat_fenicsx.annotations import Numbers
-from cosserat_fenicsx.checks import direction, number, positive, refuse, store
+from cosserat_fenicsx.checks import Numbers, direction, number, positive, refuse, store
 from cosserat_fenicsx.scene.action import LineAction, PointAction, scalar, vector
 from cosserat_fenicsx.scene.rod import Rod, RodOrName, Station, StationOrName, is_known
 

@@ -10,8 +10,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import ufl
 
-from cosserat_fenicsx.annotations import Numbers
-from cosserat_fenicsx.checks import direction, number, positive, refuse, store, vector
+from cosserat_fenicsx.checks import Numbers, direction, number, positive, refuse, store, vector
 from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.forms.contact import wall_work
 from cosserat_fenicsx.scene import action

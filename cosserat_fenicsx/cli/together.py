@@ -2,8 +2,7 @@
 
 import sys
 
-from cosserat_fenicsx.aborting import all_are_here, end_all
-from cosserat_fenicsx.ranks import launched
+from cosserat_fenicsx.ranks import all_are_here, end_all, launched
 
 # Time (s) within which ranks that fail together get here.
 _PATIENCE = 10.0

@@ -5,8 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from cosserat_fenicsx.annotations import File
-from cosserat_fenicsx.checks import number
+from cosserat_fenicsx.checks import File, number
 from cosserat_fenicsx.drilling.discs import Discs
 from cosserat_fenicsx.drilling.protocol import LEDGER, PROFILE, SERIES
 from cosserat_fenicsx.drilling.quantities import QUANTITIES, heading

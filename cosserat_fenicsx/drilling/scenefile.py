@@ -34,8 +34,7 @@ from typing import Any
 import numpy as np
 
 from cosserat_fenicsx import units
-from cosserat_fenicsx.annotations import File
-from cosserat_fenicsx.checks import positive, refuse
+from cosserat_fenicsx.checks import File, positive, refuse
 from cosserat_fenicsx.drilling.bit_laws import LAWS, BitOnRock, Stribeck, Wear
 from cosserat_fenicsx.drilling.choose import chosen
 from cosserat_fenicsx.drilling.discs import Discs

@@ -5,8 +5,7 @@ import numbers
 
 import numpy as np
 
-from cosserat_fenicsx.annotations import File
-from cosserat_fenicsx.checks import instance, number, refuse
+from cosserat_fenicsx.checks import File, instance, number, refuse
 from cosserat_fenicsx.drilling.bit_laws import Cutting, Lobes
 from cosserat_fenicsx.drilling.choose import chosen, fastest
 from cosserat_fenicsx.drilling.folder import DrillingFolder

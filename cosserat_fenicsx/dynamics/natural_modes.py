@@ -11,12 +11,11 @@ from scipy import sparse
 from cosserat_fenicsx.algebra.packed import Packed
 from cosserat_fenicsx.algebra.pencil import Pencil
 from cosserat_fenicsx.checks import instance, number, refuse
-from cosserat_fenicsx.element import lobatto_weights
 from cosserat_fenicsx.errors import NotConverged, SceneError
 from cosserat_fenicsx.models.rod_data import check_inertia, nodal_inertia, nodal_lateral, nodal_offsets
 from cosserat_fenicsx.models.traits import traits_of
+from cosserat_fenicsx.numerics import directors, lobatto_weights
 from cosserat_fenicsx.progress import MeshProgress
-from cosserat_fenicsx.quaternions import directors
 from cosserat_fenicsx.ranks import communicator
 from cosserat_fenicsx.results.modes import Modes
 from cosserat_fenicsx.results.shapes import Equilibrium

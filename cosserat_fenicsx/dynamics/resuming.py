@@ -8,7 +8,7 @@ from pathlib import Path as FilePath
 import numpy as np
 from mpi4py import MPI
 
-from cosserat_fenicsx.annotations import File
+from cosserat_fenicsx.checks import File
 from cosserat_fenicsx.checks import instance, refuse, warn
 from cosserat_fenicsx.dynamics.simulate import check_counts, pace_of, positive_time
 from cosserat_fenicsx.dynamics.solvers import solvers_of

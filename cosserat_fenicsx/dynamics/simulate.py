@@ -9,7 +9,7 @@ from mpi4py import MPI
 
 from cosserat_fenicsx.checks import instance, number, refuse
 from cosserat_fenicsx.errors import SceneError, nearest
-from cosserat_fenicsx.annotations import File
+from cosserat_fenicsx.checks import File
 from cosserat_fenicsx.ranks import communicator
 from cosserat_fenicsx.results.history import History
 from cosserat_fenicsx.results.path import Path

@@ -9,7 +9,7 @@ from dolfinx import fem
 from cosserat_fenicsx import compat
 from cosserat_fenicsx.models.rod_data import gauss_function
 from cosserat_fenicsx.models.signature import place_actions
-from cosserat_fenicsx.quaternions import directors
+from cosserat_fenicsx.numerics import directors
 from cosserat_fenicsx.scene.signals import at, signals_of, values_at, with_values
 
 # Quadrature on an interval between kinks: exact for data that are linear there, up to p = 4.

@@ -9,8 +9,7 @@ from dolfinx import fem
 from mpi4py import MPI
 
 from cosserat_fenicsx import compat
-from cosserat_fenicsx.compiling import compiling
-from cosserat_fenicsx.element import ElementRule
+from cosserat_fenicsx.compat import compiling
 from cosserat_fenicsx.forms.law import stiffness_for
 from cosserat_fenicsx.models.action_terms import ActionTerms, Densities
 from cosserat_fenicsx.models.connections import Clamps, Ties, ties_of
@@ -24,6 +23,7 @@ from cosserat_fenicsx.models.rod_data import (
     stretch_values,
 )
 from cosserat_fenicsx.models.rodmesh import Gather, Numbering, RodMesh
+from cosserat_fenicsx.numerics import ElementRule
 from cosserat_fenicsx.scene.action import powers
 
 

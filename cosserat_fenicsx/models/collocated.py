@@ -11,7 +11,7 @@ from cosserat_fenicsx.models.directors import EccentricMomenta
 from cosserat_fenicsx.models.moving import MovingSpatial, SpatialStep, along, parts_of, virtual_work_of_step
 from cosserat_fenicsx.models.moving_planar import MovingPlanar, PlanarStep
 from cosserat_fenicsx.models.rod_data import gauss_function
-from cosserat_fenicsx.quaternions import conjugate_product
+from cosserat_fenicsx.numerics import conjugate_product
 
 
 class SpatialCollocation(SpatialStep):

@@ -13,8 +13,8 @@ import numpy as np
 import ufl
 
 from cosserat_fenicsx import compat
-from cosserat_fenicsx.element import lobatto_weights
 from cosserat_fenicsx.forms.point import resultants, variation
+from cosserat_fenicsx.numerics import lobatto_weights
 
 #: Integrals over the rods with Gauss points, with the nodes of P_p, and with the two ends of every element as points.
 Measures = namedtuple("Measures", "gauss nodes ends")

@@ -13,7 +13,7 @@ import ufl
 from mpi4py import MPI
 
 from cosserat_fenicsx import compat
-from cosserat_fenicsx.compiling import compiling
+from cosserat_fenicsx.compat import compiling
 from cosserat_fenicsx.forms import ties as eq
 from cosserat_fenicsx.models.traits import resultant_at_rest
 from cosserat_fenicsx.scene.planes import independent_in

@@ -6,7 +6,7 @@ import ufl
 from dolfinx import fem
 
 from cosserat_fenicsx import compat
-from cosserat_fenicsx.compiling import compiling
+from cosserat_fenicsx.compat import compiling
 
 
 class DataDerivative:

@@ -14,7 +14,7 @@ from cosserat_fenicsx.models.base import RodModel
 from cosserat_fenicsx.models.compiled import action_densities, action_work, compile_all, derivative_in, measures
 from cosserat_fenicsx.models.planar import PlaneModel, in_space
 from cosserat_fenicsx.models.rod_data import as_matrix, gauss_function, law_of, moment, strain
-from cosserat_fenicsx.quaternions import conjugate_product, directors
+from cosserat_fenicsx.numerics import conjugate_product, directors
 
 
 def compile_in_plane(model, displacements, rotations, N, N_permanent):

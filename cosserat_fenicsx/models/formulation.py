@@ -8,7 +8,7 @@ import numpy as np
 from cosserat_fenicsx import compat
 from cosserat_fenicsx.errors import SceneError, nearest
 from cosserat_fenicsx.forms import equilibrium, spatial
-from cosserat_fenicsx.quaternions import small_rotations
+from cosserat_fenicsx.numerics import small_rotations
 
 #: The contact force that goes into fields and the second variation, the left side of eq. (1), its tangent, and the next
 #: carried n or None.

@@ -14,9 +14,9 @@ from dolfinx import fem
 
 from cosserat_fenicsx import compat
 from cosserat_fenicsx.checks import refuse
-from cosserat_fenicsx.element import lobatto_weights
 from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.forms.law import CoupledLaw, DiagonalLaw
+from cosserat_fenicsx.numerics import lobatto_weights
 
 #: Arrays (.., 3) K and J, which may be infinite in K; and (.., 3, 3), or None where all sections are diagonal: the
 #: principal axes of A and of S as columns, and G. Dimensionless.

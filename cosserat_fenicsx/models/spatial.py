@@ -23,7 +23,7 @@ from cosserat_fenicsx.models.compiled import (
     varied_actions,
 )
 from cosserat_fenicsx.models.rod_data import as_matrix, law_of, stiff_enough
-from cosserat_fenicsx.quaternions import small_rotations
+from cosserat_fenicsx.numerics import small_rotations
 
 
 def compile_spatial(model, rotations):

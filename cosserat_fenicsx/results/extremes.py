@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cosserat_fenicsx.quaternions import directors
+from cosserat_fenicsx.numerics import directors
 from cosserat_fenicsx.results.on_nodes import OnNodes
 from cosserat_fenicsx.scene.rod import Station
 

@@ -7,8 +7,8 @@ from functools import cached_property
 
 import numpy as np
 
-from cosserat_fenicsx.annotations import File
-from cosserat_fenicsx.quaternions import directors
+from cosserat_fenicsx.checks import File
+from cosserat_fenicsx.numerics import directors
 from cosserat_fenicsx.results.at_walls import WallForces, wall_forces
 from cosserat_fenicsx.results.orbits import Orbit, orbit_of
 from cosserat_fenicsx.results.records import Record

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from cosserat_fenicsx.quaternions import conjugate_product, directors
+from cosserat_fenicsx.numerics import conjugate_product, directors
 from cosserat_fenicsx.results.compared import POSITION
 from cosserat_fenicsx.results.places import halfway
 

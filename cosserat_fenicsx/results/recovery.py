@@ -4,7 +4,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from cosserat_fenicsx.quaternions import product_conjugate
+from cosserat_fenicsx.numerics import product_conjugate
 from cosserat_fenicsx.results.places import all_cell_nodes
 
 

@@ -5,9 +5,8 @@ from functools import cached_property
 
 import numpy as np
 
-from cosserat_fenicsx.annotations import File
-from cosserat_fenicsx.checks import instance
-from cosserat_fenicsx.quaternions import directors
+from cosserat_fenicsx.checks import File, instance
+from cosserat_fenicsx.numerics import directors
 from cosserat_fenicsx.remember import per_scene
 from cosserat_fenicsx.results.export.exports import Exports
 from cosserat_fenicsx.results.extremes import Extremes

@@ -8,9 +8,8 @@ import numpy as np
 from mpi4py import MPI
 
 from cosserat_fenicsx.checks import refuse
-from cosserat_fenicsx.element import ElementRule
 from cosserat_fenicsx.errors import SceneError
-from cosserat_fenicsx.quaternions import directors
+from cosserat_fenicsx.numerics import ElementRule, directors
 from cosserat_fenicsx.results.on_nodes import OnNodes
 
 # Largest displacement of a mode of pure twist, m (the largest displacement or rotation of a mode is 1).

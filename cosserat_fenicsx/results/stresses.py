@@ -4,7 +4,7 @@ import numpy as np
 
 from cosserat_fenicsx.checks import refuse
 from cosserat_fenicsx.errors import SceneError
-from cosserat_fenicsx.quaternions import directors
+from cosserat_fenicsx.numerics import directors
 from cosserat_fenicsx.results.on_nodes import OnNodes
 from cosserat_fenicsx.scene.rod import StationOrName
 from cosserat_fenicsx.scene.stresses import Stress

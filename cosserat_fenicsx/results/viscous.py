@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from cosserat_fenicsx.quaternions import directors, product_conjugate
+from cosserat_fenicsx.numerics import directors, product_conjugate
 from cosserat_fenicsx.results.recovery import at_nodes
 
 

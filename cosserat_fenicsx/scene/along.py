@@ -10,8 +10,7 @@ from pathlib import PurePath
 
 import numpy as np
 
-from cosserat_fenicsx.annotations import File, Numbers, Rows
-from cosserat_fenicsx.checks import call, number, refuse, text_of, vector
+from cosserat_fenicsx.checks import File, Numbers, Rows, call, number, refuse, text_of, vector
 from cosserat_fenicsx.errors import SceneError
 
 # Elements end at the rows of tables of up to this length. Longer ones have kinks inside elements.

@@ -10,8 +10,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from cosserat_fenicsx.annotations import Numbers
-from cosserat_fenicsx.checks import number, positive, refuse, store, vector
+from cosserat_fenicsx.checks import Numbers, number, positive, refuse, store, vector
 from cosserat_fenicsx.scene.frames import carried, exponential, level_axis, rotation, start_frame
 from cosserat_fenicsx.scene.splines import Spline
 

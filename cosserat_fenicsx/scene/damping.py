@@ -5,8 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cosserat_fenicsx.annotations import Numbers
-from cosserat_fenicsx.checks import number, refuse, store
+from cosserat_fenicsx.checks import Numbers, number, refuse, store
 
 
 @dataclass(frozen=True)

@@ -4,8 +4,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from cosserat_fenicsx.annotations import Numbers
-from cosserat_fenicsx.checks import call, refuse, vector
+from cosserat_fenicsx.checks import Numbers, call, refuse, vector
 from cosserat_fenicsx.scene.pieces import checked_pieces
 
 #: What `Rod.eccentricity` may be.

@@ -5,8 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cosserat_fenicsx.annotations import Numbers
-from cosserat_fenicsx.checks import refuse, store, vector
+from cosserat_fenicsx.checks import Numbers, refuse, store, vector
 from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.scene.rod import Rod, RodOrName, is_known
 

@@ -4,8 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cosserat_fenicsx.annotations import Numbers
-from cosserat_fenicsx.checks import direction, refuse, store
+from cosserat_fenicsx.checks import Numbers, direction, refuse, store
 from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.scene import ties
 from cosserat_fenicsx.scene.rod import Station, StationOrName, is_known

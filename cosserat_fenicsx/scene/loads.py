@@ -8,8 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cosserat_fenicsx.annotations import Numbers, NumbersInTime
-from cosserat_fenicsx.checks import instance, refuse, store, vector
+from cosserat_fenicsx.checks import Numbers, NumbersInTime, instance, refuse, store, vector
 from cosserat_fenicsx.scene import action
 from cosserat_fenicsx.scene.action import LineAction, PointAction
 from cosserat_fenicsx.scene.along import FunctionAlong, along_or_vector, breaks_of, kinks_of, values_of

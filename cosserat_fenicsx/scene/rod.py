@@ -7,10 +7,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from cosserat_fenicsx.annotations import Numbers
-from cosserat_fenicsx.checks import instance, number, refuse, store
+from cosserat_fenicsx.checks import Numbers, instance, number, refuse, store
 from cosserat_fenicsx.errors import SceneError, nearest
-from cosserat_fenicsx.quadrature import gauss
+from cosserat_fenicsx.numerics import gauss
 from cosserat_fenicsx.scene.curves import CURVES, Curve
 from cosserat_fenicsx.scene.damping import Damping
 from cosserat_fenicsx.scene.eccentricity import MassCentre, Offset, mass_centre_of

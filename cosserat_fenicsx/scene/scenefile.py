@@ -43,8 +43,7 @@ import inspect
 from pathlib import Path
 from typing import Any
 
-from cosserat_fenicsx.annotations import File
-from cosserat_fenicsx.checks import store
+from cosserat_fenicsx.checks import File, store
 from cosserat_fenicsx.errors import SceneError, nearest
 from cosserat_fenicsx.scene.along import ALONG
 from cosserat_fenicsx.scene.curves import CURVES

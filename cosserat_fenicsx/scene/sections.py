@@ -12,8 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from cosserat_fenicsx.annotations import Numbers, Rows
-from cosserat_fenicsx.checks import finite_array, number, positive, refuse, stiffness, store, vector
+from cosserat_fenicsx.checks import Numbers, Rows, finite_array, number, positive, refuse, stiffness, store, vector
 from cosserat_fenicsx.scene.computed_sections import arguments_of
 from cosserat_fenicsx.scene.materials import Material
 from cosserat_fenicsx.scene.stresses import rectangle_fibres, round_stress

@@ -12,8 +12,7 @@ from functools import cached_property
 
 import numpy as np
 
-from cosserat_fenicsx.annotations import Numbers, Rows
-from cosserat_fenicsx.checks import LARGEST, call, number, refuse, vector
+from cosserat_fenicsx.checks import LARGEST, Numbers, Rows, call, number, refuse, vector
 from cosserat_fenicsx.errors import SceneError
 
 

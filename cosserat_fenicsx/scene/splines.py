@@ -9,9 +9,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.polynomial import legendre
 
-from cosserat_fenicsx.annotations import File, Numbers, Rows
-from cosserat_fenicsx.checks import instance, refuse, store, vector
-from cosserat_fenicsx.quadrature import gauss
+from cosserat_fenicsx.checks import File, Numbers, Rows, instance, refuse, store, vector
+from cosserat_fenicsx.numerics import gauss
 from cosserat_fenicsx.scene.frames import level_axis, start_frame
 from cosserat_fenicsx.scene.polylines import polyline
 

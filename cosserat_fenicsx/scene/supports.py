@@ -6,8 +6,7 @@ or solver refers to a support by name.
 
 from dataclasses import dataclass
 
-from cosserat_fenicsx.annotations import Numbers, NumbersInTime
-from cosserat_fenicsx.checks import direction, refuse, store
+from cosserat_fenicsx.checks import Numbers, NumbersInTime, direction, refuse, store
 from cosserat_fenicsx.scene import ties
 from cosserat_fenicsx.scene.rod import Station, StationOrName, is_known
 from cosserat_fenicsx.scene.signals import at, vector_or_signal

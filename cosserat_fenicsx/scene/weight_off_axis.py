@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cosserat_fenicsx.annotations import Numbers
+from cosserat_fenicsx.checks import Numbers
 from cosserat_fenicsx.scene.action import LineAction, vector
 from cosserat_fenicsx.scene.rod import Rod
 

@@ -10,8 +10,8 @@ import itertools
 
 import numpy as np
 
-from cosserat_fenicsx.differences import PLACES, derivative
 from cosserat_fenicsx.errors import NotConverged, SceneError
+from cosserat_fenicsx.numerics import PLACES, derivative
 from cosserat_fenicsx.results.sensitivity import Sensitivity
 from cosserat_fenicsx.scene.parameters import parameter_of
 from cosserat_fenicsx.statics.energies import Energies

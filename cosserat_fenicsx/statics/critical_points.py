@@ -17,8 +17,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from cosserat_fenicsx.differences import PLACES, derivative
 from cosserat_fenicsx.errors import NotConverged, SceneError
+from cosserat_fenicsx.numerics import PLACES, derivative
 from cosserat_fenicsx.results.records import Event
 from cosserat_fenicsx.results.sensitivity import Sensitivity, called
 from cosserat_fenicsx.scene.parameters import parameter_of

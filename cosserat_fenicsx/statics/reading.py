@@ -4,7 +4,7 @@ import cosserat_fenicsx.compat  # noqa: F401, I001  first: its message says what
 
 from mpi4py import MPI
 
-from cosserat_fenicsx.annotations import File
+from cosserat_fenicsx.checks import File
 from cosserat_fenicsx.models.connections import Connections
 from cosserat_fenicsx.models.rodmesh import Layout
 from cosserat_fenicsx.models.base import Scales

@@ -12,7 +12,7 @@ import types
 
 import numpy as np
 
-from cosserat_fenicsx.arguments import NAMED
+from cosserat_fenicsx.checks import NAMED
 from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.scene.along import FUNCTIONS_ALONG
 from cosserat_fenicsx.scene.rod import Rod, Station

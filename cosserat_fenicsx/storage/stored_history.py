@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
-from cosserat_fenicsx.element import ElementRule
 from cosserat_fenicsx.errors import NotStored, SceneError
+from cosserat_fenicsx.numerics import ElementRule
 from cosserat_fenicsx.ranks import on_first
 from cosserat_fenicsx.results.history import History, Instant, Ledger
 

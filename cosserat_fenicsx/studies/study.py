@@ -14,8 +14,7 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
-from cosserat_fenicsx.annotations import File
-from cosserat_fenicsx.checks import instance, refuse
+from cosserat_fenicsx.checks import File, instance, refuse
 from cosserat_fenicsx.errors import CosseratError, InstallationError, Interrupted, NotStored, SceneError
 from cosserat_fenicsx.interrupts import obey
 from cosserat_fenicsx.progress import CaseProgress

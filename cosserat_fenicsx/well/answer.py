@@ -6,7 +6,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from cosserat_fenicsx.annotations import File
+from cosserat_fenicsx.checks import File
 from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.well import criteria, loaded
 from cosserat_fenicsx.well.contacts import WallContact, contacts_of, high_side, side_force_up_to, sides_of

@@ -9,8 +9,7 @@ import numpy as np
 from scipy.optimize import least_squares
 from scipy.stats import t as student
 
-from cosserat_fenicsx.annotations import File
-from cosserat_fenicsx.checks import instance, number, positive, refuse, store, warn
+from cosserat_fenicsx.checks import File, instance, number, positive, refuse, store, warn
 from cosserat_fenicsx.errors import SceneError, SceneWarning
 from cosserat_fenicsx.well.hole import Borehole
 from cosserat_fenicsx.well.mud import Mud

@@ -12,8 +12,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from cosserat_fenicsx.annotations import File, Numbers
-from cosserat_fenicsx.checks import finite_array, refuse
+from cosserat_fenicsx.checks import File, Numbers, finite_array, refuse
 from cosserat_fenicsx.errors import Interrupted, NotConverged
 from cosserat_fenicsx.progress import Progress
 from cosserat_fenicsx.ranks import world

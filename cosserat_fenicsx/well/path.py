@@ -13,8 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cosserat_fenicsx.annotations import File, Numbers
-from cosserat_fenicsx.checks import finite_array, refuse
+from cosserat_fenicsx.checks import File, Numbers, finite_array, refuse
 from cosserat_fenicsx.well.survey import checked_survey, read_columns
 
 #: The arcs between stations, arrays over these: md of the start (m), there position (m, 3), tangent (3) and curvature

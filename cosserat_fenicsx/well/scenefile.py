@@ -48,8 +48,7 @@ from typing import Any
 
 import numpy as np
 
-from cosserat_fenicsx.annotations import File
-from cosserat_fenicsx.checks import number, refuse
+from cosserat_fenicsx.checks import File, number, refuse
 from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.scene.materials import Material
 from cosserat_fenicsx.scene.sections import Stiffness

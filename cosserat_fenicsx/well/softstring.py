@@ -23,7 +23,7 @@ from numpy.polynomial.legendre import legval, legvander
 from scipy.optimize import brentq
 
 from cosserat_fenicsx.errors import NotConverged
-from cosserat_fenicsx.quadrature import gauss
+from cosserat_fenicsx.numerics import gauss
 
 _POINTS = 8  # Gauss points a piece
 _ITERATIONS, _ROUNDS = 60, 60

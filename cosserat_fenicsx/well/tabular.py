@@ -5,7 +5,7 @@ import math
 from pathlib import Path
 from typing import Any
 
-from cosserat_fenicsx.annotations import File
+from cosserat_fenicsx.checks import File
 from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.ranks import on_first, world
 from cosserat_fenicsx.results.export.beside import replaced

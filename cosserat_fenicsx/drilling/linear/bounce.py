@@ -6,8 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import brentq
 
-from cosserat_fenicsx.annotations import File, Numbers
-from cosserat_fenicsx.checks import refuse
+from cosserat_fenicsx.checks import File, Numbers, refuse
 from cosserat_fenicsx.drilling.bit_laws import Lobes
 from cosserat_fenicsx.drilling.linear.impedances import axial
 from cosserat_fenicsx.drilling.linear.steady import speeds_and_weights

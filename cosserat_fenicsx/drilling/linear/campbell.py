@@ -5,8 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cosserat_fenicsx.annotations import File
-from cosserat_fenicsx.checks import number, positive, refuse
+from cosserat_fenicsx.checks import File, number, positive, refuse
 from cosserat_fenicsx.drilling.bit_laws import Cutting, Lobes
 from cosserat_fenicsx.drilling.discs import Discs
 from cosserat_fenicsx.drilling.linear.frequencies import natural_frequencies

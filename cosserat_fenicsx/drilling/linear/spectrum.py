@@ -4,8 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cosserat_fenicsx.annotations import File
-from cosserat_fenicsx.checks import refuse
+from cosserat_fenicsx.checks import File, refuse
 from cosserat_fenicsx.drilling.bit_laws import Cutting
 from cosserat_fenicsx.drilling.linear.drives import growth_with
 from cosserat_fenicsx.drilling.linear.shapes import ModeShape, shape_of

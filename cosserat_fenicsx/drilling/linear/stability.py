@@ -4,8 +4,7 @@ import math
 
 import numpy as np
 
-from cosserat_fenicsx.annotations import Numbers
-from cosserat_fenicsx.checks import number, positive, refuse
+from cosserat_fenicsx.checks import Numbers, number, positive, refuse
 from cosserat_fenicsx.drilling.linear.frequencies import natural_frequencies
 from cosserat_fenicsx.drilling.linear.spectrum import Stability
 from cosserat_fenicsx.drilling.linear.stability_box import box_up_to

@@ -12,7 +12,7 @@ import numpy as np
 
 from cosserat_fenicsx.algebra.pointers import Pointers
 from cosserat_fenicsx.dynamics.contact.nodes import TouchingNodes, motion_between
-from cosserat_fenicsx.quaternions import small_rotations
+from cosserat_fenicsx.numerics import small_rotations
 
 # Up to so many nodes the compliance of all by all is taken; of more, that of so many neighbours on each side.
 _FEW, _NEIGHBOURS = 16, 8

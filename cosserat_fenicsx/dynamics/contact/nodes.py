@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from cosserat_fenicsx.quaternions import small_rotations
+from cosserat_fenicsx.numerics import small_rotations
 
 
 class TouchingNodes:

@@ -12,7 +12,7 @@ import numpy as np
 from cosserat_fenicsx.algebra.pointers import Pointers
 from cosserat_fenicsx.dynamics.contact.nodes import TouchingNodes, motion_between
 from cosserat_fenicsx.errors import SceneError
-from cosserat_fenicsx.quaternions import directors, small_rotations
+from cosserat_fenicsx.numerics import directors, small_rotations
 
 # Iterations of Newton's method for the speed, and its relative change that ends them.
 _MOST, _SMALL = 60, 1e-14

@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from cosserat_fenicsx.annotations import File
+from cosserat_fenicsx.checks import File
 from cosserat_fenicsx.errors import InstallationError, SceneError
 from cosserat_fenicsx.ranks import on_first
 from cosserat_fenicsx.results.export import columns, contents

@@ -16,8 +16,8 @@ import zlib
 import numpy as np
 
 from cosserat_fenicsx import __version__
-from cosserat_fenicsx.element import ElementRule
 from cosserat_fenicsx.errors import SceneError
+from cosserat_fenicsx.numerics import ElementRule
 from cosserat_fenicsx.results.compared import NAMES
 from cosserat_fenicsx.results.export import contents
 from cosserat_fenicsx.results.export.arrays import h5py_for, new_hdf5

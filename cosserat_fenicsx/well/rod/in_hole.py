@@ -4,7 +4,7 @@ from functools import cached_property
 
 import numpy as np
 
-from cosserat_fenicsx.quaternions import directors
+from cosserat_fenicsx.numerics import directors
 from cosserat_fenicsx.well.contacts import side_in_space
 from cosserat_fenicsx.well.rod.on_wall import OnWall
 from cosserat_fenicsx.well.rod.rod_errors import errors_of

@@ -6,7 +6,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from cosserat_fenicsx.annotations import File
+from cosserat_fenicsx.checks import File
 from cosserat_fenicsx.well import criteria
 from cosserat_fenicsx.well.answer import TorqueAndDrag, scales_of, share
 from cosserat_fenicsx.well.contacts import WallContact, name_of_side

@@ -3,7 +3,7 @@ the rotation from the rod's straight reference, without a jump of sign."""
 
 import numpy as np
 
-from cosserat_fenicsx.quaternions import directors, product_conjugate
+from cosserat_fenicsx.numerics import directors, product_conjugate
 from cosserat_fenicsx.well.criteria import snake_load
 
 

@@ -1,0 +1,213 @@
+"""Numerical tools that all rooms share: Gauss's rules, the polynomials of an element, quaternions, differences.
+
+Quaternions are unit quaternions in numpy, scalar first; for UFL see forms/rotation.py. Differences are central, of
+eighth order, of data that Python computes from numbers; nothing that a solver iterates is differenced.
+"""
+
+from functools import cache, cached_property
+from typing import NamedTuple
+
+import numpy as np
+from numpy.polynomial import legendre
+
+
+class Gauss(NamedTuple):
+    """Points (n,), weights (n,), and matrices from the values at the points to the coefficients of the Legendre series
+    through them, (n, n), and of its integral from -1, (n + 1, n)."""
+
+    points: np.ndarray
+    weights: np.ndarray
+    series: np.ndarray
+    integral: np.ndarray
+
+
+@cache
+def gauss(n):
+    """The `Gauss` rule of n points."""
+    points, weights = legendre.leggauss(n)
+    # By inversion: discrete orthogonality with Gauss weights loses two digits to the rounding of the points.
+    series = np.linalg.inv(legendre.legvander(points, n - 1))
+    return Gauss(points, weights, series, legendre.legint(series, lbnd=-1, axis=0))
+
+
+def lobatto_weights(nodes):
+    """Weights (n,) of the quadrature rule on [0, 1] whose points are the nodes (n,)."""
+    return np.linalg.solve(np.vander(nodes, increasing=True).T, 1 / np.arange(1, len(nodes) + 1))
+
+
+class ElementRule:
+    """Nodes, Gauss points and polynomials of one element on [0, 1].
+
+    Args:
+        nodes: Lobatto nodes of P_p, ascending.
+        gauss, weights: Gauss points and weights, ascending.
+    """
+
+    def __init__(self, nodes, gauss, weights):
+        order = np.argsort(gauss)
+        self.nodes, self.gauss, self.weights = nodes, gauss[order], weights[order]
+
+    @cached_property
+    def _to_coefficients(self):
+        return np.linalg.inv(np.vander(2 * self.nodes - 1, increasing=True))
+
+    def basis(self, x):
+        """(len(x), p + 1) nodal basis functions at x in [0, 1]."""
+        return np.vander(2 * np.asarray(x) - 1, len(self.nodes), increasing=True) @ self._to_coefficients
+
+    @cached_property
+    def at_gauss(self):
+        """(gauss, p + 1) nodal basis functions at the Gauss points."""
+        return self.basis(self.gauss)
+
+    @cached_property
+    def lobatto(self):
+        """(p + 1,) weights of the quadrature rule whose points are the nodes."""
+        return lobatto_weights(self.nodes)
+
+    @property
+    def leading(self):
+        """(p + 1,) weights of the nodal values in the coefficient of x^p, x in [-1, 1]."""
+        return self._to_coefficients[-1]
+
+    @cached_property
+    def slopes(self):
+        """(gauss, p + 1) d/dx of the nodal basis at the Gauss points."""
+        p = len(self.nodes) - 1
+        x = 2 * self.gauss - 1
+        powers = np.column_stack([np.zeros_like(x)] + [k * x ** (k - 1) for k in range(1, p + 1)])
+        return 2 * powers @ self._to_coefficients
+
+    @cached_property
+    def from_slopes(self):
+        """(p + 1, gauss) matrix from slopes at the Gauss points (p of them) to the values at the nodes of their
+        integral."""
+        count = len(self.gauss)
+        powers = np.column_stack([(2 * self.nodes - 1) ** (k + 1) - (-1) ** (k + 1) for k in range(count)])
+        return powers / (2 * np.arange(1, count + 1)) @ np.linalg.inv(np.vander(2 * self.gauss - 1, increasing=True))
+
+    @cached_property
+    def from_ends_and_gauss(self):
+        """(p + 1, gauss + 2) matrix from values at 0, the Gauss points and 1 to the values at the nodes."""
+        support = 2 * np.concatenate([[0.0], self.gauss, [1.0]]) - 1
+        vandermonde = np.vander(support, increasing=True)
+        return np.vander(2 * self.nodes - 1, len(support), increasing=True) @ np.linalg.inv(vandermonde)
+
+    @cached_property
+    def contact_from_fields(self):
+        """(p + 1, gauss) matrix from n (or m) at the Gauss points to the part of it at the nodes that does not depend
+        on the element's length, see `results.recovery`."""
+        ends = self.weights * self.slopes[:, [0, -1]].T * [[-1], [1]]
+        return self.from_ends_and_gauss @ np.concatenate([ends[:1], np.eye(len(self.gauss)), ends[1:]])
+
+    @cached_property
+    def contact_from_densities(self):
+        """(p + 1, gauss) matrix from the force (or moment with r' x n) per length, times the element's length, at the
+        Gauss points to the rest of n (or m) at the nodes."""
+        ends = self.weights * self.at_gauss[:, [0, -1]].T * [[1], [-1]]
+        return self.from_ends_and_gauss[:, [0, -1]] @ ends
+
+    def between_gauss(self, x):
+        """(len(x), gauss) Lagrange polynomials of the Gauss points, at x in [0, 1]."""
+        points, x = 2 * self.gauss - 1, 2 * np.asarray(x) - 1
+        size = len(points)
+        return np.vander(x, size, increasing=True) @ np.linalg.inv(np.vander(points, size, increasing=True))
+
+    def locate_all(self, breaks, x, basis=None):
+        """The elements (n,) and basis functions (n, p + 1), or another `basis`, at points x (n,) of a rod whose
+        elements end at `breaks`."""
+        cells = np.clip(np.searchsorted(breaks, x, side="left") - 1, 0, len(breaks) - 2)
+        local = (x - breaks[cells]) / np.diff(breaks)[cells]
+        return cells, (basis or self.basis)(np.clip(local, 0.0, 1.0))
+
+    def locate(self, breaks, x):
+        """`locate_all` for one point."""
+        cells, basis = self.locate_all(breaks, np.array([x]))
+        return cells[0], basis[0]
+
+
+def directors(q):
+    """(k, 3, 3) rotation matrices of unit quaternions (k, 4), eq. (6); the columns are d_1, d_2, d_3."""
+    a, b, c, d = q.T
+    return np.array(
+        [
+            [a * a + b * b - c * c - d * d, 2 * (b * c - a * d), 2 * (b * d + a * c)],
+            [2 * (b * c + a * d), a * a - b * b + c * c - d * d, 2 * (c * d - a * b)],
+            [2 * (b * d - a * c), 2 * (c * d + a * b), a * a - b * b - c * c + d * d],
+        ]
+    ).transpose(2, 0, 1)
+
+
+def conjugate_product(p, q):
+    """Vector parts (..., 3) of conj(p) q."""
+    v, w = p[..., 1:], q[..., 1:]
+    return p[..., :1] * w - q[..., :1] * v - np.cross(v, w)
+
+
+def product_conjugate(p, q):
+    """(..., 4) p conj(q)."""
+    v, w = p[..., 1:], q[..., 1:]
+    scalar = np.einsum("...i,...i", p, q)[..., None]
+    return np.concatenate([scalar, q[..., :1] * v - p[..., :1] * w - np.cross(v, w)], axis=-1)
+
+
+def cross(u, v):
+    """(k, 3) cross products of rows; np.cross takes five times as long for few rows."""
+    result = np.empty_like(u)
+    result[:, 0] = u[:, 1] * v[:, 2] - u[:, 2] * v[:, 1]
+    result[:, 1] = u[:, 2] * v[:, 0] - u[:, 0] * v[:, 2]
+    result[:, 2] = u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]
+    return result
+
+
+def small_rotations(q):
+    """(.., 3, 4) matrices from changes dq of q (.., 4) to small inertial rotations 2 vec(dq conj(q))/|q|^2."""
+    scaled = q * (2 / (q * q).sum(axis=-1, keepdims=True))
+    return (scaled @ _SMALL_ROTATIONS).reshape(*q.shape[:-1], 3, 4)
+
+
+#: (4, 12): q times this are the rows (-b, a, -d, c), (-c, d, a, -b), (-d, -c, b, a).
+_SMALL_ROTATIONS = np.array(
+    [
+        [[0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]],
+        [[-1, 0, 0, 0], [0, 0, 0, -1], [0, 0, 1, 0]],
+        [[0, 0, 0, 1], [-1, 0, 0, 0], [0, -1, 0, 0]],
+        [[0, 0, -1, 0], [0, 1, 0, 0], [-1, 0, 0, 0]],
+    ],
+    dtype=float,
+).reshape(4, 12)
+
+
+#: Multiples of the step at which the function is evaluated.
+PLACES = (-4, -3, -2, -1, 1, 2, 3, 4)
+#: The usual step over the size of the number: for the power -4 of it, truncation and rounding are below 1e-13.
+STEP = 4e-3
+# Weights of f(k h) - f(-k h), k = 1 .. 4, of orders eight and six.
+_EIGHT, _SIX = (4 / 5, -1 / 5, 4 / 105, -1 / 280), (3 / 4, -3 / 20, 1 / 60, 0.0)
+# Largest relative error of a derivative of what is smooth, and relative rounding of the values.
+_SMOOTH, _ROUNDING = 1e-6, 1e-9
+
+
+def is_smooth(values, step, of_all=lambda sizes: sizes):
+    """Whether the estimated error of `derivative` is small: that the step is short, and no jump is near.
+
+    Args:
+        of_all: makes (3,) sizes the largest ones of all ranks, where these hold parts of the values.
+    """
+    sizes = of_all(np.array([np.abs(x).max(initial=0.0) for x in (*derivative(values, step), values)]))
+    return sizes[1] <= _SMOOTH * sizes[0] + _ROUNDING * sizes[2] / step
+
+
+def derivative(values, step):
+    """The derivative of a function and an estimate of its error.
+
+    Args:
+        values: those at `PLACES` times the step, arrays of one shape; step: a number.
+
+    Returns:
+        (derivative, error), arrays: the error is the difference from a formula of sixth order, an upper bound where the
+        step is small.
+    """
+    odd = [np.subtract(values[4 + k], values[3 - k]) for k in range(4)]
+    eight, six = (sum(w * part for w, part in zip(weights, odd, strict=True)) / step for weights in (_EIGHT, _SIX))
+    return eight, np.abs(eight - six)
