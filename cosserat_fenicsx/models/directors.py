@@ -5,7 +5,7 @@ import numpy as np
 import ufl
 from dolfinx import fem
 
-from cosserat_fenicsx import compat, quaternions
+from cosserat_fenicsx import compat, numerics
 from cosserat_fenicsx.forms import eccentric, energy, inertia
 from cosserat_fenicsx.forms import spatial as eq
 from cosserat_fenicsx.forms.rotation import directors, small_rotation
@@ -44,7 +44,7 @@ class Turning:
     def set_velocity(self, linear, angular):
         """See `Moving`."""
         super().set_velocity(linear, angular)
-        R = quaternions.directors(self.state.x.array[self._nodal[:, 3:]])
+        R = numerics.directors(self.state.x.array[self._nodal[:, 3:]])
         self.turning.x.array[:] = np.cross(angular[self._slots][:, :, None], R, axis=1).ravel()
 
     @property
@@ -61,7 +61,7 @@ class Turning:
         """See `Moving`."""
         super().accept(h)
         places = self._nodal[:, 3:]
-        R, before = (quaternions.directors(f.x.array[places]) for f in (self.state, self.start))
+        R, before = (numerics.directors(f.x.array[places]) for f in (self.state, self.start))
         W = self.turning.x.array.reshape(-1, 3, 3)
         W[:] = 2 / h * (R - before) - W
 
@@ -135,7 +135,7 @@ class EccentricSpatial(Turning, MovingSpatial):
         q = self.state.x.array[places]
         change = angular[self._slots] - turned_by(self.velocity.x.array[places], q)
         super().set_velocity(linear, angular)
-        self.turning.x.array[:] = (W + np.cross(change[:, :, None], quaternions.directors(q), axis=1)).ravel()
+        self.turning.x.array[:] = (W + np.cross(change[:, :, None], numerics.directors(q), axis=1)).ravel()
 
 
 def compile_conserving(model):
@@ -217,5 +217,5 @@ class ConservingSpatial(Turning, MovingSpatial):
         super().accept(h)
         nodal = self._nodal
         q = self.state.x.array[nodal[:, 3:]]
-        omega = np.cross(quaternions.directors(q), self.turning.x.array.reshape(-1, 3, 3), axis=1).sum(axis=2) / 2
+        omega = np.cross(numerics.directors(q), self.turning.x.array.reshape(-1, 3, 3), axis=1).sum(axis=2) / 2
         self.velocity.x.array[nodal[:, 3:]] = spun(q, omega)
