@@ -15,7 +15,7 @@ from known_numbers import Check, chosen, report, verdict
 from mpi4py import MPI
 
 import cosserat_fenicsx as cf
-from cosserat_fenicsx.drilling.torsion.model import TorsionWaves
+from cosserat_fenicsx.drilling.torsion import TorsionWaves
 from cosserat_fenicsx.progress import Progress
 
 SCENES = Path(__file__).parent / "strings"

@@ -189,9 +189,8 @@ def test_the_wheel_holds_the_forms_and_works(tmp_path):
     assert {"cosserat_fenicsx/py.typed", "cosserat_fenicsx/__init__.pyi"} <= set(names)
     assert "cosserat_fenicsx/scene/rolled_profiles.csv" in names
     assert "cosserat_fenicsx/well/standard_sizes.csv" in names
-    for folder in ("axial_torsional", "torsion"):
-        sources = (PACKAGE / "drilling" / folder).glob("*.[ch]")
-        assert {f"cosserat_fenicsx/drilling/{folder}/{file.name}" for file in sources} <= set(names)
+    sources = (PACKAGE / "drilling").rglob("*.[ch]")
+    assert {f"cosserat_fenicsx/{file.relative_to(PACKAGE)}" for file in sources} <= set(names)
     zipfile.ZipFile(wheel).extractall(tmp_path / "site")
     code = "import cosserat_fenicsx.forms.spatial as f, cosserat_fenicsx as cf; print(f.__file__); cf.solve"
     done = subprocess.run([sys.executable, "-S", "-c",

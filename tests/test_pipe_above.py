@@ -7,7 +7,7 @@ import pytest
 from ended_motions import stop_at
 
 import cosserat_fenicsx as cf
-from cosserat_fenicsx.drilling.delay_lines import DelayLines, TopEnd
+from cosserat_fenicsx.drilling.pipe_above import DelayLines, TopEnd
 
 pytestmark = pytest.mark.serial
 G, E, DENSITY = 79.3e9, 206e9, 7850.0

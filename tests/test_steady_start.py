@@ -6,7 +6,7 @@ from axial_scenes import column
 
 import cosserat_fenicsx as cf
 from cosserat_fenicsx.drilling.axial_torsional.model import AxialTorsional
-from cosserat_fenicsx.drilling.torsion.model import TorsionWaves
+from cosserat_fenicsx.drilling.torsion import TorsionWaves
 
 pytestmark = [pytest.mark.serial, pytest.mark.once]
 LAW = cf.Stribeck(6000.0, 4000.0, 3.0)

@@ -8,8 +8,8 @@ from torsion_scenes import PIPE, SPEED, off_bottom, run, stick_slip, string
 
 import cosserat_fenicsx as cf
 from cosserat_fenicsx.drilling.axial_torsional.model import AxialTorsional
-from cosserat_fenicsx.drilling.step_errors import cycle_of, step_errors
-from cosserat_fenicsx.drilling.torsion.model import TorsionWaves
+from cosserat_fenicsx.drilling.stick_slip import cycle_of, step_errors
+from cosserat_fenicsx.drilling.torsion import TorsionWaves
 
 pytestmark = [pytest.mark.serial, pytest.mark.once]
 

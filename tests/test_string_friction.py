@@ -9,8 +9,8 @@ from torsion_scenes import part as part_of
 import cosserat_fenicsx as cf
 from cosserat_fenicsx.drilling.axial_torsional.model import AxialTorsional
 from cosserat_fenicsx.drilling.protocol import PROFILE
-from cosserat_fenicsx.drilling.step_errors import cycle_of
-from cosserat_fenicsx.drilling.torsion.model import TorsionWaves
+from cosserat_fenicsx.drilling.stick_slip import cycle_of
+from cosserat_fenicsx.drilling.torsion import TorsionWaves
 
 pytestmark = [pytest.mark.serial, pytest.mark.once]
 STRAIGHT = [0.0, 1500.0], [60.0, 60.0]

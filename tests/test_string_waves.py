@@ -7,10 +7,10 @@ from scipy.linalg import eigvalsh
 from torsion_scenes import LAW, PIPE, SOFT, stick_slip
 
 import cosserat_fenicsx as cf
-from cosserat_fenicsx.drilling.axial_torsional.end_condition import EndForce
+from cosserat_fenicsx.drilling.axial_torsional.ends import EndForce
 from cosserat_fenicsx.drilling.axial_torsional.model import AxialTorsional
 from cosserat_fenicsx.drilling.protocol import PROFILE
-from cosserat_fenicsx.drilling.step_errors import cycle_of
+from cosserat_fenicsx.drilling.stick_slip import cycle_of
 
 pytestmark = [pytest.mark.serial, pytest.mark.once]
 

@@ -23,9 +23,8 @@ from torsion_scenes import string as string_of
 
 import cosserat_fenicsx as cf
 from cosserat_fenicsx.drilling.protocol import PROFILE
-from cosserat_fenicsx.drilling.step_errors import cycle_of, step_errors
-from cosserat_fenicsx.drilling.torsion.cells import cells_of
-from cosserat_fenicsx.drilling.torsion.model import TorsionWaves
+from cosserat_fenicsx.drilling.stick_slip import cycle_of, step_errors
+from cosserat_fenicsx.drilling.torsion import TorsionWaves, cells_of
 
 pytestmark = [pytest.mark.serial, pytest.mark.once]
 PIPE_IMPEDANCE = 296.3752962822167

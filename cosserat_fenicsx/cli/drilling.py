@@ -11,11 +11,10 @@ from cosserat_fenicsx.cli.ended import ended
 from cosserat_fenicsx.cli.files import Files, keep_inputs
 from cosserat_fenicsx.cli.say import DONE, INTERRUPTED, NOT_CONVERGED, say, warnings_in_words
 from cosserat_fenicsx.drilling.bit_laws import Stribeck
-from cosserat_fenicsx.drilling.choose import chosen
-from cosserat_fenicsx.drilling.discs import Discs
+from cosserat_fenicsx.drilling.choose import chosen, model_of
 from cosserat_fenicsx.drilling.folder import DrillingFolder
-from cosserat_fenicsx.drilling.models import model_of
 from cosserat_fenicsx.drilling.scenefile import drilling_in
+from cosserat_fenicsx.drilling.segments import Discs
 from cosserat_fenicsx.drilling.simulate import check_arguments, resume_drilling
 from cosserat_fenicsx.drilling.tables import turns
 from cosserat_fenicsx.errors import NotConverged, SceneError

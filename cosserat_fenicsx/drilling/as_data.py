@@ -10,9 +10,9 @@ import functools
 import numpy as np
 
 from cosserat_fenicsx.drilling.bit_laws import LAWS, BitOnRock, Wear
-from cosserat_fenicsx.drilling.discs import Discs
 from cosserat_fenicsx.drilling.hook import Hook
 from cosserat_fenicsx.drilling.scene import Drilling
+from cosserat_fenicsx.drilling.segments import Discs
 from cosserat_fenicsx.drilling.signals import ScalarSignal
 from cosserat_fenicsx.drilling.top_drive import CONTROLS, TopDrive
 from cosserat_fenicsx.drilling.wall_friction import ViscousDrag, WallFriction

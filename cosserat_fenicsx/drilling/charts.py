@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from cosserat_fenicsx.checks import finite_array, number, positive, refuse
-from cosserat_fenicsx.drilling.discs import Discs
+from cosserat_fenicsx.drilling.segments import Discs
 from cosserat_fenicsx.drilling.stick_slip import AT_REST
 from cosserat_fenicsx.drilling.tables import advance_unit, alias, turns
 from cosserat_fenicsx.drilling.top_drive import PI

@@ -6,10 +6,10 @@ from typing import Any
 import numpy as np
 
 from cosserat_fenicsx.checks import File, number
-from cosserat_fenicsx.drilling.discs import Discs
 from cosserat_fenicsx.drilling.protocol import LEDGER, PROFILE, SERIES
 from cosserat_fenicsx.drilling.quantities import QUANTITIES, heading
 from cosserat_fenicsx.drilling.scene import Drilling
+from cosserat_fenicsx.drilling.segments import Discs
 from cosserat_fenicsx.drilling.stick_slip import StickSlip, stick_slip_of
 from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.ranks import on_first, world

@@ -6,16 +6,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from cosserat_fenicsx.actions.walls import HoleWall, TubeWall
-from cosserat_fenicsx.checks import instance, number, refuse
+from cosserat_fenicsx.checks import instance, number, refuse, store
 from cosserat_fenicsx.drilling.bit_laws import Stribeck
-from cosserat_fenicsx.drilling.bit_torque import BitTorque
 from cosserat_fenicsx.drilling.pipe_above import PipeAbove
 from cosserat_fenicsx.drilling.scene import Drilling
+from cosserat_fenicsx.scene.action import PointAction
 from cosserat_fenicsx.scene.along import AlongPieces
 from cosserat_fenicsx.scene.curves import Line
 from cosserat_fenicsx.scene.damping import Damping
 from cosserat_fenicsx.scene.loads import Force, LineForce
-from cosserat_fenicsx.scene.rod import Rod
+from cosserat_fenicsx.scene.rod import Rod, Station, StationOrName, is_known
 from cosserat_fenicsx.scene.scene import Scene
 from cosserat_fenicsx.scene.supports import Roller
 from cosserat_fenicsx.well.components import DrillPipe
@@ -163,3 +163,54 @@ def _why(drilling, top):
         yield "the weight on bit is constant: the bit does not leave the rock"
     if drilling.bit is not None and drilling.bit.mass > 0:
         yield f"the mass of the bit, {drilling.bit.mass:g} kg, is left out"
+
+
+@dataclass(frozen=True)
+class BitTorque(PointAction):
+    """A torque about the rod's axis d3 that falls with the speed of rotation; at rest anything up to the static one.
+
+    The law is set-valued: within a step the bit sticks or slips. In `simulate` alone, in the spatial model; at rest it
+    exerts nothing. It is not multiplied by the load factor. What it dissipates counts as such in the energy balance.
+
+    Args:
+        station: where.
+        law: a `Stribeck`.
+        weight: on bit, N, constant, for a law by coefficients of friction; the force itself is a load of its own.
+        inertia_of_bit: about the axis, kg m^2. `Damping.drag` of the rod would act on it, too: here that is taken off.
+
+    Raises:
+        SceneError: not a station, not such a law, or numbers that are negative.
+    """
+
+    station: StationOrName
+    law: Stribeck
+    weight: float = 0.0
+    inertia_of_bit: float = 0.0
+
+    work, scaled = None, False
+    traits = {"dead": True, "known_force": True, "rates": False, "turns": True, "flat": False}
+
+    def __post_init__(self):
+        is_known(self, "station", Station)
+        instance(self, "law", self.law, Stribeck, "a Stribeck(...)")
+        for field, unit in (("weight", "N"), ("inertia_of_bit", "kg m^2")):
+            value = number(
+                self, field, getattr(self, field), f"a number from 0 on ({unit})", lambda x: 0 <= x < math.inf
+            )
+            store(self, **{field: value})
+
+    def inertia(self, rod):
+        """See `Action`."""
+        return (0.0, np.array([0.0, 0.0, self.inertia_of_bit])) if self.inertia_of_bit else None
+
+    def resists(self, speed):
+        """See `Action`."""
+        static, dynamic = self.law.torques(self.weight)
+        if speed == 0:
+            return static, 0.0
+        damping = self.station.rod.damping
+        drag = self.inertia_of_bit * damping.drag if damping else 0.0
+        if self.law.speed is None:
+            return dynamic - drag * speed, -drag
+        part = (static - dynamic) * math.exp(-speed / self.law.speed)
+        return dynamic + part - drag * speed, -part / self.law.speed - drag

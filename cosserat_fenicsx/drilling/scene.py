@@ -6,9 +6,8 @@ from functools import cached_property
 
 from cosserat_fenicsx.checks import instance, positive, refuse, store
 from cosserat_fenicsx.drilling.bit_laws import BitOnRock
-from cosserat_fenicsx.drilling.discs import Discs
 from cosserat_fenicsx.drilling.hook import Hook
-from cosserat_fenicsx.drilling.segments import Segment, segment_of
+from cosserat_fenicsx.drilling.segments import Discs, Segment, segment_of
 from cosserat_fenicsx.drilling.top_drive import TopDrive
 from cosserat_fenicsx.drilling.wall_friction import ViscousDrag, WallFriction
 from cosserat_fenicsx.well.components import weight_in_mud

@@ -37,13 +37,12 @@ from cosserat_fenicsx import units
 from cosserat_fenicsx.checks import File, positive, refuse
 from cosserat_fenicsx.drilling.bit_laws import LAWS, BitOnRock, Stribeck, Wear
 from cosserat_fenicsx.drilling.choose import chosen
-from cosserat_fenicsx.drilling.discs import Discs
 from cosserat_fenicsx.drilling.history import DrillingHistory
 from cosserat_fenicsx.drilling.hook import Hook
-from cosserat_fenicsx.drilling.linear.spectrum import Stability
-from cosserat_fenicsx.drilling.linear.stability import stability
-from cosserat_fenicsx.drilling.linear.tuned import SoftSpeed, SoftTorque
+from cosserat_fenicsx.drilling.linear.frequencies import SoftSpeed, SoftTorque
+from cosserat_fenicsx.drilling.linear.stability import Stability, stability
 from cosserat_fenicsx.drilling.scene import Drilling
+from cosserat_fenicsx.drilling.segments import Discs
 from cosserat_fenicsx.drilling.simulate import check_arguments as check_simulation
 from cosserat_fenicsx.drilling.simulate import simulate_drilling
 from cosserat_fenicsx.drilling.top_drive import CONTROLS, TopDrive

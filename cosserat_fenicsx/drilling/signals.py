@@ -1,4 +1,4 @@
-"""Numbers that may depend on time: the speed of a drive, the speed of the hook."""
+"""Speeds of drive and hook that may depend on time: their values, means over steps, and steps cut where they jump."""
 
 import math
 import numbers
@@ -60,3 +60,55 @@ class ScalarSignal:
             return 0.0
         near = 1e-9 * max(1.0, abs(t))
         return self(t + near) - self(t - near)
+
+
+class MeanSpeeds:
+    """Means of a `ScalarSignal` over the steps from n dt to (n + 1) dt: by Gauss's two points between its jumps, so
+    that a jump within a step has the share that it has in the angle."""
+
+    def __init__(self, signal, dt):
+        self._signal, self._dt = signal, dt
+
+    def __call__(self, first, steps):
+        """(steps,) means over steps from number `first` on."""
+        if self._signal.constant:
+            return np.full(steps, self._signal(0.0))
+        return np.array([self.between(n * self._dt, (n + 1) * self._dt) for n in range(first, first + steps)])
+
+    def between(self, start, end):
+        """Mean from one time to another (s)."""
+        total, cuts = 0.0, [start, *(t for t in self._signal.jumps if start < t < end), end]
+        for a, b in zip(cuts[:-1], cuts[1:], strict=True):
+            middle, off = (a + b) / 2, (b - a) / (2 * 3**0.5)
+            total += (b - a) * (self._signal(middle - off) + self._signal(middle + off)) / 2
+        return total / (end - start)
+
+
+def intervals(signals, steps, dt):
+    """Rows (h, signals at the begin, signals at the end, 1 where a step ends) of a range of steps.
+
+    Args:
+        signals: a list of `ScalarSignal`. steps: (first, last + 1). dt: s.
+    """
+    first, last = steps
+    grid = np.arange(first, last + 1) * dt
+    jumps = {t for signal in signals for t in signal.jumps if grid[0] <= t < grid[-1]}
+    near = 1e-9 * dt
+    inner = sorted(t for t in jumps if np.abs(grid - t).min() > near)
+    times = np.sort(np.concatenate([grid, inner]))
+    ends = np.ones(len(times) - 1)
+    ends[np.searchsorted(times, inner) - 1] = 0.0
+    rows = np.empty((len(times) - 1, 2 + 2 * len(signals)))
+    rows[:, 0], rows[:, -1] = np.diff(times), ends
+    rows[ends == 1.0, 0] = np.where(np.isclose(rows[ends == 1.0, 0], dt, rtol=1e-9), dt, rows[ends == 1.0, 0])
+    for i, signal in enumerate(signals):
+        if signal.constant:
+            values = np.full(len(times), signal(0.0))
+            before = after = values
+        else:
+            before = np.array([signal(t) for t in times])
+            after = before.copy()
+            for j in np.flatnonzero([any(abs(t - x) <= near for x in jumps) for t in times]):
+                before[j], after[j] = signal(times[j] - 1e-6 * dt), signal(times[j] + 1e-6 * dt)
+        rows[:, 1 + i], rows[:, 1 + len(signals) + i] = after[:-1], before[1:]
+    return rows

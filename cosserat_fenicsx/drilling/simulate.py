@@ -7,12 +7,11 @@ import numpy as np
 
 from cosserat_fenicsx.checks import File, instance, number, refuse
 from cosserat_fenicsx.drilling.bit_laws import Cutting, Lobes
-from cosserat_fenicsx.drilling.choose import chosen, fastest
+from cosserat_fenicsx.drilling.choose import OtherSteps, chosen, fastest, model_of
 from cosserat_fenicsx.drilling.folder import DrillingFolder
 from cosserat_fenicsx.drilling.history import DrillingHistory
-from cosserat_fenicsx.drilling.models import OtherSteps, model_of
 from cosserat_fenicsx.drilling.scene import Drilling
-from cosserat_fenicsx.drilling.step_errors import step_errors
+from cosserat_fenicsx.drilling.stick_slip import step_errors
 from cosserat_fenicsx.drilling.time_loop import TimeLoop
 from cosserat_fenicsx.drilling.top_drive import Motor, Stiff
 from cosserat_fenicsx.errors import SceneError

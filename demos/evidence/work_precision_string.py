@@ -24,7 +24,7 @@ from written import write
 import cosserat_fenicsx as cf
 from cosserat_fenicsx.drilling.axial_torsional.model import AxialTorsional
 from cosserat_fenicsx.drilling.protocol import SERIES
-from cosserat_fenicsx.drilling.torsion.model import TorsionWaves
+from cosserat_fenicsx.drilling.torsion import TorsionWaves
 
 #: Mean of the last four periods (s), largest speed of the bit after 60 s (rad/s); and how far these may be wrong, as
 #: relative errors: the differences of meshes, and of the levels at which a period is measured.

@@ -8,6 +8,7 @@ that fail are halved. Energies and works balance to rounding and to the toleranc
 quadratic energies, and works are those of the step's own forces.
 """
 
+import math
 from pathlib import Path
 
 import numpy as np
@@ -15,17 +16,20 @@ from scipy.optimize import brentq
 
 from cosserat_fenicsx.algebra.pointers import Pointers
 from cosserat_fenicsx.checks import number, positive, refuse
-from cosserat_fenicsx.drilling.axial_torsional.bits import end_of, forces_of
-from cosserat_fenicsx.drilling.axial_torsional.chain import chain_of, usual_step
-from cosserat_fenicsx.drilling.axial_torsional.intervals import intervals
-from cosserat_fenicsx.drilling.axial_torsional.reasons import reasons
-from cosserat_fenicsx.drilling.axial_torsional.steady import steady_state
+from cosserat_fenicsx.drilling.axial_torsional.chain import chain_of, unresolved, usual_step
+from cosserat_fenicsx.drilling.axial_torsional.ends import end_of, forces_of
 from cosserat_fenicsx.drilling.bit_laws import Cutting
-from cosserat_fenicsx.drilling.discs import Discs
 from cosserat_fenicsx.drilling.protocol import LEDGER, SERIES
-from cosserat_fenicsx.drilling.signals import ScalarSignal
+from cosserat_fenicsx.drilling.segments import Discs
+from cosserat_fenicsx.drilling.signals import ScalarSignal, intervals
 from cosserat_fenicsx.drilling.single_valued import check_bit, stribeck_of
-from cosserat_fenicsx.drilling.steady_start import check_rock, check_steady, follows_the_bit, steady_velocities
+from cosserat_fenicsx.drilling.steady_start import (
+    check_rock,
+    check_steady,
+    follows_the_bit,
+    steady_state,
+    steady_velocities,
+)
 from cosserat_fenicsx.drilling.top_drive import PI, Matched, Motor, Stiff
 from cosserat_fenicsx.errors import NotConverged, SceneError
 
@@ -348,3 +352,40 @@ class AxialTorsional(Pointers):
         self.steps, m.halved, m.iterations, m.most = (int(x) for x in memory["counts"])
         if self.end is not None:
             self.end.recall(memory["end"])
+
+
+def reasons(scene, depths, dt, *, axial, wall):
+    """Sentences on nodes at so many depths (m) and steps of dt (s), with axial motion or without, with a wall or
+    without."""
+    told = [f"{len(depths) - 1} elements, steps of {dt:.3g} s"]
+    if axial:
+        if wall:
+            told.append("friction at the wall against axial and rotary slip together, normal force by the soft string "
+                        "from the tension of the step before")  # fmt: skip
+        bit = scene.bit
+        if scene.start == "steady":
+            told.append("starts in steady motion, all of it at the speeds of drive and hook")
+        elif bit is not None and bit.weight is not None:
+            told.append(f"starts with {bit.weight:g} N on bit, without friction")
+        else:
+            told.append("starts hanging off bottom, without friction")
+        if bit is not None and bit.weight is not None and not isinstance(bit.law, Cutting):
+            told += _of_rock(scene, depths, dt)
+        if follows_the_bit(scene):
+            told.append("without a Hook its load stays the same: the string follows the bit that drills")
+    elif wall:
+        told.append("friction at the wall by the tension at rest")
+    return tuple(told)
+
+
+def _of_rock(scene, depths, dt):
+    """Sentences on the rock that a bit stands on."""
+    if math.isinf(scene.bit.rock_stiffness):
+        yield ("the rock does not give way: a bit that comes down on it is stopped by an impulse, which "
+               "history.impulse_on_bit tells (N s) and weight_on_bit leaves out; with BitOnRock.rock_stiffness it is "
+               "a force")  # fmt: skip
+        return
+    yield f"the rock below the bit is a spring of {scene.bit.rock_stiffness:.4g} N/m"
+    approximate = unresolved(scene, depths, dt)
+    if approximate:
+        yield approximate

@@ -17,8 +17,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from cosserat_fenicsx.checks import refuse
-from cosserat_fenicsx.drilling.discs import Discs
 from cosserat_fenicsx.drilling.hook import Hook
+from cosserat_fenicsx.drilling.segments import Discs
 from cosserat_fenicsx.drilling.steady_start import follows_the_bit
 from cosserat_fenicsx.drilling.top_drive import PI, Matched, Motor, Stiff
 

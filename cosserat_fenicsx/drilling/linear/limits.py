@@ -7,10 +7,9 @@ from numpy.polynomial import chebyshev
 from scipy.optimize import brentq
 
 from cosserat_fenicsx.checks import number, positive, refuse
+from cosserat_fenicsx.drilling.linear.characteristic import Steady, box_up_to
 from cosserat_fenicsx.drilling.linear.impedances import torsional
 from cosserat_fenicsx.drilling.linear.roots import all_roots
-from cosserat_fenicsx.drilling.linear.stability_box import box_up_to
-from cosserat_fenicsx.drilling.linear.steady import Steady
 from cosserat_fenicsx.drilling.scene import Drilling
 from cosserat_fenicsx.drilling.single_valued import slope, stribeck_of
 from cosserat_fenicsx.errors import NotConverged

@@ -5,7 +5,7 @@ import math
 import numpy as np
 from rich.table import Table
 
-from cosserat_fenicsx.drilling.linear.drives import own_rule
+from cosserat_fenicsx.drilling.linear.frequencies import own_rule
 from cosserat_fenicsx.results.tables import as_text
 
 #: Modes that are listed with their places and drives, the fastest ones.

@@ -1,19 +1,281 @@
-"""Which modes of a string that drills steadily grow, at which speeds and weights."""
+"""Which modes of a string that drills steadily grow, at which speeds and weights; their shapes, and other drives."""
 
 import math
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from cosserat_fenicsx.checks import Numbers, number, positive, refuse
-from cosserat_fenicsx.drilling.linear.frequencies import natural_frequencies
-from cosserat_fenicsx.drilling.linear.spectrum import Stability
-from cosserat_fenicsx.drilling.linear.stability_box import box_up_to
-from cosserat_fenicsx.drilling.linear.steady import Steady, or_none, speeds_and_weights
-from cosserat_fenicsx.drilling.linear.tracking import follow
+from cosserat_fenicsx.checks import File, Numbers, number, positive, refuse
+from cosserat_fenicsx.drilling.bit_laws import Cutting
+from cosserat_fenicsx.drilling.linear.characteristic import Steady, box_up_to, or_none, speeds_and_weights
+from cosserat_fenicsx.drilling.linear.frequencies import SoftSpeed, SoftTorque, natural_frequencies, own_rule, with_rule
+from cosserat_fenicsx.drilling.linear.impedances import Disc, Uniform
+from cosserat_fenicsx.drilling.linear.roots import all_roots, follow
 from cosserat_fenicsx.drilling.scene import Drilling
+from cosserat_fenicsx.drilling.segments import Discs
+from cosserat_fenicsx.drilling.top_drive import Matched, Stiff, TopDrive
+from cosserat_fenicsx.well.tabular import Tabular
 
 #: A growth below this share of the root is rounding: a mode without losses.
 _NEUTRAL = 1e-11
+
+
+#: Points of Gauss in a part, beside those for its waves.
+_POINTS = 8
+
+
+@dataclass(frozen=True)
+class ModeShape:
+    """One mode: real motions are Re(w exp(s t)).
+
+    Attributes:
+        root: s, 1/s. depth: (m,) below the top drive, m; the number of the disc for discs. rotation: (m,) complex, the
+            amplitude of the rotation om, 1 at the bit. velocity: (m,) complex, the axial one in m/s per rad/s of the
+            bit; None where nothing moves axially. shares: {what: share} of the kinetic energy over a period, of the
+            components by name, of the top drive and the bit; "axial motion of ..." for the axial part. lengths: {name:
+            m} of the components; empty for discs.
+    """
+
+    root: complex
+    depth: np.ndarray
+    rotation: np.ndarray
+    velocity: np.ndarray | None
+    shares: dict[str, float]
+    lengths: dict[str, float]
+
+    @property
+    def where(self) -> str:
+        """Where it moves, in words."""
+        return where(self.shares, self.lengths)
+
+
+def where(shares, lengths):
+    """The largest shares of the kinetic energy up to nine tenths; and the part where it is densest, with its length."""
+    words, covered = [], 0.0
+    for name, share in sorted(shares.items(), key=lambda item: -item[1]):
+        words.append(f"{name} {100 * share:.0f} %")
+        covered += share
+        if covered > 0.9 or len(words) == 3:
+            break
+    text, whole = ", ".join(words), sum(lengths.values())
+    parts = {name: shares.get(name, 0.0) / (length / whole) for name, length in lengths.items()}
+    densest = max(parts, key=parts.get, default=None)
+    if densest is None or parts[densest] < 2:
+        return text
+    share, length = 100 * shares[densest], 100 * lengths[densest] / whole
+    return f"{text}; densest in the {densest}: {share:.0f} % on {length:.0f} % of the length"
+
+
+def shape_of(equation, s, points=200):
+    """The `ModeShape` of a root of a characteristic function, at about so many points."""
+    motions, energies = [], {}
+    for guide, amplitude in zip(equation.guides, equation.motion(s), strict=True):
+        depth, w, energy = _along(guide, s, points)
+        motions.append(amplitude * w)
+        for name, value in energy.items():
+            name = name if guide.kind == "torsion" else f"axial motion of {name}"
+            energies[name] = energies.get(name, 0.0) + abs(amplitude) ** 2 * value
+    total = sum(energies.values())
+    shares = {name: float(value / total) for name, value in energies.items() if value}
+    lengths = {}
+    for part in equation.guides[0].parts:
+        if isinstance(part, Uniform):
+            lengths[part.name] = lengths.get(part.name, 0.0) + part.length
+    return ModeShape(complex(s), depth, motions[0], motions[1] if len(motions) > 1 else None, shares, lengths)
+
+
+def _along(guide, s, points):
+    """(depth, w, {name: twice the kinetic energy}) of one guide, w = 1 at the bit."""
+    at = np.array([s], dtype=complex)
+    state, size = guide.start(at), 1.0
+    depth, w, energy, top = [], [], {}, 0.0
+    if guide.top_inertia and state.w[0] != 0:
+        energy["top drive"] = guide.top_inertia * abs(state.w[0]) ** 2
+    for k, part in enumerate(guide.parts):
+        if isinstance(part, Disc):
+            depth.append(np.array([k + 1.0]))
+            w.append(size * state.w)
+            energy[part.name] = part.inertia * abs(size * state.w[0]) ** 2
+            below = part.through(at, state)
+        else:
+            n = _POINTS + 2 * int(abs(s) * part.travel)
+            share = max(2, round(points * part.travel / guide.travel))
+            nodes, weights = np.polynomial.legendre.leggauss(n)
+            x = np.concatenate([part.length * (1 + nodes) / 2, np.linspace(0.0, part.length, share)])
+            here = size * part.through(at, state, x).w * np.exp(part.decay(at, x))
+            twice = part.inertia * part.length / 2 * float(weights @ np.abs(here[:n]) ** 2)
+            energy[part.name] = energy.get(part.name, 0.0) + twice
+            depth.append(top + x[n:])
+            w.append(here[n:])
+            top += part.length
+            below = part.through(at, state, part.length).times(np.exp(part.decay(at, part.length)))
+        scaled = below.scaled(part.impedance)
+        size *= (abs(below.w) + abs(below.P))[0] / (abs(scaled.w) + abs(scaled.P))[0]
+        state = scaled
+    if guide.inertia:
+        energy["bit"] = guide.inertia * abs(size * state.w[0]) ** 2
+    bit = w[-1][-1]
+    return np.concatenate(depth), np.concatenate(w) / bit, {n: e / abs(bit) ** 2 for n, e in energy.items()}
+
+
+def usual_drives(scene):
+    """{name: TopDrive} to compare with: others than that of the scene, those with an inertia where that has one; and
+    where `SoftTorque` or `SoftSpeed` chose its gains, the drive of the scene itself by the name of that rule."""
+    inertia, own = scene.drive.inertia, scene.drive.control
+    drives = {} if isinstance(own, Stiff) else {"stiff": TopDrive(0.0)}
+    if isinstance(scene.string, Discs):
+        return drives
+    if inertia:
+        for name, choose in (("SoftTorque", SoftTorque), ("SoftSpeed", SoftSpeed)):
+            # one tuning: that of the scene, where it has one
+            control = with_rule(own, name) if own_rule(scene) else choose(scene, inertia)
+            drives[name] = TopDrive(0.0, inertia, control)
+    if own != Matched():
+        drives["matched"] = TopDrive(0.0, control=Matched())
+    return drives
+
+
+def growth_with(answer, i, j, drives=None):
+    """See `Stability.with_drives`."""
+    own, scene = answer.roots[i, j], answer.scene
+    case = answer.speeds[i], or_none(answer.weights[j])
+    found = {}
+    for name, drive in (usual_drives(scene) if drives is None else drives).items():
+        if (drive.control, drive.inertia) == (scene.drive.control, scene.drive.inertia):  # the modes as they are
+            found[name] = own.real.copy()
+            continue
+        steady = Steady(replace(scene, drive=drive))
+        f = steady.equation(steady.parameters(*case))
+        roots, _ = all_roots(f, box_up_to(steady, 2 * np.pi * answer.up_to)(f), f.spacing)
+        nearest = np.abs(roots.imag[:, None] - np.where(np.isfinite(own), own.imag, np.inf)[None, :]).argmin(axis=1)
+        growth = [roots.real[nearest == k].max(initial=-np.inf) for k in range(len(own))]
+        found[name] = np.where(np.isneginf(growth), np.nan, growth)
+    return found
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Stability(Tabular):
+    """Growth and frequency of every mode at every speed and weight.
+
+    Attributes:
+        scene: the `Drilling`. speeds: (n,) rad/s. weights: (m,) N; NaN where the bit has none.
+        roots: (n, m, k) complex, 1/s: of each mode; NaN where it is not within the limits of the list. Pairs are listed
+            by the one with positive frequency; real roots have the frequency 0.
+        up_to: highest frequency that was looked for, Hz. Modes that decay more than a factor exp(-4) within the time
+            that a wave takes down the string are not listed.
+    """
+
+    scene: Drilling
+    speeds: np.ndarray
+    weights: np.ndarray
+    roots: np.ndarray
+    up_to: float
+
+    @property
+    def growth(self) -> np.ndarray:
+        """(n, m, k) rates, 1/s: above 0 the steady rotation is unstable."""
+        return self.roots.real
+
+    @property
+    def frequency(self) -> np.ndarray:
+        """(n, m, k) Hz."""
+        return np.where(np.isfinite(self.growth), self.roots.imag / (2 * np.pi), np.nan)
+
+    @property
+    def cautions(self) -> list[str]:
+        """What the result leaves out, in sentences."""
+        friction, hole, left_out = self.scene.friction, self.scene.hole, []
+        if friction is not None and friction.decays:
+            left_out.append(
+                "friction at the wall falls with the slip, which drives torsional modes, too: left out here"
+            )
+        if isinstance(getattr(self.scene.bit, "law", None), Cutting) and hole is not None:
+            left_out.append("friction at the wall damps axial motion of a string that rotates: left out here")
+        return left_out
+
+    @property
+    def unstable_modes(self) -> np.ndarray:
+        """(n, m) number of modes that grow."""
+        return (self.growth > 0).sum(axis=2)
+
+    def unstable(self, i: int, j: int = 0) -> list[int]:
+        """The modes that grow at `speeds[i]` and `weights[j]`, the fastest one first."""
+        growth = np.nan_to_num(self.growth[i, j], nan=-np.inf)
+        return [int(k) for k in np.argsort(-growth) if growth[k] > 0]
+
+    def worst(self, k: int) -> tuple[int, int]:
+        """(i, j) of the case in which mode k grows fastest."""
+        self._known(k)
+        i, j = np.unravel_index(np.nanargmax(self.growth[:, :, k]), self.growth.shape[:2])
+        return int(i), int(j)
+
+    def shape(self, k: int, i: int | None = None, j: int = 0) -> ModeShape:
+        """The `ModeShape` of mode k at `speeds[i]` and `weights[j]`, or where it grows fastest.
+
+        Raises:
+            SceneError: there is no such mode, or it is not listed in that case.
+        """
+        if i is None:
+            i, j = self.worst(k)
+        self._known(k)
+        root = self.roots[i, j, k]
+        if not np.isfinite(root):
+            refuse("Stability", "shape", (k, i, j), "a case in which the mode is listed: its root is not NaN")
+        return shape_of(self._equation(i, j), root)
+
+    def with_drives(self, i: int, j: int = 0, drives: dict | None = None) -> dict[str, np.ndarray]:
+        """Growth of each mode at one speed and weight with other drives.
+
+        Args:
+            i, j: of the speed and the weight.
+            drives: {name: TopDrive}; None for a stiff and a matched one, and `SoftTorque` and `SoftSpeed` where the
+                drive has an inertia: tuned as the scene's own is where one of these rules chose its gains, which then
+                is among them.
+
+        Returns:
+            {name: (k,)}: 1/s, the largest growth of those modes whose frequency is nearest to that of mode k; NaN where
+            the drive leaves none within the limits of the list.
+        """
+        return growth_with(self, i, j, drives)
+
+    def plot(self, file: File | None = None, mode: int | None = None):
+        """Maps of the growth over speed and weight, of each mode that grows somewhere, or of one; over the speed alone
+        where there is a single weight. With a file it is written, otherwise the Figure is returned.
+
+        Raises:
+            SceneError: matplotlib is missing, there is no such mode, or the file's ending is unknown.
+            OSError: the file cannot be written.
+        """
+        from cosserat_fenicsx.drilling.charts import draw_stability
+
+        if mode is not None:
+            self._known(mode)
+        return draw_stability(self, file, mode)
+
+    def __repr__(self):
+        grow = self.unstable_modes
+        cases = f"{len(self.speeds)} speeds and {len(self.weights)} weights, up to {self.up_to:.4g} Hz"
+        return f"<Stability: {cases}; modes grow in {(grow > 0).sum()} of {grow.size} cases, {grow.max()} at most>"
+
+    def __str__(self):
+        from cosserat_fenicsx.drilling.linear.spectrum_table import stability_table
+
+        return stability_table(self)
+
+    def _known(self, k):
+        if not 0 <= k < self.roots.shape[2]:
+            refuse("Stability", "mode", k, f"a number from 0 to {self.roots.shape[2] - 1}")
+
+    def _equation(self, i, j):
+        steady = Steady(self.scene)
+        return steady.equation(steady.parameters(self.speeds[i], or_none(self.weights[j])))
+
+    def _tables(self):
+        i, j, k = np.nonzero(np.isfinite(self.growth))
+        return {"": {
+            "speed (rad/s)": self.speeds[i], "weight on bit (N)": self.weights[j], "mode": k.astype(float),
+            "growth (1/s)": self.growth[i, j, k], "frequency (Hz)": self.frequency[i, j, k],
+        }}  # fmt: skip
 
 
 def stability(
@@ -70,13 +332,6 @@ def stability(
     return Stability(scene, speeds, weights, roots[:, :, np.isfinite(roots).any(axis=(0, 1))], top / (2 * math.pi))
 
 
-def _heights(found, cuts):
-    """What modes are numbered by: frequency without the bit's slope, later ones last; or that of the middle case."""
-    if cuts:
-        return [float(np.median(column[np.isfinite(column)].imag)) for column in found.T]
-    return np.where(np.isfinite(found[0]), found[0].imag, np.inf)
-
-
 def highest(scene, modes, up_to):
     """Hz: `up_to`, or half way from the last of so many modes to the next one."""
     if modes is None:
@@ -84,3 +339,10 @@ def highest(scene, modes, up_to):
     count = int(number("stability", "modes", modes, "a number from 1", lambda x: x >= 1 and x == int(x)))
     lowest = natural_frequencies(scene, count + 1)
     return float(lowest[count - 1 :].mean()) if len(lowest) > count else 1.5 * float(lowest[-1])
+
+
+def _heights(found, cuts):
+    """What modes are numbered by: frequency without the bit's slope, later ones last; or that of the middle case."""
+    if cuts:
+        return [float(np.median(column[np.isfinite(column)].imag)) for column in found.T]
+    return np.where(np.isfinite(found[0]), found[0].imag, np.inf)
