@@ -65,14 +65,14 @@ from cosserat_fenicsx.errors import NotConverged as NotConverged
 from cosserat_fenicsx.errors import NotStored as NotStored
 from cosserat_fenicsx.errors import SceneError as SceneError
 from cosserat_fenicsx.errors import SceneWarning as SceneWarning
-from cosserat_fenicsx.results.buckling import Buckling as Buckling
 from cosserat_fenicsx.results.history import History as History
+from cosserat_fenicsx.results.modes import Buckling as Buckling
 from cosserat_fenicsx.results.modes import Modes as Modes
-from cosserat_fenicsx.results.orbits import Orbit as Orbit
 from cosserat_fenicsx.results.path import Path as Path
 from cosserat_fenicsx.results.records import Event as Event
 from cosserat_fenicsx.results.sensitivity import Sensitivity as Sensitivity
 from cosserat_fenicsx.results.sensitivity import Uncertainty as Uncertainty
+from cosserat_fenicsx.results.whirl import Orbit as Orbit
 from cosserat_fenicsx.results.whirl import Whirl as Whirl
 from cosserat_fenicsx.scene.action import Action as Action
 from cosserat_fenicsx.scene.action import LineAction as LineAction

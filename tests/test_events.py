@@ -11,7 +11,7 @@ from path_scenes import clamped_ring, lees_frame, shallow_arch, torsion_pendulum
 from scipy.optimize import brentq
 
 import cosserat_fenicsx as cf
-from cosserat_fenicsx.results.same_events import find_again, keep_confirmed
+from cosserat_fenicsx.results.records import find_again, keep_confirmed
 from cosserat_fenicsx.statics.path.recorder import Tracing
 
 DEMOS = Path(__file__).parent.parent / "demos"

@@ -9,7 +9,7 @@ import pytest
 from scipy.optimize import brentq
 
 import cosserat_fenicsx as cf
-from cosserat_fenicsx.results.shape_tables import modes_table
+from cosserat_fenicsx.results.shapes import modes_table
 
 LINE = cf.Line((0, 0, 0), (1, 0, 0), d1=(0, 0, 1))
 

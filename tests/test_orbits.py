@@ -7,8 +7,7 @@ from rolling_collar import ARM, AXIS, CLEARANCE, COLLAR, LENGTH, rolling
 import cosserat_fenicsx as cf
 from cosserat_fenicsx.actions.walls import HoleWall
 from cosserat_fenicsx.pictures.motion_charts import draw_campbell, spectra
-from cosserat_fenicsx.results.orbits import Orbit
-from cosserat_fenicsx.results.whirl import whirl_of
+from cosserat_fenicsx.results.whirl import Orbit, whirl_of
 
 pytestmark = pytest.mark.serial
 SPIN = 100 * np.pi / 30

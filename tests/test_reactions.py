@@ -5,7 +5,7 @@ import pytest
 
 import cosserat_fenicsx as cf
 from cosserat_fenicsx.numerics import directors
-from cosserat_fenicsx.results.reactions import reactions_in_words
+from cosserat_fenicsx.results.queries import reactions_in_words
 
 SECTION = cf.Stiffness((2e3, 3e3), 4e3, (10.0, 20.0), 8.0, mass=2.0, inertia=(0.1, 0.2, 0.3))
 RIGID = cf.Stiffness((np.inf, np.inf), np.inf, (10.0, 20.0), 8.0, mass=2.0, inertia=(0.1, 0.2, 0.3))

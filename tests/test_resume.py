@@ -19,7 +19,7 @@ from test_schemes import everything
 import cosserat_fenicsx as cf
 from cosserat_fenicsx.dynamics import time_loop
 from cosserat_fenicsx.dynamics.steppers import SCHEMES
-from cosserat_fenicsx.results.history import Instant
+from cosserat_fenicsx.results.records import Instant
 from cosserat_fenicsx.storage import checkpoints, runfolder
 
 pytestmark = pytest.mark.serial

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import cosserat_fenicsx as cf
-from cosserat_fenicsx.results.extremes import largest_in_words
+from cosserat_fenicsx.results.queries import largest_in_words
 from cosserat_fenicsx.scene import stresses
 from cosserat_fenicsx.scene.stresses import rectangle_fibres
 

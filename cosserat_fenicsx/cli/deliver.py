@@ -122,7 +122,7 @@ def _default_station(path):
 
 def _report(path, station):
     if path.axis == "time":
-        from cosserat_fenicsx.results.motion_tables import motion_table as table
+        from cosserat_fenicsx.results.tables import motion_table as table
     else:
         from cosserat_fenicsx.results.tables import path_table as table
 

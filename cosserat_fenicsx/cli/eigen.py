@@ -12,7 +12,7 @@ from cosserat_fenicsx.interrupts import patience
 
 def run_buckling(options):
     """`cosserat buckling`; returns the exit code."""
-    from cosserat_fenicsx.results.shape_tables import buckling_table
+    from cosserat_fenicsx.results.shapes import buckling_table
     from cosserat_fenicsx.statics.linear_buckling import buckling
 
     return _deliver(options, buckling, buckling_table)
@@ -21,7 +21,7 @@ def run_buckling(options):
 def run_modes(options):
     """`cosserat modes`; returns the exit code."""
     from cosserat_fenicsx.dynamics.natural_modes import modes
-    from cosserat_fenicsx.results.shape_tables import modes_table
+    from cosserat_fenicsx.results.shapes import modes_table
 
     return _deliver(options, modes, modes_table)
 

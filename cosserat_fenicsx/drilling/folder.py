@@ -22,8 +22,8 @@ from cosserat_fenicsx.drilling.as_data import fingerprint, from_data, to_data
 from cosserat_fenicsx.drilling.history import COLUMNS, DrillingHistory
 from cosserat_fenicsx.drilling.protocol import PROFILE
 from cosserat_fenicsx.errors import NotStored, SceneError
+from cosserat_fenicsx.new_files import replaced
 from cosserat_fenicsx.ranks import on_first, world
-from cosserat_fenicsx.results.export.beside import replaced
 from cosserat_fenicsx.scene.as_data import NotData
 from cosserat_fenicsx.storage import checkpoints
 from cosserat_fenicsx.storage.described import difference

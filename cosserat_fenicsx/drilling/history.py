@@ -12,8 +12,8 @@ from cosserat_fenicsx.drilling.scene import Drilling
 from cosserat_fenicsx.drilling.segments import Discs
 from cosserat_fenicsx.drilling.stick_slip import StickSlip, stick_slip_of
 from cosserat_fenicsx.errors import SceneError
+from cosserat_fenicsx.new_files import replaced
 from cosserat_fenicsx.ranks import on_first, world
-from cosserat_fenicsx.results.export.beside import replaced
 from cosserat_fenicsx.results.export.exports import import_library
 from cosserat_fenicsx.well.tabular import Tabular
 

@@ -142,7 +142,7 @@ def read_history(folder: File, scene: Scene | None = None, *, comm: MPI.Comm | N
     if isinstance(folder, str | os.PathLike) and FilePath(folder).is_file():
         if scene is not None:
             refuse("read_history", "scene", scene, f"None, since the file {folder} holds its scene")
-        return saved.read(folder, "History", assembled, comm)
+        return saved.read(folder, History, assembled, comm)
     kept, scene = _open(folder, scene, comm)
     _, states, why = next(kept.memories())  # before the states, which another process may be writing
     history = _history(kept, scene, comm)

@@ -10,7 +10,7 @@ import numpy as np
 from cosserat_fenicsx.errors import Interrupted, NotConverged, SceneError
 from cosserat_fenicsx.interrupts import obey
 from cosserat_fenicsx.progress import Progress
-from cosserat_fenicsx.results.history import Instant, Ledger
+from cosserat_fenicsx.results.records import Instant, Ledger
 from cosserat_fenicsx.scene.signals import signals_of
 
 # Number of times that a failing step is halved before the motion is given up.

@@ -16,6 +16,7 @@ import numpy as np
 from cosserat_fenicsx.checks import number, positive, refuse
 from cosserat_fenicsx.errors import LibraryMissing, SceneError
 from cosserat_fenicsx.interrupts import obey
+from cosserat_fenicsx.new_files import replaced
 from cosserat_fenicsx.pictures.drawing import (
     add_body,
     add_wall,
@@ -30,7 +31,6 @@ from cosserat_fenicsx.pictures.drawing import (
 from cosserat_fenicsx.pictures.view import plain
 from cosserat_fenicsx.progress import Progress
 from cosserat_fenicsx.ranks import Alone, on_first
-from cosserat_fenicsx.results.export.beside import replaced
 
 #: Default frames per second, and width and height in pixels.
 FPS, SIZE = 25, (960, 720)

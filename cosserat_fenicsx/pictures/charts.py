@@ -4,8 +4,8 @@ import io
 from pathlib import Path
 
 from cosserat_fenicsx.errors import LibraryMissing, SceneError
+from cosserat_fenicsx.new_files import replaced
 from cosserat_fenicsx.ranks import on_first
-from cosserat_fenicsx.results.export.beside import replaced
 
 #: Colours and styles of lines, in their order; of what is not the subject.
 COLOURS = ("tab:blue", "tab:orange", "tab:green", "tab:red", "tab:purple", "tab:brown", "tab:pink", "tab:gray")

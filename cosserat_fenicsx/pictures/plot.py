@@ -8,6 +8,7 @@ import numpy as np
 
 from cosserat_fenicsx.checks import positive
 from cosserat_fenicsx.errors import SceneError
+from cosserat_fenicsx.new_files import replaced
 from cosserat_fenicsx.pictures.colours import colour_of, known, peak_of
 from cosserat_fenicsx.pictures.drawing import (
     add_body,
@@ -23,7 +24,6 @@ from cosserat_fenicsx.pictures.drawing import (
 from cosserat_fenicsx.pictures.signs import Deformed, Resting, signs_of, without_sign
 from cosserat_fenicsx.pictures.view import Labels, plain
 from cosserat_fenicsx.ranks import communicator, on_first
-from cosserat_fenicsx.results.export.beside import replaced
 
 # Smallest visible displacement as a share of the extent of the drawing.
 _VISIBLE = 0.01

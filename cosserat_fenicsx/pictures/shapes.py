@@ -13,7 +13,6 @@ from cosserat_fenicsx.pictures.drawing import body_of, frame, load_pyvista, poin
 from cosserat_fenicsx.pictures.plot import deliver
 from cosserat_fenicsx.pictures.view import view_of
 from cosserat_fenicsx.ranks import on_first
-from cosserat_fenicsx.results.shapes import require_modes
 
 # Panels of a picture, and in a row of it.
 _MOST_PANELS, _IN_A_ROW = 6, 3
@@ -29,7 +28,7 @@ _PIECES, _LETTER = 200, 11
 
 def draw(found, file, which, amplitude):
     """Picture of some shapes, a panel each; see `Shapes.plot`."""
-    require_modes(found, file)
+    found.require_modes(file)
     positive("plot", "amplitude", amplitude, "-")
     which = range(min(len(found), _MOST_PANELS)) if which is None else which
     if not isinstance(which, Collection) or not 1 <= len(which) <= _MOST_PANELS:
@@ -41,7 +40,7 @@ def draw(found, file, which, amplitude):
 def film(found, file, k, *, fps, seconds, cycles, amplitude, size, progress):
     """Film of one shape that swings to both sides; see `Shapes.animate`."""
     file = check_name(file)
-    require_modes(found, file)
+    found.require_modes(file)
     k, size = found.number(k), pixels(size)
     fps = number("animate", "fps", fps, "a number from 1 to 100", lambda x: 1 <= x <= 100)
     number("animate", "seconds", seconds, "a number from 0.2 to 60", lambda x: 0.2 <= x <= 60)

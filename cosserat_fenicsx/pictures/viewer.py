@@ -10,10 +10,10 @@ from importlib import resources
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from cosserat_fenicsx.new_files import replaced
 from cosserat_fenicsx.pictures.colours import MAPS, known, peak_of
 from cosserat_fenicsx.pictures.drawing import at_rest, outlines, thickness
 from cosserat_fenicsx.pictures.view import axes_of, view_of
-from cosserat_fenicsx.results.export.beside import replaced
 
 #: Fields that can be chosen in the file, where the result has them; the first is shown at first.
 FIELDS = ("bending_moment", "twisting_moment", "tension", "shear_force", "displacement", "von_mises")

@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from cosserat_fenicsx.results.compared import FORCE, POSITION, ROTATION, ROUNDING, differences
-from cosserat_fenicsx.results.places import cell_nodes, transferred
+from cosserat_fenicsx.results.compared import FORCE, POSITION, ROTATION, ROUNDING, cell_nodes, differences, transferred
 from cosserat_fenicsx.results.result import resting
 
 #: Largest number of points of a path that are all sample points.

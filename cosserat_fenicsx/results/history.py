@@ -1,48 +1,17 @@
 """A motion as arrays with named fields, in SI units. Imports no solver; other packages make files and pictures."""
 
-from collections import namedtuple
 from collections.abc import Sequence
-from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
 
 from cosserat_fenicsx.checks import File
 from cosserat_fenicsx.numerics import directors
-from cosserat_fenicsx.results.at_walls import WallForces, wall_forces
-from cosserat_fenicsx.results.orbits import Orbit, orbit_of
-from cosserat_fenicsx.results.records import Record
+from cosserat_fenicsx.results.recovery import viscous_contact
 from cosserat_fenicsx.results.result import Result
-from cosserat_fenicsx.results.viscous import viscous_contact
-from cosserat_fenicsx.results.whirl import Whirl, whirl
+from cosserat_fenicsx.results.whirl import Orbit, WallForces, Whirl, orbit_of, wall_forces, whirl
 from cosserat_fenicsx.scene.action import Action
 from cosserat_fenicsx.scene.rod import RodOrName, StationOrName
-
-#: Energies (J), work and dissipation since the start (J), linear and angular momentum (kg m/s, kg m^2/s), inertial, the
-#: latter about the inertial origin.
-Ledger = namedtuple("Ledger", "kinetic strain work dissipated linear_momentum angular_momentum")
-
-
-@dataclass
-class Instant(Record):
-    """A `Record` at a time (s).
-
-    Attributes:
-        rates: velocities and angular velocities of the nodes (N, 6), dimensionless, inertial.
-        steps: number of steps since the start.
-        ledger: the `Ledger`.
-        clamp_forces: force and moment (points, 6) that held every clamped point in the last step, dimensionless,
-            inertial: those of the clamp and of other supports and joints together; NaN where no step led to the state.
-        wall_forces: (touching nodes, 3) see `at_walls.WallForces`, dimensionless, wall by wall and rod by rod; NaN
-            likewise.
-    """
-
-    time: float = 0.0
-    rates: np.ndarray = None
-    steps: int = 0
-    ledger: Ledger = None
-    clamp_forces: np.ndarray = None
-    wall_forces: np.ndarray = field(default_factory=lambda: np.empty((0, 3)))
 
 
 class History(Result):

@@ -3,8 +3,7 @@
 import numpy as np
 
 from cosserat_fenicsx.numerics import conjugate_product, directors
-from cosserat_fenicsx.results.compared import POSITION
-from cosserat_fenicsx.results.places import halfway
+from cosserat_fenicsx.results.compared import POSITION, halfway
 
 # Largest length of an element next to a support, load or kink, over the length of the boundary layer there.
 _COARSE = 4.0

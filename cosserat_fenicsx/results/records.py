@@ -1,5 +1,7 @@
-"""The contents of a path: equilibria, and the events between them."""
+"""States of paths and motions, and the events of a path, which are found again on finer meshes."""
 
+import dataclasses
+from collections import namedtuple
 from dataclasses import dataclass, field, fields
 from typing import Self
 
@@ -39,6 +41,33 @@ class Record:
     steps: int = 0
 
 
+#: Energies (J), work and dissipation since the start (J), linear and angular momentum (kg m/s, kg m^2/s), inertial, the
+#: latter about the inertial origin.
+Ledger = namedtuple("Ledger", "kinetic strain work dissipated linear_momentum angular_momentum")
+
+
+@dataclass
+class Instant(Record):
+    """A `Record` at a time (s).
+
+    Attributes:
+        rates: velocities and angular velocities of the nodes (N, 6), dimensionless, inertial.
+        steps: number of steps since the start.
+        ledger: the `Ledger`.
+        clamp_forces: force and moment (points, 6) that held every clamped point in the last step, dimensionless,
+            inertial: those of the clamp and of other supports and joints together; NaN where no step led to the state.
+        wall_forces: (touching nodes, 3) see `at_walls.WallForces`, dimensionless, wall by wall and rod by rod; NaN
+            likewise.
+    """
+
+    time: float = 0.0
+    rates: np.ndarray = None
+    steps: int = 0
+    ledger: Ledger = None
+    clamp_forces: np.ndarray = None
+    wall_forces: np.ndarray = field(default_factory=lambda: np.empty((0, 3)))
+
+
 @dataclass
 class Records:
     """Equilibria as arrays over them: the fields of `Record`, each (n, ...); None where those of a `Record` are None.
@@ -62,14 +91,14 @@ class Records:
     @classmethod
     def of(cls, records):
         """Those of a list of `Record`s."""
-        return cls(**{name: _along([getattr(x, name) for x in records], np.array) for name in _NAMES})
+        return cls(**{name: _along([getattr(x, name) for x in records], np.array) for name in _FIELDS})
 
     @classmethod
     def joined(cls, parts):
         """Several one after another."""
         if len(parts) == 1:
             return parts[0]
-        return cls(**{name: _along([getattr(x, name) for x in parts], np.concatenate) for name in _NAMES})
+        return cls(**{name: _along([getattr(x, name) for x in parts], np.concatenate) for name in _FIELDS})
 
     def __len__(self):
         return len(self.load_factor)
@@ -77,14 +106,14 @@ class Records:
     def at(self, which) -> Self:
         """Those with the indices `which`, copied."""
         which = np.asarray(which, dtype=int)
-        return type(self)(**{name: _taken(getattr(self, name), which) for name in _NAMES})
+        return type(self)(**{name: _taken(getattr(self, name), which) for name in _FIELDS})
 
     def listed(self):
         """A list of `Record`s, which share the arrays."""
-        return [Record(**{name: _taken(getattr(self, name), k) for name in _NAMES}) for k in range(len(self))]
+        return [Record(**{name: _taken(getattr(self, name), k) for name in _FIELDS}) for k in range(len(self))]
 
 
-_NAMES = tuple(x.name for x in fields(Record))
+_FIELDS = tuple(x.name for x in fields(Record))
 
 
 def _along(values, join):
@@ -126,3 +155,48 @@ class Event:
     after: int
     residual: float = np.nan
     error: float = np.nan
+
+
+# Largest relative difference of the load factors of corresponding events on two meshes.
+_SAME = 1e-2
+_KINDS = {"limit": "a limit point", "bifurcation": "a bifurcation"}
+# Differences are relative to the event's load factor, or to this times the largest one of the path if that is larger.
+_LEAST = 1e-3
+
+
+def find_again(fine, coarse):
+    """Set the `error` of the events of a path from the events of the same kind on a coarser mesh.
+
+    Returns:
+        The events of the coarser mesh without a counterpart.
+    """
+    left, least = list(coarse.events), _LEAST * float(np.abs(fine.load_factors).max(initial=0.0))
+
+    def apart(event, other):
+        return abs(event.load_factor - other.load_factor) / max(abs(event.load_factor), least)
+
+    for k, event in enumerate(fine.events):
+        near = min((x for x in left if x.kind == event.kind), key=lambda other: apart(event, other), default=None)
+        error = np.nan
+        if near is not None and apart(event, near) < _SAME:
+            left.remove(near)
+            error = apart(event, near)
+        fine.events[k] = dataclasses.replace(event, error=error)
+    return left
+
+
+def keep_confirmed(path, largest, left):
+    """Remove the events whose `error` is unknown or too large from a path's list, and report them in its `why`.
+
+    Args:
+        largest: error allowed.
+        left: events of a coarser mesh without a counterpart.
+    """
+    unsure = [event for event in path.events if not event.error <= largest]
+    path.events = [event for event in path.events if event.error <= largest]
+    meshes = [(event, "could not be confirmed on another mesh") for event in unsure]
+    meshes += [(event, "of a coarser mesh was not found again on a finer one") for event in left]
+    for event, what in meshes:
+        apart = f" (load factors that differ by {event.error:.1g})" if np.isfinite(event.error) else ""
+        where = f"{_KINDS[event.kind]} near the load factor {event.load_factor:.6g}"
+        path.why.append(f"{where} {what}{apart}: it is not listed")

@@ -9,11 +9,9 @@ from cosserat_fenicsx.checks import File, instance
 from cosserat_fenicsx.numerics import directors
 from cosserat_fenicsx.remember import per_scene
 from cosserat_fenicsx.results.export.exports import Exports
-from cosserat_fenicsx.results.extremes import Extremes
 from cosserat_fenicsx.results.fields import fields_at
-from cosserat_fenicsx.results.reactions import Reactions
+from cosserat_fenicsx.results.queries import Extremes, Reactions, Stresses
 from cosserat_fenicsx.results.states import States
-from cosserat_fenicsx.results.stresses import Stresses
 from cosserat_fenicsx.scene.rod import RodOrName, Station, StationOrName
 
 # How far beyond a jump its right side is taken, over the rod's length.

@@ -1,16 +1,20 @@
-"""Shapes of a structure about an equilibrium: base class of the results of buckling and of natural vibrations."""
+"""Shapes of a structure about an equilibrium: base class of `Buckling` and `Modes`, and their tables."""
 
 import math
 import numbers
 from dataclasses import dataclass
+from html import escape
 
 import numpy as np
 from mpi4py import MPI
+from rich.table import Table
 
 from cosserat_fenicsx.checks import refuse
 from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.numerics import ElementRule, directors
 from cosserat_fenicsx.results.on_nodes import OnNodes
+from cosserat_fenicsx.results.tables import as_text
+from cosserat_fenicsx.scene.describe import actions_in_words
 
 # Largest displacement of a mode of pure twist, m (the largest displacement or rotation of a mode is 1).
 _TWIST = 1e-6
@@ -132,6 +136,15 @@ class Shapes(OnNodes):
             refuse(self, "k", k, f"the number of a mode, {known}")
         return int(k) % len(self)
 
+    def require_modes(self, file):
+        """Refuse a file or picture of no mode at all.
+
+        Raises:
+            SceneError: there is none.
+        """
+        if not len(self):
+            raise SceneError(f"{file or 'picture'}: there is no mode to show")
+
     def twists(self, k):
         """Whether mode k turns sections and displaces nothing."""
         return np.abs(self.shapes[self.number(k), :, :3]).max() < _TWIST
@@ -147,7 +160,6 @@ class Shapes(OnNodes):
 
     def _repr_html_(self):
         """A table for notebooks."""
-        from cosserat_fenicsx.results.shape_tables import html_table
 
         return html_table(self)
 
@@ -167,9 +179,9 @@ class Shapes(OnNodes):
             OSError: the file cannot be written.
             SceneError: an unknown format, or no mode.
         """
-        from cosserat_fenicsx.results.export import shape_files
+        from cosserat_fenicsx.results.export import xdmf
 
-        shape_files.write(self, file, k)
+        xdmf.write_shapes(self, file, k)
 
     def plot(self, file=None, which=None, *, amplitude=0.1):
         """Picture of the shapes, a panel each, with the equilibrium as a grey line.
@@ -231,11 +243,67 @@ def largest_error(errors):
     return "error not estimated" if math.isnan(worst) else f"estimated relative error {worst:.1e}"
 
 
-def require_modes(found, file):
-    """Refuse a file or picture of no mode at all.
+def buckling_table(found):
+    """Text: critical load factors by linear buckling, where each mode moves most, and the limits of the result."""
+    caption = (
+        f"The equilibrium at the load factor {found.load_factor:g}, extrapolated linearly, becomes critical there.\n"
+        "est. error: relative, of the load factor.\n"
+        "A structure that bends much before it buckles needs `cosserat run`."
+    )
+    headings = ("critical load factor", "est. error")
+    rows = [(f"{eta:.7g}", _error(error)) for eta, error in zip(found.load_factors, found.error, strict=True)]
+    text = _table(found, headings, rows, caption) if rows else f"{found.none[0].upper()}{found.none[1:]}."
+    lines = [text, actions_in_words(found.scene)]
+    if found.conservative:
+        lines.append(f"The loads have a potential: there is no static bifurcation below {found.bound:.7g} (bound).")
+    return "\n".join([*lines, found.caution]).rstrip()
 
-    Raises:
-        SceneError: there is none.
-    """
-    if not len(found):
-        raise SceneError(f"{file or 'picture'}: there is no mode to show")
+
+def modes_table(found):
+    """Text: natural frequencies, where each mode moves most, and whether the state is stable."""
+    caption = (
+        "est. error: relative, of the square of the frequency.\n"
+        "0 Hz: a free motion, or one that grows as exp(growth t)."
+    )
+    numbers = zip(found.frequencies, found.periods, found.growth, found.error, strict=True)
+    rows = [(f"{f:.7g}", f"{T:.5g}" if f else "-", f"{growth:.4g}", _error(e)) for f, T, growth, e in numbers]
+    text = _table(found, ("frequency (Hz)", "period (s)", "growth (1/s)", "est. error"), rows, caption)
+    verdict = {0: "no negative mode (stable)" if found.conservative else "no negative mode", -1: "a singular stiffness"}
+    counted = verdict.get(found.negative_modes, f"{found.negative_modes} negative mode(s) (unstable)")
+    return f"{text}\nThe equilibrium at the load factor {found.load_factor:g} has {counted}.\n{found.caution}".rstrip()
+
+
+def html_table(found):
+    """The numbers of all modes as a table in HTML, with the limits of the result."""
+    head = "".join(f"<th>{name}</th>" for name in ("k", *found.columns))
+    rows = "".join(
+        f"<tr>{''.join(f'<td>{value:.7g}</td>' for value in (k, *values))}</tr>"
+        for k, values in enumerate(zip(*found.columns.values(), strict=True))
+    )
+    title = f"{found.scene.title}: {found.title.lower()}" if found.scene.title else found.title
+    return f"<table><caption>{escape(title)}</caption><tr>{head}</tr>{rows}</table><p>{escape(found.caution)}</p>"
+
+
+def _table(found, headings, rows, caption):
+    table = Table(
+        title=f"{found.scene.title or found.title}: degree {found.degree}, "
+        f"{' + '.join(map(str, found.elements))} elements",
+        caption=f"{caption}\nk: number of the mode in Python, in files and in pictures.",
+    )
+    for heading in ("k", *headings, "mode moves most at (m)", "there along"):
+        table.add_column(heading, justify="right")
+    for k, row in enumerate(rows):
+        table.add_row(str(k), *row, *_farthest(found, k))
+    return as_text(table)
+
+
+def _error(error):
+    return "unknown" if np.isnan(error) else f"{error:.1e}"
+
+
+def _farthest(found, k):
+    """Texts: the station with the largest displacement of a mode, and its direction there, inertial."""
+    station, along = found.farthest(k)
+    if station is None:
+        return "sections turn", "-"
+    return str(station), "({:.2f}, {:.2f}, {:.2f})".format(*(np.round(along, 2) + 0.0))

@@ -11,7 +11,7 @@ from cosserat_fenicsx.checks import number
 from cosserat_fenicsx.errors import NotConverged, SceneError
 from cosserat_fenicsx.progress import MeshProgress
 from cosserat_fenicsx.ranks import communicator
-from cosserat_fenicsx.results.buckling import Buckling
+from cosserat_fenicsx.results.modes import Buckling
 from cosserat_fenicsx.results.shapes import Equilibrium
 from cosserat_fenicsx.scene.action import has_permanent
 from cosserat_fenicsx.scene.magnitudes import check_magnitudes

@@ -27,7 +27,7 @@ def read_path(file: File, *, comm: MPI.Comm | None = None) -> Path:
     Raises:
         SceneError: it cannot be read, is damaged, holds something else, or is of a newer release.
     """
-    path = saved.read(file, "Path", assembled, communicator(comm))
+    path = saved.read(file, Path, assembled, communicator(comm))
     path._potential, path._differentiated = conservative_along, derivatives_of
     return path
 

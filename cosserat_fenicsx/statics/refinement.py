@@ -21,7 +21,7 @@ from cosserat_fenicsx.results.accuracy import (
 )
 from cosserat_fenicsx.results.compared import NAMES, POSITION
 from cosserat_fenicsx.results.indicators import contact_edges, of_path, resolves, winding_lengths
-from cosserat_fenicsx.results.same_events import find_again, keep_confirmed
+from cosserat_fenicsx.results.records import find_again, keep_confirmed
 from cosserat_fenicsx.statics.first_mesh import resolving
 from cosserat_fenicsx.statics.grading import balanced, loose_edges, with_edges, with_layers, with_turns
 from cosserat_fenicsx.statics.path.recorder import Promoted

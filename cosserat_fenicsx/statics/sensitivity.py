@@ -23,7 +23,7 @@ from cosserat_fenicsx.models.rodmesh import same_places
 from cosserat_fenicsx.models.signature import Signature
 from cosserat_fenicsx.numerics import PLACES, STEP, derivative, is_smooth
 from cosserat_fenicsx.results.accuracy import on_mesh
-from cosserat_fenicsx.results.perturbed import PerturbedPath
+from cosserat_fenicsx.results.path import PerturbedPath
 from cosserat_fenicsx.results.sensitivity import Sensitivity
 from cosserat_fenicsx.scene.action import path_dependent
 from cosserat_fenicsx.scene.parameters import parameter_of

@@ -14,8 +14,8 @@ from pathlib import Path
 from cosserat_fenicsx import __version__
 from cosserat_fenicsx.checks import instance, warn
 from cosserat_fenicsx.errors import SceneError
+from cosserat_fenicsx.new_files import replaced
 from cosserat_fenicsx.ranks import on_first
-from cosserat_fenicsx.results.export.beside import replaced
 from cosserat_fenicsx.scene.as_data import NotData, from_data, to_data
 from cosserat_fenicsx.storage import checkpoints
 from cosserat_fenicsx.storage.described import difference, fingerprint, fingerprint_at, times_ahead

@@ -11,7 +11,8 @@ import numpy as np
 from cosserat_fenicsx.errors import NotStored, SceneError
 from cosserat_fenicsx.numerics import ElementRule
 from cosserat_fenicsx.ranks import on_first
-from cosserat_fenicsx.results.history import History, Instant, Ledger
+from cosserat_fenicsx.results.history import History
+from cosserat_fenicsx.results.records import Instant, Ledger
 
 
 class StoredHistory(History):

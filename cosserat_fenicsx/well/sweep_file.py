@@ -8,8 +8,8 @@ import numpy as np
 
 from cosserat_fenicsx.checks import instance, warn
 from cosserat_fenicsx.errors import SceneError
+from cosserat_fenicsx.new_files import replaced
 from cosserat_fenicsx.ranks import on_first, world
-from cosserat_fenicsx.results.export.beside import replaced
 from cosserat_fenicsx.storage import rows
 from cosserat_fenicsx.storage.described import NotDescribed, described
 from cosserat_fenicsx.storage.entries import A_TEXT, below, number, or_none

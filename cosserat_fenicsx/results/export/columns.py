@@ -5,7 +5,7 @@ import csv
 import numpy as np
 
 from cosserat_fenicsx.errors import SceneError
-from cosserat_fenicsx.results.export.beside import replaced
+from cosserat_fenicsx.new_files import replaced
 from cosserat_fenicsx.results.export.quantities import FIELDS, headings
 from cosserat_fenicsx.results.tables import most_displaced
 

@@ -17,14 +17,11 @@ import numpy as np
 
 from cosserat_fenicsx import __version__
 from cosserat_fenicsx.errors import SceneError
+from cosserat_fenicsx.new_files import h5py_for, new_hdf5, replaced
 from cosserat_fenicsx.numerics import ElementRule
 from cosserat_fenicsx.results.compared import NAMES
 from cosserat_fenicsx.results.export import contents
-from cosserat_fenicsx.results.export.arrays import h5py_for, new_hdf5
-from cosserat_fenicsx.results.export.beside import replaced
-from cosserat_fenicsx.results.history import History, Instant, Ledger
-from cosserat_fenicsx.results.path import Path
-from cosserat_fenicsx.results.records import Event, Record, Records
+from cosserat_fenicsx.results.records import Event, Instant, Ledger, Record, Records
 from cosserat_fenicsx.scene.as_data import NotData, from_data, to_data
 
 _FORMAT, _VERSION = "result of cosserat_fenicsx", 1
@@ -111,7 +108,7 @@ def read(file, kind, assemble, comm):
 
     Args:
         file: its name.
-        kind: "Path" or "History".
+        kind: the class, `Path` or `History`.
         assemble: function of the scene, the element ends of every rod and the units of length, force and moment, that
             returns the layout, the scales and the connections.
         comm: the MPI communicator of the result.
@@ -119,7 +116,7 @@ def read(file, kind, assemble, comm):
     Raises:
         SceneError: it cannot be read, is damaged, holds something else, or is of a newer release.
     """
-    h5py, expected = h5py_for(file), f"expected a file that `save` of a {kind} wrote"
+    h5py, expected = h5py_for(file), f"expected a file that `save` of a {kind.__name__} wrote"
     if not os.path.isfile(file):
         raise SceneError(f"{file}: there is no such file: {expected}")
     try:
@@ -127,7 +124,7 @@ def read(file, kind, assemble, comm):
     except OSError as problem:
         raise SceneError(f"{file}: it cannot be read ({problem}): {expected}") from None
     with store:
-        _check_kind(file, store.attrs, kind)
+        _check_kind(file, store.attrs, kind.__name__)
         try:
             settings, data = (json.loads(_checked(store, name)) for name in ("settings", "scene"))
             numbers = {name: _checked(store["solution"], name) for name in store["solution"]}
@@ -167,7 +164,7 @@ def _restored(kind, scene, settings, numbers, assemble, comm):
     counts, rule = settings["elements"], ElementRule(*(numbers[name] for name in ("nodes", "gauss", "weights")))
     breaks = np.split(numbers["element_ends"], np.cumsum(np.add(counts, 1))[:-1])
     layout, scales, connections = assemble(scene, breaks, settings["scales"])
-    p, moving = settings["degree"], kind == "History"
+    p, moving = settings["degree"], kind.axis == "time"
     sizes = {"N": sum(p * count + 1 for count in counts), "E": sum(counts), "G": len(rule.gauss), "P": p + 1,
              "T": len(connections.ties), "C": len(connections.clamped)}  # fmt: skip
     expected = (_OF_INSTANT | _OF_LEDGER if moving else _OF_POINT | _DENSITIES).items()
@@ -176,7 +173,7 @@ def _restored(kind, scene, settings, numbers, assemble, comm):
         if name in numbers:
             _check_shape(name, numbers[name].shape, (states, *(sizes.get(x, x) for x in dims)))
     common = {name: settings[name] for name in ("model", "formulation", "degree", "unknowns", "why")}
-    result = (History if moving else Path)(scene, layout, scales, rule, comm=comm, **common, connections=connections,
+    result = kind(scene, layout, scales, rule, comm=comm, **common, connections=connections,
                                            expand=None)  # fmt: skip
     listed = [_record(numbers, k, moving) for k in range(states)]
     result._expanded = listed if moving else Records.of(listed) if listed else None

@@ -1,0 +1,286 @@
+"""Queries that paths and motions share: largest forces and stresses, reactions, stresses; also in sentences."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from cosserat_fenicsx.checks import refuse
+from cosserat_fenicsx.errors import SceneError
+from cosserat_fenicsx.numerics import directors
+from cosserat_fenicsx.results.on_nodes import OnNodes
+from cosserat_fenicsx.scene.describe import describe
+from cosserat_fenicsx.scene.rod import Station, StationOrName
+from cosserat_fenicsx.scene.stresses import Stress
+from cosserat_fenicsx.scene.supports import Support
+
+# Sampling intervals of an element, per degree of its polynomials.
+_PLACES = 6
+# Relative differences, and values relative to the largest of the same unit, below this are rounding.
+_ROUNDING = 1e-6
+_UNITS = {
+    "bending moment": "N m",
+    "twisting moment": "N m",
+    "shear force": "N",
+    "tension": "N",
+    "compression": "N",
+    "normal stress": "Pa",
+    "von Mises stress": "Pa",
+}
+# States that are computed at once.
+_BLOCK = 64
+
+
+@dataclass(frozen=True)
+class Largest:
+    """The largest value of a quantity: its size (N m, N or Pa), its station, and the index of the point or time."""
+
+    size: float
+    station: Station
+    point: int
+
+
+class Extremes(OnNodes):
+    """The largest contact forces, moments and stresses of a path or a motion."""
+
+    def largest(self) -> dict[str, "Largest"]:
+        """The largest contact forces, moments and stresses over all points of a path (or times of a motion) and all
+        rods.
+
+        Both sides of jumps are included, and places between the nodes. Values are those of the mesh used: the `errors`
+        of a path tell how well it knows n and m; `tol` of a motion limits the error of positions only. With t = d_3:
+        bending ``|m - (m.t) t|``, twisting ``|m.t|``, shear ``|n - (n.t) t|``, tension ``n.t``, compression ``-n.t``.
+
+        Returns:
+            {quantity: `Largest`}, the quantities "bending moment", "twisting moment" (N m), "shear force", "tension",
+            "compression" (N) and, of the rods that know them, "normal stress" (its size) and "von Mises stress" (Pa,
+            see `stress`), without those that are zero up to rounding.
+        """
+        found = dict.fromkeys(_UNITS, Largest(0.0, None, 0))
+        inside = np.linspace(0, 1, _PLACES * self.degree + 1)
+        for first in range(0, len(self), _BLOCK):
+            which = range(first, min(first + _BLOCK, len(self)))
+            contact = np.array([self._contact_of(k) for k in which])
+            for i, rod in enumerate(self.scene.rods):
+                for what, sizes in self._sizes(i, inside, contact[:, self._cells(i)], which).items():
+                    most = sizes.max()
+                    k, place = np.unravel_index(np.argmax(sizes >= most - _ROUNDING * abs(most)), sizes.shape)
+                    if sizes[k, place] > (1 + _ROUNDING) * found[what].size:
+                        s = self._places(i, inside).ravel()[place]
+                        found[what] = Largest(float(sizes[k, place]), rod.at(s), first + int(k))
+        most = {unit: max(x.size for what, x in found.items() if _UNITS[what] == unit) for unit in _UNITS.values()}
+        return {what: x for what, x in found.items() if x.size > _ROUNDING * most[_UNITS[what]]}
+
+    def _places(self, i, inside):
+        """(elements, places) arc lengths of places in the elements of the i-th rod, m."""
+        breaks = self.layout.breaks[i]
+        return (breaks[:-1, None] + np.diff(breaks)[:, None] * inside) * self.scene.rods[i].length
+
+    def _sizes(self, i, inside, contact, which):
+        """{quantity: (states, places)} in the elements of the i-th rod.
+
+        Args:
+            contact: (states, elements, nodes per element, 6) n and m, dimensionless; which: indices of the states.
+        """
+        rod, basis, s = self.scene.rods[i], self.rule.basis(inside), self._places(i, inside)
+        nodes = np.arange(self.elements[i])[:, None] * self.degree + np.arange(self.degree + 1)
+        rows = self._rows(rod)[1]
+        q = np.einsum("qj,kcji->kcqi", basis, np.array([self._records[k].rq[rows, 3:] for k in which])[:, nodes])
+        q /= np.linalg.norm(q, axis=-1, keepdims=True)
+        d = directors(q.reshape(-1, 4)).reshape(*q.shape[:-1], 3, 3) @ rod.curve.frame(s.ravel()).reshape(
+            *s.shape, 3, 3
+        )
+        n, m = np.split(np.einsum("qj,kcji->kcqi", basis, contact), 2, axis=-1)
+        n = np.einsum("kcqij,kcqi->kcqj", d, n) * self.scales.force
+        m = np.einsum("kcqij,kcqi->kcqj", d, m) * self.scales.moment
+        sizes = {
+            "bending moment": np.hypot(m[..., 0], m[..., 1]),
+            "twisting moment": np.abs(m[..., 2]),
+            "shear force": np.hypot(n[..., 0], n[..., 1]),
+            "tension": n[..., 2],
+            "compression": -n[..., 2],
+        }
+        if rod.profile.shaped:
+            normal, mises = np.zeros((2, *n.shape[:-1]))
+            for places, side in ((slice(0, 1), "right"), (slice(1, None), "left")):  # within the element at jumps
+                flat = (len(which), -1, 3)
+                told = rod.profile.stresses(
+                    s[:, places].ravel(), side, n[:, :, places].reshape(flat), m[:, :, places].reshape(flat)
+                )
+                shape = normal[:, :, places].shape
+                normal[:, :, places] = np.nan_to_num(np.maximum(told.axial_max, -told.axial_min)).reshape(shape)
+                mises[:, :, places] = np.nan_to_num(told.von_mises).reshape(shape)
+            sizes |= {"normal stress": normal, "von Mises stress": mises}
+        return {what: values.reshape(len(which), -1) for what, values in sizes.items()}
+
+
+def largest_in_words(path):
+    """`Extremes.largest` as a line of text, and which rods' stresses it cannot know."""
+    moves = path.axis == "time"
+    unit = " s" if moves else ""
+    told = [
+        f"{what} {x.size:.4g} {_UNITS[what]} ({x.station}, {path.axis} {path.along_axis[x.point]:.4g}{unit})"
+        for what, x in path.largest().items()
+    ]
+    limits = " (tol limits errors of positions only)" if moves else ""
+    line = f"Largest on this mesh{limits}: {'; '.join(told) or 'no force or moment'}."
+    return "\n".join([line, *_unknown_in_words(path)])
+
+
+def _unknown_in_words(path):
+    """Sentences on rods of which stresses are not known, where those of others are."""
+    if not path.knows_stresses:
+        return
+    fields = {rod.name: path.fields(0, rod) for rod in path.scene.rods}
+    for field, what in (("axial_max", "Stresses"), ("von_mises", "Von Mises stresses")):
+        names = [name for name, values in fields.items() if np.isnan(values[field]).any()]
+        if names:
+            yield f"{what} of {', '.join(names)} are not computed, or not everywhere: see the sections there."
+            fields = {name: values for name, values in fields.items() if name not in names}  # each is told once
+
+
+# Components below this times the largest force or moment are rounding.
+_NO_REACTION = 1e-6
+
+
+class Reactions(OnNodes):
+    """Reactions of a result, from the residual of the equations that it solves."""
+
+    def reaction(self, support: Support | StationOrName) -> tuple[np.ndarray, np.ndarray]:
+        """Force and moment that a support exerts on its rod in every state.
+
+        They are the multipliers of the support's constraint equations. A clamp has none: its reaction balances the
+        internal forces of the rods joined there, the loads on that point, and other supports and joints there.
+
+        In a motion they balance loads and momenta over the step that led to a saved state: they belong to the middle of
+        this step with "momentum" and "energy", to the middle of the last of its three substeps with "triple-jump", and
+        to its end with "generalised-alpha". They are NaN where no step led to the state: at the start, and where a
+        motion was lost.
+
+        Args:
+            support: one of `result.scene.supports`; or a station with supports, or its name: the sum of their
+                reactions.
+
+        Returns:
+            force (n, 3), N, and moment (n, 3) about the station, N m, both inertial.
+
+        Raises:
+            SceneError: not a support of the scene; or a clamp at whose point an action with memory acts, since its
+                force is not stored.
+        """
+        parts = []
+        for i in self.scene.supports_of(support):
+            held = self.scene.supports[i]
+            parts.append(self._of_clamp(held) if held.clamps else self._of_equations(i))
+        exerted = sum(parts)
+        force, moment = np.split(exerted, 2, axis=1)
+        return force * self.scales.force, moment * self.scales.moment
+
+    def _of_equations(self, which):
+        """(n, 6) force and moment, dimensionless, of a support with constraint equations."""
+        first = sum(len(support.ties()) for support in self.scene.supports[:which])
+        own = slice(first, first + len(self.scene.supports[which].ties()))
+        return self._stacked("tie_forces")[:, own, 0].sum(axis=1)
+
+    def _of_clamp(self, clamp):
+        """(n, 6) force and moment, dimensionless."""
+        links = self._connections
+        leaders = dict(links.leaders)
+        vertex = self.layout.vertex(self.scene, clamp.station)
+        point = leaders.get(vertex, vertex)
+        joined = [point, *(vertex for vertex, leader in links.leaders if leader == point)]
+        for action in self.scene.actions:
+            if action.memory and action.station and self.layout.vertex(self.scene, action.station) in joined:
+                raise SceneError(
+                    f"{describe(clamp)}: its reaction is unknown, since {describe(action)} at the same point has "
+                    "memory, and its force is not stored"
+                )
+        exerted = self._at_clamp(links.clamped.index(point), joined)
+        tie_forces = self._stacked("tie_forces")
+        for i, (_, *stations) in enumerate(links.ties):
+            for k, station in enumerate(stations):
+                if station == point:
+                    exerted = exerted - tie_forces[:, i, k]
+        return exerted
+
+    def _at_clamp(self, point, joined):
+        """(n, 6) force and moment that hold a clamped point against internal forces and loads, dimensionless.
+
+        Args:
+            point: index of the clamped point; joined: (rod index, element end) of all rods that share it.
+        """
+        raise NotImplementedError
+
+
+def reactions_in_words(result):
+    """The reaction of every support in the last state, one sentence each."""
+    contact = result._contact_of(len(result) - 1)
+    n = np.linalg.norm(contact[..., :3], axis=-1).max() * result.scales.force
+    m = np.linalg.norm(contact[..., 3:], axis=-1).max() * result.scales.moment
+    at = result.along_axis[-1]
+    when = f"at the {result.axis} {at:.6g}" if result.axis != "time" else f"in the step that ends at t = {at:.6g} s"
+    for support in result.scene.supports:
+        try:
+            force, moment = (values[-1] for values in result.reaction(support))
+        except SceneError as unknown:
+            yield f"{unknown}."
+            continue
+        if np.isfinite(force).all():
+            yield f"{describe(support)} exerts {_vector(force, n)} N and {_vector(moment, m)} N m {when}."
+
+
+def _vector(a, beside):
+    """Components as text, with 0 for those that are rounding relative to the largest of them or to `beside`."""
+    least = _NO_REACTION * max(np.abs(a).max(), beside)
+    return f"({', '.join(f'{x:.6g}' if abs(x) > least else '0' for x in a)})"
+
+
+_SIDES = ("left", "right")
+
+
+class Stresses(OnNodes):
+    """Stresses from the contact forces and moments, where sections know their shape."""
+
+    def stress(self, station: StationOrName, side: str | None = None) -> Stress:
+        """Stresses of the section at a station, Pa; see `scene.stresses` for the theory.
+
+        They are those of tension, bending, torsion and shear by Saint-Venant, per area of the reference. Where the
+        section changes or a point load acts, the two sides of the station differ: by default each stress is the worse
+        of both, and a side whose section has no shape is left out. In motions they include the stresses of damping.
+
+        Args:
+            station: a `Station` or its name.
+            side: "left" for the side of smaller s, "right" for that of larger s; default the worse of both.
+
+        Returns:
+            `Stress` of arrays (n,): von_mises, the largest of the section, NaN for a `Profile`; axial_max and
+            axial_min, the largest and the smallest normal stress of the section, tension positive.
+
+        Raises:
+            SceneError: no such station or side, or the section there is a `Stiffness`, whose shape is not known.
+        """
+        station = self.station(station)
+        if side not in (None, *_SIDES):
+            refuse(f"stress at {station}", "side", side, "'left', 'right', or None for the worse of both")
+        profile, zero = station.rod.profile, np.zeros(3)
+        sections = {where: profile.section(station.s, where) for where in ([side] if side else _SIDES)}
+        shaped = [at for at, section in sections.items() if section.stresses(profile.material, zero, zero) is not None]
+        if not shaped:
+            kinds = " and ".join(sorted({type(section).__name__ for section in sections.values()}))
+            raise SceneError(
+                f"stress at {station}: the section there is a {kinds}, whose shape is not known: expected a Circle, "
+                "a Tube, a Rectangle, a Profile or another section with a shape"
+            )
+        von_mises, most, least = zip(*(self._stress_on(station, where) for where in shaped), strict=True)
+        return Stress(np.fmax.reduce(von_mises), np.fmax.reduce(most), np.fmin.reduce(least))
+
+    def _stress_on(self, station, side):
+        d = directors(self.rotation(station)) @ station.rod.curve.frame(station.s)
+        contact = self._contact_at(station, side)
+        n, m = contact[:, :3] * self.scales.force, contact[:, 3:] * self.scales.moment
+        n, m = (np.einsum("kij,ki->kj", d, x)[:, None] for x in (n, m))
+        return Stress(*(x[:, 0] for x in station.rod.profile.stresses(np.array([station.s]), side, n, m)))
+
+    @property
+    def knows_stresses(self) -> bool:
+        """Whether a section of any rod knows its shape; else `fields` and files have no stresses."""
+        return any(rod.profile.shaped for rod in self.scene.rods)
