@@ -121,7 +121,7 @@ from cosserat_fenicsx.scene.supports import Prescribed as Prescribed
 from cosserat_fenicsx.scene.supports import Roller as Roller
 from cosserat_fenicsx.statics.linear_buckling import buckling as buckling
 from cosserat_fenicsx.statics.path.load_control import StepControl as StepControl
-from cosserat_fenicsx.statics.reading import read_path as read_path
+from cosserat_fenicsx.statics.path.recorder import read_path as read_path
 from cosserat_fenicsx.statics.solve import solve as solve
 from cosserat_fenicsx.studies.outcome import Study as Study
 from cosserat_fenicsx.studies.study import study as study

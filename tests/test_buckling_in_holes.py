@@ -13,7 +13,7 @@ from scipy.special import ai_zeros
 
 import cosserat_fenicsx as cf
 from cosserat_fenicsx.actions.walls import TubeWall
-from cosserat_fenicsx.algebra.limited_newton import LimitedNewton
+from cosserat_fenicsx.algebra.newton import LimitedNewton
 from cosserat_fenicsx.models.rodmesh import Layout
 from cosserat_fenicsx.scene import action
 from cosserat_fenicsx.statics.solvers import solvers_of

@@ -5,7 +5,7 @@ import pytest
 
 import cosserat_fenicsx as cf
 from cosserat_fenicsx.cli.explain import explain
-from cosserat_fenicsx.statics.first_mesh import first_layout
+from cosserat_fenicsx.statics.meshes import first_layout
 from cosserat_fenicsx.storage.described import difference, fingerprint
 
 pytestmark = pytest.mark.serial

@@ -10,7 +10,7 @@ from mpi4py import MPI
 from scipy.linalg import eigvalsh_tridiagonal
 
 import cosserat_fenicsx as cf
-from cosserat_fenicsx.algebra import interface
+from cosserat_fenicsx.algebra import elimination
 from cosserat_fenicsx.models.rodmesh import Layout
 from cosserat_fenicsx.statics.solvers import solvers_of
 
@@ -296,7 +296,7 @@ def test_ranks_share_the_elimination(name):
 def test_signs_of_a_large_system_without_a_pivot_on_its_diagonal(zeros):
     """Of a sparse symmetric matrix whose factors need pivots off the diagonal; a dense one would take minutes."""
     rng, size = np.random.default_rng(5), 3000
-    system = interface._Sparse(size)
+    system = elimination._Sparse(size)
     i = np.arange(size)
     rows, columns = np.concatenate([i, i[1:], i[:-1]]), np.concatenate([i, i[:-1], i[1:]])
     entry = system.entries(rows, columns)

@@ -75,16 +75,10 @@ ROOMS = {
 #: results.
 FITTERS = {
     "statics": {
-        "agreement",
         "circulatory",
         "critical",
-        "critical_points",
-        "energies",
-        "first_mesh",
-        "grading",
+        "meshes",
         "linear_buckling",
-        "reading",
-        "recording",
         "refinement",
         "sensitivity",
         "solve",

@@ -121,3 +121,22 @@ def _linker():
     if os.environ.get("CC") and words.startswith(compiler):
         words = os.environ["CC"] + words[len(compiler) :]
     return shlex.split(words)
+
+
+class Pointers:
+    """Base of what gives C pointers to arrays: these are kept as long as the object. `sources`: see `module`."""
+
+    def __init__(self, *sources):
+        self._ffi, self._lib = module(*sources)
+        self._arrays = []
+
+    def doubles(self, array):
+        """C's pointer to an array of floats."""
+        self._arrays.append(array)
+        return self._ffi.cast("double *", array.ctypes.data)
+
+    def integers(self, array):
+        """C's pointer to an array of 32-bit integers, which is copied if it is not one."""
+        array = np.ascontiguousarray(array, dtype=np.int32)
+        self._arrays.append(array)
+        return self._ffi.cast("int *", array.ctypes.data)

@@ -1,10 +1,9 @@
-"""Eigenvalues by SLEPc; no other file imports it."""
+"""Assembled matrices: their eigenvalues by SLEPc, which no other file imports, and the direct solver for each kind."""
 
 import numpy as np
 from petsc4py import PETSc
 from slepc4py import SLEPc
 
-from cosserat_fenicsx.algebra import linear
 from cosserat_fenicsx.interrupts import obey
 
 _TOLERANCE = 1e-12
@@ -80,7 +79,7 @@ def largest_of_pencil(A, B, count, least):
     count = min(count, _above(A, B, least))
     if not count:
         return np.empty(0), []
-    solver, pc = _of_pencil(A, B, linear.factor_second_variation)
+    solver, pc = _of_pencil(A, B, factor_second_variation)
     values, vectors = _solve(solver, SLEPc.EPS.ProblemType.GHEP, SLEPc.EPS.Which.LARGEST_REAL, count, A)
     pc.destroy()
     return values, _in_units(vectors, scale)
@@ -92,7 +91,7 @@ def _above(A, B, least):
     matrix.aypx(-1 / least, B)  # B - A/least
     matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
     pc.setOperators(matrix)
-    linear.factor_constrained(pc, matrix)
+    factor_constrained(pc, matrix)
     pc.setUp()
     negative = pc.getFactorMatrix().getInertia()[0]
     pc.destroy()
@@ -142,7 +141,7 @@ def real_of_pencil(A, B, count):
 
 def _unsymmetric(A, B, count):
     """(values (n,), complex; real or imaginary parts of eigenvectors) of the eigenvalues of largest magnitude."""
-    solver, pc = _of_pencil(A, B, linear.factor_general)
+    solver, pc = _of_pencil(A, B, factor_general)
     which = SLEPc.EPS.Which.LARGEST_MAGNITUDE
     found = _solve(solver, SLEPc.EPS.ProblemType.GNHEP, which, count, A, tolerance=_UNSYMMETRIC)
     pc.destroy()
@@ -218,3 +217,44 @@ def _solve(solver, kind, which, count, like, *, room=None, tolerance=_TOLERANCE)
         vectors.append(vector)
     solver.destroy()
     return (values if kind == SLEPc.EPS.ProblemType.GNHEP else values.real), vectors
+
+
+def factor_general(pc, A):
+    """Set an LU factorisation with pivoting over the whole matrix."""
+    pc.setType("lu")
+    if A.comm.size > 1:
+        _mumps(pc, A)
+    else:
+        pc.setFactorSolverType("klu")
+
+
+def factor_second_variation(pc, K):
+    """Set a factorisation that gives the inertia of the matrix, i.e. its number of negative eigenvalues."""
+    if K.comm.size == 1:
+        pc.setType("cholesky")
+        pc.setFactorOrdering("nd")
+    else:
+        factor_constrained(pc, K)
+
+
+def factor_constrained(pc, K, null=0.0):
+    """As `factor_second_variation`, for a matrix whose diagonal may be zero because of constraint equations.
+
+    Args:
+        null: pivots below this count as zero; 0.0 for a threshold of rounding, relative to the largest row.
+    """
+    pc.setType("cholesky")
+    factor = _mumps(pc, K)
+    factor.setMumpsIcntl(13, 1)  # root front not distributed: otherwise some negative pivots are not counted
+    factor.setMumpsIcntl(6, 0)  # no search for a large diagonal, which gives up where a row is zero
+    factor.setMumpsIcntl(24, 1)  # null pivots are counted separately
+    factor.setMumpsCntl(3, -null)
+
+
+def _mumps(pc, A):
+    pc.setOperators(A)
+    pc.setFactorSolverType("mumps")
+    pc.setFactorSetUpSolverType()
+    factor = pc.getFactorMatrix()
+    factor.setMumpsIcntl(14, 200)  # % extra memory for fill-in: too little fails without a message
+    return factor

@@ -6,9 +6,8 @@ from functools import cache
 import numpy as np
 from mpi4py import MPI
 
-from cosserat_fenicsx.algebra.building import module
-from cosserat_fenicsx.algebra.interface import condensed
-from cosserat_fenicsx.algebra.pointers import Pointers
+from cosserat_fenicsx.algebra.building import Pointers, module
+from cosserat_fenicsx.algebra.elimination import condensed
 
 #: What C asks Python for, see newton.c.
 STATE, RESIDUAL, TANGENT, INTERFACE, ADD_UP, SUM, MATRICES, COUNT, CONTACT = (1 << k for k in range(9))

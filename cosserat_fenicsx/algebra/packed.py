@@ -4,7 +4,7 @@ import numpy as np
 from dolfinx import cpp
 
 from cosserat_fenicsx import compat
-from cosserat_fenicsx.algebra.pointers import Pointers
+from cosserat_fenicsx.algebra.building import Pointers
 
 _MARK = 0.8765432198765432
 

@@ -4,7 +4,7 @@ import numpy as np
 from petsc4py import PETSc
 from scipy import sparse
 
-from cosserat_fenicsx.algebra import eigen, linear
+from cosserat_fenicsx.algebra import eigen
 from cosserat_fenicsx.errors import NotConverged
 from cosserat_fenicsx.interrupts import interruptible, obey
 
@@ -146,7 +146,7 @@ class _Factored:
         A.setOption(PETSc.Mat.Option.SYMMETRIC, True)
         self._pc = PETSc.PC().create(PETSc.COMM_SELF)
         self._pc.setOperators(A)
-        linear.factor_constrained(self._pc, A, _NO_PIVOT)
+        eigen.factor_constrained(self._pc, A, _NO_PIVOT)
         self._pc.setUp()
         self._force, self._moved = A.createVecs()
 

@@ -15,7 +15,7 @@ from cosserat_fenicsx.scene.describe import actions_in_words, describe
 from cosserat_fenicsx.scene.magnitudes import check_magnitudes
 from cosserat_fenicsx.scene.rolled import Profile
 from cosserat_fenicsx.scene.sections import Rectangle, Stiffness
-from cosserat_fenicsx.statics.first_mesh import first_layout, meshes_for, resolving_turns
+from cosserat_fenicsx.statics.meshes import first_layout, meshes_for, resolving_turns
 from cosserat_fenicsx.statics.solve import check_arguments
 
 #: What the unknowns of a model are, in a plane (True) or in space.

@@ -25,7 +25,7 @@ from pathlib import Path
 
 import numpy as np
 
-from cosserat_fenicsx.algebra.pointers import Pointers
+from cosserat_fenicsx.algebra.building import Pointers
 from cosserat_fenicsx.checks import instance, positive, refuse
 from cosserat_fenicsx.drilling.bit_laws import Lobes, Stribeck
 from cosserat_fenicsx.drilling.protocol import LEDGER, PROFILE, SERIES

@@ -24,15 +24,13 @@ from cosserat_fenicsx.scene.describe import describe
 from cosserat_fenicsx.scene.magnitudes import check_magnitudes
 from cosserat_fenicsx.scene.scene import Scene
 from cosserat_fenicsx.scene.statical import without_mechanism
-from cosserat_fenicsx.statics.agreement import until_two_meshes_agree
 from cosserat_fenicsx.statics.circulatory import circulatory_part
-from cosserat_fenicsx.statics.first_mesh import FIRST_ELEMENTS
-from cosserat_fenicsx.statics.grading import layers_of
+from cosserat_fenicsx.statics.meshes import FIRST_ELEMENTS, layers_of, until_two_meshes_agree
 from cosserat_fenicsx.statics.path.follower import Follower
 from cosserat_fenicsx.statics.path.load_control import StepControl
-from cosserat_fenicsx.statics.shapes import shapes_of
 from cosserat_fenicsx.statics.solve import check_arguments
 from cosserat_fenicsx.statics.solvers import solvers_of
+from cosserat_fenicsx.statics.stability import shapes_of
 
 _MOST_ELEMENTS = 128
 # Newton iterations allowed after the added constraints of a mechanism are removed.

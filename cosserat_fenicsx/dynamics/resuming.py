@@ -25,7 +25,7 @@ from cosserat_fenicsx.results.history import History
 from cosserat_fenicsx.storage import checkpoints, entries
 from cosserat_fenicsx.storage.runfolder import RunFolder
 from cosserat_fenicsx.scene.scene import Scene
-from cosserat_fenicsx.statics.reading import assembled
+from cosserat_fenicsx.statics.path.recorder import assembled
 from cosserat_fenicsx.storage.stored_history import StoredHistory
 
 

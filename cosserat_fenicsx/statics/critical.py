@@ -1,27 +1,42 @@
-"""Derivatives of the critical load factors of linear buckling by numbers of a scene.
+"""Derivatives of critical load factors by numbers of a scene: of linear buckling, and of limit points and bifurcations.
 
-With the second variation K at a state and its derivative K' along the path due to stresses alone, the critical change
-of the load factor is Rayleigh's quotient -phi K phi/phi K' phi, which is stationary in the mode phi: its derivative by
-a parameter is that at fixed phi. State, contact force and their slopes by the load factor follow the parameter to first
-order, by the direct method of `sensitivity`.
+Linear buckling: with the second variation K at a state and its derivative K' along the path due to stresses alone, the
+critical change of the load factor is Rayleigh's quotient -phi K phi/phi K' phi, which is stationary in the mode phi:
+its derivative by a parameter is that at fixed phi. State, contact force and their slopes by the load factor follow the
+parameter to first order, by the direct method of `sensitivity`.
+
+Events: along an arc of the path, of points (x, eta) on planes c x = const., K dx + R_p dp + R_eta d eta = 0 and c dx =
+0 give
+
+    d eta/dp = -(c K^-1 R_p)/(c K^-1 R_eta),
+
+with the residual R and its tangent K. At a limit point, where eta is stationary on the arc, that is the derivative of
+the limit load. The load factor of a bifurcation is that at which the second variation mu along the mode vanishes on the
+path, so that d eta/dp = -mu_p/mu_eta, both along the path: x follows p and eta to first order, by the direct method.
+
+K is singular at the event, and a state interpolated from its neighbours is no equilibrium to rounding. So all is
+evaluated at two equilibria a little before and behind it, and the means are taken, whose error is of second order in
+the distance.
 """
 
 import itertools
+from dataclasses import replace
 
 import numpy as np
 
 from cosserat_fenicsx.errors import NotConverged, SceneError
+from cosserat_fenicsx.models.data_derivative import EnergyOfMotion, made_once
 from cosserat_fenicsx.numerics import PLACES, derivative
-from cosserat_fenicsx.results.sensitivity import Sensitivity
+from cosserat_fenicsx.results.records import Event
+from cosserat_fenicsx.results.sensitivity import Sensitivity, called
 from cosserat_fenicsx.scene.parameters import parameter_of
-from cosserat_fenicsx.statics.energies import Energies
 from cosserat_fenicsx.statics.path.follower import Follower
 from cosserat_fenicsx.statics.path.load_control import StepControl
-from cosserat_fenicsx.statics.sensitivity import Direct, check_scene, scenes_near
+from cosserat_fenicsx.statics.sensitivity import Direct, check_scene, scenes_near, sensitivity
 from cosserat_fenicsx.statics.solvers import solvers_of
 
 # Load factors are equal that differ by less, relative; derivatives of equal ones, likewise, with rounding.
-_EQUAL, _TOGETHER = 1e-5, 1e-5
+_EQUAL, _PAIRED = 1e-5, 1e-5
 # Step of the load factor for K', over the critical change.
 _STEP = 1e-3
 
@@ -42,7 +57,7 @@ def critical_sensitivity(buckling, parameters):
     ):
         direct.check(scenes, found)
         direct.points = [_state(direct, at)]
-        modes, pairs = _modes(buckling, direct.model.scales.length)
+        modes, pairs = _buckling_modes(buckling, direct.model.scales.length)
         quotient = _Quotient(direct, modes, buckling.load_factors[0] - at)
         derivatives, errors = {}, {}
         for parameter, rates in zip(found, direct.rates(scenes, found), strict=True):
@@ -66,7 +81,7 @@ def _state(direct, load_factor):
     return load_factor, direct.problem.numbers(), None
 
 
-def _modes(buckling, length):
+def _buckling_modes(buckling, length):
     """The modes (m, N, 6), dimensionless, then the sums of those of equal load factors; and [(i, j, index of the sum)]
     of these."""
     modes = buckling.shapes / np.repeat([length, 1.0], 3)
@@ -120,9 +135,245 @@ def _check_pairs(buckling, parameter, relative, pairs):
     """Refuse a parameter that separates equal load factors."""
     for i, j, both in pairs:
         one, other, mixed = relative[[i, j, both]] * parameter.size
-        if max(abs(one - other), abs(one - mixed)) > _TOGETHER * max(1.0, abs(one)):
+        if max(abs(one - other), abs(one - mixed)) > _PAIRED * max(1.0, abs(one)):
             raise SceneError(
                 f"parameter '{parameter.name}': it separates the critical load factors {i} and {j}, which are both "
                 f"{buckling.load_factors[i]:.6g} and have no derivatives by it: expected a parameter that keeps the "
                 "symmetry, or load factors that differ"
             )
+
+
+class Energies:
+    """The second variation along modes at the state of a `Problem`, supports and joints included.
+
+    Args:
+        problem: the `Problem`, in space.
+        modes: each (N, 6) displacements and rotations of all nodes in the scene's order, inertial, dimensionless.
+        resistance: see `Part`; None for modes that satisfy all constraint equations.
+    """
+
+    def __init__(self, problem, modes, resistance=None):
+        model = problem.model
+        self._problem, self._modes, self._resistance = problem, modes, resistance
+        self._energy = made_once(model, "energy_of_motion", EnergyOfMotion)
+        (variation,) = model.second_variations
+        self._axes = variation.axes
+        self._tied = np.array([mode[model.tied_slots] for mode in modes])
+
+    def here(self, springs=True):
+        """(modes,) dimensionless; springs: whether those in place of supports and joints count."""
+        ties, eta, tied = self._problem.ties, self._problem.eta, self._tied
+        found = np.array([self._energy.along(mode) for mode in self._modes])
+        if ties:
+            found += ties.energy(ties.second_variation(self._axes, eta), tied)
+            if springs and self._resistance is not None:
+                found += ties.energies_of_springs(self._axes, eta, self._resistance, tied)
+        return found
+
+
+# An event is the same where its load factor differs by less, relative.
+_SAME = 1e-4
+# Distance of the two points from an event: of the load factor, relative; of the state (lengths, rad), tried in turn;
+# and how far the event may be from their middle, over their distance.
+_BESIDE, _ASIDE, _BENT = 2e-5, (1e-5, 1e-4, 1e-3), 0.1
+# Changes of the state by an imperfection have opposite signs at the two points: their difference exceeds this share of
+# their sum; below the second number (lengths, rad) they are rounding. How far a mode may violate constraint equations.
+_OPPOSITE, _NOTHING, _HELD = 0.5, 1e-6, 1e-7
+# Relative derivatives of a double bifurcation, for its modes, differ by less.
+_TOGETHER = 1e-5
+
+
+def derivatives_of(path, query, parameters):
+    """See `Path.sensitivity`."""
+    if isinstance(query, Event):
+        return _of_event(path, query, parameters)
+    return replace(sensitivity(path, query, parameters), quantity=called(query))
+
+
+def _of_event(path, event, parameters):
+    if not any(event is known for known in path.events):
+        raise SceneError("sensitivity: the event is none of this path's: expected one of path.events")
+    if event.kind == "bifurcation" and not path.conservative:
+        raise SceneError("sensitivity: the loads have no potential, so that an energy does not tell of bifurcations")
+    check_scene(path.scene, critical=True)
+    parameters = [parameters] if isinstance(parameters, str) else list(parameters)
+    found = [parameter_of(path.scene, given) for given in parameters]
+    scenes = [scenes_near(path.scene, parameter) for parameter in found]
+    with solvers_of(
+        path.scene, path.layout, formulation=path.formulation, degree=path.degree, points=len(path.rule.gauss),
+        comm=path.comm, model=path.model,
+    ) as solvers:  # fmt: skip
+        with Direct(*solvers, path.scene, path.layout) as direct:
+            direct.check(scenes, found)
+            track, crossing, before = _located(direct, path, event)
+            direct.points = _beside(direct, track, crossing, before)
+            of = _of_limit if event.kind == "limit" else _of_bifurcation
+            rates, errors = of(direct, crossing, found, direct.rates(scenes, found))
+    return Sensitivity(
+        np.asarray(event.load_factor), _named(found, rates), _named(found, errors), {x.name: x.value for x in found},
+        {x.name: x.unit for x in found}, f"load factor of the {event.kind}",
+    )  # fmt: skip
+
+
+def _named(parameters, values):
+    return {x.name: np.asarray(value) for x, value in zip(parameters, values, strict=True)}
+
+
+class _Met(Exception):
+    """The event was met: its `Crossing`, and the `PathPoint` before it."""
+
+
+def _located(direct, path, event):
+    """The `Track`, the `Crossing` of an event, found again as the path was, and the `PathPoint` before it."""
+
+    def meet(crossing):
+        apart = abs(crossing.point.load_factor - event.load_factor)
+        if crossing.kind == event.kind and apart <= _SAME * abs(event.load_factor):
+            raise _Met(crossing, follower.track.here)
+
+    control = "arc" if path.control == "arc" else "auto"
+    follower = Follower(*direct.solvers, StepControl(), control=control, on_event=meet)
+    follower.begin()
+    # the next point of the path may have been passed already at a limit point, of which the last target lies beyond
+    ends = [path.load_factors[event.after + 1 :][:1], path.load_factors[-1:], event.load_factor * np.array([1.1, 0.9])]
+    targets = np.concatenate([path.load_factors[: event.after + 1], *ends]).tolist()
+    try:
+        for target in targets:
+            if target != follower.track.here.load_factor and not follower.to(target, max(map(abs, targets))):
+                break
+    except _Met as met:
+        return follower.track, *met.args
+    raise NotConverged(
+        f"sensitivity: the {event.kind} at the load factor {event.load_factor:.6g} was not met again on the way from "
+        "rest: expected an event of a path that has not left for a branch before it"
+    )
+
+
+def _beside(direct, track, crossing, before):
+    """[(load factor, numbers, None)] of two equilibria before and behind a `Crossing`; before: a `PathPoint`."""
+    middle, inner = crossing.point, direct.model.inner
+    for distance in _ASIDE if crossing.kind == "limit" else (None, *_ASIDE):
+        pair = [_one_beside(direct, track, crossing, before, side, distance) for side in (-1, 1)]
+        if None in pair:
+            continue
+        low, high = (numbers[0] for _, numbers, _ in pair)
+        off, apart = (np.sqrt(inner(x, x)) for x in (low + high - 2 * middle.numbers[0], high - low))
+        if off <= _BENT * apart + _NOTHING:  # else one of them is on another branch
+            return pair
+    raise NotConverged(f"sensitivity: the path was not found again on both sides of the {crossing.kind}")
+
+
+def _one_beside(direct, track, crossing, before, side, distance):
+    """One of `_beside`, or None; distance: along the path, or None for one of the load factor."""
+    numbers, eta = [values.copy() for values in crossing.point.numbers], crossing.point.load_factor
+    limit = crossing.kind == "limit"
+    track.neutral = None if limit else crossing.direction.copy()  # Newton's steps leave out the mode, and its branch
+    if distance is None:
+        solved = track.at_load(numbers, eta * (1 + side * _BESIDE))
+    else:
+        normal = crossing.direction if limit else numbers[0] - before.numbers[0]
+        numbers[0] += side * distance / direct.model.largest(normal) * normal
+        solved = track.on_plane(numbers, eta, normal, 0.0)
+    track.neutral = track.newton.bordered.neutral = None
+    if solved.converged and not limit:  # what is left of the mode in the interpolated state goes
+        solved = track.at_load(direct.problem.numbers(), direct.problem.load_factor)
+    return (direct.problem.load_factor, direct.problem.numbers(), None) if solved.converged else None
+
+
+def _of_limit(direct, crossing, parameters, rates):
+    """(derivatives of the load factor, bounds on their errors)."""
+    inner, slopes = direct.model.inner, []
+    for eta, numbers, _ in direct.points:
+        direct.factor(eta, numbers)
+        slopes.append(inner(crossing.direction, direct.slope()[0]))
+    found = np.array([
+        [-inner(crossing.direction, rate[0]) / slope for rate, slope in zip(each, slopes, strict=True)]
+        for each in rates
+    ])  # fmt: skip
+    return found.mean(axis=1), _ASIDE[0] * np.abs(np.diff(found))[:, 0]
+
+
+# -- bifurcations -----------------------------------------------------------------------------------------------------
+
+
+def _of_bifurcation(direct, crossing, parameters, rates):
+    """(derivatives of the load factor, bounds on their errors)."""
+    for parameter, each in zip(parameters, rates, strict=True):
+        _check_perfect(direct.model, parameter, each)
+    modes = _modes(direct, crossing)
+    energies = Energies(direct.problem, modes)
+    by_load = np.mean([_by_load(direct, energies, point) for point in direct.points], axis=0)
+    found, errors = [], []
+    for parameter, each in zip(parameters, rates, strict=True):
+        slopes, error = _by_parameter(direct, energies, modes, parameter, each)
+        of_modes = -slopes.mean(axis=0) / by_load
+        if np.ptp(of_modes) * parameter.size > _TOGETHER * abs(crossing.point.load_factor):
+            raise SceneError(
+                f"parameter '{parameter.name}': it separates the two bifurcations at the load factor "
+                f"{crossing.point.load_factor:.6g}, which have no derivatives by it: expected a parameter that keeps "
+                "the symmetry"
+            )
+        found.append(of_modes[0])
+        errors.append((error / np.abs(by_load)).max())
+    return found, errors
+
+
+def _check_perfect(model, parameter, rates):
+    low, high = (parameter.size * rate[0] for rate in rates)
+    apart, together = model.largest(high - low), model.largest(high + low)
+    if apart > _OPPOSITE * together + _NOTHING:
+        raise SceneError(
+            f"parameter '{parameter.name}': with it the bifurcation is no more: it is an imperfection, on which the "
+            "load depends by a power below one. Expected one that keeps the symmetry, or a limit point"
+        )
+
+
+def _modes(direct, crossing):
+    """(N, 6) the mode of all nodes, the mean of those at the two points; of a double bifurcation also the other mode,
+    and their sum."""
+    bordered = direct.newton.bordered
+    found = [0.0] * (1 if crossing.partner is None else 2)
+    for eta, numbers, _ in direct.points:
+        direct.factor(eta, numbers)
+        starts = [crossing.null] if crossing.partner is None else [crossing.null, bordered.motion_of(crossing.partner)]
+        for k, start in enumerate(starts):
+            _, motion = bordered.response(start)
+            found[k] = found[k] + np.sign(bordered.work(motion, start)) / 2 * direct.model.everywhere(motion)
+    return found if crossing.partner is None else [*found, found[0] + found[1]]
+
+
+def _stiff(direct):
+    """Take the true stiffnesses where they are finite."""
+    model = direct.model
+    model.stiffen(np.where(np.isfinite(model.section.K), model.section.K, model.bounded_K))
+
+
+def _by_load(direct, energies, point):
+    """(modes,) d mu/d eta along the path."""
+    eta, numbers, _ = point
+    direct.factor(eta, numbers)
+    slope, step, values = direct.slope(), 0.1 * _BESIDE * eta, []
+    _stiff(direct)
+    for k in PLACES:
+        direct.put((eta + k * step, numbers, None), slope, k * step)
+        values.append(energies.here())
+    return derivative(values, step)[0]
+
+
+def _by_parameter(direct, energies, modes, parameter, rates):
+    """(2, modes) d mu/dp along the path at the two points, and errors."""
+    step, values, ties = direct.step(parameter, rates), [], direct.problem.ties
+    tied, size = np.array(modes)[:, direct.model.tied_slots], np.abs(modes).max()
+    for k in PLACES:
+        direct.load_near(parameter, k * step)
+        _stiff(direct)
+        values.append([])
+        for point, rate in zip(direct.points, rates, strict=True):
+            direct.put(point, rate, k * step)
+            values[-1].append(energies.here())
+            if ties and np.abs(np.einsum("tni,mni->tm", ties.gradients(), tied)).max() > _HELD * size:
+                raise SceneError(
+                    f"parameter '{parameter.name}' turns supports or joints in which the mode moves: the derivative of "
+                    "this bifurcation by it is not known"
+                )
+    return derivative(values, step)

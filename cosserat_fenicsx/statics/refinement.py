@@ -22,9 +22,8 @@ from cosserat_fenicsx.results.accuracy import (
 from cosserat_fenicsx.results.compared import NAMES, POSITION
 from cosserat_fenicsx.results.indicators import contact_edges, of_path, resolves, winding_lengths
 from cosserat_fenicsx.results.records import find_again, keep_confirmed
-from cosserat_fenicsx.statics.first_mesh import resolving
-from cosserat_fenicsx.statics.grading import balanced, loose_edges, with_edges, with_layers, with_turns
-from cosserat_fenicsx.statics.path.recorder import Promoted
+from cosserat_fenicsx.statics.meshes import balanced, loose_edges, resolving, with_edges, with_layers, with_turns
+from cosserat_fenicsx.statics.solvers import Promoted
 
 _MOST_ELEMENTS = 1024
 # Positions that differ by less than this on two meshes, relative to the largest displacement, are on the same branch:

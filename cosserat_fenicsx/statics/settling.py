@@ -7,7 +7,7 @@ then made stiffer by tens, each time with the contact nearly known.
 
 import math
 
-from cosserat_fenicsx.algebra.limited_newton import LimitedNewton
+from cosserat_fenicsx.algebra.newton import LimitedNewton
 from cosserat_fenicsx.errors import NotConverged
 from cosserat_fenicsx.interrupts import obey
 

@@ -13,26 +13,26 @@ import numpy as np
 from mpi4py import MPI
 
 from cosserat_fenicsx.checks import instance
-from cosserat_fenicsx.models.choose import choose
-from cosserat_fenicsx.results.accuracy import FEW
-from cosserat_fenicsx.results.compared import NAMES
-from cosserat_fenicsx.statics.path.load_control import StepControl
 from cosserat_fenicsx.errors import NotConverged, SceneError, nearest
-from cosserat_fenicsx.statics.path.follower import CONTROLS
+from cosserat_fenicsx.models.choose import choose
 from cosserat_fenicsx.models.formulation import formulation_of
 from cosserat_fenicsx.models.rodmesh import Layout
-from cosserat_fenicsx.results.path import Path
 from cosserat_fenicsx.progress import Progress
 from cosserat_fenicsx.ranks import communicator
-from cosserat_fenicsx.statics.first_mesh import first_layout, meshes_for, resolving_turns
-from cosserat_fenicsx.statics.solvers import solvers_of
-from cosserat_fenicsx.statics.refinement import refine
+from cosserat_fenicsx.results.accuracy import FEW
+from cosserat_fenicsx.results.compared import NAMES
+from cosserat_fenicsx.results.path import Path
 from cosserat_fenicsx.scene.action import path_dependent
 from cosserat_fenicsx.scene.magnitudes import check_magnitudes
 from cosserat_fenicsx.scene.scene import Scene
 from cosserat_fenicsx.scene.statical import check_no_mechanism
 from cosserat_fenicsx.scene.supports import Prescribed
-from cosserat_fenicsx.statics.path.recorder import Promoted, Tracing
+from cosserat_fenicsx.statics.meshes import first_layout, meshes_for, resolving_turns
+from cosserat_fenicsx.statics.path.follower import CONTROLS
+from cosserat_fenicsx.statics.path.load_control import StepControl
+from cosserat_fenicsx.statics.path.recorder import Tracing
+from cosserat_fenicsx.statics.refinement import refine
+from cosserat_fenicsx.statics.solvers import Promoted, solvers_of
 
 # What `tol` bounds where contact forces oscillate.
 _MOTION = ("position", "rotation")

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 from scipy.optimize import brentq
 
-from cosserat_fenicsx.algebra.pointers import Pointers
+from cosserat_fenicsx.algebra.building import Pointers
 from cosserat_fenicsx.checks import number, positive, refuse
 from cosserat_fenicsx.drilling.axial_torsional.chain import chain_of, unresolved, usual_step
 from cosserat_fenicsx.drilling.axial_torsional.ends import end_of, forces_of

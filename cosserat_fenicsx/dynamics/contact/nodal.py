@@ -10,7 +10,7 @@ for by the next iteration.
 
 import numpy as np
 
-from cosserat_fenicsx.algebra.pointers import Pointers
+from cosserat_fenicsx.algebra.building import Pointers
 from cosserat_fenicsx.dynamics.contact.nodes import TouchingNodes, motion_between
 from cosserat_fenicsx.numerics import small_rotations
 

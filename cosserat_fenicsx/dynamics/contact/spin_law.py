@@ -9,7 +9,7 @@ import math
 
 import numpy as np
 
-from cosserat_fenicsx.algebra.pointers import Pointers
+from cosserat_fenicsx.algebra.building import Pointers
 from cosserat_fenicsx.dynamics.contact.nodes import TouchingNodes, motion_between
 from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.numerics import directors, small_rotations

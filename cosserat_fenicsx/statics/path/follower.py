@@ -6,8 +6,7 @@ from cosserat_fenicsx.errors import NotConverged
 from cosserat_fenicsx.statics.path.arclength import ArcLength
 from cosserat_fenicsx.statics.path.chord import Chord
 from cosserat_fenicsx.statics.path.events import UNEXPLAINED, Locator, Lost
-from cosserat_fenicsx.statics.path.load_control import Continuation
-from cosserat_fenicsx.statics.path.sweep import Sweep
+from cosserat_fenicsx.statics.path.load_control import Continuation, Sweep
 from cosserat_fenicsx.statics.path.track import INTENDED, Track
 
 #: Control parameters of the continuation, see `solve`.

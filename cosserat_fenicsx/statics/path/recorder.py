@@ -1,21 +1,31 @@
 """One path on one mesh, recorded: by continuation, or point by point from the same path on a coarser mesh."""
 
+import cosserat_fenicsx.compat  # noqa: F401, I001  first: its message says what is missing where dolfinx is
+
 import dataclasses
 import itertools
 
 import numpy as np
+from mpi4py import MPI
 
+from cosserat_fenicsx.checks import File
 from cosserat_fenicsx.errors import Interrupted, NotConverged
 from cosserat_fenicsx.interrupts import obey
+from cosserat_fenicsx.models.base import Scales
+from cosserat_fenicsx.models.connections import Connections
+from cosserat_fenicsx.models.rodmesh import Layout
+from cosserat_fenicsx.ranks import communicator
 from cosserat_fenicsx.results.accuracy import on_mesh
+from cosserat_fenicsx.results.export import saved
 from cosserat_fenicsx.results.path import Path
 from cosserat_fenicsx.results.records import Event, Records
 from cosserat_fenicsx.statics.circulatory import conservative_along
+from cosserat_fenicsx.statics.critical import derivatives_of
 from cosserat_fenicsx.statics.path.chord import Chord
 from cosserat_fenicsx.statics.path.events import Lost
 from cosserat_fenicsx.statics.path.follower import Follower
 from cosserat_fenicsx.statics.path.track import NOTHING
-from cosserat_fenicsx.statics.recording import record_of
+from cosserat_fenicsx.statics.solvers import Promoted, record_of
 
 # Loads over EA, about the axial strain that they cause, above which a mistake in the units is suggested.
 _ENORMOUS = 1.0
@@ -23,8 +33,6 @@ _ENORMOUS = 1.0
 _SHORTER = 1e-3
 # Largest |n| h^2/EI at which an element of length h resolves boundary layers, of length sqrt(EI/|n|).
 _RESOLVED = 100.0
-# Largest ratio of the load factors at which two meshes find negative modes, for the finding to be confirmed.
-_ALIKE = 1.5
 # Bounds for a point corrected from a coarser mesh: Newton iterations, and motion (lengths, rad).
 _CORRECTIONS, _NEAR = 6, 0.1
 # Largest distance of a point from the same one on a coarser mesh, over that of the latter's two neighbours.
@@ -33,33 +41,6 @@ _ASIDE = 0.3
 
 class _Enough(Exception):
     """The user's `until` returned True."""
-
-
-class Promoted(Exception):
-    """A planar solution that has to be continued with the spatial model.
-
-    Args:
-        reason: a sentence for `Path.why`.
-        between: the two load factors between which negative modes appeared, where the mesh is too coarse to be sure of
-            them; else None.
-    """
-
-    def __init__(self, reason, between=None):
-        super().__init__(reason)
-        self.reason, self.between = reason, between
-
-    def agrees(self, before):
-        """Whether the exception on the mesh before (None where none was raised) confirms the negative modes.
-
-        On a mesh that does not resolve the contact force, its directions at the Gauss points are wrong: a taut wire
-        then seems to buckle, at a load factor that grows with mesh refinement.
-        """
-        if self.between is None:
-            return True
-        if before is None or before.between is None:
-            return False
-        (a, b), (c, d) = (sorted(map(abs, found.between)) for found in (self, before))
-        return max(a, c) <= _ALIKE * min(b, d)
 
 
 class Tracing:
@@ -77,7 +58,7 @@ class Tracing:
         self.problem, _, self.stability = solvers
         self.model, self._options, self._choice, self._bar = self.problem.model, follow, choice, bar
         why = [*choice.why, self.model.signature.formulation.words]
-        self.path = Path.of(self.model, why, conservative_along, differentiated)
+        self.path = Path.of(self.model, why, conservative_along, derivatives_of)
         if choice.model == "spatial":
             self._follower = Follower(*solvers, on_event=self._meet, from_rest=from_rest, **follow)
         else:  # planar models: load control without events; the spatial model takes over where more is needed
@@ -350,8 +331,24 @@ class Tracing:
         return motion / np.sqrt(self.track.product(motion, motion))
 
 
-def differentiated(path, query, parameters):
-    """See `Path.sensitivity`."""
-    from cosserat_fenicsx.statics.critical_points import derivatives_of  # which needs solvers, and they this module
+def read_path(file: File, *, comm: MPI.Comm | None = None) -> Path:
+    """The `Path` that `Path.save` wrote, with the same digits.
 
-    return derivatives_of(path, query, parameters)
+    Its scene is a copy: stations are those of `path.rod(name)`, or are given by name.
+
+    Args:
+        file: its name.
+        comm: MPI communicator of the path, whose ranks all read the file; default all.
+
+    Raises:
+        SceneError: it cannot be read, is damaged, holds something else, or is of a newer release.
+    """
+    path = saved.read(file, Path, assembled, communicator(comm))
+    path._potential, path._differentiated = conservative_along, derivatives_of
+    return path
+
+
+def assembled(scene, breaks, scales):
+    """The `Layout`, the `Scales` and the `Connections` of a result from what `saved.read` passes."""
+    layout = Layout(tuple(breaks))
+    return layout, Scales(**scales), Connections.of(scene, layout)

@@ -16,7 +16,7 @@ from cosserat_fenicsx.ranks import communicator
 from cosserat_fenicsx.results.accuracy import on_mesh
 from cosserat_fenicsx.results.path import Path
 from cosserat_fenicsx.statics.circulatory import conservative_along
-from cosserat_fenicsx.statics.recording import record_of
+from cosserat_fenicsx.statics.solvers import record_of
 from cosserat_fenicsx.statics.settling import BACK, DECADES, LAST, LAST_TWO, settle, stages_from
 from cosserat_fenicsx.statics.solvers import solvers_of
 from cosserat_fenicsx.well.rod.in_hole import InHole
