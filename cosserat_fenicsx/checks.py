@@ -20,6 +20,7 @@ from pathlib import Path
 
 import numpy as np
 
+from cosserat_fenicsx.dimensions import LARGEST, MOST
 from cosserat_fenicsx.errors import SceneError, SceneWarning, nearest
 
 #: Numbers, as a list, a tuple or an array.
@@ -31,18 +32,11 @@ NumbersInTime = Numbers | Callable[[float], Numbers]
 #: The path of a file.
 File = str | PathLike[str]
 
-#: Sizes beyond this, and below its inverse, are refused: their fourth powers would not be numbers.
-LARGEST = 1e60
 #: Largest size (bytes) of a text file that is read.
 MOST_TEXT = 2**27
 # How workbooks of spreadsheet programs begin: as .zip archives (.xlsx, .ods), or as .xls.
 _WORKBOOKS = (b"PK\x03\x04", b"\xd0\xcf\x11\xe0")
-# Sizes in SI, by units, beyond which nothing of a string, its hole, its mud and its rig is: numbers above these are
-# mistakes, such as of units, and what follows from them has no meaning.
-_MOST = {"m": 1e6, "m/s": 1e5, "N": 1e10, "N m": 1e10, "N/m": 1e13, "N/m^2": 1e15, "Pa": 1e15, "N s/m^2": 1e10,
-         "N m s/rad": 1e10, "kg/m": 1e6, "kg/m^3": 1e5, "kg m^2": 1e10, "1/min": 1e6, "rad/s": 1e5,
-         "1/s": 1e6}  # fmt: skip
-_SMALLEST = min(_MOST.values())
+_SMALLEST = min(MOST.values())
 _OF_STRINGS = ("cosserat_fenicsx.well.", "cosserat_fenicsx.drilling.")
 # Values with a longer text, such as that of a rod, are abbreviated in messages.
 _LONGEST = 100
@@ -85,7 +79,7 @@ def number(owner, field, value, expected, accept):
 def _most(owner, unit):
     """The largest size of a number with a unit that an object has."""
     of_strings = any(kind.__module__.startswith(_OF_STRINGS) for kind in type(owner).__mro__)
-    return _MOST.get(unit, LARGEST) if of_strings else LARGEST
+    return MOST.get(unit, LARGEST) if of_strings else LARGEST
 
 
 def positive(owner, field, value, unit):

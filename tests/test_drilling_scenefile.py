@@ -10,9 +10,11 @@ from fake_string import use
 
 import cosserat_fenicsx as cf
 from cosserat_fenicsx.cli.main import main
-from cosserat_fenicsx.drilling.bit_laws import LAWS
-from cosserat_fenicsx.drilling.scenefile import KEYS, MORE_UNITS
-from cosserat_fenicsx.drilling.top_drive import CONTROLS
+from cosserat_fenicsx.dimensions import DIMENSIONS
+from cosserat_fenicsx.drilling.bit_laws import BitLaw
+from cosserat_fenicsx.drilling.scenefile import KEYS
+from cosserat_fenicsx.drilling.top_drive import DriveControl
+from cosserat_fenicsx.parts import members
 
 pytestmark = [pytest.mark.serial, pytest.mark.once]
 ROOT = Path(__file__).parent.parent
@@ -157,14 +159,15 @@ def test_the_command_line(tmp_path, capsys, monkeypatch):
 def test_the_reference_has_every_key_and_unit():
     page = (ROOT / "docs" / "drilling_files.md").read_text(encoding="utf-8")
     told = set(re.findall(r"`([^`]+)`", re.sub(r"```.*?```", "", page, flags=re.S)))
-    classes = (cf.TopDrive, *CONTROLS, cf.BitOnRock, *LAWS, cf.Wear, cf.Hook, cf.WallFriction, cf.ViscousDrag, cf.Discs)
-    assert {cls.__name__ for cls in (*CONTROLS, *LAWS)} <= told
+    named = {name: cls for name, cls in (members(BitLaw) | members(DriveControl)).items() if name in cf.__all__}
+    classes = (cf.TopDrive, *named.values(), cf.BitOnRock, cf.Wear, cf.Hook, cf.WallFriction, cf.ViscousDrag, cf.Discs)
+    assert named.keys() <= told
     arguments = {name for cls in classes for name in inspect.signature(cls).parameters}
     keys = {f"[{table}]" for table in KEYS} | {key for keys in KEYS.values() for key in keys}
-    units = {unit for _, known in MORE_UNITS.values() for unit in known}
+    units = {unit for name in ("angular velocity", "time", "stiffness") for unit in DIMENSIONS[name].units}
     for expected in (arguments, keys, units):
         assert expected <= told, expected - told
-    assert math.isclose(MORE_UNITS["angular velocity"][1]["rpm"], math.pi / 30)
+    assert math.isclose(DIMENSIONS["angular velocity"].units["rpm"], math.pi / 30)
 
 
 def refused(capsys, *arguments):

@@ -10,6 +10,7 @@ from cosserat_fenicsx.cli.deliver import prepare
 from cosserat_fenicsx.cli.ended import ended
 from cosserat_fenicsx.cli.files import Files, keep_inputs
 from cosserat_fenicsx.cli.say import DONE, INTERRUPTED, NOT_CONVERGED, say, warnings_in_words
+from cosserat_fenicsx.dimensions import in_si
 from cosserat_fenicsx.drilling.bit_laws import Stribeck
 from cosserat_fenicsx.drilling.choose import chosen, model_of
 from cosserat_fenicsx.drilling.folder import DrillingFolder
@@ -19,7 +20,6 @@ from cosserat_fenicsx.drilling.simulate import check_arguments, resume_drilling
 from cosserat_fenicsx.drilling.tables import turns
 from cosserat_fenicsx.errors import NotConverged, SceneError
 from cosserat_fenicsx.interrupts import patience
-from cosserat_fenicsx.well.field_units import in_si
 
 _TAKEN = ("duration", "dt", "elements", "model", "save_every")
 # Files that may be written.

@@ -9,14 +9,15 @@ import functools
 
 import numpy as np
 
-from cosserat_fenicsx.drilling.bit_laws import LAWS, BitOnRock, Wear
+from cosserat_fenicsx.drilling.bit_laws import BitLaw, BitOnRock, Wear
 from cosserat_fenicsx.drilling.hook import Hook
 from cosserat_fenicsx.drilling.scene import Drilling
 from cosserat_fenicsx.drilling.segments import Discs
 from cosserat_fenicsx.drilling.signals import ScalarSignal
-from cosserat_fenicsx.drilling.top_drive import CONTROLS, TopDrive
+from cosserat_fenicsx.drilling.top_drive import DriveControl, TopDrive
 from cosserat_fenicsx.drilling.wall_friction import ViscousDrag, WallFriction
 from cosserat_fenicsx.errors import SceneError
+from cosserat_fenicsx.parts import members
 from cosserat_fenicsx.scene.as_data import NotData
 from cosserat_fenicsx.scene.materials import Material
 from cosserat_fenicsx.scene.sections import Stiffness
@@ -27,7 +28,7 @@ from cosserat_fenicsx.well.mud import Mud
 from cosserat_fenicsx.well.path import WellPath
 from cosserat_fenicsx.well.string import DrillString
 
-_OF_DRILLING = (Drilling, Discs, TopDrive, *CONTROLS, Hook, BitOnRock, *LAWS, Wear, WallFriction, ViscousDrag)
+_OF_DRILLING = (Drilling, Discs, TopDrive, Hook, BitOnRock, Wear, WallFriction, ViscousDrag)
 _OF_WELLS = (DrillString, *COMPONENTS, Borehole, HoleSection, WellPath, Mud, Material, Stiffness)
 #: Functions of time, by their owner: the object's class and its field.
 _IN_TIME = {("TopDrive", "speed"): "rad/s", ("Hook", "speed"): "m/s"}
@@ -36,7 +37,8 @@ _SAMPLES = 41
 
 @functools.cache
 def _classes():
-    return {kind.__name__: kind for kind in (*_OF_DRILLING, *_OF_WELLS, *SIGNALS)}
+    kinds = {kind.__name__: kind for kind in (*_OF_DRILLING, *_OF_WELLS, *SIGNALS)}
+    return {**kinds, **members(BitLaw), **members(DriveControl)}
 
 
 def to_data(scene):

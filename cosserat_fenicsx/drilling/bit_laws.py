@@ -7,20 +7,35 @@ blade to blade. `Lobes`: a rock whose face is wavy.
 
 import math
 from dataclasses import dataclass
+from typing import Annotated
 
-from cosserat_fenicsx.checks import instance, number, positive, refuse, stiffness, store, warn
+from cosserat_fenicsx.checks import refuse, warn
+from cosserat_fenicsx.parts import (
+    AngularVelocity,
+    ForceSize,
+    Inertia,
+    Length,
+    Mass,
+    Number,
+    Part,
+    Pressure,
+    Ratio,
+    Stiffness,
+    Torque,
+    at_least,
+    positive,
+)
 
 # Depths (m) beyond this to which a weight presses a bit are those of a stiffness in other units by all appearance.
 _DEEP = 0.1
 
 
-def _not_negative(owner, field, unit):
-    value = number(owner, field, getattr(owner, field), f"a number ({unit}), not negative", lambda x: 0 <= x < math.inf)
-    store(owner, **{field: value})
+class BitLaw(Part, family="bit law"):
+    """Base of the laws of what acts between bit and rock."""
 
 
 @dataclass(frozen=True)
-class Stribeck:
+class Stribeck(BitLaw):
     """Torque on bit T = T_d + (T_s - T_d) exp(-om/speed) against the rotation om, anything up to T_s at rest.
 
     Args:
@@ -34,19 +49,15 @@ class Stribeck:
         SceneError: numbers that are negative, a static torque below the dynamic one.
     """
 
-    static: float
-    dynamic: float
-    speed: float | None = None
-    radius: float | None = None
+    static: Annotated[Torque, at_least(0)]
+    dynamic: Annotated[Torque, at_least(0)]
+    speed: Annotated[AngularVelocity, positive()] | None = None
+    radius: Length | None = None
 
-    def __post_init__(self):
-        for field in ("static", "dynamic"):
-            _not_negative(self, field, "N m, or a coefficient where there is a radius")
+    def validate(self):
+        """See `Part`."""
         if self.static < self.dynamic:
             refuse(self, "static", self.static, f"at least the dynamic one, {self.dynamic:g}")
-        for field, unit in (("speed", "rad/s"), ("radius", "m")):
-            if getattr(self, field) is not None:
-                store(self, **{field: positive(self, field, getattr(self, field), unit)})
 
     def torques(self, weight: float) -> tuple[float, float]:
         """Static and dynamic torque (N m) under a weight on bit (N)."""
@@ -55,7 +66,7 @@ class Stribeck:
 
 
 @dataclass(frozen=True)
-class Wear:
+class Wear(Part):
     """Wear flats of a bit: they rub while the bit is pressed on the rock.
 
     Args:
@@ -66,18 +77,14 @@ class Wear:
         SceneError: numbers that are not positive.
     """
 
-    stress: float
-    length: float
-    friction: float
-    geometry: float = 1.0
-
-    def __post_init__(self):
-        for field, unit in (("stress", "Pa"), ("length", "m"), ("friction", "coefficient"), ("geometry", "number")):
-            store(self, **{field: positive(self, field, getattr(self, field), unit)})
+    stress: Pressure
+    length: Length
+    friction: Ratio
+    geometry: Ratio = 1.0
 
 
 @dataclass(frozen=True)
-class Cutting:
+class Cutting(BitLaw):
     """A drag bit that cuts: weight n zeta epsilon a d and torque n epsilon a^2 d/2 for the depth of cut d of a blade.
 
     d = U(t) - U(t - tau), U the depth of the bit; within the delay tau the bit turns by 2 pi/n. Wear flats add the
@@ -92,19 +99,11 @@ class Cutting:
         SceneError: numbers that are not positive.
     """
 
-    a: float
-    epsilon: float
-    zeta: float
-    blades: int
+    a: Length
+    epsilon: Pressure
+    zeta: Ratio
+    blades: Annotated[int, Number(limits=at_least(1, "a number of blades"), whole=True)]
     wear: Wear | None = None
-
-    def __post_init__(self):
-        for field, unit in (("a", "m"), ("epsilon", "Pa"), ("zeta", "number")):
-            store(self, **{field: positive(self, field, getattr(self, field), unit)})
-        number(self, "blades", self.blades, "a number of blades from 1", lambda x: x >= 1 and x == int(x))
-        store(self, blades=int(self.blades))
-        if self.wear is not None:
-            instance(self, "wear", self.wear, Wear, "a Wear or None")
 
     @property
     def axial_stiffness(self) -> float:
@@ -118,7 +117,7 @@ class Cutting:
 
 
 @dataclass(frozen=True)
-class Lobes:
+class Lobes(BitLaw):
     """A face of the rock that lifts a roller-cone bit: by amplitude sin(count theta), theta the angle by which the bit
     has turned since the start.
 
@@ -130,22 +129,13 @@ class Lobes:
         SceneError: numbers that are not positive.
     """
 
-    count: int
-    amplitude: float
+    count: Annotated[int, Number(limits=at_least(1, "a number of lobes"), whole=True)]
+    amplitude: Length
     law: Stribeck | None = None
-
-    def __post_init__(self):
-        number(self, "count", self.count, "a number of lobes from 1", lambda x: x >= 1 and x == int(x))
-        store(self, count=int(self.count), amplitude=positive(self, "amplitude", self.amplitude, "m"))
-        if self.law is not None:
-            instance(self, "law", self.law, Stribeck, "a Stribeck or None")
-
-
-LAWS = (Stribeck, Cutting, Lobes)
 
 
 @dataclass(frozen=True)
-class BitOnRock:
+class BitOnRock(Part):
     """The bit at work, at the lower end of the string.
 
     Args:
@@ -163,23 +153,19 @@ class BitOnRock:
             `Cutting`, or without a weight.
     """
 
-    law: Stribeck | Cutting | Lobes
-    weight: float | None = None
-    inertia: float = 0.0
-    mass: float = 0.0
-    rock_stiffness: float = math.inf
+    law: BitLaw
+    weight: Annotated[ForceSize, positive()] | None = None
+    inertia: Inertia = 0.0
+    mass: Mass = 0.0
+    rock_stiffness: Stiffness = math.inf
 
-    def __post_init__(self):
-        instance(self, "law", self.law, LAWS, "Stribeck(...), Cutting(...) or Lobes(...)")
-        store(self, rock_stiffness=stiffness(self, "rock_stiffness", self.rock_stiffness, "N/m"))
+    def validate(self):
+        """See `Part`."""
         if isinstance(self.law, Cutting) and self.rock_stiffness < math.inf:
             refuse(self, "rock_stiffness", self.rock_stiffness, "infinity: Cutting has a depth of cut in its place")
         if self.weight is None and self.rock_stiffness < math.inf:
             refuse(self, "weight", None, "the weight on bit (N), where the rock has a stiffness")
-        for field, unit in (("inertia", "kg m^2"), ("mass", "kg")):
-            _not_negative(self, field, unit)
         if self.weight is not None:
-            store(self, weight=positive(self, "weight", self.weight, "N"))
             pressed = self.weight / self.rock_stiffness
             if pressed > _DEEP:
                 warn(

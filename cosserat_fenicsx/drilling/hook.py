@@ -1,15 +1,14 @@
 """The hook that holds the string."""
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 
-from cosserat_fenicsx.checks import number, store
 from cosserat_fenicsx.drilling.signals import ScalarSignal
+from cosserat_fenicsx.parts import InTime, Part, Speed, Stiffness
 
 
 @dataclass(frozen=True)
-class Hook:
+class Hook(Part):
     """The travelling block with its lines.
 
     Args:
@@ -20,12 +19,11 @@ class Hook:
         SceneError: a stiffness that is not positive, or a speed that is no number.
     """
 
-    stiffness: float = math.inf
-    speed: float | Callable[[float], float] = 0.0
+    stiffness: Stiffness = math.inf
+    speed: InTime[Speed] = 0.0
 
-    def __post_init__(self):
-        store(self, stiffness=number(self, "stiffness", self.stiffness, "a positive number or infinity (N/m)",
-                                     lambda x: x > 0))  # fmt: skip
+    def validate(self):
+        """See `Part`."""
         self.signal()
 
     def signal(self) -> ScalarSignal:

@@ -24,7 +24,7 @@ duration = 60.0
 
 [stability]                      # optional: speeds, weights
 
-Numbers are in SI, or text with a unit (`field_units`).
+Numbers are in SI, or text with a unit (`dimensions`).
 """
 
 from dataclasses import dataclass, field
@@ -33,9 +33,9 @@ from typing import Any
 
 import numpy as np
 
-from cosserat_fenicsx import units
 from cosserat_fenicsx.checks import File, positive, refuse
-from cosserat_fenicsx.drilling.bit_laws import LAWS, BitOnRock, Stribeck, Wear
+from cosserat_fenicsx.dimensions import DIMENSIONS, in_si
+from cosserat_fenicsx.drilling.bit_laws import BitLaw, BitOnRock, Stribeck, Wear
 from cosserat_fenicsx.drilling.choose import chosen
 from cosserat_fenicsx.drilling.history import DrillingHistory
 from cosserat_fenicsx.drilling.hook import Hook
@@ -45,22 +45,15 @@ from cosserat_fenicsx.drilling.scene import Drilling
 from cosserat_fenicsx.drilling.segments import Discs
 from cosserat_fenicsx.drilling.simulate import check_arguments as check_simulation
 from cosserat_fenicsx.drilling.simulate import simulate_drilling
-from cosserat_fenicsx.drilling.top_drive import CONTROLS, TopDrive
+from cosserat_fenicsx.drilling.top_drive import DriveControl, TopDrive
 from cosserat_fenicsx.drilling.wall_friction import ViscousDrag, WallFriction
 from cosserat_fenicsx.errors import SceneError
+from cosserat_fenicsx.parts import members
 from cosserat_fenicsx.scene.signals import SIGNALS
 from cosserat_fenicsx.scene.toml_tables import check_arguments, class_named, known_keys, table, tables_of
-from cosserat_fenicsx.well.field_units import DIMENSIONS, in_si
 from cosserat_fenicsx.well.mud import Mud
 from cosserat_fenicsx.well.scenefile import hole_in, made, string_in
 
-#: Dimensions with units beside those of wells.
-MORE_UNITS = {
-    "angular velocity": ("rad/s", {"rad/s": 1.0, "rpm": units.rpm, "RPM": units.rpm, "1/min": units.rpm}),
-    "time": ("s", {"s": 1.0, "ms": units.ms, "min": units.minute, "h": units.hour}),
-    "stiffness": ("N/m", {"N/m": 1.0, "kN/m": units.kN, "MN/m": units.MN}),
-}
-UNITS = {**DIMENSIONS, **MORE_UNITS}
 #: Dimensions of arguments that may be written with a unit, by class.
 _DIMENSIONS = {
     "TopDrive": {"speed": "angular velocity"},
@@ -171,7 +164,8 @@ def _drive(entry, given):
     if isinstance(control, str):
         control = {"type": control}
     if control is not None:
-        kind = class_named("drive.control", table("drive.control", control).get("type"), (*CONTROLS, *_TUNED))
+        known = (*members(DriveControl).values(), *_TUNED)
+        kind = class_named("drive.control", table("drive.control", control).get("type"), known)
         if kind in _TUNED:
             known_keys(f"drive.control ({kind.__name__})", control, ("type",))
             if "inertia" not in entry:
@@ -182,14 +176,14 @@ def _drive(entry, given):
             discs = isinstance(standing.string, Discs)  # refused there
             entry["control"] = kind(*((standing, inertia) if discs else (standing.string, inertia, standing.bit_depth)))
         else:
-            entry["control"] = _made("drive.control", control, CONTROLS)
+            entry["control"] = _made("drive.control", control, known)
     return _made("drive", entry, (TopDrive,))
 
 
 def _friction(entry):
     dimension = "angular velocity" if entry.get("of_rotation") is True else "speed"
     if "speed" in entry:
-        entry["speed"] = in_si("wall_friction.speed", entry["speed"], dimension, UNITS)
+        entry["speed"] = in_si("wall_friction.speed", entry["speed"], dimension)
     return _made("wall_friction", entry, (WallFriction,))
 
 
@@ -199,7 +193,7 @@ def _made(where, entry, classes):
     cls = classes[0] if len(classes) == 1 else class_named(where, entry.pop("type", None), classes)
     check_arguments(where, cls, entry)
     inner, dimensions = (
-        {"law": LAWS if cls is BitOnRock else (Stribeck,), "wear": (Wear,)},
+        {"law": tuple(members(BitLaw).values()) if cls is BitOnRock else (Stribeck,), "wear": (Wear,)},
         _DIMENSIONS.get(cls.__name__, {}),
     )
     for name, value in entry.items():
@@ -208,7 +202,7 @@ def _made(where, entry, classes):
         elif isinstance(value, dict) and name == "speed" and cls in (TopDrive, Hook):
             entry[name] = _signal(f"{where}.{name}", value, dimensions[name])
         elif name in dimensions:
-            entry[name] = in_si(f"{where}.{name}", value, dimensions[name], UNITS)
+            entry[name] = in_si(f"{where}.{name}", value, dimensions[name])
         elif isinstance(value, list):
             entry[name] = tuple(value)
     try:
@@ -223,14 +217,14 @@ def _signal(where, entry, dimension):
     cls = class_named(where, entry.pop("type", None), SIGNALS)
     check_arguments(where, cls, entry)
     if "value" in entry:
-        entry["value"] = (in_si(f"{where}.value", entry["value"], dimension, UNITS),)
+        entry["value"] = (in_si(f"{where}.value", entry["value"], dimension),)
     if isinstance(entry.get("values"), list):
-        entry["values"] = [(in_si(f"{where}.values[{i}]", x, dimension, UNITS),) for i, x in enumerate(entry["values"])]
+        entry["values"] = [(in_si(f"{where}.values[{i}]", x, dimension),) for i, x in enumerate(entry["values"])]
     if isinstance(entry.get("times"), list):
-        entry["times"] = [in_si(f"{where}.times[{i}]", x, "time", UNITS) for i, x in enumerate(entry["times"])]
+        entry["times"] = [in_si(f"{where}.times[{i}]", x, "time") for i, x in enumerate(entry["times"])]
     for name in ("start", "peak", "end"):
         if name in entry:
-            entry[name] = in_si(f"{where}.{name}", entry[name], "time", UNITS)
+            entry[name] = in_si(f"{where}.{name}", entry[name], "time")
     try:
         return cls(**entry)
     except SceneError as problem:
@@ -241,7 +235,7 @@ def _settings(given):
     known_keys("[simulate]", given, KEYS["simulate"])
     for name in ("duration", "dt", "save_every", "profile_every"):
         if name in given:
-            given[name] = in_si(f"simulate.{name}", given[name], "time", UNITS)
+            given[name] = in_si(f"simulate.{name}", given[name], "time")
     return given
 
 
@@ -253,10 +247,10 @@ def _stability(given, scene):
         if isinstance(values, dict):
             values = _range(f"stability.{name}", values, dimension)
         elif isinstance(values, list):
-            values = [in_si(f"stability.{name}[{i}]", x, dimension, UNITS) for i, x in enumerate(values)]
+            values = [in_si(f"stability.{name}[{i}]", x, dimension) for i, x in enumerate(values)]
         else:
             refuse("stability", name, values, "a list, or { from = ..., to = ..., count = ... }")
-        unit = UNITS[dimension][0]
+        unit = DIMENSIONS[dimension].si
         found.append(tuple(positive("stability", name, x, unit) for x in values))
     if given and not found[0]:
         raise SceneError("[stability]: 'speeds' is missing: expected a list, or { from = ..., to = ..., count = ... }")
@@ -273,6 +267,6 @@ def _range(where, given, dimension):
     count = given["count"]
     if not isinstance(count, int) or isinstance(count, bool) or not 2 <= count <= 10_000:
         raise SceneError(f"{where}.count = {count!r}: expected how many, from 2")
-    ends = [positive(where, name, in_si(f"{where}.{name}", given[name], dimension, UNITS), UNITS[dimension][0])
+    ends = [positive(where, name, in_si(f"{where}.{name}", given[name], dimension), DIMENSIONS[dimension].si)
             for name in ("from", "to")]  # fmt: skip
     return np.linspace(*ends, count).tolist()

@@ -8,24 +8,41 @@ A drive with the speed om and the inertia I hands the torque M down to the strin
     Motor      I om' = M0 - c om - M: a torque that is given
 """
 
-import math
-from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import Annotated, Literal
 
-from cosserat_fenicsx.checks import instance, number, positive, refuse, store
+from cosserat_fenicsx.checks import refuse
 from cosserat_fenicsx.drilling.signals import ScalarSignal, doubt_speed
+from cosserat_fenicsx.parts import (
+    AngularVelocity,
+    Inertia,
+    InTime,
+    Number,
+    Part,
+    Torque,
+    TorsionalDamping,
+    at_least,
+    positive,
+)
 
 #: Rules that choose the gains of a `PI` control, and its Kp over the impedance of the string: see `linear.tuned`.
 RULES = {"SoftTorque": 1.0, "SoftSpeed": 4.0}
 
 
+_GAINS = "a gain: SoftTorque(pipe), SoftSpeed(string) choose them, or give Kp and Ki"
+
+
+class DriveControl(Part, family="control of a drive"):
+    """Base of the controls of a top drive."""
+
+
 @dataclass(frozen=True)
-class Stiff:
+class Stiff(DriveControl):
     """The drive turns at the speed asked for, whatever the torque."""
 
 
 @dataclass(frozen=True)
-class PI:
+class PI(DriveControl):
     """A proportional and integral control of the speed.
 
     Args:
@@ -38,22 +55,17 @@ class PI:
         SceneError: gains that are missing, negative or not finite, or a Kp of zero; an unknown rule.
     """
 
-    Kp: float | None = None
-    Ki: float | None = None
-    rule: str | None = field(default=None, compare=False)
+    Kp: Annotated[float, Number("torsional damping", at_least(0, _GAINS))] | None = None
+    Ki: Annotated[float, Number("torsional stiffness", at_least(0, _GAINS))] | None = None
+    rule: Literal["SoftTorque", "SoftSpeed"] | None = field(default=None, compare=False)
 
-    def __post_init__(self):
-        if self.rule is not None and not (isinstance(self.rule, str) and self.rule in RULES):
-            refuse(self, "rule", self.rule, " or ".join(map(repr, RULES)) + ", or None")
-        gains = "a gain: SoftTorque(pipe), SoftSpeed(string) choose them, or give Kp and Ki"
+    def validate(self):
+        """See `Part`."""
         for name, unit in (("Kp", "N m s/rad"), ("Ki", "N m/rad")):
-            value = getattr(self, name)
-            if value is None:
-                refuse(self, name, value, f"{gains} ({unit})")
-            value = number(self, name, value, f"{gains}, not negative ({unit})", lambda x: 0 <= x < math.inf)
-            store(self, **{name: value})
+            if getattr(self, name) is None:
+                refuse(self, name, None, f"{_GAINS} ({unit})")
         if self.Kp == 0:
-            refuse(self, "Kp", 0.0, f"{gains}; without Kp the speed oscillates for ever")
+            refuse(self, "Kp", 0.0, f"{_GAINS}; without Kp the speed oscillates for ever")
 
     def __repr__(self):
         rule = f", rule={self.rule!r}" if self.rule else ""
@@ -61,7 +73,7 @@ class PI:
 
 
 @dataclass(frozen=True)
-class Matched:
+class Matched(DriveControl):
     """A drive that reflects no waves: M = torque + impedance (Om - om), without inertia.
 
     Args:
@@ -72,17 +84,12 @@ class Matched:
         SceneError: an impedance that is not positive, or a torque that is not finite.
     """
 
-    impedance: float | None = None
-    torque: float = 0.0
-
-    def __post_init__(self):
-        if self.impedance is not None:
-            store(self, impedance=positive(self, "impedance", self.impedance, "N m s/rad"))
-        store(self, torque=number(self, "torque", self.torque, "a finite number (N m)", math.isfinite))
+    impedance: Annotated[TorsionalDamping, positive()] | None = None
+    torque: Torque = 0.0
 
 
 @dataclass(frozen=True)
-class Motor:
+class Motor(DriveControl):
     """A motor of constant torque, whatever the speed.
 
     Args:
@@ -93,20 +100,12 @@ class Motor:
         SceneError: a torque that is not finite, or a negative drag.
     """
 
-    torque: float
-    drag: float = 0.0
-
-    def __post_init__(self):
-        store(self, torque=number(self, "torque", self.torque, "a finite number (N m)", math.isfinite))
-        store(self, drag=number(self, "drag", self.drag, "a number (N m s/rad), not negative",
-                                lambda x: 0 <= x < math.inf))  # fmt: skip
-
-
-CONTROLS = (Stiff, PI, Matched, Motor)
+    torque: Torque
+    drag: TorsionalDamping = 0.0
 
 
 @dataclass(frozen=True)
-class TopDrive:
+class TopDrive(Part):
     """What turns the string.
 
     Args:
@@ -121,14 +120,12 @@ class TopDrive:
         SceneError: a control that is unknown or lacks an inertia or a speed that it needs, or a number out of range.
     """
 
-    speed: float | Callable[[float], float] | None = None
-    inertia: float = 0.0
-    control: Stiff | PI | Matched | Motor = Stiff()
+    speed: InTime[AngularVelocity] | None = None
+    inertia: Inertia = 0.0
+    control: DriveControl = Stiff()
 
-    def __post_init__(self):
-        instance(self, "control", self.control, CONTROLS, "Stiff(), PI(Kp, Ki), Matched() or Motor(torque)")
-        store(self, inertia=number(self, "inertia", self.inertia, "a number (kg m^2), not negative",
-                                   lambda x: 0 <= x < math.inf))  # fmt: skip
+    def validate(self):
+        """See `Part`."""
         if isinstance(self.control, PI) and self.inertia == 0:
             refuse(self, "inertia", 0.0, "that of the drive (kg m^2), about 2000 to 4000, for a PI control")
         if isinstance(self.control, Matched) and self.inertia > 0:

@@ -1,15 +1,16 @@
 """Friction between the string and the wall of its hole, while it moves and while it sticks."""
 
-import math
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
-from cosserat_fenicsx.checks import number, positive, refuse, store
+from cosserat_fenicsx.checks import refuse, store
+from cosserat_fenicsx.parts import Friction, Kind, Number, Part, Rate, positive
 
 
 @dataclass(frozen=True)
-class WallFriction:
+class WallFriction(Part):
     """Coefficient mu = kinetic + (static - kinetic) exp(-v/speed) of the slip v, anything up to the static one at rest.
 
     The friction is a vector against the slip (V, r om) of the surface, along and around the hole. Static and kinetic
@@ -26,23 +27,21 @@ class WallFriction:
         SceneError: friction below zero, or a static friction below the kinetic one.
     """
 
-    static: float
-    kinetic: float | None = None
-    speed: float | None = None
+    static: Friction
+    kinetic: Friction | None = None
+    speed: Annotated[float, Kind()] | None = None
     of_rotation: bool = False
     of_hole: bool = False
 
-    def __post_init__(self):
+    def validate(self):
+        """See `Part`."""
         if self.kinetic is None:
             store(self, kinetic=self.static)
-        for field in ("static", "kinetic"):
-            value = number(self, field, getattr(self, field), "a coefficient of friction from 0 to 5",
-                           lambda x: 0 <= x <= 5)  # fmt: skip
-            store(self, **{field: value})
         if self.static < self.kinetic:
             refuse(self, "static", self.static, f"at least the kinetic one, {self.kinetic:g}")
         if self.speed is not None:
-            store(self, speed=positive(self, "speed", self.speed, "rad/s" if self.of_rotation else "m/s"))
+            kind = Number("angular velocity" if self.of_rotation else "speed", positive())
+            store(self, speed=kind.check(self, "speed", self.speed))
 
     @property
     def decays(self) -> bool:
@@ -60,7 +59,7 @@ def coefficients(friction: WallFriction | None, of_hole: np.ndarray) -> tuple[np
 
 
 @dataclass(frozen=True)
-class ViscousDrag:
+class ViscousDrag(Part):
     """Drag of the mud along the string: a torque per length rate rho J om, a force per length rate rho A v.
 
     Args:
@@ -70,10 +69,5 @@ class ViscousDrag:
         SceneError: negative rates.
     """
 
-    torsion: float = 0.0
-    axial: float = 0.0
-
-    def __post_init__(self):
-        for field in ("torsion", "axial"):
-            store(self, **{field: number(self, field, getattr(self, field), "a rate (1/s), not negative",
-                                         lambda x: 0 <= x < math.inf)})  # fmt: skip
+    torsion: Rate = 0.0
+    axial: Rate = 0.0

@@ -7,7 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from cosserat_fenicsx.checks import LARGEST, refuse, text_of
+from cosserat_fenicsx.checks import refuse, text_of
+from cosserat_fenicsx.dimensions import LARGEST
 from cosserat_fenicsx.errors import SceneError
 
 # Smallest distance of neighbouring points over the extent of all: nearer ones leave the curvature to rounding errors.

@@ -12,7 +12,8 @@ from functools import cached_property
 
 import numpy as np
 
-from cosserat_fenicsx.checks import LARGEST, Numbers, Rows, call, number, refuse, vector
+from cosserat_fenicsx.checks import Numbers, Rows, call, number, refuse, vector
+from cosserat_fenicsx.dimensions import LARGEST
 from cosserat_fenicsx.errors import SceneError
 
 

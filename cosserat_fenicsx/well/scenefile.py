@@ -38,7 +38,7 @@ to = 3438.0
 count = 20
 friction = [0.1, 0.2, 0.3]
 
-Numbers are in SI, or text with a unit (`field_units`).
+Numbers are in SI, or text with a unit (`dimensions`).
 """
 
 import dataclasses
@@ -49,6 +49,7 @@ from typing import Any
 import numpy as np
 
 from cosserat_fenicsx.checks import File, number, refuse
+from cosserat_fenicsx.dimensions import in_si, size_of
 from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.scene.materials import Material
 from cosserat_fenicsx.scene.sections import Stiffness
@@ -56,7 +57,6 @@ from cosserat_fenicsx.scene.toml_tables import check_arguments, class_named, ent
 from cosserat_fenicsx.well.answer import TorqueAndDrag
 from cosserat_fenicsx.well.components import COMPONENTS
 from cosserat_fenicsx.well.depth_sweep import DepthSweep, depth_sweep
-from cosserat_fenicsx.well.field_units import in_si, size_of
 from cosserat_fenicsx.well.hole import Borehole, HoleSection
 from cosserat_fenicsx.well.mud import Mud
 from cosserat_fenicsx.well.operations import OPERATIONS, Operation

@@ -10,8 +10,8 @@ import numpy as np
 
 from cosserat_fenicsx import units
 from cosserat_fenicsx.checks import finite_array, instance, positive, refuse, text_of, warn
+from cosserat_fenicsx.dimensions import size_of
 from cosserat_fenicsx.errors import SceneError, nearest
-from cosserat_fenicsx.well.field_units import size_of
 
 _FULL = math.radians(360)
 # Names of the same column in files.

@@ -16,9 +16,8 @@ from cosserat_fenicsx.ranks import communicator
 from cosserat_fenicsx.results.accuracy import on_mesh
 from cosserat_fenicsx.results.path import Path
 from cosserat_fenicsx.statics.circulatory import conservative_along
-from cosserat_fenicsx.statics.solvers import record_of
 from cosserat_fenicsx.statics.settling import BACK, DECADES, LAST, LAST_TWO, settle, stages_from
-from cosserat_fenicsx.statics.solvers import solvers_of
+from cosserat_fenicsx.statics.solvers import record_of, solvers_of
 from cosserat_fenicsx.well.rod.in_hole import InHole
 from cosserat_fenicsx.well.rod.rod_errors import UNSEEN, values_of
 from cosserat_fenicsx.well.rod.starts import in_helix, on_axis
