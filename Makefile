@@ -18,7 +18,7 @@ export VTK_DEFAULT_OPENGL_WINDOW = vtkEGLRenderWindow
 # A numpy in the user's own site directory would hide the distribution's.
 export PYTHONNOUSERSITE = 1
 
-.PHONY: help setup packages demo motion gallery well string whirl test docs tables figure3 work-precision failures rods-in-wells random random-wells imperfect clean
+.PHONY: help setup packages demo motion gallery well string whirl test docs tables figure3 work-precision failures rods-in-wells random random-wells imperfect mutants clean
 
 help:
 	@echo "make demo    solve the eccentric cantilever of the paper on two processes; writes out/"
@@ -37,6 +37,7 @@ help:
 	@echo "make random  200 random scenes against the strong form, at three tolerances (about 5 minutes)"
 	@echo "make random-wells  100 random wells, strings and operations against finer meshes in a stiffer wall (about half an hour)"
 	@echo "make imperfect  60 symmetric structures with small imperfections against paths in small steps (about 20 minutes)"
+	@echo "make mutants  120 small errors put into the code: how many do the tests find? (hours)"
 	@echo "make setup   only what all of these need first: the Debian packages and the environment .venv"
 	@echo "make clean   remove .venv, out and whatever else was built here"
 
@@ -136,6 +137,10 @@ packages:
 	if [ $$(id -u) = 0 ]; then root=; elif command -v sudo >/dev/null; then root=sudo; else \
 	    echo "Please have root install these Debian packages, then try again:" $$missing; exit 1; fi; \
 	$$root apt-get update && $$root env DEBIAN_FRONTEND=noninteractive apt-get install -y --no-install-recommends $$missing
+
+mutants: setup
+	$(PYTHON) -m pip install --disable-pip-version-check --constraint .venv/constraints.txt pytest-cov
+	$(PYTHON) demos/evidence/mutants.py
 
 clean:
 	rm -rf .venv out build dist *.egg-info .pytest_cache docs/api

@@ -32,6 +32,15 @@ def test_first_runs_quick(tmp_path):
     assert files in (4, 5) and first[0] > following[0] > 0
 
 
+def test_mutants_quick():
+    """A wrong sign in the direction of a line is found by the tests of curves, and they pass without it."""
+    import mutants
+
+    assert mutants.quick() == ["killed", "survived"]
+    chosen = mutants.chosen(mutants.ROOT, 30, seed=0)
+    assert chosen == mutants.chosen(mutants.ROOT, 30, seed=0) and {x.part for x in chosen} == {*mutants.PARTS}
+
+
 @pytest.mark.slow
 def test_accuracy_quick(tmp_path):
     import accuracy
