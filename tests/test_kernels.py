@@ -13,7 +13,7 @@ from mpi4py import MPI
 
 import cosserat_fenicsx as cf
 from cosserat_fenicsx import compat
-from cosserat_fenicsx.models.formulation import DISPLACEMENT, MIXED
+from cosserat_fenicsx.models.formulation import Displacement, Mixed
 from cosserat_fenicsx.models.rodmesh import Layout
 from cosserat_fenicsx.models.signature import Signature
 from cosserat_fenicsx.models.spatial import SpatialModel
@@ -58,7 +58,7 @@ def ends(model):
     return model.mesh.geometry.x[compat.geometry_dofs(model.mesh)]
 
 
-@pytest.mark.parametrize(("formulation", "rigid"), [(MIXED, False), (DISPLACEMENT, False), (MIXED, True)])
+@pytest.mark.parametrize(("formulation", "rigid"), [(Mixed(), False), (Displacement(), False), (Mixed(), True)])
 def test_kernels_assemble_what_dolfinx_assembles(formulation, rigid):
     """Coefficients at Gauss points, a Constant, and where the rod is rigid unknowns in a mixed space."""
     model = model_of(formulation, rigid=rigid)
@@ -91,7 +91,7 @@ def test_kernels_assemble_what_dolfinx_assembles(formulation, rigid):
 @pytest.mark.parametrize("name", ["fields", "advance", "density"])
 def test_expressions_have_the_values_that_dolfinx_gives(name):
     """The Functions and Constants in the order in which a caller must pack them."""
-    model = model_of(MIXED)
+    model = model_of(Mixed())
     expression = getattr(model.forms, name)
     (expression,) = expression if name == "density" else (expression,)
     address, functions, constants = compat.expression_address(expression)
@@ -107,7 +107,7 @@ def test_expressions_have_the_values_that_dolfinx_gives(name):
 
 
 def test_a_form_of_several_kernels_is_refused():
-    model = model_of(DISPLACEMENT)
+    model = model_of(Displacement())
     dx = ufl.Measure("dx", domain=model.mesh)
     two = fem.form(ufl.TestFunction(model.space)[0] * (dx(1) + dx(2)))
     with pytest.raises(ValueError, match="2 integrals over cells, expected 1"):

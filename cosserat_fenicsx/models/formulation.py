@@ -114,72 +114,43 @@ UNKNOWN = _Unknown("a stiffness is infinite or next to it, so the contact force 
 KNOWN = ContactForce("the contact force follows from statics alone")
 
 
+# From a moment to the residual rows of q: those of its vector part.
 _LAST_ROWS = np.eye(4)[None, :, 1:]
-
-
-class UnitLength:
-    """One equation |q|^2 = 1 per node, in the row of the scalar component of q.
-
-    Attributes:
-        unknowns: number of a node's unknowns after r and q.
-        galerkin: whether virtual rotations are those of changes of q.
-    """
-
-    unknowns, galerkin = 0, False
-
-    def __eq__(self, other):
-        return type(self) is type(other)
-
-    def __hash__(self):
-        return hash(type(self))
-
-    def tests(self, phi, phi_s, q, q_s):
-        """The `VirtualMotion` of the test functions phi at q."""
-        return spatial.tests_of(phi, phi_s)
-
-    def equations(self, state, test, U_node, phi):
-        """Residual terms added to eq. (1), integrated at the nodes; U_node: alias of the unknowns for that rule."""
-        return spatial.unit_quaternion(state, test)
-
-    def rows_of_moments(self, q):
-        """(nodes, components after r, 3): matrices from moments at nodes with q (nodes, 4) to residual rows; only one
-        where all nodes have the same."""
-        return _LAST_ROWS
-
-    def turned_rows(self, q, moments):
-        """(nodes, c, c), c the components after r: derivative by q of the residual rows of moments (nodes, 3), where
-        `galerkin`."""
-        raise NotImplementedError
-
-
-#: Eq. (1) as in the paper: small rotations are test functions.
-AT_NODES = UnitLength()
 
 
 @dataclass(frozen=True)
 class Formulation:
-    """A formulation of eq. (1). Other code uses these attributes, and never tests the name.
+    """A formulation of eq. (1): how the contact force n is represented and |q| = 1 imposed.
+
+    Here one equation |q|^2 = 1 per node stands in the row of the scalar component of q, and virtual rotations are small
+    rotations, as in the paper. A subclass with a `name` of its own is a new formulation that `solve` and scene files
+    take by that name; other code uses these attributes and methods, and never tests the name.
+
+    Args:
+        force: the representation of n.
 
     Attributes:
         name: as `solve` takes it.
         default_degree: polynomial degree of r and q.
-        force: the representation of the contact force n.
-        rigid_force: the same where a stiffness is infinite, or so large that rounding requires it; None if not
-            supported.
-        unit_length: how |q| = 1 is imposed in the spatial model.
+        rigid_force: the representation of n where a stiffness is infinite, or so large that rounding requires it; None
+            if not supported.
         models: names of the models that have it.
         advice: what else to try if it does not converge.
         says: text for `Path.why` in front of how n is represented.
+        multipliers: number of a node's unknowns after r and q in the spatial model.
+        galerkin: whether virtual rotations are those of changes of q.
     """
 
-    name: str
-    default_degree: int
-    force: ContactForce
-    rigid_force: ContactForce | None = None
-    unit_length: UnitLength = AT_NODES
-    models: tuple = ("spatial",)
-    advice: str = "the formulation 'mixed'"
-    says: str = ""
+    force: ContactForce = CARRIED
+
+    name, default_degree, rigid_force, models = "", 4, UNKNOWN, ("spatial",)
+    advice, says = "the formulation 'mixed'", ""
+    multipliers, galerkin = 0, False
+
+    def __init_subclass__(cls, **options):
+        super().__init_subclass__(**options)
+        if "name" in vars(cls):
+            FORMULATIONS[cls.name] = cls
 
     def for_stiffness(self, infinite, rounding):
         """The formulation for a mesh.
@@ -198,80 +169,95 @@ class Formulation:
             )
         return replace(self, force=self.rigid_force) if self.rigid_force and (infinite or rounding > 1.0) else self
 
-    def with_known_force(self):
-        """The formulation where statics gives n."""
-        return replace(self, force=KNOWN)
-
     @property
     def words(self):
         """How n is represented and |q| = 1 imposed, as text."""
         return f"{self.says}{self.force.words} (formulation '{self.name}')"
 
+    def tests(self, phi, phi_s, q, q_s):
+        """The `VirtualMotion` of the test functions phi at q, UFL."""
+        return spatial.tests_of(phi, phi_s)
 
-MIXED = Formulation(
-    "mixed",
-    default_degree=4,
-    force=CARRIED,
-    rigid_force=UNKNOWN,
-    models=("determinate", "planar", "spatial"),
-    advice="a larger tol",
-)
+    def equations(self, state, test, U_node, phi):
+        """Residual terms added to eq. (1), integrated at the nodes, UFL.
+
+        Args:
+            state: the `spatial.State`; test: what `tests` returns.
+            U_node, phi: the unknowns of a node (for the rule at the nodes) and their test functions: r, q, multipliers.
+        """
+        return spatial.unit_quaternion(state, test)
+
+    def rows_of_moments(self, q):
+        """(nodes, components after r, 3): matrices from moments at nodes with q (nodes, 4) to residual rows; only one
+        where all nodes have the same."""
+        return _LAST_ROWS
+
+    def turned_rows(self, q, moments):
+        """(nodes, c, c), c the components after r: derivative by q of the residual rows of moments (nodes, 3), where
+        `galerkin`."""
+        raise NotImplementedError
 
 
-DISPLACEMENT = Formulation("displacement", default_degree=2, force=OF_MOTION)
+#: The classes of formulations by name; a subclass of `Formulation` enters itself.
+FORMULATIONS = {}
 
 
-class ByMultiplier(UnitLength):
+class Mixed(Formulation):
+    """Eq. (1) as in the paper, with n carried at the Gauss points."""
+
+    name, models, advice = "mixed", ("determinate", "planar", "spatial"), "a larger tol"
+
+
+@dataclass(frozen=True)
+class Displacement(Formulation):
+    """Eq. (1) with n by the law, the motion being the only unknown."""
+
+    force: ContactForce = OF_MOTION
+
+    name, default_degree, rigid_force = "displacement", 2, None
+
+
+class Multiplier(Formulation):
     """lambda is the unknown after r and q; virtual rotations are those of changes of q."""
 
-    unknowns, galerkin = 1, True
+    name, says = "multiplier", "a multiplier at every node holds |q| = 1; "
+    multipliers, galerkin = 1, True
 
     def tests(self, phi, phi_s, q, q_s):
-        """See `UnitLength`."""
         return spatial.variations_of(phi, phi_s, q, q_s)
 
     def equations(self, state, test, U_node, phi):
-        """See `UnitLength`."""
         return spatial.multiplier(U_node[7], phi[7], state.q_node, phi)
 
     def rows_of_moments(self, q):
-        """See `UnitLength`: a moment does work on the small rotation of a change of q."""
-        rows = np.zeros((len(q), 5, 3))
+        # a moment does work on the small rotation of a change of q
+        rows = np.zeros((len(q), 4 + self.multipliers, 3))
         rows[:, :4] = small_rotations(q).swapaxes(1, 2)
         return rows
 
     def turned_rows(self, q, moments):
-        """See `UnitLength`."""
         squared = (q * q).sum(axis=1)[:, None, None]
         by_basis = np.einsum("jai,na->nij", small_rotations(np.eye(4)), moments)
         along_q = np.einsum("nai,na->ni", small_rotations(q), moments)
-        turned = np.zeros((len(q), 5, 5))
+        turned = np.zeros((len(q), 4 + self.multipliers, 4 + self.multipliers))
         turned[:, :4, :4] = (by_basis - 2 * along_q[:, :, None] * q[:, None, :]) / squared
         return turned
 
 
-MULTIPLIER = Formulation(
-    "multiplier",
-    default_degree=4,
-    force=CARRIED,
-    rigid_force=UNKNOWN,
-    unit_length=ByMultiplier(),
-    says="a multiplier at every node holds |q| = 1; ",
-)
+def formulation_of(given=None):
+    """A `Formulation`, the default for None.
 
-
-FORMULATIONS = {formulation.name: formulation for formulation in (MIXED, DISPLACEMENT, MULTIPLIER)}
-
-
-def formulation_of(name=None):
-    """The `Formulation` of a name, the default for None; one that is given is returned as it is.
+    Args:
+        given: a name, a subclass of `Formulation` or an object of one.
 
     Raises:
         SceneError: an unknown name.
     """
-    if isinstance(name, Formulation):
-        return name
-    name = MIXED.name if name is None else name
+    if isinstance(given, Formulation):
+        return given
+    if isinstance(given, type) and issubclass(given, Formulation):
+        return given()
+    name = Mixed.name if given is None else given
     if not isinstance(name, str) or name not in FORMULATIONS:
         raise SceneError(f"formulation = {name!r}: {nearest(name, FORMULATIONS)}")
-    return FORMULATIONS[name]
+    return FORMULATIONS[name]()

@@ -2,13 +2,13 @@
 
 import numbers
 from collections import namedtuple
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.models.connections import Connections
-from cosserat_fenicsx.models.formulation import Formulation, formulation_of
+from cosserat_fenicsx.models.formulation import KNOWN, Formulation, formulation_of
 from cosserat_fenicsx.models.traits import traits_of, work_of
 from cosserat_fenicsx.remember import per_scene
 from cosserat_fenicsx.scene.signals import at
@@ -81,7 +81,7 @@ class Signature:
         rounding = _rounding(scene, layout, degree)
         formulation = formulation.for_stiffness(infinite, rounding)
         if model == "determinate":
-            formulation = formulation.with_known_force()
+            formulation = replace(formulation, force=KNOWN)
         terms = tuple(kind for kind, _ in place_actions(scene, layout))
         plane = None if model == "spatial" else scene.plane
         connections = Connections.of(scene, layout, plane)
@@ -104,7 +104,7 @@ class Signature:
         nodes = cells * self.degree + len(self.counts) - len(links.clamped) - len(links.leaders)
         node, force = _SIZES[self.model, self.flat]
         if self.model == "spatial":
-            node += self.formulation.unit_length.unknowns
+            node += self.formulation.multipliers
         others = force * self.degree * cells if self.formulation.force.unknown else 0
         return node * nodes + others + len(links.equations)
 

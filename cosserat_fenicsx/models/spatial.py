@@ -48,14 +48,14 @@ def compile_spatial(model, rotations):
     section = equilibrium.Section(law, as_matrix(data.R_R), data.v_R)
     state = eq.state_of(U, along(U), U_node)
     phi, trial = ufl.TestFunction(model.space), ufl.TrialFunction(model.space)
-    test = formulation.unit_length.tests(phi, along(phi), state.q, state.q_s)
+    test = formulation.tests(phi, along(phi), state.q, state.q_s)
     derivative = derivative_in(trial, U, U_node)
 
     n, phi_n = (None if a is None else ufl.as_vector(a) for a in formulation.force.symbols(model, U, phi))
     state_before = eq.state_of(before, along(before), before)
     along_step = partial(ufl.derivative, coefficient=before, argument=step)
     weak = formulation.force.weak_form(n, phi_n, state, state_before, section, test, ds, derivative, along_step)
-    held = formulation.unit_length.equations(state, test, U_node, phi) * dx.nodes
+    held = formulation.equations(state, test, U_node, phi) * dx.nodes
     internal, tangent = weak.internal + held, weak.tangent + derivative(held)
 
     def names_at(place):
@@ -66,7 +66,7 @@ def compile_spatial(model, rotations):
 
     def test_at(place):
         at = eq.state_of(*names_at(place), U_node)
-        return formulation.unit_length.tests(phi, along(phi), at.q, at.q_s)
+        return formulation.tests(phi, along(phi), at.q, at.q_s)
 
     acting = action_work(model, dx, test, point_at, (U, U_node), test_at=test_at)
 
@@ -94,8 +94,8 @@ class SpatialModel(RodModel):
     variations = ((6, False),)
 
     def __init__(self, comm, signature):
-        unit_length = signature.formulation.unit_length
-        self.multipliers, self.rows_turn = unit_length.unknowns, unit_length.galerkin
+        formulation = signature.formulation
+        self.multipliers, self.rows_turn = formulation.multipliers, formulation.galerkin
         self.components = 7 + self.multipliers
         super().__init__(comm, signature)
 
@@ -121,7 +121,7 @@ class SpatialModel(RodModel):
     def tie_maps(self, values):
         """See `RodModel`."""
         size, q = self.components, values[:, 3:7]
-        of_moments = self.signature.formulation.unit_length.rows_of_moments(q)
+        of_moments = self.signature.formulation.rows_of_moments(q)
         trial, test = np.zeros((len(values), 6, size)), np.zeros((len(of_moments), size, 6))
         trial[:, :3, :3] = test[:, :3, :3] = _EYE
         test[:, 3:, 3:] = of_moments
@@ -130,7 +130,7 @@ class SpatialModel(RodModel):
 
     def turned_reactions(self, values, reactions):
         """See `RodModel`."""
-        turned = self.signature.formulation.unit_length.turned_rows(values[:, 3:7], reactions[:, 3:])
+        turned = self.signature.formulation.turned_rows(values[:, 3:7], reactions[:, 3:])
         return np.pad(turned, ((0, 0), (3, 0), (3, 0)))
 
     def unknowns_of(self, rq):

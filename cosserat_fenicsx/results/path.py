@@ -61,7 +61,7 @@ class Path(Result):
         the path, a query and parameters that computes its `sensitivity`."""
         formulation = model.signature.formulation
         path = super().of(model, formulation.name, why)
-        path.rounding, path.galerkin = formulation.force.rounding * model.round_off, formulation.unit_length.galerkin
+        path.rounding, path.galerkin = formulation.force.rounding * model.round_off, formulation.galerkin
         path._potential, path._differentiated = potential, differentiated
         return path
 
