@@ -133,13 +133,14 @@ from cosserat_fenicsx.well.components import Bit as Bit
 from cosserat_fenicsx.well.components import Collar as Collar
 from cosserat_fenicsx.well.components import Component as Component
 from cosserat_fenicsx.well.components import DrillPipe as DrillPipe
+from cosserat_fenicsx.well.components import DrillString as DrillString
 from cosserat_fenicsx.well.components import HeavyWeight as HeavyWeight
 from cosserat_fenicsx.well.components import Stabiliser as Stabiliser
 from cosserat_fenicsx.well.depth_sweep import DepthSweep as DepthSweep
 from cosserat_fenicsx.well.depth_sweep import depth_sweep as depth_sweep
 from cosserat_fenicsx.well.hole import Borehole as Borehole
 from cosserat_fenicsx.well.hole import HoleSection as HoleSection
-from cosserat_fenicsx.well.mud import Mud as Mud
+from cosserat_fenicsx.well.hole import Mud as Mud
 from cosserat_fenicsx.well.operations import BackReam as BackReam
 from cosserat_fenicsx.well.operations import Ream as Ream
 from cosserat_fenicsx.well.operations import RotaryDrilling as RotaryDrilling
@@ -151,7 +152,6 @@ from cosserat_fenicsx.well.operations import TripOut as TripOut
 from cosserat_fenicsx.well.path import WellPath as WellPath
 from cosserat_fenicsx.well.scenefile import WellScene as WellScene
 from cosserat_fenicsx.well.scenefile import read_well as read_well
-from cosserat_fenicsx.well.string import DrillString as DrillString
 from cosserat_fenicsx.well.torque_and_drag import torque_and_drag as torque_and_drag
 
 __version__: str

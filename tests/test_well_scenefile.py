@@ -12,10 +12,9 @@ from assembly import assembly
 import cosserat_fenicsx as cf
 from cosserat_fenicsx.cli.main import main
 from cosserat_fenicsx.dimensions import DIMENSIONS, in_si
-from cosserat_fenicsx.well.components import COMPONENTS
+from cosserat_fenicsx.well.components import COMPONENTS, standard_sizes
 from cosserat_fenicsx.well.operations import OPERATIONS
 from cosserat_fenicsx.well.scenefile import KEYS
-from cosserat_fenicsx.well.sizes import standard_sizes
 
 pytestmark = pytest.mark.serial
 DEMOS = Path(__file__).parent.parent / "demos"

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import cosserat_fenicsx as cf
-from cosserat_fenicsx.well import sizes
+from cosserat_fenicsx.well.components import standard_sizes
 
 pytestmark = pytest.mark.serial
 PATH = cf.WellPath.from_survey([0, 600, 1200, 2500], [0, 0, 50, 50], [0, 0, 120, 120])
@@ -42,7 +42,7 @@ def test_standard_sizes():
     assert pytest.approx(20.89 * cf.units.lb_per_ft) == PIPE.mass
     assert min(PIPE.stiffness.bending) == pytest.approx(1228200, rel=2e-4)
     assert cf.DrillPipe(size="5 19.5") == cf.DrillPipe(size='5" 19.50 lb/ft')
-    for name, kind in ((name, kind) for kind, known in sizes.standard_sizes().items() for name in known):
+    for name, kind in ((name, kind) for kind, known in standard_sizes().items() for name in known):
         part = getattr(cf, kind)(100.0, name)
         plain = 7850 * math.pi / 4 * (part.outer_diameter**2 - part.inner_diameter**2)
         assert plain * (1 - 1e-12) <= part.mass < 1.35 * plain and part.inner_diameter < part.outer_diameter

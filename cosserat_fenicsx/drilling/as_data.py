@@ -22,11 +22,9 @@ from cosserat_fenicsx.scene.as_data import NotData
 from cosserat_fenicsx.scene.materials import Material
 from cosserat_fenicsx.scene.sections import Stiffness
 from cosserat_fenicsx.scene.signals import SIGNALS
-from cosserat_fenicsx.well.components import COMPONENTS
-from cosserat_fenicsx.well.hole import Borehole, HoleSection
-from cosserat_fenicsx.well.mud import Mud
+from cosserat_fenicsx.well.components import COMPONENTS, DrillString
+from cosserat_fenicsx.well.hole import Borehole, HoleSection, Mud
 from cosserat_fenicsx.well.path import WellPath
-from cosserat_fenicsx.well.string import DrillString
 
 _OF_DRILLING = (Drilling, Discs, TopDrive, Hook, BitOnRock, Wear, WallFriction, ViscousDrag)
 _OF_WELLS = (DrillString, *COMPONENTS, Borehole, HoleSection, WellPath, Mud, Material, Stiffness)

@@ -24,7 +24,7 @@ from cosserat_fenicsx.drilling.top_drive import PI, Matched, Stiff, TopDrive
 from cosserat_fenicsx.drilling.wall_friction import ViscousDrag
 from cosserat_fenicsx.scene.action import PointAction, scalar, vector
 from cosserat_fenicsx.scene.rod import Station, StationOrName, is_known
-from cosserat_fenicsx.well.string import Laid
+from cosserat_fenicsx.well.components import Laid
 
 # Drag acts at nodes, so many in the pipe at least: errors of 3e-4 at a rate of 0.3 per s in 3000 m.
 _BEADS = 64

@@ -10,10 +10,8 @@ from cosserat_fenicsx.drilling.hook import Hook
 from cosserat_fenicsx.drilling.segments import Discs, Segment, segment_of
 from cosserat_fenicsx.drilling.top_drive import TopDrive
 from cosserat_fenicsx.drilling.wall_friction import ViscousDrag, WallFriction
-from cosserat_fenicsx.well.components import weight_in_mud
-from cosserat_fenicsx.well.hole import Borehole
-from cosserat_fenicsx.well.mud import Mud
-from cosserat_fenicsx.well.string import DrillString
+from cosserat_fenicsx.well.components import DrillString, weight_in_mud
+from cosserat_fenicsx.well.hole import Borehole, Mud
 
 
 @dataclass(frozen=True)

@@ -51,7 +51,7 @@ from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.parts import members
 from cosserat_fenicsx.scene.signals import SIGNALS
 from cosserat_fenicsx.scene.toml_tables import check_arguments, class_named, known_keys, table, tables_of
-from cosserat_fenicsx.well.mud import Mud
+from cosserat_fenicsx.well.hole import Mud
 from cosserat_fenicsx.well.scenefile import hole_in, made, string_in
 
 #: Dimensions of arguments that may be written with a unit, by class.

@@ -36,7 +36,7 @@ from cosserat_fenicsx.drilling.steady_start import check_steady, steady_velociti
 from cosserat_fenicsx.drilling.top_drive import PI, Matched, Motor, Stiff
 from cosserat_fenicsx.drilling.wall import wall_of
 from cosserat_fenicsx.errors import NotConverged
-from cosserat_fenicsx.well.string import DrillString
+from cosserat_fenicsx.well.components import DrillString
 
 _EXACT = 1e-9  # steps; travel times nearer to a whole number of steps are one
 _SHORTEST = 1.5  # steps

@@ -6,7 +6,7 @@ import numpy as np
 
 from cosserat_fenicsx.drilling.wall_friction import coefficients
 from cosserat_fenicsx.numerics import gauss
-from cosserat_fenicsx.well.mud import Mud
+from cosserat_fenicsx.well.hole import Mud
 from cosserat_fenicsx.well.operations import RotaryDrilling, RotateOffBottom
 from cosserat_fenicsx.well.pieces import pieces_of
 

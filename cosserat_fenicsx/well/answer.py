@@ -8,14 +8,14 @@ import numpy as np
 
 from cosserat_fenicsx.checks import File
 from cosserat_fenicsx.errors import SceneError
-from cosserat_fenicsx.well import criteria, loaded
+from cosserat_fenicsx.well import criteria
+from cosserat_fenicsx.well.components import DrillString
 from cosserat_fenicsx.well.contacts import WallContact, contacts_of, high_side, side_force_up_to, sides_of
 from cosserat_fenicsx.well.differentiated import Differentiated
-from cosserat_fenicsx.well.hole import Borehole
-from cosserat_fenicsx.well.mud import Mud
+from cosserat_fenicsx.well.hole import Borehole, Mud
 from cosserat_fenicsx.well.operations import Operation
+from cosserat_fenicsx.well.pieces import Sections, sections_of, stretch, true_tension, von_mises
 from cosserat_fenicsx.well.softstring import UP_TO
-from cosserat_fenicsx.well.string import DrillString
 from cosserat_fenicsx.well.tabular import Tabular
 
 # A torque below this share of the largest tension times the contact radius is nothing that errors are compared with.
@@ -191,8 +191,8 @@ class TorqueAndDrag(Differentiated, Tabular):
 
     @cached_property
     def _sections(self):
-        found = loaded.sections_of([place.component for place in self.laid])
-        return loaded.Sections(*(values[self.component] for values in found))
+        found = sections_of([place.component for place in self.laid])
+        return Sections(*(values[self.component] for values in found))
 
     @cached_property
     def _pressures(self):
@@ -206,12 +206,12 @@ class TorqueAndDrag(Differentiated, Tabular):
     def true_tension(self) -> np.ndarray:
         """Force in the wall of the pipe, N: effective tension + p_i A_i - p_o A_o, with the pressures of the fluids at
         rest and the areas of the body. NaN without mud, or without diameters."""
-        return loaded.true_tension(self._sections, self.tension, *self._pressures)
+        return true_tension(self._sections, self.tension, *self._pressures)
 
     @cached_property
     def von_mises(self) -> np.ndarray:
         """The largest von Mises stress in the body of the pipe, Pa. NaN without mud, or without diameters."""
-        return loaded.von_mises(self._sections, self.tension, self.torque, self.bending_moment, *self._pressures)
+        return von_mises(self._sections, self.tension, self.torque, self.bending_moment, *self._pressures)
 
     def _integral(self, values):
         """Of values at `md` along the string: by the points of pieces."""
@@ -222,7 +222,7 @@ class TorqueAndDrag(Differentiated, Tabular):
     def stretch(self) -> float:
         """How much longer the string is than at rest on the ground, m: by its tension, and by the pressures of the mud
         where these and the diameters are known. NaN where EA is not known."""
-        return self._integral(loaded.stretch(self._sections, self.tension, *self._pressures))
+        return self._integral(stretch(self._sections, self.tension, *self._pressures))
 
     @cached_property
     def twist(self) -> float:

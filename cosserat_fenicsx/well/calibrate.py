@@ -11,10 +11,9 @@ from scipy.stats import t as student
 
 from cosserat_fenicsx.checks import File, instance, number, positive, refuse, store, warn
 from cosserat_fenicsx.errors import SceneError, SceneWarning
-from cosserat_fenicsx.well.hole import Borehole
-from cosserat_fenicsx.well.mud import Mud
+from cosserat_fenicsx.well.components import DrillString
+from cosserat_fenicsx.well.hole import Borehole, Mud
 from cosserat_fenicsx.well.operations import Operation
-from cosserat_fenicsx.well.string import DrillString
 from cosserat_fenicsx.well.torque_and_drag import BUCKLED, SOFT, torque_and_drag
 
 # Where the search begins, its bounds, and the accuracy of the answers that it compares.

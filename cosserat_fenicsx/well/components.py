@@ -1,18 +1,73 @@
-"""What a string in a well is made of: by numbers, by dimensions, or by standard sizes.
+"""The components of a string, by numbers, by dimensions or by standard sizes, and the string made of them.
 
 Lengths in m. `mass` is that in air, kg/m, tool joints included; its volume of steel is mass over density. The weight in
 mud follows from it (`Mud`), or is given (`Component`).
+
+Standard sizes are in standard_sizes.csv. Drill pipe: bodies of API Spec 5DP (ISO 11961); tool joints and weights with
+them of API RP 7G, for new grade E75 pipe with the connection named, which other grades and connections exceed by up to
+a tenth. Drill collars: number, outer diameter and bore of API Spec 7-1 (ISO 10424-1); of those with two bores the
+larger one. Heavy-weight pipe: Drilco's Hevi-Wate; other makes differ by about 1 %. A weight of None: that of the plain
+section.
 """
 
+import csv
+import functools
 import math
 from dataclasses import dataclass
 from functools import cached_property
+from pathlib import Path
 
+from cosserat_fenicsx import units
 from cosserat_fenicsx.checks import instance, number, positive, refuse, store
-from cosserat_fenicsx.errors import SceneError
+from cosserat_fenicsx.errors import SceneError, nearest
 from cosserat_fenicsx.scene.materials import Material
 from cosserat_fenicsx.scene.sections import Circle, Stiffness, Tube
-from cosserat_fenicsx.well.sizes import standard_size
+
+_TABLE = Path(__file__).with_name("standard_sizes.csv")
+
+
+@functools.cache
+def standard_sizes():
+    """{kind: {name: what `standard_size` returns}}."""
+    with _TABLE.open(encoding="utf-8", newline="") as stream:
+        rows = list(csv.DictReader(stream))
+    sizes = {}
+    for row in rows:
+        inches = (row["outer_diameter_in"], row["inner_diameter_in"], row["tool_joint_in"])
+        outer, inner, joint = (float(x) * units.inch if x else None for x in inches)
+        mass = float(row["weight_lb_per_ft"]) * units.lb_per_ft if row["weight_lb_per_ft"] else None
+        found = {
+            "size": row["name"],
+            "outer_diameter": outer,
+            "inner_diameter": inner,
+            "tool_joint": joint,
+            "mass": mass,
+        }
+        sizes.setdefault(row["kind"], {})[row["name"]] = found
+    return sizes
+
+
+def standard_size(kind, name):
+    """Its full name as `size`, outer_diameter, inner_diameter, tool_joint (m, or None), mass (kg/m in air, or None).
+
+    Args:
+        kind: "DrillPipe", "HeavyWeight" or "Collar"; name: such as "5 in 19.50 lb/ft"; the units may be left out.
+
+    Raises:
+        SceneError: an unknown name, with the nearest known one.
+    """
+    known = standard_sizes()[kind]
+    plain = {_plain(size): size for size in known}
+    if not isinstance(name, str) or _plain(name) not in plain:
+        raise SceneError(f"{kind}.size = {name!r}: {nearest(name, known)}")
+    return known[plain[_plain(name)]]
+
+
+def _plain(name):
+    """A name without units and blanks, with weights to the last digit that is not zero."""
+    words = name.lower().replace('"', " ").replace("lb/ft", " ").replace("in", " ").split()
+    return " ".join(f"{float(word):g}" if word.replace(".", "", 1).isdigit() else word for word in words)
+
 
 #: Drill-pipe steel: E = 30 million psi, as in API RP 7G.
 STEEL = Material(E=206.8e9, nu=0.3, density=7850.0)
@@ -247,3 +302,81 @@ def weight_in_mud(component, mud):
 
 def _length(component):
     return None if component.length is None else positive(component, "length", component.length, "m")
+
+
+_ORDERS = ("bit up", "top down")
+
+
+@dataclass(frozen=True)
+class Laid:
+    """A component in its place: measured depths (m) of its upper and lower end."""
+
+    top: float
+    bottom: float
+    component: object
+
+
+@dataclass(frozen=True)
+class DrillString:
+    """A string of components.
+
+    Args:
+        components: `DrillPipe`, `Component` ... from the bit up. The uppermost one fills up to the surface: its length
+            is None. With a length, the string hangs from the surface only at the depth that is the sum of lengths.
+        order: "bit up", or "top down": `components` from the surface down.
+
+    Attributes:
+        components: from the bit up, whatever the order was.
+
+    Raises:
+        SceneError: no components, an unknown order, or a length that is missing below the uppermost component.
+    """
+
+    components: tuple
+    order: str = "bit up"
+
+    def __post_init__(self):
+        given = tuple(self.components) if isinstance(self.components, list | tuple) else (self.components,)
+        if self.order not in _ORDERS:
+            refuse(self, "order", self.order, "'bit up' or 'top down'")
+        for part in given:
+            if not all(hasattr(part, name) for name in ("length", "contact_radius", "stiffness", "weight", "name")):
+                refuse(self, "components", part, "components: DrillPipe, HeavyWeight, Collar, ..., or Component")
+            if not isinstance(part.name, str):
+                refuse(part, "name", part.name, "a text")
+        if not given:
+            refuse(self, "components", given, "at least one component")
+        other = _ORDERS[1 - _ORDERS.index(self.order)]
+        given = given if self.order == "bit up" else given[::-1]
+        store(self, components=given, order="bit up")
+        for part in given[:-1]:
+            if part.length is None:
+                expected = f"a length (m): only the uppermost component, {given[-1].name}, fills up"
+                if part is given[0]:
+                    expected += f"; where the list runs the other way, say order='{other}'"
+                refuse(part, "length", None, expected)
+
+    def laid(self, depth):
+        """The components in their places with the lower end at a measured depth (m), from the bit up.
+
+        Raises:
+            SceneError: the string is longer or shorter than the depth.
+        """
+        places, bottom = [], depth
+        for part in self.components:
+            top = 0.0 if part.length is None else bottom - part.length
+            if abs(top) < 1e-9 * depth:
+                top = 0.0
+            if top < 0 or bottom <= 0:
+                raise SceneError(
+                    f"DrillString: {part.name} reaches {-top:.6g} m above the surface at the depth {depth:.6g} m: "
+                    "expected a string that is no longer; the uppermost component fills up where it has no length"
+                )
+            places.append(Laid(top, bottom, part))
+            bottom = top
+        if places[-1].top > 0:
+            raise SceneError(
+                f"DrillString: it ends {places[-1].top:.6g} m below the surface at the depth {depth:.6g} m: expected "
+                "an uppermost component without a length, which fills up"
+            )
+        return places

@@ -17,11 +17,10 @@ from cosserat_fenicsx.errors import Interrupted, NotConverged
 from cosserat_fenicsx.progress import Progress
 from cosserat_fenicsx.ranks import world
 from cosserat_fenicsx.well.buckled import LockUp
-from cosserat_fenicsx.well.hole import Borehole
-from cosserat_fenicsx.well.mud import Mud
+from cosserat_fenicsx.well.components import DrillString
+from cosserat_fenicsx.well.hole import Borehole, Mud
 from cosserat_fenicsx.well.operations import Operation
 from cosserat_fenicsx.well.pieces import pieces_of
-from cosserat_fenicsx.well.string import DrillString
 from cosserat_fenicsx.well.sweep_file import SweepFile
 from cosserat_fenicsx.well.tabular import Tabular
 from cosserat_fenicsx.well.torque_and_drag import AUTO, BUCKLED, ROD, SOFT, torque_and_drag

@@ -8,7 +8,7 @@ import numpy as np
 
 from cosserat_fenicsx.errors import SceneError, nearest
 from cosserat_fenicsx.results.sensitivity import Sensitivity, Uncertainty
-from cosserat_fenicsx.well.soft_rates import Change, rates_of
+from cosserat_fenicsx.well.softstring import Change, rates_of
 
 _NUMBERED = re.compile(r"(.*)\[(\d+)\](.*)")
 #: {query: its unit}

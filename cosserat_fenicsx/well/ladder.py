@@ -28,7 +28,7 @@ import numpy as np
 
 from cosserat_fenicsx.well import criteria
 from cosserat_fenicsx.well.buckled import LockUp, earliest_helix, growth
-from cosserat_fenicsx.well.rings import free_span, prying
+from cosserat_fenicsx.well.pieces import free_span, prying
 
 # Caution over what the clearance changes: the difference from the rod was up to 1.2 times its sum of sizes, on 240
 # random strings.

@@ -55,15 +55,13 @@ from cosserat_fenicsx.scene.materials import Material
 from cosserat_fenicsx.scene.sections import Stiffness
 from cosserat_fenicsx.scene.toml_tables import check_arguments, class_named, entries, known_keys, table, tables_of
 from cosserat_fenicsx.well.answer import TorqueAndDrag
-from cosserat_fenicsx.well.components import COMPONENTS
+from cosserat_fenicsx.well.components import COMPONENTS, DrillString
 from cosserat_fenicsx.well.depth_sweep import DepthSweep, depth_sweep
-from cosserat_fenicsx.well.hole import Borehole, HoleSection
-from cosserat_fenicsx.well.mud import Mud
+from cosserat_fenicsx.well.hole import Borehole, HoleSection, Mud
 from cosserat_fenicsx.well.operations import OPERATIONS, Operation
 from cosserat_fenicsx.well.path import WellPath
 from cosserat_fenicsx.well.pieces import pieces_of
-from cosserat_fenicsx.well.rod.rod_rung import check_rod
-from cosserat_fenicsx.well.string import DrillString
+from cosserat_fenicsx.well.rod.rod_answer import check_rod
 from cosserat_fenicsx.well.torque_and_drag import CONVENTIONS, ROD, check_settings, torque_and_drag
 
 #: Dimensions of arguments that may be written with a unit.

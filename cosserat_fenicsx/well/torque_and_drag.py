@@ -6,16 +6,13 @@ from cosserat_fenicsx.checks import instance, number, refuse
 from cosserat_fenicsx.errors import InstallationError, NotConverged, SceneError
 from cosserat_fenicsx.well.answer import TorqueAndDrag, scales_of, share
 from cosserat_fenicsx.well.buckled import LockUp, buckled_string
-from cosserat_fenicsx.well.hole import Borehole
+from cosserat_fenicsx.well.components import DrillString
+from cosserat_fenicsx.well.hole import Borehole, Mud
 from cosserat_fenicsx.well.ladder import beyond_pipes, model_errors, reasons, too_much
-from cosserat_fenicsx.well.loaded import sections_of
-from cosserat_fenicsx.well.mud import Mud
 from cosserat_fenicsx.well.operations import Operation
-from cosserat_fenicsx.well.pieces import pieces_of
-from cosserat_fenicsx.well.rings import is_ring, ring_of
-from cosserat_fenicsx.well.rod.rod_rung import rod_in_contact
+from cosserat_fenicsx.well.pieces import is_ring, pieces_of, ring_of, sections_of
+from cosserat_fenicsx.well.rod.rod_answer import rod_in_contact
 from cosserat_fenicsx.well.softstring import chain_of, soft_string
-from cosserat_fenicsx.well.string import DrillString
 
 AUTO, SOFT, BUCKLED, ROD = "auto", "soft", "soft, buckled", "rod"
 MODELS = (AUTO, SOFT, BUCKLED, ROD)

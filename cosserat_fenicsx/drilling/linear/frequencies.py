@@ -30,7 +30,7 @@ from cosserat_fenicsx.drilling.linear.impedances import Guide, axial, torsional
 from cosserat_fenicsx.drilling.scene import Drilling
 from cosserat_fenicsx.drilling.segments import Discs
 from cosserat_fenicsx.drilling.top_drive import PI, RULES, Motor, TopDrive
-from cosserat_fenicsx.well.string import DrillString
+from cosserat_fenicsx.well.components import DrillString
 
 
 def natural_frequencies(scene: Drilling, count: int, bit: str = "free", kind: str = "torsion") -> np.ndarray:

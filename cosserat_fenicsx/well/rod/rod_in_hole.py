@@ -18,10 +18,8 @@ from cosserat_fenicsx.results.path import Path
 from cosserat_fenicsx.statics.circulatory import conservative_along
 from cosserat_fenicsx.statics.settling import BACK, DECADES, LAST, LAST_TWO, settle, stages_from
 from cosserat_fenicsx.statics.solvers import record_of, solvers_of
-from cosserat_fenicsx.well.rod.in_hole import InHole
-from cosserat_fenicsx.well.rod.rod_errors import UNSEEN, values_of
-from cosserat_fenicsx.well.rod.starts import in_helix, on_axis
-from cosserat_fenicsx.well.rod.string_scene import string_in
+from cosserat_fenicsx.well.rod.in_hole import UNSEEN, InHole, values_of
+from cosserat_fenicsx.well.rod.string_scene import in_helix, on_axis, string_in
 
 # Degree of the elements where none is asked for: lift-off forces limit the regularity, higher degrees gain nothing.
 _DEGREE = 3
