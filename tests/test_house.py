@@ -54,6 +54,7 @@ SHARED = {
     "numerics",
     "parts",
     "progress",
+    "quantities",
     "ranks",
     "remember",
     "units",

@@ -1,0 +1,163 @@
+"""Quantities of results: names, labels, units, frames and axes, and the units in which they are shown.
+
+A class of results says its quantities once; files, tables, data frames and charts follow from them.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from cosserat_fenicsx.dimensions import DIMENSIONS
+from cosserat_fenicsx.errors import SceneError, nearest
+
+#: Units with the prefixes that people write, by SI units: on the screen the largest one that gives a number above 1.
+_PREFIXED = {
+    "N": {"N": 1.0, "kN": 1e3, "MN": 1e6},
+    "N m": {"N m": 1.0, "kN m": 1e3, "MN m": 1e6},
+    "N/m": {"N/m": 1.0, "kN/m": 1e3, "MN/m": 1e6},
+    "Pa": {"Pa": 1.0, "kPa": 1e3, "MPa": 1e6, "GPa": 1e9},
+    "J": {"J": 1.0, "kJ": 1e3, "MJ": 1e6},
+    "W": {"W": 1.0, "kW": 1e3, "MW": 1e6},
+    "m": {"mm": 1e-3, "m": 1.0},
+}
+#: Lengths (m) are shown in mm only below this.
+_SHORT = 1e-2
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A named quantity of a class of results.
+
+    Attributes:
+        name: by which it is asked for; that of an attribute of the result unless there is a `getter`.
+        label: in words, for headings and charts; by default the name.
+        unit: in which the result has it: SI, degrees for some angles, "1" for none.
+        parts: names of the components along its last axis, such as "xyz"; "" for a scalar.
+        frame: in which the components are, in words; "" for a scalar.
+        axes: names of its axes without that of the components, such as ("point",); () for a single number.
+        getter: a function of the result that returns the values, or the path of an attribute; None for `name`.
+        shown: unit on the screen, if not that of the result with a prefix (kN, kN m) by its size.
+        dimension: name in `dimensions.DIMENSIONS`, where several have its unit ("diameter" for inches in field units).
+        noise: values up to this, in `unit`, are rounding and shown as 0.
+    """
+
+    name: str
+    label: str = ""
+    unit: str = "1"
+    parts: Sequence[str] = ""
+    frame: str = ""
+    axes: tuple[str, ...] = ("point",)
+    getter: Callable | str | None = None
+    shown: str = ""
+    dimension: str = ""
+    noise: float = 0.0
+
+    def __post_init__(self):
+        object.__setattr__(self, "label", self.label or self.name.replace("_", " "))
+
+    def of(self, result: Any, *where: Any) -> Any:
+        """Its values in a result, in `unit`; `where`: further arguments of the getter, such as a rod."""
+        if callable(self.getter):
+            return self.getter(result, *where)
+        for name in (self.getter or self.name).split("."):
+            result = getattr(result, name)
+        return result
+
+    def heading(self, unit: str | None = None, before: str = "") -> str:
+        """Its label with a unit, such as "hook load (kN)"; by default its own."""
+        unit = self.unit if unit is None else unit
+        return f"{before}{self.label}" + ("" if unit in ("1", "") else f" ({unit})")
+
+    def columns(self, values: Any, units: "Units", before: str = "") -> dict[str, np.ndarray]:
+        """{heading: (n,)} of values (n,) or (n, components) in some units, such as "position (m) x"."""
+        unit, size = units.of(self)
+        heading = self.heading(unit, before)
+        values = np.asarray(values)
+        if size != 1.0:
+            values = values / size
+        if not self.parts:
+            return {heading: values}
+        return dict(zip((f"{heading} {part}" for part in self.parts), values.reshape(-1, len(self.parts)).T,
+                        strict=True))  # fmt: skip
+
+
+class Units:
+    """The units that quantities are shown in: those of the result ("SI"), of the oil field, or chosen ones.
+
+    Args:
+        units: "SI"; "field" (ft, in, klbf, ft-lbf, ppg, rpm, psi); or {dimension or unit: unit}, such as
+            {"force": "klbf", "[length]": "ft", "N m": "kN m"}, where what is not named stays SI.
+
+    Raises:
+        SceneError: unknown units; a unit of another dimension.
+    """
+
+    def __init__(self, units: "str | Mapping | Units" = "SI"):
+        self.si = units == "SI"
+        self._chosen: dict[str, str] = {}  # units by dimensions
+        if isinstance(units, Units):
+            self.si, self._chosen = units.si, units._chosen
+        elif isinstance(units, Mapping):
+            for key, unit in units.items():
+                self._chosen |= dict.fromkeys(_named(str(key), str(unit)), str(unit))
+        elif units == "field":
+            self._chosen = {name: dimension.field for name, dimension in DIMENSIONS.items()}
+        elif not self.si:
+            raise SceneError(
+                f"units = {units!r}: expected 'SI', 'field' or a dict of units by dimensions, such as "
+                "{'force': 'klbf', 'length': 'ft'}"
+            )
+
+    def of(self, quantity: Quantity) -> tuple[str, float]:
+        """The unit of a quantity in files and data frames, and its size in that of the result."""
+        for name in _dimensions(quantity.unit, quantity.dimension):
+            if name in self._chosen:
+                known = DIMENSIONS[name].units
+                return self._chosen[name], known[self._chosen[name]] / known[quantity.unit]
+        return quantity.unit, 1.0
+
+    def on_screen(self, quantity: Quantity, values: Any = ()) -> tuple[str, float]:
+        """The unit of a quantity in tables and charts, and its size in that of the result: of SI units with the prefix
+        that suits the values."""
+        unit, size = self.of(quantity)
+        if unit != quantity.unit:
+            return unit, size
+        if quantity.shown:
+            known = next(x.units for x in DIMENSIONS.values() if {unit, quantity.shown} <= x.units.keys())
+            return quantity.shown, known[quantity.shown] / known[unit]
+        values = np.abs(np.asarray(values, dtype=float))
+        largest = float(values[np.isfinite(values)].max(initial=0.0))
+        if unit not in _PREFIXED or largest == 0 or (unit == "m" and largest >= _SHORT):
+            return unit, 1.0
+        suits = [(name, size) for name, size in _PREFIXED[unit].items() if size <= largest]
+        return suits[-1] if suits else next(iter(_PREFIXED[unit].items()))
+
+
+def _dimensions(unit, dimension=""):
+    """Names of the dimensions that have a unit, or the one that is given."""
+    return [dimension] if dimension else [name for name, x in DIMENSIONS.items() if unit in x.units]
+
+
+def _named(key, unit):
+    """Names of the dimensions that a key of chosen units means, and that have the unit."""
+    name = key.strip("[]").replace("_", " ")
+    meant = [name] if name in DIMENSIONS else _dimensions(key)
+    if not meant:
+        raise SceneError(f"units[{key!r}]: {nearest(name, list(DIMENSIONS))}")
+    found = [name for name in meant if unit in DIMENSIONS[name].units]
+    if not found:
+        raise SceneError(f"units[{key!r}] = {unit!r}: {nearest(unit, list(DIMENSIONS[meant[0]].units))}")
+    return found
+
+
+def as_text(value: Any, digits: int = 6, noise: float = 0.0) -> str:
+    """A value in a table: with some digits, 0 where it is noise, "-" where it is unknown, texts as they are."""
+    if isinstance(value, bool | np.bool_):
+        return "yes" if value else "no"
+    if not isinstance(value, float | np.floating):
+        return str(value)
+    if np.isnan(value):
+        return "-"
+    return "0" if abs(value) <= noise else f"{value:.{digits}g}"
