@@ -22,7 +22,7 @@ from scipy.integrate import solve_ivp
 
 import cosserat_fenicsx as cf
 from cosserat_fenicsx import analytic
-from cosserat_fenicsx.dynamics.initial_equilibrium import before
+from cosserat_fenicsx.dynamics.start import before
 
 SCENES = Path(__file__).parent / "motions"
 

@@ -3,8 +3,8 @@
 Both have the velocities, the momenta and the constraint of the momentum scheme, but another stress.
 """
 
-from cosserat_fenicsx.dynamics import solvers
-from cosserat_fenicsx.dynamics.steppers.momentum import Momentum
+from cosserat_fenicsx.dynamics import simulate
+from cosserat_fenicsx.dynamics.schemes import Momentum
 from cosserat_fenicsx.forms.equilibrium import balance, contact
 from cosserat_fenicsx.models.moving import MovingSpatial, SpatialStep, compile_momentum
 
@@ -34,6 +34,6 @@ def register(monkeypatch):
             return compile_momentum(SpatialStep(model), stress)
 
         monkeypatch.setitem(
-            solvers._MODELS, (name, "spatial"), type(name, (MovingSpatial,), {"_compile": compiled, "variations": ()})
+            simulate._MODELS, (name, "spatial"), type(name, (MovingSpatial,), {"_compile": compiled, "variations": ()})
         )
-        monkeypatch.setitem(solvers.SCHEMES, name, type(name, (Momentum,), {"forms": name}))
+        monkeypatch.setitem(simulate.SCHEMES, name, type(name, (Momentum,), {"forms": name}))

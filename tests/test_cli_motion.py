@@ -12,7 +12,7 @@ import cosserat_fenicsx as cf
 from cosserat_fenicsx import interrupts
 from cosserat_fenicsx.cli import explain_motion
 from cosserat_fenicsx.cli import main as cli
-from cosserat_fenicsx.dynamics.initial_equilibrium import before
+from cosserat_fenicsx.dynamics.start import before
 from cosserat_fenicsx.results import tables
 from cosserat_fenicsx.scene.signals import Triangle
 

@@ -10,7 +10,7 @@ from test_action_protocol import FREE, Lookup
 from test_schemes import smooth
 
 import cosserat_fenicsx as cf
-from cosserat_fenicsx.dynamics.steppers.one_step import OneStep
+from cosserat_fenicsx.dynamics.stepper import OneStep
 
 pytestmark = pytest.mark.serial
 SCHEME = "generalised-alpha"

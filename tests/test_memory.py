@@ -8,7 +8,7 @@ from conftest import column
 
 import cosserat_fenicsx as cf
 from cosserat_fenicsx.algebra.pool import ProblemPool
-from cosserat_fenicsx.dynamics import solvers as of_motions
+from cosserat_fenicsx.dynamics import simulate as of_motions
 from cosserat_fenicsx.models.rodmesh import RodMesh
 from cosserat_fenicsx.statics import circulatory
 from cosserat_fenicsx.statics import solvers as of_equilibria

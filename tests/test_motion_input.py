@@ -197,7 +197,7 @@ def test_steps_land_on_jumps_and_on_saved_times():
 def test_a_motion_that_is_lost_keeps_what_it_had(monkeypatch):
     from cosserat_fenicsx.algebra.newton import Solved
     from cosserat_fenicsx.dynamics import time_loop
-    from cosserat_fenicsx.dynamics.steppers.momentum import Momentum
+    from cosserat_fenicsx.dynamics.schemes import Momentum
 
     whole = Momentum.step
 

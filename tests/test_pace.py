@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 import cosserat_fenicsx as cf
-from cosserat_fenicsx.dynamics.pace import Adaptive
-from cosserat_fenicsx.dynamics.resolution import Resolution
+from cosserat_fenicsx.dynamics.pace import Adaptive, Resolution
 
 pytestmark = pytest.mark.serial
 

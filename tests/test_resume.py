@@ -18,12 +18,13 @@ from test_schemes import everything
 
 import cosserat_fenicsx as cf
 from cosserat_fenicsx.dynamics import time_loop
-from cosserat_fenicsx.dynamics.steppers import SCHEMES
+from cosserat_fenicsx.dynamics.schemes import SCHEMES
 from cosserat_fenicsx.results.records import Instant
 from cosserat_fenicsx.storage import checkpoints, runfolder
 
 pytestmark = pytest.mark.serial
-SOLVERS = ("cosserat_fenicsx.dynamics.steppers", "cosserat_fenicsx.dynamics.pace")
+PARTS = ("stepper", "schemes", "step_problem", "contact", "pace")
+SOLVERS = tuple(f"cosserat_fenicsx.dynamics.{name}" for name in PARTS)
 
 
 @pytest.mark.parametrize(("case", "apart"), [*((case, 0.02) for case in CASES), ("fixed", 0.0), ("adaptive", 1e9)])

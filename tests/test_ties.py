@@ -6,7 +6,7 @@ from dense import tangent_of_ties
 from mpi4py import MPI
 
 import cosserat_fenicsx as cf
-from cosserat_fenicsx.dynamics.solvers import solvers_of as moving_solvers
+from cosserat_fenicsx.dynamics.simulate import solvers_of as moving_solvers
 from cosserat_fenicsx.models.connections import TiePattern, Ties
 from cosserat_fenicsx.models.rodmesh import Layout
 from cosserat_fenicsx.scene.ties import AngleTie, PositionTie, TurnTie

@@ -52,7 +52,7 @@ def test_quick_motion(tmp_path, capsys):
     import work_precision_motion
     from peers.environments import OWN
 
-    from cosserat_fenicsx.dynamics.steppers import SCHEMES
+    from cosserat_fenicsx.dynamics.schemes import SCHEMES
 
     found = work_precision_motion.main(out=tmp_path, quick=True)
     rows = list(found.rows.values())

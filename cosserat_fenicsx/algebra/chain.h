@@ -83,7 +83,7 @@ typedef struct {
     int verdict;                    /* the last of them; PETSc 3.25 may end a solution with the reason of the one before */
 } newton;
 
-/* Newton's method of a time step, see dynamics/steppers/newton.py for what its numbers mean. */
+/* Newton's method of a time step, see dynamics/stepper.py for what its numbers mean. */
 typedef struct {
     problem *problem;
     int motions;                    /* nodal unknowns of this rank */

@@ -1,10 +1,9 @@
 """`cosserat explain` of a motion: the scene, the model, scheme and steps in sentences, without simulating."""
 
 from cosserat_fenicsx.cli.explain import of_the_scene
-from cosserat_fenicsx.dynamics.initial_equilibrium import before
-from cosserat_fenicsx.dynamics.simulate import DEGREE, ELEMENTS, TOL, pace_of
-from cosserat_fenicsx.dynamics.solvers import chosen_model
-from cosserat_fenicsx.dynamics.steppers import SCHEMES
+from cosserat_fenicsx.dynamics.schemes import SCHEMES
+from cosserat_fenicsx.dynamics.simulate import DEGREE, ELEMENTS, TOL, chosen_model, pace_of
+from cosserat_fenicsx.dynamics.start import before
 from cosserat_fenicsx.models.rod_data import check_inertia
 from cosserat_fenicsx.models.rodmesh import Layout
 from cosserat_fenicsx.models.signature import Signature

@@ -11,8 +11,8 @@ from mpi4py import MPI
 from cosserat_fenicsx.checks import File
 from cosserat_fenicsx.checks import instance, refuse, warn
 from cosserat_fenicsx.dynamics.simulate import check_counts, pace_of, positive_time
-from cosserat_fenicsx.dynamics.solvers import solvers_of
-from cosserat_fenicsx.dynamics.steppers import SCHEMES
+from cosserat_fenicsx.dynamics.simulate import solvers_of
+from cosserat_fenicsx.dynamics.schemes import SCHEMES
 from cosserat_fenicsx.errors import SceneError, nearest
 from cosserat_fenicsx.dynamics.time_loop import marks_of
 from cosserat_fenicsx.models.connections import Connections

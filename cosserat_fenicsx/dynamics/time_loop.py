@@ -21,7 +21,7 @@ class TimeLoop:
     """The computation of a motion, with its saved states and checkpoints.
 
     Args:
-        problem: a `StepProblem`; stepper: see `steppers.protocol`; pace: the step size control, see `pace`.
+        problem: a `StepProblem`; stepper: see `Stepper`; pace: the step size control, see `pace`.
         history: the `History` that states are appended to.
         folder: the `RunFolder` that states and checkpoints are written to, or None.
     """

@@ -92,10 +92,10 @@ class Action:
             motion: an object with `longest`, the longest step that it allows (s), `begin` (motion) at the time 0,
             `at` (t) -> {attribute: value}, of the action at a time in the next step, `accept` (t, h, motion) after a
             step from t (s) to t + h, `undo` (), which takes back the last step, and `memory` and `recall` as of
-            `dynamics.steppers.protocol.Stepper`. `motion` is a `models.action_terms.StationMotion`.
+            `dynamics.stepper.Stepper`. `motion` is a `models.action_terms.StationMotion`.
         resists: None; or a method (speed, rad/s, from 0 on) -> torque (N m) about the axis d3 against the rotation of
             its `station` in motions, and its derivative: at 0 the largest torque that holds, then a convex function.
-        touches: whether it is a wall that nodes of rods touch in motions (dynamics/contact), in place of a virtual
+        touches: whether it is a wall that nodes of rods touch in motions (dynamics/contact.py), in place of a virtual
             work. It then has `stiffness` (N/m^2; N/m at a station), `damping` (s/m), `begins` (m) and a method
             `tube_around` (arc lengths s (n,), points (n, 3) of the rod, measured depths (n,) near them) -> the
             `actions.walls.Around` of the points.

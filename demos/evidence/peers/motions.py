@@ -8,7 +8,7 @@ triangle in time over `rise` (start, peak, end, s); the `duration` (s), and whic
 
 import numpy as np
 
-from cosserat_fenicsx.dynamics.steppers import SCHEMES
+from cosserat_fenicsx.dynamics.schemes import SCHEMES
 from peers.environments import OWN
 
 PEERS = (OWN, "Exudyn")

@@ -8,11 +8,86 @@ solution for nodes that are far from each other; forces act on all nodes all the
 for by the next iteration.
 """
 
+import math
+
 import numpy as np
 
 from cosserat_fenicsx.algebra.building import Pointers
-from cosserat_fenicsx.dynamics.contact.nodes import TouchingNodes, motion_between
-from cosserat_fenicsx.numerics import small_rotations
+from cosserat_fenicsx.errors import SceneError
+from cosserat_fenicsx.numerics import directors, small_rotations
+
+
+class TouchingNodes:
+    """Nodes of a moving model by their numbers in the scene; arrays over them are the same on all ranks.
+
+    Args:
+        problem: a `StepProblem`; slots: (n,) the scene's numbers of the nodes.
+    """
+
+    def __init__(self, problem, slots):
+        model, numbering = problem.model, problem.numbering
+        self._comm, self.count = model.comm, len(slots)
+        mine = model.slots[: model.owned_nodes]
+        order = np.argsort(mine)
+        found = np.minimum(np.searchsorted(mine, slots, sorter=order), max(len(mine) - 1, 0))
+        local = order[found] if len(mine) else np.zeros(len(slots), dtype=int)
+        #: which of the nodes this rank owns, and their local degrees of freedom
+        self._here = np.flatnonzero(mine[local] == slots) if len(mine) else np.empty(0, dtype=int)
+        self._dofs = model.dofs_of_nodes[local[self._here]]
+        rows = np.zeros((self.count, 7), dtype=np.int64)
+        rows[self._here] = numbering.rows[self._dofs]
+        rows = self._sum(rows)
+        again = (rows[1:] == rows[:-1]).all(axis=1) & (rows[1:] >= 0).any(axis=1)
+        #: (n,) number of the point that a node is: those that follow each other may be the same, as of two walls
+        self.points = np.concatenate([[0], np.cumsum(~again)])
+        #: entries (of nodes and components) whose unknowns are in this rank's part of the solver's vector
+        self._mine = np.nonzero((rows >= numbering.first) & (rows < numbering.first + numbering.size))
+        self._rows = rows[self._mine] - numbering.first
+        self._clamped = rows < 0
+        self._shared = len(np.unique(self._rows)) < len(self._rows)
+
+    def _sum(self, values):
+        return self._comm.allreduce(values) if self._comm.size > 1 else values
+
+    def hold(self, state):
+        """Take the unknowns of clamped nodes from local degrees of freedom."""
+        self._fixed = np.where(self._clamped, self.of_local(state), 0.0)
+
+    def of_local(self, numbers):
+        """(n, 7) values of local degrees of freedom at the nodes."""
+        values = np.zeros((self.count, 7))
+        values[self._here] = numbers[self._dofs]
+        return self._sum(values)
+
+    def of_vector(self, *vectors):
+        """(n, 7) values at the nodes of this rank's part of a solver's vector, or of the first one minus the second;
+        zero where clamped."""
+        values = np.zeros((self.count, 7))
+        found = [vector[self._rows] for vector in vectors]
+        values[self._mine] = found[0] if len(found) == 1 else found[0] - found[1]
+        return self._sum(values)
+
+    def unknowns(self, *vectors):
+        """(n, 7) unknowns at the nodes, see `of_vector`."""
+        return self.of_vector(*vectors) + self._fixed
+
+    def subtract(self, forces, b):
+        """Subtract forces and moments (n, 6) from this rank's part of a residual."""
+        rows = np.zeros((self.count, 7))
+        rows[:, :3], rows[:, 4:] = forces[:, :3], forces[:, 3:]
+        if self._shared:
+            np.subtract.at(b, self._rows, rows[self._mine])
+        else:  # much faster
+            b[self._rows] -= rows[self._mine]
+
+
+def motion_between(before, after):
+    """(n, 6) displacements and rotations from nodal unknowns (n, 7) to others, by the mean rotation: with them the work
+    of a force and a moment in a step is exact."""
+    change = after - before
+    turned = small_rotations((before[:, 3:] + after[:, 3:]) / 2) @ change[:, 3:, None]
+    return np.concatenate([change[:, :3], turned[..., 0]], axis=1)
+
 
 # Up to so many nodes the compliance of all by all is taken; of more, that of so many neighbours on each side.
 _FEW, _NEIGHBOURS = 16, 8
@@ -241,3 +316,111 @@ def _shares(breaks, nodes):
     shares = np.zeros(len(sizes) * p + 1)
     np.add.at(shares, np.arange(len(sizes))[:, None] * p + np.arange(p + 1), sizes[:, None] * weights)
     return shares
+
+
+# Iterations of Newton's method for the speed, and its relative change that ends them.
+_MOST_FOR_SPEED, _SMALL_CHANGE = 60, 1e-14
+
+
+class SpinLaw(Pointers):
+    """The law of one action with `Action.resists`: a torque at a node against its rotation, set-valued, such as that of
+    a bit on rock.
+
+    As walls do (`NodalContact`), it acts on the compliance of the moving rods: the rotation of the node about its axis
+    d3 in a step is a linear function of the torque, by the tangent of Newton's method, and with it the law is solved
+    exactly before Newton's step is taken. The node sticks as long as a torque up to the static one can keep it.
+
+    Args:
+        problem: a `StepProblem`, loaded; action: the action.
+    """
+
+    def __init__(self, problem, action):
+        super().__init__()
+        self._problem, self._action, model = problem, action, problem.model
+        self._nodes = TouchingNodes(problem, np.array([model.slot_of(action.station)]))
+        self._nodes.hold(problem.state)
+        self._at_rest = action.station.rod.curve.frame(action.station.s)[:, 2]
+        self._time, self._moment = model.time, model.scales.force * model.scales.length
+        self._load, self._response = problem.numbering.vector(), problem.numbering.vector()
+        self._torque, self._axis, self._turned = 0.0, self._at_rest, 0.0
+        self._begun, self._unit = 0.0, None
+
+    def begin(self, h):
+        """See `NodalContact`."""
+        self._before, self._h = self._nodes.of_local(self._problem.state), h
+        self._begun, self._unit = self._torque, None
+
+    def give_up(self):
+        """See `NodalContact`."""
+        self._torque = self._begun
+
+    def _acting(self):
+        return np.concatenate([np.zeros(3), self._torque * self._axis])[None]
+
+    def add_forces(self, b):
+        """See `NodalContact`."""
+        self._nodes.subtract(self._acting(), b)
+
+    def _motion(self, after):
+        """Rotation about the axis in the step, and the axis in its middle."""
+        middle = (self._before + after)[0, 3:]
+        self._axis = directors(middle[None] / np.linalg.norm(middle))[0] @ self._at_rest
+        return float(motion_between(self._before, after)[0, 3:] @ self._axis)
+
+    def meet(self, x, change):
+        """See `NodalContact`."""
+        after = self._nodes.unknowns(x, change)
+        turned = self._motion(after)
+        if self._unit is None:
+            self._find_compliance(after)
+        before = self._torque
+        self._torque = self._solved(turned - self._compliance * before)
+        change -= self._unit * (self._torque - before)
+
+    def _find_compliance(self, after):
+        torque, self._torque = self._torque, -1.0
+        self._load.set(0.0)
+        self._nodes.subtract(self._acting(), self._load.array_w)
+        self._torque = torque
+        self._problem.solve(self._load, self._response)
+        self._unit = self._response.array_r.copy()
+        found = self._nodes.of_vector(self._unit)[0, 3:]
+        self._compliance = float(small_rotations(after[0, 3:]) @ found @ self._axis)
+
+    def _solved(self, free):
+        """The torque by the law, from the rotation in the step without it; dimensionless."""
+        hold, _ = self._law(0.0)
+        C, h, size = self._compliance, self._h, abs(free)
+        if size <= C * hold:
+            return -free / C
+        torque, slope = self._law(1e-300)
+        if -slope * C >= h:
+            raise SceneError(
+                f"{type(self._action).__name__}: in steps of {h * self._time:.3g} s its torque falls faster with the "
+                "speed than the rod can follow, and several speeds are possible: expected a shorter dt, or an inertia "
+                "there"
+            )
+        speed = size / h  # the law is convex: after the first iteration it falls to the root
+        for _ in range(_MOST_FOR_SPEED):
+            torque, slope = self._law(speed)
+            last, speed = speed, max(speed - (speed * h + C * torque - size) / (h + C * slope), 0.0)
+            if abs(speed - last) <= _SMALL_CHANGE * last:
+                break
+        return -math.copysign(self._law(speed)[0], free)
+
+    def _law(self, speed):
+        """Torque against a speed from 0 on, and its slope; dimensionless."""
+        torque, slope = self._action.resists(speed / self._time)
+        return torque / self._moment, slope / (self._moment * self._time)
+
+    def books(self):
+        """See `NodalContact`."""
+        return 0.0, -self._torque * self._motion(self._nodes.of_local(self._problem.state))
+
+    def memory(self):
+        """See `NodalContact`."""
+        return {"torque": self._torque, "axis": np.array(self._axis)}
+
+    def recall(self, memory):
+        """See `NodalContact`."""
+        self._torque, self._axis = float(memory["torque"]), memory["axis"].copy()

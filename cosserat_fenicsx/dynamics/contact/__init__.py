@@ -1,1 +1,0 @@
-"""Contact of rods in motion with walls, at the nodes: forces within a time step, and their books."""

@@ -1,0 +1,373 @@
+"""What a scheme in time offers, the base of the implicit one-step schemes of order 2 (velocities by the trapezoidal
+rule, whatever the forms conserve), and Newton's method for a step.
+"""
+
+import math
+from functools import lru_cache
+from typing import Protocol
+
+import numpy as np
+
+from cosserat_fenicsx.algebra.newton import Solved
+from cosserat_fenicsx.dynamics.start import drive
+
+
+class Stepper(Protocol):
+    """A scheme with the `StepProblem` that it solves; made once for a signature, used for every scene of it.
+
+    Attributes:
+        order: of the global error in the step h.
+        forms: the name of the discretisation that its models must have; problem_class: the class of its `StepProblem`.
+        kinks_persist: whether velocities alternate from step to step without decay after a kink of a prescribed motion.
+        adapts: whether it has `error` and `undo`.
+        rho_inf: spectral radius at infinite frequency where that can be set, else None.
+        impulse_error: error of a load's impulse over steps h, divided by h^2 times the change of the load's rate.
+        work, dissipated: work of loads and supports, and energy dissipated by damping, since `begin`; dimensionless.
+    """
+
+    order: int
+    kinks_persist: bool
+    adapts: bool
+    rho_inf: float | None
+    impulse_error: float
+    forms: str
+    problem_class: type
+    work: float
+    dissipated: float
+
+    def begin(self):
+        """Start a motion from the current state of the problem's model."""
+
+    def jump(self):
+        """Accelerations or velocities jump at the current time: earlier states can no longer be extrapolated."""
+
+    def drive(self, t):
+        """See `start.drive`, t in s; the change of kinetic energy counts as work of the supports."""
+
+    def kink(self):
+        """The slope of a load jumps at the current time, not its value: the rate of the acceleration jumps."""
+
+    def step(self, t, h):
+        """Step from the time t to t + h, s.
+
+        Returns:
+            `Solved`. Where it has converged, the problem's x and the model's state and velocity are those of t + h;
+            otherwise they are as they were at t.
+        """
+
+    def error(self, early=False):
+        """Estimated local error of the last step, of positions (over the unit of length) and rotations (rad over 10).
+
+        None where too few steps have been made since the start or a jump. With `early` few steps suffice; fast waves,
+        which they do not average out, then count too.
+        """
+
+    def prediction_error(self):
+        """Difference between the end of the last step and the predictor, in the norm of `error`."""
+
+    def undo(self):
+        """Return to the state before the last step."""
+
+    def memory(self):
+        """All data, besides the scene and the time, that later steps depend on: arrays, numbers, and dicts of them.
+
+        It includes the problem's own (`StepProblem.memory`): a motion continued from it has the same digits.
+        """
+
+    def recall(self, memory):
+        """Restore what `memory` returned, after `begin`, on the same scene."""
+
+
+# The error estimate takes four states, so many steps apart: this averages out unresolved, small vibrations.
+_STRIDE = 8
+#: Weight of rotations (rad) in error norms, relative to positions over the unit of length.
+ROTATION_WEIGHT = 0.1
+
+
+class OneStep:
+    """See `Stepper`."""
+
+    order, adapts, rho_inf, kinks_persist = 2, True, None, True
+    impulse_error = 1 / 24  # loads are evaluated at mid-step
+    #: local error over that of the trapezoidal rule, as measured
+    error_ratio = 1.0
+
+    def __init__(self, problem):
+        self.problem, self._newton = problem, StepNewton(problem)
+        model = problem.model
+        self._comm = model.comm
+        self._state, self._start, self._velocity = (f.x.array for f in (model.state, model.start, model.velocity))
+        self._rates = (*model.rate_arrays, *model.actions.memory)
+
+    def begin(self):
+        """See `Stepper`."""
+        self._h = None
+        self._newton.forget()
+        self.work = self.dissipated = 0.0
+        self.problem.model.delays.begin()
+        self.jump()
+
+    def jump(self):
+        """See `Stepper`."""
+        self._guesses = None  # those of the last step, where they are known
+        self._past = []  # of the last steps: (h, state, rates, (work, dissipated)) at their starts
+
+    def drive(self, t):
+        """See `Stepper`."""
+        kinetic, _ = self.problem.energies()
+        self._guesses = None
+        drive(self.problem.model, t)
+        self.work += self.problem.energies()[0] - kinetic
+
+    def kink(self):
+        """See `Stepper`: a one-step scheme takes earlier states for its predictor alone."""
+
+    def step(self, t, h):
+        """See `Stepper`."""
+        problem, delays = self.problem, self.problem.model.delays
+        if h > delays.longest:
+            return Solved(False, 0, f"it is longer than the {delays.longest:.3g} s that an action allows")
+        if self._h is None or abs(h - self._h) > 1e-9 * abs(h):
+            problem.fresh, self._h = True, h
+        problem.begin_step(t, h)
+        unit = problem.h
+        guesses = self._predicted(unit)
+        solved = self._newton.solve(guesses)
+        if not solved.converged:
+            self._guesses = None
+            self._state[:] = self._start
+            problem.begin_again()
+            return solved
+        self._past = [
+            *self._past[1 - 3 * _STRIDE :],
+            (unit, self._start.copy(), [rate.copy() for rate in self._rates], (self.work, self.dissipated)),
+        ]
+        self._predictor = guesses[0]
+        self.work += problem.work()
+        self.dissipated += problem.dissipated()
+        delays.accept(t, h)
+        problem.accept()
+        return solved
+
+    def _predicted(self, h):
+        """Predictors of the state at the end of the step: extrapolations of several orders.
+
+        First comes the order whose extrapolation of the last step was closest to its result.
+        """
+        known, last = self._past[-3:], self._guesses
+        steps = [step for step, *_ in known[-2:]]
+        self._guesses = guesses = _extrapolated(h, self._start, self._velocity, steps, [x[2][0] for x in known[-2:]])
+        if len(known) < 3:
+            return guesses[::-1]
+        if last is None:
+            (h2, _, rates2, _), (h1, _, rates1, _), (h0, state, rates, _) = known
+            last = _extrapolated(h0, state, rates[0], [h2, h1], [rates2[0], rates1[0]])
+        off = last - self._start
+        errors = np.array([change @ change for change in off])
+        order = np.argsort(self._comm.allreduce(errors) if self._comm.size > 1 else errors)
+        return guesses[order]
+
+    def error(self, early=False):
+        """See `Stepper`: h^3/12 times the third derivative of the cubic through four states, the last one the current.
+
+        Only positions count: differences of velocities are dominated by fast waves, which are small and not resolved.
+        """
+        stride = min(_STRIDE, len(self._past) // 3) if early else _STRIDE
+        past = self._past[-3 * stride :]
+        if not stride or len(past) < 3 * stride:
+            return None
+        steps = np.array([h for h, *_ in past])
+        states = [state for _, state, *_ in past[::stride]] + [self._state]
+        times = np.concatenate([[0.0], np.cumsum(steps)])[::stride]
+        weights = [1 / np.prod([a - b for b in times if b != a]) for a in times]
+        third = sum(w * x for w, x in zip(weights, states, strict=True))  # a sixth of the derivative
+        return self.error_ratio * 0.5 * steps[-1] ** 3 * self.problem.model.largest_of(third, ROTATION_WEIGHT)
+
+    def prediction_error(self):
+        """See `Stepper`."""
+        return self.problem.model.largest_of(self._state - self._predictor, ROTATION_WEIGHT)
+
+    def undo(self):
+        """See `Stepper`."""
+        _, state, rates, (self.work, self.dissipated) = self._past.pop()
+        self._guesses = None
+        self._state[:] = state
+        for now, before in zip(self._rates, rates, strict=True):
+            now[:] = before
+        self.problem.model.delays.undo()
+        self.problem.begin_again()
+
+    def memory(self):
+        """See `Stepper`."""
+        past = self._past
+        return {
+            "h": np.nan if self._h is None else self._h,
+            "books": np.array([self.work, self.dissipated]),
+            "rates": _numbered(self._rates),
+            "past": {
+                "steps": np.array([h for h, *_ in past]),
+                "states": np.array([state for _, state, *_ in past]),
+                "rates": _numbered(np.array(kind) for kind in zip(*(rates for *_, rates, _ in past), strict=True)),
+                "books": np.array([books for *_, books in past]),
+            },
+            "problem": self.problem.memory(),
+            "newton": self._newton.memory(),
+            "delays": self.problem.model.delays.memory(),
+        }
+
+    def recall(self, memory):
+        """See `Stepper`."""
+        self._h = None if np.isnan(memory["h"]) else memory["h"]
+        self.work, self.dissipated = memory["books"].tolist()
+        for i, rate in enumerate(self._rates):
+            rate[:] = memory["rates"][str(i)]
+        past, self._guesses = memory["past"], None
+        rates = zip(*past.get("rates", {}).values(), strict=True)
+        books = map(tuple, past["books"].tolist())
+        self._past = [
+            (float(h), state.copy(), [rate.copy() for rate in kinds], book)
+            for h, state, kinds, book in zip(past["steps"], past["states"], rates, books, strict=True)
+        ]
+        self.problem.recall(memory["problem"])
+        self._newton.recall(memory["newton"])
+        self.problem.model.delays.recall(memory.get("delays", {}))
+
+
+def _numbered(arrays):
+    return {str(i): array for i, array in enumerate(arrays)}
+
+
+def _extrapolated(h, state, velocity, steps, velocities):
+    """(orders, n) extrapolations of the state by a step h, of order 1 and one more for each earlier step.
+
+    Args:
+        steps, velocities: lengths and initial velocities of up to two steps before, the last one last.
+    """
+    return _weights(h, *steps) @ np.array([state, velocity, *velocities[::-1]])
+
+
+@lru_cache(maxsize=8)
+def _weights(h, *steps):
+    """Weights of the state and of the velocities, the current one first, in `_extrapolated`."""
+    orders = 1 + len(steps)
+    weights, square = np.zeros((orders, 1 + orders)), 0.5 * h * h
+    weights[:, 0], weights[:, 1] = 1.0, h
+    if steps:
+        h1 = steps[-1]
+        weights[1:, 1] += square / h1
+        weights[1:, 2] = -square / h1
+    if len(steps) == 2:
+        h2 = steps[0]
+        cubic = square * (h + h1) / (h1 + h2)  # times half the rate of the acceleration
+        weights[2, 1:] += cubic / h1, -cubic / h1 - cubic / h2, cubic / h2
+    return weights
+
+
+#: Newton's method stops when the remaining error, estimated from the contraction of the increments, is below the first
+#: number times the motion in the step (root mean square, units L, 1), since that is the relative error of velocities
+#: and momenta; or below the second, the rounding of positions. The rounding of a stiff rod may be larger: increments
+#: below the third that no longer shrink have converged, too.
+INCREMENT, SMALLEST, ROUNDING = 1e-12, 2e-16, 1e-10
+# Times the first two where nodes may touch walls: the errors that are left there do not cancel from step to step, and
+# would add up to 1e-8 of the energy in 10 000.
+_WITH_CONTACT = 0.03
+# Contraction of increments with a new tangent, as measured.
+_NEW_TANGENT_RATE = 3e-4
+# Cost of a new tangent, in iterations. Measured: from 1.3 in a plane to 5 in space, and 8 with constraint equations;
+# from 1 to 8 the time of a motion varies by a few per cent.
+_PRICE = 2.0
+# Number of steps with a new tangent each, after a tangent that was useful for one step only.
+_STEPS_WITH_NEW_TANGENTS = 8
+# Iterations, and dimensionless increment, that are taken as divergence.
+_MOST_ITERATIONS, _DIVERGED = 15, 10.0
+
+
+# Why the iteration stopped: `stepping.outcome` in newton.c.
+_CONVERGED = 1
+_OUTCOMES = (
+    "", "converged", "the tangent is singular", "the residual is not a number", "Newton's steps grew without bound",
+    "Newton's iterations ran out",
+)  # fmt: skip
+
+
+class StepNewton:
+    """Newton's method for the steps of one problem: full increments, with a factorised tangent that serves many steps.
+
+    An iteration with an old tangent costs one residual and one back-substitution: on a fine mesh a tenth of one with a
+    new tangent. PETSc's SNES would evaluate one more residual per step, and norms that are not used. (Broyden's updates
+    of the old tangent were tried: they need as many iterations, and each costs more.)
+
+    Convergence is tested on the increments of the nodal unknowns alone: contact forces and reactions have larger
+    rounding errors, and the residual of a stiff rod cannot fall below its rounding.
+
+    Args:
+        problem: a `StepProblem`.
+    """
+
+    def __init__(self, problem):
+        self.problem = problem
+        numbering = problem.numbering
+        self._motions = numbering.nodes * numbering.block  # nodal unknowns of this rank
+        motions = problem.model.comm.allreduce(self._motions)
+        self._start = np.zeros(self._motions)
+        self._c = problem.stepping(
+            self._start, motions=self._motions, root=math.sqrt(motions), increment=INCREMENT, smallest=SMALLEST,
+            rounding=ROUNDING, rate=_NEW_TANGENT_RATE, price=_PRICE, diverged=_DIVERGED, most=_MOST_ITERATIONS,
+        )  # fmt: skip
+        self.forget()
+
+    def forget(self):
+        """Discard the tangent and the statistics of its reuse, as before the first step."""
+        self.problem.fresh = True
+        # cost of the tangent and its iterations; steps it has served; steps left that start with a new tangent
+        self._spent, self._served, self._anew = 0.0, 0, 0
+
+    def solve(self, guesses):
+        """Newton's method from the first guess with the current tangent; where that fails, from every guess with a new
+        one.
+
+        Args:
+            guesses: predictors of the state, local arrays, the best first. Extrapolations of large rotations can fail.
+
+        Returns:
+            Solved.
+        """
+        kept, share = not self.problem.fresh, _WITH_CONTACT if self.problem.contact else 1.0
+        self._c.increment, self._c.smallest = share * INCREMENT, share * SMALLEST
+        self._start[:] = self.problem.x.array_r[: self._motions]
+        iterations = 0
+        for guess in [guesses[0], *guesses] if kept else guesses:
+            solved = self._attempt(guess)
+            iterations += solved.iterations
+            if solved.converged:
+                break
+            self.problem.fresh = True
+        return Solved(solved.converged, iterations, solved.reason)
+
+    def _attempt(self, guess):
+        problem, c = self.problem, self._c
+        lived, began_fresh = self._served, problem.fresh
+        c.fresh, c.spent, c.served = began_fresh, self._spent, self._served
+        problem.guess(guess)
+        problem.iterate(c)
+        converged, found = c.outcome == _CONVERGED, _OUTCOMES[c.outcome]
+        if converged and problem.model.turned_over():
+            converged, found = False, "a section turned by half a turn or more in one step"
+        if converged and problem.contact and problem.contact.broken:
+            converged, found = False, "the forces of a wall do not follow from the motion"
+        iterations = c.iterations
+        self._spent, self._served = c.spent + iterations, c.served + 1
+        if self._served == 1 and lived == 1 and not began_fresh:  # the last tangent served for one step only
+            self._anew = _STEPS_WITH_NEW_TANGENTS
+        # a new tangent, too, where this step took more iterations than the mean cost per step of the current one
+        problem.fresh = not converged or self._anew > 0 or iterations * self._served > self._spent
+        self._anew -= problem.fresh and self._anew > 0
+        return Solved(converged, iterations, found)
+
+    def memory(self):
+        """The statistics that decide when the tangent is renewed, see `Stepper.memory`."""
+        return {"spent": self._spent, "served": self._served, "anew": self._anew}
+
+    def recall(self, memory):
+        """Restore what `memory` returned."""
+        self._spent, self._served, self._anew = memory["spent"], memory["served"], memory["anew"]
