@@ -17,9 +17,9 @@ CODE = """
 import sys
 from mpi4py import MPI
 from cosserat_fenicsx import compat, cli, errors
-from cosserat_fenicsx.cli import main, together
+from cosserat_fenicsx.cli import main, say
 from cosserat_fenicsx.statics import solve as statics
-together._PATIENCE = 0.5
+say._PATIENCE = 0.5
 def solve(*scene, **settings):
     if MPI.COMM_WORLD.rank in {ranks}:
         raise {problem}

@@ -10,7 +10,7 @@ from test_cli import DEMO
 
 import cosserat_fenicsx as cf
 from cosserat_fenicsx import interrupts
-from cosserat_fenicsx.cli import explain_motion
+from cosserat_fenicsx.cli import explain
 from cosserat_fenicsx.cli import main as cli
 from cosserat_fenicsx.dynamics.start import before
 from cosserat_fenicsx.results import tables
@@ -127,7 +127,7 @@ WORDS = {
 @pytest.mark.parametrize("name", WORDS)
 def test_explain(name):
     scene, settings = cf.read_motion(MOTIONS / f"{name}.toml")
-    told = explain_motion.explain_motion(scene, settings)
+    told = explain.explain_motion(scene, settings)
     for words in WORDS[name]:
         assert words in told, told
 

@@ -7,7 +7,7 @@ import pytest
 from frame_scenes import SECTION, grid_shell, random_frame
 
 import cosserat_fenicsx as cf
-from cosserat_fenicsx.scene import nullspace
+from cosserat_fenicsx.scene import statical
 from cosserat_fenicsx.scene.statical import check_no_mechanism, free_motions
 
 pytestmark = pytest.mark.serial
@@ -69,7 +69,7 @@ def dense_redundant(supports, joints):
 
 @pytest.mark.parametrize("dense", [150, 0])
 def test_random_frames_have_the_free_motions_of_a_dense_decomposition(monkeypatch, dense):
-    monkeypatch.setattr(nullspace, "_DENSE", dense)
+    monkeypatch.setattr(statical, "_DENSE", dense)
     rng, free, redundant = np.random.default_rng(3), [], 0
     for _ in range(100):
         rods, supports, loads, joints = random_frame(rng)
@@ -106,7 +106,7 @@ def gate(angle):
 @pytest.mark.parametrize("dense", [150, 0])
 def test_what_is_nearly_free_is_told_from_what_is_free(monkeypatch, dense):
     """Hinges that are out of line by 1e-8 rad and more hold a rod, as the largest of dense decompositions say."""
-    monkeypatch.setattr(nullspace, "_DENSE", dense)
+    monkeypatch.setattr(statical, "_DENSE", dense)
     for angle in (1e-2, 1e-5, 1e-6, 1e-7, 1e-8):
         check_no_mechanism(gate(angle))
     with pytest.raises(cf.SceneError, match=r"rod 'gate' can turn about the axis \(0, 0, -?1\) through \(0, 0, 0\) m:"):
@@ -194,7 +194,7 @@ def test_larger_frames_have_the_free_motions_of_a_dense_decomposition(monkeypatc
 
     scene, found = cf.Scene(*grid_shell(4, release)), []
     for dense in (0, 1000):
-        monkeypatch.setattr(nullspace, "_DENSE", dense)
+        monkeypatch.setattr(statical, "_DENSE", dense)
         motions, complete = free_motions(scene)
         assert complete
         found.append(motions.reshape(len(motions), 6 * len(scene.rods)))

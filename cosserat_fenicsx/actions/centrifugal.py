@@ -8,8 +8,8 @@ import ufl
 from cosserat_fenicsx.checks import Numbers, refuse, store, vector
 from cosserat_fenicsx.scene import action
 from cosserat_fenicsx.scene.action import LineAction, PointAction
-from cosserat_fenicsx.scene.initial import InitialVelocity
 from cosserat_fenicsx.scene.rod import Rod, Station
+from cosserat_fenicsx.scene.supports import InitialVelocity
 
 # Samples along a rod, and the sine of the angle below which it has the direction of the axis.
 _SAMPLES, _SAME = 33, 1e-6

@@ -10,10 +10,10 @@ from cosserat_fenicsx.actions.springs import store_coefficients
 from cosserat_fenicsx.checks import Numbers, instance, number, positive, refuse, store, vector
 from cosserat_fenicsx.scene import action
 from cosserat_fenicsx.scene.action import LineAction, scalar
-from cosserat_fenicsx.scene.along import FunctionAlong, along_or_vector, breaks_of, kinks_of, values_of
 from cosserat_fenicsx.scene.loads import Load
-from cosserat_fenicsx.scene.pieces import checked_pieces
+from cosserat_fenicsx.scene.profiles import checked_pieces
 from cosserat_fenicsx.scene.rod import Rod, RodOrName, is_known
+from cosserat_fenicsx.scene.signals import FunctionAlong, along_or_vector, breaks_of, kinks_of, values_of
 
 
 @dataclass(frozen=True)

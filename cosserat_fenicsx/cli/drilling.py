@@ -6,10 +6,8 @@ from dataclasses import replace
 from pathlib import Path
 
 from cosserat_fenicsx import units
-from cosserat_fenicsx.cli.deliver import prepare
-from cosserat_fenicsx.cli.ended import ended
-from cosserat_fenicsx.cli.files import Files, keep_inputs
-from cosserat_fenicsx.cli.say import DONE, INTERRUPTED, NOT_CONVERGED, say, warnings_in_words
+from cosserat_fenicsx.cli.rods import prepare
+from cosserat_fenicsx.cli.say import DONE, INTERRUPTED, NOT_CONVERGED, Files, ended, keep_inputs, say, warnings_in_words
 from cosserat_fenicsx.dimensions import in_si
 from cosserat_fenicsx.drilling.bit_laws import Stribeck
 from cosserat_fenicsx.drilling.choose import chosen, model_of

@@ -8,11 +8,9 @@ import warnings
 from pathlib import Path
 
 from cosserat_fenicsx import interrupts
-from cosserat_fenicsx.cli.deliver import deliver
-from cosserat_fenicsx.cli.eigen import run_buckling, run_modes
 from cosserat_fenicsx.cli.options import parser
-from cosserat_fenicsx.cli.say import BAD_INPUT, DONE, INTERRUPTED, in_words, say, warnings_in_words
-from cosserat_fenicsx.cli.together import together
+from cosserat_fenicsx.cli.rods import deliver, run_buckling, run_modes
+from cosserat_fenicsx.cli.say import BAD_INPUT, DONE, INTERRUPTED, in_words, say, together, warnings_in_words
 from cosserat_fenicsx.errors import CosseratError, SceneError, SceneWarning
 
 # Tables that a drill-string in motion has, and a string in a well has not.
@@ -88,7 +86,7 @@ def _settings(options):
 
 
 def _run(options):
-    from cosserat_fenicsx.cli.motion import motion_of
+    from cosserat_fenicsx.cli.rods import motion_of
     from cosserat_fenicsx.scene.toml_tables import tables_of
 
     tables = tables_of(options.scene)
@@ -148,7 +146,7 @@ def _resume(options):
 
 
 def _explain(options):
-    from cosserat_fenicsx.cli.motion import motion_of
+    from cosserat_fenicsx.cli.rods import motion_of
     from cosserat_fenicsx.scene.toml_tables import tables_of
 
     tables = tables_of(options.scene)
@@ -164,7 +162,7 @@ def _explain(options):
         return DONE
     moving = motion_of(options)
     if moving:
-        from cosserat_fenicsx.cli.explain_motion import explain_motion
+        from cosserat_fenicsx.cli.explain import explain_motion
 
         scene, text = moving[0], explain_motion(*moving)
     else:

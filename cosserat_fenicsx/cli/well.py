@@ -8,9 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from cosserat_fenicsx import units
-from cosserat_fenicsx.cli.deliver import prepare
-from cosserat_fenicsx.cli.files import Files, keep_inputs
-from cosserat_fenicsx.cli.say import DONE, INTERRUPTED, say, warnings_in_words
+from cosserat_fenicsx.cli.rods import prepare
+from cosserat_fenicsx.cli.say import DONE, INTERRUPTED, Files, keep_inputs, say, warnings_in_words
 from cosserat_fenicsx.errors import Interrupted, SceneError
 from cosserat_fenicsx.ranks import on_first, world
 from cosserat_fenicsx.well.components import weight_in_mud

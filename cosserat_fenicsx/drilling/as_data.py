@@ -19,8 +19,7 @@ from cosserat_fenicsx.drilling.wall_friction import ViscousDrag, WallFriction
 from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.parts import members
 from cosserat_fenicsx.scene.as_data import NotData
-from cosserat_fenicsx.scene.materials import Material
-from cosserat_fenicsx.scene.sections import Stiffness
+from cosserat_fenicsx.scene.sections import Material, Stiffness
 from cosserat_fenicsx.scene.signals import SIGNALS
 from cosserat_fenicsx.well.components import COMPONENTS, DrillString
 from cosserat_fenicsx.well.hole import Borehole, HoleSection, Mud

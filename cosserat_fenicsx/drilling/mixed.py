@@ -11,12 +11,11 @@ from cosserat_fenicsx.drilling.bit_laws import Stribeck
 from cosserat_fenicsx.drilling.pipe_above import PipeAbove
 from cosserat_fenicsx.drilling.scene import Drilling
 from cosserat_fenicsx.scene.action import PointAction
-from cosserat_fenicsx.scene.along import AlongPieces
 from cosserat_fenicsx.scene.curves import Line
-from cosserat_fenicsx.scene.damping import Damping
 from cosserat_fenicsx.scene.loads import Force, LineForce
-from cosserat_fenicsx.scene.rod import Rod, Station, StationOrName, is_known
+from cosserat_fenicsx.scene.rod import Damping, Rod, Station, StationOrName, is_known
 from cosserat_fenicsx.scene.scene import Scene
+from cosserat_fenicsx.scene.signals import AlongPieces
 from cosserat_fenicsx.scene.supports import Roller
 from cosserat_fenicsx.well.components import DrillPipe
 

@@ -21,8 +21,7 @@ from cosserat_fenicsx.results.modes import Modes
 from cosserat_fenicsx.results.shapes import Equilibrium
 from cosserat_fenicsx.scene.action import has_permanent
 from cosserat_fenicsx.scene.describe import describe
-from cosserat_fenicsx.scene.magnitudes import check_magnitudes
-from cosserat_fenicsx.scene.scene import Scene
+from cosserat_fenicsx.scene.scene import Scene, check_magnitudes
 from cosserat_fenicsx.scene.statical import without_mechanism
 from cosserat_fenicsx.statics.circulatory import circulatory_part
 from cosserat_fenicsx.statics.meshes import FIRST_ELEMENTS, layers_of, until_two_meshes_agree

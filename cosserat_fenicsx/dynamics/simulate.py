@@ -21,7 +21,7 @@ from cosserat_fenicsx.dynamics.pace import Adaptive
 from cosserat_fenicsx.dynamics.pace import Fixed
 from cosserat_fenicsx.storage.runfolder import RunFolder
 from cosserat_fenicsx.scene.action import path_dependent
-from cosserat_fenicsx.scene.magnitudes import check_magnitudes
+from cosserat_fenicsx.scene.scene import check_magnitudes
 from cosserat_fenicsx.scene.scene import Scene
 from cosserat_fenicsx.dynamics.start import equilibrium
 from cosserat_fenicsx.dynamics.start import put_start

@@ -18,7 +18,7 @@ from cosserat_fenicsx.forms import ties as eq
 from cosserat_fenicsx.models.traits import resultant_at_rest
 from cosserat_fenicsx.scene.planes import independent_in
 from cosserat_fenicsx.scene.signals import at, signals_of
-from cosserat_fenicsx.scene.ties import AngleTie, PositionTie
+from cosserat_fenicsx.scene.supports import AngleTie, PositionTie
 
 
 @dataclass(frozen=True)
@@ -184,7 +184,7 @@ class Ties:
     """The ties of a scene, dimensionless.
 
     Args:
-        ties: those of the scene (`cosserat_fenicsx.scene.ties`).
+        ties: those of the scene (`cosserat_fenicsx.scene.supports`).
         pattern: the `TiePattern` of the tied nodes.
         reference: (tied nodes, 3) positions at rest.
         length: unit of length, m.
@@ -251,7 +251,7 @@ class Ties:
 
 
 def _numbers(tie, length):
-    """The data of a tie of `cosserat_fenicsx.scene.ties` by their names in forms/ties.py."""
+    """The data of a tie of `cosserat_fenicsx.scene.supports` by their names in forms/ties.py."""
     if isinstance(tie, PositionTie):
         return {"n": tie.direction, "rate": tie.rate / length}
     if isinstance(tie, AngleTie):

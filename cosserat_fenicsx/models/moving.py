@@ -41,7 +41,7 @@ from cosserat_fenicsx.models.rod_data import (
 )
 from cosserat_fenicsx.models.spatial import SpatialModel
 from cosserat_fenicsx.numerics import cross, small_rotations
-from cosserat_fenicsx.scene.damping import Damping
+from cosserat_fenicsx.scene.rod import Damping
 from cosserat_fenicsx.scene.signals import signals_of
 
 

@@ -9,8 +9,7 @@ import numpy as np
 from cosserat_fenicsx.errors import LibraryMissing
 from cosserat_fenicsx.pictures.colours import BENDING
 from cosserat_fenicsx.pictures.view import Labels, View, axes_of, draw_axes, round_step
-from cosserat_fenicsx.scene.materials import Material
-from cosserat_fenicsx.scene.sections import Circle
+from cosserat_fenicsx.scene.sections import Circle, Material
 
 _PREFIXES = ((1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"), (1e-12, "p"),
              (1e-15, "f"), (1e-18, "a"))  # fmt: skip

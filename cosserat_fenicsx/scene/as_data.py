@@ -11,19 +11,15 @@ import functools
 import numpy as np
 
 from cosserat_fenicsx.errors import SceneError
-from cosserat_fenicsx.scene.along import ALONG
 from cosserat_fenicsx.scene.curves import CURVES
-from cosserat_fenicsx.scene.damping import Damping
 from cosserat_fenicsx.scene.describe import name_of
-from cosserat_fenicsx.scene.initial import InitialVelocity
-from cosserat_fenicsx.scene.joints import Joint
-from cosserat_fenicsx.scene.materials import Material
 from cosserat_fenicsx.scene.profiles import SECTIONS
-from cosserat_fenicsx.scene.rod import Rod, Station
+from cosserat_fenicsx.scene.rod import Damping, Rod, Station
 from cosserat_fenicsx.scene.scene import Scene
 from cosserat_fenicsx.scene.scenefile import action_classes
-from cosserat_fenicsx.scene.signals import SIGNALS, Signal
-from cosserat_fenicsx.scene.supports import SUPPORTS
+from cosserat_fenicsx.scene.sections import Material
+from cosserat_fenicsx.scene.signals import ALONG, SIGNALS, Signal
+from cosserat_fenicsx.scene.supports import SUPPORTS, InitialVelocity, Joint
 
 _PARTS = ("supports", "loads", "joints", "velocities")
 # Fields whose constructor's argument has another name.

@@ -2,17 +2,391 @@
 
 The interface of a curve: `length`, m; `breaks`, the arc lengths inside it where it is not smooth, m; `uniform`, whether
 its curvature and twist are constant; `position(s)` and `frame(s)`, both exact to round-off, for an arc length or an
-array of them.
+array of them. Frames, rows of points from files and splines come first.
 """
 
+import contextlib
+import csv
+import io
 import math
 from dataclasses import dataclass, field
+from pathlib import Path
 
 import numpy as np
+from numpy.polynomial import legendre
 
-from cosserat_fenicsx.checks import Numbers, number, positive, refuse, store, vector
-from cosserat_fenicsx.scene.frames import carried, exponential, level_axis, rotation, start_frame
-from cosserat_fenicsx.scene.splines import Spline
+from cosserat_fenicsx.checks import File, Numbers, Rows, instance, number, positive, refuse, store, text_of, vector
+from cosserat_fenicsx.dimensions import LARGEST
+from cosserat_fenicsx.errors import SceneError
+from cosserat_fenicsx.numerics import gauss
+
+# Smallest distance of neighbouring points over the extent of all: nearer ones leave the curvature to rounding errors.
+_APART = 1e-7
+
+
+def polyline(owner, field, given, *, closed):
+    """The points (n, 3), m, of an array or a file, without repetitions.
+
+    Args:
+        owner, field: named in error messages.
+        given: an array, or the path of a file: .csv (three columns, m, with or without a header) or one that meshio
+            reads.
+        closed: whether the last point is joined to the first; it may then repeat it.
+
+    Raises:
+        SceneError: a file that cannot be read or holds no single polyline without branches, too few points, numbers
+            that are not finite, or a point that repeats the one before.
+    """
+    points, what = given, f"{given!r:.60}"
+    if isinstance(given, str | Path):
+        what = str(given)
+        if Path(given).suffix.lower() == ".csv":
+            points = _from_csv(owner, field, Path(given))
+        else:
+            points = _from_mesh(owner, field, Path(given), closed)
+    try:
+        points = np.asarray(points)
+    except ValueError:
+        refuse(owner, field, what, "points of three numbers each (m)")
+    if points.ndim != 2 or points.shape[1] != 3 or points.dtype.kind not in "iuf":
+        refuse(owner, field, what, "points of three numbers each (m)")
+    points = points.astype(float)
+    usable = (np.abs(points) <= LARGEST).all(axis=1)
+    if not usable.all():
+        row = int(np.argmin(usable))
+        refuse(owner, f"{field}[{row}]", tuple(points[row].tolist()), f"finite numbers (m), none beyond {LARGEST:g}")
+    if closed and len(points) > 1 and _coincide(points[-1:], points[:1], points)[0]:
+        points = points[:-1]
+    if len(points) < 2 + closed:
+        refuse(owner, field, what, f"{'three' if closed else 'two'} points or more")
+    again = np.flatnonzero(_coincide(points[1:], points[:-1], points))
+    if len(again):
+        row = int(again[0]) + 1
+        apart = f"a point apart from the one before, by more than {_APART:g} of the extent of all"
+        refuse(owner, f"{field}[{row}]", tuple(points[row].tolist()), apart)
+    return points
+
+
+def _coincide(a, b, points):
+    near = max(1e-12 * np.abs(points).max(), _APART * np.ptp(points, axis=0).max())
+    return ~(np.linalg.norm(a - b, axis=1) > near)
+
+
+def _from_csv(owner, field, file):
+    rows = []
+    try:
+        table = list(csv.reader(io.StringIO(text_of(file, "points as .csv"), newline="")))
+    except (SceneError, csv.Error) as problem:
+        refuse(owner, field, str(file), f"a text file that can be read ({problem})")
+    for line, row in enumerate(table, start=1):
+        if not any(cell.strip() for cell in row):
+            continue
+        try:
+            x, y, z = map(float, row)
+        except ValueError:
+            if rows or line > 1:
+                refuse(owner, field, str(file), f"three numbers in line {line}, which is {','.join(row)!r:.60}")
+        else:
+            rows.append((x, y, z))
+    return rows or np.empty((0, 3))
+
+
+def _from_mesh(owner, field, file, closed):
+    import meshio  # imported here, since few scenes need it
+
+    if not file.is_file():
+        refuse(owner, field, str(file), "a file that exists")
+    try:
+        with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()):
+            mesh = meshio.read(file)
+    except (Exception, SystemExit) as problem:  # its readers may raise anything, even SystemExit
+        refuse(owner, field, str(file), f"a .csv file or a mesh file that meshio reads ({problem!r:.120})")
+    segments = [cells.data for cells in mesh.cells if cells.type == "line"]
+    for cells in mesh.cells:
+        if cells.type == "line3":  # its third node is the midpoint
+            segments.append(cells.data[:, [0, 2, 2, 1]].reshape(-1, 2))
+    if not segments:
+        refuse(owner, field, str(file), "a file with line cells, which form the polyline")
+    points = np.asarray(mesh.points, dtype=float)
+    if points.shape[1] == 2:
+        points = np.column_stack([points, np.zeros(len(points))])
+    return points[_chain(owner, field, file, np.concatenate(segments).tolist(), closed)]
+
+
+def _chain(owner, field, file, segments, closed):
+    """The nodes of segments, ordered along the polyline that they form, from an end that is the first node of a
+    segment."""
+    neighbours = {}
+    for a, b in segments:
+        neighbours.setdefault(a, []).append(b)
+        neighbours.setdefault(b, []).append(a)
+    branching = [node for node, others in neighbours.items() if len(others) > 2]
+    if branching:
+        refuse(
+            owner, field, str(file), f"a polyline without branches, but three or more lines meet at node {branching[0]}"
+        )
+    ends = [node for node, others in neighbours.items() if len(others) == 1]
+    if not ends and not closed:
+        refuse(owner, field, str(file), "a polyline with two ends, or closed = true for this ring")
+    firsts = {a for a, _ in segments}
+    previous, node = None, next((end for end in ends if end in firsts), (ends or [segments[0][0]])[0])
+    following = segments[0][1] if not ends else neighbours[node][0]
+    chain, start = [node], node
+    while following is not None and following != start:
+        previous, node = node, following
+        chain.append(node)
+        following = next((other for other in neighbours[node] if other != previous), None)
+    if len(chain) != len(neighbours):
+        refuse(owner, field, str(file), "a single polyline, but its lines form several")
+    return chain
+
+
+# Taylor coefficients of (theta - sin theta)/theta^3 in theta^2, used below theta = 1, where the closed form cancels.
+_SERIES = np.array([(-1) ** k / math.factorial(2 * k + 3) for k in range(9)])
+
+
+def start_frame(owner, d3, default):
+    """The frame [d1 d2 d3] of a unit tangent, (3, 3).
+
+    Args:
+        owner: the curve; the component of `owner.d1` normal to the tangent gives the direction of d1.
+        default: the direction that is used where `owner.d1` is None.
+
+    Raises:
+        SceneError: d1 along the tangent.
+    """
+    given = np.asarray(default if owner.d1 is None else owner.d1, dtype=float)
+    across = given - np.dot(given, d3) * d3
+    if np.linalg.norm(across) <= 1e-6 * np.linalg.norm(given):
+        refuse(owner, "d1", owner.d1, "a direction across the tangent at the start")
+    d1 = across / np.linalg.norm(across)
+    d1 = d1 - np.dot(d1, d3) * d3  # twice, against cancellation where `given` is almost along the tangent
+    d1 /= np.linalg.norm(d1)
+    return np.column_stack([d1, np.cross(d3, d1), d3])
+
+
+def level_axis(t):
+    """The horizontal direction d1 normal to t such that t x d1 points upwards (along z); x for a vertical t."""
+    across = np.cross([0.0, 0.0, 1.0], t)
+    return across if np.linalg.norm(across) > 1e-6 else np.array([1.0, 0.0, 0.0])
+
+
+def exponential(w):
+    """Rotations by the rotation vectors w (..., 3): (..., 3, 3), orthonormal to round-off (Rodrigues' formula)."""
+    first, second, _ = _factors(w)
+    W = _skew(w)
+    return np.eye(3) + first[..., None, None] * W + second[..., None, None] * (W @ W)
+
+
+def carried(w):
+    """The integral of exponential(t w) (0, 0, 1) over t in [0, 1], (..., 3): the chord of a curve of unit length."""
+    _, second, third = _factors(w)
+    e3 = np.array([0.0, 0.0, 1.0])
+    once = np.cross(w, e3)
+    return e3 + second[..., None] * once + third[..., None] * np.cross(w, once)
+
+
+def _factors(w):
+    """sin(x)/x, (1 - cos x)/x^2 and (x - sin x)/x^3 of the lengths x of w, without cancellation."""
+    x = np.linalg.norm(w, axis=-1)
+    first, half = np.sinc(x / np.pi), np.sinc(x / (2 * np.pi))
+    small = x < 1
+    series = np.polynomial.polynomial.polyval(np.where(small, x, 0.0) ** 2, _SERIES)
+    return first, half**2 / 2, np.where(small, series, (1 - first) / np.where(small, 1.0, x) ** 2)
+
+
+def _skew(w):
+    """The skew matrices of w (..., 3): skew(w) v = w x v, (..., 3, 3)."""
+    a, b, c = np.moveaxis(w, -1, 0)
+    zero = np.zeros_like(a)
+    return np.stack([zero, -c, b, c, zero, -a, -b, a, zero], axis=-1).reshape(*np.shape(w)[:-1], 3, 3)
+
+
+def rotation(q):
+    """The rotation matrix (3, 3) of a unit quaternion, scalar first."""
+    V = _skew(np.asarray(q[1:]))
+    return np.eye(3) + 2 * q[0] * V + 2 * V @ V
+
+
+_GAUSS = gauss(20)
+#: halvings of a span, and mean number of panels per span, beyond which the curve has a cusp
+_MOST_HALVINGS, _MOST_PANELS = 24, 200
+
+
+@dataclass(frozen=True)
+class Spline:
+    """The cubic spline through points, twice continuously differentiable, with chord lengths as its parameter.
+
+    At open ends it is "not-a-knot": points of a smooth curve give that curve to fourth order up to its ends, where the
+    curvature of a natural spline would be zero. Two points give a straight line, three a parabola. Its frame is
+    rotation-minimising (Bishop's: d_1R' and d_2R' lie along the tangent, no material twist); the frame of a closed
+    spline is twisted uniformly, so that it closes too.
+
+    The frame on a panel is that at the panel's start, with tangent a, after the smallest rotation that takes a to t,
+    then rotated about t by the integral of a . (t x t')/(1 + a . t), which cancels the twist of the first rotation:
+    Bishop, Amer. Math. Monthly 82 (1975) 246, doi:10.2307/2319846; the double reflection of Wang et al. (2008),
+    doi:10.1145/1330511.1330513, integrated exactly.
+
+    Args:
+        points: (n, 3), m, or the path of a file: a .csv with three columns (m), or any file with line cells that meshio
+            reads; a relative path in a scene file starts at the scene file.
+        d1: a vector whose component normal to the tangent at the start gives the direction of d_1R there; None as for
+            `Line`.
+        closed: whether the curve returns to its first point, smoothly.
+
+    Raises:
+        SceneError: too few points, points that coincide with the one before, a file without a single polyline, a curve
+            that turns back on itself in a cusp, or d1 along the tangent.
+    """
+
+    points: Rows | File = field(repr=False, metadata={"file": True})
+    d1: Numbers | None = None
+    closed: bool = False
+    length: float = field(init=False)
+    breaks: tuple = field(init=False, repr=False, compare=False)
+
+    uniform = False
+
+    def __post_init__(self):
+        from scipy.interpolate import CubicSpline  # imported here: it is slow to import, and few scenes need it
+
+        instance(self, "closed", self.closed, bool, "true or false")
+        if self.d1 is not None:
+            store(self, d1=vector(self, "d1", self.d1, "direction"))
+        points = polyline(self, "points", self.points, closed=self.closed)
+        store(self, points=tuple(map(tuple, points.tolist())))
+        offsets = points - points[0]  # a large distance from the origin costs no accuracy
+        if self.closed:
+            offsets = np.vstack([offsets, offsets[:1]])
+        knots = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(offsets, axis=0), axis=1)))
+        cubics = CubicSpline(knots, offsets, bc_type="periodic" if self.closed else "not-a-knot").c
+        store(self, _cubics=cubics, _origin=points[0])
+        self._cut(np.diff(knots))
+        arcs = np.append(0.0, np.cumsum(self._arc.sum(axis=0), dtype=np.longdouble)).astype(float)
+        inner = np.searchsorted(self._span, np.arange(1, len(knots) - 1))
+        store(self, length=float(arcs[-1]), breaks=tuple(arcs[inner].tolist()), _arcs=arcs)
+        self._carry_frame()
+
+    def _cut(self, spans):
+        """Divide the curve into panels, and store their spans (indices), midpoints and half lengths in the spline's
+        parameter, tangents at their starts, and series."""
+        span, middle, half = np.arange(len(spans)), spans / 2, spans / 2
+        done = []
+        for _ in range(_MOST_HALVINGS):
+            resolved, start, arc, turn = self._series(span, middle, half)
+            panels = (span, middle, half, start, arc.T, turn.T)
+            done.append([values[resolved] for values in panels])
+            rest = ~resolved
+            if not rest.any():
+                break
+            span, half = np.repeat(span[rest], 2), np.repeat(half[rest] / 2, 2)
+            middle = np.repeat(middle[rest], 2) + half * np.tile([-1.0, 1.0], rest.sum())
+            if len(span) > _MOST_PANELS * len(spans):
+                break
+        if rest.any():
+            where = ", ".join(f"{x:.6g}" for x in self._origin + self._cubic(span[:1], middle[:1])[0])
+            refuse(
+                self, "points", f"({len(self.points)} points)", f"a smooth curve: this one has a cusp at ({where}) m"
+            )
+        span, middle, half, start, arc, turn = (np.concatenate(parts) for parts in zip(*done, strict=True))
+        order = np.lexsort((middle, span))
+        store(self, _span=span[order], _middle=middle[order], _half=half[order], _tangents=start[order])
+        store(self, _arc=arc[order].T, _turn=turn[order].T)
+
+    def _cubic(self, span, t, derivative=0):
+        """The cubics of spans (n,), or a derivative, (..., n, 3), at parameters t (..., n) from the starts of the
+        spans."""
+        a, b, c, d = self._cubics[:, span]
+        t = t[..., None]
+        if derivative == 0:
+            return ((a * t + b) * t + c) * t + d
+        return (3 * a * t + 2 * b) * t + c if derivative == 1 else 6 * a * t + 2 * b
+
+    def _series(self, span, middle, half):
+        """Whether panels are resolved (n,), the tangents at their starts (n, 3), and Legendre series of arc length and
+        frame angle (terms, n)."""
+        t = middle + half * np.concatenate([[-1.0], _GAUSS.points, [1.0]])[:, None]
+        first, second = self._cubic(span, t, 1), self._cubic(span, t, 2)
+        speed = np.linalg.norm(first, axis=-1)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            tangents = first / speed[..., None]
+            start = tangents[0]
+            forward = np.einsum("pj,npj->np", start, tangents)
+            rate = np.einsum("pj,npj->np", start, np.cross(tangents, second)) / (speed * (1 + forward))
+        rates = np.stack([speed, np.nan_to_num(rate, posinf=0.0, neginf=0.0)])[:, 1:-1] * half
+        tails = np.abs(_GAUSS.series[-3:] @ rates).max(axis=1)
+        # Near a cusp the terms of the derivative cancel; the series are limited by the rounding of these terms.
+        a, b, c = np.linalg.norm(self._cubics[:3, span], axis=-1)
+        end = middle + half
+        terms = 3 * a * end**2 + 2 * b * end + c
+        slowest = speed.min(axis=0)
+        resolved = (
+            (slowest > 1e-6)  # the parameter is the chord length: the speed is about 1 on a smooth curve
+            & (forward.min(axis=0) > 0.7)
+            & (tails[0] < 1e-14 * terms * half)
+            & (tails[1] * slowest < 1e-14 * terms)
+        )
+        return resolved, start, _GAUSS.integral @ rates[0], _GAUSS.integral @ rates[1]
+
+    def _carry_frame(self):
+        """Store d_1R at the start of every panel, and the angle that the frame of a closed curve fails to close by."""
+        ends = np.vstack([self._tangents[1:], self._tangent(self._span[-1:], self._middle[-1:] + self._half[-1:])])
+        d1 = start_frame(self, self._tangents[0], level_axis(self._tangents[0]))[:, 0]
+        starts = [d1]
+        for a, t, angle in zip(self._tangents, ends, self._turn.sum(axis=0), strict=True):
+            d1 = _moved(d1, a, t, angle)
+            d1 = d1 - np.dot(d1, t) * t
+            d1 /= np.linalg.norm(d1)
+            starts.append(d1)
+        t, missing = ends[-1], 0.0
+        if self.closed:
+            missing = float(np.arctan2(np.dot(np.cross(d1, starts[0]), t), np.dot(d1, starts[0])))
+        store(self, _d1=np.array(starts[:-1]), _missing=missing)
+
+    def _tangent(self, span, t):
+        first = self._cubic(span, t, 1)
+        return first / np.linalg.norm(first, axis=-1, keepdims=True)
+
+    def _locate(self, s):
+        """The panels of arc lengths s (n,), the coordinates in [-1, 1] on them, and their spans and parameters there.
+
+        By Newton's method, safeguarded by bisection.
+        """
+        s = np.clip(s, 0.0, self.length)
+        panel = np.clip(np.searchsorted(self._arcs, s, side="right") - 1, 0, len(self._half) - 1)
+        arc, span, middle, half = self._arc[:, panel], self._span[panel], self._middle[panel], self._half[panel]
+        target = s - self._arcs[panel]
+        x = 2 * target / (self._arcs[panel + 1] - self._arcs[panel]) - 1
+        low, high = np.full_like(x, -1.0), np.full_like(x, 1.0)
+        for _ in range(100):  # bisection alone would need 53
+            gap = legendre.legval(x, arc, tensor=False) - target
+            low, high = np.where(gap < 0, x, low), np.where(gap > 0, x, high)
+            new = x - gap / (half * np.linalg.norm(self._cubic(span, middle + half * x, 1), axis=-1))
+            new = np.where((new < low) | (new > high), (low + high) / 2, new)
+            step, x = np.abs(new - x).max(initial=0.0), new
+            if step < 1e-8:  # the remaining error is about its square
+                break
+        return panel, x, span, middle + half * x
+
+    def position(self, s: float | Numbers) -> np.ndarray:
+        """Inertial points at the arc lengths s (n,), m; shape (n, 3)."""
+        _, _, span, t = self._locate(np.ravel(s).astype(float))
+        return (self._origin + self._cubic(span, t)).reshape(*np.shape(s), 3)
+
+    def frame(self, s: float | Numbers) -> np.ndarray:
+        """R_R at the arc lengths s (n,); shape (n, 3, 3), the directors as columns, inertial components."""
+        panel, x, span, t = self._locate(np.ravel(s).astype(float))
+        t = self._tangent(span, t)
+        angle = legendre.legval(x, self._turn[:, panel], tensor=False) + self._missing * np.ravel(s) / self.length
+        d1 = _moved(self._d1[panel], self._tangents[panel], t, angle[:, None])
+        return np.stack([d1, np.cross(t, d1), t], axis=-1).reshape(*np.shape(s), 3, 3)
+
+
+def _moved(d1, a, t, angle):
+    """d1, normal to a, after the smallest rotation that takes a to t, then rotated about t by an angle."""
+    along = np.sum(t * d1, axis=-1, keepdims=True) / (1 + np.sum(a * t, axis=-1, keepdims=True))
+    d1 = d1 - along * (a + t)
+    return np.cos(angle) * d1 + np.sin(angle) * np.cross(t, d1)
 
 
 @dataclass(frozen=True)

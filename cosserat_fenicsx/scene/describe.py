@@ -1,4 +1,4 @@
-"""Short texts that describe parts of a scene."""
+"""Parts of a scene in words, for messages, tables and pictures."""
 
 import pickle
 

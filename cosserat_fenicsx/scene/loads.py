@@ -11,10 +11,42 @@ import numpy as np
 from cosserat_fenicsx.checks import Numbers, NumbersInTime, instance, refuse, store, vector
 from cosserat_fenicsx.scene import action
 from cosserat_fenicsx.scene.action import LineAction, PointAction
-from cosserat_fenicsx.scene.along import FunctionAlong, along_or_vector, breaks_of, kinks_of, values_of
 from cosserat_fenicsx.scene.rod import Rod, RodOrName, Station, StationOrName, is_known
-from cosserat_fenicsx.scene.signals import vector_or_signal
-from cosserat_fenicsx.scene.weight_off_axis import WeightOffAxis
+from cosserat_fenicsx.scene.signals import (
+    FunctionAlong,
+    along_or_vector,
+    breaks_of,
+    kinks_of,
+    values_of,
+    vector_or_signal,
+)
+
+
+@dataclass(frozen=True)
+class WeightOffAxis(LineAction):
+    """The moment R a x rho A g per unit of reference length about the axis of an eccentric rod; `Weight` adds it.
+
+    Args:
+        rod: a rod with an eccentricity.
+        gravity, permanent: as those of the `Weight`, whose force it leaves out.
+    """
+
+    rod: Rod
+    gravity: Numbers
+    permanent: bool = False
+
+    work = "moment_on_arm"
+
+    @property
+    def scaled(self):
+        """See `Action`."""
+        return not self.permanent
+
+    def data(self, rod, s):
+        """See `Action`."""
+        force = rod.stiffness_at(s).mass[..., None] * np.asarray(self.gravity)
+        arm = np.einsum("...ij,...j->...i", rod.curve.frame(s), rod.mass_centre.at(s))
+        return action.vector(force, "N/m"), action.vector(arm, "m")
 
 
 class Load:

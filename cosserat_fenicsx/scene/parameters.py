@@ -16,11 +16,10 @@ import numpy as np
 from cosserat_fenicsx.checks import instance, number
 from cosserat_fenicsx.errors import SceneError, nearest
 from cosserat_fenicsx.scene.as_data import argument_of
-from cosserat_fenicsx.scene.curves import CURVES
+from cosserat_fenicsx.scene.curves import CURVES, Spline
 from cosserat_fenicsx.scene.rod import Station
 from cosserat_fenicsx.scene.scene import Scene
 from cosserat_fenicsx.scene.sections import Tube
-from cosserat_fenicsx.scene.splines import Spline
 
 _NOTHING = 1e-6  # of a vector: components that are 0 but for rounding
 _PARTS = ("rods", "materials", "supports", "loads", "joints")

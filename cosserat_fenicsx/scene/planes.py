@@ -12,7 +12,7 @@ from cosserat_fenicsx.scene.action import is_axial
 from cosserat_fenicsx.scene.curves import Line
 from cosserat_fenicsx.scene.signals import at, sample_times
 from cosserat_fenicsx.scene.statical import rows_of
-from cosserat_fenicsx.scene.ties import PositionTie, TurnTie
+from cosserat_fenicsx.scene.supports import PositionTie, TurnTie
 
 # A direction lies in a plane, or along its normal, where the sine of its angle to it is below this.
 _SMALLEST_ANGLE = 1e-9

@@ -1,19 +1,129 @@
-"""The sections along a rod: one for all, in pieces, or by a function of the arc length."""
+"""What changes along a rod: its sections and its mass centre, one for all, in pieces, or by a function of the arc
+length."""
 
 from collections import namedtuple
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
 
-from cosserat_fenicsx.checks import instance, refuse, store
+from cosserat_fenicsx.checks import Numbers, call, instance, number, refuse, store, vector
 from cosserat_fenicsx.errors import SceneError
-from cosserat_fenicsx.scene.materials import Material
-from cosserat_fenicsx.scene.pieces import checked_pieces
 from cosserat_fenicsx.scene.rolled import Profile
-from cosserat_fenicsx.scene.sections import Circle, Rectangle, Stiffness, Tube, inverse, representative
+from cosserat_fenicsx.scene.sections import Circle, Material, Rectangle, Stiffness, Tube, inverse, representative
 from cosserat_fenicsx.scene.stresses import Stress
+
+
+def checked_pieces(where, field, given, length, what):
+    """[(s_end, value)] of pieces whose ends ascend to the rod's length, which the last may write None.
+
+    Args:
+        where, field: the rod and its property, in messages; given: the pieces; length: m; what: a value in messages.
+
+    Raises:
+        SceneError: a piece that is no pair, or ends that do not ascend to the length.
+    """
+    pieces, before = [], 0.0
+    for i, piece in enumerate(given):
+        if not isinstance(piece, list | tuple) or len(piece) != 2:
+            refuse(where, f"{field}[{i}]", piece, f"a piece (s_end, {what})")
+        end, value = piece
+        last = i == len(given) - 1
+        if last and end is not None:
+            number(where, f"{field}[{i}].to", end, f"the rod's length {length:.12g} m, or None for it",
+                   lambda end: abs(end - length) <= 1e-9 * length)  # fmt: skip
+        if last:
+            end = length
+        least = before + 1e-9 * length
+        end = number(where, f"{field}[{i}].to", end, f"an arc length above {before:g} and up to {length:g} m",
+                     lambda end, least=least: least < end <= length)  # fmt: skip
+        pieces.append((end, value))
+        before = end
+    return pieces
+
+
+#: What `Rod.eccentricity` may be.
+OffsetOfLength = Callable[[float], Numbers]
+Offset = Numbers | OffsetOfLength | Sequence[tuple[float | None, Numbers | OffsetOfLength]]
+
+_EXPECTED = (
+    "(a1, a2) along d_1 and d_2 (m), a function from arc length to it, or pieces (s_end, (a1, a2) or function), the "
+    "last to the rod's length"
+)
+_OFFSETS = 33
+
+
+class MassCentre:
+    """The offset of the mass centre of the sections of a rod from its axis, along d_1 and d_2.
+
+    Args:
+        owner: the rod: its name for error messages, and its `length`.
+        given: as `Rod.eccentricity`, not None.
+
+    Attributes:
+        given: the same in a normal form: (a1, a2), a function, or a tuple of pieces.
+        breaks: arc lengths inside the rod where it may jump, m.
+        largest: the largest distance from the axis, m (of a function: of samples).
+
+    Raises:
+        SceneError: none of these, offsets that are not two finite numbers, or ends that do not ascend to the length.
+    """
+
+    def __init__(self, owner, given):
+        self._where, self._length = f"Rod '{owner.name}'", owner.length
+        pieces = self._pieces(given)
+        self._ends, self._offsets = zip(*pieces, strict=True)
+        self.given = pieces if _has_pieces(given) else pieces[0][1]
+        self.breaks = self._ends[:-1]
+        s = np.linspace(0, owner.length, _OFFSETS)
+        sampled = np.concatenate([self.at(s, side) for side in ("left", "right")])
+        self.largest = float(np.linalg.norm(sampled, axis=1).max())
+
+    def at(self, s, side="right"):
+        """(..., 3) offsets along d_1, d_2, d_3 at arc lengths s (...), m; `side` as for `Rod.stiffness_at`."""
+        s = np.asarray(s, dtype=float)
+        within = 1e-9 * self._length * (1 if side == "left" else -1)
+        index = np.searchsorted(np.add(self.breaks, within), s, side=side)
+        offsets = np.zeros((*s.shape, 3))
+        for k, offset in enumerate(self._offsets):
+            here = index == k
+            if callable(offset):
+                values = [self._of(offset, float(x)) for x in s[here]]
+                offsets[here, :2] = np.reshape(values, (-1, 2))
+            else:
+                offsets[here, :2] = offset
+        return offsets
+
+    def _pieces(self, given):
+        if not _has_pieces(given):
+            return ((self._length, self._checked(given, "eccentricity")),)
+        pieces = checked_pieces(self._where, "eccentricity", given, self._length, "(a1, a2)")
+        return tuple((end, self._checked(x, f"eccentricity[{i}]")) for i, (end, x) in enumerate(pieces))
+
+    def _checked(self, offset, field):
+        if callable(offset):
+            return offset
+        if not isinstance(offset, list | tuple | np.ndarray):
+            refuse(self._where, field, offset, _EXPECTED)
+        return vector(self._where, field, offset, "m", size=2)
+
+    def _of(self, function, s):
+        given = call(function, s, f"{self._where}.eccentricity", f" at s = {s:g} m")
+        return vector(self._where, f"eccentricity({s:g})", given, "m", size=2)
+
+
+def mass_centre_of(rod):
+    """The `MassCentre` of a rod, or None where it is on the axis everywhere."""
+    if rod.eccentricity is None:
+        return None
+    found = MassCentre(rod, rod.eccentricity)
+    return found if found.largest or any(map(callable, found._offsets)) else None
+
+
+def _has_pieces(given):
+    """Whether it is a list of pieces rather than one offset."""
+    return isinstance(given, list | tuple) and bool(given) and all(isinstance(x, list | tuple) for x in given)
 
 
 class Stiffnesses(namedtuple("Stiffnesses", "K J mass inertia matrix", defaults=(None,))):

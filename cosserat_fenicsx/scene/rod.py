@@ -1,9 +1,11 @@
-"""Rods, made of a curve, sections and a material, and the stations on them that supports, loads and joints refer to."""
+"""Rods, made of a curve, sections and a material, their damping, and the stations on them that supports, loads and
+joints refer to, also by names, which are looked up when the scene is put together."""
 
+import dataclasses
 import itertools
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -11,11 +13,98 @@ from cosserat_fenicsx.checks import Numbers, instance, number, refuse, store
 from cosserat_fenicsx.errors import SceneError, nearest
 from cosserat_fenicsx.numerics import gauss
 from cosserat_fenicsx.scene.curves import CURVES, Curve
-from cosserat_fenicsx.scene.damping import Damping
-from cosserat_fenicsx.scene.eccentricity import MassCentre, Offset, mass_centre_of
-from cosserat_fenicsx.scene.materials import Material
-from cosserat_fenicsx.scene.profiles import Section, SectionOfLength, Sections, Stiffnesses
-from cosserat_fenicsx.scene.sections import Stiffness
+from cosserat_fenicsx.scene.profiles import (
+    MassCentre,
+    Offset,
+    Section,
+    SectionOfLength,
+    Sections,
+    Stiffnesses,
+    mass_centre_of,
+)
+from cosserat_fenicsx.scene.sections import Material, Stiffness
+from cosserat_fenicsx.scene.signals import Signal
+
+
+@dataclass(frozen=True)
+class Damping:
+    """Damping of a rod.
+
+    Kelvin-Voigt: to n and m are added Kt v_t and Jt u_t, the rates of the material strains, eqs. (2)-(3). A mode of a
+    beam with the angular frequency omega decays as exp(-time omega^2 t/2). Drag: every section feels the force and the
+    moment -drag times its momentum and its angular momentum; modes decay as exp(-drag t/2).
+
+    Args:
+        time: s; Kt and Jt are `time` times the stiffnesses, and so are the couplings of a `Stiffness.matrix`.
+        drag: 1/s.
+        Kt: (GAt1, GAt2, EAt), N s, instead of `time` times K.
+        Jt: (EIt1, EIt2, GJt), N m^2 s, instead of `time` times J; where either is given, rates of stretch and shear
+            cause no moment and rates of bending and torsion no force.
+
+    Raises:
+        SceneError: a number below zero, or not three of them.
+    """
+
+    time: float = 0.0
+    drag: float = 0.0
+    Kt: tuple | None = None
+    Jt: tuple | None = None
+
+    def __post_init__(self):
+        for field, unit in (("time", "s"), ("drag", "1/s")):
+            store(self, **{field: _not_negative(self, field, getattr(self, field), unit)})
+        for field, unit in (("Kt", "N s"), ("Jt", "N m^2 s")):
+            values = getattr(self, field)
+            if values is None:
+                continue
+            if not isinstance(values, tuple | list) or len(values) != 3:
+                refuse(self, field, values, f"three numbers, along or about d_1, d_2 and d_3 ({unit})")
+            store(self, **{field: tuple(_not_negative(self, field, value, unit) for value in values)})
+
+    @classmethod
+    def ratio(cls, ratio: float, frequencies: Numbers) -> "Damping":
+        """The damping with a given damping ratio drag/(2 omega) + time omega/2 at two frequencies.
+
+        Args:
+            ratio: of the damping to the critical one, in [0, 1).
+            frequencies: two, Hz; the ratio is smaller between them and larger outside.
+
+        Raises:
+            SceneError: a value outside its range.
+        """
+        ratio = number("Damping.ratio", "ratio", ratio, "a number from 0 to below 1", lambda x: 0 <= x < 1)
+        if not isinstance(frequencies, tuple | list) or len(frequencies) != 2:
+            refuse("Damping.ratio", "frequencies", frequencies, "two frequencies (Hz)")
+        one, two = (
+            2 * math.pi * number("Damping.ratio", "frequencies", f, "positive numbers (Hz)", lambda x: 0 < x < math.inf)
+            for f in frequencies
+        )
+        return cls(time=2 * ratio / (one + two), drag=2 * ratio * one * two / (one + two))
+
+    @property
+    def sizes(self):
+        """All its numbers, zero where nothing is damped."""
+        return (self.time, self.drag, *(self.Kt or ()), *(self.Jt or ()))
+
+    def viscosity(self, stiffnesses):
+        """The viscosities as `Stiffnesses` (times s), from the elastic ones."""
+        Kt, Jt = (
+            self.time * values if given is None else np.broadcast_to(given, values.shape)
+            for values, given in ((stiffnesses.K, self.Kt), (stiffnesses.J, self.Jt))
+        )
+        matrix = stiffnesses.matrix
+        if matrix is not None:
+            matrix = self.time * matrix
+            for given, part in ((self.Kt, slice(0, 3)), (self.Jt, slice(3, 6))):
+                if given is not None:
+                    matrix[..., part, :] = matrix[..., :, part] = 0.0
+                    matrix[..., part, part] = np.diag(given)
+        return stiffnesses._replace(K=Kt, J=Jt, matrix=matrix)
+
+
+def _not_negative(owner, field, value, unit):
+    return number(owner, field, value, f"a number that is not negative ({unit})", lambda x: 0 <= x < math.inf)
+
 
 _unnamed = itertools.count(1)
 # Rods that a message lists.
@@ -53,9 +142,9 @@ class Rod:
     name: str | None = None
     damping: Damping | None = None
     eccentricity: Offset | None = None
-    stiffness: Stiffness = field(init=False, repr=False)
-    profile: Sections = field(init=False, repr=False)
-    mass_centre: MassCentre | None = field(init=False, repr=False)
+    stiffness: Stiffness = dataclasses.field(init=False, repr=False)
+    profile: Sections = dataclasses.field(init=False, repr=False)
+    mass_centre: MassCentre | None = dataclasses.field(init=False, repr=False)
 
     def __post_init__(self):
         if self.name is None:
@@ -224,3 +313,53 @@ def _column_load(rod, pieces=4, points=8):
     root = np.linalg.cholesky(rod.stiffness_at(s).flexibility)
     scaled = (np.sqrt(weights)[:, None] * theta / np.sqrt(weights))[:, None, :, None] * root.swapaxes(0, 1)[None]
     return float(1 / np.linalg.norm(scaled.reshape(2 * len(s), -1), 2) ** 2)
+
+
+# The fields of actions, whatever the annotations of a class of the user's own are.
+_OF_ACTIONS = {"station": Station, "rod": Rod}
+_KINDS = {Station: Station, StationOrName: Station, Rod: Rod, RodOrName: Rod}
+
+
+def kind_of(annotation):
+    """`Station` or `Rod` where a field with this annotation takes one, or its name; else None."""
+    return _KINDS.get(annotation)
+
+
+def look_up(where, name, kind, rods):
+    """The `Station` or `Rod` (`kind`) of a name among rods {name: rod}.
+
+    Raises:
+        SceneError: there is none of that name.
+    """
+    if kind is Station:
+        return station_named(where, name, rods)
+    if not isinstance(name, str) or name not in rods:
+        raise SceneError(f"{where} = {name!r}: no rod has this name, {nearest(name, rods)}")
+    return rods[name]
+
+
+def with_names(where, item, rods):
+    """A part of a scene with the stations and rods that its names stand for; the part itself where it has no names.
+
+    Args:
+        where: for error messages; rods: {name: rod}.
+
+    Raises:
+        SceneError: there is none of that name, or the part refuses what it stands for.
+    """
+    found = {
+        field.name: look_up(f"{where}.{field.name}", getattr(item, field.name), kind, rods)
+        for field in _fields(item)
+        if (kind := kind_of(field.type) or _OF_ACTIONS.get(field.name)) and isinstance(getattr(item, field.name), str)
+    }
+    if not found:
+        return item
+    # functions of time are checked again by the constructor, with the place in their messages
+    given = {f.name: getattr(item, f.name).function for f in _fields(item) if isinstance(getattr(item, f.name), Signal)}
+    return dataclasses.replace(item, **given, **found)
+
+
+def _fields(item):
+    if isinstance(item, type) or not dataclasses.is_dataclass(item):  # no part of a scene, which says so
+        return []
+    return [field for field in dataclasses.fields(item) if field.init]

@@ -25,8 +25,7 @@ from numpy.polynomial.legendre import legvander
 from cosserat_fenicsx.checks import instance
 from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.numerics import gauss
-from cosserat_fenicsx.scene.materials import Material
-from cosserat_fenicsx.scene.sections import Stiffness
+from cosserat_fenicsx.scene.sections import Material, Stiffness
 from cosserat_fenicsx.scene.stresses import Stress
 
 _TABLE = Path(__file__).with_name("rolled_profiles.csv")

@@ -45,20 +45,14 @@ from typing import Any
 
 from cosserat_fenicsx.checks import File, store
 from cosserat_fenicsx.errors import SceneError, nearest
-from cosserat_fenicsx.scene.along import ALONG
 from cosserat_fenicsx.scene.curves import CURVES
-from cosserat_fenicsx.scene.damping import Damping
-from cosserat_fenicsx.scene.initial import InitialVelocity
-from cosserat_fenicsx.scene.joints import Joint
 from cosserat_fenicsx.scene.loads import LOADS
-from cosserat_fenicsx.scene.materials import Material
-from cosserat_fenicsx.scene.names import kind_of, look_up
 from cosserat_fenicsx.scene.profiles import SECTIONS
-from cosserat_fenicsx.scene.rod import Rod
+from cosserat_fenicsx.scene.rod import Damping, Rod, kind_of, look_up
 from cosserat_fenicsx.scene.scene import Scene
-from cosserat_fenicsx.scene.sections import Stiffness
-from cosserat_fenicsx.scene.signals import SIGNALS
-from cosserat_fenicsx.scene.supports import SUPPORTS
+from cosserat_fenicsx.scene.sections import Material, Stiffness
+from cosserat_fenicsx.scene.signals import ALONG, SIGNALS
+from cosserat_fenicsx.scene.supports import SUPPORTS, InitialVelocity, Joint
 from cosserat_fenicsx.scene.toml_tables import check_arguments, tables_of
 from cosserat_fenicsx.scene.toml_tables import entries as _entries
 from cosserat_fenicsx.scene.toml_tables import known_keys as _known_keys

@@ -1,15 +1,54 @@
-"""Supports of rods.
+"""Supports of rods, joints between them, and their initial velocities.
 
 A support either removes all unknowns of a station (`clamps`) or defines scalar constraints there (`ties`); no model
 or solver refers to a support by name.
 """
 
+from collections import namedtuple
+from collections.abc import Callable
 from dataclasses import dataclass
 
-from cosserat_fenicsx.checks import Numbers, NumbersInTime, direction, refuse, store
-from cosserat_fenicsx.scene import ties
-from cosserat_fenicsx.scene.rod import Station, StationOrName, is_known
+import numpy as np
+
+from cosserat_fenicsx.checks import Numbers, NumbersInTime, direction, refuse, store, vector
+from cosserat_fenicsx.errors import SceneError
+from cosserat_fenicsx.scene.rod import Rod, RodOrName, Station, StationOrName, is_known
 from cosserat_fenicsx.scene.signals import at, vector_or_signal
+
+#: direction . (r_a - r_b) = its value in the reference + rate times the load factor (m).
+PositionTie = namedtuple("PositionTie", "a b direction rate")
+#: The direction t, fixed to the section at a, stays normal to w, fixed to the section at b.
+AngleTie = namedtuple("AngleTie", "a b t w")
+#: The rotation of the section at a is the load factor times `rotation` (rad, a rotation vector), about one `axis`.
+TurnTie = namedtuple("TurnTie", "a b axis rotation")
+
+AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+
+
+def same_place(a, b=None, displacement=(0.0, 0.0, 0.0)):
+    """Three ties that hold a at b, or at its reference position plus the load factor times a displacement."""
+    return tuple(PositionTie(a, b, axis, rate) for axis, rate in zip(AXES, displacement, strict=True))
+
+
+def same_axis(a, b, axis):
+    """Two ties that let a rotate relative to b about `axis` (a unit vector) alone."""
+    across = AXES[min(range(3), key=lambda i: abs(axis[i]))]
+    t1 = _unit(_cross(axis, across))
+    return AngleTie(a, b, t1, tuple(axis)), AngleTie(a, b, _unit(_cross(axis, t1)), tuple(axis))
+
+
+def turned(a, rotation):
+    """Three ties that hold the rotation of the section at a to the load factor times `rotation`."""
+    return tuple(TurnTie(a, None, axis, tuple(rotation)) for axis in AXES)
+
+
+def _cross(a, b):
+    return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
+
+
+def _unit(a):
+    size = sum(x * x for x in a) ** 0.5
+    return tuple(x / size for x in a)
 
 
 @dataclass(frozen=True)
@@ -49,7 +88,7 @@ class Pin:
 
     def ties(self):
         """The scalar constraints."""
-        return ties.same_place(self.station)
+        return same_place(self.station)
 
 
 @dataclass(frozen=True)
@@ -75,7 +114,7 @@ class Hinge:
 
     def ties(self):
         """The scalar constraints."""
-        return (*ties.same_place(self.station), *ties.same_axis(self.station, None, self.axis))
+        return (*same_place(self.station), *same_axis(self.station, None, self.axis))
 
 
 @dataclass(frozen=True)
@@ -101,7 +140,7 @@ class Roller:
 
     def ties(self):
         """The scalar constraints."""
-        return (ties.PositionTie(self.station, None, self.normal, 0.0),)
+        return (PositionTie(self.station, None, self.normal, 0.0),)
 
 
 @dataclass(frozen=True)
@@ -140,10 +179,126 @@ class Prescribed:
     def ties(self):
         """The scalar constraints; at the time 0 where the motion depends on time."""
         now = at(self, 0.0)
-        moved = () if now.displacement is None else ties.same_place(self.station, None, now.displacement)
-        return moved if now.rotation is None else (*moved, *ties.turned(self.station, now.rotation))
+        moved = () if now.displacement is None else same_place(self.station, None, now.displacement)
+        return moved if now.rotation is None else (*moved, *turned(self.station, now.rotation))
 
 
 #: Supports that scene files know.
 SUPPORTS = (Clamp, Pin, Hinge, Roller, Prescribed)
 Support = Clamp | Pin | Hinge | Roller | Prescribed
+
+
+@dataclass(frozen=True)
+class Joint:
+    """Two stations share their position and, unless released, their rotation.
+
+    Args:
+        first, second: stations at one point, of two rods, or the two ends of a closed one.
+        release: None for a rigid joint; the axis of a hinge (inertial, in the reference), which moves with the rods;
+            "all" for a ball joint.
+
+    Raises:
+        SceneError: not two stations, stations apart from each other, or a release that is none of these.
+    """
+
+    first: StationOrName
+    second: StationOrName
+    release: Numbers | str | None = None
+
+    def __post_init__(self):
+        if all([is_known(self, field, Station) for field in ("first", "second")]):
+            self._check_place()
+        if isinstance(self.release, str):
+            if self.release != "all":
+                refuse(self, "release", self.release, "None, the direction of an axis, or 'all'")
+        elif self.release is not None:
+            store(self, release=direction(self, "release", self.release))
+
+    def _check_place(self):
+        if (self.first.rod, self.first.s) == (self.second.rod, self.second.s):
+            refuse(self, "second", self.second, f"another station than first = {self.first}")
+        a, b = (end.rod.curve.position(end.s) for end in (self.first, self.second))
+        apart = float(np.linalg.norm(a - b))
+        if apart > 1e-9 * max(self.first.rod.length, self.second.rod.length, np.abs(a).max()):
+            raise SceneError(
+                f"Joint of {self.first} at ({_point(a)}) with {self.second} at ({_point(b)}): they are {apart:.3g} m "
+                "apart: expected stations that touch"
+            )
+
+    @property
+    def rigid(self):
+        """Whether nothing is released."""
+        return self.release is None
+
+    def ties(self):
+        """The scalar constraints of a joint that is not rigid."""
+        held = same_place(self.first, self.second)
+        return held if self.release == "all" else (*held, *same_axis(self.first, self.second, self.release))
+
+
+def _point(x):
+    return ", ".join(f"{value:.6g}" for value in x)
+
+
+@dataclass(frozen=True, eq=False)
+class InitialVelocity:
+    """Velocity of a rod at the time 0.
+
+    Two vectors define a rigid motion: the point `about` has the velocity `linear`, and the rod rotates about it with
+    `angular`. Where one of them is a function of the arc length, both are the velocities of each section itself.
+
+    Args:
+        rod: the rod.
+        linear: m/s, inertial; or a function of arc length (m) that returns it.
+        angular: rad/s, inertial; or a function of arc length (m) that returns it.
+        about: m, the reference point of the rigid motion; None for the position of the rod's start at the time 0.
+
+    Raises:
+        SceneError: not a rod, not three finite numbers, or `about` without a rigid motion.
+    """
+
+    rod: RodOrName
+    linear: Numbers | Callable[[float], Numbers] = (0.0, 0.0, 0.0)
+    angular: Numbers | Callable[[float], Numbers] = (0.0, 0.0, 0.0)
+    about: Numbers | None = None
+
+    def __post_init__(self):
+        is_known(self, "rod", Rod)
+        for field, unit in (("linear", "m/s"), ("angular", "rad/s")):
+            if not callable(getattr(self, field)):
+                store(self, **{field: vector(self, field, getattr(self, field), unit)})
+        if self.about is not None:
+            if not self._rigid:
+                refuse(self, "about", self.about, "None, since the velocity is a function of arc length")
+            store(self, about=vector(self, "about", self.about, "m"))
+
+    @property
+    def _rigid(self):
+        return not callable(self.linear) and not callable(self.angular)
+
+    def at(self, s, position):
+        """Velocities (n, 3), m/s, and angular velocities (n, 3), rad/s, inertial.
+
+        Args:
+            s: arc lengths (n,), m; position: of the rod there, (n, 3), m.
+
+        Raises:
+            SceneError: a function that does not return three finite numbers; says at which arc length.
+        """
+        linear, angular = self._along("linear", "m/s", s), self._along("angular", "rad/s", s)
+        if self._rigid:
+            about = position[0] if self.about is None else np.array(self.about)
+            linear = linear + np.cross(angular, position - about)
+        return linear, angular
+
+    def _along(self, field, unit, s):
+        value = getattr(self, field)
+        if not callable(value):
+            return np.tile(value, (len(s), 1))
+        rows = []
+        for x in s:
+            try:
+                rows.append(vector(self, field, value(float(x)), unit))
+            except SceneError as problem:
+                raise SceneError(f"{problem}, at s = {x:g} m") from None
+        return np.array(rows)

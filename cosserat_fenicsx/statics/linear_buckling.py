@@ -16,8 +16,7 @@ from cosserat_fenicsx.ranks import communicator
 from cosserat_fenicsx.results.modes import Buckling
 from cosserat_fenicsx.results.shapes import Equilibrium
 from cosserat_fenicsx.scene.action import has_permanent
-from cosserat_fenicsx.scene.magnitudes import check_magnitudes
-from cosserat_fenicsx.scene.scene import Scene
+from cosserat_fenicsx.scene.scene import Scene, check_magnitudes
 from cosserat_fenicsx.statics.circulatory import circulatory_part, static_bifurcations
 from cosserat_fenicsx.statics.critical import Energies, critical_sensitivity
 from cosserat_fenicsx.statics.meshes import FIRST_ELEMENTS, layers_of, until_two_meshes_agree

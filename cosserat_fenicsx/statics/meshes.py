@@ -14,8 +14,8 @@ from cosserat_fenicsx.models.traits import traits_of
 from cosserat_fenicsx.remember import per_scene
 from cosserat_fenicsx.results.accuracy import leading_coefficients
 from cosserat_fenicsx.results.indicators import contact_edges, element_differences, layer_lengths, turns_of, unresolved
-from cosserat_fenicsx.scene.along import FUNCTIONS_ALONG
 from cosserat_fenicsx.scene.curves import Line
+from cosserat_fenicsx.scene.signals import FUNCTIONS_ALONG
 
 #: Elements per rod of the first mesh, where the mesh is not given.
 FIRST_ELEMENTS = 4

@@ -14,9 +14,8 @@ import numpy as np
 
 from cosserat_fenicsx.checks import NAMED
 from cosserat_fenicsx.errors import SceneError
-from cosserat_fenicsx.scene.along import FUNCTIONS_ALONG
 from cosserat_fenicsx.scene.rod import Rod, Station
-from cosserat_fenicsx.scene.signals import Signal, sample_times, signals_of
+from cosserat_fenicsx.scene.signals import FUNCTIONS_ALONG, Signal, sample_times, signals_of
 
 # Arrays with more entries than this are described by a hash.
 _LONGEST = 64

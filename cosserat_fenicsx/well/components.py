@@ -20,8 +20,7 @@ from pathlib import Path
 from cosserat_fenicsx import units
 from cosserat_fenicsx.checks import instance, number, positive, refuse, store
 from cosserat_fenicsx.errors import SceneError, nearest
-from cosserat_fenicsx.scene.materials import Material
-from cosserat_fenicsx.scene.sections import Circle, Stiffness, Tube
+from cosserat_fenicsx.scene.sections import Circle, Material, Stiffness, Tube
 
 _TABLE = Path(__file__).with_name("standard_sizes.csv")
 

@@ -51,8 +51,7 @@ import numpy as np
 from cosserat_fenicsx.checks import File, number, refuse
 from cosserat_fenicsx.dimensions import in_si, size_of
 from cosserat_fenicsx.errors import SceneError
-from cosserat_fenicsx.scene.materials import Material
-from cosserat_fenicsx.scene.sections import Stiffness
+from cosserat_fenicsx.scene.sections import Material, Stiffness
 from cosserat_fenicsx.scene.toml_tables import check_arguments, class_named, entries, known_keys, table, tables_of
 from cosserat_fenicsx.well.answer import TorqueAndDrag
 from cosserat_fenicsx.well.components import COMPONENTS, DrillString

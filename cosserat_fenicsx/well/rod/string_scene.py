@@ -13,12 +13,12 @@ import numpy as np
 from cosserat_fenicsx.actions.walls import TubeRing, TubeWall
 from cosserat_fenicsx.checks import finite_array, number, refuse
 from cosserat_fenicsx.numerics import directors, product_conjugate
-from cosserat_fenicsx.scene.along import AlongPieces
 from cosserat_fenicsx.scene.curves import Line
 from cosserat_fenicsx.scene.loads import Force, LineForce, Moment
 from cosserat_fenicsx.scene.rod import Rod
 from cosserat_fenicsx.scene.scene import Scene
 from cosserat_fenicsx.scene.sections import Stiffness
+from cosserat_fenicsx.scene.signals import AlongPieces
 from cosserat_fenicsx.scene.supports import Clamp, Hinge
 from cosserat_fenicsx.well.criteria import snake_load
 

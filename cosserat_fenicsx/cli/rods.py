@@ -1,14 +1,130 @@
-"""Printing and writing of the results of a command, also of partial ones."""
+"""Rods on the command line: equilibrium paths, motions, buckling loads and natural modes, and their files."""
 
+import sys
 import tempfile
 from pathlib import Path
 
-from cosserat_fenicsx.cli.ended import ended
-from cosserat_fenicsx.cli.files import Files, keep_inputs
-from cosserat_fenicsx.cli.say import BAD_INPUT, INTERRUPTED, first_rank, in_words, say
-from cosserat_fenicsx.cli.together import together
+from cosserat_fenicsx.cli.say import (
+    BAD_INPUT,
+    DONE,
+    INTERRUPTED,
+    NOT_CONVERGED,
+    Files,
+    ended,
+    first_rank,
+    in_words,
+    keep_inputs,
+    say,
+    together,
+)
 from cosserat_fenicsx.errors import NotConverged, SceneError
 from cosserat_fenicsx.interrupts import patience
+
+#: Options of a motion, and those of an equilibrium path, by the names of the arguments of `simulate` and `solve`.
+MOTION, PATH = (
+    ("duration", "dt", "scheme", "save_every", "start", "folder"),
+    ("load_factors", "bound", "formulation", "control", "branch"),
+)
+_BOTH = ("tol", "elements", "degree", "model")
+
+
+def motion_of(options):
+    """The scene and the arguments of `simulate`, or None where an equilibrium path is requested.
+
+    Args:
+        options: of the command line; they replace the arguments in the file.
+
+    Raises:
+        SceneError: a file that cannot be read, or an option of a path for a motion or vice versa.
+    """
+    from cosserat_fenicsx.scene.scenefile import read_motion
+
+    given = {name: getattr(options, name, None) for name in (*MOTION, *PATH, *_BOTH)}
+    given = {name: value for name, value in given.items() if value is not None}
+    scene, settings = read_motion(options.scene)
+    moves = not options.static and (settings or "duration" in given)
+    for name in PATH if moves else MOTION:
+        if name in given:
+            refuse_other(name, moves)
+    if not moves:
+        return None
+    if "dt" in given:
+        settings.pop("tol", None)
+    if "tol" in given:
+        settings.pop("dt", None)
+    return scene, {**settings, **given}
+
+
+def refuse_other(name, moves):
+    """Refuse an option of a path for a motion, or of a motion for a path.
+
+    Raises:
+        SceneError: always.
+    """
+    option = f"--{name.replace('_', '-')}"
+    if moves:
+        raise SceneError(f"{option} is for an equilibrium path, and this scene is a motion: expected --static as well")
+    raise SceneError(
+        f"{option} is for a motion, and this scene is an equilibrium path: expected a duration too, under [simulate] "
+        "in the file or by --duration, and no --static"
+    )
+
+
+def run_buckling(options):
+    """`cosserat buckling`; returns the exit code."""
+    from cosserat_fenicsx.results.shapes import buckling_table
+    from cosserat_fenicsx.statics.linear_buckling import buckling
+
+    return _deliver(options, buckling, buckling_table)
+
+
+def run_modes(options):
+    """`cosserat modes`; returns the exit code."""
+    from cosserat_fenicsx.dynamics.natural_modes import modes
+    from cosserat_fenicsx.results.shapes import modes_table
+
+    return _deliver(options, modes, modes_table)
+
+
+def _deliver(options, compute, table):
+    """Compute, print the table and write the files; returns the exit code."""
+    from cosserat_fenicsx.scene.scenefile import read_scene
+    from cosserat_fenicsx.scene.toml_tables import tables_of
+
+    scene, _ = read_scene(options.scene)
+    out = Path(options.output) if options.output else None
+    if out is not None:
+        names = [f"{options.command}.{ending}" for ending in ("csv", "xdmf", "h5", "png")]
+        keep_inputs(out, names, options.scene, tables_of(options.scene))
+        prepare(out)  # fail before the computation, not after it
+    for caution in scene.doubts:
+        say(f"cosserat: warning: {caution}")
+    given = {name: getattr(options, name) for name in ("tol", "elements", "degree")}
+    given = {name: value for name, value in given.items() if value is not None}
+    try:
+        with patience():
+            found = compute(scene, options.count, load_factor=options.load_factor, **given)
+    except NotConverged as failure:
+        say(f"cosserat: {failure}")
+        return NOT_CONVERGED
+    say(table(found), file=sys.stdout)
+    return DONE if out is None else _write_shapes(found, out, options.command, picture=not options.no_picture)
+
+
+def _write_shapes(found, out, name, *, picture):
+    """Write the table, and the shapes where there are any; returns the exit code."""
+    files = {f"{name}.csv": found.write}
+    if len(found):
+        files |= {f"{name}.xdmf": found.write} | ({f"{name}.png": found.plot} if picture else {})
+    written = Files(out)
+    try:
+        for file, write in files.items():
+            written.put(file, write, *([f"{name}.h5"] if file.endswith(".xdmf") else []))
+    except KeyboardInterrupt:
+        say(f"cosserat: interrupted; completely written to {out}/: {', '.join(written.names) or 'nothing'}")
+        return INTERRUPTED
+    written.tell()
+    return DONE
 
 
 def _names(name, *more):
