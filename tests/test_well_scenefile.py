@@ -12,8 +12,9 @@ from assembly import assembly
 import cosserat_fenicsx as cf
 from cosserat_fenicsx.cli.main import main
 from cosserat_fenicsx.dimensions import DIMENSIONS, in_si
-from cosserat_fenicsx.well.components import COMPONENTS, standard_sizes
-from cosserat_fenicsx.well.operations import OPERATIONS
+from cosserat_fenicsx.parts import members
+from cosserat_fenicsx.well.components import StringPart, standard_sizes
+from cosserat_fenicsx.well.operations import Operation
 from cosserat_fenicsx.well.scenefile import KEYS
 
 pytestmark = pytest.mark.serial
@@ -175,7 +176,8 @@ def test_doubts_are_said_once_and_without_code(tmp_path, capsys):
 def test_the_reference_has_every_key_unit_and_size():
     page = (DEMOS.parent / "docs" / "well_files.md").read_text(encoding="utf-8")
     told = set(re.findall(r"`([^`]+)`", re.sub(r"```.*?```", "", page, flags=re.S)))
-    classes = (*COMPONENTS, *OPERATIONS)
+    classes = [cls for family in (StringPart, Operation) for cls in members(family).values()]
+    classes = [cls for cls in classes if cls.__module__.startswith("cosserat_fenicsx.")]
     assert {cls.__name__ for cls in classes} <= told
     arguments = {name for cls in (*classes, cf.Mud, cf.HoleSection) for name in inspect.signature(cls).parameters}
     keys = {f"[{table}]" for table in KEYS} | {key for keys in KEYS.values() for key in keys}

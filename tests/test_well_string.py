@@ -144,7 +144,7 @@ def test_the_soft_string_says_what_it_leaves_out():
         (lambda: cf.Mud(-5), "Mud.density = -5"),
         (lambda: cf.DrillString([PIPE, cf.Bit(0.2159)]), "component, bit, fills up; .* order='top down'"),
         (lambda: cf.DrillString([PIPE], order="upwards"), "'bit up' or 'top down'"),
-        (lambda: cf.DrillString(["pipe"]), "expected components"),
+        (lambda: cf.DrillString(["pipe"]), r"components\[0\] = .*: expected Component\(...\), DrillPipe\(...\)"),
         (
             lambda: cf.Stabiliser(1.5, 0.2, 0.25, 0.07),
             "Stabiliser.diameter = 0.2: expected across the blades, at least",

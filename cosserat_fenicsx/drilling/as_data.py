@@ -21,12 +21,12 @@ from cosserat_fenicsx.parts import members
 from cosserat_fenicsx.scene.as_data import NotData
 from cosserat_fenicsx.scene.sections import Material, Stiffness
 from cosserat_fenicsx.scene.signals import SIGNALS
-from cosserat_fenicsx.well.components import COMPONENTS, DrillString
+from cosserat_fenicsx.well.components import DrillString, StringPart
 from cosserat_fenicsx.well.hole import Borehole, HoleSection, Mud
 from cosserat_fenicsx.well.path import WellPath
 
 _OF_DRILLING = (Drilling, Discs, TopDrive, Hook, BitOnRock, Wear, WallFriction, ViscousDrag)
-_OF_WELLS = (DrillString, *COMPONENTS, Borehole, HoleSection, WellPath, Mud, Material, Stiffness)
+_OF_WELLS = (DrillString, Borehole, HoleSection, WellPath, Mud, Material, Stiffness)
 #: Functions of time, by their owner: the object's class and its field.
 _IN_TIME = {("TopDrive", "speed"): "rad/s", ("Hook", "speed"): "m/s"}
 _SAMPLES = 41
@@ -35,7 +35,7 @@ _SAMPLES = 41
 @functools.cache
 def _classes():
     kinds = {kind.__name__: kind for kind in (*_OF_DRILLING, *_OF_WELLS, *SIGNALS)}
-    return {**kinds, **members(BitLaw), **members(DriveControl)}
+    return {**kinds, **members(StringPart), **members(BitLaw), **members(DriveControl)}
 
 
 def to_data(scene):

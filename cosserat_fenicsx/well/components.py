@@ -16,10 +16,12 @@ import math
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from typing import Annotated, ClassVar, Literal
 
 from cosserat_fenicsx import units
-from cosserat_fenicsx.checks import instance, number, positive, refuse, store
+from cosserat_fenicsx.checks import positive, refuse, store
 from cosserat_fenicsx.errors import SceneError, nearest
+from cosserat_fenicsx.parts import Diameter, ForcePerLength, Length, MassPerLength, Part, between
 from cosserat_fenicsx.scene.sections import Circle, Material, Stiffness, Tube
 
 _TABLE = Path(__file__).with_name("standard_sizes.csv")
@@ -74,8 +76,26 @@ STEEL = Material(E=206.8e9, nu=0.3, density=7850.0)
 _BIT_BODY = 0.7
 
 
+class StringPart(Part, family="component of a string"):
+    """Base of the components of a string; a component of one's own is a frozen dataclass derived from it.
+
+    Attributes:
+        length: m; None for the one that fills up to the surface.
+        stiffness: a `Stiffness`, or None.
+        weight: in mud, N/m; None where it follows from `mass` (in air with tool joints, kg/m), the inner diameter and
+            the density of the `material`.
+        contact_radius: where it touches the wall, m.
+        outer_diameter, inner_diameter: of the body, m; None where they are not known.
+        name: in tables.
+        touches: whether it touches along its whole length (None), with its `diameter` at its lower end ("bottom"), or
+            with that in the middle of its length ("middle").
+    """
+
+    touches: ClassVar[str | None] = None
+
+
 @dataclass(frozen=True)
-class Component:
+class Component(StringPart):
     """A part of a string by its numbers, with its weight in mud.
 
     Args:
@@ -89,28 +109,24 @@ class Component:
         SceneError: a number that is missing or not positive.
     """
 
-    length: float | None = None
+    length: Length | None = None
     stiffness: Stiffness | None = None
-    weight: float | None = None
-    contact_radius: float | None = None
+    weight: Annotated[ForcePerLength, between(-1e6, 1e6)] | None = None
+    contact_radius: Length | None = None
     name: str = "component"
 
     outer_diameter = inner_diameter = mass = None
 
-    def __post_init__(self):
-        store(self, length=_length(self))
-        if self.stiffness is not None:
-            instance(self, "stiffness", self.stiffness, Stiffness, "a Stiffness or None")
+    def validate(self):
+        """Refuse what has no weight or no contact radius."""
         if self.weight is None:
             refuse(self, "weight", None, "the weight in mud (N/m): a component without weight cannot be placed")
-        store(
-            self, weight=number(self, "weight", self.weight, "a number from -1e6 to 1e6 (N/m)", lambda x: abs(x) <= 1e6)
-        )
-        store(self, contact_radius=positive(self, "contact_radius", self.contact_radius, "m"))
+        if self.contact_radius is None:
+            refuse(self, "contact_radius", None, "a positive number (m)")
 
 
 @dataclass(frozen=True)
-class _Tubular:
+class _Tubular(StringPart):
     """Base of the components of steel, by their dimensions or by the name of a standard size.
 
     Args:
@@ -127,17 +143,20 @@ class _Tubular:
             an unknown size.
     """
 
-    length: float | None = None
+    length: Length | None = None
     size: str | None = None
-    outer_diameter: float | None = None
-    inner_diameter: float | None = None
-    tool_joint: float | None = None
-    mass: float | None = None
+    outer_diameter: Diameter | None = None
+    inner_diameter: Diameter | None = None
+    tool_joint: Diameter | None = None
+    mass: MassPerLength | None = None
     material: Material = STEEL
     name: str = ""
 
-    def __post_init__(self):
-        store(self, length=_length(self), name=self.name or type(self)._called)
+    weight = None
+
+    def validate(self):
+        """Take what is not given from the standard size or from the body."""
+        store(self, name=self.name or type(self)._called)
         if self.size is not None:
             given = ("outer_diameter", "inner_diameter", "mass")
             changed = any(getattr(self, name) is not None for name in given)
@@ -145,7 +164,6 @@ class _Tubular:
                 # the weight of another section is not that of this one
                 if field == "size" or (getattr(self, field) is None and not (field == "mass" and changed)):
                     store(self, **{field: value})
-        instance(self, "material", self.material, Material, "a Material")
         positive("Material", "density", self.material.density, "kg/m^3, for the weight")
         for field in ("outer_diameter", "inner_diameter"):
             if getattr(self, field) is None:
@@ -153,13 +171,8 @@ class _Tubular:
         Tube(self.outer_diameter, self.inner_diameter)  # refuses what is no tube
         if self.mass is None:
             store(self, mass=self.material.density * math.pi / 4 * (self.outer_diameter**2 - self.inner_diameter**2))
-        store(self, mass=positive(self, "mass", self.mass, "kg/m"))
-        if self.tool_joint is not None:
-            store(self, tool_joint=positive(self, "tool_joint", self.tool_joint, "m"))
-            if self.tool_joint < self.outer_diameter:
-                refuse(self, "tool_joint", self.tool_joint, f"at least the body's diameter, {self.outer_diameter:g} m")
-
-    weight = None
+        if self.tool_joint is not None and self.tool_joint < self.outer_diameter:
+            refuse(self, "tool_joint", self.tool_joint, f"at least the body's diameter, {self.outer_diameter:g} m")
 
     @property
     def contact_radius(self):
@@ -168,7 +181,7 @@ class _Tubular:
 
     @cached_property
     def stiffness(self):
-        """That of the body."""
+        """Of the body."""
         return Tube(self.outer_diameter, self.inner_diameter).stiffness(self.material)
 
 
@@ -190,7 +203,7 @@ class Collar(_Tubular):
 
 
 @dataclass(frozen=True)
-class Stabiliser:
+class Stabiliser(StringPart):
     """A stabiliser: a tube with blades that touch the wall.
 
     Args:
@@ -203,34 +216,32 @@ class Stabiliser:
         SceneError: as of `DrillPipe`.
     """
 
-    length: float
-    diameter: float
-    outer_diameter: float
-    inner_diameter: float
-    mass: float | None = None
+    length: Length
+    diameter: Diameter
+    outer_diameter: Diameter
+    inner_diameter: Diameter
+    mass: MassPerLength | None = None
     material: Material = STEEL
     name: str = "stabiliser"
 
-    weight = None
+    weight, touches = None, "middle"
 
-    def __post_init__(self):
-        if self.length is None:
-            refuse(self, "length", None, "a length (m)")
-        store(self, diameter=positive(self, "diameter", self.diameter, "m"))
-        if self.diameter < positive(self, "outer_diameter", self.outer_diameter, "m"):
+    def validate(self):
+        """Refuse blades that do not stand out, and what is no tube."""
+        if self.diameter < self.outer_diameter:
             refuse(
                 self, "diameter", self.diameter, f"across the blades, at least the body's, {self.outer_diameter:g} m"
             )
         sizes = (self.outer_diameter, self.inner_diameter, self.diameter, self.mass)
         body = Collar(self.length, None, *sizes, self.material)  # its checks and its stiffness are those of a collar
-        store(self, length=body.length, mass=body.mass, _body=body)
+        store(self, mass=body.mass, _body=body)
 
     contact_radius = property(lambda self: self._body.contact_radius)
     stiffness = property(lambda self: self._body.stiffness)
 
 
 @dataclass(frozen=True)
-class Bit:
+class Bit(StringPart):
     """A bit, as a short solid cylinder.
 
     Args:
@@ -244,37 +255,32 @@ class Bit:
         SceneError: a number that is not positive, or a body wider than the bit.
     """
 
-    diameter: float
-    length: float = 0.3
-    body_diameter: float | None = None
-    mass: float | None = None
+    diameter: Diameter
+    length: Length = 0.3
+    body_diameter: Diameter | None = None
+    mass: MassPerLength | None = None
     material: Material = STEEL
     name: str = "bit"
 
-    inner_diameter, weight = 0.0, None
+    inner_diameter, weight, touches = 0.0, None, "bottom"
 
-    def __post_init__(self):
-        store(self, diameter=positive(self, "diameter", self.diameter, "m"), length=_length(self))
-        if self.length is None:
-            refuse(self, "length", None, "a length (m)")
-        body = _BIT_BODY * self.diameter if self.body_diameter is None else self.body_diameter
-        store(self, body_diameter=positive(self, "body_diameter", body, "m"))
+    def validate(self):
+        """Take what is not given from the diameter."""
+        if self.body_diameter is None:
+            store(self, body_diameter=_BIT_BODY * self.diameter)
         if self.body_diameter > self.diameter:
             refuse(self, "body_diameter", self.body_diameter, f"at most the bit's, {self.diameter:g} m")
-        mass = self.material.density * math.pi / 4 * self.body_diameter**2 if self.mass is None else self.mass
-        store(self, mass=positive(self, "mass", mass, "kg/m"))
+        if self.mass is None:
+            density = positive("Material", "density", self.material.density, "kg/m^3, for the weight")
+            store(self, mass=density * math.pi / 4 * self.body_diameter**2)
 
     outer_diameter = property(lambda self: self.body_diameter)
     contact_radius = property(lambda self: self.diameter / 2)
 
     @cached_property
     def stiffness(self):
-        """That of the cylinder."""
+        """Of the cylinder."""
         return Circle(self.body_diameter).stiffness(self.material)
-
-
-#: The components; `DrillString` takes any object with their attributes.
-COMPONENTS = (Component, DrillPipe, HeavyWeight, Collar, Stabiliser, Bit)
 
 
 def weight_in_mud(component, mud):
@@ -299,24 +305,17 @@ def weight_in_mud(component, mud):
     return (component.mass - lifted) * mud.gravity
 
 
-def _length(component):
-    return None if component.length is None else positive(component, "length", component.length, "m")
-
-
-_ORDERS = ("bit up", "top down")
-
-
 @dataclass(frozen=True)
 class Laid:
     """A component in its place: measured depths (m) of its upper and lower end."""
 
     top: float
     bottom: float
-    component: object
+    component: StringPart
 
 
 @dataclass(frozen=True)
-class DrillString:
+class DrillString(Part):
     """A string of components.
 
     Args:
@@ -331,21 +330,19 @@ class DrillString:
         SceneError: no components, an unknown order, or a length that is missing below the uppermost component.
     """
 
-    components: tuple
-    order: str = "bit up"
+    components: tuple[StringPart, ...]
+    order: Literal["bit up", "top down"] = "bit up"
 
     def __post_init__(self):
-        given = tuple(self.components) if isinstance(self.components, list | tuple) else (self.components,)
-        if self.order not in _ORDERS:
-            refuse(self, "order", self.order, "'bit up' or 'top down'")
-        for part in given:
-            if not all(hasattr(part, name) for name in ("length", "contact_radius", "stiffness", "weight", "name")):
-                refuse(self, "components", part, "components: DrillPipe, HeavyWeight, Collar, ..., or Component")
-            if not isinstance(part.name, str):
-                refuse(part, "name", part.name, "a text")
+        if isinstance(self.components, StringPart):
+            store(self, components=(self.components,))
+        super().__post_init__()
+
+    def validate(self):
+        """Put the components in the order from the bit up; refuse a length that is missing below the uppermost one."""
+        given, other = self.components, "top down" if self.order == "bit up" else "bit up"
         if not given:
             refuse(self, "components", given, "at least one component")
-        other = _ORDERS[1 - _ORDERS.index(self.order)]
         given = given if self.order == "bit up" else given[::-1]
         store(self, components=given, order="bit up")
         for part in given[:-1]:

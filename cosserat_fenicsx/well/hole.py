@@ -3,14 +3,15 @@
 import math
 from copy import copy
 from dataclasses import dataclass, replace
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
 
 from cosserat_fenicsx import units
 from cosserat_fenicsx.actions.fluids import AddedMass, LinearDrag
-from cosserat_fenicsx.checks import instance, number, positive, refuse, store, warn
+from cosserat_fenicsx.checks import number, positive, refuse, store, warn
 from cosserat_fenicsx.errors import SceneError
+from cosserat_fenicsx.parts import Density, Depth, Diameter, Friction, Number, Part, WallStiffness, at_least
 from cosserat_fenicsx.scene.rod import Rod
 from cosserat_fenicsx.scene.sections import Circle, Tube
 from cosserat_fenicsx.well.path import WellPath
@@ -19,10 +20,12 @@ from cosserat_fenicsx.well.path import WellPath
 _APART = 1e-3
 # Diameters (m) above this are hardly those of holes.
 _WIDEST = 1.5
+# Densities (kg/m^3) between these are neither a gas's nor a liquid's, and no mud is heavier than the last.
+_NO_FLUID, _HEAVIEST = (5.0, 300.0), 2700.0
 
 
 @dataclass(frozen=True)
-class HoleSection:
+class HoleSection(Part):
     """A part of a hole, from the end of the part above it.
 
     Args:
@@ -35,23 +38,20 @@ class HoleSection:
         SceneError: a number outside its range.
     """
 
-    to: float
-    diameter: float
-    friction: float
+    to: Depth
+    diameter: Diameter
+    friction: Friction
     name: str = ""
 
-    def __post_init__(self):
-        store(self, to=positive(self, "to", self.to, "m"), diameter=positive(self, "diameter", self.diameter, "m"))
-        store(self, friction=number(self, "friction", self.friction, "a coefficient of friction from 0 to 5",
-                                    lambda x: 0 <= x <= 5))  # fmt: skip
-        instance(self, "name", self.name, str, "a text")
+    def validate(self):
+        """Warn of a diameter that is probably in another unit."""
         if self.diameter > _WIDEST:
             warn(f"HoleSection.diameter = {self.diameter:g} m is wider than holes are: 8.5 in are "
                           "8.5 * units.inch = 0.2159")  # fmt: skip
 
 
 @dataclass(frozen=True)
-class Borehole:
+class Borehole(Part):
     """A hole along an axis.
 
     Args:
@@ -67,19 +67,19 @@ class Borehole:
 
     path: WellPath
     sections: tuple[HoleSection, ...]
-    wall_stiffness: float | None = None
+    wall_stiffness: WallStiffness | None = None
 
     def __post_init__(self):
-        instance(self, "path", self.path, WellPath, "a WellPath")
-        given = (self.sections,) if isinstance(self.sections, HoleSection) else tuple(self.sections)
-        store(self, sections=given)
-        if self.wall_stiffness is not None:
-            store(self, wall_stiffness=positive(self, "wall_stiffness", self.wall_stiffness, "N/m^2"))
-        if not given:
-            refuse(self, "sections", given, "at least one HoleSection")
+        if isinstance(self.sections, HoleSection):
+            store(self, sections=(self.sections,))
+        super().__post_init__()
+
+    def validate(self):
+        """Refuse sections that do not follow each other downwards; warn where they and the survey end apart."""
+        if not self.sections:
+            refuse(self, "sections", self.sections, "at least one HoleSection")
         above = 0.0
-        for section in given:
-            instance(self, "sections", section, HoleSection, "HoleSections")
+        for section in self.sections:
             if section.to <= above:
                 raise SceneError(f"HoleSection.to = {section.to:g}: expected more than {above:g} m, the section above")
             above = section.to
@@ -115,12 +115,8 @@ class Borehole:
         return found
 
 
-# Densities (kg/m^3) between these are neither a gas's nor a liquid's, and no mud is heavier than the last.
-_NO_FLUID, _HEAVIEST = (5.0, 300.0), 2700.0
-
-
 @dataclass(frozen=True)
-class Mud:
+class Mud(Part):
     """The fluid in the hole and in the string, at rest.
 
     Args:
@@ -134,25 +130,18 @@ class Mud:
         SceneError: a number that is negative or not finite.
     """
 
-    density: float
-    inside: float | None = None
-    added_mass: float | None = None
-    drag: float | None = None
+    density: Density
+    inside: Density | None = None
+    added_mass: Annotated[float, at_least(0, "a coefficient")] | None = None
+    drag: Annotated[float, Number("damping per length", at_least(0, "a coefficient"))] | None = None
 
     #: m/s^2, standard.
     gravity: ClassVar[float] = 9.80665
 
-    def __post_init__(self):
-        store(self, inside=self.density if self.inside is None else self.inside)
-        for field in ("density", "inside"):
-            value = number(self, field, getattr(self, field), "a density (kg/m^3), not negative",
-                           lambda x: 0 <= x < math.inf)  # fmt: skip
-            store(self, **{field: value})
-        for field, what in (("added_mass", "a coefficient"), ("drag", "a coefficient (N s/m^2)")):
-            if getattr(self, field) is not None:
-                value = number(self, field, getattr(self, field), f"{what}, not negative, or None",
-                               lambda x: 0 <= x < math.inf)  # fmt: skip
-                store(self, **{field: value})
+    def validate(self):
+        """The same mud inside where nothing else is said; a warning of a density that is probably in another unit."""
+        if self.inside is None:
+            store(self, inside=self.density)
         if _NO_FLUID[0] < self.density < _NO_FLUID[1] or 0.5 < self.density < 3 or self.density > _HEAVIEST:
             warn(
                 f"Mud.density = {self.density:g} kg/m^3 is hardly that of a mud: 1.2 g/cm^3 are 1200, 10 pounds per US "

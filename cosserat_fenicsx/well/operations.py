@@ -1,39 +1,57 @@
-"""What is done with a string: which way it slips along the wall, and what acts on its lower end.
+"""Operations: which way a string slips along the wall, and what acts on its lower end.
 
 (c, e) = (V, omega R)/sqrt(V^2 + (omega R)^2), V upwards, R the contact radius: c is the part of the friction that acts
 along the string (+1 where it moves up), e the part that acts around it.
+
+An operation of one's own is a frozen dataclass derived from `Operation`. Its fields are its arguments; from `weight`,
+`torque` and `direction` follow the answer, and from its class name its name in tables, charts and scene files.
 """
 
 import math
-from dataclasses import dataclass
-from typing import ClassVar
+import re
+from dataclasses import dataclass, field
+from typing import Annotated, ClassVar
 
 from cosserat_fenicsx import units
-from cosserat_fenicsx.checks import number, positive, store, warn
+from cosserat_fenicsx.checks import warn
+from cosserat_fenicsx.parts import ForceSize, Part, Rotation, Speed, Torque, positive
 
-# Weights (N) and torques (N m) on bit below these are numbers in other units by all appearance.
-_HARDLY = {"weight": 500.0, "torque": 50.0}
-# Revolutions per minute below this are rad/s by all appearance: 80 rev/min are 8.4 rad/s.
+# Weights (N) and torques (N m) on bit below these are probably in other units.
+_DOUBTFUL = {"weight": (500.0, "N"), "torque": (50.0, "N m")}
+# Revolutions per minute below this are probably rad/s: 80 rev/min are 8.4 rad/s.
 _SLOW = 20.0
 
 
-class Operation:
-    """Base: a name, and the signs of (c, e)."""
+class Operation(Part, family="operation"):
+    """What is done with a string.
+
+    Attributes:
+        name: in tables and charts: that of the class as words, such as "trip out".
+        slip: the signs of (c, e).
+        weight: on bit, N: the thrust in the string at its lower end; below 0 a pull (overpull, a stuck tool).
+        torque: on bit, N m, against the rotation.
+    """
 
     name: ClassVar[str] = ""
     slip: ClassVar[tuple[float, float]] = (0.0, 0.0)
 
-    def __post_init__(self):
-        for field, unit in (("weight", "N"), ("torque", "N m")):
-            value = number(self, field, getattr(self, field), f"a number ({unit})", math.isfinite)
-            store(self, **{field: value})
-            if 0 < abs(value) < _HARDLY[field]:
+    weight = torque = 0.0
+
+    def __init_subclass__(cls, **more):
+        super().__init_subclass__(**more)
+        cls.name = re.sub(r"(?<=.)([A-Z])", r" \1", cls.__name__).lower()
+
+    def validate(self):
+        """Warn of a weight or a torque on bit that is probably in another unit."""
+        for name, (least, unit) in _DOUBTFUL.items():
+            value = getattr(self, name)
+            if 0 < abs(value) < least:
                 warn(
-                    f"{type(self).__name__}.{field} = {value:g} {unit} is hardly a {field} on bit: 25 kN are 25e3, 25 "
+                    f"{type(self).__name__}.{name} = {value:g} {unit} is hardly a {name} on bit: 25 kN are 25e3, 25 "
                     "klbf 25 * units.kip; 5 kN m are 5e3, 4000 ft-lbf 4000 * units.ft_lbf"
                 )
 
-    def direction(self, radius):
+    def direction(self, radius: float) -> tuple[float, float]:
         """(c, e) for a contact radius (m)."""
         return self.slip
 
@@ -50,29 +68,29 @@ class _Plain(Operation):
         SceneError: numbers that are not finite.
     """
 
-    weight: float = 0.0
-    torque: float = 0.0
+    weight: ForceSize = 0.0
+    torque: Torque = 0.0
 
 
 @dataclass(frozen=True)
 class TripOut(_Plain):
     """Pulled out without rotation."""
 
-    name, slip = "trip out", (1.0, 0.0)
+    slip = (1.0, 0.0)
 
 
 @dataclass(frozen=True)
 class TripIn(_Plain):
     """Run in without rotation."""
 
-    name, slip = "trip in", (-1.0, 0.0)
+    slip = (-1.0, 0.0)
 
 
 @dataclass(frozen=True)
 class RotateOffBottom(_Plain):
     """Rotated without axial motion, the bit free."""
 
-    name, slip = "rotate off bottom", (0.0, 1.0)
+    slip = (0.0, 1.0)
 
 
 @dataclass(frozen=True)
@@ -86,10 +104,10 @@ class RotaryDrilling(Operation):
         SceneError: numbers that are not finite.
     """
 
-    weight: float
-    torque: float
+    weight: ForceSize = field()
+    torque: Torque = field()
 
-    name, slip = "rotary drilling", (0.0, 1.0)
+    slip = (0.0, 1.0)
 
 
 @dataclass(frozen=True)
@@ -104,10 +122,10 @@ class Sliding(Operation):
         SceneError: numbers that are not finite.
     """
 
-    weight: float
-    torque: float = 0.0
+    weight: ForceSize = field()
+    torque: Torque = 0.0
 
-    name, slip = "sliding", (-1.0, 0.0)
+    slip = (-1.0, 0.0)
 
 
 @dataclass(frozen=True)
@@ -120,14 +138,13 @@ class _Reaming(Operation):
         weight, torque: on bit, N and N m.
     """
 
-    speed: float
-    rpm: float
-    weight: float = 0.0
-    torque: float = 0.0
+    speed: Annotated[Speed, positive()]
+    rpm: Rotation
+    weight: ForceSize = 0.0
+    torque: Torque = 0.0
 
-    def __post_init__(self):
-        super().__post_init__()
-        store(self, speed=positive(self, "speed", self.speed, "m/s"), rpm=positive(self, "rpm", self.rpm, "1/min"))
+    def validate(self):
+        super().validate()
         if self.rpm < _SLOW:
             warn(
                 f"{type(self).__name__}.rpm = {self.rpm:g} 1/min is hardly a rotation: it is in revolutions a minute, "
@@ -146,22 +163,16 @@ class _Reaming(Operation):
 class Ream(_Reaming):
     __doc__ = f"Moving down while rotating.\n{(_Reaming.__doc__ or '').partition(chr(10))[2]}"
 
-    name, slip = "ream", (-1.0, 1.0)
+    slip = (-1.0, 1.0)
 
 
 @dataclass(frozen=True)
 class BackReam(_Reaming):
     __doc__ = f"Moving up while rotating.\n{(_Reaming.__doc__ or '').partition(chr(10))[2]}"
 
-    name, slip = "back ream", (1.0, 1.0)
+    slip = (1.0, 1.0)
 
 
 @dataclass(frozen=True)
 class Static(_Plain):
     """Held at rest. Friction at rest depends on what was done before; it is left out."""
-
-    name = "static"
-
-
-#: The operations, for scene files.
-OPERATIONS = (TripOut, TripIn, RotateOffBottom, RotaryDrilling, Sliding, Ream, BackReam, Static)

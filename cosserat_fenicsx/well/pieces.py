@@ -12,7 +12,7 @@ import numpy as np
 
 from cosserat_fenicsx.checks import warn
 from cosserat_fenicsx.errors import SceneError
-from cosserat_fenicsx.well.components import Bit, Stabiliser, weight_in_mud
+from cosserat_fenicsx.well.components import weight_in_mud
 
 #: Arrays over the components of a string, from the bit up; NaN where a component does not tell. EI (N m^2), EA (N), GJ
 #: (N m^2), poisson; outer, inner: radii of the body (m).
@@ -91,12 +91,12 @@ _NONE = 1e-9
 
 def is_ring(component):
     """Whether a component touches at a place."""
-    return isinstance(component, Bit | Stabiliser)
+    return component.touches is not None
 
 
 def ring_of(place, hole):
     """The `Ring` of a component in its place: a stabiliser touches in the middle of its length, a bit at its end."""
-    s = place.bottom if isinstance(place.component, Bit) else (place.top + place.bottom) / 2
+    s = place.bottom if place.component.touches == "bottom" else (place.top + place.bottom) / 2
     radius = place.component.contact_radius
     clearance = max(0.0, float(hole.at(s, "diameter")) / 2 - radius)
     return Ring(s, clearance, radius, place.component.outer_diameter / 2)

@@ -51,13 +51,14 @@ import numpy as np
 from cosserat_fenicsx.checks import File, number, refuse
 from cosserat_fenicsx.dimensions import in_si, size_of
 from cosserat_fenicsx.errors import SceneError
+from cosserat_fenicsx.parts import members
 from cosserat_fenicsx.scene.sections import Material, Stiffness
 from cosserat_fenicsx.scene.toml_tables import check_arguments, class_named, entries, known_keys, table, tables_of
 from cosserat_fenicsx.well.answer import TorqueAndDrag
-from cosserat_fenicsx.well.components import COMPONENTS, DrillString
+from cosserat_fenicsx.well.components import DrillString, StringPart
 from cosserat_fenicsx.well.depth_sweep import DepthSweep, depth_sweep
 from cosserat_fenicsx.well.hole import Borehole, HoleSection, Mud
-from cosserat_fenicsx.well.operations import OPERATIONS, Operation
+from cosserat_fenicsx.well.operations import Operation
 from cosserat_fenicsx.well.path import WellPath
 from cosserat_fenicsx.well.pieces import pieces_of
 from cosserat_fenicsx.well.rod.rod_answer import check_rod
@@ -158,7 +159,8 @@ def _scene(tables, folder):
             raise SceneError(f"[{name}] is missing: expected [well], [string] and [[operations]]")
     hole = hole_in(table("well", tables["well"]), folder)
     string = string_in(tables["string"])
-    operations = tuple(made(f"operations[{i}]", entry, OPERATIONS) for i, entry in entries("operations", tables))
+    given = entries("operations", tables)
+    operations = tuple(made(f"operations[{i}]", entry, _members(Operation)) for i, entry in given)
     mud = made("mud", tables["mud"], (Mud,)) if "mud" in tables else None
     settings = dict(table("torque_and_drag", tables.get("torque_and_drag", {})))
     known_keys("[torque_and_drag]", settings, KEYS["torque_and_drag"])
@@ -172,7 +174,7 @@ def string_in(given):
     """The `DrillString` of a [string] table."""
     string = dict(table("string", given))
     known_keys("[string]", string, KEYS["string"])
-    parts = [made(f"string.components[{i}]", entry, COMPONENTS) for i, entry in entries("components", string)]
+    parts = [made(f"string.components[{i}]", entry, _members(StringPart)) for i, entry in entries("components", string)]
     return DrillString(parts, **{name: string[name] for name in ("order",) if name in string})
 
 
@@ -229,6 +231,10 @@ def _sweep(given):
 def _depth(table, name, value):
     value = in_si(f"{table}.{name}", value, "length")
     return number(table, name, value, "a measured depth (m), positive", lambda x: 0 < x < np.inf)
+
+
+def _members(family):
+    return tuple(members(family).values())
 
 
 def made(where, entry, classes):
