@@ -77,6 +77,11 @@ def point_of(U, U_s, *, rest, frame, r_t=NONE, omega=NONE):
     )
 
 
+def velocities(U, U_t):
+    """Velocity and angular velocity, inertial, of the seven components (r, q) with the rates U_t."""
+    return _first(U_t), small_rotation(_last(U_t), _last(U))
+
+
 def _first(w):
     return ufl.as_vector([w[0], w[1], w[2]])
 

@@ -6,7 +6,7 @@ Both have the velocities, the momenta and the constraint of the momentum scheme,
 from cosserat_fenicsx.dynamics import simulate
 from cosserat_fenicsx.dynamics.schemes import Momentum
 from cosserat_fenicsx.forms.equilibrium import balance, contact
-from cosserat_fenicsx.models.moving import MovingSpatial, SpatialStep, compile_momentum
+from cosserat_fenicsx.models.moving import MovingSpatial, compile_momentum
 
 
 def at(motion, section, test):
@@ -29,11 +29,9 @@ def register(monkeypatch):
     for stress in (midpoint, trapezoidal):
         name = stress.__name__
 
-        def compiled(model, spaces, stress=stress):
-            model._motion_fields()
-            return compile_momentum(SpatialStep(model), stress)
+        def scheme(step, stress=stress):
+            return compile_momentum(step, stress)
 
-        monkeypatch.setitem(
-            simulate._MODELS, (name, "spatial"), type(name, (MovingSpatial,), {"_compile": compiled, "variations": ()})
-        )
+        model = type(name, (MovingSpatial,), {"scheme": staticmethod(scheme)})
+        monkeypatch.setitem(simulate._MODELS, (name, "spatial"), model)
         monkeypatch.setitem(simulate.SCHEMES, name, type(name, (Momentum,), {"forms": name}))

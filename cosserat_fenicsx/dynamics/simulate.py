@@ -32,7 +32,7 @@ from cosserat_fenicsx.algebra.pool import PROBLEMS
 from cosserat_fenicsx.dynamics.start import starts_in
 from cosserat_fenicsx.errors import NotConverged
 from cosserat_fenicsx.models.choose import not_flat
-from cosserat_fenicsx.models.collocated import CollocatedPlanar
+from cosserat_fenicsx.models.collocated import CollocatedEccentric, CollocatedPlanar
 from cosserat_fenicsx.models.collocated import CollocatedSpatial
 from cosserat_fenicsx.models.directors import ConservingSpatial
 from cosserat_fenicsx.models.directors import EccentricSpatial
@@ -234,6 +234,7 @@ _MODELS = {
     ("momentum", "planar"): MovingPlanar,
     ("energy", "spatial"): ConservingSpatial,
     ("collocation", "spatial"): CollocatedSpatial,
+    ("collocation", "eccentric"): CollocatedEccentric,
     ("collocation", "planar"): CollocatedPlanar,
 }
 

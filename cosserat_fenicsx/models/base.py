@@ -5,6 +5,7 @@ from collections import namedtuple
 from dataclasses import dataclass
 
 import numpy as np
+import ufl
 from dolfinx import fem
 from mpi4py import MPI
 
@@ -126,8 +127,11 @@ class RodModel(Snapshots):
     name, components, moves, turn, multipliers = "", 0, 0, 1.0, 0
     #: components per Gauss point of the reference frame, of the reference strain and of the contact force.
     frame_size, strain_size, force_size = 9, 3, 3
-    #: components of a node in each second variation, and whether these leave the plane.
-    variations = ()
+    #: components of a node in each second variation, and whether these leave the plane; and of each a function from
+    #: these components to the `VirtualMotion`, None for the variation that is the tangent.
+    variations = small_motions = ()
+    #: factor of the law in the second variation, see `SpatialModel.stress_alone`.
+    stiffness = 1
     #: whether the map from reactions to a node's residual rows depends on the node's unknowns
     rows_turn = False
     load_norm = 0.0
@@ -152,6 +156,38 @@ class RodModel(Snapshots):
     def _section_data(self, data):
         """`RodData` in the form that the model's forms use."""
         return data
+
+    def cross_section(self):
+        """The `equilibrium.Section` of the model's data, UFL."""
+        raise NotImplementedError
+
+    def motion_of(self, w, nodal):
+        """The `equilibrium.Motion` of unknowns w; nodal: the same, or an alias for other quadrature rules."""
+        raise NotImplementedError
+
+    def tests_of(self, phi, motion):
+        """The `VirtualMotion` of test functions phi of the unknowns at a motion."""
+        raise NotImplementedError
+
+    def point_of(self, w, w_t=None, *, rest, frame):
+        """The `forms.point.Point` of unknowns w, with the rates w_t; rest, frame: see there."""
+        raise NotImplementedError
+
+    def constraint(self, motion, test, nodal, phi):
+        """What is added to eq. (1) at the nodes, or None; nodal, phi: unknowns of a node and their test functions."""
+        return None
+
+    def vector(self, a):
+        """The vector, UFL, with the components a of the contact force."""
+        return a if isinstance(a, ufl.core.expr.Expr) else ufl.as_vector(a)
+
+    def components_of(self, n):
+        """The components of a contact force that do not vanish identically in this model."""
+        return n
+
+    def fields_of(self, n, m, r_s):
+        """The same of n, m and r'; None where results follow from statics."""
+        return ufl.as_vector([*n, *m, *r_s])
 
     def _at_rest(self):
         """(N, components) unknowns of all nodes in the reference configuration, in the scene's order."""

@@ -7,8 +7,9 @@ from dolfinx import fem
 from cosserat_fenicsx import compat
 from cosserat_fenicsx.forms import collocation, eccentric, spatial
 from cosserat_fenicsx.forms.rotation import rotation_matrix
+from cosserat_fenicsx.models.compiled import along
 from cosserat_fenicsx.models.directors import EccentricMomenta
-from cosserat_fenicsx.models.moving import MovingSpatial, SpatialStep, along, parts_of, virtual_work_of_step
+from cosserat_fenicsx.models.moving import MovingSpatial, SpatialStep, parts_of, virtual_work_of_step
 from cosserat_fenicsx.models.moving_planar import MovingPlanar, PlanarStep
 from cosserat_fenicsx.models.rod_data import gauss_function
 from cosserat_fenicsx.numerics import conjugate_product
@@ -72,7 +73,7 @@ class PlanarCollocation(PlanarStep):
 
     def point_with(self, w, v, rest, frame):
         """See `SpatialCollocation`."""
-        return self.point_of(w, along(w), v, rest, frame)
+        return self.model.point_of(w, v, rest=rest, frame=frame)
 
 
 def _halves(a):
@@ -139,8 +140,9 @@ class Collocated:
         self._node_rates = np.zeros((2, len(self._slots) * self.rate_size))
         self._strain_rates = np.zeros((3, len(self.known_strain_rate.x.array)))
 
-    def _compile_collocated(self, step):
-        forms, change, rate = compile_collocated(step)
+    def _compile(self, spaces):
+        self._motion_fields()
+        forms, change, rate = compile_collocated(self.step_forms(self))
         strains = [(change, forms.gauss), (rate, forms.gauss)]
         self._strain_change, self._strain_rate = compat.expressions(self.mesh, strains)
         return forms
@@ -222,12 +224,7 @@ class Collocated:
 class CollocatedSpatial(Collocated, MovingSpatial):
     """Velocities are dr/dt and the angular velocity Om in reference components."""
 
-    rate_size = 6
-
-    def _compile(self, spaces):
-        self._motion_fields()
-        step = EccentricCollocation if self.signature.eccentric else SpatialCollocation
-        return self._compile_collocated(step(self))
+    step_forms, rate_size = SpatialCollocation, 6
 
     def _increments(self):
         now, before = (f.x.array[self._nodal] for f in (self.state, self.start))
@@ -250,14 +247,16 @@ class CollocatedSpatial(Collocated, MovingSpatial):
         rates[nodal[:, 4:]] = (q[:, :1] * Om + np.cross(q[:, 1:], Om)) / 2
 
 
+class CollocatedEccentric(CollocatedSpatial):
+    """The same with mass centres off the axis."""
+
+    step_forms = EccentricCollocation
+
+
 class CollocatedPlanar(Collocated, MovingPlanar):
     """Velocities are the rates of the unknowns."""
 
-    rate_size = 3
-
-    def _compile(self, spaces):
-        self._motion_fields()
-        return self._compile_collocated(PlanarCollocation(self))
+    step_forms, rate_size = PlanarCollocation, 3
 
     def _increments(self):
         return (self.state.x.array - self.start.x.array)[self._nodal].ravel()

@@ -7,13 +7,16 @@ that would differ and miss the code cache, which costs a second.
 from collections import namedtuple
 from dataclasses import dataclass, replace
 from dataclasses import fields as fields_of
+from functools import partial
 
 import basix
 import numpy as np
 import ufl
 
 from cosserat_fenicsx import compat
-from cosserat_fenicsx.forms.point import resultants, variation
+from cosserat_fenicsx.forms import equilibrium
+from cosserat_fenicsx.forms.equilibrium import VirtualMotion
+from cosserat_fenicsx.forms.point import NONE, resultants, variation
 from cosserat_fenicsx.numerics import lobatto_weights
 
 #: Integrals over the rods with Gauss points, with the nodes of P_p, and with the two ends of every element as points.
@@ -70,29 +73,71 @@ class CompiledForms:
     symbols: object
 
 
-def compile_all(
-    model, residual, tangent, acting, seconds, derivative, *, variations=(), fields=None, advance=None, forces=None,
-    densities=None, unknowns=None, contact=None,
-):  # fmt: skip
-    """The `CompiledForms` of UFL forms and expressions.
+def along(w):
+    """w', because the coordinate of the mesh is arc length."""
+    return w.dx(0)
+
+
+def compile_static(model, spaces, displacements=None):
+    """The `CompiledForms` of a model in statics.
 
     Args:
-        residual, tangent: without actions; derivative: of a form, in the direction of the trial function.
-        acting: the `ActionWork`; forces: that of forces on displacements alone, or None.
-        seconds: second variations without actions, whose symmetric parts count; variations: the (test, direction) of
-            each, or None for that which is the tangent.
-        densities: see `action_densities`.
-        unknowns, contact: see `Symbols`, of models in statics.
+        model: supplies mesh, data, the terms of the actions, and UFL of its unknowns (see `RodModel`).
+        spaces: of the second variations.
+        displacements: space of three components per node on which forces do work, of the determinate models; or None.
     """
-    seconds = [_symmetric(second) for second in seconds]
+    force, data, dx = model.signature.formulation.force, model.data, measures(model)
+    U, U_node = model.state, compat.alias(model.state)
+
+    def ds(a):
+        return a * dx.gauss
+
+    section, motion = model.cross_section(), model.motion_of(U, U_node)
+    phi, trial = ufl.TestFunction(model.space), ufl.TrialFunction(model.space)
+    test, derivative = model.tests_of(phi, motion), derivative_in(trial, U, U_node)
+    n, phi_n = (None if a is None else model.vector(a) for a in force.symbols(model, U, phi))
+    along_step = partial(ufl.derivative, coefficient=model.before, argument=model.step)
+    before = model.motion_of(model.before, model.before)
+    n, residual, tangent, advance = force.weak_form(n, phi_n, motion, before, section, test, ds, derivative, along_step)
+    held = model.constraint(motion, test, U_node, phi)
+    if held is not None:
+        residual, tangent = residual + held * dx.nodes, tangent + derivative(held * dx.nodes)
+
+    def at(place):
+        return U if place == "line" else U_node
+
+    def point_at(place, rest, frame):
+        return model.point_of(at(place), rest=rest, frame=frame)
+
+    def test_at(place):
+        return model.tests_of(phi, model.motion_of(at(place), U_node))
+
+    acting = action_work(model, dx, test, point_at, (U, U_node), test_at=test_at)
+    forces = None
+    if displacements is not None:
+        forces = action_work(model, dx, VirtualMotion(ufl.TestFunction(displacements), NONE), point_at, ())
+
+    seconds, variations = [], []  # in small displacements and rotations, which satisfy |q| = 1 by construction
+    for space, small_motion in zip(spaces, model.small_motions, strict=True):
+        if small_motion is None:
+            second, pair = tangent, None
+        else:
+            pair = small_motion(ufl.TestFunction(space)), small_motion(ufl.TrialFunction(space))
+            second = ds(force.second_variation(n, motion, data, section, *pair, model.stiffness))
+        seconds.append(_symmetric(second))
+        variations.append(pair)
+    fields = model.fields_of(n, equilibrium.contact_moment(n, motion, section), motion.r_s)
+    contact = model.components_of(equilibrium.contact(motion, section)[0]) if model.carried else None
     lives = {live.number: live_parts(live, derivative, variations) for live in acting.live}
-    core = [residual, tangent, *seconds]
-    found, _, _ = compile_parts(model, core, lives, acting, fields, advance, forces, densities)
+    found, _, _ = compile_parts(
+        model, [residual, tangent, *seconds], lives, acting, fields,
+        advance=None if advance is None else model.components_of(advance),
+        forces=forces, densities=action_densities(model, point_at),
+    )  # fmt: skip
     for live in lives.values():
         residual += live.residual
         seconds = [a if b is None else a + b for a, b in zip(seconds, live.seconds, strict=True)]
-    symbols = unknowns and Symbols(_balance(model, residual, acting), contact, unknowns, seconds)
-    return replace(found, symbols=symbols)
+    return replace(found, symbols=Symbols(_balance(model, residual, acting), contact, (U, U_node), seconds))
 
 
 def compile_parts(
@@ -103,7 +148,8 @@ def compile_parts(
 
     Args:
         core: [residual, tangent, *second variations], without actions; lives: {number of a term: `LiveParts`}.
-        acting, fields, advance, forces, densities: see `compile_all`.
+        acting: the `ActionWork`; forces: that of forces on displacements alone, or None.
+        fields, advance: see `CompiledForms`; densities: see `action_densities`.
         others: more forms of the core; of_terms: {number: list of more forms or None}, equally long.
 
     Returns:

@@ -1,132 +1,19 @@
 """The determinate models: unknown theta in a plane, q in space, in P_p; statics gives n, and r follows."""
 
 import numpy as np
-import ufl
 from dolfinx import cpp
 
 from cosserat_fenicsx import compat
 from cosserat_fenicsx.forms import determinate as eq
 from cosserat_fenicsx.forms import planar, spatial
-from cosserat_fenicsx.forms.equilibrium import Section, VirtualMotion
+from cosserat_fenicsx.forms.equilibrium import Section
 from cosserat_fenicsx.forms.point import NONE, Point
 from cosserat_fenicsx.forms.rotation import rotation_matrix, rotation_vector
 from cosserat_fenicsx.models.base import RodModel
-from cosserat_fenicsx.models.compiled import action_densities, action_work, compile_all, derivative_in, measures
+from cosserat_fenicsx.models.compiled import along, compile_static
 from cosserat_fenicsx.models.planar import PlaneModel, in_space
-from cosserat_fenicsx.models.rod_data import as_matrix, gauss_function, law_of, moment, strain
+from cosserat_fenicsx.models.rod_data import as_matrix, gauss_function, moment, strain
 from cosserat_fenicsx.numerics import conjugate_product, directors
-
-
-def compile_in_plane(model, displacements, rotations, N, N_permanent):
-    """The `CompiledForms` of a `DeterminateInPlane`; its second variations: in the plane and out of it.
-
-    Args:
-        model: supplies mesh, spaces, data and the terms of the actions.
-        displacements: space of three components per node, on which the forces do work.
-        rotations: space of two components per node, the small rotations about axes in the plane.
-        N, N_permanent: the contact force at the Gauss points per unit of the load factor and of the permanent one, two
-            components; the latter None where there is no permanent load.
-    """
-    U = model.state
-    U_node = compat.alias(U)
-    data, dx = model.data, measures(model)
-
-    def ds(a):
-        return a * dx.gauss
-
-    def along(w):
-        return w.dx(0)  # the mesh is the line of arc length
-
-    def about_normal(w):
-        return eq.tests_of(planar.along_normal(w[0]), planar.along_normal(along(w)[0]))
-
-    def about_plane(w):
-        return eq.tests_of(planar.in_plane(w), planar.in_plane(along(w)))
-
-    section = planar.section_of(law_of(data.K, data.K_inv, data.J, data.G), data.R_R, data.v_R)
-    motion = planar.motion_of((0, 0), U[0], along(U)[0])
-    n = planar.in_plane(_known_force(model, N, N_permanent))
-    phi, trial = ufl.TestFunction(model.space), ufl.TrialFunction(model.space)
-    test = about_normal(phi)
-    derivative = derivative_in(trial, U, U_node)
-
-    def point_at(place, rest, frame):
-        theta = (U if place == "line" else U_node)[0]
-        return Point(None, None, planar.rotation_matrix(theta), planar.along_normal(theta), rest=rest, frame=frame)
-
-    acting = action_work(model, dx, test, point_at, (U, U_node))
-    internal = eq.moments(n, motion, section, test, ds)
-    tangent = derivative(internal)
-
-    psi, w = ufl.TestFunction(rotations), ufl.TrialFunction(rotations)
-    rigid, direction = about_plane(psi), about_plane(w)
-    sideways = ds(eq.second_variation(n, motion, section, rigid, direction))
-    return _compiled(
-        model, internal, tangent, acting, [tangent, sideways], derivative, [None, (rigid, direction)], dx,
-        displacements, point_at, (U, U_node),
-    )  # fmt: skip
-
-
-def compile_in_space(model, displacements, rotations, N, N_permanent):
-    """The `CompiledForms` of a `DeterminateInSpace`.
-
-    Args:
-        model: supplies mesh, spaces, data and the terms of the actions.
-        displacements: space of three components per node, on which the forces do work.
-        rotations: space of three components per node, the small rotations.
-        N, N_permanent: the contact force at the Gauss points per unit of the load factor and of the permanent one; the
-            latter None where there is no permanent load.
-    """
-    U = model.state
-    U_node = compat.alias(U)
-    data, dx = model.data, measures(model)
-
-    def ds(a):
-        return a * dx.gauss
-
-    def along(w):
-        return w.dx(0)
-
-    section = Section(law_of(data.K, data.K_inv, data.J, data.G), as_matrix(data.R_R), data.v_R)
-    motion = spatial.motion_of(ufl.as_vector([0, 0, 0]), U, along(U), U_node)
-    n = _known_force(model, N, N_permanent)
-    phi, trial = ufl.TestFunction(model.space), ufl.TrialFunction(model.space)
-    test = eq.quaternion_tests_of(phi, along(phi))
-    derivative = derivative_in(trial, U, U_node)
-
-    def point_at(place, rest, frame):
-        q = U if place == "line" else U_node
-        return Point(None, None, rotation_matrix(q), rotation_vector(q), rest=rest, frame=frame)
-
-    acting = action_work(model, dx, test, point_at, (U, U_node))
-    internal = eq.moments(n, motion, section, test, ds) + spatial.unit_quaternion(motion, test) * dx.nodes
-    tangent = derivative(internal)
-
-    psi, w = ufl.TestFunction(rotations), ufl.TrialFunction(rotations)
-    rigid, direction = eq.tests_of(psi, along(psi)), eq.tests_of(w, along(w))
-    second = ds(eq.second_variation(n, motion, section, rigid, direction))
-    return _compiled(
-        model, internal, tangent, acting, [second], derivative, [(rigid, direction)], dx, displacements, point_at,
-        (U, U_node),
-    )  # fmt: skip
-
-
-def _known_force(model, N, N_permanent):
-    n = model.load_factor * N
-    return n if N_permanent is None else n + model.permanent_factor * N_permanent
-
-
-def _compiled(
-    model, residual, tangent, acting, seconds, derivative, variations, dx, displacements, point_at, unknowns
-):
-    """The `CompiledForms`, with the virtual work of the dead forces on displacements."""
-    moved = VirtualMotion(ufl.TestFunction(displacements), NONE)
-    forces = action_work(model, dx, moved, point_at, ())
-    densities = action_densities(model, point_at)
-    return compile_all(
-        model, residual, tangent, acting, seconds, derivative, variations=variations, forces=forces,
-        densities=densities, unknowns=unknowns,
-    )  # fmt: skip
 
 
 class Tree:
@@ -239,7 +126,15 @@ class _KnownForce(RodModel):
         lasting = any(kind.scaled != "load" for kind in self.signature.terms)
         self._permanent = gauss_function(self.mesh, self.signature.points, self.force_size) if lasting else None
         self._tree = Tree(self.signature)
-        return self._compile_with(self._displacements, spaces[-1], self._force, self._permanent)
+        return compile_static(self, spaces, self._displacements)
+
+    def known_force(self):
+        """The components of the contact force at the load factors, UFL."""
+        n = self.load_factor * self._force
+        return n if self._permanent is None else n + self.permanent_factor * self._permanent
+
+    def fields_of(self, n, m, r_s):
+        return None
 
     def _round_off(self, sizes):
         """Bound on the rounding error of |F|, which contains only moments here."""
@@ -281,7 +176,16 @@ class DeterminateInPlane(_KnownForce, PlaneModel):
 
     components, moves, turn = 1, 0, 1.0
     variations = ((1, False), (2, True))
-    _compile_with = compile_in_plane
+    small_motions = None, lambda w: eq.tests_of(planar.in_plane(w), planar.in_plane(along(w)))
+
+    def motion_of(self, w, nodal):
+        return planar.motion_of((0, 0), w[0], along(w)[0])
+
+    def tests_of(self, phi, motion):
+        return eq.tests_of(planar.along_normal(phi[0]), planar.along_normal(along(phi)[0]))
+
+    def point_of(self, w, w_t=None, *, rest, frame):
+        return Point(None, None, planar.rotation_matrix(w[0]), planar.along_normal(w[0]), rest=rest, frame=frame)
 
     def _at_rest(self):
         return np.zeros((len(self.reference), 1))
@@ -326,8 +230,22 @@ class DeterminateInSpace(_KnownForce):
     """The quaternion q alone."""
 
     components, moves, turn = 4, 0, 2.0
-    variations = ((3, False),)
-    _compile_with = compile_in_space
+    variations, small_motions = ((3, False),), (lambda w: eq.tests_of(w, along(w)),)
+
+    def cross_section(self):
+        return Section(self.data.law, as_matrix(self.data.R_R), self.data.v_R)
+
+    def motion_of(self, w, nodal):
+        return spatial.motion_of(NONE, w, along(w), nodal)
+
+    def tests_of(self, phi, motion):
+        return eq.quaternion_tests_of(phi, along(phi))
+
+    def point_of(self, w, w_t=None, *, rest, frame):
+        return Point(None, None, rotation_matrix(w), rotation_vector(w), rest=rest, frame=frame)
+
+    def constraint(self, motion, test, nodal, phi):
+        return spatial.unit_quaternion(motion, test)
 
     def _at_rest(self):
         return np.tile([1.0, 0, 0, 0], (len(self.reference), 1))

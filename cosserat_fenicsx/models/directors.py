@@ -7,21 +7,18 @@ from dolfinx import fem
 
 from cosserat_fenicsx import compat, numerics
 from cosserat_fenicsx.forms import eccentric, energy, inertia
-from cosserat_fenicsx.forms import spatial as eq
-from cosserat_fenicsx.forms.rotation import directors, small_rotation
-from cosserat_fenicsx.models.compiled import action_work, derivative_in, measures
+from cosserat_fenicsx.forms.rotation import directors
+from cosserat_fenicsx.models.compiled import along
 from cosserat_fenicsx.models.moving import (
     MovingSpatial,
-    SpatialData,
     SpatialStep,
-    along,
-    compile_momentum,
     compile_motion,
     parts_of,
     spun,
     turned_by,
     virtual_work_of_step,
 )
+from cosserat_fenicsx.models.rod_data import as_matrix
 
 
 class Turning:
@@ -94,10 +91,9 @@ class EccentricMomenta:
 class EccentricStep(EccentricMomenta, SpatialStep):
     """See `StepForms`: with the rates of the directors of `Turning`."""
 
-    def _take_data(self):
-        super()._take_data()
-        W = self.model.turning
-        self.turned = ufl.as_matrix([[W[3 * i + j] for j in range(3)] for i in range(3)]) * self.body.offset
+    def __init__(self, model):
+        super().__init__(model)
+        self.turned = as_matrix(model.turning) * self.body.offset
 
     def momentum_before(self):
         """See `StepForms`."""
@@ -124,9 +120,7 @@ class EccentricStep(EccentricMomenta, SpatialStep):
 class EccentricSpatial(Turning, MovingSpatial):
     """See `MovingSpatial`."""
 
-    def _compile(self, spaces):
-        self._motion_fields()
-        return compile_momentum(EccentricStep(self))
+    step_forms = EccentricStep
 
     def set_velocity(self, linear, angular):
         """See `Moving`: the rates of the directors change with the angular velocities, which differ from theirs by the
@@ -138,44 +132,29 @@ class EccentricSpatial(Turning, MovingSpatial):
         self.turning.x.array[:] = (W + np.cross(change[:, :, None], numerics.directors(q), axis=1)).ravel()
 
 
-def compile_conserving(model):
-    """The `MotionForms` of the energy-conserving scheme of a moving spatial model.
+def compile_conserving(step):
+    """The `MotionForms` of the energy-conserving scheme of a moving spatial model, from its `SpatialStep`.
 
     Test functions are changes of (r, q). The residual has all terms of the step except loads, and no equation |q| = 1.
     """
-    dx, data = measures(model), SpatialData.of(model)
-    named = compat.alias if model.signature.degree == 1 else (lambda function: function)
-    U, U0, V, W = model.state, model.start, model.velocity, model.turning
-    nodal, nodal0, rates, turning = named(U), named(U0), named(V), named(W)
-    h, section, viscosity, body = model.h, data.section, data.viscosity, data.body
+    model, dx, section, viscosity, body = step.model, step.dx, step.section, step.viscosity, step.body
+    h, phi = model.h, step.phi
+    turning = compat.alias(model.turning) if model.signature.degree == 1 else model.turning
 
     def line(w):
         (_, q), (r_s, q_s) = parts_of(w), parts_of(along(w))
         return energy.Configuration(r_s, q, q_s)
 
-    before, after = line(U0), line(U)
-    phi, trial = ufl.TestFunction(model.space), ufl.TrialFunction(model.space)
+    before, after = line(step.start), line(step.state)
     test = energy.Variation(*parts_of(phi), *parts_of(along(phi)))
-    derivative = derivative_in(trial, *dict.fromkeys((U, nodal)))
 
-    (r0, q0), (r1, q1), (r_t, _) = parts_of(nodal0), parts_of(nodal), parts_of(rates)
-    spin = ufl.as_matrix([[turning[3 * i + j] for j in range(3)] for i in range(3)])
+    (r0, q0), (r1, q1), (r_t, _) = parts_of(step.nodal0), parts_of(step.nodal), parts_of(step.rates)
+    spin = as_matrix(turning)
     moved, turned = (r1 - r0) / h, (energy.directors(q1) - energy.directors(q0)) / h
     half = (q0 + q1) / 2
     residual = energy.rate_work(2 * (moved - r_t) / h, 2 * (turned - spin) / h, half, body, test) * dx.nodes
     residual += model.drag[0] * energy.rate_work(moved, turned, half, body, test) * dx.nodes
     residual += energy.stress_work(before, after, section, viscosity, h, test) * dx.gauss
-
-    def point_at(place, rest, frame):
-        w, w0 = (U, U0) if place == "line" else (nodal, nodal0)
-        r_t, q_t = parts_of((w - w0) / h)
-        middle = (w + w0) / 2
-        omega = small_rotation(q_t, parts_of(middle)[1])
-        return eq.point_of(middle, along(middle), rest=rest, frame=frame, r_t=r_t, omega=omega)
-
-    def end_point(place, rest, frame):
-        w = U if place == "line" else nodal
-        return eq.point_of(w, along(w), rest=rest, frame=frame)
 
     def of_stress(test):
         """At a clamped point delta q = phi/2: q is (1, 0, 0, 0) there."""
@@ -183,15 +162,14 @@ def compile_conserving(model):
         varied = energy.Variation(test.phi_r, q, test.phi_r_s, q_s)
         return energy.stress_work(before, after, section, viscosity, h, varied)
 
-    of_step = virtual_work_of_step(model, of_stress, point_at)
-    acting = action_work(model, dx, eq.tests_of(phi, along(phi)), point_at, {U, nodal}, end_point)
-    state = eq.state_of(U, along(U), U)
-    n, m = inertia.contact(state, section, viscosity, lambda a: ufl.derivative(a, U, V))
-    tests, kappa = eq.tests_of(phi, along(phi)), energy.angular_momentum(q1, spin, body)
+    of_step = virtual_work_of_step(model, of_stress, step.halfway_point)
+    acting = step.actions(step.halfway_point)
+    n, m = inertia.contact(step.after, section, viscosity, lambda a: ufl.derivative(a, step.state, step.velocity))
+    kappa = energy.angular_momentum(q1, spin, body)
     if body.offset is None:
-        momentum = inertia.momentum(r_t, kappa, body, tests)
+        momentum = inertia.momentum(r_t, kappa, body, step.test)
     else:
-        momentum = eccentric.momentum(r_t, eccentric.arm(q1, body), spin * body.offset, kappa, body, tests)
+        momentum = eccentric.momentum(r_t, eccentric.arm(q1, body), spin * body.offset, kappa, body, step.test)
     lost = energy.viscous_loss(before, after, section, viscosity, h) * dx.gauss
     lost += 2 * h * model.drag[0] * energy.kinetic_energy(moved, turned, body) * dx.nodes
     others = {
@@ -200,17 +178,14 @@ def compile_conserving(model):
         "strain": energy.strain_energy(after, section) * dx.gauss,
         "dissipated": lost,
     }
-    fields = ufl.as_vector([*n, *m, *state.r_s])
-    dead = acting._replace(live=[])
-    return compile_motion(model, residual, dead, derivative, fields, others, of_step, acting, turned=True)
+    fields, dead = model.fields_of(n, m, step.after.r_s), acting._replace(live=[])
+    return compile_motion(model, residual, dead, step.derivative, fields, others, of_step, acting, turned=True)
 
 
 class ConservingSpatial(Turning, MovingSpatial):
     """See `MovingSpatial`; angular velocities are those of the directors' rates."""
 
-    def _compile(self, spaces):
-        self._motion_fields()
-        return compile_conserving(self)
+    scheme = staticmethod(compile_conserving)
 
     def accept(self, h):
         """See `Moving`."""

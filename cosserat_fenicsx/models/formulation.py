@@ -7,7 +7,7 @@ import numpy as np
 
 from cosserat_fenicsx import compat
 from cosserat_fenicsx.errors import SceneError, nearest
-from cosserat_fenicsx.forms import equilibrium, spatial
+from cosserat_fenicsx.forms import determinate, equilibrium, spatial
 from cosserat_fenicsx.numerics import small_rotations
 
 #: The contact force that goes into fields and the second variation, the left side of eq. (1), its tangent, and the next
@@ -58,6 +58,11 @@ class ContactForce:
         """
         raise NotImplementedError
 
+    def second_variation(self, n, motion, data, section, test, direction, stiffness):
+        """The density of the second variation, see `equilibrium.second_variation`; data: the `RodFields`."""
+        stiff = section._replace(law=data.stiff_law(n))
+        return equilibrium.second_variation(n, motion, stiff, test, direction, stiffness)
+
 
 class _OfMotion(ContactForce):
     def weak_form(self, n, phi_n, motion, before, section, test, ds, derivative, along_step):
@@ -106,12 +111,27 @@ class _Unknown(ContactForce):
         return WeakForm(n, internal, derivative(internal), None)
 
 
+class _Known(ContactForce):
+    def symbols(self, model, U, phi):
+        """See `ContactForce`."""
+        return model.known_force(), None
+
+    def weak_form(self, n, phi_n, motion, before, section, test, ds, derivative, along_step):
+        """See `ContactForce`."""
+        internal = determinate.moments(n, motion, section, test, ds)
+        return WeakForm(n, internal, derivative(internal), None)
+
+    def second_variation(self, n, motion, data, section, test, direction, stiffness):
+        """See `ContactForce`: that of the energy minimised over r."""
+        return determinate.second_variation(n, motion, section, test, direction)
+
+
 #: n by the law: on slender rods the rounding error of the residual then affects the solution.
 OF_MOTION = _OfMotion("the contact force is that of the motion", of_motion=True, stiff=1e6, rounding=0.1)
 CARRIED = _Carried("the contact force is carried at the Gauss points", carried=True, stiff=1e6)
 UNKNOWN = _Unknown("a stiffness is infinite or next to it, so the contact force is an unknown", unknown=True, stiff=1e5)
-#: for the determinate models, which have separate forms
-KNOWN = ContactForce("the contact force follows from statics alone")
+#: for the determinate models
+KNOWN = _Known("the contact force follows from statics alone")
 
 
 # From a moment to the residual rows of q: those of its vector part.

@@ -9,11 +9,9 @@ from dolfinx import fem
 from mpi4py import MPI
 
 from cosserat_fenicsx import compat
-from cosserat_fenicsx.forms import equilibrium, inertia
-from cosserat_fenicsx.forms import spatial as eq
+from cosserat_fenicsx.forms import inertia
 from cosserat_fenicsx.forms.equilibrium import VirtualMotion
 from cosserat_fenicsx.forms.point import AXES, NONE
-from cosserat_fenicsx.forms.rotation import small_rotation
 from cosserat_fenicsx.models.action_terms import Delays
 from cosserat_fenicsx.models.base import Scales
 from cosserat_fenicsx.models.compiled import (
@@ -27,7 +25,6 @@ from cosserat_fenicsx.models.compiled import (
 )
 from cosserat_fenicsx.models.connections import ties_of
 from cosserat_fenicsx.models.rod_data import (
-    as_matrix,
     check_inertia,
     gauss_function,
     joined,
@@ -68,29 +65,6 @@ class MotionForms(CompiledForms):
     of_step_at_nodes: object = None
 
 
-@dataclass(frozen=True)
-class SpatialData:
-    """The data of a moving spatial model as used in forms; `viscosity` is the law of the strain rates."""
-
-    section: equilibrium.Section
-    viscosity: object
-    body: inertia.Inertia
-
-    @classmethod
-    def of(cls, model):
-        """The data of a model."""
-        data, I = model.data, model.inertia
-        I_R = ufl.as_matrix([[I[0], I[1], I[2]], [I[1], I[3], I[4]], [I[2], I[4], I[5]]])
-        law = law_of(data.K, data.K_inv, data.J, data.G)
-        section = equilibrium.Section(law, as_matrix(data.R_R), data.v_R)
-        return cls(section, law_of(*model.viscosity), inertia.Inertia(model.mass[0], I_R, model.offset, model.lateral))
-
-
-def along(w):
-    """w', because the coordinate of the mesh is arc length."""
-    return ufl.grad(w)[:, 0]
-
-
 def parts_of(w):
     """r and q of seven components."""
     return ufl.as_vector([w[i] for i in range(3)]), ufl.as_vector([w[i] for i in range(3, 7)])
@@ -102,7 +76,8 @@ class StepForms:
     Attributes:
         state, start, velocity: the Functions; nodal, nodal0, rates: their aliases for rules other than Gauss's.
         halfway, passed: the average of both ends of the step, and their difference over h, at the nodes.
-        before, after, middle: `Motion`s; section, viscosity: data; test: test functions.
+        before, after, middle: `Motion`s; section, viscosity: data, and the law of the strain rates.
+        phi, test: test functions of the unknowns, and their `VirtualMotion`.
         derivative: that of a form in the direction of the trial function.
     """
 
@@ -113,29 +88,13 @@ class StepForms:
         self.state, self.start, self.velocity = U, U0, V = model.state, model.start, model.velocity
         self.nodal, self.nodal0, self.rates = nodal, nodal0, _ = named(U), named(U0), named(V)
         self.halfway, self.passed = (nodal + nodal0) / 2, (nodal - nodal0) / model.h
-        self._take_data()
-        self.before, self.after, self.middle = (self.motion_of(w) for w in (U0, U, (U + U0) / 2))
-        phi, trial = ufl.TestFunction(model.space), ufl.TrialFunction(model.space)
-        self.test = self.tests_of(phi)
+        self.section, self.viscosity = model.cross_section(), law_of(*model.viscosity)
+        self.before, self.after, self.middle = (model.motion_of(w, w) for w in (U0, U, (U + U0) / 2))
+        self.phi, trial = ufl.TestFunction(model.space), ufl.TrialFunction(model.space)
+        self.test = model.tests_of(self.phi, self.after)
         self.derivative = derivative_in(trial, *dict.fromkeys((U, nodal)))
 
     # -- for subclasses to define ------------------------------------------------------------------------------------
-
-    def _take_data(self):
-        """Set section and viscosity, and other data that the model needs."""
-        raise NotImplementedError
-
-    def motion_of(self, w):
-        """The `Motion` of the unknowns, for Gauss's rule."""
-        raise NotImplementedError
-
-    def tests_of(self, phi):
-        """The test functions of eq. (1)."""
-        raise NotImplementedError
-
-    def point_of(self, w, w_s, w_t, rest, frame):
-        """The `Point` of unknowns, their derivatives along the rod and their rates."""
-        raise NotImplementedError
 
     def momentum(self, w, w_t):
         """Momenta per unit length of unknowns and their rates, times the test functions."""
@@ -161,20 +120,12 @@ class StepForms:
         """What the balances have per length besides the rates of `momentum`; or None."""
         return
 
-    def constraint(self):
-        """Terms of the residual in addition to the balances, or 0."""
-        return 0
-
-    def fields(self, n, m):
-        """The components of n, m and r' that do not vanish identically in this model."""
-        raise NotImplementedError
-
     # -- forms -------------------------------------------------------------------------------------------------------
 
     def halfway_point(self, place, rest, frame):
         """The `Point` of the average of both ends of the step, with the average velocity."""
         w, w0 = (self.state, self.start) if place == "line" else (self.nodal, self.nodal0)
-        return self.point_of((w + w0) / 2, along((w + w0) / 2), (w - w0) / self.model.h, rest, frame)
+        return self.model.point_of((w + w0) / 2, (w - w0) / self.model.h, rest=rest, frame=frame)
 
     def actions(self, point_at):
         """The `ActionWork` at the points that `point_at` gives."""
@@ -183,7 +134,12 @@ class StepForms:
     def end_point(self, place, rest, frame):
         """The `Point` at the end of the step."""
         w, w0 = (self.state, self.start) if place == "line" else (self.nodal, self.nodal0)
-        return self.point_of(w, along(w), (w - w0) / self.model.h, rest, frame)
+        return self.model.point_of(w, (w - w0) / self.model.h, rest=rest, frame=frame)
+
+    def constraint(self):
+        """The model's constraint in the residual, or 0."""
+        held = self.model.constraint(self.model.motion_of(self.state, self.nodal), self.test, self.nodal, self.phi)
+        return 0 if held is None else held * self.dx.nodes
 
     def compiled(self, residual, acting, working, of_step):
         """`MotionForms` of a residual without loads.
@@ -203,7 +159,9 @@ class StepForms:
             "strain": inertia.strain_energy(self.after, section) * dx.gauss,
             "dissipated": lost,
         }
-        return compile_motion(model, residual, acting, self.derivative, self.fields(n, m), others, of_step, working)
+        return compile_motion(
+            model, residual, acting, self.derivative, model.fields_of(n, m, self.after.r_s), others, of_step, working
+        )
 
 
 def compile_momentum(step, stress=inertia.averaged_stress):
@@ -252,24 +210,17 @@ def virtual_work_of_step(model, stress, point_at):
 
 
 class SpatialStep(StepForms):
-    """See `StepForms`."""
+    """See `StepForms`.
 
-    def _take_data(self):
-        data = SpatialData.of(self.model)
-        self.section, self.viscosity, self.body = data.section, data.viscosity, data.body
+    Attributes:
+        body: the `Inertia` of a section.
+    """
 
-    def motion_of(self, w):
-        """See `StepForms`."""
-        return eq.state_of(w, along(w), w)
-
-    def tests_of(self, phi):
-        """See `StepForms`."""
-        return eq.tests_of(phi, along(phi))
-
-    def point_of(self, w, w_s, w_t, rest, frame):
-        """See `StepForms`."""
-        (_, q), (r_t, q_t) = parts_of(w), parts_of(w_t)
-        return eq.point_of(w, w_s, rest=rest, frame=frame, r_t=r_t, omega=small_rotation(q_t, q))
+    def __init__(self, model):
+        I = model.inertia
+        I_R = ufl.as_matrix([[I[0], I[1], I[2]], [I[1], I[3], I[4]], [I[2], I[4], I[5]]])
+        self.body = inertia.Inertia(model.mass[0], I_R, model.offset, model.lateral)
+        super().__init__(model)
 
     def momentum(self, w, w_t):
         """See `StepForms`."""
@@ -280,15 +231,6 @@ class SpatialStep(StepForms):
         """See `StepForms`."""
         (_, q), (r_t, q_t) = parts_of(w), parts_of(w_t)
         return inertia.kinetic_energy(r_t, inertia.angular_velocity(q, q_t), self.body)
-
-    def constraint(self):
-        """See `StepForms`: |q| = 1 at the nodes."""
-        at_nodes = self.after._replace(q_node=parts_of(self.nodal)[1])
-        return eq.unit_quaternion(at_nodes, self.test) * self.dx.nodes
-
-    def fields(self, n, m):
-        """See `StepForms`."""
-        return ufl.as_vector([*n, *m, *self.after.r_s])
 
 
 def compile_motion(model, residual, acting, derivative, fields, others, of_step, working=None, *, turned=False):
@@ -338,9 +280,15 @@ class Moving:
         delays: the `Delays` of its actions.
     """
 
-    variations = ()
+    variations = small_motions = ()
+    #: the `StepForms` of the model, and the function that compiles them
+    step_forms, scheme = None, staticmethod(compile_momentum)
     #: independent components of a section's rotational inertia
     inertia_size = 0
+
+    def _compile(self, spaces):
+        self._motion_fields()
+        return self.scheme(self.step_forms(self))
 
     def _motion_fields(self):
         """Make the Functions that the forms need in addition to those of a `RodModel`."""
@@ -518,12 +466,7 @@ class Moving:
 class MovingSpatial(Moving, SpatialModel):
     """The spatial model with inertia."""
 
-    variations = ()
-    inertia_size = 6
-
-    def _compile(self, spaces):
-        self._motion_fields()
-        return compile_momentum(SpatialStep(self))
+    step_forms, inertia_size = SpatialStep, 6
 
     def _section_inertia(self, J, frames):
         return six_of(np.einsum("...ij,...j,...kj->...ik", frames, J, frames))

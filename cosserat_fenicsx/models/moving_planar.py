@@ -1,14 +1,12 @@
 """The planar model with inertia, for scenes that move in a plane."""
 
 import numpy as np
-import ufl
 
 from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.forms import inertia
 from cosserat_fenicsx.forms import planar as eq
-from cosserat_fenicsx.models.moving import Moving, StepForms, along, compile_momentum
+from cosserat_fenicsx.models.moving import Moving, StepForms
 from cosserat_fenicsx.models.planar import PlanarModel
-from cosserat_fenicsx.models.rod_data import law_of
 from cosserat_fenicsx.scene.action import is_axial
 from cosserat_fenicsx.scene.describe import describe
 from cosserat_fenicsx.scene.signals import signals_of
@@ -16,15 +14,31 @@ from cosserat_fenicsx.scene.signals import signals_of
 _OFF = 1e-9
 
 
+class PlanarStep(StepForms):
+    """See `StepForms`."""
+
+    def momentum(self, w, w_t):
+        """See `StepForms`."""
+        test, mass, J = self.test, self.model.mass[0], self.model.inertia[0]
+        both = mass * (w_t[0] * test.phi_r[0] + w_t[1] * test.phi_r[1]) + J * w_t[2] * test.phi[2]
+        return both + _lateral(self.model, w_t, test.phi_r)
+
+    def kinetic(self, w, w_t):
+        """See `StepForms`."""
+        both = self.model.mass[0] * (w_t[0] ** 2 + w_t[1] ** 2) + self.model.inertia[0] * w_t[2] ** 2
+        return (both + _lateral(self.model, w_t, w_t)) / 2
+
+
+def _lateral(model, *pair):
+    """`inertia.lateral` in the plane."""
+    direction = None if model.lateral is None else eq.in_plane(model.lateral)
+    return inertia.lateral(direction, *map(eq.in_plane, pair))
+
+
 class MovingPlanar(Moving, PlanarModel):
     """The planar model with inertia."""
 
-    variations = ()
-    inertia_size = 1
-
-    def _compile(self, spaces):
-        self._motion_fields()
-        return compile_momentum(PlanarStep(self))
+    step_forms, inertia_size = PlanarStep, 1
 
     def _section_inertia(self, J, frames):
         along = np.einsum("...ik,i->...k", frames, self.axes[2])
@@ -97,45 +111,3 @@ class MovingPlanar(Moving, PlanarModel):
 
     def _momenta_of(self, p):
         return p[:, :2] @ self.axes[:2], p[:, 2:] * self.axes[2]
-
-
-class PlanarStep(StepForms):
-    """See `StepForms`."""
-
-    def _take_data(self):
-        data = self.model.data
-        self.section = eq.section_of(law_of(data.K, data.K_inv, data.J, data.G), data.R_R, data.v_R)
-        self.viscosity = law_of(*self.model.viscosity)
-
-    def motion_of(self, w):
-        """See `StepForms`."""
-        return eq.motion_of(along(w), w[2], along(w)[2])
-
-    def tests_of(self, phi):
-        """See `StepForms`."""
-        return eq.tests_of(phi, along(phi))
-
-    def point_of(self, w, w_s, w_t, rest, frame):
-        """See `StepForms`."""
-        return eq.point_of(w, w_s, rest=rest, frame=frame, r_t=eq.in_plane(w_t), omega=eq.along_normal(w_t[2]))
-
-    def momentum(self, w, w_t):
-        """See `StepForms`."""
-        test, mass, J = self.test, self.model.mass[0], self.model.inertia[0]
-        both = mass * (w_t[0] * test.phi_r[0] + w_t[1] * test.phi_r[1]) + J * w_t[2] * test.phi[2]
-        return both + _lateral(self.model, w_t, test.phi_r)
-
-    def kinetic(self, w, w_t):
-        """See `StepForms`."""
-        both = self.model.mass[0] * (w_t[0] ** 2 + w_t[1] ** 2) + self.model.inertia[0] * w_t[2] ** 2
-        return (both + _lateral(self.model, w_t, w_t)) / 2
-
-    def fields(self, n, m):
-        """See `StepForms`."""
-        return ufl.as_vector([n[0], n[1], m[2], self.after.r_s[0], self.after.r_s[1]])
-
-
-def _lateral(model, *pair):
-    """`inertia.lateral` in the plane."""
-    direction = None if model.lateral is None else eq.in_plane(model.lateral)
-    return inertia.lateral(direction, *map(eq.in_plane, pair))

@@ -114,15 +114,6 @@ def law_of(K, K_inv, J, G):
     return CoupledLaw(*(a if a is None else as_matrix(a) for a in (K, K_inv, J, G)))
 
 
-def stiff_enough(n, data):
-    """The law of the second variation at a contact force n: bounded stiffnesses, raised where n requires it.
-
-    Args:
-        data: the `RodFields`.
-    """
-    return law_of(data.K_stiff, data.K_inv, data.J, data.G).raised(ufl.sqrt(ufl.dot(n, n)))
-
-
 def as_matrix(a):
     """The 3 x 3 matrix of nine numbers, row by row."""
     return ufl.as_matrix([[a[3 * i + j] for j in range(3)] for i in range(3)])
@@ -176,7 +167,17 @@ def joined(parts):
 
 #: The same as dolfinx Functions, see `field_values`; K_inv is zero where K is infinite, K_stiff is bounded. In a
 #: plane R_R is the tangent.
-RodFields = namedtuple("RodFields", "K K_inv K_stiff J G R_R v_R")
+class RodFields(namedtuple("RodFields", "K K_inv K_stiff J G R_R v_R")):
+    """The fields of `RodData` as Functions, see above."""
+
+    @property
+    def law(self):
+        """The law used in forms."""
+        return law_of(self.K, self.K_inv, self.J, self.G)
+
+    def stiff_law(self, n):
+        """The law of the second variation at a contact force n: bounded stiffnesses, raised where n requires it."""
+        return law_of(self.K_stiff, self.K_inv, self.J, self.G).raised(ufl.sqrt(ufl.dot(n, n)))
 
 
 def gauss_function(mesh, points, size):

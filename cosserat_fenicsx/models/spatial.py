@@ -14,74 +14,20 @@ from cosserat_fenicsx.forms.equilibrium import VirtualMotion
 from cosserat_fenicsx.forms.point import NONE
 from cosserat_fenicsx.models.base import RodModel
 from cosserat_fenicsx.models.compiled import (
-    action_densities,
     action_work,
-    compile_all,
+    along,
     compile_single,
-    derivative_in,
+    compile_static,
     measures,
     varied_actions,
 )
-from cosserat_fenicsx.models.rod_data import as_matrix, law_of, stiff_enough
+from cosserat_fenicsx.models.rod_data import as_matrix
 from cosserat_fenicsx.numerics import small_rotations
 
 
-def compile_spatial(model, rotations):
-    """The `CompiledForms` of a `SpatialModel`.
-
-    Args:
-        model: supplies mesh, spaces, data and the terms of the actions.
-        rotations: space of (r, theta) for the second variation.
-    """
-    formulation = model.signature.formulation
-    U, before, step = model.state, model.before, model.step
-    U_node = compat.alias(U)
-    data, dx = model.data, measures(model)
-
-    def ds(a):
-        return a * dx.gauss
-
-    def along(w):
-        return w.dx(0)  # the mesh is the line of arc length
-
-    law = law_of(data.K, data.K_inv, data.J, data.G)
-    section = equilibrium.Section(law, as_matrix(data.R_R), data.v_R)
-    state = eq.state_of(U, along(U), U_node)
-    phi, trial = ufl.TestFunction(model.space), ufl.TrialFunction(model.space)
-    test = formulation.tests(phi, along(phi), state.q, state.q_s)
-    derivative = derivative_in(trial, U, U_node)
-
-    n, phi_n = (None if a is None else ufl.as_vector(a) for a in formulation.force.symbols(model, U, phi))
-    state_before = eq.state_of(before, along(before), before)
-    along_step = partial(ufl.derivative, coefficient=before, argument=step)
-    weak = formulation.force.weak_form(n, phi_n, state, state_before, section, test, ds, derivative, along_step)
-    held = formulation.equations(state, test, U_node, phi) * dx.nodes
-    internal, tangent = weak.internal + held, weak.tangent + derivative(held)
-
-    def names_at(place):
-        return (U, along(U)) if place == "line" else (U_node, along(U_node))
-
-    def point_at(place, rest, frame):
-        return eq.point_of(*names_at(place), rest=rest, frame=frame)
-
-    def test_at(place):
-        at = eq.state_of(*names_at(place), U_node)
-        return formulation.tests(phi, along(phi), at.q, at.q_s)
-
-    acting = action_work(model, dx, test, point_at, (U, U_node), test_at=test_at)
-
-    # The second variation in (r, theta) satisfies |q| = 1 by construction.
-    psi, w = ufl.TestFunction(rotations), ufl.TrialFunction(rotations)
-    rigid, direction = eq.rotation_tests_of(psi, along(psi)), eq.rotation_tests_of(w, along(w))
-    stiff = section._replace(law=stiff_enough(weak.n, data))
-    second = ds(equilibrium.second_variation(weak.n, state, stiff, rigid, direction, model.stiffness))
-    fields = ufl.as_vector([*weak.n, *equilibrium.contact_moment(weak.n, state, section), *state.r_s])
-    densities = action_densities(model, point_at)
-    contact = equilibrium.contact(state, section)[0] if model.carried else None
-    return compile_all(
-        model, internal, tangent, acting, [second], derivative, variations=[(rigid, direction)], fields=fields,
-        advance=weak.advance, densities=densities, unknowns=(U, U_node), contact=contact,
-    )  # fmt: skip
+def small_motion_of(w):
+    """The `VirtualMotion` of small displacements and rotations (r, theta)."""
+    return eq.rotation_tests_of(w, along(w))
 
 
 _EYE = np.eye(3)
@@ -91,7 +37,7 @@ class SpatialModel(RodModel):
     """The model for any scene."""
 
     name, moves, turn = "spatial", 3, 2.0
-    variations = ((6, False),)
+    variations, small_motions = ((6, False),), (small_motion_of,)
 
     def __init__(self, comm, signature):
         formulation = signature.formulation
@@ -101,7 +47,23 @@ class SpatialModel(RodModel):
 
     def _compile(self, spaces):
         self.stiffness = fem.Constant(self.mesh, np.float64(1))  # of the second variation, see `stress_alone`
-        return compile_spatial(self, *spaces)
+        return compile_static(self, spaces)
+
+    def cross_section(self):
+        return equilibrium.Section(self.data.law, as_matrix(self.data.R_R), self.data.v_R)
+
+    def motion_of(self, w, nodal):
+        return eq.state_of(w, along(w), nodal)
+
+    def tests_of(self, phi, motion):
+        return self.signature.formulation.tests(phi, along(phi), motion.q, motion.q_s)
+
+    def point_of(self, w, w_t=None, *, rest, frame):
+        r_t, omega = (NONE, NONE) if w_t is None else eq.velocities(w, w_t)
+        return eq.point_of(w, along(w), rest=rest, frame=frame, r_t=r_t, omega=omega)
+
+    def constraint(self, motion, test, nodal, phi):
+        return self.signature.formulation.equations(motion, test, nodal, phi)
 
     def _at_rest(self):
         others = [1.0, 0, 0, 0, *self.multipliers * [0.0]]
@@ -202,11 +164,10 @@ class CirculatoryModel(SpatialModel):
         because its norm gives the rounding error of d omega."""
         U, U_node, dx = self.state, compat.alias(self.state), measures(self)
         psi, w = ufl.TestFunction(rotations), ufl.TrialFunction(rotations)
-        test, direction = eq.rotation_tests_of(psi, psi.dx(0)), eq.rotation_tests_of(w, w.dx(0))
+        test, direction = small_motion_of(psi), small_motion_of(w)
 
         def point_at(place, rest, frame):
-            state = U if place == "line" else U_node
-            return eq.point_of(state, state.dx(0), rest=rest, frame=frame)
+            return self.point_of(U if place == "line" else U_node, rest=rest, frame=frame)
 
         work = partial(action_work, self, dx, point_at=point_at, unknowns=(U, U_node))
         form = varied_actions(work(test), test, direction)
