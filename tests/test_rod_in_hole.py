@@ -19,7 +19,7 @@ from cosserat_fenicsx.models.traits import found_traits, traits_of
 from cosserat_fenicsx.statics.settling import settle, stages_from
 from cosserat_fenicsx.statics.solvers import solvers_of
 from cosserat_fenicsx.well.rod.in_hole import NAMES, UNSEEN, RodErrors
-from cosserat_fenicsx.well.rod.on_wall import apart_mostly
+from cosserat_fenicsx.well.rod.resultants import apart_mostly
 from cosserat_fenicsx.well.rod.rod_in_hole import solve_in_hole
 from cosserat_fenicsx.well.rod.string_scene import on_axis
 

@@ -14,7 +14,7 @@ from reference_wells import in_build_section
 
 import cosserat_fenicsx as cf
 from cosserat_fenicsx.numerics import lobatto_weights
-from cosserat_fenicsx.well.rod.on_wall import contacts_along
+from cosserat_fenicsx.well.rod.resultants import contacts_along
 from cosserat_fenicsx.well.rod.rod_in_hole import solve_in_hole
 
 pytestmark = pytest.mark.serial

@@ -136,10 +136,10 @@ def test_lock_up_in_a_sweep_is_told():
     string = cf.DrillString([cf.Component(None, stiff, 16.6, 0.05)])
     path = cf.WellPath.from_survey([0, 12000], [90, 90], [0, 0])
     hole = cf.Borehole(path, [cf.HoleSection(12000, 2 * (0.05 + 0.041), 0.3)])
-    found = cf.depth_sweep(hole, string, cf.TripIn(), [5000, 9687, 11000], model="soft, buckled")
+    found = cf.depth_sweep(hole, string, cf.TripIn(), [5000, 9687, 11000], model="buckled")
     assert np.isfinite(found.hook_load[0, 0, :2]).all() and np.isnan(found.hook_load[0, 0, 2])
     assert found.values["locked"][0, 0, 2] == pytest.approx(11000 - 9688.9, abs=1) and found.done.all()
-    assert "locks up at md = 1311" in str(found) and found.models[0, 0].tolist() == ["soft, buckled"] * 2 + [""]
+    assert "locks up at md = 1311" in str(found) and found.models[0, 0].tolist() == ["buckled"] * 2 + [""]
     assert "bit at 9687 m: BEYOND WHAT ANY PIPE CARRIES" in str(found)
 
 
@@ -222,7 +222,7 @@ def test_charts(tmp_path):
     figure = found.plot()
     assert [axes.get_xlabel() for axes in figure.axes] == ["hook load (kN)", "surface torque (kN m)"]
     assert len(figure.axes[0].lines) == 6 and figure.axes[0].get_ylim() == pytest.approx((2585, 715))
-    answer = cf.torque_and_drag(HOLE, STRING, cf.Sliding(1e5), mud=MUD, model="soft, buckled")
+    answer = cf.torque_and_drag(HOLE, STRING, cf.Sliding(1e5), mud=MUD, model="buckled")
     with pytest.raises(cf.SceneError, match="ends in .csv"):
         answer.write(tmp_path / "answer.xlsx")
     answer.plot(tmp_path / "answer.png")

@@ -134,7 +134,7 @@ def _common(parser):
     parser.add_argument("--degree", type=int, help="polynomial degree of r and q, 1 to 4 [4]")
     parser.add_argument("--formulation", help="mixed, displacement or multiplier [mixed]")
     parser.add_argument("--model", help="auto, determinate, planar or spatial; of a string in a well auto, "
-                        "soft, 'soft, buckled' or rod [auto]; of a drill-string in motion auto, torsion or 'axial and "
+                        "soft, 'buckled' or rod [auto]; of a drill-string in motion auto, torsion or 'axial and "
                         "torsional' [auto]")  # fmt: skip
     parser.add_argument(
         "--control", help="auto, load (stop at a limit point) or arc (arc length along the path, never back) [auto]"

@@ -27,7 +27,7 @@ _ROD = "the exact rod in contact with the wall, stiff and with its clearance, on
 #: What the models of `torque_and_drag` solve.
 _MODELS = {
     "soft": _SOFT,
-    "soft, buckled": f"{_SOFT[:-1]}; with the wall force of a helix where it is one.",
+    "buckled": f"{_SOFT[:-1]}; with the wall force of a helix where it is one.",
     "rod": _ROD,
     "auto": f"first {_SOFT} Where that is above tol: {_ROD}",
 }

@@ -30,7 +30,7 @@ class TorqueAndDrag(Differentiated, Tabular):
     below. A string of components that are given by numbers has no true tension and no von Mises stress (NaN).
 
     Attributes:
-        model: what was solved: "soft", "soft, buckled" or "rod".
+        model: what was solved: "soft", "buckled" or "rod".
         why: sentences on what decided for the model, and what it leaves out.
         differences: {model: (N, N m)}: hook load and surface torque less those of the other models that were solved.
         error: estimated error of hook load and surface torque as solutions of the model's equations, over the largest

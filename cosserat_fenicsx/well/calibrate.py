@@ -132,7 +132,7 @@ def calibrate_friction(
         measurements: each a `RigMeasurement`, more than there are unknowns.
         block_weight: of block and top drive in the hook loads, N: 0 where they were subtracted, None where they were
             not and it is one more unknown.
-        model: "soft", or "soft, buckled". mud, string, torque_convention: see `torque_and_drag`.
+        model: "soft", or "buckled". mud, string, torque_convention: see `torque_and_drag`.
         confidence: between 0 and 1.
 
     Raises:

@@ -93,6 +93,11 @@ class StringPart(Part, family="component of a string"):
 
     touches: ClassVar[str | None] = None
 
+    @property
+    def body_radius(self):
+        """Of what touches along its whole length where the `diameter` stands out from the body, m."""
+        return self.contact_radius if self.touches is None else self.outer_diameter / 2
+
 
 @dataclass(frozen=True)
 class Component(StringPart):

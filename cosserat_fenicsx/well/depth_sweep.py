@@ -66,7 +66,7 @@ class DepthSweep(Tabular):
 
     @property
     def models(self) -> np.ndarray:
-        """(operations, friction, depths) what was solved: "soft", "soft, buckled" or "rod"; "" where nothing was."""
+        """(operations, friction, depths) what was solved: "soft", "buckled" or "rod"; "" where nothing was."""
         return np.array([*_RUNGS, ""])[np.nan_to_num(self.values["rung"], nan=len(_RUNGS)).astype(int)]
 
     def __len__(self):

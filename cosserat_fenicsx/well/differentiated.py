@@ -33,7 +33,7 @@ class Differentiated:
         Raises:
             SceneError: an unknown name or query, a string with a helix, or the rod in contact.
         """
-        rod = self.model not in ("soft", "soft, buckled")
+        rod = self.model not in ("soft", "buckled")
         if rod or self.solved.helical.any():
             why = "that of the rod in contact" if rod else "that of a string with a helix"
             raise SceneError(

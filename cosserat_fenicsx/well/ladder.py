@@ -37,8 +37,6 @@ _CAUTION = 1.25
 _FINE = 512
 # Length of components whose own bending stiffness does not count, and the shortest distance of a pair of forces, m.
 _SHORT, _NEAREST = 3.0, 0.3
-# Strain beyond what any pipe carries.
-_BREAKS = 0.01
 
 
 class ModelError(NamedTuple):
@@ -229,52 +227,3 @@ def _unit(vectors, axis):
     """Vectors over their lengths; zero stays zero."""
     size = np.linalg.norm(vectors, axis=axis, keepdims=True)
     return vectors / np.where(size > 0, size, 1.0)
-
-
-def reasons(used, asked, soft, solved, sections, left_out, scales):
-    """Sentences on the soft string: whether it is buckled, and what it leaves out.
-
-    Args:
-        used, asked: names of models; soft, solved: the `Solved` without and with buckling; sections: `Sections`;
-        left_out: `ModelError` of hook load and torque; scales: the largest tension and torque.
-    """
-    if asked != "auto":
-        yield f"model = '{asked}' as asked"
-    if np.isnan(sections.EI).any():
-        yield "bending stiffness is not known for all components: these are taken as not buckled"
-    if solved.helical.any():
-        change = float(solved.tension[-1, -1] - soft.tension[-1, -1])
-        length = solved.chain.length[solved.helical].sum()
-        yield (
-            f"helically buckled over {length:.4g} m: the wall force of the helix changes the hook load of the soft "
-            f"string by {change:+.4g} N"
-        )
-    elif asked == "auto":
-        yield "no helical buckling"
-    for what, unit, parts, share in _shares(left_out, scales):
-        if np.isinf(share):
-            yield f"{what} of the {used} string: it may lock up: with a helix from the load of a snake on, it does"
-        elif share > 1e-9:
-            sizes = parts._asdict().items()
-            of = [f"{name.replace('_', ' ')} {value:.3g}" for name, value in sizes if value > 1e-3 * parts.total]
-            yield (
-                f"{what} of the {used} string: the rod in contact may differ by {parts.total:.3g} {unit}, {share:.1e} "
-                f"({', '.join(of)})"
-            )
-
-
-def beyond_pipes(solved, EA):
-    """A sentence where tension strains the string beyond what any pipe carries; EA: (n,) N, NaN where not known."""
-    strain = float(np.nan_to_num(np.abs(solved.tension) / EA[:, None]).max())
-    if strain > _BREAKS:
-        yield f"BEYOND WHAT ANY PIPE CARRIES: the tension strains it by {100 * strain:.3g} %"
-
-
-def too_much(left_out, scales, tol):
-    """Names of the quantities for whose tolerance the soft string leaves out too much."""
-    return [what for what, _, _, share in _shares(left_out, scales) if share > tol]
-
-
-def _shares(left_out, scales):
-    for what, unit, parts, scale in zip(("hook load", "surface torque"), ("N", "N m"), left_out, scales, strict=True):
-        yield what, unit, parts, parts.total / scale if scale > 0 else 0.0

@@ -1,6 +1,8 @@
-"""Torque and drag of a string in its hole: the model is chosen, solved, and said why."""
+"""Choose a torque-and-drag model, solve it, and report the reason."""
 
 from dataclasses import replace
+
+import numpy as np
 
 from cosserat_fenicsx.checks import instance, number, refuse
 from cosserat_fenicsx.errors import InstallationError, NotConverged, SceneError
@@ -8,20 +10,23 @@ from cosserat_fenicsx.well.answer import TorqueAndDrag, scales_of, share
 from cosserat_fenicsx.well.buckled import LockUp, buckled_string
 from cosserat_fenicsx.well.components import DrillString
 from cosserat_fenicsx.well.hole import Borehole, Mud
-from cosserat_fenicsx.well.ladder import beyond_pipes, model_errors, reasons, too_much
+from cosserat_fenicsx.well.ladder import model_errors
 from cosserat_fenicsx.well.operations import Operation
 from cosserat_fenicsx.well.pieces import is_ring, pieces_of, ring_of, sections_of
 from cosserat_fenicsx.well.rod.rod_answer import rod_in_contact
 from cosserat_fenicsx.well.softstring import chain_of, soft_string
 
-AUTO, SOFT, BUCKLED, ROD = "auto", "soft", "soft, buckled", "rod"
+AUTO, SOFT, BUCKLED, ROD = "auto", "soft", "buckled", "rod"
 MODELS = (AUTO, SOFT, BUCKLED, ROD)
 CONVENTIONS = ("coulomb", "johancsik")
+_QUANTITIES = {"hook load": "N", "surface torque": "N m"}
 _LOCKS_UP = "WITH THE WALL FORCE OF A HELIX IT LOCKS UP"
 _NO_ROD = (
-    "the exact rod in contact is not tried: of the many equilibria of a string that is buckled beyond the load of a "
-    "helix it need not find the one that is there; model='rod' looks for one"
+    "the exact rod in contact is not tried: beyond helical buckling there are many equilibria, and it may return "
+    "another one than the string's; use model='rod' to force it"
 )
+# Tension that strains a string by more than this is beyond what any pipe carries.
+_BREAKS = 0.01
 
 
 def torque_and_drag(
@@ -44,7 +49,7 @@ def torque_and_drag(
             `Sliding(weight)`, `Ream(speed, rpm)`, `BackReam(speed, rpm)` or `Static()`.
         mud: a `Mud`; None where all components have their weight in mud.
         depth: measured depth of the string's lower end, m; None for the bottom of the hole.
-        model: "soft": a perfectly flexible string on the axis; "soft, buckled": with the wall force of a helix where
+        model: "soft": a perfectly flexible string on the axis; "buckled": with the wall force of a helix where
             the compression exceeds its load; "rod": the exact rod in contact, which is stiff and has a clearance;
             "auto": the first of these that suffices for `tol`, but not the rod where there is a helix, since it has
             many equilibria there.
@@ -114,26 +119,60 @@ def _flexible(given, model, tol, torque_convention, pieces, laid):
     sections = sections_of([place.component for place in laid])
     rings = [ring_of(place, given[0]) for place in laid if is_ring(place.component)]
     soft = soft_string(chain_of(pieces, torque_convention == "coulomb"), -operation.weight, operation.torque, tol)
-    buckled, why = None, []
+    buckled, locked = None, []
     if model != SOFT:
         try:
             buckled = buckled_string(soft, pieces, sections, tol)
         except LockUp as stuck:
             if model != ROD:
                 raise
-            why.append(f"{_LOCKS_UP}: {stuck}")
+            locked.append(f"{_LOCKS_UP}: {stuck}")
     solved, used = buckled or soft, BUCKLED if buckled or model == BUCKLED else SOFT
     left_out, scales = model_errors(path, pieces, soft, solved, sections, rings), scales_of(solved, pieces)
     error = max(map(share, (solved.error, solved.torque_error), scales))
-    model_error = max(share(parts.total, scale) for parts, scale in zip(left_out, scales, strict=True))
-    why = [*reasons(used, model, soft, solved, sections, left_out, scales), *why]
-    why += beyond_pipes(solved, sections.EA[pieces.component[solved.chain.origin]])
-    beyond = too_much(left_out, scales, tol - error)
-    told = [*why, *(f"NOT ENOUGH for tol = {tol:g} in the {what}" for what in beyond)]
+    shares = {what: share(parts.total, scale) for what, parts, scale in zip(_QUANTITIES, left_out, scales, strict=True)}
+    why = [f"model = '{model}' as asked"] if model != AUTO else []
+    why += [*_on_buckling(model, soft, solved, sections), *_on_what_is_left_out(used, left_out, shares), *locked]
+    EA = sections.EA[pieces.component[solved.chain.origin]][:, None]
+    strain = float(np.nan_to_num(np.abs(solved.tension) / EA).max())
+    if strain > _BREAKS:
+        why.append(f"BEYOND WHAT ANY PIPE CARRIES: the tension strains it by {100 * strain:.3g} %")
+    beyond = [what for what, part in shares.items() if part > tol - error]
+    whole = [*why, *(f"NOT ENOUGH for tol = {tol:g} in the {what}" for what in beyond)]
     if model == AUTO:
-        why.append(f"tol = {tol:g} is less in the {' and the '.join(beyond)}: it takes the exact rod in contact")
+        exceeding = " and the ".join(beyond)
+        why.append(f"the {used} string's error in the {exceeding} exceeds tol = {tol:g}: solving the rod in contact")
     ends = [(x.tension[-1, -1], x.torque[-1, -1]) for x in (solved, soft)]
     differences = {SOFT: tuple(float(a - b) for a, b in zip(*ends, strict=True))} if buckled else {}
-    answer = TorqueAndDrag(*given, used, tol, torque_convention, tuple(told), error, model_error, differences, laid,
-                           pieces, solved)  # fmt: skip
+    answer = TorqueAndDrag(*given, used, tol, torque_convention, tuple(whole), error, max(shares.values()), differences,
+                           laid, pieces, solved)  # fmt: skip
     return answer, why
+
+
+def _on_buckling(asked, soft, solved, sections):
+    """Sentences on whether the soft string is buckled, from the `Solved` without and with buckling."""
+    if np.isnan(sections.EI).any():
+        yield "bending stiffness is not known for all components: these are taken as not buckled"
+    if solved.helical.any():
+        change = float(solved.tension[-1, -1] - soft.tension[-1, -1])
+        length = solved.chain.length[solved.helical].sum()
+        yield (
+            f"helically buckled over {length:.4g} m: the wall force of the helix changes the hook load of the soft "
+            f"string by {change:+.4g} N"
+        )
+    elif asked == AUTO:
+        yield "no helical buckling"
+
+
+def _on_what_is_left_out(used, left_out, shares):
+    """Sentences on the `ModelError` of each quantity, and its share of the quantity."""
+    for (what, unit), parts, part in zip(_QUANTITIES.items(), left_out, shares.values(), strict=True):
+        if np.isinf(part):
+            yield f"{what} of the {used} string: it may lock up: with a helix from the load of a snake on, it does"
+        elif part > 1e-9:
+            sizes = parts._asdict().items()
+            of = [f"{name.replace('_', ' ')} {value:.3g}" for name, value in sizes if value > 1e-3 * parts.total]
+            yield (
+                f"{what} of the {used} string: the rod in contact may differ by {parts.total:.3g} {unit}, {part:.1e} "
+                f"({', '.join(of)})"
+            )

@@ -8,6 +8,7 @@ Their bodies, and all other components, touch with their contact radius along th
 import contextlib
 from dataclasses import dataclass, fields
 from functools import cached_property
+from operator import attrgetter
 from typing import ClassVar
 
 import numpy as np
@@ -19,11 +20,16 @@ from cosserat_fenicsx.well.answer import TorqueAndDrag, scales_of, share
 from cosserat_fenicsx.well.components import weight_in_mud
 from cosserat_fenicsx.well.contacts import WallContact, name_of_side
 from cosserat_fenicsx.well.pieces import is_ring, ring_of
-from cosserat_fenicsx.well.rod.on_wall import MOSTLY
+from cosserat_fenicsx.well.rod.resultants import MOSTLY
 from cosserat_fenicsx.well.rod.string_scene import energy_of_helix, turns_of_helix
 
 # Inclinations (rad) below this have no high side.
 _VERTICAL = 1e-9
+
+
+def _of_rod(name, doc):
+    """The attribute of the `InHole` with the same name."""
+    return property(attrgetter(f"solved.{name}"), doc=doc)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -68,15 +74,29 @@ class RodInContact(TorqueAndDrag):
         """Whether the rod is stable, and its errors of hook load and surface torque are within `tol`."""
         return super().enough and self.solved.negative_modes == 0
 
-    @property
-    def hook_load(self):
-        """Force along the hole on the held end, N, without block and sheaves."""
-        return self.solved.hook_load
-
-    @property
-    def surface_torque(self):
-        """N m."""
-        return self.solved.surface_torque
+    hook_load = _of_rod("hook_load", "Force along the hole on the held end, N, without block and sheaves.")
+    surface_torque = _of_rod("surface_torque", "N m.")
+    tension = _of_rod("tension", "Effective tension, N.")
+    torque = _of_rod("torque", "N m.")
+    side_force = _of_rod("side_force", "Force of the wall per length, N/m, across the hole and without friction.")
+    distributed_force = _of_rod(
+        "distributed_force",
+        "See `TorqueAndDrag`: its integral and the forces at points are the `wall_force` of `solved`.",
+    )
+    clearance = _of_rod(
+        "clearance",
+        "Radius of the hole less that of the string where it is solved: of the blades in the middle of a stabiliser, "
+        "of the bit at its lower end, else of the body or the tool joints, m.",
+    )
+    bending_moment = _of_rod("bending_moment", "N m: of the rod itself.")
+    errors_along = _of_rod(
+        "errors_along",
+        '{"side_force": N/m, "bending_moment": N m}: their estimated errors on 95 % of the string\'s length; beside '
+        "forces at points they may be larger. `error` and `enough` are about hook load and surface torque alone.",
+    )
+    standoff = _of_rod("standoff", "Distance from the wall over the clearance: 0 in contact, 1 on the axis.")
+    offset = _of_rod("offset", "(n, 3) from the hole's axis to the string, m.")
+    position = _of_rod("position", "(n, 3) north, east, down of the string, m.")
 
     @cached_property
     def _gravity(self):
@@ -92,58 +112,6 @@ class RodInContact(TorqueAndDrag):
     def md(self):
         """Measured depths, m."""
         return np.maximum.accumulate(self.solved.md)  # rounding
-
-    @property
-    def tension(self):
-        """Effective tension, N."""
-        return self.solved.tension
-
-    @property
-    def torque(self):
-        """N m."""
-        return self.solved.torque
-
-    @property
-    def side_force(self):
-        """Force of the wall per length, N/m, across the hole and without friction."""
-        return self.solved.side_force
-
-    @property
-    def distributed_force(self):
-        """See `TorqueAndDrag`: its integral and the forces at points are the `wall_force` of `solved`."""
-        return self.solved.distributed_force
-
-    @property
-    def clearance(self):
-        """Radius of the hole less that of the string where it is solved: of the blades in the middle of a stabiliser,
-        of the bit at its lower end, else of the body or the tool joints, m."""
-        return self.solved.clearance
-
-    @property
-    def bending_moment(self):
-        """N m: of the rod itself."""
-        return self.solved.bending_moment
-
-    @property
-    def errors_along(self):
-        """{"side_force": N/m, "bending_moment": N m}: their estimated errors on 95 % of the string's length; beside
-        forces at points they may be larger. `error` and `enough` are about hook load and surface torque alone."""
-        return self.solved.errors_along
-
-    @property
-    def standoff(self):
-        """Distance from the wall over the clearance: 0 in contact, 1 on the axis."""
-        return self.solved.standoff
-
-    @property
-    def offset(self):
-        """(n, 3) from the hole's axis to the string, m."""
-        return self.solved.offset
-
-    @property
-    def position(self):
-        """(n, 3) north, east, down of the string, m."""
-        return self.solved.position
 
     @cached_property
     def contact_side(self):
@@ -254,7 +222,7 @@ def rod_in_contact(flexible, decided, progress=None, exact=True):
                 [place.bottom - place.top for place in laid],
                 [place.component.stiffness for place in laid],
                 [weight_in_mud(place.component, flexible.mud) for place in laid],
-                [_body_radius(place.component) for place in laid],
+                [place.component.body_radius for place in laid],
                 radius=_along(hole, flexible.depth, lambda section: section.diameter / 2),
                 friction=_along(hole, flexible.depth, lambda section: section.friction),
                 slip=[operation.direction(place.component.contact_radius) for place in laid],
@@ -332,7 +300,7 @@ def _check(place, hole, mud):
             f"{component.name}: it weighs {weight:g} N/m in mud: expected a positive weight for model = 'rod'"
         )
     inside = [x.to for x in hole.sections if place.top < x.to < place.bottom]
-    narrowest, wide = float(hole.at([*inside, place.bottom], "diameter").min()), 2 * _body_radius(component)
+    narrowest, wide = float(hole.at([*inside, place.bottom], "diameter").min()), 2 * component.body_radius
     if not wide < narrowest:
         raise SceneError(
             f"{component.name}: its body is {wide:g} m wide in a hole of {narrowest:g} m: expected a clearance for "
@@ -348,8 +316,3 @@ def _along(hole, depth, value):
             found.append((section.to, value(section)))
         above = section.to
     return found
-
-
-def _body_radius(component):
-    """m; of what touches along its whole length."""
-    return component.outer_diameter / 2 if is_ring(component) else component.contact_radius
