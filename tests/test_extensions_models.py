@@ -3,8 +3,11 @@
 import numpy as np
 import pytest
 from extensions.augmented import Augmented
+from extensions.hardening import Hardening
+from extensions.pressure import AcrossRod
 
 import cosserat_fenicsx as cf
+from cosserat_fenicsx.numerics import directors
 
 SECTION = cf.Stiffness((1e4, 1e4), 2e4, (10.0, 8.0), 7.0, mass=1.0, inertia=(0.1, 0.1, 0.2))
 ROD = cf.Rod(cf.Line((0, 0, 0), (0, 0, 1.0)), SECTION, name="column")
@@ -24,3 +27,55 @@ def test_a_formulation(tmp_path):
     assert cf.read_path(tmp_path / "path.h5").formulation == "augmented"
     with pytest.raises(cf.SceneError, match="did you mean 'augmented'"):
         cf.solve(BENT, [1.0], formulation="augmentd")
+
+
+def pressed(law, **wall):
+    """A rod that its guides keep straight, pressed on a bed of 100 N/m^2 and against a wall of 1e3 N/m^2 by 8 N/m."""
+    guides = [cf.Roller(ROD.start, axis) for axis in ((0, 0, 1.0), (0, 1.0, 0))]
+    guides += [cf.Prescribed(station, rotation=(0, 0, 0)) for station in (ROD.start, ROD.end)]
+    wall = cf.Wall(ROD, (0, 0, 0), (0, 0, 1.0), clearance=0.01, stiffness=1e3, law=law)
+    return cf.Scene([ROD], guides, [cf.LineForce(ROD, (8.0, 0, 0)), cf.Foundation(ROD, 100.0), wall])
+
+
+@pytest.mark.parametrize("model", ["planar", "spatial"])
+def test_a_contact_law(model):
+    """Bed and wall together balance the load; without a law the wall's part is k d."""
+    for law, growth in ((Hardening(0.004), 1 / 0.004), (None, 0.0)):
+        path = cf.solve(pressed(law), [1.0], elements=2, model=model)
+        u = path.displacement(ROD.at(0.5))[0, 0]
+        depth = u - 0.01
+        assert depth > 1e-3
+        assert 100.0 * u + 1e3 * depth * (1 + growth * depth) == pytest.approx(8.0, rel=1e-6)
+
+
+def test_a_contact_law_in_motion():
+    """A rod that flies against the wall comes to rest where k d^2/2 (1 + 2 d/(3 a)) is its energy, here and across."""
+    k, a, v = 1e3, 0.004, 0.2
+    scene = cf.Scene(
+        [ROD], [], [cf.Wall(ROD, (0, 0, 0), (0, 0, 1.0), clearance=1e-4, stiffness=k, law=Hardening(a))],
+        velocities=[cf.InitialVelocity(ROD, linear=(v, 0, 0))],
+    )  # fmt: skip
+    history = cf.simulate(scene, 0.2, dt=2e-4, elements=1, degree=2)
+    depth = history.displacement(ROD.at(0.5))[:, 0].max() - 1e-4
+    assert k * depth**2 * (1 + 2 * depth / (3 * a)) == pytest.approx(v**2, rel=1e-3)
+    assert history.displacement(ROD.end)[:, 0].min() == pytest.approx(-depth - 1e-4, rel=1e-3)
+
+
+def test_a_law_is_refused_in_words():
+    with pytest.raises(cf.SceneError, match="Hardening.doubling = -1: expected a positive number"):
+        Hardening(-1)
+    with pytest.raises(cf.SceneError, match="Wall.law = 'stiff': expected a law of contact"):
+        pressed("stiff")
+
+
+def test_a_load():
+    """Across the rod in equilibrium and in motion: what holds it feels the sum of its force."""
+    scene = cf.Scene([ROD], [cf.Clamp(ROD.start)], [AcrossRod(ROD, 2.0)])
+    path = cf.solve(scene, [1.0], elements=4)
+    s, weights = np.polynomial.legendre.leggauss(12)
+    turned = [directors(path.rotation(ROD.at((1 + x) / 2)))[0, :, 0] for x in s]
+    across = weights @ turned / 2
+    np.testing.assert_allclose(path.reaction(scene.supports[0])[0][0], -2.0 * across, atol=1e-6)
+    assert path.model == "planar"
+    history = cf.simulate(scene, 0.05, dt=1e-3, elements=2)
+    assert history.displacement(ROD.end)[-1, 0] > 0

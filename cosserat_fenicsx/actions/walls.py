@@ -6,13 +6,15 @@ and `HoleRing`, in motions, set-valued friction.
 
 from collections import namedtuple
 from dataclasses import dataclass, field
+from functools import cache
 
 import numpy as np
 import ufl
 
-from cosserat_fenicsx.checks import Numbers, direction, number, positive, refuse, store, vector
+from cosserat_fenicsx.checks import Numbers, direction, instance, number, positive, refuse, store, vector
 from cosserat_fenicsx.errors import SceneError
-from cosserat_fenicsx.forms.contact import wall_work
+from cosserat_fenicsx.forms.contact import linear, wall_work
+from cosserat_fenicsx.parts import Part, fields_of
 from cosserat_fenicsx.scene import action
 from cosserat_fenicsx.scene.action import LineAction, PointAction
 from cosserat_fenicsx.scene.rod import Rod, RodOrName, Station, StationOrName, is_known
@@ -22,10 +24,62 @@ _SAMPLES, _OUTSIDE = 257, 1e-9
 # Distances from the axis below this fraction of the clearance are replaced by it: the radial direction is undefined on
 # the axis, and there is no contact there.
 _ON_AXIS = 1e-6
+# Half the length over which sizes and coefficients of the tube change at a jump, over its smallest radius; and over the
+# shortest piece, at most.
+_RAMP, _OF_PIECE = 0.05, 0.25
+# Points along a tube in a picture.
+_DRAWN = 201
+
+
+class ContactLaw(Part, family="contact law"):
+    """Base of laws of contact: the pressure of a wall that a rod has penetrated.
+
+    A law is a frozen dataclass with a static method ``pressure(depth, stiffness, *data)`` -> UFL: force per area of the
+    wall (per length at a station) from the depth of penetration, from 0 on, the stiffness of the wall, and the data of
+    the law.
+    """
+
+    def data(self):
+        """The `Datum`s of the law: its fields."""
+        kinds = fields_of(type(self)).items()
+        return tuple(action.scalar(getattr(self, name), kind.unit or "1") for name, kind in kinds)
+
+
+@cache
+def _with_law(work, pressure):
+    def of_law(point, test, *data):
+        return work(point, test, *data, pressure=pressure)
+
+    return of_law
+
+
+class _Pressing:
+    """A wall whose pressure may have a `law`. `wall_work`: its virtual work, a function with the keyword `pressure`."""
+
+    law = None
+
+    @property
+    def work(self):
+        return self.wall_work if self.law is None else _with_law(self.wall_work, type(self.law).pressure)
+
+    def _law_data(self):
+        return () if self.law is None else self.law.data()
+
+    def _check_law(self):
+        if self.law is not None:
+            instance(self, "law", self.law, ContactLaw, "a law of contact, such as a class of your own")
+
+
+def straight_wall(point, test, a, t, clearance, kp, *law, pressure=linear):
+    """Virtual work of a straight wall without friction; a, t: a point and the direction of its axis."""
+    d = point.r - a
+    away = d - ufl.dot(d, t) * t
+    rho = ufl.sqrt(ufl.max_value(ufl.dot(away, away), (_ON_AXIS * clearance) ** 2))
+    return -pressure(ufl.max_value(rho - clearance, 0), kp, *law) / rho * ufl.dot(away, test.phi_r)
 
 
 @dataclass(frozen=True)
-class Wall(LineAction):
+class Wall(_Pressing, LineAction):
     """A frictionless cylindrical wall that confines a rod's centreline by a penalty: a force kp max(rho - clearance, 0)
     per unit of reference length towards the straight axis, rho the distance from it.
 
@@ -38,6 +92,7 @@ class Wall(LineAction):
         point: a point of the axis, m, inertial; direction: that of the axis.
         clearance: radius of the hole minus that of the rod, m.
         stiffness: kp, N/m^2. The penetration is the force per unit length over kp; rock and steel have 1e9 and more.
+        law: None, or a `ContactLaw` in place of the pressure in proportion to the penetration.
 
     Raises:
         SceneError: not a rod, no direction, numbers that are not positive, or a rod that lies outside the wall at rest.
@@ -48,8 +103,9 @@ class Wall(LineAction):
     direction: Numbers
     clearance: float
     stiffness: float = 1e9
+    law: ContactLaw | None = None
 
-    scaled, at_nodes, presses = False, True, True
+    scaled, at_nodes, presses, wall_work = False, True, True, staticmethod(straight_wall)
 
     def __post_init__(self):
         store(
@@ -57,6 +113,7 @@ class Wall(LineAction):
         )
         store(self, clearance=positive(self, "clearance", self.clearance, "m"))
         store(self, stiffness=positive(self, "stiffness", self.stiffness, "N/m^2"))
+        self._check_law()
         if is_known(self, "rod", Rod):
             self._check_inside()
 
@@ -75,28 +132,13 @@ class Wall(LineAction):
     def data(self, rod, s):
         """See `Action`."""
         axis = action.vector(self.point, "m from origin"), action.vector(self.direction, "1")
-        return (*axis, action.scalar(self.clearance, "m"), action.scalar(self.stiffness, "N/m^2"))
+        sizes = action.scalar(self.clearance, "m"), action.scalar(self.stiffness, "N/m^2")
+        return *axis, *sizes, *self._law_data()
 
     def holds(self, scene):
         """See `Action`: it confines the rod across the axis."""
         across = np.linalg.svd(np.array([self.direction]))[2][1:]
         return [(station, np.r_[row, 0, 0, 0]) for station in (self.rod.start, self.rod.end) for row in across]
-
-    @staticmethod
-    def work(point, test, a, t, clearance, kp):
-        """See `Action`."""
-        d = point.r - a
-        away = d - ufl.dot(d, t) * t
-        rho = ufl.sqrt(ufl.max_value(ufl.dot(away, away), (_ON_AXIS * clearance) ** 2))
-        pressure = kp * ufl.max_value(rho - clearance, 0)
-        return -pressure / rho * ufl.dot(away, test.phi_r)
-
-
-# Half the length over which sizes and coefficients of the tube change at a jump, over its smallest radius; and over the
-# shortest piece, at most.
-_RAMP, _OF_PIECE = 0.05, 0.25
-# Points along a tube in a picture.
-_DRAWN = 201
 
 
 @dataclass
@@ -117,10 +159,10 @@ class Stage:
         self.anchor = self.last.copy()
 
 
-class _Confined:
+class _Confined(_Pressing):
     """What walls along rods and at stations share."""
 
-    scaled, work = False, staticmethod(wall_work)
+    scaled, wall_work = False, staticmethod(wall_work)
     traits = {"dead": False, "known_force": False, "rates": False, "turns": True, "flat": False}
 
     def _check(self, unit):
@@ -128,6 +170,7 @@ class _Confined:
             refuse(self, "path", self.path, "the axis of the tube, such as a WellPath")
         store(self, stiffness=positive(self, "stiffness", self.stiffness, unit))
         store(self, begins=number(self, "begins", self.begins, "a number (m)", np.isfinite))
+        self._check_law()
 
     def data(self, rod, s):
         """See `Action`: as where the rod lies on the axis, to which the spring leads again."""
@@ -152,6 +195,7 @@ class _Confined:
             action.scalar(slip[:, 0] * friction, "1"),
             action.scalar(slip[:, 1] * friction, "1"),
             action.scalar(arm, "m"),
+            *self._law_data(),
         )
 
 
@@ -176,6 +220,7 @@ class TubeWall(_Confined, LineAction):
             along the rod.
         begins: measured depth near which the rod's start lies, m.
         has_arm: whether friction has a moment about the centreline; False where it acts on the centreline itself.
+        law: None, or a `ContactLaw` in place of the pressure in proportion to the penetration.
 
     Raises:
         SceneError: numbers outside their range, a rod as wide as the tube, or a direction of slip without unit length.
@@ -190,6 +235,7 @@ class TubeWall(_Confined, LineAction):
     slip: Numbers = (0.0, 0.0)
     begins: float = 0.0
     has_arm: bool = True
+    law: ContactLaw | None = None
     stage: Stage = field(default_factory=Stage, init=False, repr=False, compare=False)
 
     at_nodes, presses, unit = True, True, "N/m^2"
@@ -270,7 +316,7 @@ class TubeRing(_Confined, PointAction):
         contact_radius: radius of the ring, m, the arm of its friction.
         stiffness: N/m.
         friction: friction coefficient.
-        slip, begins: see `TubeWall`.
+        slip, begins, law: see `TubeWall`.
 
     Raises:
         SceneError: numbers outside their range.
@@ -284,6 +330,7 @@ class TubeRing(_Confined, PointAction):
     friction: float = 0.0
     slip: Numbers = (0.0, 0.0)
     begins: float = 0.0
+    law: ContactLaw | None = None
     stage: Stage = field(default_factory=Stage, init=False, repr=False, compare=False)
 
     unit = "N/m"
@@ -419,6 +466,7 @@ class HoleWall(_InMotion, TubeWall):
     """
 
     slip: Numbers = field(default=(0.0, 0.0), init=False, repr=False, compare=False)
+    law: None = field(default=None, init=False, repr=False, compare=False)
     has_arm: bool = field(default=True, init=False, repr=False, compare=False)
     damping: float = 0.0
     kinetic: float = 1.0
@@ -443,6 +491,7 @@ class HoleRing(_InMotion, TubeRing):
     """
 
     slip: Numbers = field(default=(0.0, 0.0), init=False, repr=False, compare=False)
+    law: None = field(default=None, init=False, repr=False, compare=False)
     damping: float = 0.0
     kinetic: float = 1.0
     speed: float = 0.1
