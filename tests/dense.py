@@ -18,7 +18,7 @@ def tangent(problem):
     whole = np.zeros((size + 1, size + 1))
     np.add.at(whole, (rows[:, :, None], rows[:, None, :]), problem.tangent_form.matrices())
     if problem.ties:
-        of_nodes, reactions, equations = tangent_of_ties(problem.ties, problem.eta)
+        of_nodes, reactions, equations = tangent_of_ties(problem.ties, problem.tie_load_factor)
         nodes = problem.ties.rows.ravel()
         multipliers = numbering.first_multiplier + np.arange(numbering.multipliers)
         for i, j, part in ((nodes, nodes, of_nodes), (nodes, multipliers, reactions), (multipliers, nodes, equations)):

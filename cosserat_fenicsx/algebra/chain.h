@@ -139,23 +139,33 @@ typedef struct {
     void *self;                     /* for the hook */
 } second_variation;
 
-/* A continuation in the load factor, see statics/path/load_control.py for what its numbers mean. */
+/* How long the steps of a continuation are, and which of them it accepts: see `Limits` in statics/path/track.py. */
+typedef struct {
+    double far, intended, slight, leap; /* distances from the predictor */
+    int easy, hard;                 /* Newton iterations */
+    double step, smallest, largest; /* the next step; bounds */
+    double shrink;                  /* factor of a step that is rejected */
+    int rejections, patience, accepted; /* rejected steps without two accepted ones between, and most of them; whether the
+                                       last one was accepted */
+} step_control;
+
+/* A continuation in the load factor, see statics/path/load_control.py. */
 typedef struct {
     petsc *with;
     newton *newton;
     second_variation *stability;
+    step_control *control;
     void *snes, *x;
-    double *eta;
+    double *load_factor;
     int numbers, moves, known, negative; /* of a point: unknowns, then carried ones; displacements of a node; points */
     double turn, loads;
-    double *points, etas[3];        /* (3, numbers), the last one is the current */
-    double step, smallest, largest, shrink, slight, far, leap, intended, change, patience;
-    int easy, hard, rejections, allowed, accepted;
-    const double *targets;
-    int count, next, every;         /* whether every step is recorded, or the targets alone */
+    double *points, known_load_factors[3]; /* (3, numbers), the last one is the current */
+    double change, patience;        /* of the load factor for its derivative; seconds after which to return */
+    const double *load_factors;     /* to reach, in this order */
+    int count, next, every;         /* whether every step is recorded, or these alone */
     kernel *fields;                 /* of results, or 0 */
     int records, room, iterations, steps;
-    double *recorded, *recorded_fields, *recorded_eta; /* (room, unknowns), (room, elements, size), (room,) */
+    double *recorded, *recorded_fields, *recorded_load_factors; /* (room, unknowns), (room, elements, size), (room,) */
     int *recorded_iterations, *recorded_steps;
     double *work;                   /* (6, numbers) */
 } sweep;
@@ -186,6 +196,12 @@ int broken(const contact *c);
 void slips(const contact *c, double *size);
 double stored(const contact *c, int at_start);
 double lost(const contact *c, const double *before);
+
+double step_goal(const step_control *c, double here, double load_factor);
+double step_growth(const step_control *c, double off, int order, int iterations);
+int judge_step(step_control *c, int known, double off, double along, double size, double apart);
+void accept_step(step_control *c, double taken, double growth);
+int reject_step(step_control *c, double taken);
 
 int negative_modes(second_variation *v, int *sideways);
 int run(sweep *s);

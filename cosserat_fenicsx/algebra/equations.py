@@ -61,6 +61,7 @@ class Equations(Called):
 
     Attributes:
         x, b: unknowns, residual; the model's state follows x.
+        load_factor_array: array of one value, the factor of loads and prescribed motions.
         ties: the `TieRows` of the constraint equations of supports and joints, or None.
         elimination: the `Elimination` of the tangent; interface: its `Interface`, or None.
         tangent_form: the `Packed` tangent.
@@ -82,6 +83,8 @@ class Equations(Called):
         self.x, self.b = numbering.vector(), numbering.vector()
         self._vector_of_x = numbering.vector()  # for transfers between ranks
         self._state = model.state.x.array
+        # written in place: the setter of a constant's `value` takes as long as a residual of few elements
+        self.load_factor_array = model.load_factor.value
         self._local = np.zeros(len(numbering.rows))
         self._fill(hooks)
 
@@ -123,6 +126,11 @@ class Equations(Called):
         """Set up to three (vector, array of its factor) to subtract from the residual."""
         for k, (vector, factor) in enumerate(loads):
             self.c.load[k], self.c.factor[k] = self.doubles(vector), self.doubles(factor)
+
+    @property
+    def tie_load_factor(self):
+        """The load factor of prescribed motions; 0 while permanent loads are applied, before all others."""
+        return float(self.load_factor_array)
 
     # -- for solvers -------------------------------------------------------------------------------------------------
 
@@ -208,7 +216,7 @@ class Equations(Called):
     def _change_residual(self, x, b):
         """Change the residual b at x, arrays of this rank's unknowns."""
         if self.ties:
-            self.ties.add_residual(b, self.eta)
+            self.ties.add_residual(b, self.tie_load_factor)
 
     def _touch(self, x, change):
         """Where nodes may touch: change Newton's step, which is subtracted from x; arrays of this rank's unknowns."""
@@ -225,7 +233,7 @@ class Equations(Called):
         """The tangent's part of supports and joints, see `Interface.factor`."""
         if not self.ties:
             return (np.empty(0),)
-        return self.ties.tangent_blocks(self.eta)
+        return self.ties.tangent_blocks(self.tie_load_factor)
 
     def _solve_interface(self):
         b, comm = self._on_interface, self.numbering.comm
@@ -246,14 +254,14 @@ class Equations(Called):
     def tie_forces(self):
         """(ties, 2, 6) force and moment, inertial, that every equation of supports and joints exerts on its two
         stations, on all ranks; zero for the ground."""
-        return self.ties.forces(self.eta) if self.ties else np.empty((0, 2, 6))
+        return self.ties.forces(self.tie_load_factor) if self.ties else np.empty((0, 2, 6))
 
-    def at_ties(self, x, eta):
+    def at_ties(self, x, load_factor):
         """(multipliers, `tie_forces`) at unknowns x (this rank's part) and a load factor; the ties stay there."""
         if not self.ties:
             return np.empty(0), np.empty((0, 2, 6))
         self.ties.see(x)
-        return self.ties.everywhere(), self.ties.forces(eta)
+        return self.ties.everywhere(), self.ties.forces(load_factor)
 
     def multipliers(self):
         """Multipliers (reactions) of the constraint equations, on all ranks."""

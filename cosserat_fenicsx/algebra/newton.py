@@ -192,7 +192,7 @@ class BorderedNewton(Newton):
             neutral: (owned unknowns,) a neutral motion, or None.
         """
         self._normal, self._weight, self.neutral = normal, weight, neutral
-        self._x0, self._eta0 = self.problem.x.array_r.copy(), self.problem.load_factor
+        self._x0, self._load_factor0 = self.problem.x.array_r.copy(), self.problem.load_factor
 
     def apply(self, pc, residual, step):
         """PETSc calls this to compute the step, which it subtracts from x."""
@@ -203,14 +203,14 @@ class BorderedNewton(Newton):
             self._leave_out_neutral(step)
         if self._normal is None:
             return
-        eta, normal = problem.load_factor, self._normal
+        load_factor, normal = problem.load_factor, self._normal
         off = problem.x.array_r - self._x0 - step.array_r
-        left = inner(normal, off) + self._weight * (eta - self._eta0)
+        left = inner(normal, off) + self._weight * (load_factor - self._load_factor0)
         rise = inner(normal, self._slope.array_r) - self._weight
         change = left / rise if rise else math.inf
         step.axpy(change, self._slope)
         if math.isfinite(change):
-            problem.set_load_factor(eta + change)
+            problem.set_load_factor(load_factor + change)
             self._take_loads()
 
     def _leave_out_neutral(self, step):

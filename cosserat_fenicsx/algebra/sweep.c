@@ -7,7 +7,7 @@
 #include <time.h>
 
 enum { DONE, LEFT, LATER, FULL };
-enum { ACCEPTED, REJECTED, UNSURE };
+enum { ACCEPTED, UNSURE, REJECTED, TOO_FAR, OPPOSITE }; /* the last three reject a step */
 enum { COUNT = 128, FAILED_COUNT = -100 };
 
 static int python_hook(void *self, int what, double *a, double *b);
@@ -52,37 +52,82 @@ static double largest(const sweep *s, const double *a, const double *b)
     return sqrt(fmax(moved, s->turn * s->turn * turned));
 }
 
-/* What to do with a step whose end differs from the predictor, see `Continuation._near`. */
-static int judge(sweep *s, const double *here, const double *guess, const double *found, double off)
+/* ---- step control, for Python too ---------------------------------------------------------------------------------- */
+
+/* The load factor that the next step from `here` to a load factor ends at. */
+double step_goal(const step_control *c, double here, double load_factor)
+{
+    const double left = load_factor - here, step = fmin(c->step, c->largest);
+    if (fabs(left) <= fmin(1.2 * step, c->largest)) return load_factor;
+    return fabs(left) < 2 * step ? here + left / 2 : here + copysign(step, left);
+}
+
+/* Factor from an accepted step's length to the next one's; off: distance from the predictor, whose error is of an order
+   in the length. */
+double step_growth(const step_control *c, double off, int order, int iterations)
+{
+    const double growth = fmin(fmax(pow(c->intended / fmax(off, 1e-12), 1.0 / order), 0.5), 2);
+    if (iterations >= c->hard) return 0.5;
+    return iterations > c->easy ? fmin(growth, 1) : growth;
+}
+
+/* What to do with a step whose end is `off` the predictor, from the number of known points and, of the increments to the
+   end and to the predictor, their inner product, the latter's square, and the square of their difference. */
+int judge_step(step_control *c, int known, double off, double along, double size, double apart)
+{
+    c->shrink = 0.5;
+    if (off <= c->slight) return ACCEPTED;
+    if (off > c->far) {
+        c->shrink = fmin(fmax(pow(c->intended / off, 1.0 / known), 0.1), 0.5);
+        return TOO_FAR;
+    }
+    /* The mirrored branch of a nearly perfect pitchfork is stable about a section's stiff axis, so that neither the
+       distance nor the number of negative modes reveals it. */
+    if (known > 1 && along <= 0 && size > 0) return OPPOSITE;
+    return known > 1 && apart <= c->leap * c->leap * size ? ACCEPTED : UNSURE;
+}
+
+void accept_step(step_control *c, double taken, double growth)
+{
+    c->step = growth >= 1 ? fmax(c->step, taken * growth) : taken * growth;
+    if (c->accepted) c->rejections = 0;
+    c->accepted = 1;
+}
+
+/* Whether to give up. */
+int reject_step(step_control *c, double taken)
+{
+    c->rejections++, c->accepted = 0;
+    c->step = taken * c->shrink;
+    return c->step < c->smallest || c->rejections >= c->patience;
+}
+
+/* ---- the sweep --------------------------------------------------------------------------------------------------- */
+
+/* What to do with a step, see `judge_step`. */
+static int judge(const sweep *s, const double *here, const double *guess, const double *found, double off)
 {
     const newton *n = s->newton;
     double along = 0, size = 0, apart = 0;
-    s->shrink = 0.5;
-    if (off <= s->slight) return ACCEPTED;
-    if (off > s->far) {
-        s->shrink = fmin(fmax(pow(s->intended / off, 1.0 / s->known), 0.1), 0.5);
-        return REJECTED;
-    }
     for (int i = 0; i < n->nodes; i++)
         for (int j = i * n->block; j < i * n->block + n->motion; j++) {
             const double move = found[j] - here[j], increment = guess[j] - here[j];
             along += move * increment, size += increment * increment;
             apart += (move - increment) * (move - increment);
         }
-    if (s->known > 1 && along <= 0 && size > 0) return REJECTED;
-    return s->known > 1 && apart <= s->leap * s->leap * size ? ACCEPTED : UNSURE;
+    return judge_step(s->control, s->known, off, along, size, apart);
 }
 
 /* The polynomial through the known points at a load factor; 0 where two of them have the same. */
-static int predict(const sweep *s, double eta, double *guess)
+static int predict(const sweep *s, double load_factor, double *guess)
 {
     memset(guess, 0, s->numbers * sizeof *guess);
     for (int a = 0; a < s->known; a++) {
         double weight = 1;
         for (int b = 0; b < s->known; b++) {
             if (b == a) continue;
-            if (s->etas[a] == s->etas[b]) return 0;
-            weight *= (eta - s->etas[b]) / (s->etas[a] - s->etas[b]);
+            if (s->known_load_factors[a] == s->known_load_factors[b]) return 0;
+            weight *= (load_factor - s->known_load_factors[b]) / (s->known_load_factors[a] - s->known_load_factors[b]);
         }
         const double *point = s->points + (size_t)a * s->numbers;
         for (int i = 0; i < s->numbers; i++) guess[i] += weight * point[i];
@@ -91,11 +136,11 @@ static int predict(const sweep *s, double eta, double *guess)
 }
 
 /* Set the state and the load factor. */
-static int put(const sweep *s, const double *numbers, double eta)
+static int put(const sweep *s, const double *numbers, double load_factor)
 {
     const problem *p = s->newton->problem;
     double *x;
-    *s->eta = eta;
+    *s->load_factor = load_factor;
     if (s->with->get(s->x, &x)) return 1;
     memcpy(x, numbers, p->size * sizeof *x);
     if (s->with->restore(s->x, &x)) return 1;
@@ -118,12 +163,12 @@ static int slope(const sweep *s, const double *x, double *out)
 {
     problem *p = s->newton->problem;
     double *ahead = s->work + 4 * s->numbers, *behind = ahead + s->numbers;
-    const double eta = *s->eta, change = s->change * fmax(1, fabs(eta));
-    *s->eta = eta + change;
+    const double load_factor = *s->load_factor, change = s->change * fmax(1, fabs(load_factor));
+    *s->load_factor = load_factor + change;
     int failed = residual(p, x, ahead);
-    *s->eta = eta - change;
+    *s->load_factor = load_factor - change;
     failed |= residual(p, x, behind);
-    *s->eta = eta;
+    *s->load_factor = load_factor;
     for (int i = 0; i < p->size; i++) ahead[i] = (behind[i] - ahead[i]) * 0.5 / change;
     return failed || residual(p, x, behind) || tangent(p) || solve(p, ahead, out) || p->singular;
 }
@@ -133,21 +178,23 @@ static int jumped(const sweep *s, const double *here, const double *found, doubl
 {
     const newton *n = s->newton;
     double *at_end = s->work + 2 * s->numbers, *at_start = at_end + s->numbers, slopes = 0, moves = 0;
-    const double eta = s->etas[s->known - 1];
-    if (slope(s, found, at_end) || put(s, here, eta) || slope(s, here, at_start) || put(s, found, goal)) return UNSURE;
+    const double load_factor = s->known_load_factors[s->known - 1];
+    if (slope(s, found, at_end) || put(s, here, load_factor) || slope(s, here, at_start) || put(s, found, goal))
+        return UNSURE;
     for (int i = 0; i < n->nodes; i++)
         for (int j = i * n->block; j < i * n->block + n->motion; j++) {
             const double both = at_end[j] + at_start[j], move = found[j] - here[j];
             slopes += both * both, moves += move * move;
         }
-    return slopes * (goal - eta) * (goal - eta) >= moves ? ACCEPTED : REJECTED; /* also what is not a number */
+    const double change = goal - load_factor;
+    return slopes * change * change >= moves ? ACCEPTED : REJECTED; /* also what is not a number */
 }
 
 static int record(sweep *s)
 {
     const double *here = s->points + (size_t)(s->known - 1) * s->numbers;
     const int k = s->records++;
-    s->recorded_eta[k] = s->etas[s->known - 1];
+    s->recorded_load_factors[k] = s->known_load_factors[s->known - 1];
     s->recorded_iterations[k] = s->iterations, s->recorded_steps[k] = s->steps;
     s->iterations = 0;
     memcpy(s->recorded + (size_t)k * s->newton->problem->size, here, s->newton->problem->size * sizeof *here);
@@ -159,53 +206,51 @@ static int record(sweep *s)
 static int attempt(sweep *s, double goal)
 {
     newton *n = s->newton;
-    double *guess = s->work, *found = s->work + s->numbers;
+    double *guess = s->work, *found = s->work + s->numbers, *factors = s->known_load_factors;
     const double *here = s->points + (size_t)(s->known - 1) * s->numbers;
+    const double taken = fabs(goal - factors[s->known - 1]);
     int reason, sideways;
+    s->control->shrink = 0.5;
     if (!predict(s, goal, guess) || put(s, guess, goal)) return UNSURE;
     n->loads = fabs(goal) * s->loads;
     begin(n);
     if (s->with->solve(s->snes, 0, s->x) || s->with->get_reason(s->snes, &reason)) return UNSURE;
     s->iterations += n->iterations;
-    s->shrink = 0.5;
     if (reason <= 0 || n->verdict != n->converged) return REJECTED;
     advance(n->problem);
     if (take(s, found)) return UNSURE;
-    const double off = largest(s, found, guess), taken = fabs(goal - s->etas[s->known - 1]);
+    const double off = largest(s, found, guess);
     if (!isfinite(off)) return REJECTED;
     int judged = judge(s, here, guess, found, off);
     if (judged == UNSURE) judged = jumped(s, here, found, goal);
     if (judged != ACCEPTED) return judged;
     if (negative_modes(s->stability, &sideways) != s->negative) return UNSURE;
     const int order = s->known < 2 ? 1 : 2;
-    if (s->known == 3) memmove(s->points, s->points + s->numbers, 2 * (size_t)s->numbers * sizeof *found);
-    if (s->known == 3) s->etas[0] = s->etas[1], s->etas[1] = s->etas[2];
-    else s->known++;
+    if (s->known == 3) {
+        memmove(s->points, s->points + s->numbers, 2 * (size_t)s->numbers * sizeof *found);
+        memmove(factors, factors + 1, 2 * sizeof *factors);
+    } else {
+        s->known++;
+    }
     memcpy(s->points + (size_t)(s->known - 1) * s->numbers, found, s->numbers * sizeof *found);
-    s->etas[s->known - 1] = goal;
+    factors[s->known - 1] = goal;
     s->steps++;
-    double growth = fmin(fmax(pow(s->intended / fmax(off, 1e-12), 1.0 / order), 0.5), 2);
-    if (n->iterations >= s->hard) growth = 0.5;
-    else if (n->iterations > s->easy) growth = fmin(growth, 1);
-    s->step = growth >= 1 ? fmax(s->step, taken * growth) : taken * growth;
+    accept_step(s->control, taken, step_growth(s->control, off, order, n->iterations));
     return ACCEPTED;
 }
 
-/* Advance to the targets. Returns why it stopped. */
+/* Advance to the load factors in turn. Returns why it stopped. */
 int run(sweep *s)
 {
     const double began = now();
     while (s->next < s->count) {
-        const double here = s->etas[s->known - 1], target = s->targets[s->next], left = target - here;
-        if (left == 0) {
-            s->next++, s->rejections = s->accepted = 0;
+        const double here = s->known_load_factors[s->known - 1], wanted = s->load_factors[s->next];
+        if (here == wanted) {
+            s->next++, s->control->rejections = s->control->accepted = 0;
             if (!s->every && record(s)) return FULL;
             continue;
         }
-        const double step = fmin(s->step, s->largest);
-        double goal = here + copysign(step, left);
-        if (fabs(left) <= fmin(1.2 * step, s->largest)) goal = target;
-        else if (fabs(left) < 2 * step) goal = here + left / 2;
+        const double goal = step_goal(s->control, here, wanted);
         const int before = s->iterations, judged = attempt(s, goal);
         if (judged != ACCEPTED) {
             put(s, s->points + (size_t)(s->known - 1) * s->numbers, here);
@@ -213,12 +258,9 @@ int run(sweep *s)
                 s->iterations = before; /* Python counts them when it repeats the step */
                 return LEFT;
             }
-            s->rejections++, s->accepted = 0;
-            s->step = fabs(goal - here) * s->shrink;
-            if (s->step < s->smallest || s->rejections >= s->allowed) return LEFT;
+            if (reject_step(s->control, fabs(goal - here))) return LEFT;
             continue;
         }
-        s->rejections = s->accepted ? 0 : s->rejections, s->accepted = 1;
         if (s->every && record(s)) return FULL;
         if (now() - began > s->patience) return LATER;
     }

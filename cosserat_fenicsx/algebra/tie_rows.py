@@ -75,19 +75,19 @@ class TieRows:
         """The `Ties` that are evaluated."""
         return self.model.ties
 
-    def _evaluate(self, eta):
+    def _evaluate(self, load_factor):
         """Values and gradients of all equations, see `Ties.evaluate`; once for residual and tangent."""
-        if self._values[0] != eta:
-            self._values = eta, self.ties.evaluate(self.model.tied_motion(self.seen[0]), eta)
+        if self._values[0] != load_factor:
+            self._values = load_factor, self.ties.evaluate(self.model.tied_motion(self.seen[0]), load_factor)
         return self._values[1]
 
     def _acting(self):
         """The tied nodes' unknowns where reactions act."""
         return self.seen[0]
 
-    def _gradients(self, eta):
+    def _gradients(self, load_factor):
         """Gradients of all equations where reactions act."""
-        return self._evaluate(eta)[1]
+        return self._evaluate(load_factor)[1]
 
     def put(self, x, multipliers):
         """Set the multipliers in a vector."""
@@ -99,11 +99,11 @@ class TieRows:
         """The multipliers as of the last call of `see`, on all ranks."""
         return self.seen[1]
 
-    def forces(self, eta):
+    def forces(self, load_factor):
         """See `Equations.tie_forces`; at the state of the last call of `see`."""
         found, added = np.zeros((self._count, 2, 6)), self._added
         signed = self._signs * self.seen[1][added, None]
-        found[added] = self.model.held_forces(self._gradients(eta)[added] * signed[..., None])
+        found[added] = self.model.held_forces(self._gradients(load_factor)[added] * signed[..., None])
         return found
 
     def gradients(self):
@@ -111,14 +111,14 @@ class TieRows:
         return self.ties.on_nodes(self._evaluate(0.0)[1])
 
     @np.errstate(**_WILD)
-    def residual_blocks(self, eta):
+    def residual_blocks(self, load_factor):
         """The reactions in the rows of the nodes (all of `rows`, one after the other), and the values of the equations
         that are added."""
-        return self._blocks(eta)
+        return self._blocks(load_factor)
 
-    def _blocks(self, eta):
-        reactions = self.ties.reactions(self._gradients(eta), self.seen[1])
-        return (self._rows_of_forces() @ reactions[:, :, None]).ravel(), self._evaluate(eta)[0][self._added]
+    def _blocks(self, load_factor):
+        reactions = self.ties.reactions(self._gradients(load_factor), self.seen[1])
+        return (self._rows_of_forces() @ reactions[:, :, None]).ravel(), self._evaluate(load_factor)[0][self._added]
 
     def _rows_of_forces(self):
         """The second of the model's `tie_maps`; the same for all states of a scene unless `rows_turn`."""
@@ -129,7 +129,7 @@ class TieRows:
         return rows
 
     @np.errstate(**_WILD)
-    def tangent_blocks(self, eta):
+    def tangent_blocks(self, load_factor):
         """Derivatives of `residual_blocks`, in blocks of few nodes each.
 
         Returns:
@@ -137,7 +137,8 @@ class TieRows:
             every equation by its multiplier, (equations, 2, block); and of the equations by the same unknowns.
         """
         (nodal, multipliers), acting, ties, model = self.seen, self._acting(), self.ties, self.model
-        change, gradients = ties.change(model.tied_motion(acting), eta, multipliers), self._gradients(eta)
+        change = ties.change(model.tied_motion(acting), load_factor, multipliers)
+        gradients = self._gradients(load_factor)
         (trial, test), added, pattern = self._maps(acting), gradients[self._added], self._pattern
         of_nodes = test[pattern.first] @ change @ (self.share * trial)[pattern.second]
         reactions = (pattern.of_ends(test)[self._added] @ added[..., None])[..., 0]
@@ -145,20 +146,20 @@ class TieRows:
             turned = self.share * model.turned_reactions(acting, ties.reactions(gradients, multipliers))
             of_nodes[pattern.own] += turned
         if acting is not nodal:
-            (trial, _), added = self._maps(nodal), self._evaluate(eta)[1][self._added]
+            (trial, _), added = self._maps(nodal), self._evaluate(load_factor)[1][self._added]
         return of_nodes, reactions, (added[..., None, :] @ pattern.of_ends(trial)[self._added])[..., 0, :]
 
     def _maps(self, values):
         """The model's `tie_maps`, for every node where one serves all."""
         return [np.broadcast_to(part, (len(values), *part.shape[1:])) for part in self.model.tie_maps(values)]
 
-    def add_residual(self, b, eta):
+    def add_residual(self, b, load_factor):
         """Add the reactions to the rows of the nodes, and the constraint equations in the rows of the multipliers, in
         this rank's part of a vector."""
-        forces, c = self.residual_blocks(eta)
+        forces, c = self.residual_blocks(load_factor)
         np.add.at(b, self._mine_rows, np.concatenate([forces[self._free], c])[self._mine])
 
-    def second_variation(self, axes, eta):
+    def second_variation(self, axes, load_factor):
         """The geometric stiffness of the reactions, whose directions change with the nodes.
 
         All equations contribute, in the plane and out of it, also those that a plane model does not need.
@@ -169,28 +170,28 @@ class TieRows:
         Returns:
             (pairs, block, block) of the `TiePattern`.
         """
-        return axes @ self._symmetric_change(eta) @ axes.T
+        return axes @ self._symmetric_change(load_factor) @ axes.T
 
-    def springs(self, axes, eta, resistance):
+    def springs(self, axes, load_factor, resistance):
         """Penalty springs that replace all constraint equations; arguments and result as of `second_variation`.
 
         Args:
             resistance: (tied nodes * block,) stiffness of the elements against these motions of the nodes.
         """
-        gradient, stiffness = self._springs(axes, eta, resistance)
+        gradient, stiffness = self._springs(axes, load_factor, resistance)
         return self._pattern.sums(np.einsum("t,tia,tjb->tiajb", stiffness, gradient, gradient))
 
-    def energies_of_springs(self, axes, eta, resistance, motions):
+    def energies_of_springs(self, axes, load_factor, resistance, motions):
         """(m,) the quadratic form of `springs` along motions of the tied nodes (m, nodes, block): sums of squares of
         what the equations forbid, which rounding of the matrix would hide."""
-        gradient, stiffness = self._springs(axes, eta, resistance)
+        gradient, stiffness = self._springs(axes, load_factor, resistance)
         of_ends = np.stack([self._pattern.of_ends(motion) for motion in motions])
         return np.square(np.einsum("tia,mtia->mt", gradient, of_ends)) @ stiffness
 
-    def _springs(self, axes, eta, resistance):
+    def _springs(self, axes, load_factor, resistance):
         """Gradients (ties, 2, block) of all equations by the motions of their ends, and stiffnesses (ties,) of their
         springs."""
-        gradient = self._evaluate(eta)[1] @ axes.T
+        gradient = self._evaluate(load_factor)[1] @ axes.T
         of_ends = self._pattern.of_ends(resistance.reshape(-1, len(axes)))
         return gradient, _HELD * (gradient * gradient * of_ends).max(axis=(1, 2))
 
@@ -212,11 +213,11 @@ class TieRows:
         for i, j, values in zip(rows[pattern.first], rows[pattern.second], blocks, strict=True):
             A.setValues(i, j, values, PETSc.InsertMode.ADD_VALUES)
 
-    def _symmetric_change(self, eta):
+    def _symmetric_change(self, load_factor):
         """The symmetric part of the derivative of the reactions, (pairs, 6, 6); evaluated once for all parts of the
         second variation."""
-        if self._change[0] != eta:
+        if self._change[0] != load_factor:
             nodal, multipliers = self.seen
-            change = self.ties.change(self.model.tied_motion(nodal), eta, multipliers)
-            self._change = eta, 0.5 * (change + change[self._pattern.mirrored].swapaxes(1, 2))
+            change = self.ties.change(self.model.tied_motion(nodal), load_factor, multipliers)
+            self._change = load_factor, 0.5 * (change + change[self._pattern.mirrored].swapaxes(1, 2))
         return self._change[1]

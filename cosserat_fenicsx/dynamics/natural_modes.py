@@ -202,7 +202,7 @@ def _stiffness(problem):
     Packed(variation.form, (), ()).add_to_matrix(K)
     model.stiffen(model.bounded_K)
     if problem.ties:
-        of_ties = problem.ties.second_variation(variation.axes, problem.eta)
+        of_ties = problem.ties.second_variation(variation.axes, problem.tie_load_factor)
         if model.comm.rank == 0:
             problem.ties.add_to_matrix(K, tied, of_ties)
     K.assemble()

@@ -252,12 +252,12 @@ class EndTies(MovingTies):
         """Require these values of the constraints instead of zero in this step; see `values`."""
         self._shift = values
 
-    def values(self, ties, eta):
+    def values(self, ties, load_factor):
         """Values of the constraints at the current state, for `ties` of another time."""
-        return ties.evaluate(self.model.tied_motion(self.seen[0]), eta)[0]
+        return ties.evaluate(self.model.tied_motion(self.seen[0]), load_factor)[0]
 
-    def _evaluate(self, eta):
-        c, gradients = super()._evaluate(eta)
+    def _evaluate(self, load_factor):
+        c, gradients = super()._evaluate(load_factor)
         return c - self._shift, gradients
 
     def _reactions(self):

@@ -167,9 +167,9 @@ def _off(model, rq, rates, t=0.0):
         the rates with velocities `rates` (N, 6); the gradient of the constraints; the rates by prescribed motions
         alone.
     """
-    eta, now, held = float(model.load_factor.value), rates[model.tied_slots], rq[model.tied_slots]
-    c, gradients = model.ties_at(t).evaluate(held, eta)
-    later, _ = model.ties_at(t + _DIFFERENCE * model.time).evaluate(held, eta)
+    load_factor, now, held = float(model.load_factor.value), rates[model.tied_slots], rq[model.tied_slots]
+    c, gradients = model.ties_at(t).evaluate(held, load_factor)
+    later, _ = model.ties_at(t + _DIFFERENCE * model.time).evaluate(held, load_factor)
     driven, gradient = (later - c) / _DIFFERENCE, model.ties.on_nodes(gradients)
     return np.einsum("ikb,kb->i", gradient, now) + driven, gradient, driven
 

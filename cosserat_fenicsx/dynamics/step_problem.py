@@ -29,23 +29,23 @@ class MovingTies(TieRows):
         end = self.seen[0]
         return end if self.share == 1 else self.share * end + (1 - self.share) * self._start
 
-    def _gradients(self, eta):
+    def _gradients(self, load_factor):
         if self.share == 1:
-            return super()._gradients(eta)
-        if self._amid[0] != eta:
-            _, gradients = self.ties.evaluate(self.model.tied_motion(self._acting()), eta)
-            self._amid = eta, gradients
+            return super()._gradients(load_factor)
+        if self._amid[0] != load_factor:
+            _, gradients = self.ties.evaluate(self.model.tied_motion(self._acting()), load_factor)
+            self._amid = load_factor, gradients
         return self._amid[1]
 
-    def residual_blocks(self, eta):
+    def residual_blocks(self, load_factor):
         """See `TieRows`; `StepNewton` stops before numbers overflow."""
-        return self._blocks(eta)
+        return self._blocks(load_factor)
 
-    def work(self, eta):
+    def work(self, load_factor):
         """Work of the reactions on the structure in the step, dimensionless; on the last rank, else 0."""
         if not self._here:
             return 0.0
-        nodal, reactions = self.seen[0], self.ties.reactions(self._gradients(eta), self._reactions())
+        nodal, reactions = self.seen[0], self.ties.reactions(self._gradients(load_factor), self._reactions())
         trial, _ = self.model.tie_maps((nodal + self._start) / 2)
         passed = trial @ (nodal - self._start)[:, :, None]
         return -float(reactions.ravel() @ passed.ravel())
@@ -210,7 +210,7 @@ class StepProblem(Equations):
 
     def work(self):
         """Work of loads and supports in the step from `start` to the state, dimensionless, over all ranks."""
-        model, eta, done = self.model, self.load_factor, 0.0
+        model, load_factor, done = self.model, self.load_factor, 0.0
         if self._live or self._loads.norm() > 0:
             self.numbering.from_local(model.passed(), self._vector)
             done = self._loads.dot(self._vector)
@@ -219,7 +219,7 @@ class StepProblem(Equations):
             self._assemble(self._live, self._known)
             done -= self._known.dot(self._vector)
         if self.ties:
-            done += model.comm.allreduce(self.ties.work(eta))
+            done += model.comm.allreduce(self.ties.work(load_factor))
         return done - sum(part.books()[0] for part in self.touching)
 
     def momenta(self):
@@ -246,11 +246,6 @@ class StepProblem(Equations):
 
     def _scalar(self, form):
         return self.model.comm.allreduce(fem.assemble_scalar(form))
-
-    @property
-    def eta(self):
-        """The load factor."""
-        return self.load_factor
 
     def clamp_forces(self):
         """(points, 6) force and moment that held every clamped point in the last step, those of other supports and

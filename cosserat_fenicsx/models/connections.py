@@ -215,12 +215,12 @@ class Ties:
         other._take(ties)
         return other
 
-    def _see(self, rq, eta):
+    def _see(self, rq, load_factor):
         self._motion[:-1] = rq
         self._rows[:, : eq.MOTION] = self._motion.take(self._nodes, axis=0).reshape(-1, eq.MOTION)
-        self._rows[:, -2] = eta
+        self._rows[:, -2] = load_factor
 
-    def evaluate(self, rq, eta):
+    def evaluate(self, rq, load_factor):
         """Values at (r, q) (tied nodes, 7) and a load factor.
 
         Returns:
@@ -228,7 +228,7 @@ class Ties:
             are also the reactions per unit of multiplier.
         """
         found = np.zeros((len(self._rows), 13))
-        self._see(rq, eta)
+        self._see(rq, load_factor)
         self._add_values(self._rows, found)
         return found[:, 0], found[:, 1:].reshape(-1, 2, 6)
 
@@ -240,11 +240,11 @@ class Ties:
         """(tied nodes, 6) forces and moments, sums over the ties, from gradients (ties, 2, 6)."""
         return self.pattern.by_nodes(multipliers[:, None, None] * gradients)
 
-    def change(self, rq, eta, multipliers):
+    def change(self, rq, load_factor, multipliers):
         """The tangent of the reactions, (pairs, 6, 6) of the pattern, at (r, q) (tied nodes, 7), a load factor and
         multipliers (ties,)."""
         found = np.zeros((len(self._turning), 144))
-        self._see(rq, eta)
+        self._see(rq, load_factor)
         self._rows[:, -1] = multipliers
         self._add_changes(self._rows[self._turning], found)
         return self.pattern.sums(found.reshape(-1, 2, 6, 2, 6), self._turning)

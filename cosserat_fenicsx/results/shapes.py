@@ -251,7 +251,7 @@ def buckling_table(found):
         "A structure that bends much before it buckles needs `cosserat run`."
     )
     headings = ("critical load factor", "est. error")
-    rows = [(f"{eta:.7g}", _error(error)) for eta, error in zip(found.load_factors, found.error, strict=True)]
+    rows = [(f"{at:.7g}", _error(error)) for at, error in zip(found.load_factors, found.error, strict=True)]
     text = _table(found, headings, rows, caption) if rows else f"{found.none[0].upper()}{found.none[1:]}."
     lines = [text, actions_in_words(found.scene)]
     if found.conservative:

@@ -68,8 +68,8 @@ class States(OnNodes):
         if self._appended:
             new, self._appended = self._appended, []
             gauss = None if new[0].gauss_fields is None else np.array([x.gauss_fields for x in new])
-            etas = np.array([x.load_factor for x in new])
-            rq, fields = self._expand(etas, np.array([x.rq for x in new]), gauss)
+            load_factors = np.array([x.load_factor for x in new])
+            rq, fields = self._expand(load_factors, np.array([x.rq for x in new]), gauss)
             for x, x.rq, x.gauss_fields in zip(new, rq, fields, strict=True):
                 self._expanded.append(x)
         return self._expanded

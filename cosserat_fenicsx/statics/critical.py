@@ -109,15 +109,15 @@ class _Quotient:
 
     def here(self):
         """(modes,) the critical changes of the load factor."""
-        direct, eta, numbers = self._direct, self._direct.problem.load_factor, self._direct.problem.numbers()
-        direct.factor(eta, numbers)
+        direct, load_factor, numbers = self._direct, self._direct.problem.load_factor, self._direct.problem.numbers()
+        direct.factor(load_factor, numbers)
         slope, stiff = direct.slope(), self._energies.here()
         sides = []
         for k in PLACES:
-            direct.put((eta + k * self._step, numbers, None), slope, k * self._step)
+            direct.put((load_factor + k * self._step, numbers, None), slope, k * self._step)
             with direct.model.stress_alone():
                 sides.append(self._energies.here(springs=False))
-        direct.put((eta, numbers, None), slope, 0.0)
+        direct.put((load_factor, numbers, None), slope, 0.0)
         return -stiff / derivative(sides, self._step)[0]
 
 
@@ -162,12 +162,12 @@ class Energies:
 
     def here(self, springs=True):
         """(modes,) dimensionless; springs: whether those in place of supports and joints count."""
-        ties, eta, tied = self._problem.ties, self._problem.eta, self._tied
+        ties, load_factor, tied = self._problem.ties, self._problem.tie_load_factor, self._tied
         found = np.array([self._energy.along(mode) for mode in self._modes])
         if ties:
-            found += ties.energy(ties.second_variation(self._axes, eta), tied)
+            found += ties.energy(ties.second_variation(self._axes, load_factor), tied)
             if springs and self._resistance is not None:
-                found += ties.energies_of_springs(self._axes, eta, self._resistance, tied)
+                found += ties.energies_of_springs(self._axes, load_factor, self._resistance, tied)
         return found
 
 
@@ -234,12 +234,13 @@ def _located(direct, path, event):
     control = "arc" if path.control == "arc" else "auto"
     follower = Follower(*direct.solvers, StepControl(), control=control, on_event=meet)
     follower.begin()
-    # the next point of the path may have been passed already at a limit point, of which the last target lies beyond
+    # the next point of the path may have been passed already at a limit point, which the last load factor lies beyond
     ends = [path.load_factors[event.after + 1 :][:1], path.load_factors[-1:], event.load_factor * np.array([1.1, 0.9])]
-    targets = np.concatenate([path.load_factors[: event.after + 1], *ends]).tolist()
+    load_factors = np.concatenate([path.load_factors[: event.after + 1], *ends]).tolist()
     try:
-        for target in targets:
-            if target != follower.track.here.load_factor and not follower.to(target, max(map(abs, targets))):
+        way = max(map(abs, load_factors))
+        for load_factor in load_factors:
+            if load_factor != follower.track.here.load_factor and not follower.to(load_factor, way):
                 break
     except _Met as met:
         return follower.track, *met.args
@@ -265,15 +266,15 @@ def _beside(direct, track, crossing, before):
 
 def _one_beside(direct, track, crossing, before, side, distance):
     """One of `_beside`, or None; distance: along the path, or None for one of the load factor."""
-    numbers, eta = [values.copy() for values in crossing.point.numbers], crossing.point.load_factor
+    numbers, load_factor = [values.copy() for values in crossing.point.numbers], crossing.point.load_factor
     limit = crossing.kind == "limit"
     track.neutral = None if limit else crossing.direction.copy()  # Newton's steps leave out the mode, and its branch
     if distance is None:
-        solved = track.at_load(numbers, eta * (1 + side * _BESIDE))
+        solved = track.at_load(numbers, load_factor * (1 + side * _BESIDE))
     else:
         normal = crossing.direction if limit else numbers[0] - before.numbers[0]
         numbers[0] += side * distance / direct.model.largest(normal) * normal
-        solved = track.on_plane(numbers, eta, normal, 0.0)
+        solved = track.on_plane(numbers, load_factor, normal, 0.0)
     track.neutral = track.newton.bordered.neutral = None
     if solved.converged and not limit:  # what is left of the mode in the interpolated state goes
         solved = track.at_load(direct.problem.numbers(), direct.problem.load_factor)
@@ -283,8 +284,8 @@ def _one_beside(direct, track, crossing, before, side, distance):
 def _of_limit(direct, crossing, parameters, rates):
     """(derivatives of the load factor, bounds on their errors)."""
     inner, slopes = direct.model.inner, []
-    for eta, numbers, _ in direct.points:
-        direct.factor(eta, numbers)
+    for load_factor, numbers, _ in direct.points:
+        direct.factor(load_factor, numbers)
         slopes.append(inner(crossing.direction, direct.slope()[0]))
     found = np.array([
         [-inner(crossing.direction, rate[0]) / slope for rate, slope in zip(each, slopes, strict=True)]
@@ -333,8 +334,8 @@ def _modes(direct, crossing):
     and their sum."""
     bordered = direct.newton.bordered
     found = [0.0] * (1 if crossing.partner is None else 2)
-    for eta, numbers, _ in direct.points:
-        direct.factor(eta, numbers)
+    for load_factor, numbers, _ in direct.points:
+        direct.factor(load_factor, numbers)
         starts = [crossing.null] if crossing.partner is None else [crossing.null, bordered.motion_of(crossing.partner)]
         for k, start in enumerate(starts):
             _, motion = bordered.response(start)
@@ -350,12 +351,12 @@ def _stiff(direct):
 
 def _by_load(direct, energies, point):
     """(modes,) d mu/d eta along the path."""
-    eta, numbers, _ = point
-    direct.factor(eta, numbers)
-    slope, step, values = direct.slope(), 0.1 * _BESIDE * eta, []
+    load_factor, numbers, _ = point
+    direct.factor(load_factor, numbers)
+    slope, step, values = direct.slope(), 0.1 * _BESIDE * load_factor, []
     _stiff(direct)
     for k in PLACES:
-        direct.put((eta + k * step, numbers, None), slope, k * step)
+        direct.put((load_factor + k * step, numbers, None), slope, k * step)
         values.append(energies.here())
     return derivative(values, step)[0]
 

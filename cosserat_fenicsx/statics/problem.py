@@ -21,7 +21,6 @@ class Problem(Equations):
         see `Equations`.
         load_factor: factor of loads and prescribed motions; while `begins`, the factor of permanent loads.
         begins: whether permanent loads are still being applied, with a factor from 0 to 1, before all other loads.
-        eta_array: array of one value, the factor of loads and prescribed motions.
         fields: the `PackedExpression` of `CompiledForms.fields`; None where there is none, or with several ranks.
         load_norm: Euclidean norm of the dead loads at load factor 1, dimensionless.
     """
@@ -44,19 +43,13 @@ class Problem(Equations):
         )
         self._live = [function.x.array for function in model.carried]
         self.load_factor = self.load_norm = 0.0
-        # Arrays of the constants, written in place: the setter of `value` takes as long as a residual of few elements.
-        self.eta_array, self._share = model.load_factor.value, model.permanent_factor.value
-        self.take_loads((self._dead.array, self.eta_array), (self._permanent.array, self._share))
+        self._share = model.permanent_factor.value  # written in place, as `load_factor_array`
+        self.take_loads((self._dead.array, self.load_factor_array), (self._permanent.array, self._share))
         self.fields = None
         if forms.fields and model.comm.size == 1:
             size = len(forms.gauss) * forms.fields_size
             self.fields = PackedExpression(forms.fields, model.mesh, len(model.cell_dofs), size)
         self._loaded, self.begins = None, False
-
-    @property
-    def eta(self):
-        """The factor of loads and prescribed motions."""
-        return float(self.eta_array)
 
     def load(self, scene, layout):
         """Set the data of a scene; the state becomes its reference configuration.
@@ -81,7 +74,7 @@ class Problem(Equations):
             model.rest()
         self.elimination.c.zero_pivot = ZERO_PIVOT
         self.begins = any(kind.scaled == "permanent" for kind in model.signature.terms)
-        self.eta_array[...] = 0.0
+        self.load_factor_array[...] = 0.0
         self.set_load_factor(0.0)
         self.numbering.from_local(self._state, self.x)
         self.set_state(self.x)
@@ -104,13 +97,13 @@ class Problem(Equations):
             return False
         return all(map(np.array_equal, self._loaded[1].breaks, layout.breaks))
 
-    def set_load_factor(self, eta):
-        """Set the factor of loads and prescribed motions to eta; while `begins`, that of permanent loads."""
-        self.load_factor = eta
+    def set_load_factor(self, load_factor):
+        """Set the factor of loads and prescribed motions; while `begins`, that of permanent loads."""
+        self.load_factor = load_factor
         if self.begins:
-            self._share[...] = eta
+            self._share[...] = load_factor
         else:
-            self.eta_array[...] = eta
+            self.load_factor_array[...] = load_factor
 
     def end_beginning(self):
         """Set the factor of permanent loads to 1 and the load factor to 0."""
@@ -195,12 +188,12 @@ class Problem(Equations):
 
         The next call overwrites the returned vector.
         """
-        eta = self.load_factor
-        change = CHANGE * max(1.0, abs(eta))
+        load_factor = self.load_factor
+        change = CHANGE * max(1.0, abs(load_factor))
         for vector, ahead in zip(self._difference, (change, -change), strict=True):
-            self.set_load_factor(eta + ahead)
+            self.set_load_factor(load_factor + ahead)
             self.function(x, vector)
-        self.set_load_factor(eta)
+        self.set_load_factor(load_factor)
         derivative, behind = self._difference
         derivative.axpy(-1.0, behind)
         derivative.scale(0.5 / change)

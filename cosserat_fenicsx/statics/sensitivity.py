@@ -209,8 +209,8 @@ class Direct:
         changes = [self._data_changes(*each) for each in zip(scenes, steps, parameters, strict=True)]
         self._load(self._scene)
         found = [[] for _ in scenes]
-        for i, (eta, numbers, _) in enumerate(self.points):
-            self.factor(eta, numbers)
+        for i, (load_factor, numbers, _) in enumerate(self.points):
+            self.factor(load_factor, numbers)
             for rates, of_points in zip(found, changes, strict=True):
                 rates.append(self._rate(*of_points[i]))
         return found
@@ -245,17 +245,17 @@ class Direct:
         self.put(point, point[1], 0.0)
         return self._by_data.data()
 
-    def _of_ties(self, eta, x):
+    def _of_ties(self, load_factor, x):
         problem, found = self.problem, np.zeros(self.problem.numbering.size)
         if problem.ties:
             problem.ties.see(x)
-            problem.ties.add_residual(found, eta)
+            problem.ties.add_residual(found, load_factor)
         return found
 
-    def factor(self, eta, numbers):
+    def factor(self, load_factor, numbers):
         """Go to a state, and factorise the tangent there."""
         problem = self.problem
-        problem.set_load_factor(eta)
+        problem.set_load_factor(load_factor)
         problem.put(numbers)
         problem.function(problem.x, problem.b)
         problem.factor()
@@ -330,8 +330,8 @@ class Direct:
 
     def put(self, point, rate, change):
         """Go to a state that is moved by a change times a rate."""
-        eta, numbers, _ = point
-        self.problem.set_load_factor(eta)
+        load_factor, numbers, _ = point
+        self.problem.set_load_factor(load_factor)
         self.problem.put([a + change * b for a, b in zip(numbers, rate, strict=True)])
         if self._refreshes:
             self.model.actions.refresh()
@@ -341,6 +341,6 @@ class Direct:
         found = PerturbedPath.beside(path, self.model)
         for point, rate in zip(self.points, rates, strict=True):
             self.put(point, rate, change)
-            eta, _, record = point
-            found.append(record_of(self.problem, eta, record.negative_modes, record.iterations, record.steps))
+            load_factor, _, record = point
+            found.append(record_of(self.problem, load_factor, record.negative_modes, record.iterations, record.steps))
         return found

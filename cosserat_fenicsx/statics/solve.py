@@ -98,11 +98,11 @@ def solve(
         Interrupted: Ctrl-C; `.path` holds the points so far.
     """
     comm = communicator(comm)
-    targets, free = _targets(load_factors)
+    load_factors, free = _requested(load_factors)
     formulation = formulation_of(formulation)
     degree = formulation.default_degree if degree is None else degree
     check_arguments(scene, tol, elements, bound)
-    check_magnitudes(scene, max(map(abs, targets)))
+    check_magnitudes(scene, max(map(abs, load_factors)))
     if comm.rank == 0:
         scene.warn()
     choice = choose(
@@ -116,7 +116,7 @@ def solve(
     steps = instance("solve", "steps", StepControl() if steps is None else steps, StepControl, "a StepControl")
     follow, until = _follow_options(steps, control, branch), _until(until, free)
     if not steps.adaptive:
-        _check_jumps(scene, targets)
+        _check_jumps(scene, load_factors)
     elif _turn(scene):
         follow["steps"] = replace(steps, largest=min(steps.largest or math.inf, _LARGEST_TURN / _turn(scene)))
 
@@ -146,7 +146,7 @@ def solve(
             """Follow the path; `like`: a path on a coarser mesh whose points are reused where the solver chose them."""
             with tracing(layout) as tracer:
                 if like is None or not free or like in strayed:
-                    return tracer.along(targets, free, until)
+                    return tracer.along(load_factors, free, until)
                 if like.control == "load" or in_order:
                     return tracer.along(like.load_factors.tolist(), False)
                 try:  # a load factor may occur several times along the path, so that it does not identify a point
@@ -163,13 +163,13 @@ def solve(
 
         if elements is not None:
             return trace(Layout.of(scene, elements))
-        many = free or len(targets) > FEW
+        many = free or len(load_factors) > FEW
         layout, usual = meshes_for(scene, degree, tol, many) if simple else (first_layout(scene, degree), None)
-        turning = resolving_turns(scene, layout, max(map(abs, targets)))
+        turning = resolving_turns(scene, layout, max(map(abs, load_factors)))
         layout, usual = (layout, usual) if turning is None else (turning, None)
         return refine(trace, correct, scene, layout, tol, tuple(bound), degree, usual)
 
-    with Progress(targets, progress, comm) as bar:
+    with Progress(load_factors, progress, comm) as bar:
         try:
             path = take(choice, bar)
         except Promoted as found:
@@ -218,9 +218,9 @@ def _follow_options(steps, control, branch):
     return {"steps": steps, "control": control, "branch": branch or 0}
 
 
-def _check_jumps(scene, targets):
+def _check_jumps(scene, load_factors):
     """Refuse prescribed rotations by pi or more in one step, which equal smaller ones the other way round."""
-    farthest = max(abs(b - a) for a, b in zip([0.0, *targets[:-1]], targets, strict=True))
+    farthest = max(abs(b - a) for a, b in zip([0.0, *load_factors[:-1]], load_factors, strict=True))
     turn = farthest * _turn(scene)
     if turn >= math.pi:
         raise SceneError(
@@ -240,7 +240,7 @@ def _until(until, free):
     return until
 
 
-def _targets(load_factors):
+def _requested(load_factors):
     """([load factors], whether the solver may choose the steps between the two)."""
     if isinstance(load_factors, str) or (isinstance(load_factors, tuple) and len(load_factors) != 2):
         raise SceneError(

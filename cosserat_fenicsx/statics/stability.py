@@ -146,11 +146,11 @@ class Part:
         ties, axes, diagonal = problem.ties, self.variation.axes, self.elimination.diagonal
         if comm.size > 1:
             diagonal = comm.allreduce(diagonal)
-        found = ties.second_variation(axes, problem.eta)
+        found = ties.second_variation(axes, problem.tie_load_factor)
         if not stress_alone:
             resistance = np.where(interface.nodes < 0, 0.0, np.append(diagonal, 0.0)[interface.nodes])
             self.resistance = np.abs(resistance + ties.diagonal(found))
-            found = found + ties.springs(axes, problem.eta, self.resistance)
+            found = found + ties.springs(axes, problem.tie_load_factor, self.resistance)
         return found
 
     def complete(self):

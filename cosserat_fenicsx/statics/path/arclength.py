@@ -11,7 +11,7 @@ import math
 
 from cosserat_fenicsx.interrupts import obey
 from cosserat_fenicsx.statics.path.events import UNEXPLAINED, Lost
-from cosserat_fenicsx.statics.path.track import FAR, INTENDED, bends, growth_of, through
+from cosserat_fenicsx.statics.path.track import LIMITS, bends, step_control, through
 
 # Largest distance of the corrected point from the predictor over the length of the step; the second applies where the
 # number of negative modes changes without a limit point: the step may have changed to another branch.
@@ -42,22 +42,23 @@ class ArcLength:
     Args:
         track: a `Track`.
         control: a `StepControl`.
-        locator: a `Locator` that finds the critical points and the target between two points.
+        locator: a `Locator` that finds the critical points and the load factor to land on between two points.
     """
 
     def __init__(self, track, control, locator):
         self.track, self.control, self._locator = track, control, locator
         self._step, self._branched = None, False
+        self._lib, self._limits = step_control()
         # Whether the number of negative modes may change in the next step otherwise than the critical points tell: the
         # second variation that is counted has bounded stiffnesses, so that it may do so in a step that is plain. Where
         # it has done so often, the number tells nothing about any step.
         self._excused, self._excuses = False, 0
 
-    def to(self, target, *, first=None, slope=None, on_step=None, on_event=None):
-        """Advance to the next point of the path with the load factor `target`, solved at exactly that load factor.
+    def to(self, load_factor, *, first=None, slope=None, on_step=None, on_event=None):
+        """Advance to the next point of the path with a load factor, solved at exactly that load factor.
 
         Args:
-            target: load factor.
+            load_factor: to land on.
             first, slope: the first `PathPoint` on a branch, and dx/d eta there; None to stay on the path.
             on_step: called with every accepted `PathPoint`, the last one included.
             on_event: called with every `Crossing` on the way; the continuation ends there where it returns True.
@@ -67,7 +68,7 @@ class ArcLength:
         """
         track = self.track
         if first is None:
-            self._set_out(target)
+            self._set_out(load_factor)
         else:
             self._branch_off(first, slope)
         begin, steps, limits, home = first, 0, [], first is not None or self._branched
@@ -77,7 +78,7 @@ class ArcLength:
             if point is not None:
                 try:
                     landing, crossings = self._locator.between(
-                        track.here, point, target, self._weight,
+                        track.here, point, load_factor, self._weight,
                         probe=not branching, explained=not self._excused, short=not branching and self._plain(point),
                     )  # fmt: skip
                 except Lost as lost:
@@ -128,7 +129,7 @@ class ArcLength:
             track.history.pop()  # the predictor interpolates, which needs points that are not too close
         track.keep(point)
 
-    def _set_out(self, target):
+    def _set_out(self, load_factor):
         """Choose weight, direction and first step at the last point."""
         track = self.track
         here = track.here
@@ -137,10 +138,10 @@ class ArcLength:
         here.logarithm = track.stability.logarithm
         slope = track.slope()
         self._weigh(slope)
-        if len(track.history) == 1:  # towards the target
-            change = self.control.first or abs(target - here.load_factor) / 10 or 0.1
+        if len(track.history) == 1:  # towards the load factor
+            change = self.control.first or abs(load_factor - here.load_factor) / 10 or 0.1
             self._step = self._scale = change * math.sqrt(track.product(slope, slope) + self._weight)
-            track.set_tangent(here, slope, 0 * slope, math.copysign(1.0, target - here.load_factor), self._weight)
+            track.set_tangent(here, slope, 0 * slope, math.copysign(1.0, load_factor - here.load_factor), self._weight)
             return
         before = track.history[-2]
         moved, change = here.numbers[0] - before.numbers[0], here.load_factor - before.load_factor
@@ -237,13 +238,13 @@ class ArcLength:
         places = [-sum(lengths[i:]) for i in range(len(lengths))]
         numbers, _ = through(history, [*places, 0.0], step)
         numbers[0] = here.numbers[0] + step * here.along
-        eta = here.load_factor + step * here.rise
+        load_factor = here.load_factor + step * here.rise
         for i, (place, point) in enumerate(zip(places, history, strict=False)):
             weight = (step / place) ** 2
             weight *= math.prod((step - other) / (place - other) for j, other in enumerate(places) if j != i)
             numbers[0] += weight * (point.numbers[0] - here.numbers[0] - place * here.along)
-            eta += weight * (point.load_factor - here.load_factor - place * here.rise)
-        return numbers, eta
+            load_factor += weight * (point.load_factor - here.load_factor - place * here.rise)
+        return numbers, load_factor
 
     def _attempt(self):
         """One step: predictor, corrector, checks. A `PathPoint`, not yet accepted; None where the step is reduced."""
@@ -251,15 +252,15 @@ class ArcLength:
         self._weigh_less()
         track = self.track
         here = track.here
-        predicted, eta = self._predict(self._step)
+        predicted, load_factor = self._predict(self._step)
         bound = self.control.largest
-        if bound and abs(eta - here.load_factor) > bound:
-            self._step *= 0.9 * bound / abs(eta - here.load_factor)
-            predicted, eta = self._predict(self._step)
+        if bound and abs(load_factor - here.load_factor) > bound:
+            self._step *= 0.9 * bound / abs(load_factor - here.load_factor)
+            predicted, load_factor = self._predict(self._step)
         increment = predicted[0] - here.numbers[0]
-        change = eta - here.load_factor
+        change = load_factor - here.load_factor
         length = math.sqrt(track.product(increment, increment) + self._weight * change**2)
-        solved = track.on_plane(predicted, eta, increment, self._weight * change)
+        solved = track.on_plane(predicted, load_factor, increment, self._weight * change)
         if not solved.converged:
             return self._shorten()
         numbers, found = track.problem.numbers(), track.problem.load_factor
@@ -267,9 +268,9 @@ class ArcLength:
             return self._shorten(0.9 * bound / abs(found - here.load_factor))
         off = track.distance(numbers, predicted)
         correction = numbers[0] - predicted[0]
-        bend = math.sqrt(track.product(correction, correction) + self._weight * (found - eta) ** 2) / length
+        bend = math.sqrt(track.product(correction, correction) + self._weight * (found - load_factor) ** 2) / length
         order = len(track.history) + 1
-        if off > FAR or bend > _BEND:
+        if off > LIMITS.far or bend > _BEND:
             track.failure = "the path bends too sharply"
             return self._shorten()
         point = track.point(solved)
@@ -281,7 +282,8 @@ class ArcLength:
         if point.negative_modes != here.negative_modes and point.rise * here.rise > 0 and bend > _SURE:
             track.failure = "the step crossed a point where stability changes"
             return self._shorten()
-        growth = growth_of(max(off, INTENDED / _SURE * bend), order, solved.iterations)
+        off = max(off, LIMITS.intended / _SURE * bend)
+        growth = self._lib.step_growth(self._limits, off, order, solved.iterations)
         self._step = max(self._step, length * growth) if growth >= 1 else length * growth
         return point
 

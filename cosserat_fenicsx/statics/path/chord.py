@@ -185,12 +185,13 @@ class Chord:
         for k in range(1, _MOST):
             places = _nearest(values, place, always=(low, high))
             place = _zero(places, [values[at] for at in places], low, high)
-            eta = self.load_factor(place)
-            settled = estimate is not None and abs(eta - estimate) <= _FINE * max(abs(eta), abs(self.change))
+            load_factor = self.load_factor(place)
+            fine = _FINE * max(abs(load_factor), abs(self.change))
+            settled = estimate is not None and abs(load_factor - estimate) <= fine
             known = min(abs(place - at) for at in values) < _APART
             if settled or (known and high - low < 4 * _APART):
                 break
-            estimate, look = eta, place
+            estimate, look = load_factor, place
             if halve or k % _OFTEN == 0:
                 look, halve = (low + high) / 2, False
             elif known:

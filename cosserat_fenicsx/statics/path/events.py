@@ -84,23 +84,23 @@ class Locator:
     def __init__(self, track):
         self.track = track
 
-    def between(self, a, b, target, weight, *, probe=True, explained=True, short=False):
+    def between(self, a, b, load_factor, weight, *, probe=True, explained=True, short=False):
         """The critical points and the requested load factor between two points.
 
         Args:
             a, b: the `PathPoint`s; the last accepted point of the track is a.
-            target: load factor.
+            load_factor: to land on.
             weight: of the load factor in the metric.
             probe: whether to check for negative modes that appear and vanish between them.
             explained: whether the number of negative modes must change as the critical points tell.
             short: whether the step is too short to lead to another path unnoticed.
 
         Returns:
-            (landing, crossings): the first `PathPoint` with the load factor `target` after a, or None; the `Crossing`s
+            (landing, crossings): the first `PathPoint` with the load factor after a, or None; the `Crossing`s
             up to there, in the order of the path.
 
         Raises:
-            Lost: the point at `target` was not found, negative modes appear and vanish between a and b, or their number
+            Lost: the point to land on was not found, negative modes appear and vanish between a and b, or their number
                 changes otherwise than the critical points tell.
         """
         chord = Chord(self.track, a, b, weight, short=short)
@@ -111,8 +111,9 @@ class Locator:
         ends = [(0.0, a), *((limit.place, limit.point) for limit in limits), (1.0, b)]
         landing = place = None
         for (low, before), (high, after) in itertools.pairwise(ends):
-            if (before.load_factor - target) * (after.load_factor - target) < 0 or after.load_factor == target:
-                place, landing = self._land(chord, low, high, before, after, target)
+            lands = after.load_factor == load_factor
+            if lands or (before.load_factor - load_factor) * (after.load_factor - load_factor) < 0:
+                place, landing = self._land(chord, low, high, before, after, load_factor)
                 break
         crossings = self.crossings(chord, limits)
         if probe and explained and not self._explained(a, b, crossings):
@@ -240,14 +241,14 @@ class Locator:
     def _singular(self, kind, chord, place, directions):
         """The `Crossing`s at a coordinate, one for each direction (a change of the unknowns, owned entries)."""
         track, found = self.track, []
-        numbers, eta = chord.guess(place)
+        numbers, load_factor = chord.guess(place)
         before, after = chord.neighbours(place)
-        point = PathPoint(eta, numbers, min(before.negative_modes, after.negative_modes), 0)
+        point = PathPoint(load_factor, numbers, min(before.negative_modes, after.negative_modes), 0)
         partners = directions[::-1] if len(directions) == 2 else [None] * len(directions)
         for direction, partner in zip(directions, partners, strict=True):
             motion = track.motion_at(before, direction)
             at_rest, _ = track.response(track.origin.numbers, track.origin.load_factor, motion)
-            resistance, null = track.response(numbers, eta, motion)
+            resistance, null = track.response(numbers, load_factor, motion)
             residual = abs(resistance / at_rest) if at_rest else math.inf
             found.append(Crossing(kind, point, place, direction, residual, null, partner))
         return found
@@ -291,9 +292,9 @@ class Locator:
 
         place = chord.root(eigenvalue)
         place = 0.5 if place is None else place  # rounding hides the change of sign
-        numbers, eta = chord.guess(place)
+        numbers, load_factor = chord.guess(place)
         negative = min(point.negative_modes for _, point in (chord.known[0], chord.known[-1]))
-        point = PathPoint(eta, numbers, negative, 0)
+        point = PathPoint(load_factor, numbers, negative, 0)
         together = 1
         while j + together < last:
             ends = max(abs(eigenvalue(end, j + together)) for _, end in (chord.known[0], chord.known[-1]))
@@ -302,13 +303,13 @@ class Locator:
             together += 1
         return place, point, together
 
-    def _land(self, chord, low, high, before, after, target):
-        """(coordinate, `PathPoint`) at the load factor `target` between two coordinates, by Newton's method."""
+    def _land(self, chord, low, high, before, after, load_factor):
+        """(coordinate, `PathPoint`) at a load factor between two coordinates, by Newton's method."""
         track = self.track
         for _ in range(_MOST):
-            place = zero_of(lambda at: chord.load_factor(at) - target, low, high)
+            place = zero_of(lambda at: chord.load_factor(at) - load_factor, low, high)
             predicted, _ = chord.guess(place)
-            solved = track.at_load(predicted, target)
+            solved = track.at_load(predicted, load_factor)
             if solved.converged:
                 numbers = track.problem.numbers()
                 ends = track.distance(before.numbers, after.numbers)
@@ -318,9 +319,9 @@ class Locator:
             if found is None:
                 break
             place, point = found
-            if point.load_factor == target:
+            if point.load_factor == load_factor:
                 return place, point
-            if (point.load_factor - target) * (after.load_factor - target) < 0:
+            if (point.load_factor - load_factor) * (after.load_factor - load_factor) < 0:
                 low, before = place, point
             else:
                 high, after = place, point

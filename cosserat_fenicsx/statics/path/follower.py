@@ -1,13 +1,14 @@
 """Continuation of an equilibrium path: load control where it works, else arc length; on request onto a branch."""
 
 from dataclasses import replace
+from functools import cached_property
 
 from cosserat_fenicsx.errors import NotConverged
 from cosserat_fenicsx.statics.path.arclength import ArcLength
 from cosserat_fenicsx.statics.path.chord import Chord
 from cosserat_fenicsx.statics.path.events import UNEXPLAINED, Locator, Lost
 from cosserat_fenicsx.statics.path.load_control import Continuation, Sweep
-from cosserat_fenicsx.statics.path.track import INTENDED, Track
+from cosserat_fenicsx.statics.path.track import LIMITS, Track
 
 #: Control parameters of the continuation, see `solve`.
 CONTROLS = ("auto", "load", "arc")
@@ -31,7 +32,6 @@ class Follower:
 
     Attributes:
         track: the `Track`.
-        locator: its `Locator`.
         fork: the `Crossing` at which the path is left for a branch, once it is located; left: whether it was left.
         used: "arc" once arc length was used, else "load".
     """
@@ -41,17 +41,24 @@ class Follower:
         self.track = Track(problem, newton, stability, most, from_rest=from_rest)
         self._steps, self._control, self._branch, self._on_event = steps, control, branch, on_event
         self._sign = branch
-        self.locator = Locator(self.track)
         self._load = Continuation(self.track, steps, self._watch)
-        self._arc = ArcLength(self.track, steps, self.locator)
         self._auto = control == "auto" and steps.adaptive
         self.fork, self.left, self.used = None, False, "load"
         self._begun, self._sweep = False, None
 
+    @cached_property
+    def locator(self):
+        """The `Locator` of the track's critical points."""
+        return Locator(self.track)
+
+    @cached_property
+    def _arc(self):
+        return ArcLength(self.track, self._steps, self.locator)
+
     @property
     def smallest(self):
-        """The smallest step of the load factor that was allowed on the way to the last target."""
-        return self._load.smallest
+        """The smallest step of the load factor that was allowed on the way to the last load factor."""
+        return self._load.c.smallest
 
     def begin(self):
         """Apply the permanent loads in steps and solve for the equilibrium at load factor 0; once, at the first call.
@@ -79,11 +86,11 @@ class Follower:
                 raise NotConverged(f"no equilibrium was found at the load factor 0: {track.failure}")
             track.begin_here()
 
-    def to(self, target, way, *, on_step=None, once=False):
-        """Advance to the load factor `target`, which is reached exactly.
+    def to(self, load_factor, way, *, on_step=None, once=False):
+        """Advance to a load factor, which is reached exactly.
 
         Args:
-            target: load factor.
+            load_factor: to reach.
             way: range of the load factor over the whole path, to which steps of the load factor are relative.
             on_step: called with every accepted `PathPoint`.
             once: whether to return after the first accepted step of load control.
@@ -94,18 +101,18 @@ class Follower:
         """
         self.begin()
         track, here = self.track, self.track.here
-        done = self._advance(target, way, on_step, once)
+        done = self._advance(load_factor, way, on_step, once)
         if self.fork and not self.left:
             self.left, self._branch, self.used = True, 0, "arc"
             first = self._onto(self.fork)
             if first is not None:
                 slope = track.slope_found()
-                done = self._arc.to(target, first=first, slope=slope, on_step=on_step, on_event=self._meet)
+                done = self._arc.to(load_factor, first=first, slope=slope, on_step=on_step, on_event=self._meet)
         if not done and self._auto and track.here is here:  # arc length made no step: load control down to its smallest
-            return self._load.to(target, way, on_step=on_step)
+            return self._load.to(load_factor, way, on_step=on_step)
         if done and self.used == "arc" and len(track.history) > 1:
             before, here = track.history[-2:]
-            self._load.step = abs(here.load_factor - before.load_factor) or None
+            self._load.c.step = abs(here.load_factor - before.load_factor)
         return done
 
     @property
@@ -119,28 +126,28 @@ class Follower:
             and not (unsure or model.actions.memory or model.signature.lives_along_rods)
         )  # fmt: skip
 
-    def sweep(self, targets, way, fields, *, every, counted):
+    def sweep(self, load_factors, way, fields, *, every, counted):
         """Advance as far as steps are accepted at once, see `Sweep.along`; the path has begun."""
         self._load.begin(way)
         if self._sweep is None:
             self._sweep = Sweep(self.track, fields)
-        return self._sweep.along(targets, self._load, _PATIENCE, every=every, counted=counted)
+        return self._sweep.along(load_factors, self._load, _PATIENCE, every=every, counted=counted)
 
-    def to_fork(self, target, way):
+    def to_fork(self, load_factor, way):
         """Advance towards a load factor up to the first bifurcation; whether one was found."""
         self.begin()
-        self._advance(target, way, None)
+        self._advance(load_factor, way, None)
         return self.fork is not None
 
-    def _advance(self, target, way, on_step, once=False):
+    def _advance(self, load_factor, way, on_step, once=False):
         """Advance to the load factor; False where the path fails or is to be left for a branch before."""
         if self._control != "arc":
             patience = _PATIENCE if self._auto else None
-            done = self._load.to(target, way, on_step=on_step, patience=patience, once=once)
+            done = self._load.to(load_factor, way, on_step=on_step, patience=patience, once=once)
             if done or not self._auto or (self.fork and not self.left):
                 return done
         self.used = "arc"
-        return self._arc.to(target, on_step=on_step, on_event=self._meet)
+        return self._arc.to(load_factor, on_step=on_step, on_event=self._meet)
 
     def _meet(self, crossing):
         """Report a `Crossing`; True where the path is to be left there."""
@@ -178,7 +185,7 @@ class Follower:
         track = self.track
         base = fork.point
         track.history = [base]
-        size = INTENDED / track.model.largest(fork.direction)
+        size = LIMITS.intended / track.model.largest(fork.direction)
         for _ in range(_TRIES):
             guess = [values.copy() for values in base.numbers]
             guess[0] += self._sign * size * fork.direction

@@ -19,21 +19,25 @@ from cosserat_fenicsx.algebra.newton import petsc
 from cosserat_fenicsx.checks import number, refuse
 from cosserat_fenicsx.errors import NotConverged
 from cosserat_fenicsx.interrupts import obey
-from cosserat_fenicsx.statics.path.track import EASY, FAR, HARD, INTENDED, NOTHING, PathPoint, Track, growth_of, through
+from cosserat_fenicsx.statics.path.track import LIMITS, NOTHING, PathPoint, Track, step_control, through
 from cosserat_fenicsx.statics.problem import CHANGE
 
-#: Distance from the predictor (rad, rod lengths) below which direction and length of a step are not checked.
-SLIGHT = 1e-3
-#: Distance from the predictor, over the predicted increment, above which a step may have jumped over a limit point.
-LEAP = 1.0
-#: Number of rejected steps from the first point after which the step is limited by the stiffness there.
-FIRST_REJECTIONS = 3
+# Number of rejected steps from the first point after which the step is limited by the stiffness there.
+_FIRST_REJECTIONS = 3
 # Largest distance from the predictor, over the step's length, at which the number of negative modes may change; the
 # second once steps are below a thousandth of the way: the path is smooth there, so that it crosses a bifurcation
 # without a change of branch.
 _SMOOTH, _NEAR = 0.01, 0.3
 # The same distance below which such a change is accepted although no event explains it.
 _EXPECTED = 1e-4
+# What `judge_step` says of a step, and why one is rejected.
+_ACCEPTED, _UNSURE, _, _TOO_FAR, _OPPOSITE = range(5)
+_REASONS = {
+    _TOO_FAR: "the equilibrium jumped away from the path",
+    _OPPOSITE: "the equilibrium lies opposite to the direction of the path",
+    _UNSURE: "the equilibrium jumped away from the path's direction",
+}
+_ENDLESS = 2**30
 
 
 @dataclass(frozen=True)
@@ -89,25 +93,24 @@ class Continuation:
             rejects the step.
 
     Attributes:
-        step: the next step of the load factor; None where it is still to be chosen.
-        smallest: the smallest step of the load factor that is tried.
-        rejections: number of steps that were rejected just before the next call of `to`.
+        c: C's `step_control`, which a `Sweep` shares: its `step` is 0 where it is still to be chosen, its `rejections`
+            are those just before the next call of `to`.
     """
 
     def __init__(self, track: Track, control: StepControl, watch=None):
         self.track, self.control, self._watch = track, control, watch
-        self.step, self._shrink, self.smallest, self.rejections = None, 0.5, 0.0, 0
+        self._lib, self.c = step_control(largest=control.largest or math.inf)
 
     def begin(self, way):
         """Choose the step where none is known; `way`: see `to`."""
-        self.step = self.step or self.control.first or way / 10
-        self.smallest = self.control.smallest * way
+        self.c.step = self.c.step or self.control.first or way / 10
+        self.c.smallest = self.control.smallest * way
 
-    def to(self, target, way, *, on_step=None, patience=None, once=False):
-        """Advance to the load factor `target`, which is reached exactly.
+    def to(self, load_factor, way, *, on_step=None, patience=None, once=False):
+        """Advance to a load factor, which is reached exactly.
 
         Args:
-            target: load factor.
+            load_factor: to reach.
             way: range of the load factor over the whole path, to which steps are relative.
             on_step: called with every accepted `PathPoint`.
             patience: number of rejected steps, without two successive accepted ones between, after which to stop;
@@ -118,40 +121,35 @@ class Continuation:
             bool: False where too many steps were rejected, the steps became too small or `watch` returned False; the
             track's `failure` gives the reason, and its state is that of `here`.
         """
-        control, track = self.control, self.track
+        control, track, c = self.control, self.track, self.c
         if not control.adaptive:
-            return self._attempt(target, guard=False, on_step=on_step)
+            return self._attempt(load_factor, guard=False, on_step=on_step)
         self.begin(way)
-        self._refused, rejections, last_accepted, first = False, self.rejections, False, len(track.history) == 1
-        self.rejections = 0
-        while track.here.load_factor != target:
-            left = target - track.here.load_factor
-            step = min(self.step, control.largest or np.inf)
-            if abs(left) <= min(1.2 * step, control.largest or np.inf):
-                goal = target
-            elif abs(left) < 2 * step:
-                goal = track.here.load_factor + left / 2
-            else:
-                goal = track.here.load_factor + np.copysign(step, left)
-            taken = abs(goal - track.here.load_factor)
+        self._refused, first = False, len(track.history) == 1
+        c.patience, c.accepted = patience or _ENDLESS, False
+        done = True
+        while done and track.here.load_factor != load_factor:
+            here = track.here.load_factor
+            goal = self._lib.step_goal(c, here, load_factor)
+            taken = abs(goal - here)
             # A new negative mode counts as one of the path itself once the step is this small.
             if self._attempt(goal, guard=taken > 1e-3 * way, on_step=on_step):
-                rejections, last_accepted, first = 0 if last_accepted else rejections, True, False
+                first = False
                 if once:
-                    return True
-            else:
-                rejections, last_accepted = rejections + 1, False
-                self.step = taken * self._shrink
-                if first and rejections >= FIRST_REJECTIONS:
-                    rejections, first, linear = 0, False, self._linear_step()
-                    self.step, self.smallest = min(self.step, linear), min(self.smallest, control.smallest * linear)
-                if self._refused or self.step < self.smallest or rejections >= (patience or math.inf):
-                    self.step = None
-                    return False
-        return True
+                    break
+                continue
+            enough = self._lib.reject_step(c, taken)
+            if first and c.rejections >= _FIRST_REJECTIONS:
+                c.rejections, first, linear = 0, False, self._linear_step()
+                c.step, c.smallest = min(c.step, linear), min(c.smallest, control.smallest * linear)
+                enough = c.step < c.smallest
+            if self._refused or enough:
+                c.step, done = 0.0, False
+        c.rejections = 0
+        return done
 
     def _linear_step(self):
-        """The step of the load factor that moves or rotates the linearised structure by INTENDED; infinite where its
+        """The step of the load factor that moves or rotates the linearised structure as intended; infinite where its
         tangent is singular.
 
         The first step must be of that order where the structure is very soft, as a straight wire is against bending.
@@ -161,21 +159,21 @@ class Continuation:
             moved = track.model.largest(track.slope())
         except NotConverged:
             return math.inf
-        return INTENDED / moved if moved else math.inf
+        return LIMITS.intended / moved if moved else math.inf
 
-    def _attempt(self, eta, *, guard, on_step):
+    def _attempt(self, load_factor, *, guard, on_step):
         """One step: predictor, corrector, checks. Accepts it (True) or restores the last point (False)."""
         obey()
         track, adaptive = self.track, self.control.adaptive
         here = track.here
-        predicted = self._predict(eta) if adaptive else here.numbers
-        solved = track.at_load(predicted, eta)
-        self._shrink = 0.5
+        predicted = self._predict(load_factor) if adaptive else here.numbers
+        solved = track.at_load(predicted, load_factor)
+        self.c.shrink = 0.5
         if not solved.converged:
             return track.restore()
         numbers = track.problem.numbers()
         off = track.distance(numbers, predicted)
-        if adaptive and off > SLIGHT and not self._near(numbers, predicted, off, eta):
+        if adaptive and not self._near(numbers, predicted, off, load_factor):
             return track.restore()
         point = track.point(solved)
         changed = point.negative_modes != here.negative_modes
@@ -186,11 +184,11 @@ class Continuation:
         if adaptive and self._watch and not (onward := self._watch(here, point, plain)):
             self._refused = onward is False
             return track.restore()
-        taken = abs(eta - here.load_factor)
+        taken = abs(load_factor - here.load_factor)
         track.keep(point)
         if adaptive:
-            growth = growth_of(off, min(len(track.history) - 1, 3), solved.iterations)
-            self.step = max(self.step, taken * growth) if growth >= 1 else taken * growth
+            growth = self._lib.step_growth(self.c, off, len(track.history) - 1, solved.iterations)
+            self._lib.accept_step(self.c, taken, growth)
         if on_step:
             on_step(point)
         return True
@@ -201,33 +199,25 @@ class Continuation:
         move, off = found - track.here.numbers[0], found - predicted
         return track.product(off, off) <= share**2 * track.product(move, move) + NOTHING**2
 
-    def _near(self, found, predicted, off, eta):
+    def _near(self, found, predicted, off, load_factor):
         """Whether a step whose corrected point differs from the predictor is still one along the path.
 
         Args:
             found, predicted: numbers of the corrected point and of the predictor; off: their distance.
-            eta: load factor of the step.
+            load_factor: of the step.
         """
         track = self.track
-        if off > FAR:
-            track.failure = "the equilibrium jumped away from the path"
-            self._shrink = min(max((INTENDED / off) ** (1 / len(track.history)), 0.1), 0.5)
-            return False
-        here = track.here.numbers
+        here, sizes = track.here.numbers, (0.0, 0.0, 0.0)
         move, increment = found[0] - here[0], predicted[0] - here[0]
-        size = track.product(increment, increment)
-        if len(track.history) > 1:
-            # The mirrored branch of a nearly perfect pitchfork is stable about a section's stiff axis, so that neither
-            # the distance nor the number of negative modes reveals it.
-            if track.product(move, increment) <= 0 < size:
-                track.failure = "the equilibrium lies opposite to the direction of the path"
-                return False
-            if track.product(move - increment, move - increment) <= LEAP**2 * size:
-                return True
-        if self._jumped(move, eta - track.here.load_factor):
-            track.failure = "the equilibrium jumped away from the path's direction"
-            return False
-        return True
+        if LIMITS.slight < off <= LIMITS.far:
+            beside = move - increment
+            sizes = [track.product(*pair) for pair in ((move, increment), (increment, increment), (beside, beside))]
+        judged = self._lib.judge_step(self.c, len(track.history), off, *sizes)
+        if judged == _UNSURE and not self._jumped(move, load_factor - track.here.load_factor):
+            judged = _ACCEPTED
+        if judged != _ACCEPTED:
+            track.failure = _REASONS[judged]
+        return judged == _ACCEPTED
 
     def _jumped(self, move, change):
         """Whether a step is longer than twice the mean slope of its two ends times the change of the load factor.
@@ -235,21 +225,21 @@ class Continuation:
         Then it has jumped over a limit point to another part of the path.
         """
         track = self.track
-        end, eta = track.problem.numbers(), track.problem.load_factor
+        end, load_factor = track.problem.numbers(), track.problem.load_factor
         slopes = track.slope()
         track.restore()
         slopes += track.slope()
-        track.put(end, eta)
+        track.put(end, load_factor)
         return track.product(slopes, slopes) * change**2 < track.product(move, move)
 
-    def _predict(self, eta):
-        """Predictor: numbers at eta by the polynomial through the last points (constant, secant, quadratic)."""
+    def _predict(self, load_factor):
+        """Predictor at a load factor: the polynomial through the last points (constant, secant, quadratic)."""
         known = self.track.history
         places = [point.load_factor for point in known]
         if len(set(places)) < len(places):  # the path returned to a load factor: use its last point there
             latest = dict(zip(places, known, strict=True))
             places, known = list(latest), list(latest.values())
-        return through(known, places, eta)[0]
+        return through(known, places, load_factor)[0]
 
 
 # Seconds after which C returns, so that Ctrl-C is obeyed; load factors recorded between two returns.
@@ -277,12 +267,10 @@ class Sweep(Pointers):
         sweep.newton, sweep.stability = track.newton.c, track.stability.c
         setattr(sweep, "with", petsc())
         sweep.snes, sweep.x = (ffi.cast("void *", each.handle) for each in (track.newton.snes, problem.x))
-        sweep.eta = self.doubles(problem.eta_array)
+        sweep.load_factor = self.doubles(problem.load_factor_array)
         unknowns, numbers = problem.numbering.size, problem.numbering.size + problem.c.carries
         sweep.numbers, sweep.moves, sweep.turn = numbers, model.moves, model.turn
-        sweep.slight, sweep.far, sweep.intended = SLIGHT, FAR, INTENDED
-        sweep.leap, sweep.easy, sweep.hard, sweep.patience = LEAP, EASY, HARD, _SECONDS
-        sweep.change = CHANGE
+        sweep.change, sweep.patience = CHANGE, _SECONDS
         sweep.fields, sweep.room = fields.c if fields else ffi.NULL, _ROOM
         shape = (fields.elements, fields.size) if fields else (0,)
         self._points, work = np.zeros((3, numbers)), np.zeros((6, numbers))
@@ -290,41 +278,40 @@ class Sweep(Pointers):
             np.zeros(_ROOM), np.zeros((_ROOM, unknowns)), np.zeros((_ROOM, *shape)), *np.zeros((2, _ROOM), np.int32)
         )
         for name, array in (
-            ("points", self._points), ("work", work), ("recorded_eta", self._recorded.load_factors),
+            ("points", self._points), ("work", work), ("recorded_load_factors", self._recorded.load_factors),
             ("recorded", self._recorded.x), ("recorded_fields", self._recorded.fields),
         ):  # fmt: skip
             setattr(sweep, name, self.doubles(array))
         for name in ("iterations", "steps"):
             setattr(sweep, f"recorded_{name}", self.integers(getattr(self._recorded, name)))
 
-    def along(self, targets, control, patience, *, every, counted):
+    def along(self, load_factors, control, patience, *, every, counted):
         """Advance to load factors in turn until a step needs another decision than to be accepted or halved.
 
         Args:
-            targets: load factors.
-            control: the `Continuation`, whose step is taken and set.
+            load_factors: to reach, in this order.
+            control: the `Continuation`, whose step control is shared.
             patience: number of rejected steps, without two successive accepted ones between, after which to stop.
-            every: whether every step is recorded, or the targets alone.
+            every: whether every step is recorded, or these load factors alone.
             counted: Newton iterations since the last record.
 
         Yields:
             `Swept`, with a progress that Ctrl-C keeps; after the last one the track is at the last accepted point.
 
         Returns:
-            (number of targets reached, iterations since the last record).
+            (number of load factors reached, iterations since the last record).
         """
         track, sweep = self._track, self.c
-        targets = np.array(targets, dtype=float)
+        load_factors = np.array(load_factors, dtype=float)
         known = track.history
         for at, point in zip(self._points, known, strict=False):
             at[:] = np.concatenate(point.numbers)
         for k, point in enumerate(known):
-            sweep.etas[k] = point.load_factor
-        sweep.known, sweep.negative, sweep.step = len(known), track.here.negative_modes, control.step
-        sweep.smallest, sweep.rejections, sweep.accepted = control.smallest, 0, False
-        sweep.allowed = min(patience, FIRST_REJECTIONS if len(known) == 1 else patience) - 1
-        sweep.largest, sweep.loads = control.control.largest or np.inf, track.problem.load_norm
-        sweep.targets, sweep.count, sweep.next = self.doubles(targets), len(targets), 0
+            sweep.known_load_factors[k] = point.load_factor
+        sweep.known, sweep.negative, sweep.loads = len(known), track.here.negative_modes, track.problem.load_norm
+        sweep.control, control.c.rejections, control.c.accepted = control.c, 0, False
+        control.c.patience = min(patience, _FIRST_REJECTIONS if len(known) == 1 else patience) - 1
+        sweep.load_factors, sweep.count, sweep.next = self.doubles(load_factors), len(load_factors), 0
         sweep.every, sweep.iterations, sweep.steps, sweep.records = every, counted, track.steps, 0
         track.newton.allow(track.max_iterations)
         track.newton.c.rounding = track.model.round_off
@@ -335,7 +322,6 @@ class Sweep(Pointers):
             track.iterations += int(self._recorded.iterations[:k].sum()) + sweep.iterations - before
             sweep.records = 0
             self._follow()
-            control.step, control.rejections = sweep.step, sweep.rejections
             if k:
                 yield Swept(*(array[:k] if array.size else None for array in self._recorded))
             track.problem.raise_failure()
@@ -347,12 +333,12 @@ class Sweep(Pointers):
     def _follow(self):
         """Let the track follow: its last points, number of steps and load factor."""
         track, sweep = self._track, self.c
-        size, live = track.problem.numbering.size, [len(x) for x in track.here.numbers[1:]]
+        parts = np.cumsum([track.problem.numbering.size, *(len(x) for x in track.here.numbers[1:])])[:-1]
         if sweep.steps == track.steps:
             track.problem.set_load_factor(track.here.load_factor)
             return
         track.history = [
-            PathPoint(sweep.etas[k], [part.copy() for part in np.split(self._points[k], np.cumsum([size, *live])[:-1])],
+            PathPoint(sweep.known_load_factors[k], [part.copy() for part in np.split(self._points[k], parts)],
                       sweep.negative, 0)
             for k in range(sweep.known)
         ]  # fmt: skip

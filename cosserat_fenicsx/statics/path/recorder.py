@@ -96,8 +96,8 @@ class Tracing:
         """Whether elements are short enough for the boundary layers of the contact force at the state."""
         model = self.model
         nodal, gauss = model.snapshot()
-        eta = np.array([self.problem.load_factor])
-        _, fields = model.expansion()(eta, nodal[None], None if gauss is None else gauss[None])
+        load_factor = np.array([self.problem.load_factor])
+        _, fields = model.expansion()(load_factor, nodal[None], None if gauss is None else gauss[None])
         n = np.linalg.norm(fields[0, ..., :3], axis=2).max(axis=1)
         sizes = self.path.layout.sizes(model.scene) / model.scales.length
         return bool((n * sizes**2 < _RESOLVED * model.section.J.max(axis=(1, 2))).all())
@@ -112,11 +112,11 @@ class Tracing:
         if self._until and self._until(self.path):
             raise _Enough
 
-    def along(self, targets, free, until=None):
+    def along(self, load_factors, free, until=None):
         """Continue the path over the load factors.
 
         Args:
-            targets: load factors, reached exactly and in this order.
+            load_factors: reached exactly and in this order.
             free: whether every step from the first to the second is recorded.
             until: see `solve`.
 
@@ -124,29 +124,29 @@ class Tracing:
             NotConverged, Interrupted: with the path so far.
         """
         track = self.track
-        way = max(abs(eta) for eta in targets) or 1.0
+        way = max(abs(load_factor) for load_factor in load_factors) or 1.0
         try:
             self._follower.begin()
             k = 0
-            while (k := self._swept_from(k, targets, free, way, until)) < len(targets):
-                target, between = targets[k], free and k == 1
+            while (k := self._swept_from(k, load_factors, free, way, until)) < len(load_factors):
+                load_factor, between = load_factors[k], free and k == 1
                 self._until = until if between else None
                 on_step = (lambda point: (self._watch(point), self._record(point))) if between else self._watch
-                at_start = k == 0 and track.here.load_factor == target
+                at_start = k == 0 and track.here.load_factor == load_factor
                 # within a range C takes over again after a step
-                if not (at_start or self._follower.to(target, way, on_step=on_step, once=between)):
+                if not (at_start or self._follower.to(load_factor, way, on_step=on_step, once=between)):
                     here = track.here.load_factor
                     if self._choice.promoted and self._options["control"] == "auto":
                         raise Promoted(f"load control ends at the load factor {here:.4g}, because {track.failure}")
                     raise NotConverged(
-                        f"no equilibrium was found beyond the load factor {here:.6g} on the way to {target:g}: "
-                        f"{track.failure}. {self._advice(here, abs(target) * self.problem.load_norm)}",
+                        f"no equilibrium was found beyond the load factor {here:.6g} on the way to {load_factor:g}: "
+                        f"{track.failure}. {self._advice(here, abs(load_factor) * self.problem.load_norm)}",
                         self.path,
                     )
                 if not between:
                     self._record(track.here)
                 once = between and self._follower.used == "load"
-                k += not once or track.here.load_factor == target
+                k += not once or track.here.load_factor == load_factor
         except _Enough:
             pass
         except NotConverged as failure:
@@ -158,13 +158,13 @@ class Tracing:
             self.path.control, self.path.left = self._follower.used, self._follower.left
         return self.path
 
-    def _swept_from(self, k, targets, free, way, until):
-        """Advance from the k-th target on in C as far as every step is accepted; the number of the next target."""
+    def _swept_from(self, k, load_factors, free, way, until):
+        """Advance from the k-th load factor on in C as far as every step is accepted; the number of the next one."""
         between, here = free and k == 1, self.track.here
         watched = self._choice.promoted and here.negative_modes
-        if k == len(targets) or watched or (between and until) or not self._follower.sweeps:
+        if k == len(load_factors) or watched or (between and until) or not self._follower.sweeps:
             return k
-        wanted = targets[k:] if not free or between else targets[:1]
+        wanted = load_factors[k:] if not free or between else load_factors[:1]
         sweep = self._follower.sweep(wanted, way, self.problem.fields, every=between,
                                      counted=self.track.iterations - self._counted)  # fmt: skip
         try:
@@ -173,18 +173,19 @@ class Tracing:
         except StopIteration as end:
             done, left = end.value
         self._counted, self._stable_at = self.track.iterations - left, self.track.here.load_factor
-        return self._swept_from(1, targets, free, way, until) if free and k < done else k + done
+        return self._swept_from(1, load_factors, free, way, until) if free and k < done else k + done
 
     def _record_all(self, swept):
         self._bar.at(self.track.here)
         count, model, problem = len(swept.load_factors), self.model, self.problem
         nodal, fields = model.snapshots(swept.x, swept.fields)
-        ties = [problem.at_ties(x, eta) for x, eta in zip(swept.x, swept.load_factors, strict=True)]
+        ties = [problem.at_ties(x, load_factor) for x, load_factor in zip(swept.x, swept.load_factors, strict=True)]
         self.path.extend(Records(
             swept.load_factors.copy(), nodal, fields, np.full(count, self.track.here.negative_modes),
             swept.iterations.astype(int), np.array([multipliers for multipliers, _ in ties]),
             np.zeros(count, dtype=bool), model.densities.at(swept.load_factors), np.array([f for _, f in ties]),
-            np.array([model.clamps.loads(eta) for eta in swept.load_factors.tolist()]), swept.steps.astype(int),
+            np.array([model.clamps.loads(load_factor) for load_factor in swept.load_factors.tolist()]),
+            swept.steps.astype(int),
         ))  # fmt: skip
 
     def _advice(self, here, load):
@@ -262,8 +263,8 @@ class Tracing:
         try:
             for k in range(last + 1):
                 obey()
-                (ahead, eta_ahead), (behind, eta_behind) = guesses[min(k + 1, last)], guesses[max(k - 1, 0)]
-                normal, change = ahead[0] - behind[0], eta_ahead - eta_behind
+                (ahead, factor_ahead), (behind, factor_behind) = guesses[min(k + 1, last)], guesses[max(k - 1, 0)]
+                normal, change = ahead[0] - behind[0], factor_ahead - factor_behind
                 if k == 0 and guesses[0][1] == 0:
                     point = track.origin
                     track.put(point.numbers, 0.0)
@@ -303,8 +304,8 @@ class Tracing:
         """Locate the events up to the bifurcation where the path was left; index of the last point before that."""
         known = list(itertools.takewhile(lambda event: event.kind != "bifurcation", coarse.events))
         known.append(coarse.events[len(known)])
-        target, way = float(coarse.load_factors[-1]), float(np.abs(coarse.load_factors).max())
-        found = self._follower.to_fork(target, way)
+        load_factor, way = float(coarse.load_factors[-1]), float(np.abs(coarse.load_factors).max())
+        found = self._follower.to_fork(load_factor, way)
         if not found or len(self.path.events) != len(known):
             raise NotConverged("the bifurcation was not found on a finer mesh", self.path)
         events = zip(self.path.events, known, strict=True)
@@ -312,12 +313,12 @@ class Tracing:
         self.track.history = [self.track.origin]
         return known[-1].after
 
-    def _found(self, guess, eta, normal, weight, neutral, *, at_load):
+    def _found(self, guess, load_factor, normal, weight, neutral, *, at_load):
         """The `PathPoint` next to a guess, at its load factor or in the plane through it."""
         track = self.track
-        track.put(guess, eta)
+        track.put(guess, load_factor)
         track.neutral = self._neutral() if neutral else None
-        solved = track.at_load(guess, eta) if at_load else track.on_plane(guess, eta, normal, weight)
+        solved = track.at_load(guess, load_factor) if at_load else track.on_plane(guess, load_factor, normal, weight)
         off = self.problem.numbers()[0] - guess[0]
         if solved.converged and track.product(off, off) <= _ASIDE**2 * track.product(normal, normal) + NOTHING**2:
             return track.point(solved)

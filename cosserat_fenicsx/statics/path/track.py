@@ -2,24 +2,48 @@
 
 import math
 from dataclasses import dataclass, field
+from typing import ClassVar
 
 import numpy as np
 
+from cosserat_fenicsx.algebra.building import module
 from cosserat_fenicsx.algebra.newton import Newton
 from cosserat_fenicsx.statics.stability import NegativeModes
 
-#: Largest distance of the corrected point of a step from the predictor (rad, rod lengths), and the distance that step
-#: control aims at.
-FAR, INTENDED = 0.5, 0.1
-#: Largest angle (rad) between the tangents of the path at the two ends of a step, and largest distance of the step's
-#: direction from the mean of these tangents, all of unit length: zero on a line and on a circle.
-TURN, CORNER = 0.9, 0.12
 # Smallest cosine of the angle between the negative modes of two neighbouring points.
 _SAME_MODE = 0.5
 #: Motions below this are rounding (rad, rod lengths): an inextensible column does not move until it buckles.
 NOTHING = 1e-8
-#: Newton iterations of a step beyond which the next step does not grow, and from which on it is halved.
-EASY, HARD = 5, 9
+
+
+@dataclass(frozen=True)
+class Limits:
+    """Which steps of a continuation are accepted, and how long the next one is (`step_control` in C).
+
+    Attributes:
+        far: largest distance of the corrected point of a step from the predictor (rad, rod lengths).
+        intended: the distance that step control aims at.
+        slight: the distance below which direction and length of a step are not checked.
+        leap: distance from the predictor, over the predicted increment, above which a step may have jumped over a limit
+            point.
+        easy, hard: Newton iterations of a step beyond which the next one does not grow, and from which on it is halved.
+    """
+
+    far: float = 0.5
+    intended: float = 0.1
+    slight: float = 1e-3
+    leap: float = 1.0
+    easy: int = 5
+    hard: int = 9
+
+
+LIMITS = Limits()
+
+
+def step_control(**numbers):
+    """C's (library, `step_control` with these numbers): the decisions of step control, in C's sweep and in Python."""
+    ffi, lib = module()
+    return lib, ffi.new("step_control *", {**vars(LIMITS), **numbers})
 
 
 @dataclass(eq=False)
@@ -27,7 +51,7 @@ class PathPoint:
     """A converged point of a path.
 
     Attributes:
-        load_factor: eta.
+        load_factor: the factor of loads and prescribed motions, eta in the formulas below.
         numbers: see `Problem.numbers`; the first array holds the unknowns that this rank owns.
         negative_modes: see `NegativeModes.count`.
         iterations: Newton iterations of its solution.
@@ -102,19 +126,19 @@ class Track:
 
     # -- equilibria --------------------------------------------------------------------------------------------------
 
-    def at_load(self, numbers, eta):
+    def at_load(self, numbers, load_factor):
         """Newton's method from `numbers` at a fixed load factor; returns a `Solved` and sets `failure`."""
         if self.neutral is not None:
-            return self.on_plane(numbers, eta, None, 0.0)
-        self.put(numbers, eta)
+            return self.on_plane(numbers, load_factor, None, 0.0)
+        self.put(numbers, load_factor)
         return self._solve(self.newton)
 
-    def on_plane(self, numbers, eta, normal, weight):
+    def on_plane(self, numbers, load_factor, normal, weight):
         """Newton's method from (numbers, eta) in the plane <normal, dx> + weight d eta = 0 through them.
 
         Both x and eta are unknowns. Returns a `Solved` and sets `failure`.
         """
-        self.put(numbers, eta)
+        self.put(numbers, load_factor)
         self.newton.bordered.stay_in_plane(normal, weight, self.neutral)
         solved = self._solve(self.newton.bordered)
         if solved.converged:
@@ -248,22 +272,26 @@ def through(points, places, at):
 
 @dataclass(frozen=True)
 class Bends:
-    """How a step leads from a point of a path to another one, see `TURN` and `CORNER`.
+    """How a step leads from a point of a path to another one.
 
     Attributes:
-        turn: angle between the two tangents, rad.
-        corner: distance of the step's direction from the mean of the tangents.
+        turn: angle between the tangents of the path at the two ends, rad.
+        corner: distance of the step's direction from the mean of these tangents, all of unit length: zero on a line and
+            on a circle.
         length: of the step.
+        most_turn, most_corner: their largest values in a step that follows the path.
     """
 
     turn: float
     corner: float
     length: float
+    most_turn: ClassVar[float] = 0.9
+    most_corner: ClassVar[float] = 0.12
 
     @property
     def resolved(self):
         """Whether the step is short enough to follow the path."""
-        return self.turn <= TURN and self.corner <= CORNER
+        return self.turn <= self.most_turn and self.corner <= self.most_corner
 
 
 def bends(track, a, b, weight):
@@ -281,17 +309,3 @@ def bends(track, a, b, weight):
     mean = math.sqrt(max(2 + 2 * math.cos(turn), 1e-30))
     along = (cosine(begin, chord) + cosine(end, chord)) / mean
     return Bends(turn, math.sqrt(max(2 - 2 * along, 0.0)), math.sqrt(product(chord, chord)))
-
-
-def growth_of(off, order, iterations):
-    """Factor from a step's length to that of the next one.
-
-    Args:
-        off: distance of the corrected point from the predictor, rad or rod lengths.
-        order: of the predictor's error in the length of the step.
-        iterations: Newton iterations of the step.
-    """
-    growth = min(max((INTENDED / max(off, 1e-12)) ** (1 / order), 0.5), 2.0)
-    if iterations >= HARD:
-        return 0.5
-    return min(growth, 1.0) if iterations > EASY else growth
