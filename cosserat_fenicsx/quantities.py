@@ -41,6 +41,8 @@ class Quantity:
         shown: unit on the screen, if not that of the result with a prefix (kN, kN m) by its size.
         dimension: name in `dimensions.DIMENSIONS`, where several have its unit ("diameter" for inches in field units).
         noise: values up to this, in `unit`, are rounding and shown as 0.
+        digits: significant ones in tables on the screen.
+        short: its label there, followed by the name of a component ("d" for dx, dy, dz).
     """
 
     name: str
@@ -53,6 +55,8 @@ class Quantity:
     shown: str = ""
     dimension: str = ""
     noise: float = 0.0
+    digits: int = 6
+    short: str = ""
 
     def __post_init__(self):
         object.__setattr__(self, "label", self.label or self.name.replace("_", " "))

@@ -23,7 +23,8 @@ from rich.table import Table
 import cosserat_fenicsx as cf
 from cosserat_fenicsx import analytic
 from cosserat_fenicsx.pictures.charts import empty_figure, save
-from cosserat_fenicsx.results.tables import as_text, stability
+from cosserat_fenicsx.results.path import stability
+from cosserat_fenicsx.results.screen import as_text
 
 L, DIAMETER, ECCENTRICITY = 20.0, 0.2, 0.2  # m
 TABULATED = (0.1, 0.3, 0.5, 0.7, 0.8, 0.9, 0.95, 0.99, 1.0, 1.1, 1.3, 1.5, 2.0)

@@ -6,7 +6,7 @@ from collections import namedtuple
 import numpy as np
 from rich.table import Table
 
-from cosserat_fenicsx.results.tables import as_text
+from cosserat_fenicsx.results.screen import as_text
 
 #: A number, its expected value and the source of that, and the allowed deviation (absolute).
 Check = namedtuple("Check", "what found expected allowed source")

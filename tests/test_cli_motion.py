@@ -13,7 +13,6 @@ from cosserat_fenicsx import interrupts
 from cosserat_fenicsx.cli import explain
 from cosserat_fenicsx.cli import main as cli
 from cosserat_fenicsx.dynamics.start import before
-from cosserat_fenicsx.results import tables
 from cosserat_fenicsx.scene.signals import Triangle
 
 pytestmark = pytest.mark.serial
@@ -64,9 +63,9 @@ def test_run_of_a_motion(tmp_path, cosserat):
 def test_the_table_picks_rows_and_the_csv_keeps_all(tmp_path):
     scene, _ = cf.read_motion(FLIGHT)
     history = cf.simulate(scene, 1, dt=0.01, elements=2, degree=2)
-    text = tables.motion_table(history)
+    text = history.details()
     assert "21 of 101 times" in text and len(re.findall(r"^│", text, re.MULTILINE)) == 21
-    assert "speed: of spaghetti@2.5." in tables.motion_table(history, "spaghetti@2.5")
+    assert "speed: of spaghetti@2.5." in history.details(station="spaghetti@2.5")
     history.write(tmp_path / "a.csv", station="spaghetti@2.5")
     lines = (tmp_path / "a.csv").read_text().splitlines()
     assert len(lines) == 102 and "spaghetti@2.5 velocity (m/s) x" in lines[0]

@@ -38,12 +38,12 @@ def rows_of(file):
 def test_tables_as_csv(path, history, tmp_path_all):
     path.write(tmp_path_all / "path.csv", station="column@7.5")
     rows = rows_of(tmp_path_all / "path.csv")
-    assert [float(row["load_factor"]) for row in rows] == [0.4, 0.8]
+    assert [float(row["load factor"]) for row in rows] == [0.4, 0.8]
     heading = "column@7.5 displacement (m) x"
     assert [float(row[heading]) for row in rows] == path.displacement("column@7.5")[:, 0].tolist()
     history.write(tmp_path_all / "motion.csv")
     rows = rows_of(tmp_path_all / "motion.csv")
-    assert [float(row["time (s)"]) for row in rows] == history.times.tolist() and "kinetic (J)" in rows[0]
+    assert [float(row["time (s)"]) for row in rows] == history.times.tolist() and "kinetic energy (J)" in rows[0]
     assert float(rows[-1]["rod.end velocity (m/s) z"]) == history.velocity("rod.end")[-1, 2]
 
 
@@ -61,7 +61,7 @@ def test_profiles_as_csv(path, tmp_path_all):
     path.write(file, -1)
     rows = rows_of(file)
     assert [row["rod"] for row in rows] == ["column"] * 9 + ["an/arm"] * 9
-    assert rows[-1]["von Mises stress (Pa)"] == "nan" and float(rows[-1]["s (m)"]) == 1.0
+    assert rows[-1]["von Mises stress (Pa)"] == "" and float(rows[-1]["s (m)"]) == 1.0
 
 
 def test_what_does_not_fit_is_refused(path, tmp_path_all):
@@ -113,7 +113,7 @@ def test_notebooks_show_a_table_and_a_picture(path, history):
     for result, rows in ((path, 2), (history, 3), (found, 8)):
         text = result._repr_html_()
         page = xml.fromstring(text)
-        assert len(text) < 4000 and len(page.findall(".//tr")) == rows + 1
+        assert len(text) < 4500 and len(page.findall(".//tr")) == rows + 1
     assert page.find(".//b").text == "<script>&" and "8 of 12 shown" in text
     *_, last = page.findall(".//polyline")
     corners = np.array([corner.split(",") for corner in last.get("points").split()], dtype=float)

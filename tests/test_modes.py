@@ -9,7 +9,6 @@ import pytest
 from scipy.optimize import brentq
 
 import cosserat_fenicsx as cf
-from cosserat_fenicsx.results.shapes import modes_table
 
 LINE = cf.Line((0, 0, 0), (1, 0, 0), d1=(0, 0, 1))
 
@@ -233,5 +232,5 @@ def test_what_resists_velocities_is_left_out_and_told():
         )
         assert ", ".join(found.left_out) == told
         np.testing.assert_allclose(found.squares, undamped.squares, rtol=1e-10)
-        for text in (found.caution, repr(found), found._repr_html_(), modes_table(found)):
+        for text in (found.caution, repr(found), found._repr_html_(), found.details()):
             assert "left out" in text.lower() and told in text.replace("\n", " "), text

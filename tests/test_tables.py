@@ -5,7 +5,7 @@ import re
 import pytest
 
 import cosserat_fenicsx as cf
-from cosserat_fenicsx.results.tables import ROWS, path_table
+from cosserat_fenicsx.results.screen import ROWS
 from cosserat_fenicsx.scene.describe import actions_in_words
 
 pytestmark = pytest.mark.serial
@@ -18,7 +18,7 @@ def arm():
 
 
 def rows_of(path):
-    return re.findall(r"^[│|] *([\d.]+) [│|]", path_table(path), flags=re.M)
+    return re.findall(r"^[│|] *([\d.]+) [│|]", path.details(), flags=re.M)
 
 
 def test_a_long_table_leaves_out_its_middle():
@@ -26,11 +26,11 @@ def test_a_long_table_leaves_out_its_middle():
     path.events = [cf.Event("limit", 0.5, None, after=29)]
     rows = [row for row in rows_of(path) if row.strip(".")]
     assert len(rows) == ROWS + 2 and {"0.5", "0.516667"} < set(rows) and (rows[0], rows[-1]) == ("0.0166667", "1")
-    table = path_table(path)
+    table = path.details()
     assert table.count("...") == 2 * 8  # two gaps, in every column
     assert "42 of 60 points: path.csv has all (-o DIR; path.write('path.csv') in Python)." in table
     short = path[:ROWS]
-    assert len(rows_of(short)) == ROWS and "points: path.csv" not in path_table(short)
+    assert len(rows_of(short)) == ROWS and "points: path.csv" not in short.details()
 
 
 def test_prescribed_motions_are_told_with_the_loads():

@@ -14,7 +14,7 @@ from fake_string import use
 
 import cosserat_fenicsx as cf
 from cosserat_fenicsx.cli.main import main
-from cosserat_fenicsx.results.export.columns import plain_text
+from cosserat_fenicsx.results.result import plain_text
 
 pytestmark = pytest.mark.serial
 ROOT = Path(__file__).parent.parent

@@ -166,7 +166,7 @@ def deliver(computed, options, moving, tables=None):
 
     path, trouble, code = ended(lambda: together(computed))
     if path is not None and len(path):
-        station = options.station or _default_station(path)
+        station = options.station
         _report(path, station)
         if out is not None:
             film = options.animate if code != INTERRUPTED else None  # a film would take long after an interruption
@@ -229,20 +229,8 @@ def _check_film(options, moving):
     check_name(options.animate)
 
 
-def _default_station(path):
-    """The station of table and CSV file where none is requested."""
-    from cosserat_fenicsx.results.tables import most_displaced
-
-    return most_displaced(path)
-
-
 def _report(path, station):
-    if path.axis == "time":
-        from cosserat_fenicsx.results.tables import motion_table as table
-    else:
-        from cosserat_fenicsx.results.tables import path_table as table
-
-    text = table(path, station)
+    text = path.details(station=station)
     if first_rank():
         print(text, flush=True)  # before the messages on stderr that follow
 

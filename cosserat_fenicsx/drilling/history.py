@@ -14,7 +14,7 @@ from cosserat_fenicsx.drilling.stick_slip import StickSlip, stick_slip_of
 from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.new_files import replaced
 from cosserat_fenicsx.ranks import on_first, world
-from cosserat_fenicsx.results.export.exports import import_library
+from cosserat_fenicsx.results.result import import_library
 from cosserat_fenicsx.well.tabular import Tabular
 
 #: Columns of the rows that a `StringModel` gives.

@@ -3,7 +3,7 @@
 import numpy as np
 from rich.table import Table
 
-from cosserat_fenicsx.results.tables import as_text
+from cosserat_fenicsx.results.screen import as_text
 
 # Rows that are shown.
 _ROWS = 16

@@ -3,7 +3,7 @@
 import numpy as np
 
 from cosserat_fenicsx.results.compared import FORCE, POSITION, ROTATION, ROUNDING, cell_nodes, differences, transferred
-from cosserat_fenicsx.results.result import resting
+from cosserat_fenicsx.results.rods import resting
 
 #: Largest number of points of a path that are all sample points.
 FEW = 3

@@ -1,5 +1,6 @@
 """A motion as arrays with named fields, in SI units. Imports no solver; other packages make files and pictures."""
 
+import dataclasses
 from collections.abc import Sequence
 from functools import cached_property
 
@@ -7,21 +8,44 @@ import numpy as np
 
 from cosserat_fenicsx.checks import File
 from cosserat_fenicsx.numerics import directors
+from cosserat_fenicsx.quantities import Quantity
+from cosserat_fenicsx.results import screen
 from cosserat_fenicsx.results.recovery import viscous_contact
-from cosserat_fenicsx.results.result import Result
+from cosserat_fenicsx.results.result import by_name
+from cosserat_fenicsx.results.rods import RodResult
 from cosserat_fenicsx.results.whirl import Orbit, WallForces, Whirl, orbit_of, wall_forces, whirl
 from cosserat_fenicsx.scene.action import Action
 from cosserat_fenicsx.scene.rod import RodOrName, StationOrName
 
+# Largest number of times in tables.
+_TIMES = 21
+_ALONG = ("point", "s")
+_ENERGIES = ("kinetic", "strain", "work", "dissipated", "balance")
+# What belongs to every time, and the fields that paths do not have.
+_QUANTITIES = by_name(
+    Quantity("time", unit="s", getter="times"),
+    Quantity("steps"),
+    Quantity("iterations", "Newton iterations"),
+    Quantity("kinetic_energy", unit="J", getter="kinetic"),
+    Quantity("strain_energy", unit="J", getter="strain"),
+    Quantity("work", unit="J"),
+    Quantity("dissipated", unit="J"),
+    Quantity("balance", unit="J"),
+    Quantity("linear_momentum", unit="kg m/s", parts="xyz", frame="inertial"),
+    Quantity("angular_momentum", unit="kg m^2/s", parts="xyz", frame="inertial"),
+    Quantity("velocity", unit="m/s", parts="xyz", frame="inertial", axes=_ALONG),
+    Quantity("angular_velocity", unit="rad/s", parts="xyz", frame="inertial", axes=_ALONG),
+)
 
-class History(Result):
+
+class History(RodResult):
     """A motion: its states at the saved times, energies and momenta.
 
     All station queries (`position`, `displacement`, `rotation`, `force`, `moment`, ...) give one row per time. Contact
     forces and moments, and so stresses, include those of damping; strains and curvatures are those of the shape. If
     `simulate` was given a `folder`, the states are read from a file in it.
 
-    Beside those of `Result` it has these attributes.
+    Beside those of `RodResult` it has these attributes.
 
     Attributes:
         times: (n,) s.
@@ -35,8 +59,11 @@ class History(Result):
     """
 
     axis, counts_modes = "time", False
+    _kind, _more_about, _coordinates = "History", ("scheme",), ("time",)
+    _quantities = _QUANTITIES
+    _of_stations = ("displacement", "quaternion", "velocity", "angular_velocity", "force", "moment")
     more_fields = {"velocity": "velocity", "angular_velocity": "angular_velocity"}  # noqa: RUF012
-    _computed = (*Result._computed, "_all_rates", "_all_gauss")
+    _computed = (*RodResult._computed, "_all_rates", "_all_gauss")
 
     @classmethod
     def of(cls, model, scheme, why=()):
@@ -48,6 +75,56 @@ class History(Result):
     def __repr__(self):
         reach = f"t = {self.times[0]:g} .. {self.times[-1]:g} s" if len(self) else "empty"
         return f"<History: {len(self)} times, {reach}, {self.model}, {self.unknowns} unknowns, scheme {self.scheme}>"
+
+    def _answer(self, units):
+        title = f"{self.scene.title}: at" if self.scene.title else "At"
+        if not len(self):
+            yield "No time of the motion was computed."
+            return
+        station = self._most_displaced()
+        yield (
+            f"{title} t = {self.times[-1]:.6g} s {station} is displaced by {self._moved_in_words(station, units)}; "
+            f"its largest speed is {np.linalg.norm(self.velocity(station), axis=1).max():.4g} m/s."
+        )
+        largest = max(np.abs(getattr(self, name)).max() for name in _ENERGIES)
+        if largest:
+            worst = np.abs(self.balance).max()
+            yield f"The energy balance is off by at most {worst:.1e} J, {worst / largest:.1e} of the largest energy."
+        yield f"{self.steps[-1]} steps of the scheme {self.scheme}, {self.model} model."
+
+    def _table(self, units, rows, station=None):
+        rows = min(rows, _TIMES)
+        known, station = self.quantities, self.station(station or self._most_displaced())
+        title = f"{self.scene.title}\n" if self.scene.title else ""
+        some = f"{rows} of " if rows < len(self) else ""
+        speed = np.linalg.norm(self.velocity(station), axis=1)
+        energies = [(dataclasses.replace(known.get(f"{x}_energy", known.get(x)), label=x, digits=5), getattr(self, x))
+                    for x in _ENERGIES[:-1]]  # fmt: skip
+        return screen.table(
+            [
+                (known["time"], self.times),
+                (Quantity("displacement", unit="m", parts="xyz", short="d"), self.displacement(station)),
+                (Quantity("speed", unit="m/s", digits=4), speed),
+                *energies,
+                (dataclasses.replace(known["balance"], digits=2), self.balance),
+            ],
+            units,
+            rows,
+            f"{title}{self.model} model, scheme {self.scheme}, {self._mesh_in_words()}, {self.steps[-1]} steps, "
+            f"{some}{len(self)} times",
+            f"dx, dy, dz, speed: of {station}. work: of loads and prescribed motions. balance: kinetic + strain - "
+            "work + dissipated, minus its value at the start; zero for an exact solution.",
+        )
+
+    def _more(self, units):
+        if len(self):
+            least = 1e-12 * self.scales.length
+            ends = (
+                f"{place} at ({', '.join(f'{x if abs(x) > least else 0:.6g}' for x in self.position(place)[-1])}) m"
+                for place in _named(self.scene)
+            )
+            yield f"t = {self.times[-1]:.6g} s: {'; '.join(ends)}."
+        yield from super()._more(units)
 
     @property
     def times(self) -> np.ndarray:
@@ -130,7 +207,7 @@ class History(Result):
         return f"{self.times[k]:.3g} s"
 
     def fields_at(self, which: Sequence[int] | np.ndarray, rod: RodOrName | None = None) -> dict[str, np.ndarray]:
-        """See `Result`; with velocity (m/s) and angular_velocity (rad/s), inertial."""
+        """See `RodResult`; with velocity (m/s) and angular_velocity (rad/s), inertial."""
         rows = self._rows(rod)[1]
         rates = np.array([self._records[k].rates[rows] for k in which]) / self._time_unit
         velocity = rates[..., :3] * self.scales.length
@@ -259,3 +336,12 @@ class History(Result):
 
     def _contact_in(self, cell):
         return np.einsum("jg,kgi->kji", self._from_gauss, self._all_gauss[:, cell, :, :6])
+
+
+def _named(scene):
+    """The ends of all rods and the stations of supports, loads and joints, without repetitions."""
+    places = {}
+    for rod in scene.rods:
+        for station in (rod.start, *scene.stations(rod), rod.end):
+            places.setdefault(tuple(np.round(rod.curve.position(station.s), 9)), station)
+    return places.values()

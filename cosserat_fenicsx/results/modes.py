@@ -6,8 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cosserat_fenicsx.quantities import Quantity
+from cosserat_fenicsx.results.result import by_name
 from cosserat_fenicsx.results.sensitivity import Sensitivity, Uncertainty
 from cosserat_fenicsx.results.shapes import Shapes, in_words, largest_error
+from cosserat_fenicsx.scene.describe import actions_in_words
 from cosserat_fenicsx.scene.parameters import Parameter, check_once
 
 
@@ -42,6 +45,11 @@ class Buckling(Shapes):
     _differentiated: Callable | None = None
 
     title = "Linear buckling"
+    _on_screen = ("k", "critical_load_factor", "error", "place", "direction")
+    _quantities = by_name(
+        Quantity("critical_load_factor", axes=("mode",), getter="load_factors", digits=7),
+        Quantity("error", "estimated relative error", axes=("mode",), digits=2, short="est. error"),
+    )
 
     @property
     def modes(self):
@@ -114,10 +122,26 @@ class Buckling(Shapes):
         """See `Shapes`."""
         return f"critical load factor {self.load_factors[k]:.5g}"
 
+    def _answer(self, units):
+        title = f"{self.scene.title}: " if self.scene.title else ""
+        told = f"Critical load factors {in_words(self.load_factors)}, {largest_error(self.error)}"
+        yield f"{title}{told if len(self) else self.none[0].upper() + self.none[1:]}."
+        if self.conservative:
+            yield f"The loads have a potential: there is no static bifurcation below {self.bound:.7g} (bound)."
+        if self.caution:
+            yield self.caution
+
+    def _more(self, units):
+        yield actions_in_words(self.scene)
+
     @property
-    def columns(self):
-        """See `Shapes`."""
-        return {"critical load factor": self.load_factors, "estimated relative error": self.error}
+    def _caption(self):
+        return (
+            f"The equilibrium at the load factor {self.load_factor:g}, extrapolated linearly, becomes critical there.\n"
+            "est. error: relative, of the load factor.\n"
+            "A structure that bends much before it buckles needs `cosserat run`."
+        )
+
 
 
 # Largest number of things that are left out to name in a sentence.
@@ -146,6 +170,19 @@ class Modes(Shapes):
     left_out: tuple[str, ...] = ()
 
     title = "Natural vibrations"
+    _on_screen = ("k", "frequency", "period", "growth", "error", "place", "direction")
+    _quantities = by_name(
+        Quantity("frequency", unit="Hz", axes=("mode",), getter="frequencies", digits=7),
+        Quantity("period", unit="s", axes=("mode",), getter="periods", digits=5),
+        Quantity("growth", unit="1/s", axes=("mode",), digits=4),
+        Quantity("error", "estimated relative error of the squared frequency", axes=("mode",), digits=2,
+                 short="est. error"),
+        Quantity("squares", "squared angular frequency", "rad^2/s^2", axes=("mode",)),
+    )
+    _caption = (
+        "est. error: relative, of the square of the frequency.\n"
+        "0 Hz: a free motion, or one that grows as exp(growth t)."
+    )
 
     @property
     def caution(self):
@@ -192,12 +229,12 @@ class Modes(Shapes):
             return f"unstable, growth {self.growth[k]:.4g} 1/s"
         return f"{self.frequencies[k]:.4g} Hz" if self.squares[k] else "0 Hz, free motion"
 
-    @property
-    def columns(self):
-        """See `Shapes`."""
-        return {
-            "frequency (Hz)": self.frequencies,
-            "period (s)": self.periods,
-            "growth (1/s)": self.growth,
-            "estimated relative error of the squared frequency": self.error,
-        }
+    def _answer(self, units):
+        title = f"{self.scene.title}: " if self.scene.title else ""
+        told = f"{in_words(self.frequencies, 'Hz')}, squares with {largest_error(self.error)}"
+        yield f"{title}Natural frequencies {told}."
+        verdict = {0: f"no negative mode{' (stable)' if self.conservative else ''}", -1: "a singular stiffness"}
+        counted = verdict.get(self.negative_modes, f"{self.negative_modes} negative mode(s) (unstable)")
+        yield f"The equilibrium at the load factor {self.load_factor:g} has {counted}."
+        if self.caution:
+            yield self.caution

@@ -8,20 +8,54 @@ from typing import Self
 
 import numpy as np
 
+from cosserat_fenicsx.quantities import Quantity
+from cosserat_fenicsx.results import screen
 from cosserat_fenicsx.results.accuracy import leading_of
 from cosserat_fenicsx.results.compared import NAMES, Errors, all_cell_nodes, sizes_of
 from cosserat_fenicsx.results.records import Event, Record, Records
 from cosserat_fenicsx.results.recovery import element_contact
-from cosserat_fenicsx.results.result import Result
+from cosserat_fenicsx.results.result import by_name
+from cosserat_fenicsx.results.rods import RodResult
 from cosserat_fenicsx.results.sensitivity import Sensitivity, Uncertainty
+from cosserat_fenicsx.scene.describe import actions_in_words
 from cosserat_fenicsx.scene.parameters import Parameter, check_once
 from cosserat_fenicsx.scene.rod import RodOrName
 
+_KINDS = {"limit": "Limit point", "bifurcation": "Bifurcation"}
+# The state of a point by the sign of its number of negative modes.
+_STATES = {0: "stable", 1: "unstable", -1: "critical"}
 
-class Path(Result):
+
+def _of_events(name):
+    return lambda path: np.array([getattr(event, name) for event in path.events])
+
+
+# What belongs to every point, and to every event.
+_QUANTITIES = by_name(
+    Quantity("load_factor", getter="load_factors"),
+    Quantity("steps"),
+    Quantity("negative_modes"),
+    Quantity("stable"),
+    Quantity("iterations", "Newton iterations"),
+    Quantity("error", "estimated error", digits=2),
+    Quantity("error_position", "estimated error of positions", getter="errors.position", digits=2),
+    Quantity("error_rotation", "estimated error of rotations", getter="errors.rotation", digits=2),
+    Quantity("error_force", "estimated error of contact forces", getter="errors.force", digits=2),
+    Quantity("error_moment", "estimated error of contact moments", getter="errors.moment", digits=2),
+    Quantity("event_kind", "kind", axes=("event",), getter=_of_events("kind")),
+    Quantity("event_load_factor", "load factor", axes=("event",), getter=_of_events("load_factor")),
+    Quantity("event_after", "index of the point before it", axes=("event",), getter=_of_events("after")),
+    Quantity("event_residual", "residual", axes=("event",), getter=_of_events("residual")),
+    Quantity("event_error", "relative difference from a coarser mesh", axes=("event",), getter=_of_events("error")),
+    Quantity("event_mode", "mode", "1", "xyz", "inertial", ("event", "s"),
+             lambda path, rod: np.array([path.mode(x, rod) for x in path.events]) if path.events else None),
+)  # fmt: skip
+
+
+class Path(RodResult):
     """An equilibrium path: a sequence of converged points.
 
-    Beside those of `Result` it has these attributes.
+    Beside those of `RodResult` it has these attributes.
 
     Attributes:
         load_factors: (n,).
@@ -41,9 +75,12 @@ class Path(Result):
     """
 
     axis = "load factor"
+    _kind, _more_about, _coordinates = "Path", ("control",), ("load_factor",)
+    _quantities = _QUANTITIES
     #: whether the formulation's virtual rotations are those of changes of q instead of independent small rotations
     galerkin = False
-    _computed = (*Result._computed, "_records", "_contact", "conservative", "_reference", "_roughness", "_in_elements")
+    _computed = (*RodResult._computed, "_records", "_contact", "conservative", "_reference", "_roughness",
+                 "_in_elements")  # fmt: skip
     # functions of a path that compute its `conservative` and its `sensitivity`
     _potential = _differentiated = None
 
@@ -143,6 +180,56 @@ class Path(Result):
         reach = f"load factors {self.load_factors[0]:g} .. {self.load_factors[-1]:g}" if len(self) else "empty"
         points = f"{len(self)} point{'' if len(self) == 1 else 's'}"
         return f"<Path: {points}, {reach}, {self.model}, {self.unknowns} unknowns>"
+
+    def _answer(self, units):
+        title = f"{self.scene.title}: at" if self.scene.title else "At"
+        if not len(self):
+            yield "No point of the path was computed."
+            return
+        station = self._most_displaced()
+        turned = np.where((angle := self.rotation_angle(station)) > 1e-12, angle, 0.0)[-1]
+        yield (
+            f"{title} the load factor {self.load_factors[-1]:.6g}, {_STATES[np.sign(self.negative_modes[-1])]}, "
+            f"{station} is displaced by {self._moved_in_words(station, units)} and turned by {turned:.6g} rad."
+        )
+        for event in self.events:
+            yield f"{_KINDS[event.kind]} at the load factor {event.load_factor:.7g}"
+        if not self.left and any(event.kind == "bifurcation" for event in self.events):
+            yield (
+                "The path stays on its branch there; --branch 1 or -1 (branch= in Python) leaves it at the first "
+                "bifurcation."
+            )
+        yield from errors_in_words(self)
+
+    def _table(self, units, rows, station=None):
+        station = self.station(station or self._most_displaced())
+        known, stable = self.quantities, [stability(count) for count in self.negative_modes]
+        title = f"{self.scene.title}\n" if self.scene.title else ""
+        which, digits = None, 9 if rows == screen.ROWS else 6
+        if rows == screen.ROWS:
+            beside = {k for event in self.events for k in (event.after, event.after + 1)}
+            which = [k for k in range(len(self)) if k < rows // 2 or k >= len(self) - rows // 2 or k in beside]
+        shown = min(rows, len(self)) if which is None else len(which)
+        left_out = ""
+        if shown < len(self):
+            left_out = f"{shown} of {len(self)} points: path.csv has all (-o DIR; path.write('path.csv') in Python).\n"
+        return screen.table(
+            [
+                (known["load_factor"], self.load_factors),
+                (Quantity("displacement", unit="m", parts="xyz", short="d", digits=digits), self.displacement(station)),
+                (Quantity("rotation", unit="rad", noise=1e-12, digits=digits), self.rotation_angle(station)),
+                (known["stable"], stable),
+                (Quantity("iterations"), self.iterations),
+                (Quantity("estimated_error", digits=2, short="est. error"), self.error),
+            ],
+            units,
+            rows,
+            f"{title}{self.model} model, {self.formulation} formulation, {self._mesh_in_words()}",
+            f"{left_out}dx, dy, dz, size of the rotation: of {station}. stable: 'no (2)' has two negative modes. "
+            f"iterations: Newton's, since the row above. est. error: the largest of {_bounded(self)}. "
+            f"{actions_in_words(self.scene)}",
+            which,
+        )
 
     @property
     def load_factors(self) -> np.ndarray:
@@ -328,3 +415,27 @@ class PerturbedPath(Path):
             parts = [super(PerturbedPath, self).reaction(x) for x in found]
             return tuple(sum(part) for part in zip(*parts, strict=True))
         return super().reaction(support)
+
+
+def errors_in_words(path):
+    """A sentence on the largest estimated errors; none where they are unknown."""
+    known = [(name, values.max()) for name, values in path.errors._asdict().items() if not np.isnan(values).any()]
+    if known and len(path):
+        by_rounding = dict(zip(NAMES, path.rounding_errors.max(axis=1), strict=True))
+        told = ", ".join(
+            f"{name}s {worst:.1e}{' (rounding)' if 0 < worst <= by_rounding[name] else ''}" for name, worst in known
+        )
+        yield f"Estimated errors, each relative to the largest of its kind, are at most: {told}."
+
+
+def _bounded(path):
+    """What `tol` bounds, in words."""
+    *names, last = [f"{name}s" for name in path.bounded]
+    return f"{', '.join(names)} and {last}, relative" if names else f"{last}, relative"
+
+
+def stability(negative_modes):
+    """'yes', 'no (2)' with the number of negative modes, or 'critical'."""
+    if negative_modes < 0:
+        return "critical"
+    return "yes" if negative_modes == 0 else f"no ({negative_modes})"

@@ -1,259 +1,312 @@
-"""Base class of equilibrium paths and motions: queries of a sequence of states."""
+"""`Result`: what all results offer. A class says its quantities once; dicts, data frames, xarray, files, tables on the
+screen and in notebooks follow from them."""
 
-from collections.abc import Sequence
-from functools import cached_property
+import csv
+from collections import namedtuple
+from collections.abc import Callable, Iterable, Mapping
+from pathlib import Path
+from typing import Any, ClassVar
 
 import numpy as np
 
-from cosserat_fenicsx.checks import File, instance
-from cosserat_fenicsx.numerics import directors
-from cosserat_fenicsx.remember import per_scene
-from cosserat_fenicsx.results.export.exports import Exports
-from cosserat_fenicsx.results.fields import fields_at
-from cosserat_fenicsx.results.queries import Extremes, Reactions, Stresses
-from cosserat_fenicsx.results.states import States
-from cosserat_fenicsx.scene.rod import RodOrName, Station, StationOrName
+from cosserat_fenicsx.checks import File
+from cosserat_fenicsx.errors import InstallationError, SceneError
+from cosserat_fenicsx.new_files import replaced
+from cosserat_fenicsx.quantities import Quantity, Units
+from cosserat_fenicsx.ranks import on_first, world
+from cosserat_fenicsx.results import screen
 
-# How far beyond a jump its right side is taken, over the rod's length.
-_BEYOND = 1e-9
+#: dims: names of the dimensions of `values`, the components included; attributes: texts by names, such as units.
+Variable = namedtuple("Variable", "dims values attributes")
 
-
-@per_scene
-def resting(scene, layout, rule):
-    """(nodes, 3) positions at rest, m, of all nodes of all rods, relative to the origin of each structure."""
-    return np.concatenate([
-        rod.curve.position(x * rod.length) - scene.origin(rod)
-        for rod, x in zip(scene.rods, layout.node_s(rule.nodes), strict=True)
-    ])  # fmt: skip
+# Dimensions of components by their names.
+_COMPONENTS = {("x", "y", "z"): "component", ("a", "b", "c", "d"): "quaternion_component"}
+# How texts begin that spreadsheet programs take for formulas.
+_FORMULAS = ("=", "+", "-", "@", "\t", "\r")
 
 
-class Result(Exports, Extremes, Reactions, Stresses, States):
-    """A sequence of states of a scene. Public methods return SI units. It can be copied and pickled, see `States`.
+class Result:
+    """A result: named quantities with units, for files, tables, data frames and charts.
 
-    Attributes:
-        scene: the scene it belongs to.
-        model, formulation: names of those it was computed with.
-        degree, unknowns: of the elements, and number of unknowns; elements: number of elements of each rod.
-        why: sentences on the choice of the model, and cautions.
-        comm: the MPI communicator of the solution; every rank has the whole result, rank 0 writes files and pictures.
-        iterations: (n,) Newton iterations since the previous state, rejected steps included.
-
-    Station queries take a `Station` or its name as in scene files ("column.end", "column@5.0"), and return one row per
-    state, in inertial components unless stated otherwise.
+    `units` of its methods are "SI", "field" (ft, in, klbf, ft-lbf, ppg, rpm, psi), or {dimension or unit: unit}, such
+    as {"force": "klbf", "[length]": "ft"}. `print` shows the answer and a short table; `details()` has more.
     """
 
-    def station(self, station: StationOrName) -> Station:
-        """The `Station` given as one or by its name.
+    _quantities: ClassVar[dict[str, Quantity]] = {}
+    # The axis that data frames, .csv files and tables run along; those of further .csv files, by ends of their names.
+    _rows_axis: ClassVar[str] = "point"
+    _beside: ClassVar[dict[str, str]] = {}
+    # Quantities of the table on the screen; () for all along `_rows_axis`.
+    _on_screen: ClassVar[tuple[str, ...]] = ()
+    # Quantities that are coordinates beside those that have the name of their axis.
+    _coordinates: ClassVar[tuple[str, ...]] = ()
 
-        Raises:
-            SceneError: neither a station nor the name of one.
-        """
-        if isinstance(station, str):
-            return self.scene.station(station)
-        return instance(type(self).__name__, "station", station, Station, "a station such as rod.end, or its name")
+    @classmethod
+    def quantity(cls, label: str = "", unit: str = "1", **more: Any) -> Callable:
+        """Decorator: a function of a result becomes a quantity of this class of results, by the function's name.
 
-    def position(self, station: StationOrName) -> np.ndarray:
-        """(n, 3) positions, m, inertial."""
-        station = self.station(station)
-        return self.displacement(station) + station.rod.curve.position(station.s)
-
-    def displacement(self, station: StationOrName) -> np.ndarray:
-        """(n, 3) displacements from the reference, m, inertial."""
-        return self._at(station, self._all_rq[:, :, :3], self._rest) * self.scales.length
-
-    def rotation(self, station: StationOrName) -> np.ndarray:
-        """(n, 4) unit quaternion (scalar first) from the reference to the current section; its sign is continuous
-        from point to point and along the rod."""
-        q = self._at(station, self._all_rq[:, :, 3:])
-        return q / np.linalg.norm(q, axis=1, keepdims=True)
-
-    def rotation_angle(self, station: StationOrName) -> np.ndarray:
-        """(n,) angle of `rotation`, rad, in [0, 2 pi]: since q is continuous, it exceeds pi and decreases again after
-        2 pi."""
-        q = self.rotation(station)
-        half = np.arctan2(np.linalg.norm(q[:, 1:], axis=1), q[:, 0])
-        return 2 * half
-
-    def force(self, station: StationOrName) -> np.ndarray:
-        """(n, 3) contact force n, N, inertial, exerted by the part with larger s on the part with smaller s. At a
-        station with a point load it is the value just before it; at rod.start the value just after."""
-        return self._contact_at(station)[:, :3] * self.scales.force
-
-    def moment(self, station: StationOrName) -> np.ndarray:
-        """(n, 3) contact moment m, N m, inertial; sign and side as in `force`."""
-        return self._contact_at(station)[:, 3:] * self.scales.moment
-
-    def centreline(self, k: int = -1, rod: RodOrName | None = None) -> np.ndarray:
-        """(nodes, 3) m, inertial: the nodes of a rod (default the first) at point k."""
-        return self.fields(k, rod)["position"]
-
-    def fields(self, k: int, rod: RodOrName | None = None) -> dict[str, np.ndarray]:
-        """All fields at the nodes of a rod (a `Rod` or its name; default the first) at point k.
-
-        Returns:
-            dict of arrays (nodes, ...): s (m), position, displacement (m), quaternion, d1, d2, d3, force (N), moment
-            (N m), all inertial; strain (v - v_R: shear 1, shear 2, stretch) and curvature (u - u_R: bending 1,
-            bending 2, twist; 1/m), both material; bending_moment (N m, its size). Where a section of the scene knows
-            its shape, also von_mises, axial_max and axial_min (Pa), see `stress`; NaN along other sections. Of a motion
-            also velocity (m/s) and angular_velocity (rad/s), inertial. Where a section changes or a point load acts,
-            what jumps is that of the side of smaller s; `stress` and `largest` cover both sides.
-
-        Raises:
-            IndexError: there is no point k.
-            SceneError: k is no whole number.
-        """
-        which = [self._index(k, f"fields({k!r})")]
-        return {name: a if name == "s" else a[0] for name, a in self.fields_at(which, rod).items()}
-
-    def fields_at(self, which: Sequence[int] | np.ndarray, rod: RodOrName | None = None) -> dict[str, np.ndarray]:
-        """`fields` in several states at once: {name: array (n, nodes, ...)}, but s (nodes,).
+        It is then in `quantities`, `to_dict`, `to_dataframe`, `to_xarray`, .csv files and charts, and in those of
+        results that were stored before.
 
         Args:
-            which: their indices (n,).
+            label: in words, by default the name. unit: in which the function returns it.
+            more: further attributes of `Quantity`: parts, frame, axes, shown, dimension, noise. By default it is one
+                number a row, (n,). Along the rods of a path or a motion, axes = ("point", "s"), the function takes the
+                rod as its second argument and returns (n, nodes).
         """
-        return fields_at(self, which, self.rod(rod))
 
-    def largest_displacement(self) -> np.ndarray:
-        """(n,) the largest displacement of any node, m."""
-        return np.linalg.norm(self._moved, axis=2).max(axis=1) * self.scales.length
+        def register(function):
+            cls.add_quantities(Quantity(function.__name__, label, unit, getter=function, **more))
+            return function
 
-    @cached_property
-    def _all_rq(self):
-        """(points, nodes, 7) r and q, dimensionless."""
-        return self._stacked("rq") if len(self) else np.empty((0, len(self._rest), 7))
+        more.setdefault("axes", (cls._rows_axis,))
+        return register
 
-    @cached_property
-    def _rest(self):
-        """(nodes, 3) positions at rest, dimensionless, relative to the origin of each structure."""
-        return resting(self.scene, self.layout, self.rule) / self.scales.length
-
-    @cached_property
-    def _moved(self):
-        """(points, nodes, 3) displacements of the nodes, dimensionless."""
-        return self._motion[:, :, :3]
-
-    @cached_property
-    def _motion(self):
-        """(points, nodes, 7) displacements of the nodes, dimensionless, and q."""
-        motion = self._all_rq.copy()
-        motion[:, :, :3] -= self._rest
-        return motion
+    @classmethod
+    def add_quantities(cls, *quantities: Quantity) -> None:
+        """Give this class of results more quantities, or others by the same names."""
+        cls._quantities = {**vars(cls).get("_quantities", {}), **{x.name: x for x in quantities}}
 
     @property
-    def _turned(self):
-        """(points, nodes, 4) q at the nodes."""
-        return self._all_rq[:, :, 3:]
+    def quantities(self) -> dict[str, Quantity]:
+        """{name: `Quantity`}: label, unit, frame and axes of all that the result holds."""
+        found: dict[str, Quantity] = {}
+        for kind in reversed(type(self).__mro__):
+            found |= vars(kind).get("_quantities", {})
+        return found
 
-    def _contact_at(self, station, side="left"):
-        """(points, 6) n and m at a station, dimensionless; at a jump those of the "left" or the "right" side."""
-        station = self.station(station)
-        i, _ = self._rows(station.rod)
-        x = station.s / station.rod.length + (_BEYOND if side == "right" else 0.0)
-        cell, weights = self.rule.locate(self.layout.breaks[i], x)
-        return np.einsum("j,njk->nk", weights, self._contact_in(self._cells(i).start + cell))
+    def values(self, name: str, units: str | Mapping = "SI") -> Any:
+        """A quantity by its name, in some units.
 
-    def _contact_of(self, k):
-        """(elements, nodes per element, 6) n and m at point k, dimensionless; they jump at point loads."""
-        raise NotImplementedError
-
-    def _contact_in(self, cell):
-        """(points, nodes per element, 6) n and m in one element, dimensionless."""
-        raise NotImplementedError
-
-    def _viscous(self, which, rod):
-        """The viscous parts of n and m at the nodes of a rod in several states, material, N and N m: none at rest."""
-        return 0.0, 0.0
-
-    def _cells(self, i):
-        """Slice of the elements of the i-th rod."""
-        first = sum(self.elements[:i])
-        return slice(first, first + self.elements[i])
-
-    def _at(self, station, values, rest=None):
-        """Values (points, nodes, k), minus those at rest (nodes, k), interpolated to a station."""
-        station = self.station(station)
-        i, rows = self._rows(station.rod)
-        cell, weights = self.rule.locate(self.layout.breaks[i], station.s / station.rod.length)
-        first = rows.start + cell * self.degree
-        nodes = slice(first, first + self.degree + 1)
-        return np.einsum("j,njk->nk", weights, values[:, nodes] if rest is None else values[:, nodes] - rest[nodes])
-
-    def sample(self, k, rod, x):
-        """Positions and directors anywhere along a rod, at point k.
-
-        Args:
-            k: the point, or a `Record`.
-            rod: the rod.
-            x: arc lengths (n,) over the rod's length, in [0, 1].
-
-        Returns:
-            positions (n, 3), m, and directors (n, 3, 3) as columns, both inertial.
+        Raises:
+            SceneError: an unknown name, or unknown units.
         """
-        moved = self.motion(rod, x, [k if hasattr(k, "rq") else self._records[k]])[0]
-        s, q = np.asarray(x) * rod.length, moved[:, 3:]
-        return rod.curve.position(s) + moved[:, :3] * self.scales.length, directors(q) @ rod.curve.frame(s)
+        known = self.quantities
+        if name not in known:
+            raise SceneError(f"values({name!r}): expected one of {', '.join(known)}")
+        size = Units(units).of(known[name])[1]
+        return known[name].of(self) if size == 1.0 else known[name].of(self) / size
 
-    def motion(self, rod, x, records=None):
-        """(points, n, 7) displacement over `scales.length` and unit quaternion at arc lengths x (n,) over the rod's
-        length."""
-        i, rows = self._rows(rod)
-        cells, weights = self.rule.locate_all(self.layout.breaks[i], x)
-        nodes = cells[:, None] * self.degree + np.arange(self.degree + 1)
-        if records is None:
-            nodal = self._all_rq[:, rows].copy()
+    # -- other libraries ---------------------------------------------------------------------------------------------
+
+    def to_dict(self, units: str | Mapping = "SI") -> dict[str, Any]:
+        """All of the result as a dict of numpy arrays, numbers and texts: its `kind`, what it is, every quantity by its
+        name, and `units` and `frames`, {name: text}. `json.dumps(result.to_dict(), default=lambda a: a.tolist())` makes
+        text of it, with NaN for the unknown."""
+        found = self._variables(Units(units))
+        return {**self._about(), **_values(found), **_said(found)}
+
+    def to_dataframe(self, units: str | Mapping = "SI") -> Any:
+        """A pandas DataFrame with the columns of the .csv of `write`.
+
+        Raises:
+            InstallationError: pandas is missing.
+            SceneError: an empty result.
+        """
+        return self._frame(self.columns(units), self._rows_axis)
+
+    def to_xarray(self, units: str | Mapping = "SI") -> Any:
+        """An xarray Dataset of all quantities over their axes, with the attributes units, long_name and frame.
+
+        Raises:
+            InstallationError: xarray is missing.
+            SceneError: an empty result.
+        """
+        xarray = import_library("xarray", "to_xarray")
+        self._refuse_empty("to_xarray")
+        about = {name: "\n".join(x) if isinstance(x, tuple | list) else x for name, x in self._about().items()}
+        return dataset(xarray, self._variables(Units(units)), self._coordinates, about)
+
+    def columns(self, units: str | Mapping = "SI", axis: str = "") -> dict[str, np.ndarray]:
+        """{heading with unit: (n,)} of the quantities along an axis, by default that of the rows of tables; without
+        those that are not known anywhere."""
+        units, found = Units(units), {}
+        for quantity in self.quantities.values():
+            if quantity.axes == (axis or self._rows_axis,):
+                values = quantity.of(self)
+                if values is not None and not _unknown(values):
+                    found |= quantity.columns(values, units)
+        return found
+
+    def write(self, file: File, *, units: str | Mapping = "SI") -> None:
+        """Write a table (.csv) or all quantities (.nc, NetCDF 4). An old file is replaced once the new one is complete.
+        Rank 0 writes.
+
+        Raises:
+            SceneError: another ending, or an empty result.
+            InstallationError: xarray or h5netcdf is missing, for .nc.
+            OSError: it cannot be written; an old one stays.
+        """
+        file = Path(file)
+        self._refuse_empty(f"{file}")
+        if file.suffix.lower() == ".csv":
+            for ending, axis in {"": self._rows_axis, **self._beside}.items():
+                columns = self.columns(units, axis)
+                beside = file.with_name(f"{file.stem}{ending}{file.suffix}")
+                on_first(self._ranks, lambda beside=beside, columns=columns: write_columns(beside, columns))
+        elif file.suffix.lower() == ".nc":
+            import_library("h5netcdf", "write")
+            found = self.to_xarray(units)
+
+            def written():
+                with replaced(file) as fresh:
+                    found.to_netcdf(fresh, engine="h5netcdf")
+
+            on_first(self._ranks, written)
         else:
-            nodal = np.array([record.rq[rows] for record in records])
-        nodal[:, :, :3] -= self._rest[rows]
-        moved = np.einsum("kj,nkjc->nkc", weights, nodal[:, nodes])
-        moved[:, :, 3:] /= np.linalg.norm(moved[:, :, 3:], axis=2, keepdims=True)
-        return moved
+            raise SceneError(f"{file}: expected a name that ends in .csv or .nc")
 
-    # -- files and pictures ------------------------------------------------------------------------------------------
+    # -- on the screen -----------------------------------------------------------------------------------------------
 
-    def write(
-        self,
-        file: File,
-        k: int | None = None,
-        *,
-        rod: RodOrName | None = None,
-        station: StationOrName | None = None,
-    ) -> None:
-        """Write a file whose ending says what it holds.
+    def __str__(self) -> str:
+        return self.summary()
 
-        .xdmf: all points, with the load factor or the time as time axis, for ParaView. .csv: a table over load factors
-        or time, of motion and contact forces at stations; or, given k or rod, all fields along the rods at point k.
-        .html: one interactive page with a slider over all points, which needs no network.
-        .vtu, .vtk or another ending of meshio: point k. For all of a result, to read it again, see `save`.
+    def summary(self, units: str | Mapping = "SI") -> str:
+        """What `print` shows, in some units: the answer in sentences, then one table; at most 30 lines of 100
+        characters."""
+        units = Units(units)
+        return screen.page(self._answer(units), lambda rows: self._table(units, rows))
 
-        Args:
-            file: its name.
-            k: the index of the point, for endings other than .xdmf and .html; default the last.
-            rod: for .csv: the `Rod`, or its name, along which fields are written; None for all.
-            station: for .csv: a station of the table beside the ends of rods and the places of loads and supports;
-                default the one that moves most.
+    def details(self, units: str | Mapping = "SI") -> str:
+        """A longer table, the answer, and all that is told of the result."""
+        units = Units(units)
+        table = self._table(units, screen.ROWS)
+        text = [] if table is None else [screen.as_text(table)]
+        return "\n".join([*text, *self._answer(units), *self._more(units)])
 
-        Raises:
-            OSError: the file cannot be written.
-            SceneError: an unknown format, or an option that it does not have.
-        """
-        from cosserat_fenicsx.results.export import files
+    def _repr_html_(self) -> str:
+        from cosserat_fenicsx.results.export.notebook import as_html
 
-        files.write(self, file, k, rod=rod, station=station)
+        return as_html(self)
 
-    def plot(self, file=None, points=None, *, magnify=1.0, color="bending_moment"):
-        """Picture of the deformed rods with supports, joints and loads, at some points (default up to five).
+    def _answer(self, units: Units) -> Iterable[str]:
+        """Sentences: the answer first, whether it is enough, and why."""
+        return [repr(self)]
 
-        Args:
-            file: a .png; None returns the pyvista plotter.
-            points: indices of points of a path, or of times.
-            magnify: factor of the displacements in the picture.
-            color: what colours the rods: bending_moment, twisting_moment, tension, shear_force, n, m, displacement,
-                strain, curvature, of a motion velocity and angular_velocity too; n.x, n.y, n.z for an inertial
-                component, n.1, n.2, n.3 for one along d_1, d_2, d_3.
+    def _more(self, units: Units) -> Iterable[str]:
+        """Sentences of `details` after the table."""
+        return ()
 
-        Raises:
-            SceneError: an unknown field (lists the names), or pyvista is missing.
-        """
-        from cosserat_fenicsx.pictures import plot
+    def _table(self, units: Units, rows: int):
+        """The table of `summary`, of at most so many rows."""
+        known = self.quantities
+        names = self._on_screen or [x.name for x in known.values() if x.axes == (self._rows_axis,)]
+        given = [(known[name], known[name].of(self)) for name in names]
+        return screen.table([(x, values) for x, values in given if not _unknown(values)], units, rows,
+                            *self._titles(units))  # fmt: skip
 
-        return plot.rods(self, file, points, magnify, color)
+    def _titles(self, units: Units) -> tuple[str | None, str | None]:
+        """The title of the table, and what stands under it."""
+        return None, None
+
+    # -- of subclasses -----------------------------------------------------------------------------------------------
+
+    @property
+    def _ranks(self):
+        """The MPI communicator whose rank 0 writes files."""
+        return world()
+
+    def _about(self) -> dict[str, Any]:
+        """What the result is, as texts, numbers and lists of these."""
+        return {"kind": type(self).__name__}
+
+    def _variables(self, units: Units) -> dict[str, Variable]:
+        """{name: `Variable`} of all quantities that the result knows."""
+        found = {name: (x, x.of(self)) for name, x in self.quantities.items() if "s" not in x.axes}
+        return {name: variable(x, values, units) for name, (x, values) in found.items() if values is not None}
+
+    def _refuse_empty(self, method):
+        if not len(self):
+            axis = getattr(self, "axis", self._rows_axis)
+            raise SceneError(f"{method}: expected a result with at least one {axis}, this one is empty")
+
+    def _frame(self, columns, axis):
+        pandas = import_library("pandas", "to_dataframe")
+        self._refuse_empty("to_dataframe")
+        return pandas.DataFrame(columns).rename_axis(axis)
+
+
+def by_name(*quantities):
+    """{name: quantity}, as classes of results have them."""
+    return {quantity.name: quantity for quantity in quantities}
+
+
+def variable(quantity, values, units):
+    """The `Variable` of a quantity's values."""
+    unit, size = units.of(quantity)
+    values = np.asarray(values) if size == 1.0 else np.asarray(values) / size
+    more = (components_of(quantity),) if quantity.parts else ()
+    attributes = {"units": unit, "long_name": quantity.label}
+    return Variable((*quantity.axes, *more), values, attributes | ({"frame": quantity.frame} if quantity.frame else {}))
+
+
+def components_of(quantity):
+    """The name of the dimension of a quantity's components."""
+    return _COMPONENTS.get(tuple(quantity.parts), f"{quantity.name}_component")
+
+
+def component_names(quantities, variables):
+    """{name: `Variable`} that name the components of those of `variables` that have any."""
+    parts = {components_of(x): x.parts for name, x in quantities.items() if x.parts and name in variables}
+    return {name: Variable((name,), np.array(list(x)), {}) for name, x in parts.items()}
+
+
+def dataset(xarray, variables, coordinates, attributes):
+    """A Dataset; coordinates are those named, and what has the name of its one dimension."""
+    named = {name for name, x in variables.items() if name in coordinates or x.dims == (name,)}
+    data = {name: x for name, x in variables.items() if name not in named}
+    return xarray.Dataset(data, {name: variables[name] for name in variables if name in named}, attributes)
+
+
+def plain_text(text):
+    """A text for a table, with a quote before it where a spreadsheet program would take it for a formula."""
+    return f"'{text}" if text.startswith(_FORMULAS) else text
+
+
+def write_columns(file, columns):
+    """Write columns {heading: (n,)} as CSV, numbers with all digits, and nothing where one is not known."""
+    with replaced(file) as fresh, open(fresh, "w", newline="", encoding="utf-8") as stream:
+        writer = csv.writer(stream)
+        writer.writerow(map(plain_text, columns))
+        writer.writerows(zip(*map(_cells, columns.values()), strict=True))
+
+
+def _cells(column):
+    values = np.asarray(column)
+    if values.dtype.kind == "f":
+        return ["" if x != x else x for x in values.tolist()]
+    return [plain_text(x) if isinstance(x, str) else x for x in values.tolist()]
+
+
+def _unknown(values):
+    """Whether nothing in an array of numbers is known."""
+    values = np.asarray(values)
+    return values.dtype.kind == "f" and values.size > 0 and bool(np.isnan(values).all())
+
+
+def _values(variables):
+    return {name: variable.values for name, variable in variables.items()}
+
+
+def _said(variables):
+    """The units and the frames of variables, {name: text} each."""
+    return {
+        key: {name: x.attributes[attribute] for name, x in variables.items() if attribute in x.attributes}
+        for key, attribute in (("units", "units"), ("frames", "frame"))
+    }
+
+
+def import_library(library, method, needed=None):
+    """A library, which may be missing or too old to have the name `needed`."""
+    try:
+        found = __import__(library)
+    except ImportError as missing:
+        problem = f"cannot be imported ({missing})"
+    else:
+        if needed is None or hasattr(found, needed):
+            return found
+        problem = f"is too old: version {found.__version__} has no {needed}"
+    raise InstallationError(
+        f"{method} needs {library}, which {problem}: pip install 'cosserat-fenicsx[data]', or pip install {library}; "
+        "where dolfinx is the distribution's, hold its numpy fixed by pip's --constraint"
+    )

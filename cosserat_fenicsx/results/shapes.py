@@ -3,18 +3,17 @@
 import math
 import numbers
 from dataclasses import dataclass
-from html import escape
+from pathlib import Path
 
 import numpy as np
 from mpi4py import MPI
-from rich.table import Table
 
 from cosserat_fenicsx.checks import refuse
 from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.numerics import ElementRule, directors
+from cosserat_fenicsx.quantities import Quantity
 from cosserat_fenicsx.results.on_nodes import OnNodes
-from cosserat_fenicsx.results.tables import as_text
-from cosserat_fenicsx.scene.describe import actions_in_words
+from cosserat_fenicsx.results.result import Result, by_name
 
 # Largest displacement of a mode of pure twist, m (the largest displacement or rotation of a mode is 1).
 _TWIST = 1e-6
@@ -71,8 +70,38 @@ class Equilibrium(OnNodes):
         return rod.curve.position(s) + self.between(rod, x, self.displacement), frames
 
 
+def _farthest(found):
+    """(modes,) texts: where each mode moves most."""
+    return np.array(["sections turn" if (place := found.farthest(k)[0]) is None else str(place)
+                     for k in range(len(found))])  # fmt: skip
+
+
+def _directions(found):
+    """(modes, 3) the directions there; NaN where nothing is displaced."""
+    along = [found.farthest(k)[1] for k in range(len(found))]
+    return np.array([np.full(3, np.nan) if x is None else np.round(x, 9) + 0.0 for x in along]).reshape(-1, 3)
+
+
+_ON_NODES = ("mode", "node")
+_QUANTITIES = by_name(
+    Quantity("k", axes=("mode",), getter=lambda found: np.arange(len(found))),
+    Quantity("place", "moves most at", axes=("mode",), getter=_farthest),
+    Quantity("direction", "direction there", "1", "xyz", "inertial", ("mode",), _directions, digits=3, short="along "),
+    Quantity("displacement", unit="m", parts="xyz", frame="inertial", axes=_ON_NODES,
+             getter=lambda found: found.shapes[:, :, :3]),
+    Quantity("rotation", unit="rad", parts="xyz", frame="inertial", axes=_ON_NODES,
+             getter=lambda found: found.shapes[:, :, 3:]),
+    Quantity("rod", axes=("node",), getter=lambda found: np.concatenate(
+        [np.full(len(found.equilibrium.s(rod)), i) for i, rod in enumerate(found.scene.rods)])),
+    Quantity("s", unit="m", axes=("node",), getter=lambda found: np.concatenate(
+        [found.equilibrium.s(rod) for rod in found.scene.rods])),
+    Quantity("position", unit="m", parts="xyz", frame="inertial", axes=("node",), getter=lambda found: np.concatenate(
+        [found.equilibrium.position(rod) for rod in found.scene.rods])),
+)  # fmt: skip
+
+
 @dataclass(frozen=True, eq=False, repr=False)
-class Shapes(OnNodes):
+class Shapes(Result, OnNodes):
     """Shapes about an equilibrium. Modes are numbered from 0. It can be copied and pickled, as its scene can.
 
     Attributes:
@@ -92,8 +121,10 @@ class Shapes(OnNodes):
     conservative: bool
     comm: object
 
-    #: what the shapes are, in titles
-    title = ""
+    #: what the shapes are, in titles; under their table
+    title = _caption = ""
+    _rows_axis, axis = "mode", "mode"
+    _quantities = _QUANTITIES
 
     scene = property(lambda self: self.equilibrium.scene)
     load_factor = property(lambda self: self.equilibrium.load_factor)
@@ -105,11 +136,6 @@ class Shapes(OnNodes):
 
     def label(self, k):
         """The eigenvalue of mode k in words, with its unit, for pictures."""
-        raise NotImplementedError
-
-    @property
-    def columns(self):
-        """{heading with unit: (n,)} the numbers of all modes, for tables."""
         raise NotImplementedError
 
     @property
@@ -158,22 +184,37 @@ class Shapes(OnNodes):
         place = int(np.argmax(size))
         return rod.at(self.equilibrium.s(rod)[place]), self.mode(k, rod)[place] / size[place]
 
-    def _repr_html_(self):
-        """A table for notebooks."""
+    # -- tables ------------------------------------------------------------------------------------------------------
 
-        return html_table(self)
+    @property
+    def _ranks(self):
+        return self.comm
+
+    def _about(self):
+        told = {"kind": type(self).__name__, "title": self.scene.title, "load_factor": self.load_factor}
+        told |= {"elements": list(self.elements), "degree": self.degree, "conservative": self.conservative}
+        return told | {"rods": [rod.name for rod in self.scene.rods], "caution": self.caution}
+
+    def _table(self, units, rows):
+        return super()._table(units, rows) if len(self) else None
+
+    def _titles(self, units):
+        elements = " + ".join(map(str, self.elements))
+        title = f"{self.scene.title or self.title}: degree {self.degree}, {elements} elements"
+        return title, f"{self._caption}\nk: number of the mode in Python, in files and in pictures."
 
     # -- files and pictures ------------------------------------------------------------------------------------------
 
-    def write(self, file, k=0):
-        """Write the shapes (.xdmf with .h5, or a format of meshio), or the table of the eigenvalues (.csv).
+    def write(self, file, k=0, *, units="SI"):
+        """Write the shapes (.xdmf with .h5, or a format of meshio), the table of the eigenvalues (.csv), or all (.nc).
 
         The mesh is that of the equilibrium, whose positions are the field `position`; warp it by `displacement`. In an
         .xdmf the time of a shape is the number of its mode.
 
         Args:
-            file: its name, with the ending .xdmf, .csv, or .vtu, .vtk or another of meshio's.
-            k: the number of the mode, for formats other than .xdmf and .csv.
+            file: its name, with the ending .xdmf, .csv, .nc, or .vtu, .vtk or another of meshio's.
+            k: the number of the mode, for formats other than .xdmf, .csv and .nc.
+            units: of .csv and .nc, see `Result`.
 
         Raises:
             OSError: the file cannot be written.
@@ -181,7 +222,10 @@ class Shapes(OnNodes):
         """
         from cosserat_fenicsx.results.export import xdmf
 
-        xdmf.write_shapes(self, file, k)
+        if Path(file).suffix in (".csv", ".nc"):
+            super().write(file, units=units)
+        else:
+            xdmf.write_shapes(self, file, k)
 
     def plot(self, file=None, which=None, *, amplitude=0.1):
         """Picture of the shapes, a panel each, with the equilibrium as a grey line.
@@ -241,69 +285,3 @@ def largest_error(errors):
     """The largest of estimated relative errors (n,), in words."""
     worst = max(errors, default=math.nan)
     return "error not estimated" if math.isnan(worst) else f"estimated relative error {worst:.1e}"
-
-
-def buckling_table(found):
-    """Text: critical load factors by linear buckling, where each mode moves most, and the limits of the result."""
-    caption = (
-        f"The equilibrium at the load factor {found.load_factor:g}, extrapolated linearly, becomes critical there.\n"
-        "est. error: relative, of the load factor.\n"
-        "A structure that bends much before it buckles needs `cosserat run`."
-    )
-    headings = ("critical load factor", "est. error")
-    rows = [(f"{at:.7g}", _error(error)) for at, error in zip(found.load_factors, found.error, strict=True)]
-    text = _table(found, headings, rows, caption) if rows else f"{found.none[0].upper()}{found.none[1:]}."
-    lines = [text, actions_in_words(found.scene)]
-    if found.conservative:
-        lines.append(f"The loads have a potential: there is no static bifurcation below {found.bound:.7g} (bound).")
-    return "\n".join([*lines, found.caution]).rstrip()
-
-
-def modes_table(found):
-    """Text: natural frequencies, where each mode moves most, and whether the state is stable."""
-    caption = (
-        "est. error: relative, of the square of the frequency.\n"
-        "0 Hz: a free motion, or one that grows as exp(growth t)."
-    )
-    numbers = zip(found.frequencies, found.periods, found.growth, found.error, strict=True)
-    rows = [(f"{f:.7g}", f"{T:.5g}" if f else "-", f"{growth:.4g}", _error(e)) for f, T, growth, e in numbers]
-    text = _table(found, ("frequency (Hz)", "period (s)", "growth (1/s)", "est. error"), rows, caption)
-    verdict = {0: "no negative mode (stable)" if found.conservative else "no negative mode", -1: "a singular stiffness"}
-    counted = verdict.get(found.negative_modes, f"{found.negative_modes} negative mode(s) (unstable)")
-    return f"{text}\nThe equilibrium at the load factor {found.load_factor:g} has {counted}.\n{found.caution}".rstrip()
-
-
-def html_table(found):
-    """The numbers of all modes as a table in HTML, with the limits of the result."""
-    head = "".join(f"<th>{name}</th>" for name in ("k", *found.columns))
-    rows = "".join(
-        f"<tr>{''.join(f'<td>{value:.7g}</td>' for value in (k, *values))}</tr>"
-        for k, values in enumerate(zip(*found.columns.values(), strict=True))
-    )
-    title = f"{found.scene.title}: {found.title.lower()}" if found.scene.title else found.title
-    return f"<table><caption>{escape(title)}</caption><tr>{head}</tr>{rows}</table><p>{escape(found.caution)}</p>"
-
-
-def _table(found, headings, rows, caption):
-    table = Table(
-        title=f"{found.scene.title or found.title}: degree {found.degree}, "
-        f"{' + '.join(map(str, found.elements))} elements",
-        caption=f"{caption}\nk: number of the mode in Python, in files and in pictures.",
-    )
-    for heading in ("k", *headings, "mode moves most at (m)", "there along"):
-        table.add_column(heading, justify="right")
-    for k, row in enumerate(rows):
-        table.add_row(str(k), *row, *_farthest(found, k))
-    return as_text(table)
-
-
-def _error(error):
-    return "unknown" if np.isnan(error) else f"{error:.1e}"
-
-
-def _farthest(found, k):
-    """Texts: the station with the largest displacement of a mode, and its direction there, inertial."""
-    station, along = found.farthest(k)
-    if station is None:
-        return "sections turn", "-"
-    return str(station), "({:.2f}, {:.2f}, {:.2f})".format(*(np.round(along, 2) + 0.0))

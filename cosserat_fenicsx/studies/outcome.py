@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from cosserat_fenicsx.errors import SceneError
-from cosserat_fenicsx.results.export.exports import import_library
+from cosserat_fenicsx.results.result import import_library
 
 
 class Failure(NamedTuple):
@@ -171,7 +171,7 @@ def as_lines(study):
     """Text: a table of cases and results, and what failed."""
     from rich.table import Table
 
-    from cosserat_fenicsx.results.tables import as_text
+    from cosserat_fenicsx.results.screen import as_text
 
     given, found = _columns(study)
     columns = given | found

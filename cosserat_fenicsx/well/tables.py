@@ -5,7 +5,7 @@ import math
 import numpy as np
 from rich.table import Table
 
-from cosserat_fenicsx.results.tables import as_text
+from cosserat_fenicsx.results.screen import as_text
 from cosserat_fenicsx.well import criteria
 from cosserat_fenicsx.well.components import DrillPipe
 from cosserat_fenicsx.well.contacts import ROUGH, stretches

@@ -9,8 +9,7 @@ from cosserat_fenicsx.checks import File
 from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.new_files import replaced
 from cosserat_fenicsx.ranks import on_first, world
-from cosserat_fenicsx.results.export.columns import plain_text
-from cosserat_fenicsx.results.export.exports import import_library
+from cosserat_fenicsx.results.result import import_library, plain_text
 
 
 class Tabular:

@@ -6,7 +6,7 @@ import numpy as np
 from rich.table import Table
 
 from cosserat_fenicsx.drilling.linear.frequencies import own_rule
-from cosserat_fenicsx.results.tables import as_text
+from cosserat_fenicsx.results.screen import as_text
 
 #: Modes that are listed with their places and drives, the fastest ones.
 _LISTED = 12

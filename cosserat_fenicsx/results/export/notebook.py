@@ -4,26 +4,23 @@ import html
 
 import numpy as np
 
+from cosserat_fenicsx.quantities import Units
+
 # Rows of the table, states and points of the picture, and its size in pixels.
 _ROWS, _STATES, _POINTS, _SIZE, _MARGIN = 8, 4, 240, 200, 6
-# Displacements below this times the length of the longest rod are rounding.
-_ROUNDING = 1e-12
-_COLUMNS = {
-    "load factor": (("stable", "stable", lambda yes: "yes" if yes else "no"),
-                    ("error", "estimated error", lambda x: "unknown" if np.isnan(x) else f"{x:.1e}")),
-    "time": (("kinetic", "kinetic energy (J)", "{:.4g}".format), ("balance", "balance (J)", "{:.1e}".format)),
-}  # fmt: skip
 
 
 def as_html(result):
-    """HTML of about 3 kB."""
-    whole = "".join([f"<b>{html.escape(result.scene.title)}</b><br/>" if result.scene.title else "",
-                     f"<code>{html.escape(repr(result))}</code>"])  # fmt: skip
+    """HTML of about 3 kB: what the result is, a table of some rows and, of rods, a picture."""
+    title = getattr(getattr(result, "scene", None), "title", "")
+    whole = f"<b>{html.escape(title)}</b><br/>" if title else ""
+    whole += f"<code>{html.escape(repr(result))}</code>"
     if len(result) == 0:
         return f"<div>{whole}</div>"
+    picture = f"<div>{_picture(result)}</div>" if hasattr(result, "sample") else ""
     return (
         f'<div style="display:flex;flex-wrap:wrap;gap:1em;align-items:flex-start"><div>{whole}{_table(result)}</div>'
-        f"<div>{_picture(result)}</div></div>"
+        f"{picture}</div>"
     )
 
 
@@ -33,19 +30,11 @@ def _some(result, count):
 
 
 def _table(result):
-    shown, more = _some(result, _ROWS), _COLUMNS[result.axis]
-    moved = [
-        np.linalg.norm(result.fields_at(shown, rod)["displacement"], axis=2).max(axis=1) for rod in result.scene.rods
-    ]
-    moved = np.max(moved, axis=0)
-    moved[moved < _ROUNDING * result.scales.length] = 0.0
-    columns = [[f"{x:.4g}" for x in values] for values in (result.along_axis[shown], moved)]
-    columns += [[text(x) for x in getattr(result, name)[shown]] for name, _, text in more]
-    axis = "time (s)" if result.axis == "time" else result.axis
-    rows = [("td", row) for row in zip(*columns, strict=True)]
-    heading = ("th", (axis, "largest displacement (m)", *(words for _, words, _ in more)))
-    lines = ("".join(f"<{tag}>{cell}</{tag}>" for cell in row) for tag, row in (heading, *rows))
-    left_out = f"{len(shown)} of {len(result)} shown" if len(shown) < len(result) else ""
+    columns = result._table(Units(), _ROWS).columns
+    rows = [("th", [column.header for column in columns])]
+    rows += [("td", row) for row in zip(*(column.cells for column in columns), strict=True)]
+    lines = ("".join(f"<{tag}>{html.escape(str(cell))}</{tag}>" for cell in row) for tag, row in rows)
+    left_out = f"{len(rows) - 1} of {len(result)} shown" if len(rows) - 1 < len(result) else ""
     return f"<table>{''.join(f'<tr>{line}</tr>' for line in lines)}</table>{left_out}"
 
 

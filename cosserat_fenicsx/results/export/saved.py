@@ -20,7 +20,6 @@ from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.new_files import h5py_for, new_hdf5, replaced
 from cosserat_fenicsx.numerics import ElementRule
 from cosserat_fenicsx.results.compared import NAMES
-from cosserat_fenicsx.results.export import contents
 from cosserat_fenicsx.results.records import Event, Instant, Ledger, Record, Records
 from cosserat_fenicsx.scene.as_data import NotData, from_data, to_data
 
@@ -48,18 +47,17 @@ def save(result, file):
         ) from None
     with replaced(file) as fresh, new_hdf5(fresh) as store:
         store.attrs.update(format=_FORMAT, version=_VERSION, written_by=f"cosserat_fenicsx {__version__}",
-                           kind=contents.about(result)["kind"], title=result.scene.title)  # fmt: skip
+                           kind=result._kind, title=result.scene.title)  # fmt: skip
         for name, text in (
             ("scene", scene),
             ("settings", json.dumps(_settings(result), default=lambda number: number.item())),
         ):
             store[name] = text
             store[name].attrs["crc32"] = zlib.crc32(text.encode())
-        _write_variables(store, contents.of_states(result) | contents.of_supports(result) | contents.of_events(result))
-        for rod, group in zip(result.scene.rods, contents.group_names(result.scene), strict=True):
-            place = store.create_group(f"rods/{group}")
-            place.attrs["rod"] = rod.name
-            _write_variables(place, contents.of_rod(result, rod))
+        for place, attributes, variables in result.in_groups():
+            group = store if place == "/" else store.create_group(f"rods{place}")
+            group.attrs.update(attributes)
+            _write_variables(group, variables)
         solution = store.create_group("solution")
         solution.attrs["units"] = "1: lengths, forces and moments over the scales of the settings, inertial components"
         for name, values in _solution(result).items():
@@ -68,7 +66,7 @@ def save(result, file):
 
 
 def _write_variables(place, variables):
-    for name, variable in (variables | contents.component_names(variables)).items():
+    for name, variable in variables.items():
         values = variable.values
         place[name] = values.astype(object) if values.dtype.kind == "U" else values
         place[name].attrs.update(variable.attributes)
@@ -116,7 +114,7 @@ def read(file, kind, assemble, comm):
     Raises:
         SceneError: it cannot be read, is damaged, holds something else, or is of a newer release.
     """
-    h5py, expected = h5py_for(file), f"expected a file that `save` of a {kind.__name__} wrote"
+    h5py, expected = h5py_for(file), f"expected a file that `save` of a {kind._kind} wrote"
     if not os.path.isfile(file):
         raise SceneError(f"{file}: there is no such file: {expected}")
     try:
@@ -124,7 +122,7 @@ def read(file, kind, assemble, comm):
     except OSError as problem:
         raise SceneError(f"{file}: it cannot be read ({problem}): {expected}") from None
     with store:
-        _check_kind(file, store.attrs, kind.__name__)
+        _check_kind(file, store.attrs, kind._kind)
         try:
             settings, data = (json.loads(_checked(store, name)) for name in ("settings", "scene"))
             numbers = {name: _checked(store["solution"], name) for name in store["solution"]}

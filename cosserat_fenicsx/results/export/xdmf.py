@@ -13,8 +13,6 @@ import numpy as np
 from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.new_files import arrays_in, replaced
 from cosserat_fenicsx.ranks import on_first
-from cosserat_fenicsx.results.export.columns import write_columns
-from cosserat_fenicsx.results.export.quantities import FIELDS as QUANTITIES
 from cosserat_fenicsx.scene.stresses import Stress
 
 #: Names in the files, as in eq. (1), and the fields of `Path.fields` behind them.
@@ -83,7 +81,7 @@ def write_mesh(file, mesh, known):
 def write_series(path, file, k=None):
     """Write all points of a path or a motion, over the load factor or the time; see `write_blocks`."""
     fields = {**_names(path), "arc_length": "s", "position": "position"}
-    units = {name: QUANTITIES[field].unit for name, field in fields.items()}
+    units = {name: path.quantities[field].unit for name, field in fields.items()}
     units[f"time axis ({path.axis})"] = "s" if path.axis == "time" else "1"
     write_blocks(file, "path", path, path.along_axis, _blocks(path), units)
 
@@ -188,7 +186,8 @@ def constants_of(meshed):
 
 def _names(path):
     """Names in the files, and the fields of `Path.fields` behind them."""
-    return {**FIELDS, **path.more_fields, **(_STRESSES if path.knows_stresses else {})}
+    own = {name: name for name, x in path.quantities.items() if x.axes == ("point", "s") and x.getter is not None}
+    return {**FIELDS, **path.more_fields, **(_STRESSES if path.knows_stresses else {}), **own}
 
 
 def meshes_of(path, which):
@@ -199,7 +198,7 @@ def meshes_of(path, which):
         fields = path.fields_at(which, rod)
         points.append(fields["position"])
         for name, field in names.items():
-            data[name].append(fields[field])
+            data[name].append(fields[field] if field in fields else path.quantities[field].of(path, rod)[list(which)])
     joined = {name: np.concatenate(values, axis=1) for name, values in data.items()}
     return np.concatenate(points, axis=1), [("line", lines_of(p.shape[1] for p in points))], joined
 
@@ -225,21 +224,9 @@ _UNITS_OF_SHAPES = {
 def write_shapes(found, file, k=0):
     """Write shapes to a file; see `Shapes.write`."""
     file = Path(file)
-    if file.suffix == ".csv":
-        on_first(found.comm, lambda: write_columns(file, csv_columns(found)))
-        return
     found.require_modes(file)
     k = found.number(k)
     on_first(found.comm, lambda: _write_shapes(found, file, k))
-
-
-def csv_columns(found):
-    """{heading: (n,)} the numbers of all modes, and where and how each moves most."""
-    columns = {"k": np.arange(len(found)), **found.columns}
-    places = [found.farthest(k) for k in range(len(found))]
-    columns["moves most at"] = np.array(["" if place is None else str(place) for place, _ in places])
-    along = np.array([np.full(3, np.nan) if axis is None else axis for _, axis in places]).reshape(-1, 3)
-    return columns | {f"direction there {axis}": along[:, i] for i, axis in enumerate("xyz")}
 
 
 def _write_shapes(found, file, k):
@@ -250,7 +237,7 @@ def _write_shapes(found, file, k):
         write_blocks(file, "modes", found.equilibrium, range(len(found)), [block], _UNITS_OF_SHAPES)
         return
     fields = {name: values[0] for name, values in _shape_fields(found, points, slice(k, k + 1)).items()}
-    known = ".xdmf, .csv, .vtu, .vtk or another ending that meshio knows"
+    known = ".xdmf, .csv, .nc, .vtu, .vtk or another ending that meshio knows"
     write_mesh(file, lambda: (points, [("line", lines)], fields), known)
 
 

@@ -1,0 +1,91 @@
+"""Tables for the screen, and pages of sentences with one table."""
+
+import dataclasses
+import sys
+import textwrap
+
+import numpy as np
+from rich import box
+from rich.console import Console
+from rich.table import Table
+
+from cosserat_fenicsx.quantities import as_text as value_text
+
+#: Largest numbers of rows of a table: of `details`, and of `print`, whose page has so many lines of so many characters.
+ROWS, SHORT, LINES, WIDTH = 40, 12, 30, 100
+# Lines that a table has beside its rows, and the fewest rows.
+_FRAME, _FEWEST = 6, 4
+# Numbers below this times the largest of their column are rounding.
+_ROUNDING = 1e-12
+
+
+def rows_of(count, most):
+    """Indices of at most so many of `count` rows, with the first and the last."""
+    return np.unique(np.linspace(0, count - 1, min(most, count)).round().astype(int)) if count else np.arange(0)
+
+
+def table(given, units, rows, title=None, caption=None, which=None):
+    """A table of quantities.
+
+    Args:
+        given: pairs of a `Quantity` and its values (n,) or (n, components).
+        units: the `Units`. rows: the most of them; those in between are left out.
+        which: indices of rows instead, with dots for those between.
+    """
+    count, gaps = len(given[0][1]), which is not None
+    which = rows_of(count, rows) if which is None else which
+    found = Table(title=title, caption=caption)
+    texts = []
+    for quantity, values in given:
+        values = np.asarray(values)
+        numbers = values.dtype.kind in "fiu"
+        unit, size = units.on_screen(quantity, values[which] if numbers else ())
+        least = quantity.noise
+        if values.dtype.kind == "f":
+            least = max(least, _ROUNDING * float(np.nanmax(np.abs(values), initial=0.0)))
+            values = np.where(np.abs(values) <= least, 0.0, values) / size
+        parts = values.reshape(count, -1).T
+        for part, column in zip(quantity.parts or [""], parts, strict=True):
+            label = dataclasses.replace(quantity, label=f"{quantity.short or f'{quantity.label} '}{part}".strip())
+            found.add_column(label.heading(unit), justify="right" if numbers else "left", overflow="fold")
+            texts.append([value_text(column[k], quantity.digits) for k in which])
+    for i, row in enumerate(zip(*texts, strict=True)):
+        if gaps and which[i] > (which[i - 1] + 1 if i else 0):
+            found.add_row(*["..."] * len(row))
+        found.add_row(*row)
+    return found
+
+
+def as_text(table, width=140):
+    """A rich table as plain text, as wide as it needs up to `width`, with names and titles as they are.
+
+    Its lines are ASCII where standard output does not know others.
+    """
+    try:
+        "━┏┃".encode(sys.stdout.encoding or "utf-8")
+    except UnicodeEncodeError:
+        table.box = box.ASCII2
+    # a fixed width, since the size of the terminal is unknown under mpirun
+    console = Console(width=width, color_system=None, markup=False, emoji=False)
+    with console.capture() as capture:
+        console.print(table)
+    return capture.get().rstrip()
+
+
+def page(answer, table_of):
+    """Sentences and a table that fit a screen.
+
+    Args:
+        answer: sentences; those that do not fit are left out, from the end. table_of: a function of the number of rows
+            that returns a rich table, or None where there is nothing to show.
+    """
+    lines = [line for told in answer for line in textwrap.wrap(told, WIDTH, break_on_hyphens=False)]
+    if len(lines) > LINES - _FRAME - _FEWEST:
+        lines = [*lines[: LINES - _FRAME - _FEWEST - 1], "... more by `details()`"]
+    rows = SHORT
+    while (shown := table_of(rows)) is not None and rows >= 1:
+        text = as_text(shown, WIDTH).splitlines()
+        if len(lines) + len(text) <= LINES:
+            return "\n".join([*lines, *text])
+        rows -= 1
+    return "\n".join(lines[:LINES])
