@@ -82,7 +82,7 @@ def test_condensed_tangent_meets_the_displacement_tangent_at_equilibrium(carried
         problems.append(problem)
     mixed, plain = problems
     model = mixed.model
-    model.state.x.array[model._nodal[:, :7]] = path._records[0].rq[model._slots]
+    model.state.x.array[model.nodal[:, :7]] = path._records[0].rq[model.slots]
     problem.numbering.from_local(model.state.x.array, problem.x)
     x = problem.x.array.copy()
     for problem in problems:
@@ -104,10 +104,10 @@ def test_a_rigid_motion_strains_nothing(formulation):
     a /= np.linalg.norm(a)
     w, v = a[0], a[1:]
     x = model.state.x.array  # the clamped end too
-    r = x[model._nodal[:, :3]]
+    r = x[model.nodal[:, :3]]
     turned = r + 2 * np.cross(v, np.cross(v, r) + w * r)
-    x[model._nodal[:, :3]] = turned + [1.0, 2.0, 3.0]
-    x[model._nodal[:, 3:7]] = a
+    x[model.nodal[:, :3]] = turned + [1.0, 2.0, 3.0]
+    x[model.nodal[:, 3:7]] = a
     problem.numbering.from_local(x, problem.x)
     assert np.abs(residual(problem, problem.x.array.copy())).max() < model.round_off
 

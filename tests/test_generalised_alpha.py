@@ -192,7 +192,7 @@ def test_a_step_by_half_a_turn_is_none(monkeypatch, scheme):
         guesses = predicted(stepper, h)
         if len(stepper._past) == 3 and not flips:
             flips.append(h)
-            tip = stepper.problem.model._nodal[-1, 3:]
+            tip = stepper.problem.model.nodal[-1, 3:]
             for guess in guesses:
                 guess[tip] *= -1
         return guesses

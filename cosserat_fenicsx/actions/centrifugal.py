@@ -115,7 +115,6 @@ class _OfRod(LineAction):
     at_nodes, scaled, work = True, False, staticmethod(turning)
 
     def data(self, rod, s):
-        """See `Action`."""
         found = rod.stiffness_at(s)
         added = [x.added_mass(rod, s, "right") for x in self.along]
         mass = found.mass + sum(both[0] for both in added if both is not None)
@@ -132,7 +131,6 @@ class _OfUnbalance(LineAction):
     at_nodes, work = True, staticmethod(unbalanced)
 
     def data(self, rod, s):
-        """See `Action`."""
         arm = np.einsum("...ij,...j->...i", rod.curve.frame(s), rod.mass_centre.at(s))
         return (
             action.scalar(rod.stiffness_at(s).mass, "kg/m"),
@@ -153,5 +151,4 @@ class _OfPoint(PointAction):
     scaled, work = False, staticmethod(turning)
 
     def data(self, rod, s):
-        """See `Action`."""
         return _turning_data(*self.body.inertia(rod), self.of, ("kg", "kg m^2"))

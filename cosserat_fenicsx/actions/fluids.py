@@ -60,15 +60,12 @@ class AddedMass(LineAction):
 
     @property
     def lateral(self):
-        """See `Action`."""
         return not self.axial
 
     def breaks(self, rod):
-        """See `Action`."""
         return tuple(s for s, _ in self._pieces[:-1])
 
     def added_mass(self, rod, s, side):
-        """See `Action`."""
         ends, masses = zip(*self._pieces, strict=True)
         within = 1e-9 * rod.length * (1 if side == "left" else -1)
         across = np.array(masses)[np.searchsorted(np.add(ends[:-1], within), s, side=side)]
@@ -121,21 +118,17 @@ class Drag(Load, LineAction):
         self._check_permanent()
 
     def data(self, rod, s):
-        """See `Action`."""
         coefficients = (action.scalar(c, "N s^2/m^3") for c in (self.normal, self.tangential))
         return (*coefficients, action.vector(values_of(self.current, s), "m/s"))
 
     def breaks(self, rod):
-        """See `Action`."""
         return breaks_of(self.current)
 
     def kinks(self, rod):
-        """See `Action`."""
         return kinks_of(self.current)
 
     @staticmethod
     def work(point, test, c_n, c_t, current):
-        """See `Action`."""
         w, d3 = point.r_t - current, point.directors[:, 2]
         along = ufl.dot(w, d3) * d3
         across = w - along
@@ -174,12 +167,10 @@ class LinearDrag(LineAction):
         store_coefficients(self, units, "a coefficient (N s/m^2)")
 
     def data(self, rod, s):
-        """See `Action`."""
         return scalar(self.normal, "N s/m^2"), scalar(self.tangential, "N s/m^2")
 
     @staticmethod
     def work(point, test, c_n, c_t):
-        """See `Action`."""
         v, d3 = point.r_t, point.directors[:, 2]
         along = ufl.dot(v, d3) * d3
         return -ufl.dot(c_n * (v - along) + c_t * along, test.phi_r)

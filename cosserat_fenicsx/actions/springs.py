@@ -41,7 +41,6 @@ class Directed:
 
     @property
     def work(self):
-        """See `Action`."""
         everywhere, directed = self.works
         return everywhere if self.direction is None else directed
 
@@ -78,7 +77,6 @@ class Foundation(Directed, LineAction):
 
     @property
     def works(self):
-        """See `Directed`."""
         return alike, along
 
     def __post_init__(self):
@@ -87,11 +85,9 @@ class Foundation(Directed, LineAction):
         self._store_direction()
 
     def data(self, rod, s):
-        """See `Action`."""
         return self._with_direction(scalar(self.stiffness, "N/m^2"))
 
     def holds(self, scene):
-        """See `Action`."""
         return [(self.rod.at(share * self.rod.length), row) for share in (0.0, 0.5, 1.0) for row in self._held()]
 
 
@@ -133,7 +129,6 @@ class Spring(Directed, PointAction):
 
     @property
     def works(self):
-        """See `Directed`."""
         return _sprung, _sprung_along
 
     def __post_init__(self):
@@ -143,11 +138,9 @@ class Spring(Directed, PointAction):
         self._store_direction()
 
     def data(self, rod, s):
-        """See `Action`."""
         return self._with_direction(scalar(self.stiffness, "N/m"), scalar(self.rotational, "N m/rad"))
 
     def holds(self, scene):
-        """See `Action`."""
         rows = [*(self._held() if self.stiffness else ()), *(np.eye(6)[3:] if self.rotational else ())]
         return [(self.station, row) for row in rows]
 
@@ -190,7 +183,6 @@ class Dashpot(Directed, PointAction):
 
     @property
     def works(self):
-        """See `Directed`."""
         return _resisted, _resisted_along
 
     def __post_init__(self):
@@ -200,7 +192,6 @@ class Dashpot(Directed, PointAction):
         self._store_direction()
 
     def data(self, rod, s):
-        """See `Action`."""
         return self._with_direction(scalar(self.damping, "N s/m"), scalar(self.rotational, "N m s/rad"))
 
 
@@ -243,5 +234,4 @@ class PointMass(PointAction):
         store(self, moments=tuple(moments * (3 // len(moments))))
 
     def inertia(self, rod):
-        """See `Action`."""
         return self.mass, np.array(self.moments)

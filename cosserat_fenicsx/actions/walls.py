@@ -130,7 +130,6 @@ class Wall(_Pressing, LineAction):
             )
 
     def data(self, rod, s):
-        """See `Action`."""
         axis = action.vector(self.point, "m from origin"), action.vector(self.direction, "1")
         sizes = action.scalar(self.clearance, "m"), action.scalar(self.stiffness, "N/m^2")
         return *axis, *sizes, *self._law_data()
@@ -178,7 +177,6 @@ class _Confined(_Pressing):
         return self.refreshed(rod, s, self.path.nearest(None, s + self.begins).position)
 
     def refreshed(self, rod, s, r):
-        """See `Action`."""
         near = self.path.nearest(r, s + self.begins)
         clearance, arm, friction = self.sizes(s, near.md)
         stage, kp = self.stage, np.full(len(s), self.stiffness)
@@ -290,7 +288,6 @@ class TubeWall(_Confined, LineAction):
         return tuple(sorted({end for end in along if 0 < end < rod.length}))
 
     def tube(self):
-        """See `Action`."""
         s = np.linspace(0.0, self.rod.length, _DRAWN)
         md = s + self.begins
         return self.path.nearest(None, md).position, self.sizes(s, md)[0]
@@ -353,7 +350,6 @@ class TubeRing(_Confined, PointAction):
         return self.path.nearest(None, md).position, np.full(2, self.clearance)
 
     def sizes(self, s, md):
-        """See `TubeWall`."""
         return tuple(np.full(len(s), x) for x in (self.clearance, self.contact_radius, self.friction))
 
 
@@ -424,11 +420,9 @@ class _InMotion:
         store(self, speed=positive(self, "speed", self.speed, "m/s"))
 
     def data(self, rod, s):
-        """See `Action`."""
         return ()
 
     def tube_around(self, s, points, md):
-        """See `Action.touches`."""
         near = self.path.nearest(points, md)
         return Around(near.md, near.position, near.tangent, *self.sizes(s, near.md))
 

@@ -33,7 +33,7 @@ class TouchingNodes:
         local = order[found] if len(mine) else np.zeros(len(slots), dtype=int)
         #: which of the nodes this rank owns, and their local degrees of freedom
         self._here = np.flatnonzero(mine[local] == slots) if len(mine) else np.empty(0, dtype=int)
-        self._dofs = model.dofs_of_nodes[local[self._here]]
+        self._dofs = model.nodal[local[self._here]]
         rows = np.zeros((self.count, 7), dtype=np.int64)
         rows[self._here] = numbering.rows[self._dofs]
         rows = self._sum(rows)

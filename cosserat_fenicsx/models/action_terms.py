@@ -308,7 +308,6 @@ class Term:
                 self._frame.x.array.reshape(-1, 9)[numbers[here].ravel()] = frames.reshape(-1, 9)
 
     def follow(self, delayed):
-        """See `ActionTerms.follow`."""
         self._delayed = {id(action): delayed[id(action)] for action, *_ in self._where if id(action) in delayed}
         self.moves = self.moves or bool(self._delayed)
 
@@ -385,7 +384,7 @@ class StationNode:
         self._model = model
         slot = model.slot_of(station)
         here = np.flatnonzero(model.slots[: model.owned_nodes] == slot)
-        self._dofs = model.dofs_of_nodes[here[0]] if len(here) else None
+        self._dofs = model.nodal[here[0]] if len(here) else None
         self._rest = model.reference[slot]
 
     def _everywhere(self, *functions):
@@ -451,7 +450,6 @@ class Delays:
             delayed.undo()
 
     def memory(self):
-        """See `Stepper.memory`."""
         return {str(i): delayed.memory() for i, (delayed, _) in enumerate(self._all)}
 
     def recall(self, memory):

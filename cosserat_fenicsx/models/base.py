@@ -58,7 +58,7 @@ class Snapshots:
     def snapshot(self):
         """The input of `expansion`: the nodes' unknowns (N, components), and the fields at the Gauss points (cells,
         points, k) or None; in the scene's order, on all ranks, dimensionless."""
-        nodal = self._gather_nodes(self.state.x.array[self._nodal[: self._owned_nodes]])
+        nodal = self._gather_nodes(self.state.x.array[self.nodal[: self.owned_nodes]])
         if self.forms.fields is None:
             return nodal, None
         return nodal, self.gathered(self.forms.fields, len(self.forms.gauss), self.forms.fields_size)
@@ -69,8 +69,8 @@ class Snapshots:
         numbering = self.numbering
         state = np.tile(self._rest_state, (len(x), 1))
         state[:, numbering.free] = x[:, numbering.of_free]
-        nodal = np.empty((len(x), *self._nodal.shape))
-        nodal[:, self._slots] = state[:, self._nodal]
+        nodal = np.empty((len(x), *self.nodal.shape))
+        nodal[:, self.slots] = state[:, self.nodal]
         if fields is None:
             return nodal, None
         values = fields.reshape(*fields.shape[:2], len(self.forms.gauss), -1).copy()
@@ -108,6 +108,8 @@ class RodModel(Snapshots):
         load_factor: the Constant eta; permanent_factor: that of permanent loads, 1 except while they are applied.
         actions: the `ActionTerms` with the data of all actions; densities: their `Densities`.
         forms: the `CompiledForms`.
+        slots: (n,) the scene's number of every local node; the first `owned_nodes` belong to this rank.
+        nodal: (n, components) local degrees of freedom of the local nodes.
         numbering: the solver's unknowns.
         second_variations: the `SecondVariation`s, whose numbers of negative eigenvalues add up; with the axes of the
             loaded scene.
@@ -203,7 +205,7 @@ class RodModel(Snapshots):
 
     def positions_at_rest(self):
         """The same in the reference configuration."""
-        return self.reference[self._slots]
+        return self.reference[self.slots]
 
     def tied_motion(self, values):
         """(r, q), (nodes, 7), inertial, from the unknowns of tied nodes, (nodes, components)."""
@@ -273,19 +275,19 @@ class RodModel(Snapshots):
         p, rods, links = self.signature.degree, self.rods, self.signature.connections
         V, size = self.nodal_space, self.components
         self.nodes = np.sort(compat.element_nodes(V))
-        self._slots = slots = rods.slots(V, p)
+        self.slots = slots = rods.slots(V, p)
         nodal = np.arange(size * len(slots)).reshape(-1, size)  # node, component -> index into state.x.array
         #: (local elements, p + 1) local nodes in dolfinx's order, and the position of each along its element
         self.cell_nodes = cell_nodes = compat.cell_nodes(V)
         self.node_order = np.argsort(np.argsort(compat.element_nodes(V)))
         if self.space is not V:
             nodal[cell_nodes] = compat.cell_nodes(self.space)[:, : size * (p + 1)].reshape(-1, p + 1, size)
-        self._nodal, self._owned_nodes = nodal, V.dofmap.index_map.size_local
+        self.nodal, self.owned_nodes = nodal, V.dofmap.index_map.size_local
         owned_cells = self.mesh.topology.index_map(1).size_local
         self._owned_cells = np.arange(owned_cells, dtype=np.int32)
         self._local_cells = np.arange(len(rods.cells), dtype=np.int32)
         cells = sum(rods.counts)
-        self._gather_nodes = Gather(self.comm, slots[: self._owned_nodes], cells * p + len(rods.counts))
+        self._gather_nodes = Gather(self.comm, slots[: self.owned_nodes], cells * p + len(rods.counts))
         self._gather_cells = Gather(self.comm, rods.cells[:owned_cells], cells)
         first = np.concatenate([[0], np.cumsum(np.asarray(rods.counts) * p + 1)])
 
@@ -296,7 +298,7 @@ class RodModel(Snapshots):
         leaders = {slot(a): slot(b) for a, b in links.leaders}
         self._held = slots, clamped, leaders
         self.tied_slots = np.array([slot(x) for x in links.tied], dtype=np.int64)
-        self.numbering = Numbering(self.comm, self.space, nodal, self._owned_nodes, *self._held, len(links.equations))
+        self.numbering = Numbering(self.comm, self.space, nodal, self.owned_nodes, *self._held, len(links.equations))
         others = compat.cell_nodes(self.space)[:owned_cells, size * (p + 1) :] if self.space is not V else None
         of_nodes = nodal[cell_nodes[:owned_cells]].reshape(owned_cells, size * (p + 1))
         self.cell_dofs = of_nodes if others is None else np.concatenate([of_nodes, others], axis=1)
@@ -306,8 +308,8 @@ class RodModel(Snapshots):
         self._variations = []
         owned = len(self._owned_cells)
         for form, space, (size, sideways) in zip(self.forms.second_variations, spaces, self.variations, strict=True):
-            dofs = np.arange(size * len(self._slots)).reshape(-1, size)
-            numbering = Numbering(self.comm, space, dofs, self._owned_nodes, *self._held)
+            dofs = np.arange(size * len(self.slots)).reshape(-1, size)
+            numbering = Numbering(self.comm, space, dofs, self.owned_nodes, *self._held)
             cell_dofs = dofs[self.cell_nodes[:owned]].reshape(owned, size * (self.signature.degree + 1))
             tied = self._rows_of_tied(numbering, dofs)
             self._variations.append(SecondVariation(form, numbering, cell_dofs, tied, None, sideways))
@@ -322,22 +324,22 @@ class RodModel(Snapshots):
     def rows_of_tied(self):
         """(tied nodes, components) rows in the solver's vector of the nodes in constraint equations, on all ranks; -1
         where clamped."""
-        return self._rows_of_tied(self.numbering, self._nodal)
+        return self._rows_of_tied(self.numbering, self.nodal)
 
     @property
     def rows_of_nodes(self):
         """(N, block) rows of all nodes in the second variation (of a model with one part), in the scene's order, on all
         ranks; -1 where clamped."""
         (part,) = self._variations
-        dofs = np.arange(part.numbering.block * len(self._slots)).reshape(-1, part.numbering.block)
+        dofs = np.arange(part.numbering.block * len(self.slots)).reshape(-1, part.numbering.block)
         rows = np.empty((self._gather_nodes.total, part.numbering.block), dtype=np.int64)
-        for slots, numbers in self.comm.allgather((self._slots, part.numbering.rows[dofs])):
+        for slots, numbers in self.comm.allgather((self.slots, part.numbering.rows[dofs])):
             rows[slots] = numbers
         return rows
 
     def _rows_of_tied(self, numbering, dofs):
         here = {
-            int(self._slots[i]): numbering.rows[dofs[i]] for i in np.flatnonzero(np.isin(self._slots, self.tied_slots))
+            int(self.slots[i]): numbering.rows[dofs[i]] for i in np.flatnonzero(np.isin(self.slots, self.tied_slots))
         }
         everywhere = {}
         for part in self.comm.allgather(here):
@@ -380,7 +382,7 @@ class RodModel(Snapshots):
         """The state becomes the reference configuration of the scene."""
         x = self.state.x.array
         x[:] = 0
-        x[self._nodal] = self._rest[self._slots]
+        x[self.nodal] = self._rest[self.slots]
         for function in self.carried:
             function.x.array[:] = 0
 
@@ -397,7 +399,7 @@ class RodModel(Snapshots):
     def set_motion(self, values, n):
         """Set the initial guess, in the scene's order: the nodes' unknowns (N, components), and n at the Gauss points
         (elements, points, 3), inertial, used where n is carried or unknown."""
-        self.state.x.array[self._nodal] = values[self._slots]
+        self.state.x.array[self.nodal] = values[self.slots]
         self.signature.formulation.force.put(self, n @ self.axes[: self.force_size].T)
 
     # -- for solvers and results -------------------------------------------------------------------------------------

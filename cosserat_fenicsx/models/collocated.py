@@ -44,13 +44,11 @@ class EccentricCollocation(EccentricMomenta, SpatialCollocation):
     """A `SpatialCollocation` with mass centres off the axis."""
 
     def rate_of_momentum(self, v, a):
-        """See `SpatialCollocation`."""
         (_, Om), (r_tt, Om_t) = _halves(v), _halves(a)
         R = rotation_matrix(parts_of(self.nodal)[1])
         return eccentric.rate_of_momentum(r_tt, Om, Om_t, R, self.body, self.test)
 
     def momentum_by(self, v):
-        """See `SpatialCollocation`."""
         (r_t, Om), R, body = _halves(v), rotation_matrix(parts_of(self.nodal)[1]), self.body
         z, z_t = R * body.offset, R * ufl.cross(Om, body.offset)
         return eccentric.momentum(r_t, z, z_t, R * (body.I_R * Om), body, self.test)
@@ -60,19 +58,15 @@ class PlanarCollocation(PlanarStep):
     """A `PlanarStep` whose rates are those of its unknowns."""
 
     def increment(self, w, w0):
-        """See `SpatialCollocation`."""
         return w - w0
 
     def rate_of_momentum(self, v, a):
-        """See `SpatialCollocation`."""
         return self.momentum(self.nodal, a)
 
     def momentum_by(self, v):
-        """See `SpatialCollocation`."""
         return self.momentum(self.nodal, v)
 
     def point_with(self, w, v, rest, frame):
-        """See `SpatialCollocation`."""
         return self.model.point_of(w, v, rest=rest, frame=frame)
 
 
@@ -137,7 +131,7 @@ class Collocated:
         self.known_velocity, self.known_acceleration = fem.Function(space), fem.Function(space)
         self.known_strain_rate = gauss_function(self.mesh, self.signature.points, _STRAINS)
         self._gauss_nodes = compat.cell_nodes(self.known_strain_rate.function_space).ravel()
-        self._node_rates = np.zeros((2, len(self._slots) * self.rate_size))
+        self._node_rates = np.zeros((2, len(self.slots) * self.rate_size))
         self._strain_rates = np.zeros((3, len(self.known_strain_rate.x.array)))
 
     def _compile(self, spaces):
@@ -155,12 +149,10 @@ class Collocated:
 
     @property
     def rate_arrays(self):
-        """See `Moving`."""
         return self.velocity.x.array, *self._node_rates, *self._strain_rates
 
     @property
     def ends(self):
-        """See `Moving`."""
         return *super().ends, self.known_velocity, self.known_acceleration, self.known_strain_rate
 
     def begin_rates(self):
@@ -227,19 +219,19 @@ class CollocatedSpatial(Collocated, MovingSpatial):
     step_forms, rate_size = SpatialCollocation, 6
 
     def _increments(self):
-        now, before = (f.x.array[self._nodal] for f in (self.state, self.start))
+        now, before = (f.x.array[self.nodal] for f in (self.state, self.start))
         p, w = conjugate_product(before[:, 3:], now[:, 3:]), np.einsum("ni,ni->n", before[:, 3:], now[:, 3:])
         size = np.sqrt(np.einsum("ni,ni->n", p, p))
         turned = 2 * np.where(size > 0, np.arctan2(size, w) / np.where(size > 0, size, 1.0), 1.0)
         return np.concatenate([now[:, :3] - before[:, :3], turned[:, None] * p], axis=1).ravel()
 
     def _velocities(self):
-        q = self.start.x.array[self._nodal[:, 3:]]
-        rates = self.velocity.x.array[self._nodal]
+        q = self.start.x.array[self.nodal[:, 3:]]
+        rates = self.velocity.x.array[self.nodal]
         return np.concatenate([rates[:, :3], 2 * conjugate_product(q, rates[:, 3:])], axis=1).ravel()
 
     def _put_velocities(self, v):
-        nodal, v = self._nodal, v.reshape(-1, 6)
+        nodal, v = self.nodal, v.reshape(-1, 6)
         Om, q = v[:, 3:], self.state.x.array[nodal[:, 3:]]
         rates = self.velocity.x.array
         rates[nodal[:, :3]] = v[:, :3]
@@ -259,10 +251,10 @@ class CollocatedPlanar(Collocated, MovingPlanar):
     step_forms, rate_size = PlanarCollocation, 3
 
     def _increments(self):
-        return (self.state.x.array - self.start.x.array)[self._nodal].ravel()
+        return (self.state.x.array - self.start.x.array)[self.nodal].ravel()
 
     def _velocities(self):
-        return self.velocity.x.array[self._nodal].ravel()
+        return self.velocity.x.array[self.nodal].ravel()
 
     def _put_velocities(self, v):
-        self.velocity.x.array[self._nodal.ravel()] = v
+        self.velocity.x.array[self.nodal.ravel()] = v

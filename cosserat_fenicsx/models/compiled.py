@@ -6,7 +6,6 @@ that would differ and miss the code cache, which costs a second.
 
 from collections import namedtuple
 from dataclasses import dataclass, replace
-from dataclasses import fields as fields_of
 from functools import partial
 
 import basix
@@ -56,21 +55,21 @@ class CompiledForms:
         symbols: the `Symbols`, or None.
     """
 
-    residual: object
-    tangent: object
-    dead: object
-    permanent: object
-    second_variations: tuple
-    fields: object
-    fields_size: int
-    advance: object
-    force: object
-    permanent_force: object
-    density: object
-    node_density: object
     gauss: np.ndarray
     weights: np.ndarray
-    symbols: object
+    residual: tuple = ()
+    tangent: tuple = ()
+    dead: tuple = ()
+    permanent: tuple = ()
+    second_variations: tuple = ()
+    fields: object = None
+    fields_size: int = 0
+    advance: object = None
+    force: tuple = ()
+    permanent_force: tuple = ()
+    density: tuple = ()
+    node_density: tuple = ()
+    symbols: Symbols | None = None
 
 
 def along(w):
@@ -179,27 +178,12 @@ def compile_parts(
         tuple(compiled for number, (_, (compiled,)) in terms if compiled and densities[number][0] == place)
         for place in ("line", "node")
     )
-    residual_forms, tangent_forms, *second_forms = (
-        tuple(filter(None, (form, *of_all(i)))) for i, form in enumerate(core_forms[:n])
-    )
+    core_parts = [tuple(filter(None, (form, *of_all(i)))) for i, form in enumerate(core_forms[:n])]
     dead, permanent, force, permanent_force = (of_all(n + i) for i in range(len(loads)))
     found = CompiledForms(
-        residual_forms,
-        tangent_forms,
-        dead,
-        permanent,
-        tuple(second_forms),
-        core_fields[0],
-        0 if fields is None else len(fields),
-        core_fields[1],
-        force,
-        permanent_force,
-        density,
-        node_density,
-        points[:, 0],
-        weights,
-        None,
-    )
+        points[:, 0], weights, *core_parts[:2], dead, permanent, tuple(core_parts[2:]), core_fields[0],
+        0 if fields is None else len(fields), core_fields[1], force, permanent_force, density, node_density,
+    )  # fmt: skip
     return found, core_forms[n:], [parts[n + len(loads) :] for number, (parts, _) in terms if number in of_terms]
 
 
@@ -240,10 +224,8 @@ def _balance(model, residual, acting):
 def compile_single(model, second):
     """The `CompiledForms` of a model that has only a second variation, unsymmetric, or None."""
     points, weights = basix.make_quadrature(basix.CellType.interval, 2 * model.signature.points - 1)
-    none = {field.name: None for field in fields_of(CompiledForms)}
-    seconds = (() if second is None else tuple(compat.forms(model.mesh, [second])),)
-    given = {"second_variations": seconds, "fields_size": 0, "gauss": points[:, 0], "weights": weights}
-    return CompiledForms(**none | given)
+    seconds = () if second is None else tuple(compat.forms(model.mesh, [second]))
+    return CompiledForms(points[:, 0], weights, second_variations=(seconds,))
 
 
 def measures(model):
@@ -269,6 +251,13 @@ def _rule(mesh, points, weights):
     )
 
 
+def acting_at(model, point_at):
+    """(number, `Term`, its factor, UFL, and its `Point`) of all actions of a model; point_at: see `action_work`."""
+    factors = {"load": model.load_factor, "permanent": model.permanent_factor, "full": 1}
+    for number, term in enumerate(model.actions.terms):
+        yield number, term, factors[term.kind.scaled], point_at(term.kind.place, term.rest, term.frame)
+
+
 def action_work(model, dx, test, point_at, unknowns, accepted_at=None, test_at=None):
     """The `ActionWork` of a model's actions.
 
@@ -280,17 +269,15 @@ def action_work(model, dx, test, point_at, unknowns, accepted_at=None, test_at=N
         test_at: function place -> the `VirtualMotion` there; given where test functions depend on the state.
     """
     dead, live = {"load": {}, "permanent": {}}, []
-    factors = {"load": model.load_factor, "permanent": model.permanent_factor, "full": 1}
-    for number, term in enumerate(model.actions.terms):
+    for number, term, factor, point in acting_at(model, point_at):
         kind = term.kind
         measure = {"point": dx.ends, "line": dx.gauss, "node": dx.nodes}[kind.place]
-        point = point_at(kind.place, term.rest, term.frame)
         integrand = term.work(point, test_at(kind.place) if test_at else test)
         if isinstance(integrand, ufl.constantvalue.Zero):
             continue  # such as a force in a determinate model, or a dashpot in statics
         form = integrand * measure
         if set(unknowns) & set(form.coefficients()) or kind.memory or kind.refreshed:
-            live.append(Live(number, form, factors[kind.scaled], measure, point, term.work))
+            live.append(Live(number, form, factor, measure, point, term.work))
         else:
             dead["load" if kind.scaled == "load" else "permanent"][number] = form
         if kind.memory and term not in (known for known, _ in model.evolving):
@@ -301,13 +288,12 @@ def action_work(model, dx, test, point_at, unknowns, accepted_at=None, test_at=N
 def action_densities(model, point_at):
     """Force and moment per length of the distributed actions: {number of the term: (place, UFL (6,))}, place "line"
     (Gauss points) or "node" (for actions integrated there)."""
-    factors = {"load": model.load_factor, "permanent": model.permanent_factor, "full": 1}
     found = {}
-    for number, term in enumerate(model.actions.terms):
+    for number, term, factor, point in acting_at(model, point_at):
         place = term.kind.place
         if place != "point":
-            force, moment = resultants(term.work, point_at(place, term.rest, term.frame))
-            density = factors[term.kind.scaled] * ufl.as_vector([*force, *moment])
+            force, moment = resultants(term.work, point)
+            density = factor * ufl.as_vector([*force, *moment])
             if not isinstance(density, ufl.constantvalue.Zero):  # as of what resists velocities, in statics
                 found[number] = place, density
     return found

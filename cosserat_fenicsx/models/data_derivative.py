@@ -81,7 +81,7 @@ class EnergyOfMotion:
         Args:
             motion: (N, 6) displacements and rotations of all nodes in the scene's order, inertial, dimensionless.
         """
-        self._motion.x.array.reshape(-1, 6)[:] = motion[self._model._slots]
+        self._motion.x.array.reshape(-1, 6)[:] = motion[self._model.slots]
         return self._model.comm.allreduce(fem.assemble_scalar(self._form))
 
 

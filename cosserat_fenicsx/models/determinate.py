@@ -159,11 +159,11 @@ class _KnownForce(RodModel):
 
     def _nodal_forces(self, forms):
         """(N, d) nodal forces equivalent to the dead forces, in the scene's order, on all ranks."""
-        total, local = np.zeros((len(self.reference), self.force_size)), np.zeros((len(self._slots), 3))
+        total, local = np.zeros((len(self.reference), self.force_size)), np.zeros((len(self.slots), 3))
         for form in map(compat.kernel, forms):
             packed = cpp.fem.pack_constants(form), cpp.fem.pack_coefficients(form)
             cpp.fem.assemble_vector(local.reshape(-1), form, *packed)
-        np.add.at(total, self._slots, local[:, : self.force_size])
+        np.add.at(total, self.slots, local[:, : self.force_size])
         return self.comm.allreduce(total) if self.comm.size > 1 else total
 
     def _sizes(self):
@@ -196,11 +196,9 @@ class DeterminateInPlane(_KnownForce, PlaneModel):
         return np.array([[*none, *e3]]), np.array([[*none, *e1], [*none, *e2]])
 
     def unknowns_of(self, rq):
-        """See `RodModel`."""
         return self._angles(rq)[..., None]
 
     def expansion(self):
-        """See `RodModel`."""
         axes, offset, section = self.axes, self._out_of_plane(), self.section
         known, lasting, rule, tree, sizes = self._known, self._lasting, self.rule, self._tree, self._sizes()
         rest, basis = self.reference @ axes[:2].T, rule.at_gauss
@@ -254,11 +252,9 @@ class DeterminateInSpace(_KnownForce):
         return (np.eye(6)[3:],)
 
     def unknowns_of(self, rq):
-        """See `RodModel`."""
         return rq[..., 3:]
 
     def expansion(self):
-        """See `RodModel`."""
         section, known, lasting = self.section, self._known, self._lasting
         rule, tree, sizes = self.rule, self._tree, self._sizes()
         rest, basis = self.reference, rule.at_gauss

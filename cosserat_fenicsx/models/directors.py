@@ -34,30 +34,25 @@ class Turning:
         self.turning = fem.Function(compat.function_space(self.mesh, element))
 
     def load(self, scene, layout):
-        """See `Moving`."""
         super().load(scene, layout)
         self.turning.x.array[:] = 0.0
 
     def set_velocity(self, linear, angular):
-        """See `Moving`."""
         super().set_velocity(linear, angular)
-        R = numerics.directors(self.state.x.array[self._nodal[:, 3:]])
-        self.turning.x.array[:] = np.cross(angular[self._slots][:, :, None], R, axis=1).ravel()
+        R = numerics.directors(self.state.x.array[self.nodal[:, 3:]])
+        self.turning.x.array[:] = np.cross(angular[self.slots][:, :, None], R, axis=1).ravel()
 
     @property
     def ends(self):
-        """See `Moving`."""
         return *super().ends, self.turning
 
     @property
     def rate_arrays(self):
-        """See `Moving`."""
         return *super().rate_arrays, self.turning.x.array
 
     def accept(self, h):
-        """See `Moving`."""
         super().accept(h)
-        places = self._nodal[:, 3:]
+        places = self.nodal[:, 3:]
         R, before = (numerics.directors(f.x.array[places]) for f in (self.state, self.start))
         W = self.turning.x.array.reshape(-1, 3, 3)
         W[:] = 2 / h * (R - before) - W
@@ -67,12 +62,10 @@ class EccentricMomenta:
     """Mixin of a `SpatialStep`, first among the bases: the momenta of forms/eccentric.py."""
 
     def momentum(self, w, w_t):
-        """See `StepForms`."""
         (_, q), (_, q_t) = parts_of(w), parts_of(w_t)
         return self.momentum_with(w, w_t, eccentric.arm_rate(q, q_t, self.body))
 
     def kinetic(self, w, w_t):
-        """See `StepForms`."""
         (_, q), (_, q_t) = parts_of(w), parts_of(w_t)
         return self.kinetic_with(w, w_t, eccentric.arm_rate(q, q_t, self.body))
 
@@ -96,19 +89,15 @@ class EccentricStep(EccentricMomenta, SpatialStep):
         self.turned = as_matrix(model.turning) * self.body.offset
 
     def momentum_before(self):
-        """See `StepForms`."""
         return self.momentum_with(self.nodal, self.rates, self.turned)
 
     def kinetic_before(self):
-        """See `StepForms`."""
         return self.kinetic_with(self.nodal, self.rates, self.turned)
 
     def momentum_after(self):
-        """See `StepForms`."""
         return self.momentum_with(self.nodal, 2 * self.passed - self.rates, 2 * self._arm_passed() - self.turned)
 
     def of_moving_axis(self):
-        """See `StepForms`."""
         return eccentric.of_moving_axis(parts_of(self.passed)[0], self._arm_passed(), self.body, self.test)
 
     def _arm_passed(self):
@@ -125,9 +114,9 @@ class EccentricSpatial(Turning, MovingSpatial):
     def set_velocity(self, linear, angular):
         """See `Moving`: the rates of the directors change with the angular velocities, which differ from theirs by the
         error of the scheme, so that momenta stay the same where these do."""
-        places, W = self._nodal[:, 3:], self.turning.x.array.reshape(-1, 3, 3).copy()
+        places, W = self.nodal[:, 3:], self.turning.x.array.reshape(-1, 3, 3).copy()
         q = self.state.x.array[places]
-        change = angular[self._slots] - turned_by(self.velocity.x.array[places], q)
+        change = angular[self.slots] - turned_by(self.velocity.x.array[places], q)
         super().set_velocity(linear, angular)
         self.turning.x.array[:] = (W + np.cross(change[:, :, None], numerics.directors(q), axis=1)).ravel()
 
@@ -188,9 +177,8 @@ class ConservingSpatial(Turning, MovingSpatial):
     scheme = staticmethod(compile_conserving)
 
     def accept(self, h):
-        """See `Moving`."""
         super().accept(h)
-        nodal = self._nodal
+        nodal = self.nodal
         q = self.state.x.array[nodal[:, 3:]]
         omega = np.cross(numerics.directors(q), self.turning.x.array.reshape(-1, 3, 3), axis=1).sum(axis=2) / 2
         self.velocity.x.array[nodal[:, 3:]] = spun(q, omega)

@@ -66,7 +66,6 @@ class ContactForce:
 
 class _OfMotion(ContactForce):
     def weak_form(self, n, phi_n, motion, before, section, test, ds, derivative, along_step):
-        """See `ContactForce`."""
         internal = equilibrium.displacement(motion, section, test, ds)
         n, _ = equilibrium.contact(motion, section)
         return WeakForm(n, internal, derivative(internal), None)
@@ -74,12 +73,10 @@ class _OfMotion(ContactForce):
 
 class _Carried(ContactForce):
     def symbols(self, model, U, phi):
-        """See `ContactForce`."""
         (n,) = model.carried
         return [n[i] for i in range(model.force_size)], None
 
     def put(self, model, n):
-        """See `ContactForce`."""
         model.rods.fill(model.carried[0], n)
 
     def weak_form(self, n, phi_n, motion, before, section, test, ds, derivative, along_step):
@@ -106,18 +103,15 @@ class _Unknown(ContactForce):
             model.state.x.array[dofs[cells]] = values.reshape(len(cells), model.force_size * p)
 
     def weak_form(self, n, phi_n, motion, before, section, test, ds, derivative, along_step):
-        """See `ContactForce`."""
         internal = equilibrium.mixed(n, motion, section, test, phi_n, ds)
         return WeakForm(n, internal, derivative(internal), None)
 
 
 class _Known(ContactForce):
     def symbols(self, model, U, phi):
-        """See `ContactForce`."""
         return model.known_force(), None
 
     def weak_form(self, n, phi_n, motion, before, section, test, ds, derivative, along_step):
-        """See `ContactForce`."""
         internal = determinate.moments(n, motion, section, test, ds)
         return WeakForm(n, internal, derivative(internal), None)
 

@@ -16,6 +16,7 @@ from cosserat_fenicsx.models.action_terms import Delays
 from cosserat_fenicsx.models.base import Scales
 from cosserat_fenicsx.models.compiled import (
     CompiledForms,
+    acting_at,
     action_work,
     compile_parts,
     derivative_in,
@@ -55,11 +56,11 @@ class MotionForms(CompiledForms):
         of_step, of_step_at_nodes: the two results of `virtual_work_of_step`, compiled, or None.
     """
 
-    momentum: object
-    live: object
-    kinetic: object
-    strain: object
-    dissipated: object
+    momentum: object = None
+    live: tuple = ()
+    kinetic: object = None
+    strain: object = None
+    dissipated: object = None
     live_tangent: tuple = ()
     of_step: object = None
     of_step_at_nodes: object = None
@@ -195,16 +196,14 @@ def virtual_work_of_step(model, stress, point_at):
     """
     if not model.signature.connections.clamped:
         return None, None
-    factors = {"load": model.load_factor, "permanent": model.permanent_factor, "full": 1}
-    acting = [(term, factors[term.kind.scaled], point_at(term.kind.place, term.rest, term.frame))
-              for term in model.actions.terms]  # fmt: skip
+    acting = list(acting_at(model, point_at))
 
     def less(test, place):
-        return sum(factor * term.work(point, test) for term, factor, point in acting if term.kind.place == place)
+        return sum(factor * term.work(point, test) for _, term, factor, point in acting if term.kind.place == place)
 
     tests = [VirtualMotion(*(axis if k == i else NONE for k in range(4))) for i in range(4) for axis in AXES]
     at_gauss = ufl.as_vector([stress(test) - less(test, "line") for test in tests])
-    if not any(term.kind.place == "node" for term, _, _ in acting):
+    if not any(term.kind.place == "node" for _, term, _, _ in acting):
         return at_gauss, None
     return at_gauss, ufl.as_vector([-less(test, "node") for test in tests[:6]])
 
@@ -223,12 +222,10 @@ class SpatialStep(StepForms):
         super().__init__(model)
 
     def momentum(self, w, w_t):
-        """See `StepForms`."""
         (_, q), (r_t, q_t) = parts_of(w), parts_of(w_t)
         return inertia.momentum(r_t, inertia.angular_momentum(q, q_t, self.body), self.body, self.test)
 
     def kinetic(self, w, w_t):
-        """See `StepForms`."""
         (_, q), (r_t, q_t) = parts_of(w), parts_of(w_t)
         return inertia.kinetic_energy(r_t, inertia.angular_velocity(q, q_t), self.body)
 
@@ -391,25 +388,10 @@ class Moving:
 
     # -- for time steppers and results -------------------------------------------------------------------------------
 
-    @property
-    def slots(self):
-        """(n,) the scene's number of every local node."""
-        return self._slots
-
     def slot_of(self, station):
         """The scene's number of the node at a station."""
         rod, vertex = self.layout.vertex(self.scene, station)
         return sum(self.layout.counts[:rod]) * self.signature.degree + rod + vertex * self.signature.degree
-
-    @property
-    def owned_nodes(self):
-        """Number of the local nodes that this rank owns; they come first."""
-        return self._owned_nodes
-
-    @property
-    def dofs_of_nodes(self):
-        """(n, components) local degrees of freedom of the local nodes."""
-        return self._nodal
 
     @property
     def rate_arrays(self):
@@ -437,7 +419,7 @@ class Moving:
 
     def largest_of(self, change, turns):
         """Largest displacement (lengths), or rotation (rad) times `turns`, in a change of the state, over all ranks."""
-        nodal = change[self._nodal]
+        nodal = change[self.nodal]
         moved, turned = (np.square(x).sum(axis=1).max(initial=0.0) for x in np.split(nodal, [self.moves], axis=1))
         local = math.sqrt(max(moved, (turns * self.turn) ** 2 * turned))
         return self.comm.allreduce(local, op=MPI.MAX) if self.comm.size > 1 else local
@@ -448,7 +430,7 @@ class Moving:
 
     def snapshot_of_rates(self):
         """(N, components) `velocity` at the nodes, in the scene's order, on all ranks, dimensionless."""
-        return self._gather_nodes(self._arrays[2][self._nodal[: self._owned_nodes]])
+        return self._gather_nodes(self._arrays[2][self.nodal[: self.owned_nodes]])
 
     def momenta(self, tested):
         """Linear (3,) and angular momentum (3,) about the inertial origin, over all ranks, dimensionless.
@@ -456,8 +438,8 @@ class Moving:
         Args:
             tested: (local degrees of freedom,) the assembled `forms.momentum`, contributions of this rank's elements.
         """
-        linear, angular = self._momenta_of(tested[self._nodal])
-        place = self.positions() + self._origins[self._slots]
+        linear, angular = self._momenta_of(tested[self.nodal])
+        place = self.positions() + self._origins[self.slots]
         both = np.concatenate([linear.sum(axis=0), (cross(place, linear) + angular).sum(axis=0)])
         both = self.comm.allreduce(both) if self.comm.size > 1 else both
         return both[:3], both[3:]
@@ -472,7 +454,6 @@ class MovingSpatial(Moving, SpatialModel):
         return six_of(np.einsum("...ij,...j,...kj->...ik", frames, J, frames))
 
     def passed(self):
-        """See `Moving`."""
         now, before = (array.reshape(-1, 7) for array in self._arrays[:2])  # node by node
         work = now - before
         work[:, 4:] = turned_by(work[:, 3:], (now[:, 3:] + before[:, 3:]) / 2)
@@ -486,13 +467,11 @@ class MovingSpatial(Moving, SpatialModel):
         return self.comm.allreduce(here, op=MPI.LOR) if self.comm.size > 1 else here
 
     def set_velocity(self, linear, angular):
-        """See `Moving`."""
-        slots, nodal, x = self._slots, self._nodal, self.velocity.x.array
+        slots, nodal, x = self.slots, self.nodal, self.velocity.x.array
         x[nodal[:, :3]] = linear[slots]
         x[nodal[:, 3:]] = spun(self.state.x.array[nodal[:, 3:]], angular[slots])
 
     def rates(self):
-        """See `Moving`."""
         return lambda nodal, rates: np.concatenate([rates[..., :3], turned_by(rates[..., 3:], nodal[..., 3:])], axis=-1)
 
     def _momenta_of(self, p):

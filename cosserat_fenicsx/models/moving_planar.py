@@ -18,13 +18,11 @@ class PlanarStep(StepForms):
     """See `StepForms`."""
 
     def momentum(self, w, w_t):
-        """See `StepForms`."""
         test, mass, J = self.test, self.model.mass[0], self.model.inertia[0]
         both = mass * (w_t[0] * test.phi_r[0] + w_t[1] * test.phi_r[1]) + J * w_t[2] * test.phi[2]
         return both + _lateral(self.model, w_t, test.phi_r)
 
     def kinetic(self, w, w_t):
-        """See `StepForms`."""
         both = self.model.mass[0] * (w_t[0] ** 2 + w_t[1] ** 2) + self.model.inertia[0] * w_t[2] ** 2
         return (both + _lateral(self.model, w_t, w_t)) / 2
 
@@ -45,22 +43,19 @@ class MovingPlanar(Moving, PlanarModel):
         return np.einsum("...k,...k->...", along**2, J)[..., None]
 
     def passed(self):
-        """See `Moving`."""
         now, before, _ = self._arrays
         return now - before
 
     def set_velocity(self, linear, angular):
-        """See `Moving`."""
         e1, e2, normal = self.axes
         off = max(np.abs(linear @ normal).max(), np.abs(angular @ e1).max(), np.abs(angular @ e2).max())
         if off > _OFF * max(np.abs(linear).max(), np.abs(angular).max(), 1e-300):
             raise SceneError("Scene.velocities leave the plane of the scene: expected model = 'spatial' in simulate")
         x = self.velocity.x.array
-        x[self._nodal[:, :2]] = (linear @ self.axes[:2].T)[self._slots]
-        x[self._nodal[:, 2]] = (angular @ normal)[self._slots]
+        x[self.nodal[:, :2]] = (linear @ self.axes[:2].T)[self.slots]
+        x[self.nodal[:, 2]] = (angular @ normal)[self.slots]
 
     def unknowns_of(self, rq):
-        """See `RodModel`."""
         off = np.abs((rq[:, :3] - self.reference) @ self.axes[2]).max(), np.abs(rq[:, 4:] @ self.axes[:2].T).max()
         if max(off) > _OFF:
             raise SceneError(
@@ -105,7 +100,6 @@ class MovingPlanar(Moving, PlanarModel):
         raise SceneError(f"{what} leaves the plane at t = {t:g} s: expected model = 'spatial' in simulate")
 
     def rates(self):
-        """See `Moving`."""
         axes = self.axes
         return lambda nodal, rates: np.concatenate([rates[..., :2] @ axes[:2], rates[..., 2:] * axes[2]], axis=-1)
 

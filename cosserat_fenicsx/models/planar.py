@@ -112,11 +112,9 @@ class PlanarModel(PlaneModel):
         self._inside, self._tied_off = self._variation_axes()[0], self._out_of_plane()[self.tied_slots]
 
     def positions(self):
-        """See `RodModel`."""
-        return self.state.x.array[self._nodal[:, :2]] @ self.axes[:2] + self._out_of_plane()[self._slots]
+        return self.state.x.array[self.nodal[:, :2]] @ self.axes[:2] + self._out_of_plane()[self.slots]
 
     def tied_motion(self, values):
-        """See `RodModel`."""
         e3, half = self.axes[2], values[:, 2:] / 2
         rq = np.empty((len(values), 7))
         rq[:, :3] = values[:, :2] @ self.axes[:2]
@@ -125,7 +123,6 @@ class PlanarModel(PlaneModel):
         return rq
 
     def tie_maps(self, values):
-        """See `RodModel`."""
         return self._inside.T[None], self._inside[None]
 
     def held_forces(self, forces):
@@ -133,11 +130,9 @@ class PlanarModel(PlaneModel):
         return forces @ self._inside.T @ self._inside
 
     def unknowns_of(self, rq):
-        """See `RodModel`."""
         return np.concatenate([rq[..., :3] @ self.axes[:2].T, self._angles(rq)[..., None]], axis=-1)
 
     def expansion(self):
-        """See `RodModel`."""
         axes, offset = self.axes, self._out_of_plane()
 
         def expand(load_factors, nodal, gauss):

@@ -140,7 +140,6 @@ class Layout:
 
 @per_scene
 def _equal(scene, elements):
-    """See `Layout.of`."""
     most = MOST_ELEMENTS // len(scene.rods)
     if elements > most:
         gigabytes = elements * len(scene.rods) * _GIGABYTES
@@ -158,7 +157,6 @@ def _equal(scene, elements):
 
 @per_scene
 def _finer(scene, layout, factor):
-    """See `Layout.finer`."""
     return layout.resized(scene, [np.full(count, float(factor)) for count in layout.counts])
 
 

@@ -73,15 +73,12 @@ class SpatialModel(RodModel):
         return (np.eye(6),)
 
     def positions(self):
-        """See `RodModel`."""
-        return self.state.x.array[self._nodal[:, :3]]
+        return self.state.x.array[self.nodal[:, :3]]
 
     def tied_motion(self, values):
-        """See `RodModel`."""
         return values[:, :7]
 
     def tie_maps(self, values):
-        """See `RodModel`."""
         size, q = self.components, values[:, 3:7]
         of_moments = self.signature.formulation.rows_of_moments(q)
         trial, test = np.zeros((len(values), 6, size)), np.zeros((len(of_moments), size, 6))
@@ -91,7 +88,6 @@ class SpatialModel(RodModel):
         return trial, test
 
     def turned_reactions(self, values, reactions):
-        """See `RodModel`."""
         turned = self.signature.formulation.turned_rows(values[:, 3:7], reactions[:, 3:])
         return np.pad(turned, ((0, 0), (3, 0), (3, 0)))
 
@@ -114,21 +110,21 @@ class SpatialModel(RodModel):
         vector, local = self.numbering.vector(), np.zeros_like(self.state.x.array)
         vector.array_w[:] = change
         self.numbering.to_local(vector, local)
-        return self._gather_nodes(local[self._nodal[: self._owned_nodes, :3]])
+        return self._gather_nodes(local[self.nodal[: self.owned_nodes, :3]])
 
     def everywhere(self, motion):
         """(N, 6) a motion of all nodes in the scene's order, on all ranks, from that of this rank's free nodes, (nodes,
         6), in the order of its part of the solver's vector."""
-        numbering, local = self.second_variations[0].numbering, np.zeros((len(self._nodal), 6))
+        numbering, local = self.second_variations[0].numbering, np.zeros((len(self.nodal), 6))
         vector = numbering.vector()
         vector.array_w[:] = motion.ravel()
         numbering.to_local(vector, local.reshape(-1))
-        return self._gather_nodes(local[: self._owned_nodes])
+        return self._gather_nodes(local[: self.owned_nodes])
 
     def change_of(self, motion):
         """This rank's part of the change of the solver's vector, at the state, that corresponds to a vector (r, theta)
         in the second variation's numbering."""
-        state, nodal = self.state.x.array, self._nodal
+        state, nodal = self.state.x.array, self.nodal
         moved, change = np.zeros(6 * len(nodal)), np.zeros_like(state)
         self.second_variations[0].numbering.to_local(motion, moved)
         moved, q = moved.reshape(-1, 6), state[nodal[:, 3:7]]
@@ -141,7 +137,6 @@ class SpatialModel(RodModel):
         return vector.array_r.copy()
 
     def expansion(self):
-        """See `RodModel`."""
         return lambda load_factors, nodal, gauss: (nodal[..., :7], gauss)
 
 

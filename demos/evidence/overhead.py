@@ -42,8 +42,8 @@ class BareLoop:
         self.dead = self.b.duplicate()
         for form in forms.dead:
             fem_petsc.assemble_vector(self.dead, form)
-        (node,) = np.flatnonzero(model._slots == 0).astype(np.int32)  # the clamped one
-        self.clamped = model._nodal[node]
+        (node,) = np.flatnonzero(model.slots == 0).astype(np.int32)  # the clamped one
+        self.clamped = model.nodal[node]
         self.dead.array_w[self.clamped] = 0
         self.held = [fem.dirichletbc(fem.Function(model.space), np.array([node]))]
         self.held_rotations = [fem.dirichletbc(fem.Function(model.variation_spaces[0]), np.array([node]))]
@@ -95,7 +95,7 @@ class BareLoop:
                 self.pc.setUp()
                 self.pc.getFactorMatrix().getInertia()
             known = [*known[-2:], (eta, U.copy(), n.x.array.copy())]
-            tips.append(U[model._nodal[np.argmax(model._slots), :3]].copy())
+            tips.append(U[model.nodal[np.argmax(model.slots), :3]].copy())
         return np.array(tips)
 
 

@@ -51,7 +51,7 @@ class Loop:
         loaded, _, _ = self._lease.enter_context(lent)
         self.problem, self.model = problem, loaded.model
         self.forms = weakly_unit(self.model) if weak else self.model.forms
-        forms, nodal, slots = self.model.forms, self.model._nodal, self.model._slots
+        forms, nodal, slots = self.model.forms, self.model.nodal, self.model.slots
         (clamp,), (self._tip,) = nodal[slots == 0], nodal[slots == slots.max(), :3]
         self.held = clamp[list(held)].astype(np.int32)
         self.A, self.b = fem_petsc.create_matrix(forms.tangent[0]), fem_petsc.assemble_vector(forms.residual[0])
