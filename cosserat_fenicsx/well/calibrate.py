@@ -4,13 +4,15 @@ import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Annotated
 
 import numpy as np
 from scipy.optimize import least_squares
 from scipy.stats import t as student
 
-from cosserat_fenicsx.checks import File, instance, number, positive, refuse, store, warn
+from cosserat_fenicsx.checks import File, instance, number, refuse, warn
 from cosserat_fenicsx.errors import SceneError, SceneWarning
+from cosserat_fenicsx.parts import Depth, ForceSize, Part, Torque, positive
 from cosserat_fenicsx.well.components import DrillString
 from cosserat_fenicsx.well.hole import Borehole, Mud
 from cosserat_fenicsx.well.operations import Operation
@@ -28,7 +30,7 @@ _SINGULAR = 1e-6
 
 
 @dataclass(frozen=True)
-class RigMeasurement:
+class RigMeasurement(Part):
     """What was read at the rig at one depth of the bit.
 
     Args:
@@ -43,22 +45,17 @@ class RigMeasurement:
         SceneError: neither was read, or numbers outside their range.
     """
 
-    depth: float
+    depth: Depth
     operation: Operation
-    hook_load: float | None = None
-    torque: float | None = None
-    hook_load_sd: float = 10e3
-    torque_sd: float = 500.0
+    hook_load: ForceSize | None = None
+    torque: Torque | None = None
+    hook_load_sd: Annotated[ForceSize, positive()] = 10e3
+    torque_sd: Annotated[Torque, positive()] = 500.0
 
-    def __post_init__(self):
-        store(self, depth=positive(self, "depth", self.depth, "m"))
-        instance(self, "operation", self.operation, Operation, "an operation, such as TripOut()")
+    def validate(self):
+        """Refuse a measurement without a reading."""
         if self.hook_load is None and self.torque is None:
             refuse(self, "hook_load", None, "a hook load (N) or a torque (N m)")
-        for name, unit in (("hook_load", "N"), ("torque", "N m")):
-            if getattr(self, name) is not None:
-                store(self, **{name: number(self, name, getattr(self, name), f"a number ({unit})", np.isfinite)})
-            store(self, **{f"{name}_sd": positive(self, f"{name}_sd", getattr(self, f"{name}_sd"), unit)})
 
 
 @dataclass(frozen=True, eq=False)

@@ -113,23 +113,15 @@ class WellPath:
 
     def position(self, md: float | Numbers) -> np.ndarray:
         """(..., 3) north, east, down at measured depths, m."""
-        i, x = self._place(md)
-        _, along, aside = _arc(self.sections, i, x)
-        s = self.sections
-        return s.position[i] + along[..., None] * s.tangent[i] + aside[..., None] * s.curvature[i]
+        return self._at(*self._place(md))[0]
 
     def tangent(self, md: float | Numbers) -> np.ndarray:
         """(..., 3) unit vectors down the hole at measured depths (m)."""
-        i, x = self._place(md)
-        cos, along, _ = _arc(self.sections, i, x)
-        return cos[..., None] * self.sections.tangent[i] + along[..., None] * self.sections.curvature[i]
+        return self._at(*self._place(md))[1]
 
     def curvature(self, md: float | Numbers) -> np.ndarray:
         """(..., 3) derivative of the tangent by md, 1/m; at a station that of the section below it."""
-        i, x = self._place(md)
-        cos, along, _ = _arc(self.sections, i, x)
-        k, t = self.sections.curvature[i], self.sections.tangent[i]
-        return cos[..., None] * k - (along * (k * k).sum(axis=-1))[..., None] * t
+        return self._at(*self._place(md))[2]
 
     def inclination_at(self, md: float | Numbers) -> np.ndarray:
         """(...) inclination at measured depths (m), rad."""
@@ -179,28 +171,29 @@ class WellPath:
             `Nearest`. Beyond its ends the axis goes on straight: a point there has the measured depth and the position
             of the end, and no curvature.
         """
-        s, at = self.sections, np.clip(near, 0.0, self.length)
+        at = np.clip(near, 0.0, self.length)
         if points is None:
             beyond, md = near - at, at
         else:
             md, beyond = np.nan_to_num(self._walked(points, at)), None  # a solver that diverges sees it by its points
-        i, x = self._place(md)
-        cos, along, aside = _arc(s, i, x)
-        k, t0 = s.curvature[i], s.tangent[i]
-        position = s.position[i] + along[:, None] * t0 + aside[:, None] * k
-        tangent = cos[:, None] * t0 + along[:, None] * k
-        curvature = cos[:, None] * k - (along * (k * k).sum(axis=-1))[:, None] * t0
+        position, tangent, curvature = self._at(*self._place(md))
         if beyond is not None:
             position += beyond[:, None] * tangent
         curvature[(md <= 0.0) | (md >= self.length)] = 0.0
         return Nearest(md, position, tangent, curvature)
 
-    def _on_the_whole(self, points):
-        every = np.arange(len(self.sections.length))
-        x = np.clip(self._projected(points[:, None], every), 0.0, self.sections.length)
-        _, along, aside = _arc(self.sections, every, x)
+    def _at(self, i, x):
+        """Position, tangent and curvature vector, (..., 3), at arc lengths x (m) from the starts of sections i."""
         s = self.sections
-        away = s.position + along[..., None] * s.tangent + aside[..., None] * s.curvature - points[:, None]
+        t, k = s.tangent[i], s.curvature[i]
+        cos, along, aside = (part[..., None] for part in _arc(s, i, x))
+        bent = along * (k * k).sum(axis=-1, keepdims=True)
+        return s.position[i] + along * t + aside * k, cos * t + along * k, cos * k - bent * t
+
+    def _on_the_whole(self, points):
+        s, every = self.sections, np.arange(len(self.sections.length))
+        x = np.clip(self._projected(points[:, None], every), 0.0, s.length)
+        away = self._at(every, x)[0] - points[:, None]
         best = np.argmin((away * away).sum(axis=-1), axis=1)
         return s.start[best] + x[np.arange(len(points)), best]
 
