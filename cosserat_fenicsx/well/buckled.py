@@ -8,6 +8,7 @@ finite there; where the state changes is found as an event.
 
 import math
 from collections import namedtuple
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.integrate import solve_ivp
@@ -16,12 +17,27 @@ from cosserat_fenicsx.errors import NotConverged, SceneError
 from cosserat_fenicsx.well import criteria
 from cosserat_fenicsx.well.softstring import UP_TO, Chain, Solved, soft_string
 
-# Of the solution whose distance from the other is its error estimate, and of that other; then again more closely.
-_RTOLS = (1e-10, 1e-12), (1e-11, 1e-13)
-_ROUGH = 1e-6  # where a few digits do
-_LEAST = 1e-12  # the smallest tolerance of the soft string
-_CHANGES = 20  # of the state, within one piece
-_INFINITE = math.pi / 2 - 1e-6  # atan(F/F_0) from where F is beyond all bounds
+
+@dataclass(frozen=True)
+class _Integration:
+    """Settings of the integration up the hole.
+
+    Attributes:
+        rtols: pairs of relative tolerances, tried in turn; the difference of the two solutions is the error estimate.
+        rough: relative tolerance where a few digits suffice.
+        least: smallest tolerance of the soft string below.
+        changes: most changes of state within one piece.
+        unbounded: atan(F/F_0) above which F counts as infinite.
+    """
+
+    rtols: tuple = ((1e-10, 1e-12), (1e-11, 1e-13))
+    rough: float = 1e-6
+    least: float = 1e-12
+    changes: int = 20
+    unbounded: float = math.pi / 2 - 1e-6
+
+
+_SET = _Integration()
 
 #: Arrays over the pieces of a chain: EI (N m^2), clearance (m), known: whether these are; and load: the compression of
 #: a helix, such as `criteria.helix_load`.
@@ -38,7 +54,7 @@ def buckled_string(soft, pieces, sections, tol):
         LockUp: the string locks up.
         NotConverged: the tolerance was not reached.
     """
-    for rtols in _RTOLS:
+    for rtols in _SET.rtols:
         start, first = _begin(soft, pieces, sections, criteria.helix_load)
         if first is None:
             return None
@@ -49,7 +65,7 @@ def buckled_string(soft, pieces, sections, tol):
         errors = soft.error * grown + errors[0], soft.torque_error * grown + errors[1]
         if errors[0] <= tol * np.abs(found.tension).max() and errors[1] <= tol * np.abs(found.torque).max():
             return found._replace(error=errors[0], torque_error=errors[1])
-        soft = soft_string(soft.chain, soft.tension[0, 0], soft.torque[0, 0], max(tol / (4 * grown), _LEAST))
+        soft = soft_string(soft.chain, soft.tension[0, 0], soft.torque[0, 0], max(tol / (4 * grown), _SET.least))
     raise NotConverged(
         f"torque_and_drag: the buckled string did not reach tol = {tol:g}: its helix multiplies errors from below by "
         f"{grown:.2g}, as close to lock-up as it is. Expected a larger tol"
@@ -64,7 +80,7 @@ def earliest_helix(soft, pieces, sections):
         LockUp: such a string locks up.
     """
     start, first = _begin(soft, pieces, sections, criteria.earliest_helix_load)
-    return soft if first is None else _March(soft, start, pieces.bottom[-1], _ROUGH).up(first)
+    return soft if first is None else _March(soft, start, pieces.bottom[-1], _SET.rough).up(first)
 
 
 def growth(solved, pieces, sections):
@@ -135,7 +151,7 @@ class _March:
         """Tension and torque at the upper end of a piece, from those at its lower end."""
         piece = Chain(*(array[i].item() for array in self._soft.chain))
         done, helical = 0.0, None
-        for _ in range(_CHANGES):
+        for _ in range(_SET.changes):
             part = _rest(piece, done)
             equations = _Equations(part, self._start, i, self._scale)
             helical = equations.over(0.0, tension) > 0 if helical is None else not helical
@@ -162,7 +178,7 @@ class _March:
             return equations.over(u, -scale * math.tan(y[0]))
 
         def unbounded(u, y):
-            return _INFINITE - y[0]
+            return _SET.unbounded - y[0]
 
         change.terminal, change.direction = True, -1 if helical else 1
         unbounded.terminal = True

@@ -18,15 +18,29 @@ from cosserat_fenicsx.well.hole import Borehole, Mud
 from cosserat_fenicsx.well.operations import Operation
 from cosserat_fenicsx.well.torque_and_drag import BUCKLED, SOFT, torque_and_drag
 
-# Where the search begins, its bounds, and the accuracy of the answers that it compares.
-_START, _MOST, _TOL = 0.2, 2.0, 1e-10
-# Unit of the block's weight in the search, N.
-_BLOCK = 1e5
-# Misfit above which something is wrong with readings or string, and by which it falls where the cause is found; factor
-# by which hook loads in another unit differ at least.
-_BAD, _OTHER_UNIT = 3.0, 50.0
-# Smallest singular value of the sensitivities over the largest one.
-_SINGULAR = 1e-6
+
+@dataclass(frozen=True)
+class _Fit:
+    """Settings of the fit.
+
+    Attributes:
+        start, most: first value and upper bound of the coefficients. tol: of the answers that are compared.
+        block: unit of the block's weight in the search, N.
+        bad: misfit above which readings or string are wrong, and factor by which it falls where the cause is found.
+        other_unit: least factor between hook loads in different units.
+        singular: smallest singular value of the sensitivities, over the largest one.
+    """
+
+    start: float = 0.2
+    most: float = 2.0
+    tol: float = 1e-10
+    block: float = 1e5
+    bad: float = 3.0
+    other_unit: float = 50.0
+    singular: float = 1e-6
+
+
+_SET = _Fit()
 
 
 @dataclass(frozen=True)
@@ -142,7 +156,7 @@ def calibrate_friction(
     if model not in (SOFT, BUCKLED):
         refuse("calibrate_friction", "model", model, f"'{SOFT}' or '{BUCKLED}'")
     confidence = number("calibrate_friction", "confidence", confidence, "a number between 0 and 1", lambda x: 0 < x < 1)
-    settings = {"mud": mud, "model": model, "tol": _TOL, "torque_convention": torque_convention}
+    settings = {"mud": mud, "model": model, "tol": _SET.tol, "torque_convention": torque_convention}
     unknown_block, sections = block_weight is None, len(hole.sections)
     hooks = [m for m in measurements if m.hook_load is not None]
     turns = [m for m in measurements if m.torque is not None]
@@ -157,7 +171,7 @@ def calibrate_friction(
                 for m in measurements}  # fmt: skip
 
     def residuals(unknowns):
-        block = unknowns[sections] * _BLOCK if unknown_block else block_weight
+        block = unknowns[sections] * _SET.block if unknown_block else block_weight
         answers = answers_of(tuple(unknowns[:sections]))
         return np.array(
             [(m.hook_load - answers[id(m)].hook_load - block) / m.hook_load_sd for m in hooks]
@@ -170,7 +184,7 @@ def calibrate_friction(
 
         def row(m, query, sd):
             found = answers[id(m)].sensitivity(names, query)
-            block = [_BLOCK if query == "hook_load" else 0.0] * unknown_block
+            block = [_SET.block if query == "hook_load" else 0.0] * unknown_block
             return [-x / sd for x in (*found.values(), *block)]
 
         return np.array(
@@ -179,8 +193,8 @@ def calibrate_friction(
         )
 
     free = [np.inf] * unknown_block  # of the block's weight
-    bounds = [0.0] * sections + [-x for x in free], [_MOST] * sections + free
-    start = [_START] * sections + [0.5] * unknown_block
+    bounds = [0.0] * sections + [-x for x in free], [_SET.most] * sections + free
+    start = [_SET.start] * sections + [0.5] * unknown_block
     jacobian = slopes if model == SOFT else "2-point"  # of buckled strings no derivative is known
     found = least_squares(residuals, start, jacobian, bounds, xtol=1e-10, ftol=1e-12, gtol=1e-12)
     _check_told(hole, found.jac, unknown_block)
@@ -188,7 +202,7 @@ def calibrate_friction(
     covariance = np.linalg.inv(found.jac.T @ found.jac) * misfit**2
     spread = np.sqrt(np.diag(covariance))
     half = student.ppf((1 + confidence) / 2, readings - wanted) * spread
-    scale = np.array([1.0] * sections + [_BLOCK] * unknown_block)
+    scale = np.array([1.0] * sections + [_SET.block] * unknown_block)
     values, half = found.x * scale, half * scale
     ends = np.stack([values - half, values + half], axis=1)
     friction = values[:sections]
@@ -196,7 +210,7 @@ def calibrate_friction(
         correlation = covariance / np.outer(spread, spread)
     block = float(values[-1]) if unknown_block else float(block_weight)
     doubts = ()
-    if misfit > _BAD:
+    if misfit > _SET.bad:
         computed = [m.hook_load - x * m.hook_load_sd for m, x in zip(hooks, found.fun, strict=False)]
 
         def with_block():
@@ -225,7 +239,7 @@ def _causes(hooks, computed, misfit, with_block):
             None where it was fitted.
     """
     sizes = [sum(abs(x) for x in values) for values in ([m.hook_load for m in hooks], computed)]
-    if hooks and not sizes[1] / _OTHER_UNIT < sizes[0] < sizes[1] * _OTHER_UNIT:
+    if hooks and not sizes[1] / _SET.other_unit < sizes[0] < sizes[1] * _SET.other_unit:
         yield f"the hook loads are {sizes[0] / sizes[1]:.1e} times those computed: expected N"
         return
     out, into = ([m for m in hooks if m.operation.direction(1.0)[0] * sign > 0] for sign in (1, -1))
@@ -239,7 +253,7 @@ def _causes(hooks, computed, misfit, with_block):
             free = with_block() if with_block and hooks else None
     except SceneError:  # the readings do not tell it
         free = None
-    if free is not None and free.misfit < misfit / _BAD:
+    if free is not None and free.misfit < misfit / _SET.bad:
         yield (
             f"with block_weight=None it is {free.misfit:.3g}, and block and top drive weigh "
             f"{free.block_weight / 1e3:.4g} kN: hook loads include them unless they were subtracted"
@@ -252,15 +266,16 @@ def _check_told(hole, sensitivity, unknown_block):
     """Refuse readings that leave an unknown open."""
     names = [f"section {i + 1} (to {section.to:g} m)" for i, section in enumerate(hole.sections)]
     names += ["block_weight"] * unknown_block
-    told = np.linalg.norm(sensitivity, axis=0)[: len(hole.sections)]
-    silent = [name for name, size in zip(names, told, strict=False) if size <= _SINGULAR * np.linalg.norm(sensitivity)]
+    effects = np.linalg.norm(sensitivity, axis=0)[: len(hole.sections)]
+    least = _SET.singular * np.linalg.norm(sensitivity)
+    silent = [name for name, size in zip(names, effects, strict=False) if size <= least]
     if silent:
         raise SceneError(
             f"calibrate_friction: no reading depends on friction of {' and '.join(silent)}: expected readings with "
             "the string there, of hook loads up or down or of torques where it rotates"
         )
     _, sizes, rows = np.linalg.svd(sensitivity, full_matrices=False)
-    if sizes[-1] > _SINGULAR * sizes[0]:
+    if sizes[-1] > _SET.singular * sizes[0]:
         return
     open_ones = [name for name, share in zip(names, np.abs(rows[-1]), strict=True) if share > 0.1]
     raise SceneError(

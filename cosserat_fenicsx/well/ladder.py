@@ -1,4 +1,4 @@
-"""Which model is enough: how far the soft string may be from the rod in contact, and why.
+"""Model error of the soft string: by how much the rod in contact may differ from it, and why.
 
 The soft string lies on the axis. With a clearance, a string changes sides where its load turns round, and spans the
 hole between without touching it; the friction that is missed there is mu times
@@ -22,6 +22,7 @@ again with a helix wherever there may be one. A helix is pressed on the wall by 
 by its load as well, as is usually reckoned. These are sums of sizes: differences of opposite signs do not cancel.
 """
 
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -30,13 +31,26 @@ from cosserat_fenicsx.well import criteria
 from cosserat_fenicsx.well.buckled import LockUp, earliest_helix, growth
 from cosserat_fenicsx.well.pieces import free_span, prying
 
-# Caution over what the clearance changes: the difference from the rod was up to 1.2 times its sum of sizes, on 240
-# random strings.
-_CAUTION = 1.25
-# Places on a piece where a snake is looked for.
-_FINE = 512
-# Length of components whose own bending stiffness does not count, and the shortest distance of a pair of forces, m.
-_SHORT, _NEAREST = 3.0, 0.3
+
+@dataclass(frozen=True)
+class _Estimate:
+    """Settings of the estimate.
+
+    Attributes:
+        caution: over the effects of the clearance: on 240 random strings the difference from the rod was up to 1.2
+            times their sum of sizes.
+        fine: sample points on a piece in the search for snakes.
+        short: length of components whose own bending stiffness does not count, m.
+        nearest: least distance of a pair of forces, m.
+    """
+
+    caution: float = 1.25
+    fine: int = 512
+    short: float = 3.0
+    nearest: float = 0.3
+
+
+_SET = _Estimate()
 
 
 class ModelError(NamedTuple):
@@ -72,7 +86,7 @@ def model_errors(path, pieces, soft, solved, sections, rings=()):
     missed[groups[1:]] += jumps
     missed[groups] += _edges(pieces, solved, groups, EI[groups])
     missed[groups[-1]] += _hung(chain, solved, clearance[-1], EI[-1])
-    missed *= _CAUTION
+    missed *= _SET.caution
     stiff[groups[1:]] = stiffer
     stiff[groups] += _levers(path, pieces, solved, groups, EI[groups], clearance[groups])
     extra = _snakes(chain, solved, EI, clearance)
@@ -101,7 +115,7 @@ def _snakes(chain, solved, EI, clearance):
     """Half the wall force (N) of a helix, of the snakes in pieces (a snake may be a small part of a long piece); and
     the load across of the helices, since the mean wall force of a helix with gravity is r F^2/(4 EI) alone."""
     extra = np.zeros(len(EI))
-    fine = (np.arange(_FINE) + 0.5) / _FINE
+    fine = (np.arange(_SET.fine) + 0.5) / _SET.fine
     compressed = (solved.tension.min(axis=1) < 0) & (clearance > 1e-9) & (EI > 0)
     for i in np.flatnonzero(compressed | solved.helical):
         F = np.maximum(-np.interp(fine, solved.at, solved.tension[i]), 0.0)
@@ -201,12 +215,12 @@ def _levers(path, pieces, solved, groups, EI, clearance):
     moment by a pair of forces at a distance of sqrt(8 d/k), where they exceed the load there."""
     md, n = pieces.bottom[::-1], len(groups)
     wide = np.maximum(np.append(EI[1:], 0.0), np.append(0.0, EI[:-1]))  # of neighbours
-    EI = np.where(pieces.bottom[::-1] - pieces.top[::-1] < _SHORT, np.minimum(EI, wide), EI) if n > 1 else EI
+    EI = np.where(pieces.bottom[::-1] - pieces.top[::-1] < _SET.short, np.minimum(EI, wide), EI) if n > 1 else EI
     below = np.append(0.0, EI[:-1])[:, None] * path.curvature(md)
     moment = np.linalg.norm(EI[:, None] * path.curvature(np.maximum(md - 1e-6, 0.0)) - below, axis=1)
     known = (moment > 0) & (EI > 0)
     moment, stiff = np.where(known, moment, 0.0), np.where(known, EI, 1.0)
-    apart = np.maximum(np.sqrt(8 * clearance * stiff / np.where(known, moment, 1.0)), _NEAREST)
+    apart = np.maximum(np.sqrt(8 * clearance * stiff / np.where(known, moment, 1.0)), _SET.nearest)
     return np.maximum(2 * moment / apart - solved.side[groups, 0] * solved.chain.climb[groups] * apart, 0.0)
 
 

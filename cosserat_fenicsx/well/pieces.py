@@ -82,11 +82,9 @@ _Span = namedtuple("_Span", "length load moment angle carried")
 # (72 EI d/q)^(1/4) = l and bends with q l^2/6 at the ring, which carries 2/3 of q l. With a hinge at the ring it turns
 # there by less than q l^3/(24 EI), which is that of a beam between two hinges.
 _SPAN, _MOMENT, _CARRIED, _TURN = 72.0, 1 / 6, 2 / 3, 1 / 24
-# Caution over moments, which are sums of sizes; the most by which compression enlarges bending; distance from a ring up
-# to which the string matters to it, m.
-_CAUTION, _ENLARGED, _REACH = 1.5, 5.0, 60.0
-# Length of a span that there is none, m.
-_NONE = 1e-9
+# Safety factor of moments, which are sums of sizes; cap on the factor by which compression enlarges bending; distance
+# from a ring within which the string affects it, m; spans below the last length (m) count as absent.
+_CAUTION, _ENLARGED, _REACH, _NONE = 1.5, 5.0, 60.0, 1e-9
 
 
 def is_ring(component):

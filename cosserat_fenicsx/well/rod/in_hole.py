@@ -5,6 +5,7 @@ stabiliser presses on it, less where the string leaves it. From solutions at k/1
 last two changes, rho = 10^-a; what is left at k is rho/(1 - rho) times the last change.
 """
 
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -18,7 +19,7 @@ from cosserat_fenicsx.well.rod.string_scene import is_round
 _CENTRED = 1e-9
 # Forces below this part of the largest one are none.
 _ROUNDING = 1e-10
-# Arrays whose errors are told.
+# Fields with an error estimate.
 _ALONG = ("side_force", "bending_moment")
 
 
@@ -406,22 +407,38 @@ class InHole:
         return f"<InHole: hook load {self.hook_load:.6g} N, {elements} elements, {self.steps} Newton steps>"
 
 
-#: What is known with errors: hook load, N; surface torque, N m; sum of the wall's forces, N.
+#: Quantities with error estimates: hook load, N; surface torque, N m; sum of the wall's forces, N.
 NAMES = ("hook_load", "surface_torque", "wall_force")
 # Errors of the finer mesh over changes from one mesh to the next, whose signs alternate: what covered 97 random wells,
 # but for the wall force of one buckled string.
 _OF_CHANGE = {"hook_load": 3.0, "surface_torque": 4.0, "wall_force": 6.0}
-# Smallest scales that errors are relative to: of the hook load, over the string's weight; of the torque, over that of
-# the wall's forces at the string's surface.
-_LEAST_LOAD, _LEAST_TORQUE = 1e-3, 1e-3
-# Caution over what is left of the wall's softness; bounds of the ratio of changes; the ratio where it is not known.
-_CAUTION, _RATIOS, _UNKNOWN = 2.0, (0.1, 0.9), 0.5
-#: What is left of the wall's softness on a finer mesh where it was found on a coarser one, which may not resolve the
-#: layer in the wall and then tells a part of it: at least this, relative, the largest one of 150 strings.
+
+
+@dataclass(frozen=True)
+class _Errors:
+    """Settings of the error estimates.
+
+    Attributes:
+        least_load: smallest scale of hook loads, over the string's weight.
+        least_torque: smallest scale of torques, over that of the wall's forces at the string's surface.
+        caution: over what is left of the wall's softness.
+        ratios: bounds of the ratio of changes. unknown: that ratio where it is not known.
+        falls: a change by the mesh below this share of the change before is taken as small by chance: changes fall to a
+            twentieth (the median, from equal elements to others) or a seventh (later).
+    """
+
+    least_load: float = 1e-3
+    least_torque: float = 1e-3
+    caution: float = 2.0
+    ratios: tuple[float, float] = (0.1, 0.9)
+    unknown: float = 0.5
+    falls: float = 1 / 32
+
+
+_ERRORS = _Errors()
+#: Least effect of the wall's softness, relative, on a finer mesh where it was found on a coarser one, which may not
+#: resolve the layer in the wall: the largest one of 150 strings.
 UNSEEN = 9e-6
-# A change by the mesh that is smaller than this part of the change before it is small by chance: changes fall to a
-# twentieth (the median, from equal elements to others) or a seventh (later).
-_FALLS = 1 / 32
 
 
 class RodErrors:
@@ -451,7 +468,7 @@ class RodErrors:
             changes = _changes(before.values[factor], self.values[factor], scales, counted)
         if before is not None:
             known = {name: x for name, x in before.changes.items() if np.isfinite(x)}
-            changes |= {name: max(changes[name], _FALLS * x) for name, x in known.items()}
+            changes |= {name: max(changes[name], _ERRORS.falls * x) for name, x in known.items()}
         self.changes = changes
         of_mesh = {name: _OF_CHANGE[name] * changes[name] * scales[name] for name in NAMES}
         self.errors = {name: of_mesh[name] + self._by_stiffness[name] + rounding[name] for name in NAMES}
@@ -463,16 +480,16 @@ class RodErrors:
         walls = list(self.values.values())
         if len(walls) < 2:
             if before is None:
-                return dict.fromkeys(NAMES, np.inf), _UNKNOWN
+                return dict.fromkeys(NAMES, np.inf), _ERRORS.unknown
             unseen = UNSEEN * min(1.0, walls[0]["wall_force"] / scales["wall_force"])  # none without contact
             return {name: max(x, unseen * scales[name]) for name, x in before._by_stiffness.items()}, before.ratio
         changes = [_changes(a, b, scales, counted) for a, b in zip(walls, walls[1:], strict=False)]
-        ratio = before.ratio if before else _UNKNOWN
+        ratio = before.ratio if before else _ERRORS.unknown
         if len(changes) > 1:
             sizes = [max(change.values()) for change in changes[-2:]]
-            ratio = float(np.clip(sizes[1] / sizes[0], *_RATIOS)) if sizes[0] > 0 else _UNKNOWN
-            changes[-1] = {name: max(x, _RATIOS[0] * changes[-2][name]) for name, x in changes[-1].items()}
-        share = _CAUTION * ratio / (1 - ratio)
+            ratio = float(np.clip(sizes[1] / sizes[0], *_ERRORS.ratios)) if sizes[0] > 0 else _ERRORS.unknown
+            changes[-1] = {name: max(x, _ERRORS.ratios[0] * changes[-2][name]) for name, x in changes[-1].items()}
+        share = _ERRORS.caution * ratio / (1 - ratio)
         factors = list(self.values)
         if factors[-1] > self._capped:  # what is left of rings is known from walls in which they were stiffer, too
             known = [pair for pair in zip(changes, factors[1:], strict=True) if pair[1] <= self._capped]
@@ -500,11 +517,11 @@ def errors_of(answer, values, before=None):
     string = answer.string
     weight = np.diff(string.ends, prepend=0.0) @ string.weight
     arm = max(radius for _, radius in string.wall.contact_radius)
-    least = _LEAST_LOAD * weight
+    least = _ERRORS.least_load * weight
     wall = max(answer.wall_force, least)
     scales = {
         "hook_load": max(abs(answer.hook_load), least),
-        "surface_torque": max(abs(answer.surface_torque), _LEAST_TORQUE * arm * wall),
+        "surface_torque": max(abs(answer.surface_torque), _ERRORS.least_torque * arm * wall),
         "wall_force": wall,
     }
     rounding = {name: answer.balance * (arm if name == "surface_torque" else 1.0) for name in NAMES}

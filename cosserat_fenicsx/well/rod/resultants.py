@@ -17,6 +17,7 @@ At a small kink of the wall the rod does not leave it, or hardly: there what is 
 """
 
 from collections import namedtuple
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -24,25 +25,49 @@ import numpy as np
 #: side on which it touches, rad, see `InHole.side`; and the error of a concentrated force, N.
 Contact = namedtuple("Contact", "start end force side error", defaults=(np.nan,))
 
-# Lengths of the layer in an elastic wall, or nodes of the mesh, that hold a peak: at least; this times more where there
-# is room, and so many lengths of the layer.
-_LAYERS, _NODES, _ROOMY, _FAR = 4.0, 8, 2.5, 14.0
-# The regular pressure beside a peak is that of so many such lengths.
-_BESIDE = 1.0
-# Contacts are one where the gap between them is below so many lengths of the layer, or has no more than so many nodes:
-# nodes touch by turns where the mesh is coarse.
-_APART, _BETWEEN = 1.0, 4
-# g^3 q/(P lam^2), see above; lengths g that hold a peak behind which the rod rises; what a peak holds of q g beyond P.
-_RISES, _SPLIT, _EXCESS = 3.245, 2.0, 0.75
-# The length that holds a peak is found in so many rounds, to this factor.
-_ROUNDS, _SAME = 6, 1.001
-# The error of a force is the difference from that by a length which is shorter or longer by this factor.
-_SHORTER = 0.8
-# Caution over what other lengths change of a force; what is left of its change from the coarser mesh; what the wall's
-# softness changes of it, over the square of the layer over the free span.
-_CAUTION, _LEFT, _SOFT = 2.0, 0.25, 2.5
-# A force below this times the regular pressure on the peak's length is none; inside a contact, on the layer's length.
-_NONE, _PEAK = 0.05, 0.2
+
+@dataclass(frozen=True)
+class _Resultants:
+    """Settings by which peaks of the pressure become forces. Lengths are those of the layer in the wall, lam, of the
+    rise behind a peak, g (see the head of the module), or of the part of a contact that holds a peak.
+
+    Attributes:
+        layers, nodes: least length that holds a peak, in lam, and in nodes of the mesh.
+        roomy, far: where there is room, this multiple of it, and so many lam.
+        beside: length from which the regular pressure beside a peak is taken, over the length that holds the peak.
+        apart, between: contacts are one where the gap between them is below so many lam, or has at most so many nodes:
+            on coarse meshes nodes touch by turns.
+        rises: g^3 q/(P lam^2). split: length in g that holds a peak behind which the rod rises.
+        excess: what such a peak holds beyond P, over q g.
+        rounds, same: the length that holds a peak is found in so many rounds, to this factor.
+        shorter: the error of a force is the difference from that by a length shorter or longer by this factor.
+        caution: over what other lengths change of a force. left: of its change from the coarser mesh, what is left.
+        soft: what the wall's softness changes of it, over the square of lam over the free span.
+        least: smallest force at an end of a contact, over the regular pressure on the length that holds the peak.
+        peak: smallest force inside a contact, over the regular pressure on lam.
+    """
+
+    layers: float = 4.0
+    nodes: int = 8
+    roomy: float = 2.5
+    far: float = 14.0
+    beside: float = 1.0
+    apart: float = 1.0
+    between: int = 4
+    rises: float = 3.245
+    split: float = 2.0
+    excess: float = 0.75
+    rounds: int = 6
+    same: float = 1.001
+    shorter: float = 0.8
+    caution: float = 2.0
+    left: float = 0.25
+    soft: float = 2.5
+    least: float = 0.05
+    peak: float = 0.2
+
+
+_SET = _Resultants()
 
 
 def contacts_along(s, sizes, pressure, side, layer, rings=(), kinks=()):
@@ -99,14 +124,14 @@ def with_errors(contacts, coarser, reach, layer, rings=()):
                          for part in (contacts[:i], contacts[i + 1 :]))  # fmt: skip
         gaps = [x.start - (before[-1].end if before else 0.0), after[0].start - x.end if after else np.inf]
         lam = float(layer(x.start))
-        soft = _SOFT * (lam / min((gap for gap in gaps if gap > lam), default=np.inf)) ** 2
+        soft = _SET.soft * (lam / min((gap for gap in gaps if gap > lam), default=np.inf)) ** 2
         change = x.force
         if coarser is not None:
             near = [y for y in coarser if y.start == y.end and np.cos(y.side - x.side) > 0]
             nearest = min(near, key=lambda y: abs(y.start - x.start), default=None)
             if nearest and abs(nearest.start - x.start) < reach:
-                change = _LEFT * abs(nearest.force - x.force)
-        found.append(x._replace(error=min(x.force, max(_CAUTION * x.error, change) + soft * x.force)))
+                change = _SET.left * abs(nearest.force - x.force)
+        found.append(x._replace(error=min(x.force, max(_SET.caution * x.error, change) + soft * x.force)))
     return found
 
 
@@ -122,7 +147,7 @@ def _groups(along):
     touching = np.flatnonzero(along.pressure > 0)
     if not len(touching):
         return
-    apart = (np.diff(along.s[touching]) > _APART * along.layer[touching[1:]]) & (np.diff(touching) > _BETWEEN)
+    apart = (np.diff(along.s[touching]) > _SET.apart * along.layer[touching[1:]]) & (np.diff(touching) > _SET.between)
     turned = np.cos(np.diff(along.side[touching])) < 0
     ends = np.flatnonzero(apart | turned)
     for a, b in zip(np.append(0, ends + 1), np.append(ends, len(touching) - 1), strict=True):
@@ -177,25 +202,25 @@ def _behind(along, here, peak, there, kinks):
     stretch = slice(there[0], there[1] + 1)
     q = _median(along.pressure[stretch], along.sizes[stretch])
     g = _length(peak.force, along.layer[edge], q)
-    if abs(along.s[near] - along.s[edge]) > _SPLIT * g:
+    if abs(along.s[near] - along.s[edge]) > _SET.split * g:
         return None
     gap = abs(along.s[near] - peak.at)
     force = peak.force - q * gap
     moved = q * gap**2 / 2 / force if force > 0 else np.inf
     low, high = sorted((along.s[near], peak.at))
     jumps = ((kinks > low - along.layer[edge]) & (kinks < high + along.layer[edge])).any()
-    return _Behind(not jumps and moved <= abs(along.s[outer] - peak.at), _EXCESS * q * g)
+    return _Behind(not jumps and moved <= abs(along.s[outer] - peak.at), _SET.excess * q * g)
 
 
 def _length(force, layer, pressure):
     """g, see above, m."""
-    return (_RISES * force * layer**2 / pressure) ** (1 / 3) if force > 0 and pressure > 0 else 0.0
+    return (_SET.rises * force * layer**2 / pressure) ** (1 / 3) if force > 0 and pressure > 0 else 0.0
 
 
 def _width(s, i, layer):
     """Shortest length that holds a peak at node i, m."""
-    before, after = max(0, i - _NODES // 2), min(len(s) - 1, i + _NODES // 2)
-    return max(_LAYERS * layer[i], s[after] - s[before])
+    before, after = max(0, i - _SET.nodes // 2), min(len(s) - 1, i + _SET.nodes // 2)
+    return max(_SET.layers * layer[i], s[after] - s[before])
 
 
 def _resultants(along, group, kinks):
@@ -205,17 +230,17 @@ def _resultants(along, group, kinks):
     weight = pressure * sizes
     total, mean = float(weight.sum()), _mean_side(side, weight)
     widths = [_width(s, i, layer) for i in (0, len(s) - 1)]
-    room = (s[-1] - s[0]) / ((1 + _BESIDE) * sum(widths))
+    room = (s[-1] - s[0]) / ((1 + _SET.beside) * sum(widths))
     if room < 1:
         if s[-1] - s[0] <= max(widths):
             middle = float((weight * s).sum() / total)
             return [Contact(middle, middle, total, mean, group.error)], np.zeros(len(s))
         return [Contact(float(s[0]), float(s[-1]), total, mean)], np.full(len(s), total / sizes.sum())
-    far = [max(_ROOMY, _FAR * layer[i] / widths[i]) for i in (0, -1)]
+    far = [max(_SET.roomy, _SET.far * layer[i] / widths[i]) for i in (0, -1)]
     usual, taken = [min(room, x) * width for x, width in zip(far, widths, strict=True)], widths.copy()
     forces, ends, regular, inside = [], [float(s[0]), float(s[-1])], pressure.copy(), np.ones(len(s), dtype=bool)
     for i, (x, sign) in enumerate(((s - s[0], 1), (s[-1] - s, -1))):
-        bound = (s[-1] - s[0]) / (1 + _BESIDE) - taken[1 - i]
+        bound = (s[-1] - s[0]) / (1 + _SET.beside) - taken[1 - i]
         jumps = np.sort(sign * (kinks - (s[0], s[-1])[i]))
         found = _at_end(x, along, widths[i], min(usual[i], bound), bound, jumps[jumps > layer[-i]])
         taken[i] = found.width if found else min(usual[i], bound)
@@ -237,7 +262,7 @@ def _resultants(along, group, kinks):
     for peak, level in _peaks(s, sizes, pressure, inside, layer):
         excess = (pressure[peak] - level) * sizes[peak]
         at, force = float(excess @ s[peak] / excess.sum()), float(excess.sum())
-        error = min(force, 2 * _EXCESS * level * _length(force, layer[peak.start], level))
+        error = min(force, 2 * _SET.excess * level * _length(force, layer[peak.start], level))
         forces.append(Contact(at, at, force, _mean_side(side[peak], excess), error))
         regular[peak] = level
     return [*forces, Contact(*ends, total - sum(x.force for x in forces), mean)], regular
@@ -250,8 +275,8 @@ def _peaks(s, sizes, pressure, inside, layer):
     tops = np.flatnonzero(inside & (rises[:-1] > 0) & (rises[1:] <= 0))
     until = 0  # the end of the peak before
     for i in tops:
-        longest = _ROOMY * _LAYERS * layer[i]
-        if i < until or s[min(i + _NODES // 2, len(s) - 1)] - s[max(i - _NODES // 2, 0)] > longest:
+        longest = _SET.roomy * _SET.layers * layer[i]
+        if i < until or s[min(i + _SET.nodes // 2, len(s) - 1)] - s[max(i - _SET.nodes // 2, 0)] > longest:
             continue
         beside = [(s > s[i] - longest) & (s < s[i]), (s > s[i]) & (s < s[i] + longest)]
         level = max(_median(pressure[part], sizes[part]) for part in beside)
@@ -261,7 +286,7 @@ def _peaks(s, sizes, pressure, inside, layer):
             continue
         first, last = max(lower[k - 1] + 1, until), lower[k]  # the nodes above the regular pressure
         excess = (pressure[first:last] - level) @ sizes[first:last]
-        if inside[first:last].all() and s[last] - s[first] < longest and excess > _PEAK * level * layer[i]:
+        if inside[first:last].all() and s[last] - s[first] < longest and excess > _SET.peak * level * layer[i]:
             until = last
             yield slice(first, last), level
 
@@ -284,25 +309,26 @@ def _at_end(x, along, shortest, usual, bound, jumps):
             distances of the kinks, ascending, m.
     """
     jump = jumps[0] if len(jumps) and jumps[0] > 0 else np.inf
-    width = usual if jump >= (1 + _BESIDE) * usual else max(shortest, jump / (1 + _BESIDE))
+    width = usual if jump >= (1 + _SET.beside) * usual else max(shortest, jump / (1 + _SET.beside))
     found = _force_at_end(x, along, width)
     if found is None:
         return None
-    for _ in range(_ROUNDS):
+    for _ in range(_SET.rounds):
         place, _, force, line = found
         q = max(float(line(width)), 0.0)
         g = _length(force, along.layer[np.argmin(np.abs(x - place))], q)
-        wanted = place + _SPLIT * g
+        wanted = place + _SET.split * g
         longer = min(wanted, bound)
-        again = _force_at_end(x, along, longer) if longer > _SAME * width else None
+        again = _force_at_end(x, along, longer) if longer > _SET.same * width else None
         if again is None:
             break
         found, width = again, longer
-    room = min((1 + _BESIDE) * bound, jump) >= (1 + _BESIDE) * width / _SHORTER
-    other = _force_at_end(x, along, width / _SHORTER if room and wanted > _SHORTER * width else _SHORTER * width)
+    room = min((1 + _SET.beside) * bound, jump) >= (1 + _SET.beside) * width / _SET.shorter
+    longer = room and wanted > _SET.shorter * width
+    other = _force_at_end(x, along, width / _SET.shorter if longer else _SET.shorter * width)
     error = abs(other[2] - force) if other else force
-    if wanted > _SAME * width or jump < (1 + _BESIDE) * width:
-        error = max(error, min(force, _EXCESS * q * g))
+    if wanted > _SET.same * width or jump < (1 + _SET.beside) * width:
+        error = max(error, min(force, _SET.excess * q * g))
     return _AtEnd(*found, width, error)
 
 
@@ -316,7 +342,7 @@ def _force_at_end(x, along, width):
     """
     sizes, pressure = along.sizes, along.pressure
     near = ~np.isin(along.element, along.element[x > width])  # whole elements
-    beside = (x > width) & (x <= (1 + _BESIDE) * width)
+    beside = (x > width) & (x <= (1 + _SET.beside) * width)
     if np.count_nonzero(beside) < 3 or not near.any():
         return None
     line = np.polynomial.Polynomial(np.polyfit(x[beside], pressure[beside], 1, w=np.sqrt(sizes[beside]))[::-1])
@@ -336,7 +362,7 @@ def _force_at_end(x, along, width):
     i = k[0]
     begins = float(places[i] + (places[i + 1] - places[i]) * left_over[i] / (left_over[i] - left_over[i + 1]))
     force = float(M0 - (line.integ()(b) - line.integ()(begins)))
-    if not _NONE * abs(line(0.0)) * width < force < M0:
+    if not _SET.least * abs(line(0.0)) * width < force < M0:
         return None
     return 0.0 if at_edge else begins, begins, force, line
 

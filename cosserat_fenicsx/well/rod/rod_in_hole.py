@@ -3,6 +3,7 @@
 import contextlib
 import math
 import numbers
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -21,36 +22,65 @@ from cosserat_fenicsx.statics.solvers import record_of, solvers_of
 from cosserat_fenicsx.well.rod.in_hole import UNSEEN, InHole, values_of
 from cosserat_fenicsx.well.rod.string_scene import in_helix, on_axis, string_in
 
-# Degree of the elements where none is asked for: lift-off forces limit the regularity, higher degrees gain nothing.
-_DEGREE = 3
-# Elements of the first mesh and the most, where none are asked for; factor from one mesh to the next. Where a number is
-# asked for, the mesh before it has this part of it.
-_FIRST, _MOST, _FINER, _BEFORE = 256, 8192, 2, 4
-# Elements of the first mesh over the pieces of the string, at least.
-_OF_PIECES = 1.5
-# A finer mesh has shorter elements where the pressure changes: bounds of their number, over that of equal ones.
-_FEWEST, _DENSEST = 0.3, 2.4
-# An error below this times that by the wall's stiffness is hardly one of the mesh.
-_BY_WALL = 1.25
-# Ratio of the changes by the wall's stiffness above which it is found again on a finer mesh.
-_REGULAR = 0.3
-# Part of the accuracy asked for below which the effect of the wall's stiffness is not found again on a finer mesh; and
-# the part above which a rigid wall is approached by one that is stiffer by ten, up to the stiffest one, over the first.
-_KNOWN, _TOO_SOFT, _STIFFEST = 0.1, 0.25, 1e3
-# Stiffness of the first wall in place of a rigid one, N/m^2.
-_FIRST_WALL = 1e9
-# Starts on the axis in turn, see `stages_from`; and the one from a helix, which begins as in a viscous fluid.
+
+@dataclass(frozen=True)
+class _Meshes:
+    """Settings of the meshes.
+
+    Attributes:
+        degree: of the elements where none is asked for; lift-off forces limit the regularity, so that higher degrees
+            gain nothing.
+        first, most: number of elements of the first mesh and of the last, where none is asked for.
+        finer: factor from one mesh to the next.
+        before: where a number of elements is asked for, the mesh before it has so many times fewer.
+        per_piece: elements of the first mesh over the pieces of the string, at least.
+        fewest, densest: bounds of the density of elements on a finer mesh, over equal ones.
+        by_wall: below this multiple of the wall-stiffness error, the mesh error is taken as resolved.
+        fine: the first mesh on which a solution must be found: snakes and helices need more elements than others.
+    """
+
+    degree: int = 3
+    first: int = 256
+    most: int = 8192
+    finer: int = 2
+    before: int = 4
+    per_piece: float = 1.5
+    fewest: float = 0.3
+    densest: float = 2.4
+    by_wall: float = 1.25
+    fine: int = 1024
+
+
+@dataclass(frozen=True)
+class _Walls:
+    """Settings of the wall, by which a rigid one is approached, and of the equilibrium in it.
+
+    Attributes:
+        first: stiffness of the first wall in place of a rigid one, N/m^2.
+        stiffest: of the stiffest wall, over the first.
+        regular: above this ratio of its changes, the effect of the wall's stiffness is found again on a finer mesh.
+        known: below this share of the tolerance, it is not.
+        too_soft: above this share of the tolerance, the wall is made ten times stiffer.
+        hold: springs that hold a helix, see `settle`.
+        rounding: of the residual of a node, over that of its position times the stiffness of its piece of wall or ring.
+        unbalanced: largest difference between the reaction and all other forces, over the sum of the wall's forces.
+    """
+
+    first: float = 1e9
+    stiffest: float = 1e3
+    regular: float = 0.3
+    known: float = 0.1
+    too_soft: float = 0.25
+    hold: float = 1e-10
+    rounding: float = 20.0
+    unbalanced: float = 1e-5
+
+
+_MESHES, _WALLS = _Meshes(), _Walls()
+# Starts on the axis in turn, see `stages_from`; and the start from a helix, which begins as in a viscous fluid.
 _STARTS, _FROM_HELIX = ("fast", "gentle", "relaxed"), ("helix",)
-# More negative modes than there ever are, in place of -1 where the second variation is singular.
+# Stands for an unknown number of negative modes in comparisons, instead of -1 where the second variation is singular.
 _SINGULAR = 1 << 30
-# Springs that hold a helix, see `settle`.
-_HOLD = 1e-10
-# Elements of the first mesh that a string is looked for on, at most: snakes and helices need more than others.
-_FINE = 1024
-# Rounding of the residual of a node, over that of its position times the stiffness of its piece of wall, or ring.
-_ROUNDED = 20.0
-# Largest difference between the reaction and the balance of all forces, over the sum of the wall's forces.
-_UNBALANCED = 1e-5
 
 
 def solve_in_hole(
@@ -73,7 +103,7 @@ def solve_in_hole(
     helix=False,
     tol=1e-4,
     elements=None,
-    degree=_DEGREE,
+    degree=_MESHES.degree,
     progress=None,
     comm=None,
 ):
@@ -121,13 +151,13 @@ def solve_in_hole(
         SceneError: numbers that are not what was expected.
         NotConverged: no equilibrium was found, or, as a `NotAccurate`, not as accurately as asked.
     """
-    first = _FIRST_WALL if wall_stiffness is None else wall_stiffness
+    first = _WALLS.first if wall_stiffness is None else wall_stiffness
     string = string_in(path, lengths, stiffness, weight, contact_radius, radius, friction, slip, bottom_tension,
                        bottom_torque, rings, first, hinge, extensible, has_arm)  # fmt: skip
     tol = number("solve_in_hole", "tol", tol, "a number from 1e-12 to below 1", lambda x: 1e-12 <= x < 1)
     comm, counts = communicator(comm), _counts(elements, len(Layout.of(string.scene, 1).breaks[0]) - 1)
     with Progress([float(len(stages_from(string.spring)))], progress, comm, "stage") as bar:
-        job = _Job(degree, bool(helix), tol, _STIFFEST if wall_stiffness is None else 1.0, bar, comm)
+        job = _Job(degree, bool(helix), tol, _WALLS.stiffest if wall_stiffness is None else 1.0, bar, comm)
         answer = None
         for count in counts:
             try:
@@ -135,11 +165,11 @@ def solve_in_hole(
             except NotConverged:
                 if answer is not None and elements is None and answer.error < np.inf:
                     break  # not as accurately as asked
-                if answer is not None or count >= min(_FINE, counts[-1]):
+                if answer is not None or count >= min(_MESHES.fine, counts[-1]):
                     raise
                 continue  # too few elements for its turns, or for a snake
             # finer meshes change nothing of what is left of the wall's softness
-            if elements is None and answer.error <= max(tol, _BY_WALL * answer.of_stiffness):
+            if elements is None and answer.error <= max(tol, _MESHES.by_wall * answer.of_stiffness):
                 break
     string.leave(answer.factor)
     if elements is None and answer.error > tol:
@@ -166,14 +196,15 @@ class NotAccurate(NotConverged):
 def _counts(elements, pieces):
     """Elements of the meshes in turn, for a string of so many pieces, each of which has at least one."""
     if elements is None:
-        first = _FIRST * _FINER ** max(0, math.ceil(math.log(_OF_PIECES * pieces / _FIRST, _FINER)))
-        most = max(_MOST, first * _FINER**2)
-        return [first * _FINER**k for k in range(1 + int(np.log2(most / first)))]
+        first, finer = _MESHES.first, _MESHES.finer
+        first *= finer ** max(0, math.ceil(math.log(_MESHES.per_piece * pieces / first, finer)))
+        most = max(_MESHES.most, first * finer**2)
+        return [first * finer**k for k in range(1 + int(np.log2(most / first)))]
     if isinstance(elements, bool) or not isinstance(elements, numbers.Integral) or elements < 1:
         refuse("solve_in_hole", "elements", elements, "a whole number above zero")
     if elements < pieces:
         refuse("solve_in_hole", "elements", elements, f"at least one for each of the {pieces} pieces of the string")
-    return [max(1, int(elements) // _BEFORE), int(elements)]
+    return [max(1, int(elements) // _MESHES.before), int(elements)]
 
 
 class _Job(NamedTuple):
@@ -192,8 +223,8 @@ def _finer(string, count, before, job):
     """The `InHole` on a mesh of so many elements, from that on the mesh before, or from the start in stages."""
     if before is not None:
         layout = _divided(string, before.path.layout, _wanted(before), count)
-        near = LAST_TWO if before.estimates.ratio <= _REGULAR else DECADES
-        near = LAST if max(before.of_stiffness, UNSEEN) <= _KNOWN * job.tol else near
+        near = LAST_TWO if before.estimates.ratio <= _WALLS.regular else DECADES
+        near = LAST if max(before.of_stiffness, UNSEEN) <= _WALLS.known * job.tol else near
         # the contact on the coarse mesh may be too far off, or the wall too stiff for this one
         for stages, factor in ((near, before.factor), (BACK, before.factor), (BACK, 1.0)):
             with contextlib.suppress(NotConverged):
@@ -224,7 +255,7 @@ def _wanted(answer):
     change = p.max(axis=1) - p.min(axis=1)
     change = np.maximum(change, np.maximum(np.append(change[1:], 0.0), np.append(0.0, change[:-1])))
     usual = np.median(p[p > 0]) if (p > 0).any() else 1.0
-    return h * np.clip(np.sqrt(change / usual), _FEWEST, _DENSEST)
+    return h * np.clip(np.sqrt(change / usual), _MESHES.fewest, _MESHES.densest)
 
 
 def _divided(string, layout, wanted, count):
@@ -263,7 +294,7 @@ def _on_mesh(string, layout, stages, factor, start, before, job):
             answer, steps = found, found.steps
             values |= {each.factor: values_of(each) for each in (*softer, answer)}
             answer.estimate(values, before)
-            if answer.of_stiffness <= _TOO_SOFT * job.tol or factor >= job.stiffest:
+            if answer.of_stiffness <= _WALLS.too_soft * job.tol or factor >= job.stiffest:
                 return answer
             stages, factor = LAST, 10.0 * factor
 
@@ -283,18 +314,18 @@ def _in_walls(string, problem, stability, stages, factor, steps, job):
 
     of_wall = string.wall.stiffness * float(model.layout.sizes(model.scene).max())
     stiffest = factor * max([of_wall, *(ring.stiffness for ring in string.rings)])
-    rounding = _ROUNDED * np.finfo(float).eps * stiffest
+    rounding = _WALLS.rounding * np.finfo(float).eps * stiffest
     steps += settle(problem, string.stages, string.clearance / model.scales.length,
                     rounding * model.scales.length / model.scales.force,
                     [(factor * wall, factor * spring, viscous) for wall, spring, viscous in stages],
-                    careful, on_stage, _HOLD if job.helix else 0.0)  # fmt: skip
+                    careful, on_stage, _WALLS.hold if job.helix else 0.0)  # fmt: skip
     records[factor] = record_of(problem, 1.0, _negative_modes(string, problem, stability), steps, steps)
     answers = []
     for stiffness, record in records.items():
         path = Path.of(model, [f"{string.words}; {model.signature.formulation.words}"], conservative_along)
         path.append(record)
         answers.append(InHole(string, path, stiffness))
-    if not answers[-1].balance <= _UNBALANCED * answers[-1].scale:
+    if not answers[-1].balance <= _WALLS.unbalanced * answers[-1].scale:
         raise NotConverged(
             f"the contact alternates: the reaction and all other forces differ by {answers[-1].balance:.3g} N"
         )

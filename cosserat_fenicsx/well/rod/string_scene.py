@@ -22,19 +22,34 @@ from cosserat_fenicsx.scene.signals import AlongPieces
 from cosserat_fenicsx.scene.supports import Clamp, Hinge
 from cosserat_fenicsx.well.criteria import snake_load
 
-# Torsional stiffness of round sections over that of bending: torsion winds a long string up by many turns, which
-# changes nothing else of it, but Newton's method fails on the way. The twist is computed from the torque afterwards.
-_STIFFER = 1e4
-# Stiffness of the wall at a ring (N/m) over that along the string (N/m^2), since a ring digs in less; but where it is
-# larger than that, not more than so many EI/L^3, for rounding.
-_OF_RINGS, _STIFFEST = 100.0, 1e13
-# Where the wall is made stiffer, largest stiffness of a ring, N/m, and of its force by the rounding of positions, N.
-_STIFFEST_RING, _ROUNDED = 1e13, 1.0
-# Points at which the load across the hole is sampled, the part of them that it is not larger at, and its smallest value
-# over the weight.
-_SAMPLES, _TYPICAL, _LEAST = 257, 0.9, 0.1
-# The first spring over the one in which the string would buckle.
-_SAFE = 3.0
+
+@dataclass(frozen=True)
+class _Stiffening:
+    """Settings of the rod, its wall and its rings.
+
+    Attributes:
+        torsion: torsional stiffness of round sections over that of bending: torsion winds a long string up by many
+            turns, which changes nothing else of it, but makes Newton's method fail. The twist is computed from the
+            torque afterwards.
+        of_rings: stiffness of a ring (N/m) over that of the wall (N/m^2), since a ring digs in less.
+        per_bending: cap on the stiffness of a ring above that of the wall, in EI/L^3, for rounding.
+        most, rounding: cap on ring stiffness (N/m) and on its rounding force (N) during wall stiffening.
+        samples, typical, least: sample count, quantile and floor (over the weight) of the lateral load.
+        safe: the first spring over the one in which the string would buckle.
+    """
+
+    torsion: float = 1e4
+    of_rings: float = 100.0
+    per_bending: float = 1e13
+    most: float = 1e13
+    rounding: float = 1.0
+    samples: int = 257
+    typical: float = 0.9
+    least: float = 0.1
+    safe: float = 3.0
+
+
+_SET = _Stiffening()
 
 
 @dataclass(frozen=True)
@@ -95,15 +110,15 @@ class StringScene:
         """Stiffness of a spring to the axis in which the loads, and the string's resistance to the axis's curvature k,
         move it by about twice the clearance c, and in which its compression F does not buckle it; over that of the
         wall. The moment EI k acts within the length sqrt(8 c/k), which gives EI k^2/(16 c^2); F^2/(4 EI) buckles."""
-        s = np.linspace(0.0, self.ends[-1], _SAMPLES)
+        s = np.linspace(0.0, self.ends[-1], _SET.samples)
         near, at, tension = self.path.nearest(None, s), self.section_at(s)[1:], self.tension(s)[:-1]
         down = np.array([0.0, 0.0, 1.0]) - near.tangent[:, 2:] * near.tangent
         load = tension[:, None] * near.curvature[1:] + self.weight[at, None] * down[1:]
-        typical = max(np.quantile(np.linalg.norm(load, axis=1), _TYPICAL), _LEAST * self.weight.max())
+        typical = max(np.quantile(np.linalg.norm(load, axis=1), _SET.typical), _SET.least * self.weight.max())
         EI = self.bending[at]
         buckles = (np.minimum(tension, 0.0) ** 2 / (4 * EI)).max()
         bends = (EI * (near.curvature[1:] ** 2).sum(axis=1)).max() / (16 * self.clearance**2)
-        return float(max(typical / (2 * self.clearance), bends, _SAFE * buckles) / self.wall.stiffness)
+        return float(max(typical / (2 * self.clearance), bends, _SET.safe * buckles) / self.wall.stiffness)
 
     @property
     def stiffest_rings(self):
@@ -159,14 +174,14 @@ def string_in(path, lengths, stiffness, weight, contact_radius, radius, friction
     loads = [LineForce(rod, down)]
     loads += [Force(rod.end, tuple(pull * t))] if pull else []
     loads += [Moment(rod.end, tuple(-torque * t))] if torque else []
-    stiffest = _STIFFEST * max(bending_of(section) for section in sections) / length**3
-    ring_stiffness = min(_OF_RINGS * wall.stiffness, max(wall.stiffness, stiffest))
+    stiffest = _SET.per_bending * max(bending_of(section) for section in sections) / length**3
+    ring_stiffness = min(_SET.of_rings * wall.stiffness, max(wall.stiffness, stiffest))
     around = tuple(
         TubeRing(rod.at(s), path, clearance, ring_radius, ring_stiffness, *_friction_at(wall, s))
         for s, clearance, ring_radius in rings
     )
     for ring in around:
-        ring.stage.most = max(1.0, min(_STIFFEST_RING, _ROUNDED / (np.finfo(float).eps * length)) / ring.stiffness)
+        ring.stage.most = max(1.0, min(_SET.most, _SET.rounding / (np.finfo(float).eps * length)) / ring.stiffness)
     support = Clamp(rod.start) if hinge is None else Hinge(rod.start, hinge)
     words = "the string's lengths are those under load" if not extensible else "the string stretches"
     turns = bool(torque or any(across for _, (_, across) in wall.slip))
@@ -189,7 +204,7 @@ def _in_place(section, extensible):
     if section.matrix is not None:
         return section
     held = section if extensible else replace(section, axial=math.inf)
-    return replace(held, torsion=max(section.torsion, _STIFFER * section.bending[0])) if is_round(section) else held
+    return replace(held, torsion=max(section.torsion, _SET.torsion * section.bending[0])) if is_round(section) else held
 
 
 def is_round(section):
