@@ -21,7 +21,7 @@ from cosserat_fenicsx.drilling.bit_laws import Lobes as Lobes
 from cosserat_fenicsx.drilling.bit_laws import Stribeck as Stribeck
 from cosserat_fenicsx.drilling.bit_laws import Wear as Wear
 from cosserat_fenicsx.drilling.history import DrillingHistory as DrillingHistory
-from cosserat_fenicsx.drilling.hook import Hook as Hook
+from cosserat_fenicsx.drilling.top_drive import Hook as Hook
 from cosserat_fenicsx.drilling.linear.excitation import BitBounce as BitBounce
 from cosserat_fenicsx.drilling.linear.excitation import Campbell as Campbell
 from cosserat_fenicsx.drilling.linear.excitation import bit_bounce as bit_bounce

@@ -9,7 +9,7 @@ from scipy.integrate import solve_ivp
 
 import cosserat_fenicsx as cf
 from cosserat_fenicsx.drilling.as_data import from_data, to_data
-from cosserat_fenicsx.drilling.axial_torsional.model import AxialTorsional
+from cosserat_fenicsx.drilling.elements import AxialTorsional
 
 pytestmark = pytest.mark.serial
 TURNS, LOBES, HEIGHT, WEIGHT, MASS = 120 * cf.units.rpm, 3, 8e-3, 6e4, 300.0

@@ -8,7 +8,7 @@ import pytest
 from axial_scenes import column, hanging, unbalanced
 
 import cosserat_fenicsx as cf
-from cosserat_fenicsx.drilling.axial_torsional.model import AxialTorsional
+from cosserat_fenicsx.drilling.elements import AxialTorsional
 
 pytestmark = [pytest.mark.serial, pytest.mark.once]
 BLADES, PSI, RATE = 4, 13.9, 0.5

@@ -53,7 +53,7 @@ def test_what_is_asked_for_is_taken_and_told():
     assert chosen(scene(), BOTH) == (BOTH, ["axial and torsional: as asked"])
     moving = scene(bit=None, hook=cf.Hook(speed=0.3))
     assert chosen(moving, TORSION)[1][1].startswith("APPROXIMATE: torsion alone leaves out what moves along the axis")
-    with pytest.raises(cf.SceneError, match="expected 'axial and torsional' or 'auto', since the torque of Cutting"):
+    with pytest.raises(cf.SceneError, match="or 'auto', since with Cutting the torque on bit follows"):
         chosen(scene(bit=cf.BitOnRock(cf.Cutting(0.1, 60e6, 0.6, 4))), TORSION)
     with pytest.raises(cf.SceneError, match="expected 'torsion' or 'auto': discs without masses turn alone"):
         chosen(scene(string=cf.Discs((9.0, 4.0), (7.0,))), BOTH)

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from cosserat_fenicsx.drilling.axial_torsional.ends import RockSurface
+from cosserat_fenicsx.drilling.bit_laws import RockSurface
 
 pytestmark = [pytest.mark.serial, pytest.mark.once]
 

@@ -5,7 +5,7 @@ import pytest
 from axial_scenes import column
 
 import cosserat_fenicsx as cf
-from cosserat_fenicsx.drilling.axial_torsional.model import AxialTorsional
+from cosserat_fenicsx.drilling.elements import AxialTorsional
 from cosserat_fenicsx.drilling.torsion import TorsionWaves
 
 pytestmark = [pytest.mark.serial, pytest.mark.once]

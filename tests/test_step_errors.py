@@ -7,7 +7,7 @@ import pytest
 from torsion_scenes import PIPE, SPEED, off_bottom, run, stick_slip, string
 
 import cosserat_fenicsx as cf
-from cosserat_fenicsx.drilling.axial_torsional.model import AxialTorsional
+from cosserat_fenicsx.drilling.elements import AxialTorsional
 from cosserat_fenicsx.drilling.stick_slip import cycle_of, step_errors
 from cosserat_fenicsx.drilling.torsion import TorsionWaves
 

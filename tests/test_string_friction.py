@@ -7,7 +7,7 @@ from torsion_scenes import lying, off_bottom
 from torsion_scenes import part as part_of
 
 import cosserat_fenicsx as cf
-from cosserat_fenicsx.drilling.axial_torsional.model import AxialTorsional
+from cosserat_fenicsx.drilling.elements import AxialTorsional
 from cosserat_fenicsx.drilling.protocol import PROFILE
 from cosserat_fenicsx.drilling.stick_slip import cycle_of
 from cosserat_fenicsx.drilling.torsion import TorsionWaves

@@ -10,7 +10,7 @@ from reference_strings import GIVEN, RPM, drive_of, falling, pipe_and_collars, p
 
 import cosserat_fenicsx as cf
 from cosserat_fenicsx.drilling.linear.impedances import axial, torsional
-from cosserat_fenicsx.drilling.single_valued import check_bit
+from cosserat_fenicsx.drilling.laws import check_bit
 
 pytestmark = [pytest.mark.serial, pytest.mark.once]
 BAND = 60 / (2 * math.pi)  # Hz, of the reference
@@ -254,7 +254,7 @@ def test_a_torque_that_falls_too_fast():
         (lambda: cf.stability(replace(cutting(), hook=None), [1.0]), "or a Hook whose speed"),
         (lambda: cf.limit_weight(cutting(), 1.0), "a Stribeck law and a radius"),
         (lambda: cf.stability(pipe_and_collars(), [5.0], up_to=1.0).shape(99), "a number from 0 to"),
-        (lambda: cf.PI(1.0, 1.0, rule="SoftSped"), "PI.rule = 'SoftSped': expected 'SoftTorque' or 'SoftSpeed', or"),
+        (lambda: cf.PI(1.0, 1.0, rule="SoftSped"), "PI.rule = 'SoftSped': expected 'SoftTorque' or 'SoftSpeed'"),
         (lambda: cf.SoftSpeed(tubes(*GIVEN["sections"]), 2900.0, bit_inertia=-1), "bit_inertia = -1"),
         (lambda: cf.LumpedCutting(13.9, 4).limits(3.0, 2.0), "more than low"),
     ],

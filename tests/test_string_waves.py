@@ -7,8 +7,8 @@ from scipy.linalg import eigvalsh
 from torsion_scenes import LAW, PIPE, SOFT, stick_slip
 
 import cosserat_fenicsx as cf
-from cosserat_fenicsx.drilling.axial_torsional.ends import EndForce
-from cosserat_fenicsx.drilling.axial_torsional.model import AxialTorsional
+from cosserat_fenicsx.drilling.bit_laws import EndForce
+from cosserat_fenicsx.drilling.elements import AxialTorsional
 from cosserat_fenicsx.drilling.protocol import PROFILE
 from cosserat_fenicsx.drilling.stick_slip import cycle_of
 

@@ -10,12 +10,11 @@ import functools
 import numpy as np
 
 from cosserat_fenicsx.drilling.bit_laws import BitLaw, BitOnRock, Wear
-from cosserat_fenicsx.drilling.hook import Hook
 from cosserat_fenicsx.drilling.scene import Drilling
 from cosserat_fenicsx.drilling.segments import Discs
 from cosserat_fenicsx.drilling.signals import ScalarSignal
-from cosserat_fenicsx.drilling.top_drive import DriveControl, TopDrive
-from cosserat_fenicsx.drilling.wall_friction import ViscousDrag, WallFriction
+from cosserat_fenicsx.drilling.top_drive import DriveControl, Hook, TopDrive
+from cosserat_fenicsx.drilling.wall_friction import FrictionLaw, ViscousDrag
 from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.parts import members
 from cosserat_fenicsx.scene.as_data import NotData
@@ -25,7 +24,7 @@ from cosserat_fenicsx.well.components import DrillString, StringPart
 from cosserat_fenicsx.well.hole import Borehole, HoleSection, Mud
 from cosserat_fenicsx.well.path import WellPath
 
-_OF_DRILLING = (Drilling, Discs, TopDrive, Hook, BitOnRock, Wear, WallFriction, ViscousDrag)
+_OF_DRILLING = (Drilling, Discs, TopDrive, Hook, BitOnRock, Wear, ViscousDrag)
 _OF_WELLS = (DrillString, Borehole, HoleSection, WellPath, Mud, Material, Stiffness)
 #: Functions of time, by their owner: the object's class and its field.
 _IN_TIME = {("TopDrive", "speed"): "rad/s", ("Hook", "speed"): "m/s"}
@@ -35,7 +34,8 @@ _SAMPLES = 41
 @functools.cache
 def _classes():
     kinds = {kind.__name__: kind for kind in (*_OF_DRILLING, *_OF_WELLS, *SIGNALS)}
-    return {**kinds, **members(StringPart), **members(BitLaw), **members(DriveControl)}
+    families = (StringPart, BitLaw, DriveControl, FrictionLaw)
+    return functools.reduce(lambda found, family: found | members(family), families, kinds)
 
 
 def to_data(scene):

@@ -6,11 +6,9 @@ import warnings
 import numpy as np
 
 from cosserat_fenicsx.checks import refuse
-from cosserat_fenicsx.drilling.axial_torsional.model import AxialTorsional
-from cosserat_fenicsx.drilling.bit_laws import Cutting, Lobes, Stribeck
-from cosserat_fenicsx.drilling.segments import Discs
+from cosserat_fenicsx.drilling.elements import AxialTorsional
 from cosserat_fenicsx.drilling.torsion import TorsionWaves
-from cosserat_fenicsx.drilling.wall_friction import coefficients
+from cosserat_fenicsx.drilling.wall_friction import law_of
 from cosserat_fenicsx.errors import NotConverged, SceneError, SceneWarning, nearest
 from cosserat_fenicsx.well import criteria
 from cosserat_fenicsx.well.operations import RotaryDrilling, RotateOffBottom, TripIn, TripOut
@@ -28,8 +26,8 @@ def chosen(scene, model="auto"):
     """
     if not isinstance(model, str) or model not in MODELS:
         raise SceneError(f"simulate_drilling.model = {model!r}: {nearest(model, MODELS)}")
-    if isinstance(scene.string, Discs):
-        fits = TORSION if scene.string.masses is None else BOTH
+    if scene.discs:
+        fits = TORSION if scene.discs.masses is None else BOTH
         what = "discs without masses turn alone" if fits == TORSION else "the discs have masses"
         if model not in ("auto", fits):
             raise SceneError(f"simulate_drilling.model = '{model}': expected '{fits}' or 'auto': {what}")
@@ -41,9 +39,9 @@ def chosen(scene, model="auto"):
         return name, [f"{name}: {'; '.join(why)}", *_left_out(scene, name)]
     why = [f"{model}: as asked"]
     if model == TORSION and asks:
-        if isinstance(getattr(scene.bit, "law", None), Cutting):
-            raise SceneError(f"simulate_drilling.model = '{TORSION}': expected '{BOTH}' or 'auto', since the torque of "
-                             "Cutting follows the depth of cut")  # fmt: skip
+        if scene.bit is not None and scene.bit.law.drills:
+            raise SceneError(f"simulate_drilling.model = '{TORSION}': expected '{BOTH}' or 'auto', since with "
+                             f"{type(scene.bit.law).__name__} {scene.bit.law.lifts}")  # fmt: skip
         why.append(f"APPROXIMATE: torsion alone leaves out what moves along the axis ({'; '.join(asks)})")
     return model, [*why, *_left_out(scene, model)]
 
@@ -54,22 +52,15 @@ def _asks_for_axial(scene):
     A string that hangs in its weight, or stands on the rock with a weight on bit, does so in equilibrium: rotation
     slips around alone, without a force along the hole, and the weight on bit that the torque may follow stays.
     """
-    law, found = getattr(scene.bit, "law", None), []
-    moves = scene.hook is not None and not (scene.hook.signal().constant and scene.hook.signal()(0.0) == 0.0)
-    if moves:
+    hook, found = scene.hook, []
+    if hook is not None and not (hook.signal().constant and hook.signal()(0.0) == 0.0):
         found.append("the hook moves")
-    if isinstance(law, Cutting):
-        found.append("the torque on bit follows the depth of cut")
-    if isinstance(law, Lobes):
-        found.append("the lobes of the rock lift the bit")
-    return found
+    return found + ([scene.bit.law.lifts] if scene.bit is not None and scene.bit.law.lifts else [])
 
 
 def _still(scene):
-    law = getattr(scene.bit, "law", None)
-    if isinstance(law, Stribeck) and law.radius is not None:
-        return ", and the weight on bit stays as it is"
-    return ""
+    follows = scene.bit is not None and scene.bit.law.needs_weight
+    return ", and the weight on bit stays as it is" if follows else ""
 
 
 def _left_out(scene, name):
@@ -114,11 +105,11 @@ def _buckled(scene, name):
 
 def _operations(scene):
     """What is done, at rest in time: which of these compresses the string most is not known in advance."""
-    weight = (scene.bit.weight or 0.0) if scene.bit is not None else 0.0
-    law = getattr(scene.bit, "law", None)
-    law = law.law if isinstance(law, Lobes) else law
-    torque = law.torques(weight)[1] if isinstance(law, Stribeck) else 0.0
-    yield _drills(weight, torque, getattr(law, "radius", None) is not None) if weight > 0 else RotateOffBottom()
+    bit = scene.bit
+    weight = (bit.weight or 0.0) if bit is not None else 0.0
+    law = None if bit is None else bit.law.resistance(bit.weight)
+    follows = law is not None and bit.law.needs_weight
+    yield _drills(weight, law.kinetic if law else 0.0, follows) if weight > 0 else RotateOffBottom()
     if scene.hook is not None:
         signal = scene.hook.signal()
         speeds = [signal(t) for t in (0.0, *signal.jumps)]
@@ -137,8 +128,8 @@ def _with_friction(scene):
     """The hole with the kinetic friction of the motion."""
     if scene.friction is None:
         return scene.hole
-    of_hole = np.array([section.friction for section in scene.hole.sections])
-    return scene.hole.with_friction(coefficients(scene.friction, of_hole)[1].tolist())
+    law, _, of_hole = law_of(scene.friction)
+    return scene.hole.with_friction([law.kinetic * (x.friction if of_hole else 1.0) for x in scene.hole.sections])
 
 
 def fastest(scene, until):
@@ -162,7 +153,7 @@ class OtherSteps:
             SceneError: a step that the laws of friction do not allow, or a mesh that is as coarse as it can be.
         """
         scene, name, model = self._given
-        if not isinstance(model, AxialTorsional) or isinstance(scene.string, Discs):
+        if name == TORSION or scene.discs:
             return model_of(scene, name, factor * model.dt)
         asked = max(2, round((len(model.depths) - 1) / factor))
         other = model_of(scene, name, factor * model.dt, asked)
@@ -181,10 +172,9 @@ def model_of(scene, name, dt=None, elements=None):
     Raises:
         SceneError: a scene that the model has no equations for; steps that its laws do not allow.
     """
-    discs = isinstance(scene.string, Discs)
-    if discs and elements is not None:
+    if scene.discs and elements is not None:
         refuse("simulate_drilling", "elements", elements, "None for Discs, which are not divided")
-    if discs or name == BOTH:
+    if scene.discs or name == BOTH:
         return AxialTorsional(scene, dt, elements)
     if dt is not None and elements is not None:
         refuse("simulate_drilling", "elements", elements, "None beside dt: waves of torsion have cells of one step")

@@ -7,9 +7,10 @@ import numpy as np
 
 from cosserat_fenicsx.actions.walls import HoleWall, TubeWall
 from cosserat_fenicsx.checks import instance, number, refuse, store
-from cosserat_fenicsx.drilling.bit_laws import Stribeck
+from cosserat_fenicsx.drilling.bit_laws import BitLaw
 from cosserat_fenicsx.drilling.pipe_above import PipeAbove
 from cosserat_fenicsx.drilling.scene import Drilling
+from cosserat_fenicsx.drilling.wall_friction import law_of
 from cosserat_fenicsx.scene.action import PointAction
 from cosserat_fenicsx.scene.curves import Line
 from cosserat_fenicsx.scene.loads import Force, LineForce
@@ -129,7 +130,7 @@ def _bit(drilling, rod):
     if drilling.bit is None:
         return []
     law = drilling.bit.law
-    instance("mixed_scene", "drilling.bit.law", law, Stribeck, "a Stribeck; the rod's end knows no depth of cut")
+    _check_law("mixed_scene", "drilling.bit.law", law)
     return [BitTorque(rod.end, law, drilling.bit.weight or 0.0, drilling.bit.inertia)]
 
 
@@ -142,8 +143,11 @@ def _walls(drilling, rod, top, radii):
     given = {"stiffness": hole.wall_stiffness or _WALL, "begins": top}
     friction = [(section.to, section.friction) for section in hole.sections]
     if drilling.friction is not None:
-        ours = drilling.friction
-        friction = [(to, ours.kinetic * (x if ours.of_hole else 1.0)) for to, x in friction]
+        law, _, of_hole = law_of(drilling.friction)
+        if law.function is not None:
+            refuse("mixed_scene", "drilling.friction", drilling.friction, "a WallFriction, of which the rod's wall "
+                   "takes the kinetic coefficient; other laws act in simulate_drilling")  # fmt: skip
+        friction = [(to, law.kinetic * (x if of_hole else 1.0)) for to, x in friction]
     return [TubeWall(rod, hole.path, radius, radii, **given),
             HoleWall(rod, hole.path, radius, radii, friction=friction, **given)]  # fmt: skip
 
@@ -153,7 +157,7 @@ def _why(drilling, top):
     if drilling.hole is not None:
         yield "the pipe above turns and moves without friction at the wall"
         friction = drilling.friction
-        if friction is not None and friction.static != friction.kinetic:
+        if friction is not None and friction.decays:
             yield "friction at the rod's wall is the kinetic one, at rest too"
         if drilling.hole.wall_stiffness is None:
             yield f"the wall has a stiffness of {_WALL:g} N/m^2"
@@ -173,7 +177,7 @@ class BitTorque(PointAction):
 
     Args:
         station: where.
-        law: a `Stribeck`.
+        law: a `Stribeck`, or another `BitLaw` of the torque over the speed alone.
         weight: on bit, N, constant, for a law by coefficients of friction; the force itself is a load of its own.
         inertia_of_bit: about the axis, kg m^2. `Damping.drag` of the rod would act on it, too: here that is taken off.
 
@@ -182,7 +186,7 @@ class BitTorque(PointAction):
     """
 
     station: StationOrName
-    law: Stribeck
+    law: BitLaw
     weight: float = 0.0
     inertia_of_bit: float = 0.0
 
@@ -191,7 +195,8 @@ class BitTorque(PointAction):
 
     def __post_init__(self):
         is_known(self, "station", Station)
-        instance(self, "law", self.law, Stribeck, "a Stribeck(...)")
+        instance(self, "law", self.law, BitLaw, "a Stribeck(...), or another BitLaw of the torque over the speed")
+        _check_law(self, "law", self.law)
         for field, unit in (("weight", "N"), ("inertia_of_bit", "kg m^2")):
             value = number(
                 self, field, getattr(self, field), f"a number from 0 on ({unit})", lambda x: 0 <= x < math.inf
@@ -204,12 +209,18 @@ class BitTorque(PointAction):
 
     def resists(self, speed):
         """See `Action`."""
-        static, dynamic = self.law.torques(self.weight)
+        law = self.law.resistance(self.weight)
         if speed == 0:
-            return static, 0.0
+            return law.still, 0.0
         damping = self.station.rod.damping
         drag = self.inertia_of_bit * damping.drag if damping else 0.0
-        if self.law.speed is None:
-            return dynamic - drag * speed, -drag
-        part = (static - dynamic) * math.exp(-speed / self.law.speed)
-        return dynamic + part - drag * speed, -part / self.law.speed - drag
+        return float(law(speed)) - drag * speed, law.slope(speed) - drag
+
+
+def _check_law(owner, field, law):
+    """Refuse a law that is not one of the torque over the speed alone."""
+    if law.lifts:
+        refuse(owner, field, law, f"a Stribeck or another law of the torque over the speed: {law.lifts}, and the rod's "
+               "end knows no depth of cut")  # fmt: skip
+
+

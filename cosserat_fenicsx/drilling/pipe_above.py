@@ -17,10 +17,9 @@ import numpy as np
 import ufl
 
 from cosserat_fenicsx.checks import instance, number, positive, refuse, store
-from cosserat_fenicsx.drilling.hook import Hook
 from cosserat_fenicsx.drilling.segments import Segment, segment_of
 from cosserat_fenicsx.drilling.signals import MeanSpeeds
-from cosserat_fenicsx.drilling.top_drive import PI, Matched, Stiff, TopDrive
+from cosserat_fenicsx.drilling.top_drive import Hook, TopDrive
 from cosserat_fenicsx.drilling.wall_friction import ViscousDrag
 from cosserat_fenicsx.scene.action import PointAction, scalar, vector
 from cosserat_fenicsx.scene.rod import Station, StationOrName, is_known
@@ -86,15 +85,12 @@ class PipeAbove(PointAction):
 
     def _found_numbers(self):
         """What else a motion depends on, for the fingerprint of a scene: functions of time by some values."""
-        hook, drag, control = self.hook or Hook(), self.drag or ViscousDrag(), vars(self.drive.control)
+        hook, drag = self.hook or Hook(), self.drag or ViscousDrag()
         found = [x for part in self.segments for x in (part.length, part.GJ, part.rhoJ, part.EA, part.rhoA)]
         found += [
-            drag.torsion,
-            drag.axial,
-            hook.stiffness,
-            self.drive.inertia,
-            *map(float, filter(None, control.values())),
-        ]
+            drag.torsion, drag.axial, hook.stiffness, self.drive.inertia,
+            *map(float, self.drive.control.gains(self.segments[0].torsional_impedance)),
+        ]  # fmt: skip
         for signal in (self.drive.signal(), hook.signal()):
             found += [signal(t) for t in (0.0, 1.0, 10.0)]
         return tuple(found)
@@ -218,14 +214,9 @@ def _hook_end(hook):
 
 
 def _drive_end(drive, impedance):
-    control, mean = drive.control, MeanSpeeds(drive.signal(), None).between
-    if isinstance(control, Stiff):
-        return TopEnd(mean, stiff=True)
-    if isinstance(control, PI):
-        return TopEnd(mean, inertia=drive.inertia, Kp=control.Kp, Ki=control.Ki)
-    if isinstance(control, Matched):
-        return TopEnd(mean, Kp=control.impedance or impedance, given=control.torque)
-    return TopEnd(mean, inertia=drive.inertia, Kp=control.drag, given=control.torque)
+    rigid, given, Kp, Ki = drive.control.gains(impedance)
+    mean = MeanSpeeds(drive.signal(), None).between
+    return TopEnd(mean, stiff=rigid, inertia=drive.inertia, Kp=Kp, Ki=Ki, given=given)
 
 
 # Samples of an interpolation; the travel time of a part over the longest step, so that all of them are known.

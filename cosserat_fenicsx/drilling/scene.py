@@ -6,10 +6,9 @@ from functools import cached_property
 
 from cosserat_fenicsx.checks import instance, positive, refuse, store
 from cosserat_fenicsx.drilling.bit_laws import BitOnRock
-from cosserat_fenicsx.drilling.hook import Hook
 from cosserat_fenicsx.drilling.segments import Discs, Segment, segment_of
-from cosserat_fenicsx.drilling.top_drive import TopDrive
-from cosserat_fenicsx.drilling.wall_friction import ViscousDrag, WallFriction
+from cosserat_fenicsx.drilling.top_drive import Hook, TopDrive
+from cosserat_fenicsx.drilling.wall_friction import FrictionLaw, ViscousDrag
 from cosserat_fenicsx.well.components import DrillString, weight_in_mud
 from cosserat_fenicsx.well.hole import Borehole, Mud
 
@@ -26,7 +25,7 @@ class Drilling:
         hook: a `Hook`; None for a rigid one at rest, or, where the bit has a `Cutting` law and a weight, for one whose
             load stays the same, so that the string follows the bit.
         mud: a `Mud`; None where all components have their weight in mud, or where there is no hole: in air.
-        friction: `WallFriction`; None for that of the hole, the same at rest and in motion.
+        friction: `WallFriction` or another law; None for that of the hole, the same at rest and in motion.
         drag: `ViscousDrag`; None for none.
         depth: measured depth of the bit, m; None for the bottom of the hole, or the string's length without one.
         start: "rest": untwisted, hanging in its weight, with the static weight on bit; or "steady": all of it turns at
@@ -42,7 +41,7 @@ class Drilling:
     hole: Borehole | None = None
     hook: Hook | None = None
     mud: Mud | None = None
-    friction: WallFriction | None = None
+    friction: FrictionLaw | None = None
     drag: ViscousDrag | None = None
     depth: float | None = None
     start: str = "rest"
@@ -50,7 +49,7 @@ class Drilling:
     def __post_init__(self):
         parts = {
             "string": (DrillString, Discs), "drive": TopDrive, "bit": BitOnRock, "hole": Borehole, "hook": Hook,
-            "mud": Mud, "friction": WallFriction, "drag": ViscousDrag,
+            "mud": Mud, "friction": FrictionLaw, "drag": ViscousDrag,
         }  # fmt: skip
         for field, kinds in parts.items():
             value = getattr(self, field)
@@ -59,7 +58,7 @@ class Drilling:
                 instance(self, field, value, kinds, f"{names}(...)")
         if self.start not in ("rest", "steady"):
             refuse(self, "start", self.start, "'rest' or 'steady'")
-        if isinstance(self.string, Discs):
+        if self.discs is not None:
             for field in ("hole", "mud", "friction", "drag", "depth"):
                 if getattr(self, field) is not None:
                     refuse(self, field, getattr(self, field), "None for Discs, whose drags are their own")
@@ -73,6 +72,11 @@ class Drilling:
         elif self.hole is None and self.string.components[-1].length is None:
             refuse(self.string.components[-1], "length", None, "a length (m), where there is neither hole nor depth")
         _ = self.segments
+
+    @property
+    def discs(self) -> Discs | None:
+        """The string, where it is one of `Discs`."""
+        return self.string if isinstance(self.string, Discs) else None
 
     @cached_property
     def bit_depth(self) -> float:

@@ -38,14 +38,13 @@ from cosserat_fenicsx.dimensions import DIMENSIONS, in_si
 from cosserat_fenicsx.drilling.bit_laws import BitLaw, BitOnRock, Stribeck, Wear
 from cosserat_fenicsx.drilling.choose import chosen
 from cosserat_fenicsx.drilling.history import DrillingHistory
-from cosserat_fenicsx.drilling.hook import Hook
 from cosserat_fenicsx.drilling.linear.frequencies import SoftSpeed, SoftTorque
 from cosserat_fenicsx.drilling.linear.stability import Stability, stability
 from cosserat_fenicsx.drilling.scene import Drilling
 from cosserat_fenicsx.drilling.segments import Discs
 from cosserat_fenicsx.drilling.simulate import check_arguments as check_simulation
 from cosserat_fenicsx.drilling.simulate import simulate_drilling
-from cosserat_fenicsx.drilling.top_drive import DriveControl, TopDrive
+from cosserat_fenicsx.drilling.top_drive import DriveControl, Hook, TopDrive
 from cosserat_fenicsx.drilling.wall_friction import ViscousDrag, WallFriction
 from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.parts import members

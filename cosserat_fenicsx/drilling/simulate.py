@@ -6,14 +6,12 @@ import numbers
 import numpy as np
 
 from cosserat_fenicsx.checks import File, instance, number, refuse
-from cosserat_fenicsx.drilling.bit_laws import Cutting, Lobes
 from cosserat_fenicsx.drilling.choose import OtherSteps, chosen, fastest, model_of
 from cosserat_fenicsx.drilling.folder import DrillingFolder
 from cosserat_fenicsx.drilling.history import DrillingHistory
 from cosserat_fenicsx.drilling.scene import Drilling
 from cosserat_fenicsx.drilling.stick_slip import step_errors
 from cosserat_fenicsx.drilling.time_loop import TimeLoop
-from cosserat_fenicsx.drilling.top_drive import Motor, Stiff
 from cosserat_fenicsx.errors import SceneError
 
 #: More steps, and rows of a history, are refused as a mistake; so many profiles where nothing else is asked for.
@@ -196,7 +194,7 @@ def check_arguments(scene, duration, dt=None, elements=None, save_every=None, pr
     if dt is not None and duration / dt > MOST_STEPS:
         refuse(where, "dt", dt, f"at least {duration / MOST_STEPS:g} s: {MOST_STEPS:g} steps in {duration:g} s")
     signal = scene.drive.signal()
-    if isinstance(scene.drive.control, Stiff) and not signal.constant:
+    if scene.drive.imposes_speed and not signal.constant:
         for t in signal.jumps:
             if 0 < t < duration and abs(signal.jump(t)) > 1e-6 * max(1.0, abs(signal(t))):
                 refuse("TopDrive", "speed", scene.drive.speed, f"no jump, such as that of {signal.jump(t):.4g} rad/s "
@@ -226,17 +224,16 @@ def check_step(scene, dt, duration, save_every=None):
 
 def _largest_turn(scene):
     """The largest rotation of the bit in a step, rad, and words on it where blades or lobes decide for it."""
-    law = getattr(scene.bit, "law", None)
-    parts = law.blades if isinstance(law, Cutting) else law.count if isinstance(law, Lobes) else None
-    if parts is None:
+    repeats = scene.bit.law.repeats if scene.bit is not None else None
+    if repeats is None:
         return _TURN, ""
-    named = "blades" if isinstance(law, Cutting) else "lobes"
+    parts, named = repeats
     return _OF_BLADES * 2 * math.pi / parts, f"{_OF_BLADES:g} of the angle between {named}"
 
 
 def _turn_to_watch(scene):
     """The largest rotation in a step where it is not known before the motion, below a motor; else infinite."""
-    watched = scene.bit is not None and isinstance(scene.drive.control, Motor)
+    watched = scene.bit is not None and scene.drive.speed is None
     return _largest_turn(scene)[0] if watched else math.inf
 
 

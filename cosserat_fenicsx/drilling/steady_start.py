@@ -10,8 +10,6 @@ import math
 import numpy as np
 
 from cosserat_fenicsx.checks import refuse
-from cosserat_fenicsx.drilling.bit_laws import Cutting
-from cosserat_fenicsx.drilling.top_drive import PI, Motor, Stiff
 from cosserat_fenicsx.errors import NotConverged
 
 
@@ -21,11 +19,12 @@ def check_steady(scene) -> None:
     Raises:
         SceneError: a motor, a control without an integral part, or a drive at rest.
     """
-    control = scene.drive.control
-    speed = None if isinstance(control, Motor) else scene.drive.signal()(0.0)
-    if not (isinstance(control, Stiff) or (isinstance(control, PI) and control.Ki > 0)):
+    drive = scene.drive
+    gains = None if drive.speed is None or drive.control.sampled else drive.control.gains(1.0)
+    if gains is None or not (gains.rigid or gains.Ki > 0):
         refuse("Drilling", "start", "steady", "'rest' with this drive: only Stiff(), and PI(Kp, Ki) with Ki above 0, "
                "have the speed asked for in steady rotation")  # fmt: skip
+    speed = drive.signal()(0.0)
     if not speed > 0:
         refuse("Drilling", "start", "steady", "'rest' where the drive does not turn at the start, or a speed above 0")
 
@@ -37,7 +36,7 @@ def check_rock(scene) -> None:
         SceneError: so it is.
     """
     bit, (down, _) = scene.bit, steady_velocities(scene)
-    if down and bit is not None and bit.weight is not None and not isinstance(bit.law, Cutting):
+    if down and bit is not None and bit.weight is not None and not bit.law.drills:
         refuse("Drilling", "start", "steady", f"'rest' with a hook that moves at {-down:g} m/s: the rock below a bit "
                "with a weight is not drilled and does not give way, unless its law is Cutting(...)")  # fmt: skip
 
@@ -45,7 +44,7 @@ def check_rock(scene) -> None:
 def follows_the_bit(scene) -> bool:
     """Whether the load of the hook stays the same, so that the string follows the bit, which drills by its weight."""
     bit = scene.bit
-    return scene.hook is None and bit is not None and bit.weight is not None and isinstance(bit.law, Cutting)
+    return scene.hook is None and bit is not None and bit.weight is not None and bit.law.drills
 
 
 def steady_velocities(scene) -> np.ndarray:
@@ -66,8 +65,7 @@ def penetration(bit, turning) -> float:
     Raises:
         SceneError: a weight that its wear flats bear.
     """
-    law, wear = bit.law, bit.law.wear
-    idle = law.a * wear.length * wear.stress if wear else 0.0
+    law, idle = bit.law, bit.law.idle
     if bit.weight <= idle:
         refuse(bit, "weight", bit.weight, f"more than the wear flats carry, {idle:.6g} N")
     return (bit.weight - idle) / law.axial_stiffness * law.blades * turning / (2 * math.pi)
@@ -76,13 +74,13 @@ def penetration(bit, turning) -> float:
 _ROUNDS, _SAME = 200, 1e-13
 
 
-def steady_state(velocities, chain, limits, decay, bit):
+def steady_state(velocities, chain, limits, friction, bit):
     """Places of the nodes and forces on the top in steady motion.
 
     Args:
         velocities: (dofs,) of all nodes. chain: the `Chain`.
         limits: (nodes, 3) of the places (nodes, dofs): largest friction at rest, in motion, contact radius.
-        decay: (speed, of rotation) of the law of friction.
+        friction: the `Resistance` of the wall, and whether it is one over the rotation.
         bit: (dofs,) weight on bit less that at rest (N), torque on bit (N m).
 
     Returns:
@@ -98,12 +96,13 @@ def steady_state(velocities, chain, limits, decay, bit):
     drag[1:] += chain.drag_off
     down, turning = velocities[0] if n == 2 else 0.0, velocities[-1]
     for _ in range(_ROUNDS):
-        still, slipping, radius = limits(x).T
+        still, _, radius = limits(x).T
         around = radius * turning
         slip = np.hypot(down, around)
-        speed = np.abs(turning) if decay[1] else slip
-        falling = np.exp(-speed / decay[0]) if decay[0] > 0 else 0.0
-        size = np.divide(slipping + (still - slipping) * falling, slip, out=np.zeros_like(slip), where=slip > 0)
+        braked = still > 0
+        speed = np.full_like(slip, abs(turning)) if friction[1] else slip
+        size = np.zeros_like(slip)
+        size[braked] = still[braked] / friction[0].still * friction[0](speed[braked]) / slip[braked]
         resisting = drag * velocities
         resisting[:, -1] += size * around * radius
         if n == 2:

@@ -21,20 +21,18 @@ time is at most 0.16 dt (omega dt)^2.
 
 import math
 from collections import namedtuple
-from pathlib import Path
 
 import numpy as np
 
 from cosserat_fenicsx.algebra.building import Pointers
 from cosserat_fenicsx.checks import instance, positive, refuse
-from cosserat_fenicsx.drilling.bit_laws import Lobes, Stribeck
+from cosserat_fenicsx.drilling.laws import SOURCES, InC, check_bit
 from cosserat_fenicsx.drilling.protocol import LEDGER, PROFILE, SERIES
 from cosserat_fenicsx.drilling.scene import Drilling
 from cosserat_fenicsx.drilling.signals import MeanSpeeds
-from cosserat_fenicsx.drilling.single_valued import check_bit, stribeck_of
 from cosserat_fenicsx.drilling.steady_start import check_steady, steady_velocities
-from cosserat_fenicsx.drilling.top_drive import PI, Matched, Motor, Stiff
-from cosserat_fenicsx.drilling.wall import wall_of
+from cosserat_fenicsx.drilling.top_drive import Gains, Sampler
+from cosserat_fenicsx.drilling.wall_friction import law_of, wall_of
 from cosserat_fenicsx.errors import NotConverged
 from cosserat_fenicsx.well.components import DrillString
 
@@ -140,7 +138,6 @@ def _long_enough(parts, dt):
     return parts, short
 
 
-_SOURCE = Path(__file__).with_name("waves.c")
 _WIDTH = 1 + len(SERIES) + len(LEDGER)
 # Numbers and arrays of C that change in a step.
 _NUMBERS = ("drive_speed", "integral", "bit_speed", "last_on_bit", "work", "at_bit", "at_wall", "in_mud", "iterations")
@@ -159,7 +156,8 @@ class TorsionWaves(Pointers):
     Speeds and torques that are told are means over the last two steps, but for speeds of drives and bits with inertia.
 
     Args:
-        scene: a `Drilling` with a `DrillString`; the bit's law a `Stribeck`, or `Lobes`, of which it takes the torque.
+        scene: a `Drilling` with a `DrillString`; the bit's law one of the torque over the speed; of `Lobes` it takes
+            the torque.
         dt: longest step, s; None for 300 cells. The step is the longest, from three quarters of it on, for which the
             travel times of the parts are nearest to whole numbers of steps; shorter where a law of friction needs it.
         elements: least number of cells, or None.
@@ -174,9 +172,11 @@ class TorsionWaves(Pointers):
     name = "torsion"
 
     def __init__(self, scene, dt=None, elements=None, *, normal_force=None):
-        super().__init__(_SOURCE)
+        super().__init__(*SOURCES)
         _check(scene)
         self.scene, self.normal_force, self.steps = scene, normal_force, 0
+        self._law = None if scene.bit is None else scene.bit.law.resistance(scene.bit.weight)
+        self._wall = law_of(scene.friction)[0]
         drag = 0.0 if scene.drag is None else scene.drag.torsion
         time = math.fsum(x.length / x.torsional_speed for x in scene.segments)
         if dt is not None:
@@ -202,6 +202,7 @@ class TorsionWaves(Pointers):
         self.dt, self.depths = cells.dt, cells.depths
         self.signal = MeanSpeeds(scene.drive.signal(), self.dt)
         self.why = tuple(self._reasons(asked))
+        self._sampler = Sampler(scene.drive, self.dt) if scene.drive.control.sampled else None
         self._allocate()
         if scene.start == "steady":
             check_steady(scene)
@@ -212,17 +213,19 @@ class TorsionWaves(Pointers):
         Z, half = self.cells.impedance, self.cells.impedance * self.cells.time / 2
         self._above, self._below = np.concatenate([[0.0], Z]), np.concatenate([Z, [0.0]])
         self._drag = drag * (np.concatenate([[0.0], half]) + np.concatenate([half, [0.0]]))
-        wall = wall_of(self.scene, self.cells.depths, self.normal_force)
-        self._hold, self._slide, self._decay = (x.copy() for x in wall)
-        law = None if self.scene.bit is None else stribeck_of(self.scene.bit.law)
-        if law is not None:
-            self._hold[-1], self._slide[-1] = law.torques(self.scene.bit.weight)
-            self._decay[-1] = law.speed or 0.0
+        self._grip, self._reach = wall_of(self.scene, self.cells.depths, self.normal_force)
+        wall = self._wall
+        self._hold, self._slide = wall.still * self._grip, wall.slipping * self._grip
+        self._decay = np.where(self._grip > 0, wall.decay / self._reach, 0.0)
+        if self._law is not None:
+            self._hold[-1], self._slide[-1], self._decay[-1] = self._law.still, self._law.slipping, self._law.decay
 
     def _steepness(self):
         """The largest slope of a law of friction over the impedance of its node, laws that drop at once left out; and
         whether it is that of the bit."""
-        slope = np.divide(self._hold - self._slide, self._decay, out=np.zeros_like(self._hold), where=self._decay > 0)
+        slope = self._wall.steepest * self._grip * self._reach
+        if self._law is not None:
+            slope[-1] = self._law.steepest
         impedance = self._above + self._below + self._drag
         if self.scene.bit is not None:
             impedance[-1] += 2 * self.scene.bit.inertia / self.cells.dt
@@ -265,26 +268,27 @@ class TorsionWaves(Pointers):
         for name, array in (
             ("above", self._above), ("below", self._below), ("share", self.dt / (4 * cells.impedance)),
             ("turn", cells.turn[filtered]), ("drag", self._drag), ("hold", self._hold), ("slide", self._slide),
-            ("decay", self._decay), *self._changing.items(),
+            ("decay", self._decay), ("grip", self._grip), ("reach", self._reach), *self._changing.items(),
         ):  # fmt: skip
             setattr(c, name, self.doubles(array))
-        drive, control = scene.drive, scene.drive.control
-        c.stiff, c.bit, c.drive_inertia = isinstance(control, Stiff), scene.bit is not None, drive.inertia
-        c.bit_inertia = 0.0 if scene.bit is None else scene.bit.inertia
-        if isinstance(control, PI):
-            c.Kp, c.Ki = control.Kp, control.Ki
-        elif isinstance(control, Matched):
-            c.Kp = control.impedance or scene.segments[0].torsional_impedance
-            c.given = control.torque
-        elif isinstance(control, Motor):
-            c.Kp, c.given = control.drag, control.torque
+        drive, bit = scene.drive, scene.bit
+        c.bit, c.drive_inertia = bit is not None, drive.inertia
+        gains = Gains() if self._sampler else drive.control.gains(scene.segments[0].torsional_impedance)
+        c.stiff, c.given, c.Kp, c.Ki = gains
+        c.bit_inertia = 0.0 if bit is None else bit.inertia
+        self._laws = [InC(self._ffi, self._wall)]
+        self._laws[0].fill(c.wall)
+        if self._law is not None and self._law.function is not None:
+            self._laws.append(InC(self._ffi, self._law, bit.law.in_c()))
+            self._laws[1].fill(c.rock)
+            c.load = bit.weight or 0.0
 
     def _set_steady(self, speed):
         """All turns at the drive's speed (rad/s), twisted by what brakes it."""
         cells, now, c = self.cells, self._changing, self.c
-        more, decay = self._hold - self._slide, self._decay
-        falling = np.exp(-np.divide(speed, decay, out=np.full_like(decay, np.inf), where=decay > 0))
-        law = np.where(self._hold > 0, self._slide + more * falling, 0.0)
+        law = np.where(self._hold > 0, self._grip * self._wall(speed * self._reach), 0.0)
+        if self._law is not None:
+            law[-1] = self._law(speed)
         above = np.cumsum((law + self._drag * speed)[::-1])[::-1]  # handed down to the nodes
         torque, Z = above[1:], cells.impedance
         now["down"][:], now["up"][:] = torque + Z * speed, torque - Z * speed
@@ -311,16 +315,30 @@ class TorsionWaves(Pointers):
     def advance(self, steps: int) -> np.ndarray:
         """See `StringModel`."""
         rows = np.empty((steps, _WIDTH))
-        speeds = self.signal(self.steps, steps)
-        buffer = self._ffi.from_buffer
-        done = self._lib.advance(self.c, steps, buffer("double[]", speeds), self.steps, _WIDTH,
-                                 buffer("double[]", rows, require_writable=True))  # fmt: skip
-        self.steps += done
+        done, sampler = 0, self._sampler
+        while done < steps:
+            chunk = steps - done
+            if sampler:
+                if self.steps % sampler.every == 0:
+                    now = self.c.drive_speed, self._changing["angle"][0], self._changing["moment"][0]
+                    self.c.given = sampler.torque(self.time, *map(float, now))
+                chunk = min(chunk, sampler.left(self.steps))
+            did = self._advance(self.signal(self.steps, chunk), rows[done : done + chunk])
+            done, self.steps = done + did, self.steps + did
+            if did < chunk:
+                break
+        for law in self._laws:
+            law.raise_failure()
         if done < steps:
             problem = NotConverged(f"torsion: a number was not finite at t = {self.time:.6g} s")
             problem.rows = rows[:done]
             raise problem
         return rows
+
+    def _advance(self, speeds, rows):
+        buffer = self._ffi.from_buffer
+        return self._lib.advance_waves(self.c, len(rows), buffer("double[]", speeds), self.steps, _WIDTH,
+                                       buffer("double[]", rows, require_writable=True))  # fmt: skip
 
     def with_step(self, factor: float) -> "TorsionWaves":
         """The same scene at rest, with so many times the step."""
@@ -338,10 +356,11 @@ class TorsionWaves(Pointers):
 
     def memory(self) -> dict:
         """See `StringModel`."""
-        return {
+        found = {
             "steps": self.steps, **{name: getattr(self.c, name) for name in _NUMBERS},
             **{name: array.copy() for name, array in self._changing.items()},
         }  # fmt: skip
+        return found | ({"control": self._sampler.state.copy(), "given": self.c.given} if self._sampler else {})
 
     def recall(self, memory: dict) -> None:
         """See `StringModel`."""
@@ -350,12 +369,14 @@ class TorsionWaves(Pointers):
         for name in _NUMBERS:
             setattr(self.c, name, memory[name])
         self.steps = int(memory["steps"])
+        if self._sampler:
+            self._sampler.state, self.c.given = memory["control"].copy(), float(memory["given"])
 
 
 def _check(scene):
     instance("TorsionWaves", "scene", scene, Drilling, "a Drilling")
     instance("TorsionWaves", "scene.string", scene.string, DrillString, "a DrillString; discs have no waves")
-    if scene.bit is not None:
-        instance("TorsionWaves", "scene.bit.law", scene.bit.law, (Stribeck, Lobes),
-                 "a Stribeck law, or Lobes with one: torsion alone knows no depth of cut")  # fmt: skip
+    if scene.bit is not None and scene.bit.law.drills:
+        refuse("TorsionWaves", "scene.bit.law", scene.bit.law, "a Stribeck law, or another one of the torque over the "
+               "speed: torsion alone knows no depth of cut")  # fmt: skip
     check_bit(scene)

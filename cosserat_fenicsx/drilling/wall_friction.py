@@ -1,16 +1,60 @@
-"""Friction between the string and the wall of its hole, while it moves and while it sticks."""
+"""Friction between the string and the wall of its hole: laws, and the wall force of a string that only rotates."""
 
+import functools
+from collections import namedtuple
 from dataclasses import dataclass
 from typing import Annotated
 
 import numpy as np
 
 from cosserat_fenicsx.checks import refuse, store
+from cosserat_fenicsx.drilling.laws import Resistance, by_function, checked
+from cosserat_fenicsx.numerics import gauss
 from cosserat_fenicsx.parts import Friction, Kind, Number, Part, Rate, positive
+from cosserat_fenicsx.well.hole import Mud
+from cosserat_fenicsx.well.operations import RotaryDrilling, RotateOffBottom
+from cosserat_fenicsx.well.pieces import pieces_of
+
+
+class FrictionLaw(Part, family="law of friction at the wall"):
+    """Base of the laws of friction between string and wall, a vector against the slip of the surface.
+
+    A law of your own is a frozen dataclass with a method `coefficient(slip)`: the coefficient of friction at a slip
+    from 0 on (m/s), at 0 the largest one at rest.
+
+    Attributes:
+        of_rotation: the slip that `coefficient` gets is the speed of rotation, rad/s.
+        of_hole: what it returns is a factor on the friction of the sections of the hole.
+    """
+
+    of_rotation, of_hole = False, False
+
+    def coefficient(self, slip: float) -> float:
+        """See the class."""
+        raise NotImplementedError(f"{type(self).__name__}.coefficient(slip) is missing")
+
+    @property
+    def resistance(self) -> Resistance:
+        """The coefficient over the slip.
+
+        Raises:
+            SceneError: `coefficient` fails, or its values are no numbers from 0 on.
+        """
+        return _sampled(self)
+
+    @property
+    def decays(self) -> bool:
+        """Whether the coefficient falls with the slip."""
+        return self.resistance.steepest > 0 or self.resistance.drops
+
+
+@functools.lru_cache(64)
+def _sampled(law):
+    return by_function(law, "coefficient", checked(law, "coefficient"))
 
 
 @dataclass(frozen=True)
-class WallFriction(Part):
+class WallFriction(FrictionLaw):
     """Coefficient mu = kinetic + (static - kinetic) exp(-v/speed) of the slip v, anything up to the static one at rest.
 
     The friction is a vector against the slip (V, r om) of the surface, along and around the hole. Static and kinetic
@@ -43,19 +87,22 @@ class WallFriction(Part):
             kind = Number("angular velocity" if self.of_rotation else "speed", positive())
             store(self, speed=kind.check(self, "speed", self.speed))
 
+    def coefficient(self, slip: float) -> float:
+        """See `FrictionLaw`."""
+        return float(self.resistance(slip)) if slip > 0 else self.static
+
     @property
-    def decays(self) -> bool:
-        """Whether the coefficient depends on the slip."""
-        return self.static > self.kinetic
+    def resistance(self) -> Resistance:
+        """See `FrictionLaw`."""
+        return Resistance(self.static, self.kinetic, self.speed or 0.0, drops=self.static > self.kinetic)
 
 
-def coefficients(friction: WallFriction | None, of_hole: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Static and kinetic coefficients (n,) where those of the hole's sections are `of_hole` (n,); without a friction of
-    the scene both are these."""
+def law_of(friction: FrictionLaw | None) -> tuple[Resistance, bool, bool]:
+    """The `Resistance`, and whether it is one over the rotation, and a factor on the friction of the hole's sections;
+    that friction itself, the same at rest and in motion, without a friction of the scene."""
     if friction is None:
-        return of_hole.copy(), of_hole.copy()
-    factor = of_hole if friction.of_hole else np.ones_like(of_hole)
-    return friction.static * factor, friction.kinetic * factor
+        return Resistance(1.0, 1.0), False, True
+    return friction.resistance, friction.of_rotation, friction.of_hole
 
 
 @dataclass(frozen=True)
@@ -71,3 +118,76 @@ class ViscousDrag(Part):
 
     torsion: Rate = 0.0
     axial: Rate = 0.0
+
+
+#: Of the nodes, (n,) each. grip: torque of a coefficient of friction of 1, N m. reach: what the law of friction depends
+#: on, slip or rotation, over the speed of rotation, m or 1.
+Wall = namedtuple("Wall", "grip reach")
+_RULE = gauss(4)
+
+
+def scene_pieces(scene):
+    """The `Pieces` of the string of a `Drilling` with a hole, rotating at its depth."""
+    weight = 0.0 if scene.bit is None else scene.bit.weight or 0.0
+    operation = RotaryDrilling(weight, 0.0) if weight else RotateOffBottom()
+    mud = Mud(0.0) if scene.mud is None else scene.mud
+    return pieces_of(scene.hole, scene.string, operation, mud, scene.bit_depth)[0]
+
+
+def soft_string_force(pieces, weight, md):
+    """Wall force per length of a soft string that rotates and does not move along the hole, |T k n + w (e - (e.t) t)|.
+
+    Args:
+        pieces: the `Pieces` of the string. weight: on bit, N. md: (...) measured depths, m.
+
+    Returns:
+        (...) N/m. T is the effective tension, k and n curvature and normal of the hole, t its tangent, w the weight in
+        mud, e downwards (softstring.py); friction acts across t alone, and T is that of the weight.
+    """
+    i = np.minimum(np.searchsorted(pieces.bottom, md), len(pieces.bottom) - 1)
+    below = np.cumsum(_heavy(pieces, pieces.top, slice(None))[::-1])[::-1]
+    below = np.append(below[1:], 0.0) - weight
+    t, n, b, k, w = (x[i] for x in (pieces.t, pieces.n, pieces.b, pieces.curvature, pieces.weight))
+    u = pieces.bottom[i] - md
+    across = w * (n * np.cos(k * u) + t * np.sin(k * u))
+    return np.hypot(k * (below[i] + _heavy(pieces, md, i)) + across, w * b)
+
+
+def _heavy(pieces, md, i):
+    """Weight along the hole of the pieces i below measured depths, N."""
+    t, n, k, w = (x[i] for x in (pieces.t, pieces.n, pieces.curvature, pieces.weight))
+    u = pieces.bottom[i] - md
+    return w * (t * u * np.sinc(k * u / np.pi) - n * k * u**2 / 2 * np.sinc(k * u / 2 / np.pi) ** 2)
+
+
+def wall_of(scene, depths, normal_force=None):
+    """The `Wall` of a `Drilling`, at nodes of so many measured depths (m), each with half of its cells.
+
+    Args:
+        normal_force: N/m for an array of measured depths, in place of that of the soft string.
+    """
+    size = len(depths)
+    if scene.hole is None:
+        return Wall(np.zeros(size), np.ones(size))
+    pieces = scene_pieces(scene)
+    weight = 0.0 if scene.bit is None else scene.bit.weight or 0.0
+    middles = (depths[1:] + depths[:-1]) / 2
+    inside = pieces.bottom[pieces.bottom < depths[-1]]
+    cuts = np.unique(np.concatenate([depths, middles, inside]))
+    half = np.diff(cuts)[:, None] / 2
+    md = cuts[:-1, None] + half * (1 + _RULE.points)
+    force = soft_string_force(pieces, weight, md) if normal_force is None else normal_force(md)
+    middle = md.mean(axis=1)
+    at = np.minimum(np.searchsorted(pieces.bottom, middle), len(pieces.bottom) - 1)
+    load = (force * _RULE.weights).sum(axis=1) * half[:, 0]
+    node = np.searchsorted(middles, middle)
+    law, of_rotation, of_hole = law_of(scene.friction)
+    if of_hole:
+        load = load * scene.hole.at(middle, "friction")
+    torque = load * pieces.radius[at]
+    grip, force = np.bincount(node, torque, size), np.bincount(node, load, size)
+    reach = np.ones(size) if of_rotation else np.divide(grip, force, out=np.ones(size), where=force > 0)
+    if scene.bit is not None:  # one law a node: the wall beside the bit acts on the node above it
+        grip[-2] += grip[-1]
+        grip[-1] = 0.0
+    return Wall(grip, reach)

@@ -1,41 +1,41 @@
-/* Torsional waves of a string, step by step; see model.py for the method. */
-#include <math.h>
-#include "waves.h"
+/* Torsional waves of a string, step by step; see torsion.py for the method. */
 
-enum { MOST = 100 };
-
-/* The speed om with S om + T(om) = F, T the law of friction: anything up to `hold` at rest, and
-   slide + (hold - slide) exp(-|om|/decay) against the speed. Where several speeds fulfil that, it goes on sliding as
-   before, with the sign of `before`. The left side is convex for om > 0: Newton's method comes down from the right. */
-static double slip(double F, double S, double hold, double slide, double decay, double before, long long *iterations)
+/* The law of friction at a node. */
+static inline friction law_at(const waves *w, int node)
 {
-    double size = fabs(F), sign = F < 0 ? -1.0 : 1.0, more = hold - slide;
-    if (size <= hold && !(more > S * decay && before * sign > 0)) return 0.0;
-    double om = (size - slide) / S;
-    if (om <= 0) return 0.0;
-    if (more > 0 && decay > 0) {
-        double enough = 1e-14 * size / S;
-        for (int i = 0; i < MOST; i++) {
-            double e = more * exp(-om / decay), slope = S - e / decay;
-            ++*iterations;
-            if (slope <= 0) return 0.0;
-            double change = (S * om + slide + e - size) / slope;
-            om -= change;
-            if (om <= 0) return 0.0;
-            if (fabs(change) <= enough) break;
+    friction f = {w->hold[node], w->slide[node], w->decay[node], NULL, 1, 1, 0};
+    if (w->wall.self || w->wall.count || w->rock.self) {
+        const int bit = w->bit && node == w->cells;
+        const curve *other = bit ? &w->rock : &w->wall;
+        if (other->self || other->count) {
+            f.other = other;
+            f.scale = bit ? 1 : w->grip[node];
+            f.reach = bit ? 1 : w->reach[node];
+            f.load = w->load;
         }
     }
-    return sign * om;
+    return f;
+}
+
+/* The speed om with S om + T(om) = F, T the law of friction. Where several speeds fulfil that, it goes on sliding as
+   before, with the sign of `before`. */
+static inline double slip(const friction *f, double F, double S, double before, long long *iterations)
+{
+    double size = fabs(F), sign = F < 0 ? -1.0 : 1.0, R, slope;
+    if (size <= f->still && !(several(f, S) && before * sign > 0)) return 0.0;
+    double om = slides(f, S, size, &R, &slope, iterations);
+    return om > 0 || isnan(om) ? sign * om : 0.0;
 }
 
 /* The mean speed of a node with an inertia over a step. A node that would turn round stops. `speed`: at the start of
    the step, then at its end. */
 static double turned(waves *w, int node, double F, double S, double inertia, double *speed)
 {
-    double before = *speed, rate = 2 * inertia / w->dt, hold = w->hold[node];
-    double om = slip(F + rate * before, S + rate, hold, w->slide[node], w->decay[node], before, &w->iterations);
+    double before = *speed, rate = 2 * inertia / w->dt;
+    const friction law = law_at(w, node);
+    double om = slip(&law, F + rate * before, S + rate, before, &w->iterations);
     double after = inertia > 0 ? 2 * om - before : om;
-    if (inertia > 0 && hold > 0 && after * before < 0) {
+    if (inertia > 0 && law.still > 0 && after * before < 0) {
         double torque = F + rate * before - (S + rate) * before / 2;
         if (torque * before >= 0) {
             om = before / 2;
@@ -48,7 +48,7 @@ static double turned(waves *w, int node, double F, double S, double inertia, dou
 }
 
 /* Book the losses at a node and turn it. */
-static void settle(waves *w, int node, double om, double moment)
+static void book(waves *w, int node, double om, double moment)
 {
     double dt = w->dt;
     w->last_speed[node] = w->speed[node];
@@ -66,10 +66,10 @@ static void drive(waves *w, double asked)
     double Q = w->up[0], Z = w->below[0], S = Z + w->drag[0], dt = w->dt, om, torque;
     double I = w->drive_inertia, before = w->drive_speed;
     if (w->stiff) {
-        double hold = w->hold[0], slide = w->slide[0], decay = w->decay[0], size = fabs(asked);
+        const friction law = law_at(w, 0);
         om = asked;
-        if (om == 0) w->torque[0] = fmax(-hold, fmin(hold, -Q));
-        else w->torque[0] = copysign(slide + (decay > 0 ? (hold - slide) * exp(-size / decay) : 0.0), om);
+        if (om == 0) w->torque[0] = fmax(-law.still, fmin(law.still, -Q));
+        else w->torque[0] = law.still > 0 ? copysign(resistance(&law, fabs(om)), om) : 0.0;
         torque = Q + S * om + w->torque[0];
         w->work += dt * torque * om + I * (om * om - before * before) / 2;
         w->drive_speed = om;
@@ -80,7 +80,7 @@ static void drive(waves *w, double asked)
         w->work += dt * (F - gain * om) * om;
         w->integral += dt * (asked - om);
     }
-    settle(w, 0, om, torque);
+    book(w, 0, om, torque);
 }
 
 void energies(const waves *w, double *kinetic, double *strain)
@@ -107,7 +107,7 @@ static void end(waves *w, double P)
     int n = w->cells;
     w->last_on_bit = w->torque[n];
     double om = turned(w, n, P, w->above[n] + w->drag[n], w->bit_inertia, &w->bit_speed);
-    settle(w, n, om, P - w->above[n] * om);
+    book(w, n, om, P - w->above[n] * om);
     w->up[n - 1] = P - 2 * w->above[n] * om;
 }
 
@@ -117,9 +117,10 @@ static double between(waves *w, double P)
     double *down = w->down, *up = w->up, *speed = w->speed, dt = w->dt, lost = 0.0, braked = 0.0;
     for (int j = 1; j < w->cells; j++) {
         double Q = up[j], above = w->above[j], below = w->below[j], drag = w->drag[j], F = P - Q;
-        double S = above + below + drag, om, hold = w->hold[j];
-        if (hold > 0) {
-            om = slip(F, S, hold, w->slide[j], w->decay[j], speed[j], &w->iterations);
+        double S = above + below + drag, om;
+        if (w->hold[j] > 0) {
+            const friction law = law_at(w, j);
+            om = slip(&law, F, S, speed[j], &w->iterations);
             double torque = F - S * om;
             w->torque[j] = torque;
             lost += torque * om;
@@ -148,7 +149,7 @@ static void pass(double turn, double root, double *wave, double *kept)
 
 /* Do so many steps, the first of them number `first` from 0. Returns how many were done: fewer where a number is not
    finite. */
-int advance(waves *w, int steps, const double *speeds, double first, int width, double *rows)
+int advance_waves(waves *w, int steps, const double *speeds, double first, int width, double *rows)
 {
     int n = w->cells;
     for (int k = 0; k < steps; k++) {

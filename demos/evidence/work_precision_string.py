@@ -22,7 +22,7 @@ from peers import upwind_torsion
 from written import write
 
 import cosserat_fenicsx as cf
-from cosserat_fenicsx.drilling.axial_torsional.model import AxialTorsional
+from cosserat_fenicsx.drilling.elements import AxialTorsional
 from cosserat_fenicsx.drilling.protocol import SERIES
 from cosserat_fenicsx.drilling.torsion import TorsionWaves
 

@@ -21,12 +21,10 @@ import numpy as np
 from scipy.optimize import brentq
 
 from cosserat_fenicsx.checks import finite_array, positive, refuse
-from cosserat_fenicsx.drilling.bit_laws import Cutting
+from cosserat_fenicsx.drilling.laws import refuse_several_speeds
 from cosserat_fenicsx.drilling.linear.impedances import Guide, axial, torsional
 from cosserat_fenicsx.drilling.linear.roots import Box
-from cosserat_fenicsx.drilling.segments import Discs
 from cosserat_fenicsx.drilling.signals import doubt_speed
-from cosserat_fenicsx.drilling.single_valued import refuse_several_speeds, slope, stribeck_of
 from cosserat_fenicsx.drilling.steady_start import penetration
 
 
@@ -178,7 +176,7 @@ class Steady:
         self.scene = scene
         self.law = scene.bit.law if scene.bit else None
         self.torsion = torsional(scene, drive)
-        self.cuts = isinstance(self.law, Cutting)
+        self.cuts = self.law is not None and self.law.drills
         self.axial = axial(scene) if self.cuts else None
 
     def parameters(self, speed, weight):
@@ -189,13 +187,15 @@ class Steady:
         """
         if self.cuts:
             return np.array([speed, self._penetration(speed, weight)])
-        law = stribeck_of(self.law)
+        if self.law is None:
+            return np.zeros(1)
+        if self.law.needs_weight and weight is None:
+            refuse(self.scene.bit, "weight", None, "the weight on bit (N), which the law needs")
+        law = self.law.resistance(weight)
         if law is None:
             return np.zeros(1)
-        if law.radius is not None and weight is None:
-            refuse(self.scene.bit, "weight", None, "the weight on bit (N), which the law needs")
-        kappa = slope(law, speed, weight)
-        if not isinstance(self.scene.string, Discs):
+        kappa = law.slope(speed)
+        if not self.scene.discs:
             at = f" at {speed:.4g} rad/s" + (f" under {weight / 1e3:.4g} kN" if weight is not None else "")
             refuse_several_speeds(kappa, self.torsion.impedance, self.torsion.inertia, at)
         return np.array([kappa])

@@ -7,12 +7,11 @@ import numpy as np
 from scipy.optimize import brentq
 
 from cosserat_fenicsx.checks import File, Numbers, number, positive, refuse
-from cosserat_fenicsx.drilling.bit_laws import Cutting, Lobes
+from cosserat_fenicsx.drilling.bit_laws import Lobes
 from cosserat_fenicsx.drilling.linear.characteristic import speeds_and_weights
 from cosserat_fenicsx.drilling.linear.frequencies import natural_frequencies
 from cosserat_fenicsx.drilling.linear.impedances import axial
 from cosserat_fenicsx.drilling.scene import Drilling
-from cosserat_fenicsx.drilling.segments import Discs
 from cosserat_fenicsx.well.tabular import Tabular
 
 
@@ -91,7 +90,7 @@ def campbell(
         excitations = {"1 x": 1.0} | _of_the_bit(scene)
     for name, times in excitations.items():
         number("campbell", f"excitations[{name!r}]", times, "a positive number", lambda x: 0 < x < math.inf)
-    kinds = {"torsion": torsion} | ({} if isinstance(scene.string, Discs) else {"axial": axial})
+    kinds = {"torsion": torsion} | ({} if scene.discs else {"axial": axial})
     for kind, end in kinds.items():
         if end not in ("free", "fixed"):
             refuse("campbell", kind, end, "'free' or 'fixed'")
@@ -100,12 +99,8 @@ def campbell(
 
 
 def _of_the_bit(scene):
-    law = scene.bit.law if scene.bit else None
-    if isinstance(law, Cutting):
-        return {f"{law.blades} x (blades)": float(law.blades)}
-    if isinstance(law, Lobes):
-        return {f"{law.count} x (lobes)": float(law.count)}
-    return {}
+    repeats = scene.bit.law.repeats if scene.bit else None
+    return {f"{repeats[0]} x ({repeats[1]})": float(repeats[0])} if repeats else {}
 
 
 def _up_to(scene, kind, end, up_to):

@@ -25,11 +25,10 @@ from scipy.optimize import brentq
 
 from cosserat_fenicsx.checks import instance, number, positive, refuse
 from cosserat_fenicsx.drilling.bit_laws import BitOnRock, Stribeck
-from cosserat_fenicsx.drilling.hook import Hook
 from cosserat_fenicsx.drilling.linear.impedances import Guide, axial, torsional
 from cosserat_fenicsx.drilling.scene import Drilling
 from cosserat_fenicsx.drilling.segments import Discs
-from cosserat_fenicsx.drilling.top_drive import PI, RULES, Motor, TopDrive
+from cosserat_fenicsx.drilling.top_drive import PI, RULES, Hook, TopDrive
 from cosserat_fenicsx.well.components import DrillString
 
 
@@ -57,7 +56,7 @@ def natural_frequencies(scene: Drilling, count: int, bit: str = "free", kind: st
         refuse("natural_frequencies", "bit", bit, "'free' or 'fixed'")
     if kind not in ("torsion", "axial"):
         refuse("natural_frequencies", "kind", kind, "'torsion' or 'axial'")
-    if kind == "torsion" and isinstance(scene.string, Discs):
+    if kind == "torsion" and scene.discs:
         return _of_discs(scene, bit)[:count]
     guide, top = (axial(scene), _hook(scene)) if kind == "axial" else (torsional(scene), _drive(scene))
     found = _circular(guide, count, bit == "fixed", top) / (2 * math.pi)
@@ -66,7 +65,7 @@ def natural_frequencies(scene: Drilling, count: int, bit: str = "free", kind: st
 
 def _drive(scene):
     """tan psi at the top as (numerator, denominator) of w and the impedance."""
-    if isinstance(scene.drive.control, Motor):
+    if scene.drive.speed is None:
         return lambda w, Z: (Z, -scene.drive.inertia * w)
     return lambda w, Z: (0.0, 1.0)
 
@@ -116,7 +115,7 @@ def _of_discs(scene, bit):
     inertias[-1] += scene.bit.inertia if scene.bit else 0.0
     k = np.array(string.stiffnesses)
     stiffness = np.diag(np.append(k, 0.0) + np.append(0.0, k)) - np.diag(k, 1) - np.diag(k, -1)
-    kept = slice(0 if isinstance(scene.drive.control, Motor) else 1, len(inertias) - (bit == "fixed"))
+    kept = slice(0 if scene.drive.speed is None else 1, len(inertias) - (bit == "fixed"))
     if kept.start == kept.stop:
         return np.array([])
     squares = eigh(stiffness[kept, kept], np.diag(inertias[kept]), eigvals_only=True)
@@ -167,7 +166,7 @@ def _matched(name, string, inertia, depth, bit_inertia):
         name, "bit_inertia", bit_inertia, "a number (kg m^2), not negative", lambda x: 0 <= x < math.inf
     )
     if isinstance(string, Drilling):
-        string, depth = string.string, None if isinstance(string.string, Discs) else string.bit_depth
+        string, depth = string.string, None if string.discs else string.bit_depth
     if isinstance(string, Discs):
         refuse(name, "string", string, "a string of components: discs have no impedance; choose PI(Kp, Ki)")
     if not isinstance(string, DrillString):

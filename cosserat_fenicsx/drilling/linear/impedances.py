@@ -17,10 +17,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from cosserat_fenicsx.checks import refuse
-from cosserat_fenicsx.drilling.hook import Hook
-from cosserat_fenicsx.drilling.segments import Discs
 from cosserat_fenicsx.drilling.steady_start import follows_the_bit
-from cosserat_fenicsx.drilling.top_drive import PI, Matched, Motor, Stiff
+from cosserat_fenicsx.drilling.top_drive import Hook
 
 #: |g L|^2 below which sinh(g L)/g and its derivative are taken from their series, of which 1e-16 is left out.
 _SMALL = 1e-2
@@ -199,37 +197,26 @@ def _free(s):
 
 def _drive_top(drive, impedance):
     """What the drive does: (om, M) at the top and their derivatives, free of poles."""
-    control, inertia = drive.control, drive.inertia
-    if isinstance(control, Stiff):
+    (rigid, _, Kp, Ki), inertia = drive.control.gains(impedance), drive.inertia
+    if rigid:
         return _held
-    if isinstance(control, PI) and control.Ki:
-        Kp, Ki = control.Kp, control.Ki
+    if Ki:
         return lambda s: (s, -(inertia * s**2 + Kp * s + Ki), 1.0, -(2 * inertia * s + Kp))
-    if isinstance(control, PI):
-        resistance = control.Kp
-    elif isinstance(control, Motor):
-        resistance = control.drag
-    else:
-        assert isinstance(control, Matched)
-        resistance = control.impedance or impedance
-    return lambda s: (1.0, -(inertia * s + resistance), 0.0, -inertia)
+    return lambda s: (1.0, -(inertia * s + Kp), 0.0, -inertia)
 
 
 def torsional(scene, drive=None) -> Guide:
     """The guide of torsional waves of a `Drilling` scene, with its drive or another one."""
     drive = drive or scene.drive
     bit = scene.bit.inertia if scene.bit else 0.0
-    if isinstance(scene.string, Discs):
-        string = scene.string
-        n = len(string.inertias)
+    string = scene.discs
+    if string:
         lower = zip((*string.stiffnesses, None), (*string.dampings, 0.0), strict=True)
         parts = tuple(
             Disc(J, c, k, d, f"disc {i + 1}")
             for i, (J, c, (k, d)) in enumerate(zip(string.inertias, string.drags, lower, strict=True))
         )
-        if isinstance(drive.control, Matched) and drive.control.impedance is None:
-            refuse(drive.control, "impedance", None, f"an impedance (N m s/rad): {n} discs have none of their own")
-        return Guide("torsion", parts, bit, _drive_top(drive, parts[0].impedance), drive.inertia)
+        return Guide("torsion", parts, bit, _drive_top(drive, None), drive.inertia)
     rate = scene.drag.torsion if scene.drag else 0.0
     parts = tuple(Uniform(x.length, x.GJ, x.rhoJ, rate, x.name) for x in scene.segments)
     return Guide("torsion", parts, bit, _drive_top(drive, parts[0].impedance), drive.inertia)
@@ -241,7 +228,7 @@ def axial(scene) -> Guide:
     Raises:
         SceneError: the string is made of discs, which turn alone.
     """
-    if isinstance(scene.string, Discs):
+    if scene.discs:
         refuse(scene, "string", scene.string, "a DrillString: discs turn alone")
     stiffness = (scene.hook or Hook()).stiffness
     top = _held if np.isinf(stiffness) else lambda s: (s, -stiffness, 1.0, 0.0)

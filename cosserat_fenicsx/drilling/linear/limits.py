@@ -11,7 +11,6 @@ from cosserat_fenicsx.drilling.linear.characteristic import Steady, box_up_to
 from cosserat_fenicsx.drilling.linear.impedances import torsional
 from cosserat_fenicsx.drilling.linear.roots import all_roots
 from cosserat_fenicsx.drilling.scene import Drilling
-from cosserat_fenicsx.drilling.single_valued import slope, stribeck_of
 from cosserat_fenicsx.errors import NotConverged
 
 #: Degree of the polynomials that a piece of the imaginary axis is interpolated by, and how well they must do.
@@ -109,10 +108,13 @@ def limit_weight(scene: Drilling, speed: float, *, up_to: float = 10.0) -> float
         SceneError: a law whose torque does not depend on the weight.
     """
     speed = positive("limit_weight", "speed", speed, "rad/s")
-    law = stribeck_of(scene.bit.law) if scene.bit else None
-    if law is None or law.radius is None:
+    law = scene.bit.law if scene.bit else None
+    if law is None or law.drills or not law.needs_weight or law.resistance(1.0) is None:
         refuse("limit_weight", "scene", scene.bit, "a bit with a Stribeck law and a radius")
-    per_newton = slope(law, speed, 1.0)
+    per_newton, per_kilonewton = (law.resistance(weight).slope(speed) / weight for weight in (1.0, 1e3))
+    if not math.isclose(per_newton, per_kilonewton, rel_tol=1e-4):
+        refuse("limit_weight", "scene", scene.bit, "a bit whose torque is proportional to the weight on bit; stability "
+               "takes any law")  # fmt: skip
     kappa, _ = critical_slope(scene, up_to)
     return abs(kappa / per_newton) if per_newton else math.inf
 
@@ -151,14 +153,13 @@ def limit_speed(
     steady = Steady(scene)
     if steady.cuts:
         return _limit_of_cutting(steady, weight, up_to, between, points)
-    law = stribeck_of(scene.bit.law)
-    if law is None or law.speed is None:
+    law = scene.bit.law.resistance(weight)
+    if law is None or law.steepest == 0:
         return 0.0
-    steepest = slope(law, 0.0, weight)
     kappa, _ = critical_slope(scene, up_to)
-    if steepest >= kappa:
+    if -law.steepest >= kappa:
         return 0.0
-    return math.inf if kappa >= 0 else law.speed * math.log(steepest / kappa)
+    return math.inf if kappa >= 0 else law.slowest_with(kappa)
 
 
 def _limit_of_cutting(steady, weight, up_to, between, points):

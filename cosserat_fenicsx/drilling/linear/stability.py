@@ -6,13 +6,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from cosserat_fenicsx.checks import File, Numbers, number, positive, refuse
-from cosserat_fenicsx.drilling.bit_laws import Cutting
 from cosserat_fenicsx.drilling.linear.characteristic import Steady, box_up_to, or_none, speeds_and_weights
 from cosserat_fenicsx.drilling.linear.frequencies import SoftSpeed, SoftTorque, natural_frequencies, own_rule, with_rule
 from cosserat_fenicsx.drilling.linear.impedances import Disc, Uniform
 from cosserat_fenicsx.drilling.linear.roots import all_roots, follow
 from cosserat_fenicsx.drilling.scene import Drilling
-from cosserat_fenicsx.drilling.segments import Discs
 from cosserat_fenicsx.drilling.top_drive import Matched, Stiff, TopDrive
 from cosserat_fenicsx.well.tabular import Tabular
 
@@ -122,8 +120,8 @@ def usual_drives(scene):
     """{name: TopDrive} to compare with: others than that of the scene, those with an inertia where that has one; and
     where `SoftTorque` or `SoftSpeed` chose its gains, the drive of the scene itself by the name of that rule."""
     inertia, own = scene.drive.inertia, scene.drive.control
-    drives = {} if isinstance(own, Stiff) else {"stiff": TopDrive(0.0)}
-    if isinstance(scene.string, Discs):
+    drives = {} if own == Stiff() else {"stiff": TopDrive(0.0)}
+    if scene.discs:
         return drives
     if inertia:
         for name, choose in (("SoftTorque", SoftTorque), ("SoftSpeed", SoftSpeed)):
@@ -189,7 +187,7 @@ class Stability(Tabular):
             left_out.append(
                 "friction at the wall falls with the slip, which drives torsional modes, too: left out here"
             )
-        if isinstance(getattr(self.scene.bit, "law", None), Cutting) and hole is not None:
+        if self.scene.bit is not None and self.scene.bit.law.drills and hole is not None:
             left_out.append("friction at the wall damps axial motion of a string that rotates: left out here")
         return left_out
 

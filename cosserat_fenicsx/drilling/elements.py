@@ -1,7 +1,7 @@
 """The model of a string by elements: torsion alone, axial and torsional motion together, or discs.
 
 Method: linear elements, the implicit midpoint rule, and set-valued laws of wall and bit, which hold or slip within a
-step: Newton's method on their proximal maps with the mean velocities of the step as unknowns (laws.c). Friction at
+step: Newton's method on their proximal maps with the mean velocities of the step as unknowns (elements.c). Friction at
 the wall is a vector against the slip (V, r om), of a normal force per length by the soft string, the norm of
 T k n + w (e - (e.t) t), with the tension at the begin of the step. What is held in a step is at rest at its end. Steps
 that fail are halved. Energies and works balance to rounding and to the tolerance of Newton's method: the rule keeps
@@ -9,20 +9,16 @@ quadratic energies, and works are those of the step's own forces.
 """
 
 import math
-from pathlib import Path
 
 import numpy as np
 from scipy.optimize import brentq
 
 from cosserat_fenicsx.algebra.building import Pointers
 from cosserat_fenicsx.checks import number, positive, refuse
-from cosserat_fenicsx.drilling.axial_torsional.chain import chain_of, unresolved, usual_step
-from cosserat_fenicsx.drilling.axial_torsional.ends import end_of, forces_of
-from cosserat_fenicsx.drilling.bit_laws import Cutting
+from cosserat_fenicsx.drilling.chain import chain_of, unresolved, usual_step
+from cosserat_fenicsx.drilling.laws import SOURCES, InC, check_bit
 from cosserat_fenicsx.drilling.protocol import LEDGER, SERIES
-from cosserat_fenicsx.drilling.segments import Discs
 from cosserat_fenicsx.drilling.signals import ScalarSignal, intervals
-from cosserat_fenicsx.drilling.single_valued import check_bit, stribeck_of
 from cosserat_fenicsx.drilling.steady_start import (
     check_rock,
     check_steady,
@@ -30,10 +26,10 @@ from cosserat_fenicsx.drilling.steady_start import (
     steady_state,
     steady_velocities,
 )
-from cosserat_fenicsx.drilling.top_drive import PI, Matched, Motor, Stiff
+from cosserat_fenicsx.drilling.top_drive import Sampler
+from cosserat_fenicsx.drilling.wall_friction import law_of
 from cosserat_fenicsx.errors import NotConverged, SceneError
 
-SOURCES = tuple(Path(__file__).with_name(name) for name in ("model.c", "laws.c", "step.c"))
 _STATE = ("x", "v", "w", "force")
 _TRIALS = 30
 _ELEMENTS = 1_000_000
@@ -68,9 +64,8 @@ class AxialTorsional(Pointers):
     def __init__(self, scene, dt: float | None = None, elements: int | None = None, *, axial: bool = True, end=None):
         super().__init__(*SOURCES)
         check_bit(scene)
-        discs = isinstance(scene.string, Discs)
         self.scene, self._given_end, self.steps = scene, end, 0
-        self._asked, self._axial = elements, axial and not (discs and scene.string.masses is None)
+        self._asked, self._axial = elements, axial and not (scene.discs and scene.discs.masses is None)
         self.name = "axial and torsional" if self._axial else "torsion"
         if dt is not None:
             dt = positive("AxialTorsional", "dt", dt, "s")
@@ -85,6 +80,7 @@ class AxialTorsional(Pointers):
             if dt is not None:
                 self._refuse_step()
             self.dt /= 2
+        self._sampler = Sampler(scene.drive, self.dt) if scene.drive.control.sampled else None
         self._start()
         self.why = reasons(scene, self.depths, self.dt, axial=self._axial, wall=self._m.pieces > 0)
 
@@ -117,7 +113,7 @@ class AxialTorsional(Pointers):
         m, chain, n = self._m, self._chain, self._dofs
         nodes = len(chain.depths)
         m.nodes, m.dofs, m.hanging_top = nodes, n, chain.hanging_top
-        m.at_end = isinstance(self.scene.string, Discs)
+        m.at_end = self.scene.discs is not None
         for name in ("mass", "mass_off", "drag", "drag_off", "spring", "hanging"):
             self._array(name, getattr(chain, name))
         for name in (*_STATE, "a", "o", "rho", "b", "y", "c"):
@@ -133,8 +129,9 @@ class AxialTorsional(Pointers):
         m.pieces, m.fixed = len(wall.element), self._dofs == 1
         for name, values in vars(wall).items():
             self._array(name, values)
-        if friction is not None and friction.decays:
-            m.decay, m.of_rotation = friction.speed or 0.0, friction.of_rotation
+        self._wall, m.of_rotation, _ = law_of(friction)
+        self._laws = [InC(self._ffi, self._wall)]
+        self._laws[0].put(*(self._ffi.addressof(m[0], name) for name in ("wall", "curve")))
 
     def _set_bit(self, bit):
         m = self._m.bit
@@ -147,12 +144,15 @@ class AxialTorsional(Pointers):
             m.mass = mass[0] if self._m.at_end else bit.mass
             m.hanging = bit.weight or 0.0
         m.weight = bit.weight or 0.0
-        m.rock, m.share = self._axial and bit.weight is not None and not isinstance(bit.law, Cutting), 1.0
+        m.rock, m.share = self._axial and bit.weight is not None and not bit.law.drills, 1.0
         m.stiffness = bit.rock_stiffness if m.rock and np.isfinite(bit.rock_stiffness) else 0.0
-        law = stribeck_of(bit.law)
+        law = bit.law.resistance(bit.weight)
         if law is not None:
-            m.law, m.weighs, m.decay = 1, law.radius is not None, law.speed or 0.0
-            m.still, m.slipping = law.torques(1.0)
+            closed = law.function is None
+            m.law, m.weighs = 1, bit.law.needs_weight
+            per_weight = bit.law.resistance(1.0) if closed else law
+            self._laws.append(InC(self._ffi, per_weight, None if closed else bit.law.in_c()))
+            self._laws[1].put(*(self._ffi.addressof(m, name) for name in ("given", "curve")))
 
     def _set_hook(self, hook):
         top = self._m.top[0]
@@ -162,35 +162,37 @@ class AxialTorsional(Pointers):
         return ScalarSignal("Hook", "speed", 0.0, "m/s") if hook is None else hook.signal()
 
     def _set_drive(self, drive):
-        top, control = self._m.top[self._dofs - 1], drive.control
-        top.inertia, top.rigid = drive.inertia, isinstance(control, Stiff)
+        top, segments = self._m.top[self._dofs - 1], None if self.scene.discs else self.scene.segments
+        top.inertia = drive.inertia
         self._kept["mass"][0, -1] += drive.inertia
-        if isinstance(control, PI):
-            top.proportional, top.integral = control.Kp, control.Ki
-        elif isinstance(control, Matched):
-            top.constant, top.proportional = control.torque, control.impedance or self._impedance()
-        elif isinstance(control, Motor):
-            top.constant, top.proportional = control.torque, control.drag
+        if not drive.control.sampled:
+            gains = drive.control.gains(segments and segments[0].torsional_impedance)
+            top.rigid, top.constant, top.proportional, top.integral = gains
         return drive.signal()
-
-    def _impedance(self):
-        if isinstance(self.scene.string, Discs):
-            refuse("Matched", "impedance", None, "an impedance (N m s/rad): Discs have none")
-        return self.scene.segments[0].torsional_impedance
 
     # -- the start -----------------------------------------------------------------------------------------------------
 
     def _start(self):
         """The state at the time 0, and what acts on the bit beside a Stribeck law."""
         scene, axial, motion = self.scene, self._axial, np.zeros(2)
-        self.end = self._given_end or end_of(scene.bit, self._kept["x"][-1], motion, axial)
+        self._set_end(motion)
         if scene.start == "steady":
             check_steady(scene)
             if axial:
                 check_rock(scene)
             motion[1 - axial :] = steady_velocities(scene)[1 - axial :]
             self._set_steady(motion)
-            self.end = self._given_end or end_of(scene.bit, self._kept["x"][-1], motion, axial)
+            self._set_end(motion)
+
+    def _set_end(self, motion):
+        """What the law of the bit remembers, from the state now."""
+        bit, axial = self.scene.bit, self._axial
+        self.end = self._given_end
+        if self.end is None and bit is not None and axial:
+            self.end = bit.law.end(bit.weight or 0.0, self._kept["x"][-1], motion)
+        elif bit is not None and bit.law.drills and not axial:
+            refuse("BitOnRock", "law", bit.law, "a Stribeck or another law of the torque over the speed, for torsion "
+                   f"alone: {bit.law.lifts}; model='axial and torsional'")  # fmt: skip
 
     def _set_steady(self, motion):
         """All turns and moves as asked for, see `steady`."""
@@ -204,9 +206,10 @@ class AxialTorsional(Pointers):
 
         def found(down):
             motion[0] = down
-            bears = forces_of(self.scene.bit, motion)
+            bit = self.scene.bit
+            bears = np.zeros(2) if bit is None else bit.law.steady_forces(bit.weight or 0.0, motion)
             extra = (bears - [m.bit.hanging, 0.0])[unknowns]
-            return bears, *steady_state(motion[unknowns], self._chain, limits, (m.decay, m.of_rotation), extra)
+            return bears, *steady_state(motion[unknowns], self._chain, limits, (self._wall, m.of_rotation), extra)
 
         if self._axial and follows_the_bit(self.scene):  # what brakes the string takes a part of the weight on bit
             most = motion[0]
@@ -249,16 +252,22 @@ class AxialTorsional(Pointers):
 
     def advance(self, steps: int) -> np.ndarray:
         """See `StringModel.advance`."""
-        rows = intervals(self._signals, (self.steps, self.steps + steps), self.dt)
-        if self._axial:
-            rows[:, [1, 3]] *= -1  # the hook's speed is positive upwards
         records = np.full((steps, len(SERIES) + len(LEDGER)), np.nan)
-        start = self.steps
-        done = self._advance(rows, records) if self.end is None else self._advance_with_end(rows, records)
-        self.steps = start + int(rows[:done, -1].sum())
+        start, sampler, failed = self.steps, self._sampler, False
+        while self.steps < start + steps and not failed:
+            chunk = start + steps - self.steps
+            if sampler:
+                if self.steps % sampler.every == 0:
+                    top, kept = self._m.top[self._dofs - 1], self._kept
+                    now = kept["v"][0, -1], kept["x"][0, -1], top.force
+                    top.constant = sampler.torque(self.time, *map(float, now))
+                chunk = min(chunk, sampler.left(self.steps))
+            failed = self._do(chunk, records[self.steps - start :])
         times = np.arange(start + 1, self.steps + 1) * self.dt
         found = np.column_stack([times, records[: len(times)]])
-        if done < len(rows):
+        for law in self._laws:
+            law.raise_failure()
+        if failed:
             problem = NotConverged(
                 f"{self.name}: the step at t = {self.time:g} s does not converge however short it is made: expected a "
                 "smoother signal, or laws that fall less steeply"
@@ -267,9 +276,19 @@ class AxialTorsional(Pointers):
             raise problem
         return found
 
+    def _do(self, steps, records):
+        """Do so many steps; returns whether one failed."""
+        rows = intervals(self._signals, (self.steps, self.steps + steps), self.dt)
+        if self._axial:
+            rows[:, [1, 3]] *= -1  # the hook's speed is positive upwards
+        start = self.steps
+        done = self._advance(rows, records) if self.end is None else self._advance_with_end(rows, records)
+        self.steps = start + int(rows[:done, -1].sum())
+        return done < len(rows)
+
     def _advance(self, rows, records):
         cast = self._ffi.cast
-        return self._lib.advance(
+        return self._lib.advance_elements(
             self._m, len(rows), cast("double *", rows.ctypes.data), cast("double *", records.ctypes.data)
         )
 
@@ -288,7 +307,7 @@ class AxialTorsional(Pointers):
         bit = self._m.bit
         bit.force, bit.tangent, bit.flat = list(given.force), np.ravel(given.tangent).tolist(), given.flats
         if given.torque is not None:
-            bit.law, bit.still, bit.slipping = given.torque > 0, given.torque, given.torque
+            bit.law, bit.given.still, bit.given.slipping = given.torque > 0, given.torque, given.torque
         if given.rock is not None:
             bit.rock, (bit.floor, bit.sinking) = 1, given.rock
 
@@ -335,6 +354,8 @@ class AxialTorsional(Pointers):
         found["counts"] = np.array([self.steps, m.halved, m.iterations, m.most])
         if self.end is not None:
             found["end"] = self.end.memory()
+        if self._sampler:
+            found["control"], found["given"] = self._sampler.state.copy(), m.top[self._dofs - 1].constant
         return found
 
     def recall(self, memory: dict) -> None:
@@ -352,6 +373,8 @@ class AxialTorsional(Pointers):
         self.steps, m.halved, m.iterations, m.most = (int(x) for x in memory["counts"])
         if self.end is not None:
             self.end.recall(memory["end"])
+        if self._sampler:
+            self._sampler.state, m.top[self._dofs - 1].constant = memory["control"].copy(), float(memory["given"])
 
 
 def reasons(scene, depths, dt, *, axial, wall):
@@ -369,7 +392,7 @@ def reasons(scene, depths, dt, *, axial, wall):
             told.append(f"starts with {bit.weight:g} N on bit, without friction")
         else:
             told.append("starts hanging off bottom, without friction")
-        if bit is not None and bit.weight is not None and not isinstance(bit.law, Cutting):
+        if bit is not None and bit.weight is not None and not bit.law.drills:
             told += _of_rock(scene, depths, dt)
         if follows_the_bit(scene):
             told.append("without a Hook its load stays the same: the string follows the bit that drills")

@@ -11,9 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cosserat_fenicsx.drilling.segments import Discs
-from cosserat_fenicsx.drilling.wall import scene_pieces
-from cosserat_fenicsx.drilling.wall_friction import coefficients
+from cosserat_fenicsx.drilling.wall_friction import law_of, scene_pieces
 
 # Shares of the mass that couples neighbours.
 _LEAST, _MOST = 1 / 12, 0.235
@@ -53,7 +51,7 @@ class Wall:
     Attributes:
         element: number. first, second: the nodes that take the friction of its ends. share: of the second.
         length: m. curvature: 1/m. across, aside: weight along normal and binormal, N/m. tension: at rest, N.
-        still, slipping: coefficients of friction. radius: of contact, m.
+        factor: on the coefficients of friction. radius: of contact, m.
     """
 
     element: np.ndarray
@@ -65,16 +63,15 @@ class Wall:
     across: np.ndarray
     aside: np.ndarray
     tension: np.ndarray
-    still: np.ndarray
-    slipping: np.ndarray
+    factor: np.ndarray
     radius: np.ndarray
 
 
 def usual_step(scene, elements: int | None, axial: bool) -> float:
     """The time step (s) of a `Drilling` for so many elements, where none is asked for."""
     longest = min(_LONGEST, USUAL * time_of_impact(scene)) if axial else _LONGEST
-    if isinstance(scene.string, Discs):
-        discs, shortest = scene.string, math.inf
+    if scene.discs:
+        discs, shortest = scene.discs, math.inf
         for inertias, springs in ((discs.inertias, discs.stiffnesses), (discs.masses, discs.axial_stiffnesses)):
             if inertias is not None:
                 around = np.append(springs, 0.0) + np.append(0.0, springs)
@@ -89,8 +86,8 @@ def _travel_time(scene):
 
 def chain_of(scene, dt: float, elements: int | None, axial: bool) -> Chain:
     """The `Chain` of a `Drilling` for steps of `dt` (s), of about so many elements, or None for the usual number."""
-    if isinstance(scene.string, Discs):
-        return _chain_of_discs(scene.string, axial, _static_weight(scene) if axial else 0.0)
+    if scene.discs:
+        return _chain_of_discs(scene.discs, axial, _static_weight(scene) if axial else 0.0)
     if elements is None:
         elements = min(max(_travel_time(scene) / dt, _FEWEST), _MOST_ELEMENTS)
     return _chain_of_string(scene, dt, elements, axial)
@@ -107,7 +104,7 @@ def _chain_of_discs(discs, axial, weight):
         diagonal[1:] += between
         columns.append((np.array(inertia), np.zeros(n - 1), diagonal, -np.array(between), np.array(spring)))
     nothing = np.zeros(0)
-    wall = Wall(*[np.zeros(0, dtype=np.int32)] * 3, *[nothing] * 9)
+    wall = Wall(*[np.zeros(0, dtype=np.int32)] * 3, *[nothing] * 8)
     arrays = [np.ascontiguousarray(np.stack(parts, axis=1)) for parts in zip(*columns, strict=True)]
     return Chain(np.arange(n, dtype=float), *arrays, np.full(n - 1, -weight), -weight, wall)
 
@@ -149,7 +146,7 @@ def _against_the_wall(drilling, depths):
         total = np.concatenate([[0.0], np.cumsum([s.length * s.weight for s in segments])])
         below = total[-1] - np.interp(depths, ends, total) - weight
         nothing = np.zeros(0)
-        wall = Wall(*[np.zeros(0, dtype=np.int32)] * 3, *[nothing] * 9)
+        wall = Wall(*[np.zeros(0, dtype=np.int32)] * 3, *[nothing] * 8)
         return (below[:-1] + below[1:]) / 2, below[0], wall
     pieces = scene_pieces(drilling)
     cuts = np.union1d(np.concatenate([[0.0], pieces.bottom]), depths)
@@ -169,8 +166,8 @@ def _against_the_wall(drilling, depths):
     # a node with a drive, hook or bit has no friction beside: its neighbour takes it
     lowest = len(depths) - (1 if drilling.bit is None else 2)
     first, second = (np.clip(element + i, 1, lowest).astype(np.int32) for i in (0, 1))
-    still, slipping = coefficients(drilling.friction, pieces.friction[of])
-    wall = Wall(element.astype(np.int32), first, second, share, length, k, w * normal, w * b, tension, still, slipping,
+    factor = pieces.friction[of] if law_of(drilling.friction)[2] else np.ones_like(length)
+    wall = Wall(element.astype(np.int32), first, second, share, length, k, w * normal, w * b, tension, factor,
                 pieces.radius[of])  # fmt: skip
     return hanging, float(below[0]), wall
 
@@ -190,8 +187,8 @@ def time_of_impact(scene) -> float:
     bit = scene.bit
     if bit is None or math.isinf(bit.rock_stiffness):
         return math.inf
-    if isinstance(scene.string, Discs):
-        mass, impedance = bit.mass + (scene.string.masses or (math.inf,))[-1], 0.0
+    if scene.discs:
+        mass, impedance = bit.mass + (scene.discs.masses or (math.inf,))[-1], 0.0
     else:
         mass, impedance = bit.mass, scene.segments[-1].axial_impedance
     return max(math.sqrt(mass / bit.rock_stiffness), impedance / bit.rock_stiffness)
@@ -199,7 +196,7 @@ def time_of_impact(scene) -> float:
 
 def passing_time(scene, depths) -> float:
     """Time (s) that an axial wave takes along the lowest element of a string whose nodes have these depths (m)."""
-    return 0.0 if isinstance(scene.string, Discs) else float(depths[-1] - depths[-2]) / scene.segments[-1].axial_speed
+    return 0.0 if scene.discs else float(depths[-1] - depths[-2]) / scene.segments[-1].axial_speed
 
 
 def unresolved(scene, depths, dt) -> str:

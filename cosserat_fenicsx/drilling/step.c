@@ -215,7 +215,7 @@ static void commit(model *m, double h, const double *signal)
     /* of a torque by the weight of the step before, what its impulse makes is one, too */
     m->bit.torque = m->bit.told[1] = force[1];
     if (m->bit.weighs && m->bit.share < 1) {
-        const double most = m->bit.share * m->bit.factor * m->bit.still;
+        const double most = m->bit.share * m->bit.rubs.still;
         m->bit.told[1] = slips ? m->bit.share * force[1] : fmax(fmin(force[1], most), -most);
     }
     for (int j = 0; j < m->nodes * n; j++) {
@@ -232,6 +232,25 @@ static void commit(model *m, double h, const double *signal)
     if (n == 2 && on_rigid(m)) weigh(m, h, h * force[0] + given, stood, before);
 }
 
+/* The law of friction of a bit in the next step, by the weight on bit of the last one. */
+static void rub_by_weight(lower *bit)
+{
+    const double load = fmax(bit->weight, 0), stands = !bit->rock || bit->weight > 0;
+    friction f = bit->given;
+    if (f.other) {
+        double slope;
+        f.load = bit->weighs ? load : bit->hanging;
+        f.scale = bit->weighs ? load > 0 : stands;
+        f.still = f.scale > 0 ? resistance_of_other(&f, 0, &slope) : 0;
+        f.slipping = f.scale > 0 ? resistance_of_other(&f, 1e-6, &slope) : 0;
+    } else {
+        const double factor = bit->weighs ? load : stands;
+        f.still *= factor;
+        f.slipping *= factor;
+    }
+    bit->rubs = f;
+}
+
 static int step(model *m, double h, const double *from, const double *to)
 {
     double signal[2];
@@ -239,7 +258,7 @@ static int step(model *m, double h, const double *from, const double *to)
     for (int d = 0; d < m->dofs; d++) signal[d] = (from[d] + to[d]) / 2;
     if (!build(m, h)) return 0;
     if (!m->fixed) limits(m);
-    m->bit.factor = m->bit.weighs ? fmax(m->bit.weight, 0) : !m->bit.rock || m->bit.weight > 0;
+    rub_by_weight(&m->bit);
     /* a step that fails leaves the guess as it was */
     memcpy(m->guess, m->w, size);
     memcpy(m->guess + (size_t)m->nodes * m->dofs, m->force, size);
@@ -284,7 +303,7 @@ static void write_record(const model *m, double *row)
 
 /* Do intervals, rows (h, velocities asked for at the begin, at the end, whether a record is written). Returns how many
    were done; of one that fails nothing, or its first parts, have been done, which nobody may use. */
-int advance(model *m, int intervals, const double *interval, double *record)
+int advance_elements(model *m, int intervals, const double *interval, double *record)
 {
     const int n = m->dofs;
     for (int i = 0; i < intervals; i++, interval += 2 + 2 * n) {

@@ -1,0 +1,295 @@
+/* The equations of a step of the implicit midpoint rule for the mean velocities w:
+   (2 M/h + C + h/2 K) w = 2 M/h v - K x - friction - bit + drive. */
+enum { ITERATIONS = 60, PATIENCE = 15, HALVINGS = 12 };
+enum { AXIAL = 1, TURN = 2 }; /* bits of masks; of one unknown alone only the second */
+
+static inline int bit_of(const model *m, int d) { return m->dofs == 1 ? TURN : 1 << d; }
+
+/* Whether a set-valued law acts on the bit along the axis. */
+static inline int pushed(const model *m) { return m->bit.rock || m->bit.flat > 0; }
+
+/* Whether the bit stands on a rock that does not give way. */
+static inline int on_rigid(const model *m) { return m->bit.rock && m->bit.stiffness == 0; }
+
+/* Largest friction forces at the nodes from the tension now: the normal force of the soft string,
+   |T k n + w (e - (e.t) t)|. */
+void limits(model *m)
+{
+    const int n = m->dofs;
+    memset(m->limit, 0, 3 * (size_t)m->nodes * sizeof *m->limit);
+    for (int p = 0; p < m->pieces; p++) {
+        const double *x = m->x + (size_t)m->element[p] * n;
+        double T = m->tension[p];
+        if (n == 2 && !m->fixed) T += m->spring[2 * m->element[p]] * (x[2] - x[0]);
+        const double q = m->curvature[p] * T + m->across[p];
+        const double N = m->length[p] * sqrt(q * q + m->aside[p] * m->aside[p]);
+        const double part[2] = {(1 - m->share[p]) * N, m->share[p] * N};
+        for (int i = 0; i < 2; i++) {
+            double *limit = m->limit + 3 * (size_t)(i ? m->second[p] : m->first[p]);
+            limit[0] += m->factor[p] * part[i];
+            limit[2] += m->factor[p] * part[i] * m->radius[p];
+        }
+    }
+    for (int i = 0; i < m->nodes; i++) {
+        double *limit = m->limit + 3 * (size_t)i;
+        if (limit[0] > 0) limit[2] /= limit[0];
+        limit[1] = m->wall.slipping * limit[0];
+        limit[0] *= m->wall.still;
+    }
+}
+
+/* The law of friction at a node on the wall, against its slip (m/s). */
+static inline friction law_on_wall(const model *m, int i)
+{
+    const double *limit = m->limit + 3 * (size_t)i, r = m->of_rotation ? limit[2] : 1;
+    friction f = {limit[0], limit[1], r * m->wall.decay, m->wall.other, 1, 1 / r, 0};
+    if (f.other) f.scale = limit[0] / m->wall.still;
+    return f;
+}
+
+/* The matrix for steps of the length h, and what a node feels as its own inverse compliance, 1/(A^-1)_ii, which is the
+   best factor of proximal steps. 0 where the matrix is not positive. */
+int build(model *m, double h)
+{
+    const int n = m->dofs, last = m->nodes - 1;
+    if (h == m->h) return 1;
+    m->h = h;
+    for (int i = 0; i <= last; i++)
+        for (int d = 0; d < n; d++) {
+            const int j = i * n + d;
+            m->a[j] = 2 / h * m->mass[j] + m->drag[j];
+            if (i) m->a[j] += h / 2 * m->spring[j - n];
+            if (i < last) {
+                m->a[j] += h / 2 * m->spring[j];
+                m->o[j] = 2 / h * m->mass_off[j] + m->drag_off[j] - h / 2 * m->spring[j];
+            }
+        }
+    for (int d = 0; d < n; d++) {
+        const upper *top = m->top + d;
+        if (!top->rigid) m->a[d] += top->proportional + h / 2 * top->integral;
+        double above = top->rigid ? INFINITY : m->a[d], below = m->a[last * n + d];
+        for (int j = n + d; j <= last * n + d; j += n) {
+            above = m->rho[j] = m->a[j] - m->o[j - n] * m->o[j - n] / above;
+            if (!(above > 0)) return 0;
+        }
+        m->rho[d] = m->a[d];
+        for (int j = (last - 1) * n + d; j >= 0; j -= n) {
+            m->rho[j] -= m->o[j] * m->o[j] / below;
+            below = m->a[j] - m->o[j] * m->o[j] / below;
+        }
+    }
+    return 1;
+}
+
+/* Whether all laws are single-valued in steps of the length h: with the steepest slopes of all falling laws at once the
+   matrices stay positive. Returns the smallest pivot over its diagonal. */
+double steepest(model *m, double h)
+{
+    const int n = m->dofs, last = m->nodes - 1, turn = n - 1;
+    double smallest = 1;
+    if (!build(m, h)) return -1;
+    for (int d = 0; d < n; d++) {
+        double pivot = INFINITY;
+        for (int i = m->top[d].rigid; i <= last; i++) {
+            const int j = i * n + d;
+            const friction wall = law_on_wall(m, i);
+            const double r = m->limit[3 * (size_t)i + 2];
+            double slope = wall.still > 0 ? fall(&wall) * (d == turn ? r * r : 1) : 0;
+            if (i == last && d == turn && m->bit.law)
+                slope += fall(&m->bit.given) * (m->bit.weighs && !m->bit.given.other ? m->bit.weight : 1);
+            pivot = m->a[j] - slope - (i ? m->o[j - n] * m->o[j - n] / pivot : 0);
+            smallest = fmin(smallest, pivot / m->a[j]);
+            if (!(pivot > 0)) return smallest;
+        }
+    }
+    return smallest;
+}
+
+/* b = 2 M/h v - K x + drive, with the mean signals of the step. */
+static void loads(model *m, double h, const double *signal)
+{
+    const int n = m->dofs, last = m->nodes - 1;
+    const double *v = m->v, *x = m->x;
+    for (int i = 0; i <= last; i++)
+        for (int d = 0; d < n; d++) {
+            const int j = i * n + d;
+            double p = m->mass[j] * v[j], f = 0;
+            if (i) p += m->mass_off[j - n] * v[j - n], f -= m->spring[j - n] * (x[j] - x[j - n]);
+            if (i < last) p += m->mass_off[j] * v[j + n], f += m->spring[j] * (x[j + n] - x[j]);
+            m->b[j] = 2 / h * p + f;
+        }
+    for (int d = 0; d < n; d++) {
+        const upper *top = m->top + d;
+        if (!top->rigid)
+            m->b[d] += top->constant + top->proportional * signal[d]
+                       + top->integral * (top->error + h / 2 * signal[d]);
+    }
+    for (int d = 0; d < n; d++) m->b[last * n + d] -= m->bit.force[d + 2 - n];
+    if (n == 2) m->b[2 * last] += m->bit.hanging; /* a part of what the bit bears is in the tension at rest */
+}
+
+/* The force on a node that is missing in its equation without laws: b - A w. */
+static double missing(const model *m, int i, int d)
+{
+    const int n = m->dofs, last = m->nodes - 1, j = i * n + d;
+    double r = m->b[j] - m->a[j] * m->w[j];
+    if (i) r -= m->o[j - n] * m->w[j - n];
+    if (i < last)
+        r -= m->o[j] * m->w[j + n];
+    else
+        for (int k = 0; k < n; k++) r -= m->bit.tangent[2 * (d + 2 - n) + k + 2 - n] * m->w[j - d + k];
+    return r;
+}
+/* Set-valued laws: friction at the wall, a vector against the slip (V, r om), and the torque of the bit.
+
+   Newton's method on the law's proximal map. With the force F and the slip s of an iteration, tau = F + rho s. Where
+   tau is within the limit the node is held. Elsewhere the slip s* that belongs to tau, F(s*) + rho s* = tau, is found
+   first, and the law is linearised there: F = F* + D (s - s*). */
+
+static inline double length(double x, double y) { return sqrt(x * x + y * y); }
+
+/* Where the law of friction drops at once, a node is held by the static limit only while it has not slipped. */
+static double threshold(const model *m, int i, int mask, const friction *f)
+{
+    if (f->decay > 0 || f->still == f->slipping) return f->still;
+    return (m->held[i] & mask) == mask && !m->broken[i] ? f->still : f->slipping;
+}
+
+static double wall(model *m, int i)
+{
+    const int n = m->dofs;
+    const friction law = law_on_wall(m, i);
+    const double r = m->limit[3 * (size_t)i + 2];
+    const double s[2] = {n == 2 ? m->w[2 * i] : 0, r * m->w[i * n + n - 1]};
+    const double *F = m->force + (size_t)i * n;
+    double rho = m->rho[i * n + n - 1] / (r * r), *d = m->d + 3 * (size_t)i, *c = m->c + (size_t)i * n;
+    if (n == 2) rho = fmin(rho, m->rho[2 * i]);
+    rho *= m->ease;
+    rho = fmax(rho, 2 * fall(&law));
+    const double tau[2] = {n == 2 ? F[0] + rho * s[0] : 0, F[n - 1] + rho * s[1]};
+    const double size = length(tau[0], tau[1]);
+    const int both = n == 2 ? AXIAL | TURN : TURN;
+    if (size <= threshold(m, i, both, &law)) {
+        m->mask[i] |= both;
+        return length(s[0], s[1]);
+    }
+    m->broken[i] = 1;
+    double R, falling;
+    const double sigma = slides(&law, rho, size, &R, &falling, &m->inner);
+    const double turning = n == 2 ? R / fmax(sigma, 1e-300) : 0, e[2] = {tau[0] / size, tau[1] / size};
+    d[0] = turning + (falling - turning) * e[0] * e[0];
+    d[1] = (falling - turning) * e[0] * e[1];
+    d[2] = turning + (falling - turning) * e[1] * e[1];
+    if (n == 1) d[2] = falling;
+    if (n == 2) c[0] = e[0] * R - sigma * (d[0] * e[0] + d[1] * e[1]);
+    c[n - 1] = e[1] * R - sigma * (d[1] * e[0] + d[2] * e[1]);
+    d[1] *= r, d[2] *= r * r; /* from here on against w */
+    return length(s[0] - sigma * e[0], s[1] - sigma * e[1]);
+}
+
+/* The torque of the bit, at the last node, where the wall has no friction. */
+static double cut(model *m)
+{
+    const int n = m->dofs, i = m->nodes - 1, j = i * n + n - 1;
+    const friction *law = &m->bit.rubs;
+    const double s = m->w[j], rho = fmax(m->ease * m->rho[j], 2 * fall(law)), tau = m->force[j] + rho * s;
+    if (fabs(tau) <= threshold(m, i, TURN, law)) {
+        m->mask[i] |= TURN;
+        return fabs(s);
+    }
+    m->broken[i] = 1;
+    double R, falling;
+    const double sigma = slides(law, rho, fabs(tau), &R, &falling, &m->inner);
+    m->d[3 * i + 2] = falling;
+    m->c[j] = copysign(R - falling * sigma, tau);
+    return fabs(s - copysign(sigma, tau));
+}
+
+/* The weight on bit on a rock, which pushes but does not pull: on a rigid one, or on a spring that is as long at rest
+   as the static weight compresses it. */
+static double rest(model *m, double h)
+{
+    const int i = m->nodes - 1;
+    if (m->bit.stiffness > 0) {
+        const double k = m->bit.stiffness, still = k * (m->x[2 * i] - m->bit.middle) + m->bit.hanging;
+        const double pressed = still + k * h / 2 * m->w[2 * i];
+        if (pressed > 0) m->c[2 * i] = still, m->d[3 * i] = k * h / 2;
+        return fabs(m->force[2 * i] - fmax(pressed, 0)) / (m->rho[2 * i] + k * h / 2);
+    }
+    const double gap = (m->bit.face - m->x[2 * i]) / h, s = m->w[2 * i] - gap;
+    if (m->force[2 * i] + m->rho[2 * i] * s > 0) {
+        m->mask[i] |= AXIAL;
+        return fabs(s);
+    }
+    return fabs(m->force[2 * i] / m->rho[2 * i]);
+}
+
+/* The flats of a worn bit, which bear between nothing and twice their mean force: all where the bit moves down, nothing
+   where it moves up. The mean is a part of the given force. */
+static double rub(model *m)
+{
+    const int i = m->nodes - 1;
+    const double tau = m->force[2 * i] + m->rho[2 * i] * m->w[2 * i];
+    if (fabs(tau) <= m->bit.flat) {
+        m->mask[i] |= AXIAL;
+        return fabs(m->w[2 * i]);
+    }
+    m->c[2 * i] = copysign(m->bit.flat, tau);
+    return fabs(m->force[2 * i] - m->c[2 * i]) / m->rho[2 * i];
+}
+
+/* What all laws foretell from the state of the iteration, as masks of held unknowns and as linear laws c + d w.
+   Returns the largest difference to its slips, m/s or rad/s; the largest slip into *scale. */
+static double foretell(model *m, double h, double *scale)
+{
+    const int n = m->dofs, last = m->nodes - 1;
+    double error = 0, largest = 0;
+    for (int i = 0; i <= last; i++) {
+        const double *limit = m->limit + 3 * (size_t)i;
+        m->mask[i] = 0;
+        memset(m->d + 3 * (size_t)i, 0, 3 * sizeof *m->d);
+        memset(m->c + (size_t)i * n, 0, n * sizeof *m->c);
+        if (limit[0] > 0) {
+            error = fmax(error, wall(m, i));
+            const double s = limit[2] * m->w[i * n + n - 1];
+            largest = fmax(largest, fabs(s));
+            if (n == 2) largest = fmax(largest, fabs(m->w[2 * i]));
+        }
+    }
+    if (m->bit.law) {
+        error = fmax(error, cut(m));
+        largest = fmax(largest, fabs(m->w[last * n + n - 1]));
+    }
+    if (m->bit.rock) error = fmax(error, rest(m, h));
+    if (m->bit.flat > 0) {
+        error = fmax(error, rub(m));
+        largest = fmax(largest, fabs(m->w[2 * last]));
+    }
+    *scale = largest;
+    return error;
+}
+
+/* Forces of the laws that belong to the new w: of slipping nodes from the linear law, of held ones from balance. */
+static void take_forces(model *m)
+{
+    const int n = m->dofs, last = m->nodes - 1;
+    for (int i = 0; i <= last; i++) {
+        const double *limit = m->limit + 3 * (size_t)i, *d = m->d + 3 * (size_t)i;
+        double *F = m->force + (size_t)i * n;
+        const double *c = m->c + (size_t)i * n, *w = m->w + (size_t)i * n;
+        if (limit[0] > 0) {
+            const double r = limit[2];
+            if (m->mask[i]) {
+                if (n == 2) F[0] = missing(m, i, 0);
+                F[n - 1] = missing(m, i, n - 1) / r;
+            } else {
+                if (n == 2) F[0] = c[0] + d[0] * w[0] + d[1] * w[1];
+                F[n - 1] = c[n - 1] + (n == 2 ? d[1] / r * w[0] : 0) + d[2] / r * w[n - 1];
+            }
+        }
+    }
+    const int j = last * n + n - 1, mask = m->mask[last];
+    if (m->bit.law) m->force[j] = mask & TURN ? missing(m, last, n - 1) : m->c[j] + m->d[3 * last + 2] * m->w[j];
+    if (pushed(m))
+        m->force[2 * last] = mask & AXIAL ? missing(m, last, 0) : m->c[2 * last] + m->d[3 * last] * m->w[2 * last];
+}

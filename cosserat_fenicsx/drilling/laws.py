@@ -1,0 +1,246 @@
+"""Laws of friction, at the wall and at the bit: what resists a slip.
+
+A law resists with anything up to R(0) while nothing slips, and with R(s) against a slip s > 0, a speed. Models ask laws
+for a `Resistance`: the exponential law in closed form, or any other one as a function in Python. C sees it as a small
+record (strings.h), with the function called at one place, such as the bit, or sampled for many, such as the wall. The
+linear theory takes its slope.
+"""
+
+import functools
+import math
+import weakref
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from scipy.interpolate import PchipInterpolator
+from scipy.optimize import brentq
+
+from cosserat_fenicsx.checks import call, number
+from cosserat_fenicsx.errors import SceneError
+
+#: Of the models of strings in C.
+SOURCES = tuple(Path(__file__).with_name(f"{name}.c") for name in ("strings", "waves", "elements", "step"))
+#: Slips at which functions are sampled, 128 a decade: the error of a smooth law is about 1e-9 of it.
+SLIPS = np.geomspace(1e-6, 1e3, 9 * 128 + 1)
+# Relative step of slopes by differences; of a drop, the share of the change between neighbours that stays.
+_STEP, _STAYS, _HALVINGS = 1e-5, 0.5, 45
+
+
+@dataclass(frozen=True)
+class Resistance:
+    """R(s) = slipping + (still - slipping) exp(-s/decay), anything up to `still` at rest; or a function.
+
+    Attributes:
+        still: largest resistance at rest, N m or a coefficient of friction. slipping: that of fast slip; of a function
+            that just beyond the rest. decay: speed; 0 where the resistance drops at once, and for a function.
+        function: R(s) for a number s above 0, m/s or rad/s. fall: its steepest fall where it is continuous. drops:
+            whether it drops at some speed.
+    """
+
+    still: float
+    slipping: float
+    decay: float = 0.0
+    function: Callable[[float], float] | None = None
+    fall: float = 0.0
+    drops: bool = False
+
+    def __call__(self, s):
+        """R at slips (n,) or a number, above 0."""
+        if self.function is not None:
+            return np.vectorize(self.function, otypes=[float])(s)
+        falling = np.exp(-np.asarray(s) / self.decay) if self.decay > 0 else 0.0
+        return self.slipping + (self.still - self.slipping) * falling
+
+    def slope(self, s: float) -> float:
+        """dR/ds at a slip; the steepest one at 0."""
+        if s == 0:
+            return -self.steepest
+        if self.function is not None:
+            return slope_of(self.function, s)
+        return -self.steepest * math.exp(-s / self.decay) if self.decay > 0 else 0.0
+
+    @property
+    def kinetic(self) -> float:
+        """That of fast slip; of a function that at 1 m/s, or 1 rad/s."""
+        return self.slipping if self.function is None else self.function(1.0)
+
+    @property
+    def steepest(self) -> float:
+        """The steepest fall, -dR/ds, of where it does not drop at once."""
+        return (self.still - self.slipping) / self.decay if self.decay > 0 else self.fall
+
+    def slowest_with(self, slope: float) -> float:
+        """The slip from which on R falls less steeply than a slope, negative; 0 where it does so everywhere."""
+        if self.steepest <= -slope:
+            return 0.0
+        if self.function is None:
+            return self.decay * math.log(-self.steepest / slope)
+        steep = np.flatnonzero([self.slope(s) < slope for s in SLIPS])
+        if not len(steep):
+            return 0.0
+        if steep[-1] == len(SLIPS) - 1:
+            return math.inf
+        return brentq(lambda s: self.slope(s) - slope, *SLIPS[steep[-1] : steep[-1] + 2], xtol=1e-12)
+
+
+def slope_of(function, s):
+    """dR/ds of a function at s > 0, by differences."""
+    h = _STEP * s
+    return (function(s + h) - function(s - h)) / (2 * h)
+
+
+def by_function(owner, name, function) -> Resistance:
+    """The `Resistance` of a function R(s), s from 0 on, see `checked`.
+
+    Raises:
+        SceneError: its value is 0 at rest and not beyond; see `checked`.
+    """
+    still, values = function(0.0), np.array([function(s) for s in SLIPS])
+    if still == 0 and values.any():
+        raise SceneError(
+            f"{type(owner).__name__}.{name} = 0 at the speed 0: expected the largest value at rest, above 0 where "
+            "there is one in motion"
+        )
+    fall, drops = _steepest_fall(function, values)
+    return Resistance(still, float(values[0]), 0.0, function, fall, drops or still > values[0] * (1 + 1e-3))
+
+
+def checked(owner, name, *more):
+    """A method of an object of the user's as a function of a speed s from 0 on, with more arguments.
+
+    Raises:
+        SceneError: by the function, where the method fails, or its value is no number from 0 on.
+    """
+    method, where = getattr(owner, name), f"{type(owner).__name__}.{name}"
+
+    def function(s):
+        value = call(lambda x: method(x, *more), float(s), where, f" at the speed {s:g}")
+        return number(owner, name, value, f"a number, not negative, at the speed {s:g}", lambda x: 0 <= x < math.inf)
+
+    return function
+
+
+def _steepest_fall(function, values):
+    """The steepest fall between neighbours of `SLIPS` where a function is continuous; whether it drops elsewhere."""
+    falls, drops = -np.diff(values) / np.diff(SLIPS), False
+    for k in np.argsort(falls)[::-1]:
+        if falls[k] <= 0:
+            break
+        low, high, above, below = SLIPS[k], SLIPS[k + 1], values[k], values[k + 1]
+        for _ in range(_HALVINGS):
+            middle = (low + high) / 2
+            value = function(middle)
+            if above - value > value - below:
+                high, below = middle, value
+            else:
+                low, above = middle, value
+        if above - below < _STAYS * (values[k] - values[k + 1]):
+            return float(falls[k]), drops
+        drops = True
+    return 0.0, drops
+
+
+class InC:
+    """A `Resistance` for C, with what C refers to.
+
+    Args:
+        ffi: of the module in C. resistance: see there. function: of slip (a number) and load (N), which C calls for
+            every value; None: the resistance's own function, if it has one, is sampled.
+
+    Attributes:
+        failure: the exception that has ended the last call of the function, if any.
+    """
+
+    def __init__(self, ffi, resistance: Resistance, function=None):
+        self.failure, self.function, self._ffi, self._resistance = None, function, ffi, resistance
+        if function is not None:
+            _answers(ffi)
+            self._handle = ffi.new_handle(weakref.ref(self))
+        elif resistance.function is not None:
+            self._cubics = np.ascontiguousarray(PchipInterpolator(np.log(SLIPS), resistance(SLIPS)).c.T)
+
+    def fill(self, curve):
+        """Fill C's record of a `curve`; a law in closed form needs none, and leaves it empty."""
+        law = self._resistance
+        if law.function is None:
+            return
+        curve.fall, curve.drop = law.fall, math.inf if law.drops else law.fall
+        if self.function is not None:
+            curve.self = self._handle
+        else:
+            curve.count, curve.first = len(self._cubics), math.log(SLIPS[0])
+            curve.width = math.log(SLIPS[-1] / SLIPS[0]) / len(self._cubics)
+            curve.cubics = self._ffi.cast("double *", self._cubics.ctypes.data)
+
+    def put(self, friction, curve):
+        """Fill C's record of a `friction`, and that of its curve; both are pointers."""
+        law = self._resistance
+        friction.still, friction.slipping, friction.decay = law.still, law.slipping, law.decay
+        friction.scale = friction.reach = 1.0
+        self.fill(curve)
+        if law.function is not None:
+            friction.other = curve
+
+    def raise_failure(self):
+        """Raise the exception that was kept, if any."""
+        failure, self.failure = self.failure, None
+        if failure is not None:
+            raise failure
+
+
+@functools.cache
+def _answers(ffi):
+    """Let C call the functions of `InC`."""
+
+    def keep(kind, failure, trace):  # C cannot pass it on
+        ffi.from_handle(trace.tb_frame.f_locals["owner"])().failure = failure.with_traceback(trace)
+
+    @ffi.def_extern(name="call_law", error=math.nan, onerror=keep)
+    def called(owner, slip, load, slope):
+        function = ffi.from_handle(owner)().function
+        slope[0] = slope_of(lambda s: function(s, load), slip) if slip > 0 else 0.0
+        return function(slip, load)
+
+    return called
+
+
+def refuse_several_speeds(slope: float, impedance: float, inertia: float, where: str = "") -> None:
+    """Refuse a bit whose torque falls faster than the string can follow.
+
+    A wave that arrives at the lower end, where there is no inertia, meets the condition T(om) + Z om = 2 M_in, with the
+    impedance Z of the lowest section, J sqrt(G rho), and the torque M_in of the wave. Where the torque T of the bit
+    falls faster than Z om grows, several speeds satisfy it, and the linear theory has unstable roots at all
+    frequencies.
+
+    Args:
+        slope: dT/dom, N m s/rad; only a falling one, negative, can be refused.
+        impedance: of the string at the bit, N m s/rad: J sqrt(G rho) of its lowest section, or that of one time step.
+        inertia: at the bit, kg m^2; with any, the speed is single-valued.
+        where: at which speed and weight, such as " at 3 rad/s".
+
+    Raises:
+        SceneError: -slope is not below the impedance, and there is no inertia.
+    """
+    if inertia == 0 and -slope >= impedance:
+        raise SceneError(
+            f"BitOnRock.law: its torque falls by {-slope:.6g} N m per rad/s{where}, and the impedance of the string at "
+            f"the bit is {impedance:.6g} N m s/rad: expected a law less steep than that, or BitOnRock.inertia (kg m^2) "
+            "above 0; without inertia several speeds of the bit are possible at the same time"
+        )
+
+
+def check_bit(scene) -> None:
+    """Refuse the bit of a `Drilling` scene whose law is at its steepest, at slow rotation, too steep for the string.
+
+    A torque that drops at once from the static to the dynamic one passes: there the bit sticks until the static torque
+    is reached, and slips with the dynamic one.
+
+    Raises:
+        SceneError: see `refuse_several_speeds`.
+    """
+    law = None if scene.bit is None else scene.bit.law.resistance(scene.bit.weight)
+    if law is not None and scene.discs is None:  # the last one of Discs has inertia
+        impedance = scene.segments[-1].torsional_impedance
+        refuse_several_speeds(-law.steepest, impedance, scene.bit.inertia, " at slow rotation")
