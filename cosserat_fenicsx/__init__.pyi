@@ -44,7 +44,6 @@ from cosserat_fenicsx.drilling.scenefile import DrillingScene as DrillingScene
 from cosserat_fenicsx.drilling.scenefile import read_drilling_scene as read_drilling_scene
 from cosserat_fenicsx.drilling.segments import Discs as Discs
 from cosserat_fenicsx.drilling.simulate import read_drilling as read_drilling
-from cosserat_fenicsx.drilling.simulate import resume_drilling as resume_drilling
 from cosserat_fenicsx.drilling.simulate import simulate_drilling as simulate_drilling
 from cosserat_fenicsx.drilling.stick_slip import StickSlip as StickSlip
 from cosserat_fenicsx.drilling.top_drive import PI as PI
@@ -56,7 +55,6 @@ from cosserat_fenicsx.drilling.wall_friction import ViscousDrag as ViscousDrag
 from cosserat_fenicsx.drilling.wall_friction import WallFriction as WallFriction
 from cosserat_fenicsx.dynamics.natural_modes import modes as modes
 from cosserat_fenicsx.dynamics.resuming import read_history as read_history
-from cosserat_fenicsx.dynamics.resuming import resume as resume
 from cosserat_fenicsx.dynamics.simulate import simulate as simulate
 from cosserat_fenicsx.errors import CosseratError as CosseratError
 from cosserat_fenicsx.errors import InstallationError as InstallationError
@@ -123,6 +121,7 @@ from cosserat_fenicsx.statics.linear_buckling import buckling as buckling
 from cosserat_fenicsx.statics.path.load_control import StepControl as StepControl
 from cosserat_fenicsx.statics.path.recorder import read_path as read_path
 from cosserat_fenicsx.statics.solve import solve as solve
+from cosserat_fenicsx.storage.store import resume as resume
 from cosserat_fenicsx.studies.outcome import Study as Study
 from cosserat_fenicsx.studies.study import study as study
 from cosserat_fenicsx.well.answer import TorqueAndDrag as TorqueAndDrag

@@ -25,11 +25,17 @@ _watched = None  # the process that `watch` was called in
 class Alone:
     """The communicator of a process that is alone, for what needs no MPI otherwise."""
 
-    rank = 0
+    rank, size = 0, 1
 
     @staticmethod
     def bcast(value):
         return value
+
+    @staticmethod
+    def gather(value):
+        return [value]
+
+    allgather = gather
 
 
 def launched():

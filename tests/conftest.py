@@ -18,6 +18,10 @@ from cosserat_fenicsx.ranks import end_all
 COMM = MPI.COMM_WORLD
 
 
+def pytest_addoption(parser):
+    parser.addoption("--mutations", type=int, default=12, help="damaged folders of each kind of computation")
+
+
 @pytest.hookimpl(trylast=True)
 def pytest_configure(config):
     if COMM.rank != 0:

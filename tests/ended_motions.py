@@ -10,7 +10,7 @@ from test_schemes import everything
 
 import cosserat_fenicsx as cf
 from cosserat_fenicsx.models.moving import Moving
-from cosserat_fenicsx.storage import runfolder
+from cosserat_fenicsx.storage.store import Store
 
 SMALL = {"elements": 4, "degree": 2}
 CASES = {
@@ -41,8 +41,8 @@ def stop_at(monkeypatch, step, apart):
             raise Stopped
 
     monkeypatch.setattr(Moving, "accept", accept_or_stop)
-    monkeypatch.setattr(runfolder, "APART", apart)
-    monkeypatch.setattr(runfolder, "SELDOM", 0)
+    monkeypatch.setattr(Store, "APART", apart)
+    monkeypatch.setattr(Store, "SELDOM", 0)
 
 
 def run(case, folder=None):
@@ -81,5 +81,5 @@ def kill_in(case, step, folder):
             os.kill(os.getpid(), signal.SIGKILL)
 
     Moving.accept = accept_or_die
-    runfolder.APART, runfolder.SELDOM = 0.05, 0
+    Store.APART, Store.SELDOM = 0.05, 0
     run(case, folder)

@@ -1,8 +1,5 @@
 """A torsional pendulum as a `StringModel`, for tests of what is around the models; and the scene that it belongs to."""
 
-import os
-import signal
-
 import numpy as np
 
 import cosserat_fenicsx as cf
@@ -22,14 +19,12 @@ class Pendulum:
         self.depths = np.linspace(0.0, 1000.0, 5)
         self.angle = self.speed = self.top = self.work = self.lost = self.torque = 0.0
         self.delayed = np.zeros(10)
-        self.dies_at = self.fails_at = self.stops_at = None
+        self.fails_at = self.stops_at = None
 
     def advance(self, steps):
         return np.array([self._step() for _ in range(steps)])
 
     def _step(self):
-        if self.steps == self.dies_at:
-            os.kill(os.getpid(), signal.SIGKILL)
         if self.steps == self.stops_at:
             raise KeyboardInterrupt
         if self.steps == self.fails_at:
@@ -86,17 +81,3 @@ def use(monkeypatch, **settings):
         return model
 
     monkeypatch.setattr(simulate, "model_of", made)
-
-
-def kill_in(folder, step):
-    """In a process of its own: a motion that is killed in the middle of a step."""
-    from cosserat_fenicsx.drilling import folder as storage
-    from cosserat_fenicsx.drilling import simulate, time_loop
-
-    def made(scene, name, dt, elements):
-        model = Pendulum(scene, dt, elements)
-        model.dies_at = step
-        return model
-
-    simulate.model_of, storage.APART, storage.SELDOM, time_loop.CHUNK = made, 0.0, 0, 37
-    cf.simulate_drilling(scene(), 30.0, folder=folder)

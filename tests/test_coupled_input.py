@@ -6,7 +6,7 @@ import pytest
 import cosserat_fenicsx as cf
 from cosserat_fenicsx.cli.explain import explain
 from cosserat_fenicsx.statics.meshes import first_layout
-from cosserat_fenicsx.storage.described import difference, fingerprint
+from cosserat_fenicsx.storage.mark import difference, mark_of
 
 pytestmark = pytest.mark.serial
 EYE = np.eye(6)
@@ -157,8 +157,9 @@ force = [0.01, 0, 0]
 
 def test_a_stored_motion_knows_its_matrix():
     one, other = (scene(in_plane((0.05, y)))[1] for y in (0.0, 0.01))
-    assert difference(fingerprint(one, 1.0), fingerprint(one, 1.0)) is None
-    assert "rods[0]: matrix at s" in difference(fingerprint(one, 1.0), fingerprint(other, 1.0))
+    one, same, other = (mark_of(x, "Scene", [0.0]) for x in (one, one, other))
+    assert difference(one, same, "motion") is None
+    assert "Scene.rods[0].section" in difference(one, other, "motion")
 
 
 def test_the_first_mesh_sees_axes_that_turn_along_the_rod():

@@ -93,7 +93,7 @@ def test_every_model_moves_and_goes_on(changed, settings, tmp_path):
     given = scene(**changed)
     whole = cf.simulate_drilling(given, 6.0, check=True, **settings)
     cf.simulate_drilling(given, 3.0, folder=tmp_path / "part", profile_every=6.0 / 400, **settings)
-    again = cf.resume_drilling(tmp_path / "part", duration=6.0)
+    again = cf.resume(tmp_path / "part", duration=6.0)
     assert np.array_equal(again.rows, whole.rows, equal_nan=True) and np.isfinite(whole.errors.peak)
     assert np.array_equal(again.angle, whole.angle) and again.sticking.shape == again.speed.shape
     assert whole.times[-1] == pytest.approx(6.0, abs=whole.dt) and "Estimated errors by the step" in str(whole)

@@ -30,9 +30,9 @@ def scene_of(kind):
 
 def run_in(folder, kind):
     """In a process of its own: a motion that keeps its state as often as it can."""
-    from cosserat_fenicsx.drilling import folder as storage
+    from cosserat_fenicsx.storage.store import Store
 
-    storage.APART, storage.SELDOM = 0.0, 0
+    Store.APART, Store.SELDOM = 0.0, 0
     cf.simulate_drilling(scene_of(kind), DURATION, folder=folder)
 
 
@@ -43,14 +43,14 @@ def test_kill_9(kind, tmp_path):
     process = subprocess.Popen([sys.executable, "-c", f"{code} t.run_in({str(place)!r}, {kind!r})"])
     until = time.monotonic() + 60
     while process.poll() is None and time.monotonic() < until:
-        if (place / "series.f64").exists() and (place / "series.f64").stat().st_size > 2e5:
+        if (place / "series.npy").exists() and (place / "series.npy").stat().st_size > 2e5:
             break
         time.sleep(0.001)
     process.kill()
     process.wait()
     whole = cf.simulate_drilling(scene_of(kind), DURATION)
     assert 0 < len(cf.read_drilling(place)) < len(whole)
-    again = cf.resume_drilling(place)
+    again = cf.resume(place)
     assert np.array_equal(again.rows, whole.rows, equal_nan=True) and again.counts == whole.counts
     for name in ("profile_times", "angle", "speed", "torque", "tension", "sticking"):
         assert np.array_equal(getattr(again, name), getattr(whole, name), equal_nan=name != "sticking"), name

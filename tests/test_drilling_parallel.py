@@ -5,19 +5,19 @@ import pytest
 from fake_string import scene
 
 import cosserat_fenicsx as cf
-from cosserat_fenicsx.drilling import folder as storage
+from cosserat_fenicsx.storage.store import Store
 
 pytestmark = pytest.mark.ranks
 
 
 def test_ranks_share_a_folder(tmp_path_all, monkeypatch):
-    monkeypatch.setattr(storage, "APART", 0.0)
-    monkeypatch.setattr(storage, "SELDOM", 0)
+    monkeypatch.setattr(Store, "APART", 0.0)
+    monkeypatch.setattr(Store, "SELDOM", 0)
     given = scene(bit=cf.BitOnRock(cf.Stribeck(6e3, 4e3, 3.0), inertia=50.0))
     history = cf.simulate_drilling(given, 10.0, folder=tmp_path_all / "one", profile_every=1.0)
     alone = cf.simulate_drilling(given, 15.0, profile_every=1.0)
     assert np.array_equal(history.rows, alone.rows[: len(history)], equal_nan=True)
-    again = cf.resume_drilling(tmp_path_all / "one", duration=15.0)
+    again = cf.resume(tmp_path_all / "one", duration=15.0)
     assert np.array_equal(again.rows, alone.rows, equal_nan=True) and np.array_equal(again.speed, alone.speed)
     history.write(tmp_path_all / "out.csv")
     history.plot(tmp_path_all / "out.png")

@@ -28,7 +28,7 @@ pipe, path = cf.DrillPipe(size="5 in 19.50 lb/ft"), cf.WellPath.from_survey([0, 
 given = cf.Borehole(path, cf.HoleSection(1000.0, 0.2, 0.2)), cf.DrillString([pipe]), cf.TripOut(), [1000.0]
 if rank == 1:
     raise ValueError("one rank")
-cf.depth_sweep(*given, mud=cf.Mud(1200.0), model="soft", file="sweep.jsonl")
+cf.depth_sweep(*given, mud=cf.Mud(1200.0), model="soft", folder="sweep")
 """
 SOLVE = """
 rod = cf.Rod(cf.Line((0, 0, 0), (0, 0, 1)), cf.Circle(0.1), cf.Material(E=1e9, nu=0.3), name="rod")

@@ -20,7 +20,7 @@ from cosserat_fenicsx.cli.drilling import explain_drilling
 from cosserat_fenicsx.cli.main import main
 from cosserat_fenicsx.cli.options import parser
 from cosserat_fenicsx.cli.well import explain_well
-from cosserat_fenicsx.storage.described import task_described
+from cosserat_fenicsx.storage.mark import mark_of
 
 pytestmark = pytest.mark.serial
 DEMOS = Path(__file__).parent.parent / "demos"
@@ -199,9 +199,9 @@ def test_a_type_error_from_inside_stays():
 def test_public_functions_are_those_of_their_modules():
     """For pickle, and for what a study knows a task by."""
     assert pickle.loads(pickle.dumps(cf.euler_load)) is cf.euler_load
-    told = task_described(cf.euler_load)
-    assert told["function"] == "cosserat_fenicsx.scene.rod.euler_load" and told != task_described(cf.solve)
-    assert task_described(cf.euler_load)["code"] == task_described(cf.euler_load.__wrapped__)["code"]
+    told = mark_of(cf.euler_load)
+    assert told[": function"] == "cosserat_fenicsx.scene.rod.euler_load" and told != mark_of(cf.solve)
+    assert told[": code"] == mark_of(cf.euler_load.__wrapped__)[": code"]
     again = pickle.loads(pickle.dumps(cf.Circle(0.1)))
     assert again == cf.Circle(0.1) and copy.copy(again) == again
 

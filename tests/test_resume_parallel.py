@@ -10,7 +10,7 @@ from moving_scenes import right_angle
 
 import cosserat_fenicsx as cf
 from cosserat_fenicsx.models.moving import Moving
-from cosserat_fenicsx.storage import runfolder
+from cosserat_fenicsx.storage.store import Store
 
 pytestmark = pytest.mark.ranks
 
@@ -33,8 +33,8 @@ def test_it_goes_on(tmp_path_all, monkeypatch):
             raise Stopped
 
     monkeypatch.setattr(Moving, "accept", accept_or_stop)
-    monkeypatch.setattr(runfolder, "APART", 0.02)
-    monkeypatch.setattr(runfolder, "SELDOM", 0)
+    monkeypatch.setattr(Store, "APART", 0.02)
+    monkeypatch.setattr(Store, "SELDOM", 0)
     with pytest.raises(Stopped):
         cf.simulate(scene, **ASKED, folder=tmp_path_all / "motion")
     history = cf.resume(tmp_path_all / "motion")

@@ -1,13 +1,13 @@
 """Motions written to a folder: damaged files, other scenes, and requests that are refused."""
 
-import json
+import math
 
 import pytest
 from ended_motions import assert_same, part_of, rows, run
 from moving_scenes import flying_in_a_plane, flying_in_space
 
 import cosserat_fenicsx as cf
-from cosserat_fenicsx.storage import runfolder
+from cosserat_fenicsx.storage import files
 
 pytestmark = pytest.mark.serial
 
@@ -34,17 +34,10 @@ def test_damaged_files(tmp_path, monkeypatch, never_ended):
     states.unlink()
     cf.resume(folder)
     assert_same(folder, never_ended("fixed"))
-    (folder / "scene.json").write_bytes(b"nonsense")
-    with pytest.raises(cf.SceneError, match=r"resume.scene = None: expected the scene of .* cannot be loaded here"):
-        cf.resume(folder)
-    assert len(cf.resume(folder, flying_in_space()[1])) == len(rows(folder))
     for name in ("checkpoint.npz", "start.npz"):
         (folder / name).unlink()
     with pytest.raises(cf.SceneError, match="no checkpoint can be read"):
         cf.resume(folder, flying_in_space()[1])
-    (folder / "motion.json").write_text("{}")
-    with pytest.raises(cf.SceneError, match=r"motion.json is damaged"):
-        cf.resume(folder)
 
 
 def test_no_objects_are_read_from_a_file_of_states(tmp_path):
@@ -69,18 +62,18 @@ def test_another_scene_is_told_from_the_one_of_the_motion(tmp_path, monkeypatch)
     )
     damped = cf.Rod(rod.curve, rod.section, name=rod.name, damping=cf.Damping(drag=1.0))
     others = {
-        "number of rods is 2": cf.Scene([rod, cf.Rod(cf.Line((0, 0, 0), (1, 0, 0)), rod.section)], loads=scene.loads),
-        "length (m) is 10.0498": cf.Scene([longer]),
-        "J at s = 0 m is [500.0, 400.0, 500.0]": cf.Scene([softer]),
-        "damping is 'Damping(": cf.Scene([damped]),
-        "number of loads is 1": cf.Scene([rod], loads=scene.loads[:1]),
-        "force at t = 2.5 s is [10.0, 0.0, 0.0]": cf.Scene(
+        "rods is '2 items'": cf.Scene([rod, cf.Rod(cf.Line((0, 0, 0), (1, 0, 0)), rod.section)], loads=scene.loads),
+        "rods[0].curve.end is [0.0, 8.0, 1.0]": cf.Scene([longer]),
+        "rods[0].section.bending is [500.0, 400.0]": cf.Scene([softer]),
+        "rods[0].damping is": cf.Scene([damped]),
+        "loads is '1 items'": cf.Scene([rod], loads=scene.loads[:1]),
+        "loads[0].force.value is": cf.Scene(
             [rod], loads=[cf.Force(rod.start, cf.Triangle((10, 0, 0), 0, 2.5, 5)), scene.loads[1]]
         ),
-        "station is ['spaghetti', 10.0]": cf.Scene(
+        "loads[0].station.s is 10.0": cf.Scene(
             [rod], loads=[cf.Force(rod.end, cf.Triangle((20, 0, 0), 0, 2.5, 5)), scene.loads[1]]
         ),
-        "number of supports is 1": cf.Scene([rod], [cf.Pin(rod.start)], scene.loads),
+        "supports is '1 items'": cf.Scene([rod], [cf.Pin(rod.start)], scene.loads),
     }
     for words, other in others.items():
         with pytest.raises(cf.SceneError, match="the scene is not the one of the motion") as refusal:
@@ -97,27 +90,16 @@ def test_what_cannot_be_done_is_said(tmp_path, monkeypatch):
         cf.SceneError, match=r"resume.scene = None: expected the scene of .* a function written in Python cannot be"
     ):
         cf.resume(folder)
-    with pytest.raises(cf.SceneError, match=r"simulate.folder = 3: expected the name of a folder"):
-        run("plane", 3)
     with pytest.raises(cf.SceneError, match=r"resume.scene = 3: expected a Scene"):
         cf.resume(folder, 3)
     with pytest.raises(cf.SceneError, match=r"resume.duration = 1: expected None or at least 3 s"):
         cf.resume(folder, scene, duration=1)
     with pytest.raises(cf.SceneError, match=r"simulate.folder = .*: it holds a motion already"):
         run("plane", folder)
-    other = runfolder.RunFolder(folder, cf.read_history(folder, scene).comm)
-    other.hold()
-    other.open().extend(4, scene)
-    with pytest.raises(cf.SceneError, match="another process is at work on this motion"):
-        cf.resume(folder, scene)
-    other.release()
-    head = json.loads((folder / "motion.json").read_text())
-    (folder / "motion.json").write_text(json.dumps({**head, "ranks": 2}))
+    head = {**files.unsealed((folder / "stored.json").read_bytes()), "ranks": 2}
+    (folder / "stored.json").write_bytes(files.sealed(head))
     with pytest.raises(cf.SceneError, match=r"computed by 2 rank\(s\), and here are 1"):
         cf.resume(folder, scene)
-    (tmp_path / "file").write_text("")
-    with pytest.raises(cf.SceneError, match=r"simulate.folder = .*: expected a folder that can be written to"):
-        run("plane", tmp_path / "file")
 
 
 SECTION = cf.Stiffness((5e3, 5e3), 1e4, (50, 50), 40, mass=1.0, inertia=(0.01, 0.01, 0.02))
@@ -135,7 +117,7 @@ def test_a_scene_that_changes_after_the_first_duration_is_another(tmp_path):
     folder = tmp_path / "motion"
     first = pushed(lambda t: (0, 5.0, 0))
     cf.simulate(first, 1.0, folder=folder, **BEGUN)
-    head = (folder / "motion.json").read_text()
+    head = (folder / "stored.json").read_text()
     changes = {2.0: 1.0, 2.9: 2.5}
     for until, since in changes.items():
         other = pushed(lambda t, since=since: (0, 5.0 if t <= since else 50.0, 0))
@@ -144,22 +126,22 @@ def test_a_scene_that_changes_after_the_first_duration_is_another(tmp_path):
         ):
             cf.resume(folder, other, duration=until)
         assert cf.resume(folder, other).times[-1] < until  # the same motion so far
-        assert (folder / "motion.json").read_text() == head
+        assert (folder / "stored.json").read_text() == head
         assert cf.resume(folder, first, duration=until).times[-1] == until
         with pytest.raises(cf.SceneError, match="the scene is not the one of the motion"):
             cf.resume(folder, other)
-        head = (folder / "motion.json").read_text()
+        head = (folder / "stored.json").read_text()
 
 
 def test_what_differs_is_told_where_it_differs_most(tmp_path):
     """Not at half the duration, where the sine is zero up to rounding."""
     folder = tmp_path / "motion"
-    cf.simulate(pushed(cf.Sine((0, 5, 0), 2.0)), 1.0, folder=folder, **BEGUN)
+    cf.simulate(pushed(lambda t: (0, 5 * math.sin(4 * math.pi * t), 0)), 1.0, folder=folder, **BEGUN)
     with pytest.raises(cf.SceneError) as refusal:
-        cf.resume(folder, pushed(cf.Sine((0, 6, 0), 2.0)))
+        cf.resume(folder, pushed(lambda t: (0, 6 * math.sin(4 * math.pi * t), 0)))
     told, expected = (float(part.split(", ")[1]) for part in str(refusal.value).split("[")[-2:])
     assert told / expected == pytest.approx(1.2) and abs(told - expected) > 0.9
-    assert len(cf.resume(folder, pushed(cf.Sine((0, 5, 0), 2.0 * (1 + 1e-12))))) == 21
+    assert len(cf.resume(folder, pushed(lambda t: (0, 5 * math.sin(4 * math.pi * t * (1 + 1e-12)), 0)))) == 21
 
 
 def contents(folder):
@@ -192,8 +174,8 @@ def test_a_longer_duration_that_is_refused_leaves_no_trace(tmp_path):
     folder = tmp_path / "motion"
     scene = cf.Scene([ROD], [cf.Prescribed(ROD.start, cf.Step((0, 0.1, 0), 2.0), (0, 0, 0))])
     cf.simulate(scene, 1.0, folder=folder, **BEGUN)
-    before = (folder / "motion.json").read_bytes()
+    before = (folder / "stored.json").read_bytes()
     for until, words in ((3.0, "displacement jumps at t = 2 s, by 0.1 m"), (1e12, "expected at most 1e.09 steps")):
         with pytest.raises(cf.SceneError, match=words):
             cf.resume(folder, scene, duration=until)
-    assert (folder / "motion.json").read_bytes() == before
+    assert (folder / "stored.json").read_bytes() == before

@@ -214,7 +214,7 @@ def test_an_interrupt_of_one_rank_ends_all_and_says_how_to_go_on(tmp_path_all):
             raise KeyboardInterrupt
         return i
 
-    with pytest.raises(cf.Interrupted, match=r"cases, which .* they are kept in .*, from where the same call") as stop:
+    with pytest.raises(cf.Interrupted, match=r"cases, which .* they are kept in .*, the same call") as stop:
         cf.study(stops, {"i": range(40)}, folder=tmp_path_all)
     found = stop.value.path
     assert 5 <= len(found) < 5 + 4 * COMM.size and not found.done[5] and found.results[:5] == [0, 1, 2, 3, 4]
@@ -225,16 +225,16 @@ def test_an_interrupt_of_one_rank_ends_all_and_says_how_to_go_on(tmp_path_all):
 
 @pytest.mark.ranks
 def test_a_full_disk_ends_all_ranks(tmp_path_all, monkeypatch):
-    from cosserat_fenicsx.studies.folder import StudyFolder
+    from cosserat_fenicsx.storage.store import Store
 
-    keep = StudyFolder.keep
+    keep = Store.keep
 
-    def full(self, row):
+    def full(self, row, *more):
         if row["case"] == 3:
             raise OSError(28, os.strerror(28))
-        keep(self, row)
+        keep(self, row, *more)
 
-    monkeypatch.setattr(StudyFolder, "keep", full)
+    monkeypatch.setattr(Store, "keep", full)
     with pytest.raises(cf.NotStored, match="No space left on device") as stop:
         cf.study(lambda i: i, {"i": range(400)}, folder=tmp_path_all)
     assert stop.value.path.done[:3].all()

@@ -39,7 +39,7 @@ def third(i):
 
 
 def lines_in(folder):
-    return [line for file in sorted(Path(folder).glob("outcomes.*.jsonl")) for line in file.read_bytes().splitlines()]
+    return [line for file in sorted(Path(folder).glob("rows.*.jsonl")) for line in file.read_bytes().splitlines()]
 
 
 @pytest.mark.serial
@@ -62,7 +62,7 @@ def test_killed_and_gone_on_with(tmp_path):
             break
     begun += map(int, broken.communicate()[0].split())
     assert broken.returncode == -signal.SIGKILL
-    with open(tmp_path / "broken" / "outcomes.0.jsonl", "a") as stream:
+    with open(tmp_path / "broken" / "rows.0.jsonl", "a") as stream:
         stream.write('{"case": 20, "attempt": 1, "seco')  # as by a kill in the middle of writing
     after, whole = run("broken").communicate()[0], run("whole").communicate()[0]
     begun += [int(line) for line in after.splitlines() if line.isdigit()]
@@ -116,7 +116,7 @@ def test_lines_that_no_study_wrote_are_left_out(damage, tmp_path_all):
     found = cf.study(third, CASES, folder=tmp_path_all)
     COMM.barrier()
     if COMM.rank == 0:
-        file = sorted(tmp_path_all.glob("outcomes.*.jsonl"))[0]
+        file = sorted(tmp_path_all.glob("rows.*.jsonl"))[0]
         lines = file.read_bytes().splitlines()
         file.write_bytes(b"\n".join([damage, *lines[1:]]) + b"\n")
     COMM.barrier()
@@ -144,18 +144,18 @@ def test_another_study_is_refused(tmp_path_all, monkeypatch):
 
     def refused(task, cases, words):
         with pytest.raises(
-            cf.SceneError, match=rf"study\.folder = .*: it holds a study {words}: expected the same task"
+            cf.SceneError, match=rf"it holds another study, expected the same call, .*: {words}"
         ):
             cf.study(task, cases, folder=tmp_path_all)
 
-    refused(fourth, CASES, r"of the task test_study_folder\.third, not of test_study_folder\.fourth")
-    refused(third, {"i": range(13)}, "of 12 cases, not of 13")
-    refused(third, {"i": [*range(11), 0.5]}, r'whose case 11 is {"dict": .*11.*, not .*0\.5.*')
+    refused(fourth, CASES, "task: function is '.*fourth', where the study has '.*third'")
+    refused(third, {"i": range(13)}, "cases: number is 13, where the study has 12")
+    refused(third, {"i": [*range(11), 0.5]}, r"cases\[11\]\['i'\] is 0.5, where the study has 11")
     with monkeypatch.context() as changed:
         changed.setattr(sys.modules[__name__], "LIMIT", 5)
-        refused(third, CASES, "of the task .*third as it was before its code, or something that it uses, was changed")
+        refused(third, CASES, "the code of task, or something that it uses, was changed")
         changed.setattr(fourth, "__qualname__", "third")
-        refused(fourth, CASES, "of the task .*third as it was before its code, or .* changed")
+        refused(fourth, CASES, "the code of task, or .* changed")
     assert len(cf.study(third, CASES, folder=tmp_path_all)) == 12
 
 
@@ -209,7 +209,7 @@ def test_parts_of_scenes_are_compared(tmp_path_all):
     cases = {"mud": [cf.Mud(1200.0), cf.Mud(1300.0)], "operation": [cf.TripIn()]}
     assert cf.study(weight, cases, folder=tmp_path_all).results == [1200.0, 1300.0]
     COMM.barrier()
-    with pytest.raises(cf.SceneError, match="whose case 1 is"):
+    with pytest.raises(cf.SceneError, match=r"cases\[1\]\['mud'\].density is 1400"):
         cf.study(weight, {**cases, "mud": [cf.Mud(1200.0), cf.Mud(1400.0)]}, folder=tmp_path_all)
 
 
@@ -217,15 +217,9 @@ def test_parts_of_scenes_are_compared(tmp_path_all):
 def test_places_that_cannot_be_written_to(tmp_path_all):
     if COMM.rank == 0:
         (tmp_path_all / "file").write_text("")
-        (tmp_path_all / "damaged").mkdir()
-        (tmp_path_all / "damaged" / "study.json").write_text('{"format": 1}')
     COMM.barrier()
     with pytest.raises(cf.SceneError, match="expected a folder that can be written to"):
         cf.study(third, CASES, folder=tmp_path_all / "file")
-    with pytest.raises(cf.SceneError, match="is damaged: expected the file that study wrote"):
-        cf.study(third, CASES, folder=tmp_path_all / "damaged")
-    with pytest.raises(cf.SceneError, match="expected the name of a folder"):
-        cf.study(third, CASES, folder=3)
 
 
 @pytest.mark.serial

@@ -1,16 +1,11 @@
 """Files of the user's own stay as they are; tables are safe to open; pictures without their libraries are left out."""
 
 import csv
-import json
-import shutil
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
-from conftest import column
-from fake_string import scene as string_scene
-from fake_string import use
 
 import cosserat_fenicsx as cf
 from cosserat_fenicsx.cli.main import main
@@ -74,61 +69,6 @@ def test_points_of_a_rod_are_not_replaced(command, tmp_path, capsys):
     (tmp_path / "rod.toml").write_text(ROD.format(points=name))
     assert main([command, str(tmp_path / "rod.toml"), "-o", str(tmp_path)]) == 2
     assert f"{name} would replace" in capsys.readouterr().err and (tmp_path / name).read_text() == POINTS
-
-
-OWN = {
-    "scene.json": '{"objects": []}',
-    "instants.npy": "mine",
-    "motion.json": '{"speed": 3}',
-    "start.npz": "mine",
-    "study.json": "{}",
-    "drilling.json": "{}",
-}
-
-
-@pytest.mark.parametrize("name", OWN)
-def test_folders_for_motions_of_rods(name, tmp_path):
-    (tmp_path / name).write_text(OWN[name])
-    with pytest.raises(cf.SceneError, match=f"simulate.folder = .*: it holds {name}"):
-        cf.simulate(column()[1], 0.01, dt=0.01, elements=1, degree=2, folder=tmp_path)
-    assert [file.name for file in tmp_path.iterdir()] == [name] and (tmp_path / name).read_text() == OWN[name]
-
-
-@pytest.mark.parametrize("name", ["scene.json", "motion.json", "study.json", "series.f64", "checkpoint.npz"])
-def test_folders_for_strings(name, tmp_path, monkeypatch):
-    use(monkeypatch)
-    (tmp_path / name).write_text("[1]")
-    with pytest.raises(cf.SceneError, match=f"simulate_drilling.folder = .*: it holds {name}"):
-        cf.simulate_drilling(string_scene(), 1.0, folder=tmp_path)
-    assert [file.name for file in tmp_path.iterdir()] == [name] and (tmp_path / name).read_text() == "[1]"
-
-
-@pytest.mark.parametrize("name", ["outcomes.0.jsonl", "motion.json"])
-def test_folders_for_studies(name, tmp_path):
-    (tmp_path / name).write_text("mine")
-    with pytest.raises(cf.SceneError, match=f"study.folder = .*: it holds {name}"):
-        cf.study(lambda i: i, {"i": range(2)}, folder=tmp_path)
-    assert (tmp_path / name).read_text() == "mine"
-
-
-def test_what_a_killed_run_left_is_taken_over(tmp_path, monkeypatch):
-    """Ended between any two files that it writes before the first step."""
-    use(monkeypatch)
-    cf.simulate_drilling(string_scene(), 1.0, folder=tmp_path / "whole")
-    for name in ("series.f64", "profiles.f64"):
-        (tmp_path / "part").mkdir(exist_ok=True)
-        (tmp_path / "part" / name).write_bytes(b"")
-    shutil.copy(tmp_path / "whole" / "scene.json", tmp_path / "part")
-    assert len(cf.simulate_drilling(string_scene(), 1.0, folder=tmp_path / "part")) == 100
-    scene = column()[1]
-    motion = {"dt": 0.01, "elements": 1, "degree": 2}
-    cf.simulate(scene, 0.01, folder=tmp_path / "rods", **motion)
-    for kept in (["scene.json"], ["scene.json", "motion.json"], ["motion.json"]):
-        for name in kept:
-            (tmp_path / "-".join(kept)).mkdir(exist_ok=True)
-            shutil.copy(tmp_path / "rods" / name, tmp_path / "-".join(kept))
-        assert len(cf.simulate(scene, 0.01, folder=tmp_path / "-".join(kept), **motion)) == 2
-    assert json.loads((tmp_path / "scene.json-motion.json" / "motion.json").read_text())["format"] == 2
 
 
 def cells(file):

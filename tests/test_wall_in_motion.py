@@ -12,7 +12,7 @@ from scipy.integrate import simpson
 import cosserat_fenicsx as cf
 from cosserat_fenicsx.actions.walls import HoleRing, HoleWall
 from cosserat_fenicsx.models.moving import Moving
-from cosserat_fenicsx.storage import runfolder
+from cosserat_fenicsx.storage.store import Store
 
 SCHEMES = ("momentum", "energy", "generalised-alpha")
 STEEL = cf.Material(E=206e9, nu=0.3, density=7850.0)
@@ -174,8 +174,8 @@ def test_it_is_continued_to_the_same_digits(scheme, tmp_path, monkeypatch):
             raise KeyboardInterrupt
 
     monkeypatch.setattr(Moving, "accept", accept_or_stop)
-    monkeypatch.setattr(runfolder, "APART", 0.0)
-    monkeypatch.setattr(runfolder, "SELDOM", 0)
+    monkeypatch.setattr(Store, "APART", 0.0)
+    monkeypatch.setattr(Store, "SELDOM", 0)
     if scheme == "generalised-alpha":
         monkeypatch.setattr("cosserat_fenicsx.models.collocated.Collocated.accept", stopping(taken))
     with pytest.raises(cf.Interrupted):

@@ -12,8 +12,8 @@ pytestmark = pytest.mark.ranks
 def test_a_sweep_is_kept_by_one_rank_and_goes_on_for_all(tmp_path_all):
     path = cf.WellPath.from_survey([0, 600, 1200, 2500], [0, 0, 50, 50], [0, 0, 120, 120])
     hole = cf.Borehole(path, cf.HoleSection(2500.0, 0.2159, 0.25))
-    string, file = cf.DrillString([cf.DrillPipe(size="5 in 19.50 lb/ft")]), tmp_path_all / "sweep.jsonl"
-    settings = {"mud": cf.Mud(1200.0), "model": "soft", "file": file}
+    string, file = cf.DrillString([cf.DrillPipe(size="5 in 19.50 lb/ft")]), tmp_path_all / "sweep"
+    settings = {"mud": cf.Mud(1200.0), "model": "soft", "folder": file}
     found = cf.depth_sweep(hole, string, cf.TripOut(), [1000.0, 2500.0], **settings)
     COMM.barrier()
     assert len(file.read_text(encoding="utf-8").splitlines()) == 3

@@ -38,7 +38,7 @@ def test_a_sweep_is_its_answers():
 
 
 def test_a_sweep_goes_on_where_it_was_broken_off(tmp_path, monkeypatch):
-    file, asked = tmp_path / "sweep.jsonl", []
+    file, asked = tmp_path / "sweep", []
 
     def counted(*args, **named):
         asked.append(named["depth"])
@@ -48,17 +48,17 @@ def test_a_sweep_goes_on_where_it_was_broken_off(tmp_path, monkeypatch):
 
     monkeypatch.setattr(module, "torque_and_drag", counted)
     with pytest.raises(cf.Interrupted, match="after 11 answers") as stop:
-        sweep(file=file)
+        sweep(folder=file)
     assert len(stop.value.path) == 11 and np.isfinite(stop.value.path.hook_load).sum() == 11
-    with file.open("a") as stream:
+    with (file / "rows.0.jsonl").open("a") as stream:
         stream.write("[0, 0, 3, 1.5")  # as by a machine that stopped
-    again = sweep(file=file)
+    again = sweep(folder=file)
     assert len(asked) == 12 + 19 and len(again) == 30
     assert (again.hook_load == sweep().hook_load).all()
     asked.clear()
-    assert (sweep(file=file).surface_torque == again.surface_torque).all() and not asked
+    assert (sweep(folder=file).surface_torque == again.surface_torque).all() and not asked
     with pytest.raises(cf.SceneError, match="holds another sweep"):
-        sweep(file=file, tol=1e-3)
+        sweep(folder=file, tol=1e-3)
 
 
 def test_a_depth_without_an_answer_is_a_row_that_says_so(monkeypatch, tmp_path):
@@ -78,7 +78,7 @@ def test_a_depth_without_an_answer_is_a_row_that_says_so(monkeypatch, tmp_path):
     monkeypatch.setattr(rod_in_hole, "solve_in_hole", fails)
     given = HOLE, STRING, cf.TripOut(), [800.0, 1200.0, 1600.0]
     for _ in range(2):  # solved, and read from the file
-        found = cf.depth_sweep(*given, mud=MUD, model="rod", file=tmp_path / "sweep.jsonl")
+        found = cf.depth_sweep(*given, mud=MUD, model="rod", folder=tmp_path / "sweep")
         assert calls == [800, 1200, 1600] and len(found) == 3 and found.done.all()
         assert np.isnan(found.hook_load[0, 0]).tolist() == [True, False, False] and sorted(found.notes) == [
             (0, 0, 0), (0, 0, 1)]  # fmt: skip
@@ -100,10 +100,10 @@ def test_a_depth_without_an_answer_is_a_row_that_says_so(monkeypatch, tmp_path):
 def test_a_sweep_by_the_rod_is_stopped_and_goes_on(monkeypatch, tmp_path):
     """The signal comes while C asks for the wall's data in a Newton step, as most of them do."""
     given = HOLE, STRING, cf.TripOut(), [800.0, 1200.0, 1600.0]
-    file, nearest, calls = tmp_path / "sweep.jsonl", cf.WellPath.nearest, []
+    file, nearest, calls = tmp_path / "sweep", cf.WellPath.nearest, []
 
     def stops(self, *args):
-        if file.read_text(encoding="utf-8").count("\n") == 2:  # its head, and the first answer
+        if (file / "rows.0.jsonl").exists():  # the first answer
             calls.append(1)
             if len(calls) == 60:
                 os.kill(os.getpid(), signal.SIGINT)
@@ -113,10 +113,10 @@ def test_a_sweep_by_the_rod_is_stopped_and_goes_on(monkeypatch, tmp_path):
     with monkeypatch.context() as patch, contextlib.ExitStack() as stack:
         stack.callback(signal.signal, signal.SIGINT, before)
         patch.setattr(cf.WellPath, "nearest", stops)
-        with pytest.raises(cf.Interrupted, match="after 1 answer, which .* they are kept in .*sweep.jsonl") as stop:
-            cf.depth_sweep(*given, mud=MUD, model="rod", file=file)
+        with pytest.raises(cf.Interrupted, match="after 1 answer, which .* they are kept in .*sweep") as stop:
+            cf.depth_sweep(*given, mud=MUD, model="rod", folder=file)
     assert np.isfinite(stop.value.path.hook_load[0, 0]).tolist() == [True, False, False]
-    found = cf.depth_sweep(*given, mud=MUD, model="rod", file=file)
+    found = cf.depth_sweep(*given, mud=MUD, model="rod", folder=file)
     assert (found.hook_load == cf.depth_sweep(*given, mud=MUD, model="rod").hook_load).all()
     assert not found.notes
     assert np.isnan(found.values["model_error"]).all() and (found.values["error"] <= 1e-4).all()

@@ -11,13 +11,13 @@ from cosserat_fenicsx.cli.say import DONE, INTERRUPTED, NOT_CONVERGED, Files, en
 from cosserat_fenicsx.dimensions import in_si
 from cosserat_fenicsx.drilling.bit_laws import Stribeck
 from cosserat_fenicsx.drilling.choose import chosen, model_of
-from cosserat_fenicsx.drilling.folder import DrillingFolder
 from cosserat_fenicsx.drilling.scenefile import drilling_in
 from cosserat_fenicsx.drilling.segments import Discs
-from cosserat_fenicsx.drilling.simulate import check_arguments, resume_drilling
+from cosserat_fenicsx.drilling.simulate import KIND, check_arguments
 from cosserat_fenicsx.drilling.tables import turns
 from cosserat_fenicsx.errors import NotConverged, SceneError
 from cosserat_fenicsx.interrupts import patience
+from cosserat_fenicsx.storage.store import Store, holds, resume
 
 _TAKEN = ("duration", "dt", "elements", "model", "save_every")
 # Files that may be written.
@@ -59,8 +59,9 @@ def run_drilling(options, tables):
 
 def _check_folder(folder, scene):
     """Refuse the folder of another motion, or of this one."""
-    if folder and (Path(folder) / "drilling.json").exists():
-        DrillingFolder(folder).open().scene(scene)  # refused with what differs
+    if folder and holds(folder) == KIND.what:
+        store = Store(folder, KIND).open()
+        store.scene(scene, store.head["duration"])  # refused with what differs
         raise SceneError(f"--folder {folder}: it holds this motion already: `cosserat resume {folder}` continues it; "
                          "or expected another name")  # fmt: skip
 
@@ -88,7 +89,7 @@ def _stability(found, options):
 @warnings_in_words()
 def resume_run(options):
     """`cosserat resume` of a folder that holds a drill-string in motion; returns the exit code."""
-    return _deliver(lambda: resume_drilling(options.folder, duration=options.duration), options)
+    return _deliver(lambda: resume(options.folder, duration=options.duration), options)
 
 
 def _deliver(compute, options):

@@ -128,21 +128,17 @@ def _resume(options):
             f"{folder}: no motion was found there, there is no such folder: expected the DIR of "
             "`cosserat run ... --folder DIR`"
         )
-    if (folder / "drilling.json").exists():
+    from cosserat_fenicsx.storage.store import Store, resume
+
+    store = Store(folder, None).open()
+    if store.home.__name__.startswith("cosserat_fenicsx.drilling"):
         from cosserat_fenicsx.cli.drilling import resume_run
 
         return resume_run(options)
     if options.station:
-        from cosserat_fenicsx.dynamics.resuming import read_history
+        store.home.read(store, None).station(options.station)  # refused before the computation
 
-        read_history(options.folder).station(options.station)  # refused before the computation
-
-    def computed():
-        from cosserat_fenicsx.dynamics.resuming import resume
-
-        return resume(options.folder, duration=options.duration)
-
-    return deliver(computed, options, True)
+    return deliver(lambda: resume(options.folder, duration=options.duration), options, True)
 
 
 def _explain(options):

@@ -12,6 +12,7 @@ from cosserat_fenicsx.cli.rods import prepare
 from cosserat_fenicsx.cli.say import DONE, INTERRUPTED, Files, keep_inputs, say, warnings_in_words
 from cosserat_fenicsx.errors import Interrupted, SceneError
 from cosserat_fenicsx.ranks import on_first, world
+from cosserat_fenicsx.storage.store import discard
 from cosserat_fenicsx.well.components import weight_in_mud
 from cosserat_fenicsx.well.scenefile import well_in
 
@@ -19,7 +20,7 @@ from cosserat_fenicsx.well.scenefile import well_in
 _OTHERS = ("load_factors", "bound", "elements", "degree", "formulation", "control", "branch", "duration", "dt",
            "scheme", "save_every", "start", "folder", "station", "at", "animate", "speed", "color",
            "magnify")  # fmt: skip
-_OF_SWEEPS = ("depth_sweep.csv", "depth_sweep.jsonl", "depth_sweep.png")
+_OF_SWEEPS = ("depth_sweep.csv", "depth_sweep", "depth_sweep.png")
 _SOFT = (
     "the soft string by a differential equation along the axis, and what that leaves out is estimated with each answer."
 )
@@ -61,7 +62,7 @@ def run_well(options, tables):
             _write(answer, written, stem, not options.no_picture)
     code = DONE
     try:
-        sweep = scene.depth_sweep(out / "depth_sweep.jsonl" if out is not None else None)
+        sweep = scene.depth_sweep(out / "depth_sweep" if out is not None else None)
     except Interrupted as stop:
         sweep, code = stop.path, INTERRUPTED
         say(f"cosserat: {stop.words}")
@@ -69,7 +70,7 @@ def run_well(options, tables):
         say(str(sweep), file=sys.stdout)
         if out is not None:
             if code == DONE:  # complete: another run begins anew
-                on_first(world(), lambda: (out / "depth_sweep.jsonl").unlink(missing_ok=True))
+                on_first(world(), lambda: discard(out / "depth_sweep"))
             written.put("depth_sweep.csv", sweep.write)
             if not options.no_picture and len(sweep):
                 written.put("depth_sweep.png", sweep.plot)

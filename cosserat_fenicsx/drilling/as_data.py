@@ -1,4 +1,4 @@
-"""A `Drilling` as plain data, which JSON can hold, and back; and its fingerprint, to tell whether a scene is another.
+"""A `Drilling` as plain data, which JSON can hold, and back.
 
 An object of the package is {"type": its class, field: value, ...}. Reading data calls the constructors of the package's
 classes and nothing else. Functions written in Python and components of the user's own have no such form.
@@ -12,7 +12,6 @@ import numpy as np
 from cosserat_fenicsx.drilling.bit_laws import BitLaw, BitOnRock, Wear
 from cosserat_fenicsx.drilling.scene import Drilling
 from cosserat_fenicsx.drilling.segments import Discs
-from cosserat_fenicsx.drilling.signals import ScalarSignal
 from cosserat_fenicsx.drilling.top_drive import DriveControl, Hook, TopDrive
 from cosserat_fenicsx.drilling.wall_friction import FrictionLaw, ViscousDrag
 from cosserat_fenicsx.errors import SceneError
@@ -26,9 +25,6 @@ from cosserat_fenicsx.well.path import WellPath
 
 _OF_DRILLING = (Drilling, Discs, TopDrive, Hook, BitOnRock, Wear, ViscousDrag)
 _OF_WELLS = (DrillString, Borehole, HoleSection, WellPath, Mud, Material, Stiffness)
-#: Functions of time, by their owner: the object's class and its field.
-_IN_TIME = {("TopDrive", "speed"): "rad/s", ("Hook", "speed"): "m/s"}
-_SAMPLES = 41
 
 
 @functools.cache
@@ -62,38 +58,19 @@ def from_data(data):
     return found
 
 
-def fingerprint(scene, duration):
-    """{place: number, string, None or list of these} of all that the motion up to a time (s) follows from; functions of
-    time by their values."""
-    times = np.linspace(0.0, duration, _SAMPLES)
-    return dict(_flat(_value(scene, "Drilling", times), "Drilling"))
-
-
-def _value(value, where, times=None):
-    """A value as data; with `times` functions are replaced by their values there."""
+def _value(value, where):
     if value is None or isinstance(value, str | bool | int | float):
         return value
     if isinstance(value, np.ndarray | np.generic):
         return value.tolist()
     if isinstance(value, list | tuple):
-        return [_value(x, f"{where}[{i}]", times) for i, x in enumerate(value)]
+        return [_value(x, f"{where}[{i}]") for i, x in enumerate(value)]
     kind = type(value)
     if _classes().get(kind.__name__) is not kind:
-        if times is not None:
-            return kind.__name__  # of the user's own: compared by type alone
         what = "a function written in Python" if callable(value) else f"a part of the class {kind.__name__}"
         raise NotData(f"{where}: {what} cannot be stored as data")
-    found = {"type": kind.__name__}
-    for field in dataclasses.fields(kind):
-        if not field.init:
-            continue
-        inner = getattr(value, field.name)
-        if times is not None and callable(inner) and (kind.__name__, field.name) in _IN_TIME:
-            signal = ScalarSignal(value, field.name, inner, _IN_TIME[kind.__name__, field.name])
-            found[field.name] = {"jumps": list(signal.jumps), "values": [signal(t) for t in times]}
-        else:
-            found[field.name] = _value(inner, f"{where}.{field.name}", times)
-    return found
+    fields = [field.name for field in dataclasses.fields(kind) if field.init]
+    return {"type": kind.__name__, **{name: _value(getattr(value, name), f"{where}.{name}") for name in fields}}
 
 
 def _object(data):
@@ -106,15 +83,3 @@ def _object(data):
     if kind is WellPath:
         arguments = {name: np.array(values, dtype=float) for name, values in arguments.items()}
     return kind(**arguments)
-
-
-def _flat(value, where):
-    if isinstance(value, dict):
-        for name, inner in value.items():
-            yield from _flat(inner, f"{where}.{name}")
-    elif isinstance(value, list) and any(isinstance(x, dict | list | str) or x is None for x in value):
-        yield f"{where}: number", len(value)
-        for i, inner in enumerate(value):
-            yield from _flat(inner, f"{where}[{i}]")
-    else:
-        yield where, value

@@ -1,18 +1,21 @@
-"""`simulate_drilling`: a drill-string in motion; `resume_drilling` and `read_drilling`: from the folder of one."""
+"""`simulate_drilling`: a drill-string in motion; it is read from its folder, and gone on with."""
 
 import math
 import numbers
+from functools import partial
 
 import numpy as np
 
 from cosserat_fenicsx.checks import File, instance, number, refuse
+from cosserat_fenicsx.drilling.as_data import from_data, to_data
 from cosserat_fenicsx.drilling.choose import OtherSteps, chosen, fastest, model_of
-from cosserat_fenicsx.drilling.folder import DrillingFolder
-from cosserat_fenicsx.drilling.history import DrillingHistory
+from cosserat_fenicsx.drilling.history import COLUMNS, DrillingHistory
+from cosserat_fenicsx.drilling.protocol import PROFILE
 from cosserat_fenicsx.drilling.scene import Drilling
 from cosserat_fenicsx.drilling.stick_slip import step_errors
 from cosserat_fenicsx.drilling.time_loop import TimeLoop
 from cosserat_fenicsx.errors import SceneError
+from cosserat_fenicsx.storage.store import Kind, Store
 
 #: More steps, and rows of a history, are refused as a mistake; so many profiles where nothing else is asked for.
 MOST_STEPS, MOST_ROWS, PROFILES = 1e8, 2e7, 400
@@ -21,6 +24,12 @@ _ROUNDING = 1e-9
 # Largest rotation in a step, rad, at three times the speed of the drive, as a bit that slips may have; and the largest
 # part of the angle between two blades or lobes.
 _TURN, _FASTER, _OF_BLADES = 1.0, 3.0, 0.25
+KIND = Kind(
+    what="motion of a drill-string", home="drilling.simulate", call="simulate_drilling",
+    again="cosserat_fenicsx.resume('{place}'), or `cosserat resume {place}`, continues it",
+    differs="the scene is not the one of the motion", tables=("series", "profiles"), starts=True, rounding=1e-9,
+    as_data=to_data, from_data=from_data,
+)  # fmt: skip
 
 
 def simulate_drilling(
@@ -47,8 +56,8 @@ def simulate_drilling(
         elements: along the string; None for those of the model.
         save_every: s between the rows of the history, rounded to steps; None for every step.
         profile_every: s between profiles along the string; None for 400 of them.
-        folder: to write the motion and checkpoints to during the run: whatever ends it, `resume_drilling(folder)`
-            continues it to the same digits. It must not hold a motion yet.
+        folder: to write the motion and checkpoints to during the run: whatever ends it, `resume(folder)` continues
+            it to the same digits. It must not hold a motion yet.
         check: whether the motion is computed once more at twice the step, on a mesh half as fine, for the history's
             `errors`.
         progress: True, False, or None for a bar in runs of more than two seconds.
@@ -76,70 +85,45 @@ def simulate_drilling(
     }
     kept = None
     if folder is not None:
-        asked = {"duration": float(duration), "asked": {"model": name, "dt": dt, "elements": elements}, "apart": apart}
-        kept = DrillingFolder(folder).make(scene, history, asked)
+        told = {"duration": float(duration), "asked": {"model": name, "dt": dt, "elements": elements}, "apart": apart}
+        told |= {"model": history.model, "why": history.why, "dt": history.dt, "depths": history.depths.tolist()}
+        kept = Store(folder, KIND).make(told, scene, float(duration))
+        _tables(kept)
+        history.folder = kept.place
     TimeLoop(running, history, kept, **apart, turn=_turn_to_watch(scene)).until(duration, progress)
     if check:
         history.errors = step_errors(OtherSteps(scene, name, running), history.rows, duration / 2)
     return history
 
 
-def resume_drilling(
-    folder: File, scene: Drilling | None = None, *, duration: float | None = None, progress: bool | None = None
-) -> DrillingHistory:
-    """Continue a motion from the folder that `simulate_drilling` wrote, to the same digits, whatever ended it.
-
-    Args:
-        folder: its name.
-        scene: the `Drilling`, which is compared with that of the folder; None for the one stored there, which is
-            missing where a speed is a function written in Python.
-        duration: s; None for the last one asked for. A longer one goes on from there.
-        progress: see `simulate_drilling`.
-
-    Returns:
-        the `DrillingHistory` from the start; at once where it is complete.
-
-    Raises:
-        SceneError: no such folder, another scene, or a shorter duration.
-        NotConverged, Interrupted, NotStored: see `simulate_drilling`.
-    """
-    kept = DrillingFolder(folder).open()
-    scene = kept.scene(scene)
-    if duration is None:
-        duration = kept.asked
-    elif _seconds("resume_drilling", "duration", duration) < kept.asked:
-        refuse("resume_drilling", "duration", duration, f"at least {kept.asked:g} s, the last one asked for")
-    check_arguments(scene, duration, kept.head["asked"]["dt"], kept.head["asked"]["elements"])
-    kept.hold()
+def go_on(store, scene, duration, progress):
+    """`resume` of a drill-string in motion; see there."""
+    last, asked, apart = (store.head[name] for name in ("duration", "asked", "apart"))
+    if duration is not None and _seconds("resume", "duration", duration) < last:
+        refuse("resume", "duration", duration, f"at least {last:g} s, the last one asked for")
+    duration = float(duration or last)
+    scene = _scene(store, scene, duration)
+    check_arguments(scene, duration, asked["dt"], asked["elements"])
+    store.hold()
     try:
-        return _go_on(kept, scene, float(duration), progress)
+        running, tables = _running(store, scene), _tables(store)
+        if duration > last:
+            check_step(scene, running.dt, duration, apart["save_every"] * running.dt)
+            store.extend(scene, duration, duration=duration)
+        store.memory(running.memory(), running.recall)
+        history = _history(store, scene, [np.array(table.rows[: table.next]) for table in tables])
+        return TimeLoop(running, history, store, **apart, turn=_turn_to_watch(scene)).until(duration, progress)
     finally:
-        kept.release()
+        store.release()
 
 
-def _go_on(kept, scene, duration, progress):
-    running, memory = _running(kept, scene), kept.memory()
-    if duration > kept.asked:
-        check_step(scene, running.dt, duration, kept.head["apart"]["save_every"] * running.dt)
-        kept.extend(duration, scene)
-    why = memory and (kept.wrong(memory) or kept.not_recalled(memory, running))
-    if why:
-        kept.tell_lost(why)
-        running, memory = _running(kept, scene), None
-    rows, profiles = (memory["rows"], memory["profiles"]) if memory else (0, 0)
-    history = kept.history(scene, rows, profiles)
-    kept.cut(rows, profiles)
-    loop = TimeLoop(running, history, kept, **kept.head["apart"], turn=_turn_to_watch(scene))
-    return loop.until(duration, progress)
-
-
-def _running(kept, scene):
+def _running(store, scene):
     """The model of a motion that is gone on with.
 
     Raises:
         SceneError: it is not the one that the rows are of.
     """
-    asked, told = kept.head["asked"], kept.head
+    asked, told = store.head["asked"], store.head
     running = model_of(scene, asked["model"], asked["dt"], asked["elements"])
     alike = {
         "model": running.name == told["model"],
@@ -150,8 +134,8 @@ def _running(kept, scene):
     for name, same in alike.items():
         if not same:
             raise SceneError(
-                f"{kept.place}: the {name} of its motion is another one than that of this release, or drilling.json is "
-                "damaged: expected a new motion by simulate_drilling"
+                f"{store.place}: the {name} of its motion is another one than that of this release: expected a "
+                "new motion by simulate_drilling"
             )
     return running
 
@@ -159,22 +143,45 @@ def _running(kept, scene):
 def read_drilling(folder: File, scene: Drilling | None = None) -> DrillingHistory:
     """The motion that a folder holds so far; another process may still be computing it.
 
-    Args: see `resume_drilling`.
+    Args: see `resume`.
 
     Raises:
         SceneError: no such folder, or another scene.
     """
-    kept = DrillingFolder(folder).open()
-    scene, memory = kept.scene(scene), kept.memory(tell=False)  # before the rows, which another process may be writing
-    why, history = memory and kept.wrong(memory), None
-    if not why:
-        history = kept.history(scene)
-        why = kept.not_in_order(history)
-    if why:
-        raise SceneError(
-            f"{why}: expected the files as they were; cosserat_fenicsx.resume_drilling computes them again"
-        )
-    return history
+    return read(Store(folder, KIND).open(), scene)
+
+
+def read(store, scene):
+    """The motion of a drill-string that is stored so far."""
+    scene, tables = _scene(store, scene, store.head["duration"]), _tables(store)
+    store.check_rows(_times_of)
+    return _history(store, scene, [np.array(table.rows) for table in tables])
+
+
+def _scene(store, scene, until):
+    if scene is not None:
+        instance("resume", "scene", scene, Drilling, "a Drilling, or None for the folder's own")
+    return store.scene(scene, until)
+
+
+def _tables(store):
+    widths = len(COLUMNS), 1 + len(PROFILE) * len(store.head["depths"])
+    return [store.table(name, partial(_are_rows, width)) for name, width in zip(KIND.tables, widths, strict=True)]
+
+
+def _are_rows(width, dtype, shape):
+    return dtype.str == "<f8" and shape == (width,)
+
+
+def _times_of(rows):
+    return rows[:, 0]
+
+
+def _history(store, scene, rows):
+    told = store.head
+    series, along = (found if len(found) else None for found in rows)
+    return DrillingHistory(scene, told["model"], told["why"], told["dt"], told["depths"], series, along,
+                           folder=store.place)  # fmt: skip
 
 
 def check_arguments(scene, duration, dt=None, elements=None, save_every=None, profile_every=None):

@@ -20,7 +20,7 @@ class TimeLoop:
 
     Args:
         model: a `StringModel`. history: the `DrillingHistory` that it is written to.
-        folder: a `DrillingFolder`, or None.
+        folder: the `Store`, or None.
         save_every, profile_every: steps between rows and between profiles.
         turn: the largest rotation of the bit in a step, rad.
     """
@@ -28,11 +28,6 @@ class TimeLoop:
     def __init__(self, model, history, folder, save_every, profile_every, turn=np.inf):
         self.model, self.history, self._folder = model, history, folder
         self._save_every, self._profile_every, self._turn = save_every, profile_every, turn
-        self._rows, self._profiles = len(history), len(history.profile_times)
-
-    def memory(self):
-        """What it takes to go on from here: that of the model, and the numbers of rows."""
-        return {"rows": self._rows, "profiles": self._profiles, "model": self.model.memory()}
 
     def until(self, duration, progress=None):
         """Advance to a time (s), and return the history.
@@ -46,6 +41,8 @@ class TimeLoop:
             with Progress([duration], progress, world(), "t (s) =") as bar:
                 bar.start(f"{model.name}, {len(model.depths)} places")
                 bar.reached(model.time)
+                if not model.steps:
+                    self._keep()
                 while model.time < end:
                     obey()
                     self._chunk(end)
@@ -60,9 +57,7 @@ class TimeLoop:
         except KeyboardInterrupt as stop:
             if isinstance(stop, Interrupted):
                 raise
-            place = self._folder and self._folder.place
-            kept = f"; cosserat_fenicsx.resume_drilling({str(place)!r}) goes on from there" if place else ""
-            raise Interrupted(history, kept) from None
+            raise Interrupted(history, f"; {self._folder.again}" if self._folder else "") from None
         finally:
             history.counts = dict(model.counts)
             if self._folder:
@@ -100,13 +95,12 @@ class TimeLoop:
 
     def _add(self, rows, profile=False):
         self.history.append(rows)
-        row = np.empty(0)
+        along = []
         if profile:
-            row = self.history.append_profile(self.model.time, self.model.profile())
+            along = self.history.append_profile(self.model.time, self.model.profile())[None]
         if self._folder:
-            self._folder.add(self.history, rows, row)
-        self._rows, self._profiles = self._rows + len(rows), self._profiles + bool(profile)
+            self._folder.put(self.history, "the motion", series=rows, profiles=along)
 
     def _keep(self):
         if self._folder:
-            self._folder.keep(self.history, self.memory())
+            self._folder.checkpoint(self.model.memory(), self.history)

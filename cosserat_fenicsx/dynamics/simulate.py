@@ -19,14 +19,14 @@ from cosserat_fenicsx.models.rodmesh import Layout
 from cosserat_fenicsx.dynamics.time_loop import TimeLoop
 from cosserat_fenicsx.dynamics.pace import Adaptive
 from cosserat_fenicsx.dynamics.pace import Fixed
-from cosserat_fenicsx.storage.runfolder import RunFolder
+from cosserat_fenicsx.storage.store import Store
 from cosserat_fenicsx.scene.action import path_dependent
 from cosserat_fenicsx.scene.scene import check_magnitudes
 from cosserat_fenicsx.scene.scene import Scene
 from cosserat_fenicsx.dynamics.start import equilibrium
 from cosserat_fenicsx.dynamics.start import put_start
 from cosserat_fenicsx.dynamics.schemes import SCHEMES
-from cosserat_fenicsx.storage.stored_history import StoredHistory
+from cosserat_fenicsx.storage.stored_history import KIND, StoredHistory
 import contextlib
 from cosserat_fenicsx.algebra.pool import PROBLEMS
 from cosserat_fenicsx.dynamics.start import starts_in
@@ -153,7 +153,9 @@ def simulate(
             asked = {"duration": duration, "tol": tol, "dt": dt, "scheme": scheme, "save_every": save_every,
                      "load_factor": load_factor, "elements": elements, "degree": degree,
                      "rho_inf": rho_inf}  # fmt: skip
-            folder = RunFolder(folder, comm).make(scene, asked, history)
+            told = {"asked": asked, "durations": [duration], "told": history.told()}
+            folder = Store(folder, KIND, comm).make(told, scene, duration)
+            history.keep_in(folder)
         motion = TimeLoop(problem, stepper, pace, history, folder)
         return motion.over(marks, save_every is None, progress)
 

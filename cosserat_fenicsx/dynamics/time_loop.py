@@ -23,7 +23,7 @@ class TimeLoop:
     Args:
         problem: a `StepProblem`; stepper: see `Stepper`; pace: the step size control, see `pace`.
         history: the `History` that states are appended to.
-        folder: the `RunFolder` that states and checkpoints are written to, or None.
+        folder: the `Store` that states and checkpoints are written to, or None.
     """
 
     def __init__(self, problem, stepper, pace, history, folder):
@@ -66,7 +66,7 @@ class TimeLoop:
                     self._between(mark, after, save_all, bar)
                 self._keep()
         except KeyboardInterrupt:
-            raise Interrupted(self.history) from None
+            raise Interrupted(self.history, f"; {self._folder.again}" if self._folder else "") from None
         except SceneError as problem:  # a function of time that raises, or gives no finite numbers, after the start
             problem.path = self.history
             raise
@@ -115,7 +115,7 @@ class TimeLoop:
 
     def _keep(self):
         if self._folder:
-            self._folder.keep(self.memory(), self.history)
+            self._folder.checkpoint(self.memory(), self.history)
 
     def _advance(self, t, h, halvings=0):
         """Step from t by h (s), in halves where that fails; False where a shorter step is to be tried instead."""

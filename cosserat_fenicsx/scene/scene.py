@@ -3,6 +3,7 @@ meant."""
 
 import contextlib
 import copy
+import dataclasses
 from collections import Counter, namedtuple
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -122,7 +123,7 @@ class Scene:
     supports: Sequence[Support] = ()
     loads: Sequence[Action] = ()
     joints: Sequence[Joint] = ()
-    title: str = ""
+    title: str = dataclasses.field(default="", compare=False)
     velocities: Sequence[InitialVelocity] = ()
 
     #: time (s) up to which functions of time are sampled, see `over`

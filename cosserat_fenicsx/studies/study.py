@@ -4,7 +4,6 @@ import gc
 import inspect
 import itertools
 import json
-import os
 import time
 import traceback
 from collections.abc import Callable, Iterable, Mapping
@@ -15,14 +14,19 @@ import numpy as np
 from mpi4py import MPI
 
 from cosserat_fenicsx.checks import File, instance, refuse
-from cosserat_fenicsx.errors import CosseratError, InstallationError, Interrupted, NotStored, SceneError
+from cosserat_fenicsx.errors import CosseratError, InstallationError, Interrupted, SceneError
 from cosserat_fenicsx.interrupts import obey
 from cosserat_fenicsx.progress import CaseProgress
 from cosserat_fenicsx.ranks import apart, communicator
-from cosserat_fenicsx.storage.described import NotDescribed, described, task_described
-from cosserat_fenicsx.studies.folder import StudyFolder, from_data, to_data
+from cosserat_fenicsx.storage.mark import NotMarked, mark_of
+from cosserat_fenicsx.storage.store import Kind, Store
 from cosserat_fenicsx.studies.outcome import Study
+from cosserat_fenicsx.studies.values import from_data, to_data
 
+KIND = Kind(
+    what="study", home="studies.study", call="study", again="the same call of study goes on from there",
+    differs="it holds another study, expected the same call, or another folder", each_rank=True,
+)  # fmt: skip
 _COMPARABLE = "numbers, texts, arrays, functions, parts of scenes and of wells, lists and dicts of these"
 
 
@@ -73,42 +77,59 @@ def study(
     check_task(task, cases)
     instance("study", "retry", retry, bool, "True or False")
     told = _told(task, cases, strictly=folder is not None)
-    if len(set(comm.allgather(json.dumps(told[1])))) > 1:
+    of_cases = json.dumps({place: found for place, found in told.items() if not place.startswith("task")})
+    if len(set(comm.allgather(of_cases))) > 1:
         raise SceneError("study.cases: they differ between ranks: expected the same cases on every rank")
     if comm.size > 1:
         gc.collect()  # what ranks must free together is not left for times at which they are apart
-    kept = None if folder is None else StudyFolder(folder, comm)
-    rows = {} if kept is None else _latest(kept.open(*told))
-    run = _Run(task, cases, rows, retry, kept, comm)
+    store = None if folder is None else Store(folder, KIND, comm).begin(told)
     try:
+        rows = {} if store is None else _latest(store.lines(lambda row: _outcome_in(row, len(cases))))
+        run = _Run(task, cases, rows, retry, store, comm)
         rows, troubles = run.over(progress)
     finally:
-        if kept is not None:
-            kept.close()
+        if store is not None:
+            store.release()
     found = Study(cases, grid, {i: _outcome(row) for i, row in sorted(rows.items())})
-    _raise_first(run.trouble, troubles, found, folder)
+    _raise_first(run.trouble, troubles, found, store)
     return found
 
 
+def go_on(store, scene, duration, progress):
+    """`resume` of a study, which holds no functions."""
+    raise SceneError(f"{store.place}: it holds a study: expected the same call of study, which goes on")
+
+
 def _told(task, cases, *, strictly):
-    """The descriptions of task and cases, by which they are compared with those of a folder, and cases between ranks.
+    """The mark of task and cases, by which they are compared with those of a folder, and cases between ranks.
 
     Raises:
         SceneError: something cannot be compared, and `strictly` is true.
     """
-
-    def of(what, describe, value):
+    told = {"cases: number": len(cases)}
+    for name, value in (("task", task), *((f"cases[{i}]", case) for i, case in enumerate(cases))):
         try:
-            return describe(value)
-        except NotDescribed as problem:
+            told |= mark_of(value, name)
+        except NotMarked as problem:
             if strictly:
                 raise SceneError(
-                    f"study.{what}: a {problem} cannot be compared with what the folder holds: expected {_COMPARABLE}, "
+                    f"study.{name}: a {problem} cannot be compared with what the folder holds: expected {_COMPARABLE}, "
                     "or that the task makes the others itself"
                 ) from None
-            return str(problem)
+            told[name] = str(problem)
+    return told
 
-    return of("task", task_described, task), [of(f"cases[{i}]", described, case) for i, case in enumerate(cases)]
+
+def _outcome_in(row, count):
+    """A stored row, which is that of one of `count` cases.
+
+    Raises:
+        ValueError, LookupError, TypeError: it is not.
+    """
+    if not 0 <= row["case"] < count or ("result" in row) == ("failure" in row):
+        raise ValueError(f"case = {row['case']}: expected a result or a failure of one of {count} cases")
+    row["attempt"] + row["seconds"], from_data(row.get("result"))
+    return row
 
 
 class _Run:
@@ -161,7 +182,7 @@ class _Run:
                 try:
                     self._kept.keep(row)
                 except OSError as problem:
-                    raise _CannotKeep(f"{self._kept.place}: {problem.strerror or problem}") from problem
+                    raise _CannotKeep(problem.strerror or str(problem)) from problem
             pool.tell("failure" in row)
 
     def _computed(self, i):
@@ -219,22 +240,20 @@ def _kind(trouble):
     return RuntimeError.__name__, f"{type(trouble).__name__}: {trouble}"
 
 
-def _raise_first(own, troubles, found, folder):
+def _raise_first(own, troubles, found, store):
     """Raise what ended the work, the same on all ranks."""
     if not troubles:
         return
     name, text = min(troubles, key=lambda trouble: trouble[0] == KeyboardInterrupt.__name__)
-    kept = (
-        "; with a folder they would be kept there, and the same call would go on from them"
-        if folder is None
-        else f"; they are kept in {os.fspath(folder)}, from where the same call goes on"
-    )
     if name == KeyboardInterrupt.__name__:
+        kept = (
+            "; with a folder they would be kept there, and the same call would go on from them"
+            if store is None
+            else f"; they are kept in {store.place}, {store.again}"
+        )
         raise Interrupted(found, kept) from None
     if name == _CannotKeep.__name__:
-        raise NotStored(
-            f"study.folder: {text}: {len(found)} cases are computed, which the exception's `path` holds", found
-        )
+        raise store.not_stored(OSError(0, text), found, "an outcome")
     if name == InstallationError.__name__:
         raise InstallationError(text) from own
     raise own or RuntimeError(text)

@@ -13,22 +13,27 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from cosserat_fenicsx.checks import File, Numbers, finite_array, refuse
-from cosserat_fenicsx.errors import Interrupted, NotConverged
+from cosserat_fenicsx.errors import Interrupted, NotConverged, SceneError
 from cosserat_fenicsx.progress import Progress
 from cosserat_fenicsx.ranks import world
+from cosserat_fenicsx.storage.mark import NotMarked, mark_of
+from cosserat_fenicsx.storage.store import Kind, Store
 from cosserat_fenicsx.well.buckled import LockUp
 from cosserat_fenicsx.well.components import DrillString
 from cosserat_fenicsx.well.hole import Borehole, Mud
 from cosserat_fenicsx.well.operations import Operation
 from cosserat_fenicsx.well.pieces import pieces_of
-from cosserat_fenicsx.well.sweep_file import SweepFile
 from cosserat_fenicsx.well.tabular import Tabular
 from cosserat_fenicsx.well.torque_and_drag import AUTO, BUCKLED, ROD, SOFT, torque_and_drag
 
 #: Numbers that are kept of an answer; `locked` is where the string locks up, m, or NaN; `rung` the index of its model.
 KEPT = ("hook_load", "surface_torque", "error", "model_error", "locked", "rung")
 _RUNGS = (SOFT, BUCKLED, ROD)
-_KINDS = {"rung": (lambda value: value in (None, *map(float, range(len(_RUNGS)))), "null or the index of a model")}
+KIND = Kind(
+    what="sweep", home="well.depth_sweep", call="depth_sweep", again="the same call of depth_sweep goes on from there",
+    differs="it holds another sweep, expected the same call, or another folder",
+)  # fmt: skip
+_PLACE = ("operation", "friction", "depth")
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,7 +132,7 @@ def depth_sweep(
     model: str = "auto",
     tol: float = 1e-4,
     torque_convention: str = "coulomb",
-    file: File | None = None,
+    folder: File | None = None,
     progress: bool | None = None,
 ) -> DepthSweep:
     """Hook load and surface torque over the depth of the bit.
@@ -136,7 +141,7 @@ def depth_sweep(
         operations: one or several. depths: measured depths of the bit, m.
         friction: coefficients to compare, each a number for the whole hole, or one for each of its sections; None for
             those of the hole.
-        file: keeps the answers as they come, as lines of JSON; the same call goes on from there. None keeps none.
+        folder: keeps the answers as they come, as lines of JSON; the same call goes on from there. None keeps none.
         progress: True or False; None shows it in runs of more than two seconds.
         hole, string, mud, model, tol, torque_convention: see `torque_and_drag`.
 
@@ -144,8 +149,8 @@ def depth_sweep(
         a `DepthSweep`. Where a string locks up, or no equilibrium is found, its loads are NaN, and its `notes` say so.
 
     Raises:
-        SceneError: see `torque_and_drag`; a file of another sweep.
-        OSError: the file cannot be written.
+        SceneError: see `torque_and_drag`; a folder that holds another sweep.
+        NotStored: the folder can no longer be written to; its `path` is the sweep so far.
         Interrupted: by Ctrl-C; its `path` is the sweep so far.
     """
     operations = (operations,) if isinstance(operations, Operation) else tuple(operations)
@@ -166,29 +171,60 @@ def depth_sweep(
     values = {name: np.full(shape, np.nan) for name in KEPT}
     sweep = DepthSweep(operations, depths, friction, values)
     about = {"hole": hole, "string": string, "operations": operations, "depths": depths, "friction": friction}
-    store = SweepFile(file, {**about, **settings}, shape, KEPT, _KINDS)
-    for answer in store.kept:
+    store = None if folder is None else Store(folder, KIND).begin(_mark({**about, **settings}))
+    for answer in store.lines(lambda row: _answer_in(row, shape)) if store else ():
         _put(sweep, *answer)
     missing = np.argwhere(~sweep.done)
     try:
         with Progress([len(missing)], progress, world(), "answer") as bar:
             bar.start("depth sweep")
-            for number, (i, j, k) in enumerate(missing, start=1):
+            for number, (i, j, k) in enumerate(missing.tolist(), start=1):
                 found = _answer(holes[j], string, operations[i], float(depths[k]), settings)
                 _put(sweep, (i, j, k), *found)
-                store.keep((i, j, k), *found)
+                if store:
+                    store.keep(_row((i, j, k), *found), sweep)
                 bar.reached(number)
     except KeyboardInterrupt:
-        kept = "" if file is None else f"; they are kept in {os.fspath(file)}, from where the same call goes on"
-        raise Interrupted(sweep, kept) from None
+        raise Interrupted(sweep, f"; they are kept in {os.fspath(folder)}, {store.again}" if store else "") from None
     finally:
-        store.close()
+        if store:
+            store.release()
     return sweep
+
+
+def go_on(store, scene, duration, progress):
+    """`resume` of a sweep, which holds no objects."""
+    raise SceneError(f"{store.place}: it holds a sweep: expected the same call of depth_sweep, which goes on")
+
+
+def _mark(about):
+    try:
+        return {place: found for name, value in about.items() for place, found in mark_of(value, name).items()}
+    except NotMarked as problem:
+        raise SceneError(
+            f"depth_sweep.folder: a {problem} cannot be compared with what the folder holds: expected objects of the "
+            "package, or dataclasses of numbers and texts, or no folder"
+        ) from None
+
+
+def _row(place, numbers, note):
+    return {**dict(zip((*_PLACE, *KEPT), (*place, *map(float, numbers)), strict=True)), "note": note}
+
+
+def _answer_in(row, shape):
+    """(indices, numbers, note) of a stored row.
+
+    Raises:
+        ValueError, LookupError, TypeError: it is none of a sweep of this shape.
+    """
+    place = tuple(row[name] for name in _PLACE)
+    if not all(type(i) is int and 0 <= i < count for i, count in zip(place, shape, strict=True)):
+        raise ValueError(f"{place}: expected indices below {shape}")
+    return place, [float(row[name]) for name in KEPT], str(row["note"])
 
 
 def _put(sweep, place, numbers, note):
     """Put an answer into a sweep, at its indices."""
-    place = tuple(map(int, place))
     for name, number in zip(KEPT, numbers, strict=True):
         sweep.values[name][place] = number
     if note:

@@ -124,13 +124,13 @@ class WellScene:
         """The answers of `torque_and_drag`, one an operation."""
         return [self.answer(operation) for operation in self.operations]
 
-    def depth_sweep(self, file: File | None = None) -> DepthSweep | None:
-        """The sweep over depths that the file asks for, else None; `file`: see `depth_sweep`."""
+    def depth_sweep(self, folder: File | None = None) -> DepthSweep | None:
+        """The sweep over depths that the file asks for, else None; `folder`: see `depth_sweep`."""
         if not self.sweep:
             return None
         settings = {name: value for name, value in self.settings.items() if name != "depth"}
         return depth_sweep(
-            self.hole, self.string, self.operations, mud=self.mud, file=file, **{**settings, **self.sweep}
+            self.hole, self.string, self.operations, mud=self.mud, folder=folder, **{**settings, **self.sweep}
         )
 
 
