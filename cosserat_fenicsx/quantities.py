@@ -126,7 +126,7 @@ class Units:
         """The unit of a quantity in tables and charts, and its size in that of the result: of SI units with the prefix
         that suits the values."""
         unit, size = self.of(quantity)
-        if unit != quantity.unit:
+        if any(name in self._chosen for name in _dimensions(quantity.unit, quantity.dimension)):
             return unit, size
         if quantity.shown:
             known = next(x.units for x in DIMENSIONS.values() if {unit, quantity.shown} <= x.units.keys())

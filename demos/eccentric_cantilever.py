@@ -22,7 +22,7 @@ from rich.table import Table
 
 import cosserat_fenicsx as cf
 from cosserat_fenicsx import analytic
-from cosserat_fenicsx.pictures.charts import empty_figure, save
+from cosserat_fenicsx.pictures.charts import draw_chart, empty_figure
 from cosserat_fenicsx.results.path import stability
 from cosserat_fenicsx.results.screen import as_text
 
@@ -172,15 +172,18 @@ def draw(rod, path, file):
         (path.load_factors, path.displacement(rod.end)[:, 0], "cosserat_fenicsx",
          {"color": "tab:blue", "marker": "o", "ls": ""}),
     ]  # fmt: skip
-    figure = empty_figure(8, 5.5)
-    axes = figure.subplots()
-    for x, y, label, style in curves:
-        axes.plot(x, y, label=label, **style)
-    axes.set(xlabel=r"load factor $\eta = F / P_{cr}$", ylabel=r"transverse tip displacement $\delta$ (m)")
-    axes.set(title="Eccentrically compressed cantilever, e = L/100", ylim=(0, 18))
-    axes.grid(alpha=0.3)
-    axes.legend()
-    save(figure, file)
+
+    def chart():
+        figure = empty_figure(8, 5.5)
+        axes = figure.subplots()
+        for x, y, label, style in curves:
+            axes.plot(x, y, label=label, **style)
+        axes.set(xlabel=r"load factor $\eta = F / P_{cr}$", ylabel=r"transverse tip displacement $\delta$ (m)")
+        axes.set(title="Eccentrically compressed cantilever, e = L/100", ylim=(0, 18))
+        axes.legend()
+        return figure
+
+    draw_chart(chart, file)
 
 
 def main(out="out", load_factors=TABULATED, formulation=None, **mesh):

@@ -5,6 +5,8 @@ from pathlib import Path
 
 import numpy as np
 
+from cosserat_fenicsx.pictures.charts import draw_chart, empty_figure, legend
+
 #: The first panel: axes ("xy", "xz" or "xyz"), the station whose track is drawn, the last time (s) or None, and whether
 #: the axes have different scales.
 Shapes = namedtuple("Shapes", "axes station until stretched", defaults=(None, False))
@@ -22,11 +24,12 @@ def draw(history, file, shapes, curve):
         file: a .png.
         shapes: see `Shapes`; curve: see `Curve`.
     """
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
+    Path(file).parent.mkdir(parents=True, exist_ok=True)
+    draw_chart(lambda: _figure(history, shapes, curve), file, history.comm)
 
-    figure = Figure(figsize=(14, 6.5), layout="constrained")
-    FigureCanvasAgg(figure)
+
+def _figure(history, shapes, curve):
+    figure = empty_figure(14, 6.5)
     grid = figure.add_gridspec(2, 2, width_ratios=(1.4, 1))
     figure.suptitle(history.scene.title)
     _draw_shapes(figure, grid[:, 0], history, shapes)
@@ -54,10 +57,8 @@ def draw(history, file, shapes, curve):
             )
     below.set(xlabel="time (s)", ylabel="energy (J)")
     for axes in (above, below):
-        axes.grid(alpha=0.3)
-        axes.legend(frameon=False, loc="center left", bbox_to_anchor=(1.0, 0.5))
-    Path(file).parent.mkdir(parents=True, exist_ok=True)
-    figure.savefig(file, dpi=110)
+        legend(axes)
+    return figure
 
 
 def _draw_shapes(figure, place, history, shapes):
@@ -85,8 +86,7 @@ def _draw_shapes(figure, place, history, shapes):
         axes.set_box_aspect(np.ptp(ranges, axis=1), zoom=1.1)
         for axis, size in zip((axes.xaxis, axes.yaxis, axes.zaxis), np.ptp(ranges, axis=1), strict=True):
             axis.set_major_locator(MaxNLocator(max(2, round(6 * size / np.ptp(ranges, axis=1).max()))))
-    axes.grid(alpha=0.3)
-    axes.legend(frameon=False, loc="lower center", bbox_to_anchor=(0.5, 1.0))
+    legend(axes)
     figure.colorbar(
         colours,
         ax=axes,

@@ -3,7 +3,7 @@
 import numpy as np
 
 import cosserat_fenicsx as cf
-from cosserat_fenicsx.pictures.charts import empty_figure, save
+from cosserat_fenicsx.pictures.charts import beside, draw_chart, legend
 
 #: Operations of the hook loads, their colours, and for how many depths of the bit the rod is solved.
 OPERATIONS, COLOURS, DEPTHS = (cf.TripOut(), cf.TripIn()), ("tab:blue", "tab:orange"), 9
@@ -20,8 +20,11 @@ def stiff_and_soft(scene, drilling, file):
         cf.depth_sweep(scene.hole, scene.string, OPERATIONS, depths, mud=scene.mud, model=model, tol=1e-3)
         for model in ("soft", "rod")
     )
-    figure = empty_figure(13.5, 6.5)
-    hook, apart, side = figure.subplots(1, 3, sharey=True)
+    draw_chart(lambda: _figure(scene, drilling, depths, soft, stiff), file)
+
+
+def _figure(scene, drilling, depths, soft, stiff):
+    figure, (hook, apart, side), _ = beside([4.5, 4.5, 4.5], 6.5)
     for i, (operation, colour) in enumerate(zip(OPERATIONS, COLOURS, strict=True)):
         loads, given = (sweep.hook_load[i, 0] / 1e3 for sweep in (stiff, soft))
         hook.plot(given, depths, color=colour, label=f"{operation.name}, soft string")
@@ -42,7 +45,6 @@ def stiff_and_soft(scene, drilling, file):
     )
     hook.invert_yaxis()
     for panel in (hook, apart, side):
-        panel.grid(alpha=0.3)
-        panel.legend(fontsize=9, loc="best")
+        legend(panel)
     figure.suptitle(f"{scene.title}: the exact rod in contact beside the soft string")
-    save(figure, file)
+    return figure

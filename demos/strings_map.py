@@ -18,7 +18,7 @@ from known_numbers import Check, report, verdict
 from mpi4py import MPI
 
 import cosserat_fenicsx as cf
-from cosserat_fenicsx.pictures.charts import empty_figure, save
+from cosserat_fenicsx.pictures.charts import draw_chart, empty_figure
 
 FOUND = cf.read_drilling_scene(Path(__file__).parent / "strings" / "stability_map.toml")
 #: A bit whose speed has this severity at the end does not rotate steadily; modes that grow faster than this (1/s) have
@@ -35,7 +35,7 @@ def drilled(speed, weight):
     return {"severity": cycle.severity, "period": cycle.period, "stuck": cycle.stuck}
 
 
-def picture(severity, growth, speeds, weights, file):
+def picture(severity, growth, speeds, weights):
     """Draw the severity of stick-slip, and the limits of the modes that grow."""
     figure = empty_figure(8.5, 5.5)
     panel = figure.subplots()
@@ -47,10 +47,11 @@ def picture(severity, growth, speeds, weights, file):
         if (values < 0).any():
             panel.contour(x, y, values, levels=[0.0], colors="white", linewidths=1.2)
     panel.plot([], [], color="white", label="left of each line one more mode grows (linear theory)")
-    panel.legend(loc="lower right", facecolor="0.4", labelcolor="white")
+    panel.legend(loc="lower right", facecolor="0.4", labelcolor="white", frameon=True)
     panel.set(xlabel="speed (rpm)", ylabel="weight on bit (kN)")
     panel.set_title(f"Stick-slip after {FOUND.settings['duration']:g} s from rest, {severity.size} simulations")
-    save(figure, file)
+    panel.grid(visible=False)
+    return figure
 
 
 def main(quick=False, out="out/strings"):
@@ -85,7 +86,7 @@ def main(quick=False, out="out/strings"):
               f"{took:.1f} s; the bit oscillates in {moves.sum()}, a mode grows in {grows.sum()}")  # fmt: skip
         if not quick:
             Path(out).mkdir(parents=True, exist_ok=True)
-            picture(severity, growth, speeds, weights, Path(out) / "stability_map.png")
+            draw_chart(lambda: picture(severity, growth, speeds, weights), Path(out) / "stability_map.png")
     return checks
 
 

@@ -19,7 +19,7 @@ from mpi4py import MPI
 from whirling_collar import LENGTH, MESH, least_friction, rolling
 
 import cosserat_fenicsx as cf
-from cosserat_fenicsx.pictures.charts import empty_figure, save
+from cosserat_fenicsx.pictures.charts import draw_chart, empty_figure, legend
 
 SPEEDS = [rpm * cf.units.rpm for rpm in (40, 60, 80, 100, 120, 150)]
 FRICTIONS = [0.02, 0.03, 0.045, 0.07, 0.12, 0.3]
@@ -64,11 +64,11 @@ def main(quick=False, out="out/whirl"):
               f"backward in {int(rolls.sum())}, forward already in {int((ratio > 0).sum())}")  # fmt: skip
         if not quick:
             Path(out).mkdir(parents=True, exist_ok=True)
-            picture(ratio, rolls > 0, speeds, frictions, Path(out) / "map.png")
+            draw_chart(lambda: picture(ratio, rolls > 0, speeds, frictions), Path(out) / "map.png")
     return checks
 
 
-def picture(ratio, rolls, speeds, frictions, file):
+def picture(ratio, rolls, speeds, frictions):
     """Draw the ratio of whirl to spin over speed and friction, and the friction that rolling takes."""
     figure = empty_figure(8.5, 5.5)
     panel = figure.subplots()
@@ -85,8 +85,9 @@ def picture(ratio, rolls, speeds, frictions, file):
     panel.set_yticks(y, [f"{value:g}" for value in frictions])
     panel.set(xlabel="speed of the drive (rpm)", ylabel="friction coefficient (1)")
     panel.set_ylim(y[0] - 0.5, y[-1] + 0.5)
-    panel.legend(frameon=False, loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2)
-    save(figure, file)
+    legend(panel)
+    panel.grid(visible=False)
+    return figure
 
 
 if __name__ == "__main__":

@@ -1,6 +1,7 @@
 """Charts of a drill-string in motion, maps over time and depth, and charts of its stability, by matplotlib; films."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
@@ -11,19 +12,36 @@ from cosserat_fenicsx.drilling.tables import advance_unit, alias, turns
 from cosserat_fenicsx.drilling.top_drive import PI
 from cosserat_fenicsx.errors import SceneError, nearest
 from cosserat_fenicsx.pictures.animation import MOST_FRAMES, check_name, record
-from cosserat_fenicsx.pictures.charts import COLOURS, GREY, STYLES, draw_chart, empty_figure
+from cosserat_fenicsx.pictures.charts import (
+    COLOURS,
+    STYLES,
+    arrange,
+    draw_chart,
+    empty_figure,
+    ledger,
+    legend,
+    room_for,
+    scale,
+    stacked,
+    styled,
+)
+from cosserat_fenicsx.quantities import Quantity
 from cosserat_fenicsx.ranks import on_first, world
+from cosserat_fenicsx.units import rpm
 
-#: Factors from SI to the units of charts, and these.
-RPM, KILO = 30 / np.pi, 1e-3
-#: {name: (words, unit, factor from SI, whether it has values of either sign)} of what maps show.
-SHOWN = {
-    "speed": ("speed of rotation", "rpm", RPM, False),
-    "torque": ("torque", "kN m", KILO, True),
-    "angle": ("turns", "1", 1 / (2 * np.pi), False),
-    "tension": ("tension", "kN", KILO, True),
-    "displacement": ("displacement downwards", "mm", 1e3, True),
-    "velocity": ("velocity downwards", "m/s", 1.0, True),
+_SPEED = Quantity("speed", unit="rad/s", shown="rpm")
+_TORQUE = Quantity("torque", unit="N m", shown="kN m")
+_FORCE = Quantity("force", unit="N", shown="kN")
+_WEIGHT = Quantity("weight on bit", unit="N", shown="kN")
+_DEPTH = Quantity("measured depth", unit="m", shown="m", dimension="length")
+#: {name: (quantity, whether it has values of either sign)} of what maps show.
+_MAPPED = {
+    "speed": (Quantity("speed of rotation", unit="rad/s", shown="rpm"), False),
+    "torque": (_TORQUE, True),
+    "angle": (Quantity("turns"), False),
+    "tension": (Quantity("tension", unit="N", shown="kN"), True),
+    "displacement": (Quantity("displacement downwards", unit="m", shown="mm", dimension="diameter"), True),
+    "velocity": (Quantity("velocity downwards", unit="m/s"), True),
 }
 DRIVE, BIT = "tab:blue", "tab:red"
 # Bands of a chart of a long run.
@@ -72,7 +90,7 @@ def title_of(history):
         control = f"{_impedances(history)} drive"
     else:
         control += " drive"
-    asked = f" at {drive.signal()(0.0) * RPM:.4g} rpm" if drive.signal().constant and drive.speed is not None else ""
+    asked = f" at {drive.signal()(0.0) / rpm:.4g} rpm" if drive.signal().constant and drive.speed is not None else ""
     bit = history.scene.bit
     at = "bit off bottom" if bit is None else f"{type(bit.law).__name__} bit"
     weight = f", {bit.weight / 1e3:.4g} kN on bit" if bit is not None and bit.weight else ""
@@ -87,13 +105,13 @@ def _impedances(history):
     return f"PI (Kp = {Kp / scene.segments[0].torsional_impedance:.3g} impedances)"
 
 
-#: Panels over time: (axis, ((attribute, factor, label, colour), ...)).
+#: Panels over time: (quantity, ((attribute, label, colour), ...)).
 _PANELS = (
-    ("speed (rpm)", (("drive_speed", RPM, "drive", DRIVE), ("bit_speed", RPM, "bit", BIT))),
-    ("torque (kN m)", (("surface_torque", KILO, "at the surface", DRIVE), ("torque_on_bit", KILO, "on bit", BIT))),
-    ("force (kN)", (("hook_load", KILO, "hook load", DRIVE), ("weight_on_bit", KILO, "weight on bit", BIT))),
-    ("impulse (kN s)", (("impulse_on_bit", KILO, "impacts on rigid\nrock, their sum", BIT),)),
-    ("bit advance (m)", (("bit_advance", 1.0, "bit advance", BIT),)),
+    (_SPEED, (("drive_speed", "drive", DRIVE), ("bit_speed", "bit", BIT))),
+    (_TORQUE, (("surface_torque", "at the surface", DRIVE), ("torque_on_bit", "on bit", BIT))),
+    (_FORCE, (("hook_load", "hook load", DRIVE), ("weight_on_bit", "weight on bit", BIT))),
+    (Quantity("impulse", unit="N s"), (("impulse_on_bit", "impacts on rigid rock, their sum", BIT),)),
+    (Quantity("bit advance", unit="m"), (("bit_advance", "bit advance", BIT),)),
 )
 #: (attribute, label, colour, style) of the ledger.
 _LEDGER = (
@@ -108,51 +126,42 @@ _LEDGER = (
 )
 # A chart with more oscillations of the bit than this shows the bands between their extremes.
 _SWINGS = 80
-# Energies below this share of the largest are not drawn.
-_LITTLE = 1e-9
 
 
-def draw_over_time(history, file, between=None):
+def draw_over_time(history, file, between=None, **look):
     """See `DrillingHistory.plot`."""
     rows = times_between("plot", history.times, between)
-    return draw_chart(lambda: _over_time(history, rows), file, world())
+    return draw_chart(lambda: _over_time(history, rows), file, world(), **look)
 
 
 def _over_time(history, rows):
     t = history.times[rows]
-    panels = [(axis, [(getattr(history, name)[rows] * factor, *look) for name, factor, *look in lines])
-              for axis, lines in _PANELS]  # fmt: skip
-    panels = [(axis, [line for line in lines if np.nan_to_num(line[0]).any()]) for axis, lines in panels]
-    panels = [_readable(*panel) for panel in panels if panel[1]]  # without what stays zero, or is unknown
+    panels = [(quantity, [(getattr(history, name)[rows], *style) for name, *style in lines])
+              for quantity, lines in _PANELS]  # fmt: skip
+    panels = [(quantity, [line for line in lines if np.nan_to_num(line[0]).any()]) for quantity, lines in panels]
+    panels = [(quantity, lines) for quantity, lines in panels if lines]  # without what stays zero, or is unknown
     many = max(swings(history.bit_speed[rows]), swings(np.nan_to_num(history.bit_velocity[rows]))) > _SWINGS
-    figure = empty_figure(10, 1.2 + 2.3 * len(panels))
-    axes = figure.subplots(len(panels), 1, sharex=True, squeeze=False)[:, 0]
-    for panel, (axis, lines) in zip(axes, panels, strict=True):
+    figure, axes = stacked(10, [2.3] * len(panels))
+    for panel, (quantity, lines) in zip(axes, panels, strict=True):
+        every = [values for values, *_ in lines]
+        if quantity.label == "bit advance":
+            quantity = replace(quantity, shown=advance_unit(every[0])[0], dimension="length")
+        heading, size = scale(quantity, *every)
         for values, label, colour in lines[::-1]:
+            label = label if label != quantity.label else None
             if many:
-                middles, ((least, most),) = bands(t, values)
+                middles, ((least, most),) = bands(t, values / size)
                 panel.fill_between(middles, least, most, color=colour, label=label, alpha=0.4)
             else:
-                panel.plot(t, values, color=colour, label=label, linewidth=1.1)
-        panel.set_ylabel(axis)
-        panel.grid(alpha=0.3)
+                panel.plot(t, values / size, color=colour, label=label, linewidth=1.1)
+        panel.set_ylabel(heading)
         if panel is axes[0] and turns(history) and not many:
             lower = "bit" if history.scene.bit is not None else "lower end"
             _shade_rest(panel, t, history.bit_speed[rows], history.drive_speed[rows], f"{lower} at rest")
-        if len(lines) > 1 or lines[0][1] not in axis:
-            panel.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), frameon=False)
-    axes[0].margins(x=0.0)
+    legend(*axes)
     axes[-1].set_xlabel("time (s)")
     figure.suptitle(title_of(history) + ("\nbands between the extremes of oscillations" if many else ""))
     return figure
-
-
-def _readable(axis, lines):
-    """The advance of a bit in mm, where it is short."""
-    if "advance" not in axis:
-        return axis, lines
-    unit, factor = advance_unit(lines[0][0])
-    return f"bit advance ({unit})", [(values * factor, *look) for values, *look in lines]
 
 
 def _shade_rest(panel, t, bit, drive, label):
@@ -164,14 +173,14 @@ def _shade_rest(panel, t, bit, drive, label):
                            zorder=0, label=label)  # fmt: skip
 
 
-def draw_phase(history, file, since=None):
+def draw_phase(history, file, since=None, **look):
     """See `DrillingHistory.plot_phase`."""
     times_between("plot_phase", history.times, None)
     last = float(history.times[-1])
     since = last / 2 if since is None else since
     if not isinstance(since, int | float) or (history.times >= since).sum() < 2:
         refuse("plot_phase", "since", since, f"a time (s) before the end, {last:g} s")
-    return draw_chart(lambda: _phase(history, since), file, world())
+    return draw_chart(lambda: _phase(history, since), file, world(), **look)
 
 
 def _phase(history, since):
@@ -179,40 +188,23 @@ def _phase(history, since):
     twist = history.drive_angle[rows] - history.bit_angle[rows]
     figure = empty_figure(6.5, 5.5)
     panel = figure.subplots()
-    panel.plot(twist, history.bit_speed[rows] * RPM, color=BIT, linewidth=1.0, label="bit")
-    panel.axhline(float(history.drive_speed[rows].mean()) * RPM, color=DRIVE, linewidth=1.0, label="drive, mean speed")
-    panel.set(xlabel="twist between drive and bit (rad)", ylabel="bit speed (rpm)")
-    panel.grid(alpha=0.3)
-    panel.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2, frameon=False)
-    figure.suptitle(f"{title_of(history)}\nfrom {since:.4g} to {history.times[-1]:.4g} s", fontsize=10)
+    heading, size = scale(_SPEED)
+    panel.plot(twist, history.bit_speed[rows] / size, color=BIT, label="bit")
+    panel.axhline(float(history.drive_speed[rows].mean()) / size, color=DRIVE, label="drive, mean speed")
+    panel.set(xlabel="twist between drive and bit (rad)", ylabel=f"bit {heading}")
+    legend(panel)
+    figure.suptitle(f"{title_of(history)}\nfrom {since:.4g} to {history.times[-1]:.4g} s")
     return figure
 
 
-def draw_energy(history, file):
+def draw_energy(history, file, **look):
     """See `DrillingHistory.plot_energy`."""
     times_between("plot_energy", history.times, None)
-    return draw_chart(lambda: _energy(history), file, world())
-
-
-def _energy(history):
-    figure = empty_figure(10, 6)
-    above, below = figure.subplots(2, 1, sharex=True, height_ratios=(3, 1))
-    values = {name: np.nan_to_num(getattr(history, name)) * KILO for name, *_ in _LEDGER}
-    most = max(np.abs(x).max() for x in values.values())
-    for name, label, colour, style in _LEDGER:
-        if np.abs(values[name]).max() > _LITTLE * most:
-            above.plot(history.times, values[name], style, color=colour, label=label)
+    curves = [(label, np.nan_to_num(getattr(history, name)), *style) for name, label, *style in _LEDGER]
     axial = not np.isnan(history.hook_load).all()
-    above.set_ylabel("energy (kJ)" + ("; strain: less that\nof the string as it hangs at rest" if axial else ""))
-    above.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), frameon=False)
-    below.plot(history.times, history.balance * KILO, color=GREY)
-    below.set_ylabel("not accounted\nfor (kJ)")
-    below.set_xlabel("time (s)")
-    for panel in (above, below):
-        panel.grid(alpha=0.3)
-        panel.margins(x=0.0)
-    figure.suptitle(f"{title_of(history)}: energy")
-    return figure
+    about = "; strain: less the energy of the string as it hangs at rest" if axial else ""
+    title = f"{title_of(history)}: energy"
+    return draw_chart(lambda: ledger(history.times, curves, history.balance, title, about), file, world(), **look)
 
 
 # At most so many depths are drawn; the colour of places that stick.
@@ -221,26 +213,29 @@ _DEPTHS, _STICKS = 500, "0.8"
 _BIT = 0.03
 
 
-def draw_map(history, file, what=None, between=None):
+def draw_map(history, file, what=None, between=None, **look):
     """See `DrillingHistory.plot_map`."""
     if what is None:
         what = "speed" if turns(history) else "velocity"
-    if not isinstance(what, str) or what not in SHOWN:
-        raise SceneError(f"plot_map.what = {what!r}: {nearest(what, SHOWN)}")
+    if not isinstance(what, str) or what not in _MAPPED:
+        raise SceneError(f"plot_map.what = {what!r}: {nearest(what, _MAPPED)}")
     rows = times_between("plot_map", history.profile_times, between)
     if np.isnan(getattr(history, what)).all():
         raise SceneError(
             f"plot_map.what = {what!r}: the {history.model} model has none: expected model='axial and torsional'"
         )
-    return draw_chart(lambda: _map(history, rows, what), file, world())
+    return draw_chart(lambda: _map(history, rows, what), file, world(), **look)
 
 
 def _map(history, rows, what):
-    words, unit, factor, signed = SHOWN[what]
+    quantity, signed = _MAPPED[what]
     places = np.unique(np.linspace(0, len(history.depths) - 1, _DEPTHS).astype(int))
-    t, depths = history.profile_times[rows], history.depths[places]
-    values = getattr(history, what)[rows][:, places].T * factor
-    sticks = history.sticking[rows][:, places].T
+    along, length = scale(_DEPTH)
+    t, depths = history.profile_times[rows], history.depths[places] / length
+    values = getattr(history, what)[rows][:, places].T
+    values = values / (2 * np.pi) if what == "angle" else values
+    heading, size = scale(quantity, values)
+    values, sticks = values / size, history.sticking[rows][:, places].T
     figure = empty_figure(10, 5.5)
     panel = figure.subplots()
     most, least = float(np.nanmax(values)), float(np.nanmin(values))
@@ -249,7 +244,7 @@ def _map(history, rows, what):
     limits = limits if limits[1] > limits[0] else (0.0, 1.0)
     colours = panel.pcolormesh(t, depths, values, shading="nearest", cmap="coolwarm" if signed else "viridis",
                                vmin=limits[0], vmax=limits[1], rasterized=True)  # fmt: skip
-    figure.colorbar(colours, ax=panel, label=f"{words} ({unit})")
+    figure.colorbar(colours, ax=panel, label=heading)
     told = ""
     if sticks.any():
         from matplotlib.colors import ListedColormap
@@ -261,10 +256,10 @@ def _map(history, rows, what):
             panel.fill_between(t, 0, _BIT, where=sticks[-1], transform=panel.get_xaxis_transform(), step="mid",
                                color=_STICKS, edgecolor="0.3", linewidth=0.3)  # fmt: skip
             told += " (at the lower edge: the bit)"
-    panel.set(xlabel="time (s)", ylabel="measured depth (m)", ylim=(depths[-1], depths[0]), xlim=(t[0], t[-1]))
+    panel.set(xlabel="time (s)", ylabel=along, ylim=(depths[-1], depths[0]), xlim=(t[0], t[-1]))
+    panel.grid(visible=False)
     caution = alias(history)
-    told += f"\n{caution}" if caution else ""
-    panel.set_title(f"{title_of(history)}{told}", fontsize=8 if caution else 11)
+    figure.suptitle(f"{title_of(history)}{told}" + (f"\n{caution}" if caution else ""))
     return figure
 
 
@@ -272,20 +267,20 @@ def _map(history, rows, what):
 _MAPS, _LINES = 6, 8
 
 
-def draw_stability(answer, file, mode):
+def draw_stability(answer, file, mode, **look):
     """See `Stability.plot`."""
     grid = len(answer.weights) > 1 and len(answer.speeds) > 1
-    return draw_chart(lambda: (_maps if grid else _lines)(answer, _modes(answer, mode)), file, world())
+    return draw_chart(lambda: (_maps if grid else _lines)(answer, _modes(answer, mode)), file, world(), **look)
 
 
-def draw_campbell(answer, file):
+def draw_campbell(answer, file, **look):
     """See `Campbell.plot`."""
-    return draw_chart(lambda: _campbell(answer), file, world())
+    return draw_chart(lambda: _campbell(answer), file, world(), **look)
 
 
-def draw_bounce(answer, file):
+def draw_bounce(answer, file, **look):
     """See `BitBounce.plot`."""
-    return draw_chart(lambda: _bounce(answer), file, world())
+    return draw_chart(lambda: _bounce(answer), file, world(), **look)
 
 
 def _modes(answer, mode):
@@ -306,27 +301,29 @@ def _named(answer, k):
 def _maps(answer, modes):
     from matplotlib.colors import SymLogNorm
 
-    columns = min(3, len(modes))
+    columns = max(1, min(2 if len(modes) in (2, 4) else 3, len(modes), int((room_for(11.2) - 1.0) / 3.0)))
     rows = math.ceil(len(modes) / columns)
     figure = empty_figure(1.0 + 3.4 * columns, 0.9 + 2.7 * rows)
     axes = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
     speeds, weights = np.argsort(answer.speeds), np.argsort(answer.weights)
     largest = max(float(np.nanmax(np.abs(answer.growth[:, :, modes]))), 1e-12)
-    scale = SymLogNorm(largest / 30, vmin=-largest, vmax=largest)  # so that the sign is seen near the limit
+    colours = SymLogNorm(largest / 30, vmin=-largest, vmax=largest)  # so that the sign is seen near the limit
+    (along, turning), (across, pressing) = scale(_SPEED), scale(_WEIGHT, answer.weights)
     for panel, k in zip(axes.flat, modes, strict=False):
         growth = answer.growth[np.ix_(speeds, weights, [k])][:, :, 0].T
-        x, y = answer.speeds[speeds] * RPM, answer.weights[weights] * KILO
-        drawn = panel.pcolormesh(x, y, growth, cmap="coolwarm", norm=scale, shading="nearest")
+        x, y = answer.speeds[speeds] / turning, answer.weights[weights] / pressing
+        drawn = panel.pcolormesh(x, y, growth, cmap="coolwarm", norm=colours, shading="nearest")
         known = np.nan_to_num(growth, nan=-largest)
         if (known > 0).any() and (known < 0).any():
             panel.contour(x, y, known, levels=[0.0], colors="black", linewidths=1.2)
-        panel.set_title(_named(answer, k), fontsize=10)
+        panel.set_title(_named(answer, k))
+        panel.grid(visible=False)
     for panel in axes.flat[len(modes) :]:
         panel.set_visible(False)
     for panel in axes[-1]:
-        panel.set_xlabel("speed (rpm)")
+        panel.set_xlabel(along)
     for panel in axes[:, 0]:
-        panel.set_ylabel("weight on bit (kN)")
+        panel.set_ylabel(across)
     figure.colorbar(drawn, ax=axes, label="growth (1/s); black: the limit")
     return figure
 
@@ -335,52 +332,53 @@ def _lines(answer, modes):
     figure = empty_figure(7.0, 4.2)
     panel = figure.subplots()
     by_speed = len(answer.weights) == 1
-    x = answer.speeds * RPM if by_speed else answer.weights * KILO
+    x = answer.speeds if by_speed else answer.weights
+    heading, size = scale(_SPEED if by_speed else _WEIGHT, x)
     order = np.argsort(x)
     for n, k in enumerate(modes):
         growth = (answer.growth[:, 0, k] if by_speed else answer.growth[0, :, k])[order]
-        look = {"color": COLOURS[n % len(COLOURS)], "linestyle": STYLES[n % len(STYLES)]}  # some lie on each other
-        panel.plot(x[order], growth, **look, label=_named(answer, k))
+        style = {"color": COLOURS[n % len(COLOURS)], "linestyle": STYLES[n % len(STYLES)]}  # some lie on each other
+        panel.plot(x[order] / size, growth, **style, label=_named(answer, k))
     panel.axhline(0.0, color="black", linewidth=0.8)
-    panel.set(xlabel="speed (rpm)" if by_speed else "weight on bit (kN)", ylabel="growth (1/s)")
-    panel.grid(alpha=0.3)
-    panel.legend(fontsize=8)
+    panel.set(xlabel=heading, ylabel="growth (1/s)")
+    legend(panel)
     return figure
 
 
 def _campbell(answer):
     figure = empty_figure(7.0, 5.0)
     panel = figure.subplots()
-    fastest = answer.fastest * RPM
+    heading, size = scale(_SPEED)
+    fastest = answer.fastest / size
     for n, (kind, frequencies) in enumerate(answer.frequencies.items()):
         for i, frequency in enumerate(frequencies):
             label = f"{kind} (natural)" if i == 0 else None
             panel.plot([0, fastest], [frequency] * 2, color=COLOURS[n], linewidth=0.9, label=label)
     for n, (name, times) in enumerate(answer.excitations.items()):
-        panel.plot([0, fastest], [0, times * fastest / 60], "--", color="black", linewidth=1.0 + 0.6 * n, label=name)
-    marked = [(speed * RPM, answer.excitations[name] * speed / (2 * math.pi))
+        highest = times * answer.fastest / (2 * math.pi)
+        panel.plot([0, fastest], [0, highest], "--", color="black", linewidth=1.0 + 0.6 * n, label=name)
+    marked = [(speed / size, answer.excitations[name] * speed / (2 * math.pi))
               for (_, name), speeds in answer.critical_speeds().items() for speed in speeds]  # fmt: skip
     marked = [(x, y) for x, y in marked if y <= answer.up_to]
     if marked:
         panel.plot(*zip(*marked, strict=True), "o", color="tab:red", markersize=4, label="critical speeds")
-    panel.set(xlabel="speed (rpm)", ylabel="frequency (Hz)", xlim=(0, fastest), ylim=(0, answer.up_to))
-    figure.legend(fontsize=8, loc="outside upper center", ncols=5)
+    panel.set(xlabel=heading, ylabel="frequency (Hz)", xlim=(0, fastest), ylim=(0, answer.up_to))
+    legend(panel)
     return figure
 
 
 def _bounce(answer):
     figure = empty_figure(7.0, 4.2)
     panel = figure.subplots()
-    order = np.argsort(answer.speeds)
-    x, y = answer.speeds[order] * RPM, answer.amplitude[order] * KILO
-    weight = answer.scene.bit.weight * KILO
+    order, weight = np.argsort(answer.speeds), answer.scene.bit.weight
+    (along, turning), (across, pressing) = scale(_SPEED), scale(_WEIGHT, answer.amplitude, weight)
+    x, y = answer.speeds[order] / turning, answer.amplitude[order] / pressing
     panel.plot(x, y, color="tab:blue", label="amplitude of the weight on bit")
-    panel.axhline(weight, color="black", linestyle="--", label="static weight on bit")
-    panel.fill_between(x, 0, 1, where=y > weight, transform=panel.get_xaxis_transform(), color="tab:red", alpha=0.15,
-                       label="the bit lifts off")  # fmt: skip
-    panel.set(xlabel="speed (rpm)", ylabel="weight (kN)", yscale="log", xlim=(x[0], x[-1]))
-    panel.grid(alpha=0.3)
-    panel.legend(fontsize=8)
+    panel.axhline(weight / pressing, color="black", linestyle="--", label="static weight on bit")
+    panel.fill_between(x, 0, 1, where=y > weight / pressing, transform=panel.get_xaxis_transform(), color="tab:red",
+                       alpha=0.15, linewidth=0, label="the bit lifts off")  # fmt: skip
+    panel.set(xlabel=along, ylabel=across, yscale="log", xlim=(x[0], x[-1]))
+    legend(panel)
     return figure
 
 
@@ -411,7 +409,12 @@ class _Stage:
 
     def __init__(self, history, speed):
         self._history, self._speed = history, speed
-        self._figure = figure = empty_figure(9.6, 6.0)
+        with styled():
+            self._figure = self._prepared(history)
+
+    def _prepared(self, history):
+        """The Figure with what is constant."""
+        figure = empty_figure(9.6, 6.0)
         figure.set_dpi(_DPI)
         string, along, over = figure.subplots(1, 3, width_ratios=(0.35, 1.0, 2.0))
         top, bottom = history.depths[[0, -1]]
@@ -420,24 +423,24 @@ class _Stage:
         blank, box = np.zeros((_ALONG, _ACROSS)), (0, 1, bottom, top)
         self._stripes = string.imshow(blank, extent=box, aspect="auto", cmap="gray", vmin=-0.4, vmax=1.2)
         string.set(xticks=[], ylabel="measured depth (m)", title="string")
-        speeds = history.speed * RPM
+        speeds = history.speed / rpm
         (self._line,) = along.plot(speeds[0], history.depths, color="tab:purple")
         (self._held,) = along.plot([], [], ".", color="0.6", markersize=4, label="held by friction")
         low, high = float(min(np.nanmin(speeds), 0.0)), float(np.nanmax(speeds))
         room = 0.05 * max(high - low, 1.0)
         along.set(xlim=(low - room, high + room), ylim=(bottom, top), xlabel="speed (rpm)", yticklabels=[])
         if history.sticking.any():
-            along.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), frameon=False)
-        over.plot(history.times, history.drive_speed * RPM, color=DRIVE, label="drive", linewidth=1.0)
-        over.plot(history.times, history.bit_speed * RPM, color=BIT, label="bit", linewidth=1.0)
+            legend(along)
+        over.plot(history.times, history.drive_speed / rpm, color=DRIVE, label="drive", linewidth=1.0)
+        over.plot(history.times, history.bit_speed / rpm, color=BIT, label="bit", linewidth=1.0)
         over.set(xlabel="time (s)", ylabel="speed (rpm)", xlim=(0, history.times[-1]))
-        over.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2, frameon=False)
+        legend(over)
         self._now = over.axvline(0.0, color="black", linewidth=0.8)
-        for panel in (along, over):
-            panel.grid(alpha=0.3)
-        figure.suptitle(self._title(float(history.profile_times[0])), fontsize=10)
-        figure.draw_without_rendering()
+        string.grid(visible=False)
+        figure.suptitle(self._title(float(history.profile_times[0])))
+        arrange(figure)
         figure.set_layout_engine("none")  # found once: it would take half of the time of each frame
+        return figure
 
     def at(self, t):
         """(height, width, 3) the picture at t (s)."""
@@ -448,11 +451,11 @@ class _Stage:
         angle, speed = ((1 - share) * x[k] + share * x[k + 1] for x in (history.angle, history.speed))
         turned = np.interp(self._places, history.depths, angle)[:, None] + self._across
         self._stripes.set_data(np.cos(self._across) * np.where(np.cos(turned) > 0.0, 1.0, 0.25))
-        self._line.set_xdata(speed * RPM)
+        self._line.set_xdata(speed / rpm)
         held = history.sticking[k + round(share)]
-        self._held.set_data(speed[held] * RPM, history.depths[held])
+        self._held.set_data(speed[held] / rpm, history.depths[held])
         self._now.set_xdata([t, t])
-        self._figure.suptitle(self._title(t), fontsize=10)
+        self._figure.suptitle(self._title(t))
         self._figure.canvas.draw()
         return np.asarray(self._figure.canvas.buffer_rgba())[..., :3].copy()
 

@@ -195,52 +195,76 @@ class DrillingHistory(Tabular):
 
     # -- pictures ----------------------------------------------------------------------------------------------------
 
-    def plot(self, file: File | None = None, between: tuple[float, float] | None = None):
+    def plot(
+        self,
+        file: File | None = None,
+        between: tuple[float, float] | None = None,
+        *,
+        units: Any = "SI",
+        width: int | None = None,
+    ):
         """Draw the speeds of drive and bit and the torques over time, with hook load and weight on bit where the model
         has them.
 
         Args:
             file: .png, .pdf or another format of matplotlib (rank 0 writes); None returns the Figure.
             between: times (s) from which to which; None for all.
+            units: "SI", "field", or a dict of units by dimensions, such as {"force": "klbf"}.
+            width: of the picture, pixels, which its fonts and legends are arranged for; None for 150 to the inch.
 
         Raises:
             SceneError: matplotlib is missing, an unknown ending, or fewer than two times.
         """
         from cosserat_fenicsx.drilling.charts import draw_over_time
 
-        return draw_over_time(self, file, between)
+        return draw_over_time(self, file, between, units=units, width=width)
 
-    def plot_map(self, file: File | None = None, what: str | None = None, between: tuple[float, float] | None = None):
+    def plot_map(
+        self,
+        file: File | None = None,
+        what: str | None = None,
+        between: tuple[float, float] | None = None,
+        *,
+        units: Any = "SI",
+        width: int | None = None,
+    ):
         """Draw a quantity over time and depth, which runs downwards, and where friction holds the string.
 
         Args:
             what: "speed", "torque", "angle", "tension", "displacement" or "velocity"; None for the speed of rotation,
                 or the velocity along the axis where nothing turns.
-            file, between: see `plot`.
+            file, between, units, width: see `plot`.
 
         Raises:
             SceneError: see `plot`; a quantity that the model does not have.
         """
         from cosserat_fenicsx.drilling.charts import draw_map
 
-        return draw_map(self, file, what, between)
+        return draw_map(self, file, what, between, units=units, width=width)
 
-    def plot_phase(self, file: File | None = None, since: float | None = None):
+    def plot_phase(
+        self,
+        file: File | None = None,
+        since: float | None = None,
+        *,
+        units: Any = "SI",
+        width: int | None = None,
+    ):
         """Draw the phase portrait of the bit: its speed over the twist between drive and bit.
 
         Args:
             since: s; None for the second half.
-            file: see `plot`.
+            file, units, width: see `plot`.
         """
         from cosserat_fenicsx.drilling.charts import draw_phase
 
-        return draw_phase(self, file, since)
+        return draw_phase(self, file, since, units=units, width=width)
 
-    def plot_energy(self, file: File | None = None):
-        """Draw the ledger of energy, and what it does not account for, over time; `file`: see `plot`."""
+    def plot_energy(self, file: File | None = None, *, units: Any = "SI", width: int | None = None):
+        """Draw the ledger of energy, and what it does not account for, over time; for the arguments see `plot`."""
         from cosserat_fenicsx.drilling.charts import draw_energy
 
-        return draw_energy(self, file)
+        return draw_energy(self, file, units=units, width=width)
 
     def animate(self, file: File, *, speed: float | None = None, fps: float = 25, progress: bool | None = None) -> None:
         """Write a film of the string that turns: twist and speed of rotation along it.

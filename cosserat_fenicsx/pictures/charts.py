@@ -1,65 +1,300 @@
-"""Charts of matplotlib as files."""
+"""What all charts share, by matplotlib: style, sizes in pixels, units, panels, legends, ledgers of energy; and files.
+
+A chart is drawn for the width that it is shown at: fonts keep a size that can be read, panels, legends, titles and
+labels are arranged in the room that there is.
+"""
 
 import io
+import math
+import textwrap
+from contextvars import ContextVar
 from pathlib import Path
 
+import numpy as np
+
+from cosserat_fenicsx.checks import number
 from cosserat_fenicsx.errors import LibraryMissing, SceneError
 from cosserat_fenicsx.new_files import replaced
-from cosserat_fenicsx.ranks import on_first
+from cosserat_fenicsx.quantities import Quantity, Units
+from cosserat_fenicsx.ranks import Alone, on_first
 
 #: Colours and styles of lines, in their order; of what is not the subject.
 COLOURS = ("tab:blue", "tab:orange", "tab:green", "tab:red", "tab:purple", "tab:brown", "tab:pink", "tab:gray")
 STYLES = ("-", "--", ":", "-.")
 GREY = "0.45"
+#: Settings of matplotlib for all charts; size of the font of notes within a panel, points.
+STYLE = {"font.size": 9, "axes.titlesize": 9, "legend.fontsize": 8, "figure.titlesize": 10, "axes.grid": True,
+         "grid.alpha": 0.3, "legend.frameon": False, "legend.borderaxespad": 0.2, "lines.linewidth": 1.2,
+         "figure.constrained_layout.h_pad": 0.05}  # fmt: skip
+SMALL = 7.5
+# Dots per inch unless a width is asked for, and least ones, at which the smallest font is 9 pixels; widths, pixels.
+_DPI, _LEAST_DPI, _WIDTHS = 150, 90, (300, 10_000)
+# Panels may be narrower by this factor before they stand in several rows, which are at most so high over their width.
+_SQUEEZED, _TALL = 1.3, 1.2
+# Most passes of the arrangement of texts; mean width of a letter over the size of its font.
+_PASSES, _LETTER = 5, 0.55
+_ENERGY, _UNACCOUNTED = Quantity("energy", unit="J"), Quantity("not accounted for", unit="J")
+# Energies below this share of the largest are not drawn.
+_LITTLE = 1e-9
+# What is asked for of the chart that is drawn: its width in pixels, and its units.
+_pixels = ContextVar("_pixels", default=None)
+_units = ContextVar("_units", default="SI")
 
 
-def empty_figure(width, height):
-    """A Figure (inches) that needs no screen.
-
-    Raises:
-        SceneError: matplotlib is missing.
-    """
-    try:
-        from matplotlib.backends.backend_agg import FigureCanvasAgg
-        from matplotlib.figure import Figure
-    except ImportError:
-        raise LibraryMissing(
-            "charts need matplotlib: pip install 'cosserat-fenicsx[pictures]', or pip install matplotlib"
-        ) from None
-    figure = Figure(figsize=(width, height), layout="constrained")
-    FigureCanvasAgg(figure)
-    return figure
-
-
-def draw_chart(make, file, comm):
+def draw_chart(make, file=None, comm=Alone, *, width=None, units="SI"):
     """The Figure that `make` returns; or None where a file is given, which rank 0 writes.
 
+    Args:
+        make: a function that draws on an `empty_figure`.
+        width: of the picture, pixels; None for 150 to the inch.
+        units: that `scale` takes, see `Units`.
+
     Raises:
-        SceneError: the file's ending is unknown to matplotlib; or `make` raised it.
+        SceneError: the file's ending is unknown to matplotlib, or it is missing; the width is no number from 300 to
+            10000; unknown units; or `make` raised it.
         OSError: the file cannot be written.
     """
+    if width is not None:
+        low, high = _WIDTHS
+        width = number("plot", "width", width, f"pixels, from {low} to {high}", lambda x: low <= x <= high)
+    units = Units(units)
     if file is None:
-        return make()
-    on_first(comm, lambda: _write(make(), Path(file)))
+        return _drawn(make, width, units)
+    on_first(comm, lambda: _write(_drawn(make, width, units), Path(file)))
     return None
+
+
+def _drawn(make, width, units):
+    tokens = _pixels.set(width), _units.set(units)
+    try:
+        with styled():
+            figure = make()
+            arrange(figure)
+    finally:
+        _pixels.reset(tokens[0])
+        _units.reset(tokens[1])
+    return figure
 
 
 def _write(figure, file):
     known = figure.canvas.get_supported_filetypes()
     if file.suffix.removeprefix(".") not in known:
         raise SceneError(f"{file}: expected a name that ends in .{', .'.join(sorted(known))}")
-    save(figure, file)
-
-
-def save(figure, file):
-    """Write a Figure at 150 dots per inch, in the format of the file's ending.
-
-    It is complete in memory first: a full disk leads matplotlib to other exceptions than OSError.
-
-    Raises:
-        OSError: the file cannot be written.
-    """
-    picture = io.BytesIO()
-    figure.savefig(picture, format=Path(file).suffix[1:] or "png", dpi=150)
+    picture = io.BytesIO()  # complete in memory first: a full disk leads matplotlib to other exceptions than OSError
+    figure.savefig(picture, format=file.suffix[1:], dpi=figure.dpi)
     with replaced(file) as fresh:
         fresh.write_bytes(picture.getvalue())
+
+
+def styled():
+    """A context manager in which charts have the `STYLE`.
+
+    Raises:
+        SceneError: matplotlib is missing.
+    """
+    try:
+        from matplotlib import rc_context
+    except ImportError:
+        raise LibraryMissing(
+            "charts need matplotlib: pip install 'cosserat-fenicsx[pictures]', or pip install matplotlib"
+        ) from None
+    return rc_context(STYLE)
+
+
+def unit_of(quantity, *values):
+    """(unit, size) of a `Quantity` in the units of the chart: a unit that suits all the values, and its size in the
+    unit of the quantity."""
+    every = np.concatenate([np.ravel(x) for x in values]) if values else ()
+    return Units(_units.get()).on_screen(quantity, every)
+
+
+def scale(quantity, *values):
+    """(heading, size): the label of a `Quantity` with a unit, see `unit_of`."""
+    unit, size = unit_of(quantity, *values)
+    return quantity.heading(unit), size
+
+
+# -- panels and legends ------------------------------------------------------------------------------------------------
+
+
+def room_for(width):
+    """The inches that there are of a width in inches, in the width that is asked for in pixels."""
+    return width if _pixels.get() is None else min(width, _pixels.get() / _LEAST_DPI)
+
+
+def empty_figure(width, height):
+    """A Figure (inches) that needs no screen; narrower where the width asked for has no room for its fonts."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    width, pixels = room_for(width), _pixels.get()
+    dpi = _DPI if pixels is None else pixels / width
+    figure = Figure(figsize=(width, height), dpi=dpi, layout="constrained")
+    FigureCanvasAgg(figure)
+    return figure
+
+
+def stacked(width, heights):
+    """A Figure (width in inches) and panels above each other with a common horizontal axis, such as time.
+
+    Args:
+        heights: of the panels, inches.
+    """
+    figure = empty_figure(width, 0.8 + sum(heights))
+    panels = figure.subplots(len(heights), 1, sharex=True, squeeze=False, height_ratios=heights)[:, 0]
+    panels[0].margins(x=0.0)
+    return figure, panels
+
+
+def beside(widths, height):
+    """A Figure and panels beside each other, inches, that share the vertical axis; in several rows where the picture is
+    narrower.
+
+    Returns:
+        the Figure; the panels, in the order of the widths; for each row the panels in it.
+    """
+    room, rows = room_for(sum(widths)), [[]]
+    for k, width in enumerate(widths):
+        if rows[-1] and sum(widths[i] for i in rows[-1]) + width > _SQUEEZED * room:
+            rows.append([])
+        rows[-1].append(k)
+    figure = empty_figure(sum(widths), height if len(rows) == 1 else len(rows) * min(height, _TALL * room))
+    grid, panels = figure.add_gridspec(len(rows), 1), []
+    for i, row in enumerate(rows):
+        inner = grid[i].subgridspec(1, len(row), width_ratios=[widths[k] for k in row])
+        for j in range(len(row)):
+            panels.append(figure.add_subplot(inner[j], sharey=panels[0] if panels else None))
+            panels[-1].tick_params(labelleft=j == 0)
+    return figure, panels, [[panels[k] for k in row] for row in rows]
+
+
+def legend(*panels, **look):
+    """A legend above each panel, of the names that no panel before has, in as many columns as there is room for."""
+    told = set()
+    for panel in panels:
+        handles = dict(zip(*panel.get_legend_handles_labels()[::-1], strict=True))
+        new = {name: handle for name, handle in handles.items() if name not in told}
+        told |= set(new)
+        if new:
+            names, columns = _in_columns(panel, list(new))
+            panel.legend(new.values(), names, ncols=columns, loc="lower center", bbox_to_anchor=(0.5, 1.0),
+                         columnspacing=1.2, **look)  # fmt: skip
+
+
+def _in_columns(panel, names):
+    """Names, in lines that the width of a panel has room for, and for `Axes.legend` the number of columns."""
+    size = STYLE["legend.fontsize"] / 72
+    room = panel.get_subplotspec().get_position(panel.figure).width / 0.775 * panel.figure.get_figwidth() - 0.3
+    letters = max(12, int((room - 4 * size) / (_LETTER * size)))
+    lines = ["\n".join(textwrap.wrap(line, letters)) for line in names]
+    longest = max(len(line) for text in lines for line in text.split("\n"))
+    return lines, max(1, min(len(names), int(room / ((_LETTER * longest + 4) * size))))
+
+
+def ledger(times, curves, balance, title, about=""):
+    """The Figure of energies over time, and of the error of their balance below.
+
+    Args:
+        times: (n,) s. curves: (label, values (n,) in J, colour, style); those that stay zero are left out.
+        balance: (n,) what is not accounted for, J. about: words after the label of the axis.
+    """
+    figure, (above, below) = stacked(10, (3.6, 1.2))
+    most = max(np.abs(values).max() for _, values, *_ in curves)
+    heading, size = scale(_ENERGY, most)
+    for label, values, colour, style in curves:
+        if np.abs(values).max() > _LITTLE * most:
+            above.plot(times, values / size, style, color=colour, label=label)
+    above.set_ylabel(f"{heading}{about}")
+    heading, size = scale(_UNACCOUNTED, balance)
+    below.plot(times, balance / size, color=GREY)
+    below.set(xlabel="time (s)", ylabel=heading)
+    legend(above)
+    figure.suptitle(title)
+    return figure
+
+
+# -- texts that overlap nothing ----------------------------------------------------------------------------------------
+
+
+def arrange(figure):
+    """Break titles and labels into lines that fit, take fewer ticks where their numbers touch, and move texts within
+    panels off each other."""
+    for _ in range(_PASSES):
+        figure.draw_without_rendering()
+        changed = [] if figure._suptitle is None else [_fit(figure._suptitle, 0.96 * figure.bbox.width)]
+        changed += [_fit_panel(panel) for panel in figure.axes if panel.get_visible()]
+        if not any(changed):
+            return
+
+
+def _fit_panel(panel):
+    changed = [
+        _fit(panel.title, 1.05 * panel.bbox.width),
+        _fit(panel.xaxis.label, 1.05 * panel.bbox.width),
+        _fit(panel.yaxis.label, 1.05 * panel.bbox.height),
+        _thin_out(panel.xaxis),
+        _thin_out(panel.yaxis),
+        _spread(panel),
+    ]
+    return any(changed)
+
+
+def _fit(text, room):
+    """Whether a text is broken anew, since it is longer than the room, pixels."""
+    extent = text.get_window_extent()
+    length = max(extent.width, extent.height) if text.get_rotation() else extent.width
+    if not text.get_text() or length <= room:
+        return False
+    old = text.get_text().split("\n")
+    most, lines = max(8, int(max(map(len, old)) * room / length)), []
+    for line in old:
+        parts = math.ceil(len(line) / most)
+        lines += textwrap.wrap(line, min(most, len(line) // parts + 6)) if parts > 1 else [line]
+    text.set_text("\n".join(lines))
+    return lines != old
+
+
+def _thin_out(axis):
+    """Whether an axis has fewer ticks now, since the numbers of neighbours touched."""
+    from matplotlib.ticker import AutoLocator, MaxNLocator
+
+    across = axis.axis_name == "x"
+    boxes = [label.get_window_extent() for label in axis.get_ticklabels() if label.get_text() and label.get_visible()]
+    ends = sorted((box.x0, box.x1) if across else (box.y0, box.y1) for box in boxes)
+    gap = 3 if across else 1
+    if not isinstance(axis.get_major_locator(), AutoLocator | MaxNLocator) or all(
+        one[1] + gap <= other[0] for one, other in zip(ends, ends[1:], strict=False)
+    ):
+        return False
+    axis.set_major_locator(MaxNLocator(max(1, math.ceil(0.6 * len(ends)) - 1)))
+    return True
+
+
+def _spread(panel):
+    """Whether texts within a panel were moved, since they covered others or left the panel at a side."""
+    placed, moved = [], False
+    for text in panel.texts:
+        if not text.get_text():
+            continue
+        box = text.get_window_extent()
+        left, over = max(panel.bbox.x0 - box.x0, 0.0), max(box.x1 - panel.bbox.x1, 0.0)
+        right = left - over if box.width < panel.bbox.width else 0.0
+        box, up = box.translated(right, 0.0), 0.0
+        while any(box.overlaps(other) for other in placed):
+            step = 0.55 * box.height * (1.0 if text.get_va() == "bottom" else -1.0)
+            box, up = box.translated(0.0, step), up + step
+        placed.append(box)
+        if abs(right) > 0.5 or abs(up) > 0.5:
+            _move(text, right, up)
+            moved = True
+    return moved
+
+
+def _move(text, right, up):
+    """Move a text by pixels."""
+    if hasattr(text, "xyann") and text.anncoords == "offset points":
+        per_point = text.figure.dpi / 72
+        text.xyann = (text.xyann[0] + right / per_point, text.xyann[1] + up / per_point)
+    else:
+        transform = text.get_transform()
+        text.set_position(transform.inverted().transform(transform.transform(text.get_position()) + (right, up)))

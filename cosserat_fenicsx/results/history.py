@@ -3,6 +3,7 @@
 import dataclasses
 from collections.abc import Sequence
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -213,15 +214,17 @@ class History(RodResult):
         velocity = rates[..., :3] * self.scales.length
         return {**super().fields_at(which, rod), "velocity": velocity, "angular_velocity": rates[..., 3:]}
 
-    def plot_energy(self, file=None):
+    def plot_energy(self, file: File | None = None, *, units: Any = "SI", width: int | None = None):
         """Chart of the energies over time.
 
         Args:
             file: a .png or .pdf; None returns matplotlib's Figure.
+            units: "SI", "field", or a dict of units by dimensions, such as {"force": "klbf"}.
+            width: of the picture, pixels, which its fonts and legends are arranged for; None for 150 to the inch.
         """
         from cosserat_fenicsx.pictures import motion_charts
 
-        return motion_charts.draw_energy(self, file)
+        return motion_charts.draw_energy(self, file, units=units, width=width)
 
     def animate(self, file, *, fps=25, speed=None, magnify=1.0, enlarge=1.0, size=(960, 720), progress=None):
         """Film of the rods, coloured by bending moment, at a constant rate of frames; see `animation.film`.
@@ -285,18 +288,35 @@ class History(RodResult):
         """
         return whirl(self, station, wall, since)
 
-    def plot_orbit(self, station: StationOrName, wall: Action | None = None, file: File | None = None):
+    def plot_orbit(
+        self,
+        station: StationOrName,
+        wall: Action | None = None,
+        file: File | None = None,
+        *,
+        units: Any = "SI",
+        width: int | None = None,
+    ):
         """Chart of the way of a section's axis in the circle of the clearance, seen down the hole, coloured by time.
 
         Args:
             station, wall: see `orbit`.
-            file: a .png or .pdf; None returns matplotlib's Figure.
+            file, units, width: see `plot_energy`.
         """
         from cosserat_fenicsx.pictures import motion_charts
 
-        return motion_charts.draw_orbit(self, orbit_of(self, station, wall), self.station(station), file)
+        orbit, station = orbit_of(self, station, wall), self.station(station)
+        return motion_charts.draw_orbit(self, orbit, station, file, units=units, width=width)
 
-    def plot_whirl(self, station: StationOrName, wall: Action | None = None, file: File | None = None):
+    def plot_whirl(
+        self,
+        station: StationOrName,
+        wall: Action | None = None,
+        file: File | None = None,
+        *,
+        units: Any = "SI",
+        width: int | None = None,
+    ):
         """Chart over time of a section's distance from the axis of the hole, of its rates of whirl and spin, and of the
         wall's normal force.
 
@@ -304,9 +324,18 @@ class History(RodResult):
         """
         from cosserat_fenicsx.pictures import motion_charts
 
-        return motion_charts.draw_whirl(self, orbit_of(self, station, wall), self.station(station), file)
+        orbit, station = orbit_of(self, station, wall), self.station(station)
+        return motion_charts.draw_whirl(self, orbit, station, file, units=units, width=width)
 
-    def plot_campbell(self, station: StationOrName, wall: Action | None = None, file: File | None = None):
+    def plot_campbell(
+        self,
+        station: StationOrName,
+        wall: Action | None = None,
+        file: File | None = None,
+        *,
+        units: Any = "SI",
+        width: int | None = None,
+    ):
         """Campbell diagram of a section over a run-up: amplitude of whirl and its spectrum, forward and backward, over
         the speed of rotation.
 
@@ -317,7 +346,8 @@ class History(RodResult):
         """
         from cosserat_fenicsx.pictures import motion_charts
 
-        return motion_charts.draw_campbell(self, orbit_of(self, station, wall), self.station(station), file)
+        orbit, station = orbit_of(self, station, wall), self.station(station)
+        return motion_charts.draw_campbell(self, orbit, station, file, units=units, width=width)
 
     def _at_clamp(self, point, joined):
         return self._stacked("clamp_forces")[:, point]

@@ -290,22 +290,38 @@ class TorqueAndDrag(Differentiated, Tabular):
 
         return {"": answer_columns(self), "_contacts": contact_columns(self)}
 
-    def plot(self, file: File | None = None, between: tuple[float, float] | None = None):
+    def plot(
+        self,
+        file: File | None = None,
+        between: tuple[float, float] | None = None,
+        *,
+        units: Any = "SI",
+        width: int | None = None,
+    ):
         """Draw the string in its hole, tension with the loads of buckling, torque, side force per length and at points,
         and bending moment along the string, depth downwards.
 
         Args:
             file: .png, .pdf or another format of matplotlib (rank 0 writes); None returns the Figure.
             between: measured depths (m) from which to which it shows them, such as those of the bottom-hole assembly.
+            units: "SI", "field", or a dict of units by dimensions, such as {"force": "klbf"}.
+            width: of the picture, pixels, which its fonts and legends are arranged for; None for 150 to the inch.
 
         Raises:
             SceneError: matplotlib is missing, or the ending is unknown; depths that the string has not.
         """
         from cosserat_fenicsx.well.charts import draw_answer
 
-        return draw_answer(self, file, between)
+        return draw_answer(self, file, between, units=units, width=width)
 
-    def plot_from_side(self, file: File | None = None, length: float | None = None):
+    def plot_from_side(
+        self,
+        file: File | None = None,
+        length: float | None = None,
+        *,
+        units: Any = "SI",
+        width: int | None = None,
+    ):
         """See `RodInContact.plot_from_side`; a soft string has no shape of its own, and raises a SceneError."""
         raise SceneError(f"plot_from_side: a {self.words} lies on the axis: expected an answer of model = 'rod'")
 

@@ -4,7 +4,7 @@ import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 from scipy.optimize import least_squares
@@ -103,18 +103,20 @@ class FrictionFit:
     doubts: tuple[str, ...] = ()
     measurements: tuple[RigMeasurement, ...] = ()
 
-    def plot(self, file: File | None = None):
+    def plot(self, file: File | None = None, *, units: Any = "SI", width: int | None = None):
         """Draw measured loads and those computed with the coefficients found, over the depth of the bit.
 
         Args:
             file: .png, .pdf or another format of matplotlib (rank 0 writes); None returns the Figure.
+            units: "SI", "field", or a dict of units by dimensions, such as {"force": "klbf"}.
+            width: of the picture, pixels, which its fonts and legends are arranged for; None for 150 to the inch.
 
         Raises:
             SceneError: matplotlib is missing, or the ending is unknown.
         """
         from cosserat_fenicsx.well.charts import draw_fit
 
-        return draw_fit(self, file)
+        return draw_fit(self, file, units=units, width=width)
 
     def __str__(self):
         from cosserat_fenicsx.well.tables import fit_table

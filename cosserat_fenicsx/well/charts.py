@@ -4,8 +4,20 @@ in its hole from the side, where depth runs to the right and the high side of th
 import numpy as np
 
 from cosserat_fenicsx.checks import finite_array, positive, refuse
-from cosserat_fenicsx.pictures.charts import COLOURS, GREY, STYLES, draw_chart, empty_figure
+from cosserat_fenicsx.pictures.charts import (
+    COLOURS,
+    GREY,
+    SMALL,
+    STYLES,
+    beside,
+    draw_chart,
+    empty_figure,
+    legend,
+    scale,
+    unit_of,
+)
 from cosserat_fenicsx.pictures.view import round_step
+from cosserat_fenicsx.quantities import Quantity
 from cosserat_fenicsx.ranks import world
 from cosserat_fenicsx.well import criteria
 from cosserat_fenicsx.well.components import Bit, Stabiliser
@@ -69,63 +81,64 @@ def usual_side_force(answer, force, md):
 
 # Loads beyond so many times the median are not what the axis is for.
 _UNUSUAL = 10.0
+_HOOK = Quantity("hook load", unit="N", shown="kN")
+_SURFACE = Quantity("surface torque", unit="N m", shown="kN m")
+_BIT_DEPTH = Quantity("measured depth of the bit", unit="m", shown="m", dimension="length")
+_DEPTH = Quantity("measured depth", unit="m", shown="m", dimension="length")
+# Heights of panels over the depth, inches.
+_HEIGHT = 7.5
 
 
-def draw_sweep(sweep, file):
+def draw_sweep(sweep, file, **look):
     """See `DepthSweep.plot`."""
-    return draw_chart(lambda: sweep_figure(sweep), file, world())
+    return draw_chart(lambda: sweep_figure(sweep), file, world(), **look)
 
 
-def draw_fit(fit, file):
+def draw_fit(fit, file, **look):
     """See `FrictionFit.plot`."""
-    return draw_chart(lambda: fit_figure(fit), file, world())
+    return draw_chart(lambda: fit_figure(fit), file, world(), **look)
 
 
-def depth_axes(width, columns=None, width_ratios=None):
-    """A Figure (width in inches) and axes side by side that share the depth, which runs downwards."""
-    figure = empty_figure(width, 7.5)
-    axes = figure.subplots(
-        1, columns or len(width_ratios), sharey=True, squeeze=False, gridspec_kw={"width_ratios": width_ratios}
-    )[0]
-    axes[0].invert_yaxis()
-    for panel in axes:
-        panel.grid(alpha=0.3)
-    return figure, axes
+def over_depth(widths, quantity):
+    """A Figure, panels of some widths (inches) in rows that share the depth, which runs downwards and has this label,
+    and the unit of lengths with its size."""
+    figure, panels, rows = beside(widths, _HEIGHT)
+    panels[0].invert_yaxis()
+    for row in rows:
+        row[0].set_ylabel(scale(quantity)[0])
+    return figure, panels, *unit_of(quantity)
 
 
 def sweep_figure(sweep):
     """Hook load and surface torque over the depth of the bit, with marks where there is no answer."""
     turns = any(operation.direction(1.0)[1] for operation in sweep.operations)
-    figure, axes = depth_axes(6.5 * (1 + bool(turns)), 1 + bool(turns))
-    low, high = _usual_range(sweep.hook_load / 1e3)
+    figure, panels, _, length = over_depth([6.5] * (1 + bool(turns)), _BIT_DEPTH)
+    (hook_label, force), (torque_label, moment) = scale(_HOOK), scale(_SURFACE)
+    depths, (low, high) = sweep.depths / length, _usual_range(sweep.hook_load / force)
     by_rod = sweep.models == "rod"
     both = (by_rod.any(), (np.isfinite(sweep.hook_load) & ~by_rod).any()) == (True, True)
     for i, operation in enumerate(sweep.operations):
         for j in range(len(sweep.friction)):
-            look = {"color": COLOURS[i % len(COLOURS)], "linestyle": STYLES[j % len(STYLES)]}
-            drawn = {**look, "label": sweep.label(i, j), "marker": "." if len(sweep.depths) < 30 else None}
-            hook = sweep.hook_load[i, j] / 1e3
-            panels = [(axes[0], np.where((hook < low) | (hook > high), np.nan, hook))]
+            style = {"color": COLOURS[i % len(COLOURS)], "linestyle": STYLES[j % len(STYLES)]}
+            drawn = {**style, "label": sweep.label(i, j), "marker": "." if len(depths) < 30 else None}
+            hook = sweep.hook_load[i, j] / force
+            shown = [(panels[0], np.where((hook < low) | (hook > high), np.nan, hook))]
             if turns and operation.direction(1.0)[1]:
-                panels.append((axes[1], sweep.surface_torque[i, j] / 1e3))
-            for panel, loads in panels:
-                panel.plot(loads, sweep.depths, **drawn)
+                shown.append((panels[1], sweep.surface_torque[i, j] / moment))
+            for panel, loads in shown:
+                panel.plot(loads, depths, **drawn)
                 if both:
                     here = by_rod[i, j]
-                    panel.plot(
-                        loads[here], sweep.depths[here], "s", color=look["color"], markersize=7, fillstyle="none"
-                    )
-            _without_answer(axes[0], sweep, i, j, (low, high), look["color"])
-    axes[0].set(xlabel="hook load (kN)", ylabel="measured depth of the bit (m)")
+                    panel.plot(loads[here], depths[here], "s", color=style["color"], markersize=7, fillstyle="none")
+            _without_answer(panels[0], sweep, i, j, (low, high), style["color"])
+    panels[0].set_xlabel(hook_label)
     if turns:
-        axes[1].set_xlabel("surface torque (kN m)")
+        panels[1].set_xlabel(torque_label)
     if both:
-        axes[0].plot([], [], "s", color=GREY, markersize=7, fillstyle="none", label="by the exact rod, others soft")
+        panels[0].plot([], [], "s", color=GREY, markersize=7, fillstyle="none", label="by the exact rod, others soft")
     if (sweep.done & np.isnan(sweep.hook_load)).any():
-        axes[0].plot([], [], "X", color=GREY, linestyle="none", label="locks up, or no answer")
-    for panel in axes:
-        if panel.get_legend_handles_labels()[0]:
-            panel.legend(fontsize=8)
+        panels[0].plot([], [], "X", color=GREY, linestyle="none", label="locks up, or no answer")
+    legend(*panels)
     part = "" if sweep.done.all() else f", {len(sweep)} of {sweep.done.size} answers so far"
     what = "Hook load and torque" if turns else "Hook load"
     figure.suptitle(f"{what} over the depth of the bit{part}")
@@ -146,12 +159,13 @@ def _usual_range(loads):
 def _without_answer(axes, sweep, i, j, limits, colour):
     """Marks where a line's loads are beyond the axis, with their numbers, and where it has none, with the place of
     lock-up."""
-    loads, depths = sweep.hook_load[i, j] / 1e3, sweep.depths
-    note = {"fontsize": 7, "color": colour, "va": "center", "textcoords": "offset points"}
+    (force_unit, force), (length_unit, length) = unit_of(_HOOK), unit_of(_BIT_DEPTH)
+    loads, depths = sweep.hook_load[i, j] / force, sweep.depths / length
+    note = {"fontsize": SMALL, "color": colour, "va": "center", "textcoords": "offset points"}
 
     def offset(depth, right):
         """In points: notes at one depth are below each other."""
-        return right, -9 * sum(text.xy[1] == depth for text in axes.texts)
+        return right, -1.3 * SMALL * sum(text.xy[1] == depth for text in axes.texts)
 
     if np.isfinite(limits).all():
         axes.set_xlim(*limits)
@@ -159,69 +173,79 @@ def _without_answer(axes, sweep, i, j, limits, colour):
         left = loads[k] < limits[0]
         at = limits[0] if left else limits[1]
         axes.plot(at, depths[k], "<" if left else ">", color=colour, clip_on=False)
-        axes.annotate(f"{loads[k]:,.0f} kN, beyond the axis: close to lock-up", (at, depths[k]),
+        axes.annotate(f"{loads[k]:,.0f} {force_unit}, beyond the axis: close to lock-up", (at, depths[k]),
                       offset(depths[k], 8 if left else -8), ha="left" if left else "right", **note)  # fmt: skip
-    order = np.argsort(depths)
     shown = None
-    for k in order:
+    for k in np.argsort(depths):
         if np.isfinite(loads[k]):
             shown = np.clip(loads[k], *limits)
         elif sweep.done[i, j, k]:
             # below the load at the depth before
             at = {"transform": axes.get_yaxis_transform()} if shown is None else {}
             axes.plot(0.02 if shown is None else shown, depths[k], "X", color=colour, clip_on=False, **at)
-            locked = sweep.values["locked"][i, j, k]
+            locked = sweep.values["locked"][i, j, k] / length
             if shown is not None and np.isfinite(locked):
-                told = f"bit at {depths[k]:.6g} m: locks up, from md = {locked:.5g} m of the string on"
+                told = f"bit at {depths[k]:.6g} {length_unit}: locks up, "
+                told += f"from md = {locked:.5g} {length_unit} of the string on"
                 axes.annotate(told, (shown, depths[k]), offset(depths[k], 8), **note)
 
 
 def fit_figure(fit):
     """Measured loads and those computed with the coefficients found, over the depth of the bit."""
-    loads = [(m, "hook load (kN)", m.hook_load, m.hook_load_sd) for m in fit.measurements if m.hook_load is not None]
-    loads += [(m, "surface torque (kN m)", m.torque, m.torque_sd) for m in fit.measurements if m.torque is not None]
-    names = list(dict.fromkeys(name for _, name, *_ in loads))
+    loads = [(m, _HOOK, m.hook_load, m.hook_load_sd) for m in fit.measurements if m.hook_load is not None]
+    loads += [(m, _SURFACE, m.torque, m.torque_sd) for m in fit.measurements if m.torque is not None]
+    quantities = [x for x in (_HOOK, _SURFACE) if any(quantity is x for _, quantity, *_ in loads)]
     operations = list(dict.fromkeys(m.operation for m in fit.measurements))
-    figure, axes = depth_axes(6.5 * len(names), len(names))
-    for panel, name in zip(axes, names, strict=True):
-        panel.set_xlabel(name)
+    figure, panels, unit, length = over_depth([6.5] * len(quantities), _BIT_DEPTH)
+    weight_unit, weight = unit_of(_HOOK)
+    for panel, quantity in zip(panels, quantities, strict=True):
+        heading, size = scale(quantity)
+        panel.set_xlabel(heading)
         for i, operation in enumerate(operations):
             rows = sorted(
-                (m.depth, value / 1e3, sd / 1e3, (value - residual * sd) / 1e3)
+                (m.depth, value, sd, value - residual * sd)
                 for (m, what, value, sd), residual in zip(loads, fit.residuals, strict=True)
-                if what == name and m.operation == operation
+                if what is quantity and m.operation == operation
             )
             if rows:
-                depth, measured, sd, computed = np.array(rows).T
-                told = operation.name + (f", {operation.weight / 1e3:g} kN on bit" if operation.weight else "")
-                look = {"color": COLOURS[i % len(COLOURS)]}
-                panel.errorbar(measured, depth, xerr=sd, fmt="o", markersize=5, label=told, **look)
-                panel.plot(computed, depth, "-x", linewidth=1, **look)
+                depth, measured, sd, computed = np.array(rows).T / np.array([[length], [size], [size], [size]])
+                on_bit = f", {operation.weight / weight:.4g} {weight_unit} on bit" if operation.weight else ""
+                colour = COLOURS[i % len(COLOURS)]
+                panel.errorbar(measured, depth, xerr=sd, fmt="o", markersize=5, color=colour,
+                               label=f"{operation.name}{on_bit}")  # fmt: skip
+                panel.plot(computed, depth, "-x", linewidth=1, color=colour)
         panel.plot([], [], "-x", color=GREY, linewidth=1, label="computed")
-        panel.legend(fontsize=8, title="measured, with standard deviations", title_fontsize=8)
-    axes[0].set_ylabel("measured depth of the bit (m)")
-    told = [f"{section.name or f'to {section.to:g} m'} {mu:.3f} ({low:.3f} to {high:.3f})" for section, mu, (low, high)
-            in zip(fit.hole.sections, fit.friction, fit.interval, strict=True)]  # fmt: skip
-    block = f", block {fit.block_weight / 1e3:.1f} kN" if fit.block_weight else ""
-    figure.suptitle(f"Friction: {', '.join(told)}\nmisfit {fit.misfit:.3g}{block}", fontsize=10)
+    legend(*panels, title="measured, with standard deviations", title_fontsize=8)
+    told = [
+        f"{section.name or f'to {section.to / length:g} {unit}'} {mu:.3f} ({low:.3f} to {high:.3f})"
+        for section, mu, (low, high) in zip(fit.hole.sections, fit.friction, fit.interval, strict=True)
+    ]
+    block = f", block {fit.block_weight / weight:.1f} {weight_unit}" if fit.block_weight else ""
+    figure.suptitle(f"Friction: {', '.join(told)}\nmisfit {fit.misfit:.3g}{block}")
     return figure
 
 
 # A torque below this part of the largest tension times the contact radius is not drawn.
 _LITTLE_TORQUE = 1e-4
-# Smallest ranges of the axes: side force (N/m), forces at points and moment (kN, kN m).
-_LEAST_SIDE, _LEAST = 1.0, 0.1
-# Most forces at points with numbers; distance of labels over the height of a panel.
-_LABELS, _LINE = 20, 0.0235
+# Smallest ranges of the axes: side force (N/m), forces at points and moment (N, N m).
+_LEAST_SIDE, _LEAST = 1.0, 100.0
+# Most forces at points with numbers; distance of labels over the size of their font.
+_LABELS, _LINE = 20, 1.5
+_ACROSS = Quantity("across", unit="m", shown="mm", dimension="diameter")
+_TENSION = Quantity("tension", unit="N", shown="kN")
+_TORQUE = Quantity("torque", unit="N m", shown="kN m")
+_BENDING = Quantity("bending moment", unit="N m", shown="kN m")
+_SIDE = Quantity("side force per length", unit="N/m", shown="N/m", dimension="force per length")
+_AT_POINTS = Quantity("forces at points", unit="N", shown="kN")
 # Stretches that are buckled: colours and names.
 _BUCKLED = {criteria.SNAKE: ("gold", "sinusoidal buckling"), criteria.HELIX: ("tab:pink", "helical buckling")}
 _PARTS = ("0.55", "0.75")
 
 
-def draw_answer(answer, file, between=None):
+def draw_answer(answer, file, between=None, **look):
     """See `TorqueAndDrag.plot`."""
     ends = depths_between("plot", between, answer.depth)
-    return draw_chart(lambda: answer_figure(answer, *ends), file, world())
+    return draw_chart(lambda: answer_figure(answer, *ends), file, world(), **look)
 
 
 def answer_figure(answer, top, bottom):
@@ -233,40 +257,39 @@ def answer_figure(answer, top, bottom):
     bends = np.nanmax(answer.bending_moment, initial=0.0) > 0
     draws = [_string, _tension, *([_torque] if turns else []), _side_force]
     draws += [*([_at_points] if points else []), *([_bending] if bends else [])]
-    widths = [{_string: 0.8, _at_points: 1.15}.get(drawn, 1.0) for drawn in draws]
-    figure, axes = depth_axes(2.7 * sum(widths), width_ratios=widths)
-    axes[0].set_ylim(bottom + 0.01 * (bottom - top), top - 0.01 * (bottom - top))
+    widths = [2.7 * {_string: 0.8, _at_points: 1.15}.get(drawn, 1.0) for drawn in draws]
+    figure, panels, unit, length = over_depth(widths, _DEPTH)
+    room = 0.01 * (bottom - top)
+    panels[0].set_ylim((bottom + room) / length, (top - room) / length)
     rows = rows_between(answer.md, top, bottom)
-    for panel, drawn in zip(axes, draws, strict=True):
-        drawn(panel, answer, rows)
-        _stretches(panel, answer)
-    _shoes(axes, answer, top, bottom)
-    _legend(axes)
-    part = "" if (top, bottom) == (0.0, answer.depth) else f", from {top:g} to {bottom:g} m"
+    for panel, drawn in zip(panels, draws, strict=True):
+        drawn(panel, answer, rows, answer.md[rows] / length)
+        for state, (colour, name) in _BUCKLED.items():
+            for a, b in stretches(answer.md / length, _to_next(answer.buckling == state)):
+                panel.axhspan(a, b, color=colour, alpha=0.25, linewidth=0, label=name)
+    for section in answer.hole.sections[:-1]:
+        if top < section.to < bottom:
+            _shoe(panels, section.to / length, f"{section.name or 'section'} ends, {section.to / length:g} {unit}")
+    legend(*panels)
+    part = "" if (top, bottom) == (0.0, answer.depth) else f", from {top / length:g} to {bottom / length:g} {unit}"
+    (force_unit, force), (moment_unit, moment) = unit_of(_HOOK), unit_of(_SURFACE)
     figure.suptitle(
-        f"{answer.operation.name}, bit at {answer.depth:g} m, {answer.words}{part}\nhook load "
-        f"{answer.hook_load / 1e3:.1f} kN, surface torque {round(answer.surface_torque / 1e3, 2) + 0.0:.2f} kN m"
+        f"{answer.operation.name}, bit at {answer.depth / length:g} {unit}, {answer.words}{part}\n"
+        f"hook load {answer.hook_load / force:.1f} {force_unit}, "
+        f"surface torque {round(answer.surface_torque / moment, 2) + 0.0:.2f} {moment_unit}"
     )
     return figure
 
 
-def _shoes(axes, answer, top, bottom):
-    """Lines where the sections of the hole end, with their names."""
-    for section in answer.hole.sections[:-1]:
-        if top < section.to < bottom:
-            for panel in axes:
-                panel.axhline(section.to, color="tab:brown", linewidth=0.9, linestyle=(0, (6, 3)))
-            axes[1].annotate(
-                f"{section.name or 'section'} ends, {section.to:g} m", (0.02, section.to), (0, 2), fontsize=7,
-                xycoords=axes[1].get_yaxis_transform(), textcoords="offset points", color="tab:brown", va="bottom",
-                bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 0.5}, zorder=4,
-            )  # fmt: skip
-
-
-def _stretches(panel, answer):
-    for state, (colour, name) in _BUCKLED.items():
-        for a, b in stretches(answer.md, _to_next(answer.buckling == state)):
-            panel.axhspan(a, b, color=colour, alpha=0.25, linewidth=0, label=name)
+def _shoe(panels, depth, words):
+    """A line where a section of the hole ends, with its name."""
+    for panel in panels:
+        panel.axhline(depth, color="tab:brown", linewidth=0.9, linestyle=(0, (6, 3)))
+    panels[1].annotate(
+        words, (0.02, depth), (0, 2), fontsize=SMALL, xycoords=panels[1].get_yaxis_transform(),
+        textcoords="offset points", color="tab:brown", va="bottom",
+        bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 0.5}, zorder=4,
+    )  # fmt: skip
 
 
 def _to_next(where):
@@ -274,53 +297,43 @@ def _to_next(where):
     return where | np.append(False, where[:-1])
 
 
-def _legend(axes):
-    """One legend above each panel that has names; those that several panels have, once."""
-    told = set()
-    for panel in axes:
-        handles = dict(zip(*panel.get_legend_handles_labels()[::-1], strict=True))
-        new = {name: handle for name, handle in handles.items() if name not in told}
-        told |= set(new)
-        if new:
-            panel.legend(new.values(), new.keys(), fontsize=7, loc="lower center", bbox_to_anchor=(0.5, 1.0),
-                         frameon=False, borderaxespad=0.2)  # fmt: skip
-
-
-def _string(panel, answer, rows):
+def _string(panel, answer, rows, depth):
     """The string in the hole, seen across its plane of high and low side, or across north where it is vertical."""
-    md, hole = answer.md[rows], answer.hole.at(answer.md[rows], "diameter") / 2
+    unit, size = unit_of(_ACROSS)
+    md, hole = answer.md[rows], answer.hole.at(answer.md[rows], "diameter") / 2 / size
+    length = unit_of(_DEPTH)[1]
     high = high_side(answer.hole.path.tangent(md))
     vertical = not high.any()
     across = answer.offset[rows][:, 0] if vertical else (answer.offset[rows] * high).sum(axis=1)
-    panel.fill_betweenx(md, -1e3 * hole, 1e3 * hole, color="bisque", linewidth=0)
-    panel.plot(-1e3 * hole, md, color="tab:brown", linewidth=1.2)
-    panel.plot(1e3 * hole, md, color="tab:brown", linewidth=1.2)
-    most, (bottom, top) = 1e3 * float(hole.max()), panel.get_ylim()
+    panel.fill_betweenx(depth, -hole, hole, color="bisque", linewidth=0)
+    for wall in (-hole, hole):
+        panel.plot(wall, depth, color="tab:brown")
+    most, (bottom, top) = float(hole.max()), panel.get_ylim()
     names, middles = [], []
     for k, place in enumerate(answer.laid):
-        a, b = max(place.top, top), min(place.bottom, bottom)
+        a, b = max(place.top / length, top), min(place.bottom / length, bottom)
         if b <= a:
             continue
-        at = np.unique(np.concatenate([[a, b], md[(md > a) & (md < b)]]))
-        x, radius = 1e3 * np.interp(at, md, across), 1e3 * place.component.contact_radius
+        at = np.unique(np.concatenate([[a, b], depth[(depth > a) & (depth < b)]]))
+        x, radius = np.interp(at, depth, across) / size, place.component.contact_radius / size
         panel.fill_betweenx(at, x - radius, x + radius, facecolor=_PARTS[k % 2], edgecolor="black", linewidth=0.5)
         names.append(place.component.name)
         middles.append((a + b) / 2)
     panel.set_xlim(-1.1 * most, 4.2 * most)
     for y, middle, name in zip(_apart(middles, panel), middles, names, strict=True):
         panel.plot([0.8 * most, 1.35 * most], [middle, y], color=GREY, linewidth=0.5)
-        panel.text(1.4 * most, y, name, fontsize=7, va="center", clip_on=True)
-    panel.set_xticks([-round(most), 0, round(most)])
-    panel.tick_params(axis="x", labelsize=7)
-    panel.set_xlabel("south ← → north (mm)" if vertical else "low side ← → high side (mm)")
-    panel.set_ylabel("measured depth (m)")
+        panel.text(1.4 * most, y, name, fontsize=SMALL, va="center", clip_on=True)
+    end = float(f"{most:.2g}")
+    panel.set_xticks([-end, 0, end], [f"{x:g}" for x in (-end, 0, end)], fontsize=SMALL)
+    panel.set_xlabel(f"south ← → north ({unit})" if vertical else f"low side ← → high side ({unit})")
     panel.grid(visible=False)
 
 
 def _apart(places, panel):
     """Depths of labels near places, ascending or descending, so far apart that they can be read."""
     (bottom, top), order = panel.get_ylim(), np.argsort(places, kind="stable")
-    line = _LINE * (bottom - top)
+    height = 72 * panel.figure.get_figheight() * panel.get_subplotspec().get_position(panel.figure).height
+    line = _LINE * SMALL / height * (bottom - top)
     found = np.array(places, dtype=float)[order]
     for k in range(1, len(found)):
         found[k] = max(found[k], found[k - 1] + line)
@@ -332,11 +345,12 @@ def _apart(places, panel):
     return result
 
 
-def _tension(panel, answer, rows):
-    md, tension = answer.md[rows], answer.tension[rows]
-    panel.plot(tension / 1e3, md, color="black", label="effective tension")
+def _tension(panel, answer, rows, depth):
+    heading, size = scale(_TENSION)
+    tension = answer.tension[rows]
+    panel.plot(tension / size, depth, color="black", label="effective tension")
     if np.isfinite(answer.true_tension).any():
-        panel.plot(answer.true_tension[rows] / 1e3, md, color=GREY, linestyle="--", label="true tension")
+        panel.plot(answer.true_tension[rows] / size, depth, color=GREY, linestyle="--", label="true tension")
     low = min(tension.min(), 0.0) * 1.5 - 0.1 * np.abs(answer.tension).max()
     # what decides for the state: in a vertical hole Lubinski's load, which is the greater one there
     inclined = (answer.inclination > VERTICAL) | (answer.dogleg_severity > 0)  # without a wall force: Lubinski's alone
@@ -347,38 +361,40 @@ def _tension(panel, answer, rows):
     if np.isfinite(critical).any():
         label = "tension at which it buckles (He-Kyllingstad, Lubinski)"
         label += ", elsewhere it is farther left" if far.any() else ""
-        panel.plot(
-            critical / 1e3, md, color="tab:orange", label=label.replace(" (", "\n(").replace(", else", ",\nelse")
-        )
+        panel.plot(critical / size, depth, color="tab:orange", label=label)
     panel.axvline(0.0, color="black", linewidth=0.6)
-    panel.set_xlabel("tension (kN)")
+    panel.set_xlabel(heading)
 
 
-def _torque(panel, answer, rows):
-    panel.plot(answer.torque[rows] / 1e3, answer.md[rows], color="black")
-    panel.set_xlabel(f"torque (kN m)\nconvention: {answer.torque_convention}")
+def _torque(panel, answer, rows, depth):
+    heading, size = scale(_TORQUE)
+    panel.plot(answer.torque[rows] / size, depth, color="black")
+    panel.set_xlabel(f"{heading}\nconvention: {answer.torque_convention}")
 
 
-def _bending(panel, answer, rows):
-    panel.plot(answer.bending_moment[rows] / 1e3, answer.md[rows], color="black")
-    panel.set_xlim(0.0, max(1.05 * np.nanmax(answer.bending_moment[rows], initial=0.0) / 1e3, _LEAST))
-    panel.set_xlabel("bending moment (kN m)")
+def _bending(panel, answer, rows, depth):
+    heading, size = scale(_BENDING)
+    moment = answer.bending_moment[rows]
+    panel.plot(moment / size, depth, color="black")
+    panel.set_xlim(0.0, max(1.05 * np.nanmax(moment, initial=0.0), _LEAST) / size)
+    panel.set_xlabel(heading)
 
 
-def _side_force(panel, answer, rows):
+def _side_force(panel, answer, rows, depth):
     """Per length, without the peaks by which the rod has forces at points."""
-    md, force = answer.md[rows], answer.distributed_force[rows]
-    sides = sides_along(answer)[rows]
+    heading, size = scale(_SIDE)
+    unit = unit_of(_SIDE)[0]
+    force, sides = answer.distributed_force[rows], sides_along(answer)[rows]
     for side, colour in SIDES.items():
         if (sides == side).any():
-            panel.fill_betweenx(md, 0.0, force, where=_to_next(sides == side) & np.isfinite(force), color=colour,
-                                alpha=0.35, linewidth=0, label=_words(side))  # fmt: skip
-    panel.plot(force, md, color="black", linewidth=1.0)
+            panel.fill_betweenx(depth, 0.0, force / size, where=_to_next(sides == side) & np.isfinite(force),
+                                color=colour, alpha=0.35, linewidth=0, label=_words(side))  # fmt: skip
+    panel.plot(force / size, depth, color="black", linewidth=1.0)
     most = np.nanmax(force, initial=0.0)
-    shown = usual_side_force(answer, force, md)
-    panel.set_xlim(0.0, max(1.05 * shown, _LEAST_SIDE))
-    cut = f"\ncut off: up to {most:.3g} N/m" if most > 1.05 * shown else ""
-    panel.set_xlabel(f"side force per length (N/m){cut}")
+    shown = usual_side_force(answer, force, answer.md[rows])
+    panel.set_xlim(0.0, max(1.05 * shown, _LEAST_SIDE) / size)
+    cut = f"\ncut off: up to {most / size:.3g} {unit}" if most > 1.05 * shown else ""
+    panel.set_xlabel(f"{heading}{cut}")
     if not most > 0:
         panel.text(0.5, 0.5, "none", ha="center", transform=panel.transAxes, color=GREY)
 
@@ -387,41 +403,44 @@ def _words(side):
     return "wall of a vertical hole" if side == "wall" else f"on the {side} side"
 
 
-def _at_points(panel, answer, _):
+def _at_points(panel, answer, *_):
     """Forces at points, with their numbers beside them."""
+    (heading, size), unit = scale(_AT_POINTS), unit_of(_AT_POINTS)[0]
+    length_unit, length = unit_of(_DEPTH)
     bottom, top = panel.get_ylim()
-    points = points_between(answer, top, bottom)
-    most = max(max(force for _, force, _ in points) / 1e3, _LEAST)
+    points = [(md / length, force / size, side)
+              for md, force, side in points_between(answer, top * length, bottom * length)]  # fmt: skip
+    most = max(max(force for _, force, _ in points), _LEAST / size)
     for side, colour in SIDES.items():
-        here = np.array([(md, force / 1e3) for md, force, name in points if name == side]).reshape(-1, 2)
+        here = np.array([(depth, force) for depth, force, name in points if name == side]).reshape(-1, 2)
         if len(here):
             panel.hlines(here[:, 0], 0.0, here[:, 1], color=colour, linewidth=1.2)
             panel.plot(here[:, 1], here[:, 0], "o", color=colour, markersize=3.5, label=_words(side))
     numbered = sorted(sorted(points, key=lambda point: -point[1])[:_LABELS])
-    places = [md for md, *_ in numbered]
-    for y, (md, force, side) in zip(_apart(places, panel), numbered, strict=True):
-        panel.plot([force / 1e3, 1.12 * most, 1.2 * most], [md, y, y], color=GREY, linewidth=0.4)
-        text = f"{force / 1e3:.3g} kN, {md:.5g} m"
-        panel.text(1.22 * most, y, text, fontsize=7, va="center", color=SIDES[side],
-                   bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.3})  # fmt: skip
+    places = [depth for depth, *_ in numbered]
+    for y, (depth, force, side) in zip(_apart(places, panel), numbered, strict=True):
+        panel.plot([force, 1.12 * most, 1.2 * most], [depth, y, y], color=GREY, linewidth=0.4)
+        panel.text(1.22 * most, y, f"{force:.3g} {unit}, {depth:.5g} {length_unit}", fontsize=SMALL, va="center",
+                   color=SIDES[side], bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.3})  # fmt: skip
     panel.set_xlim(0.0, 2.5 * most)
     panel.set_xticks(np.arange(0.0, most, round_step(most, 3)))
     more = f"\nthe {_LABELS} largest numbered" if len(points) > _LABELS else ""
-    panel.set_xlabel(f"forces at points (kN){more}")
+    panel.set_xlabel(f"{heading}{more}")
 
 
 _ROCK, _BODY, _BLADES, _BIT, _FORCE = "#e4d3bd", "#9db4cc", "#5f7f9f", "#4d5b6b", "tab:red"
 # Length of the longest arrow, heights of the names, in turn, and of the picture's edges, over the width of the hole.
 _ARROW, _NAMES, _LOW, _HIGH = 0.35, (1.1, 1.32), 1.1, 1.6
+_TOWARDS_HIGH_SIDE = Quantity("from the hole's axis towards its high side", unit="m", shown="mm", dimension="diameter")
 # Forces below this share of the largest one have no arrow.
 _LITTLE_FORCE = 0.01
 
 
-def draw_from_side(answer, file, length):
+def draw_from_side(answer, file, length, **look):
     """See `RodInContact.plot_from_side`."""
     if length is not None:
         positive("plot_from_side", "length", length, "m")
-    return draw_chart(lambda: side_figure(answer, length), file, world())
+    return draw_chart(lambda: side_figure(answer, length), file, world(), **look)
 
 
 def side_figure(answer, length=None):
@@ -429,25 +448,27 @@ def side_figure(answer, length=None):
     top = max(0.0, answer.depth - (length or answer.depth))
     figure = empty_figure(11, 5.5)
     axes = figure.subplots()
+    (along, metre), (across, size) = scale(_DEPTH), scale(_TOWARDS_HIGH_SIDE)
     md = np.linspace(top, answer.depth, 801)
-    wall = 1e3 * answer.hole.at(md, "diameter") / 2
+    wall, at = answer.hole.at(md, "diameter") / 2 / size, md / metre
     width = 2 * wall.max()
     for sign in (1, -1):
-        axes.fill_between(md, sign * wall, sign * _HIGH * width, color=_ROCK, linewidth=0)
-        axes.plot(md, sign * wall, color="black", linewidth=1.0)
+        axes.fill_between(at, sign * wall, sign * _HIGH * width, color=_ROCK, linewidth=0)
+        axes.plot(at, sign * wall, color="black", linewidth=1.0)
     axes.axhline(0.0, color="gray", linewidth=0.6, linestyle=(0, (8, 4)))
-    high = 1e3 * np.interp(md, answer.md, _towards_high_side(answer))
+    pad = 0.025 * (answer.depth - top)
+    axes.set(xlim=((top - pad) / metre, (answer.depth + 2 * pad) / metre), ylim=(-_LOW * width, _HIGH * width))
+    axes.set(xlabel=along, ylabel=across)
+    high = np.interp(md, answer.md, _towards_high_side(answer))
     for i, place in enumerate(answer.laid):
         if place.bottom > top:
             _draw_component(axes, place, md, high, _NAMES[i % 2] * width)
     _draw_forces(axes, answer, top, width)
-    pad = 0.025 * (answer.depth - top)
-    axes.set(xlim=(top - pad, answer.depth + 2 * pad), ylim=(-_LOW * width, _HIGH * width))
-    axes.set(xlabel="measured depth (m)", ylabel="from the hole's axis towards its high side (mm)")
+    (unit, _), (weight_unit, weight) = unit_of(_DEPTH), unit_of(_HOOK)
     operation = answer.operation
     figure.suptitle(
-        f"{operation.name}, weight on bit {operation.weight / 1e3:g} kN, bit at {answer.depth:g} m: the string in its "
-        "hole from the side, forces of the wall on it"
+        f"{operation.name}, weight on bit {operation.weight / weight:.4g} {weight_unit}, bit at "
+        f"{answer.depth / metre:g} {unit}: the string in its hole from the side, forces of the wall on it"
     )
     return figure
 
@@ -460,37 +481,38 @@ def _towards_high_side(answer):
 
 
 def _draw_component(axes, place, md, high, name):
-    """Its body along the string, blades or a bit over it, and its name at a height (mm)."""
+    """Its body along the string, blades or a bit over it, and its name at a height of the chart."""
+    (_, metre), (_, size) = unit_of(_DEPTH), unit_of(_TOWARDS_HIGH_SIDE)
     part, here = place.component, (md >= place.top) & (md <= place.bottom)
     at = np.concatenate([[max(place.top, md[0])], md[here], [place.bottom]])
-    middle = np.interp(at, md, high)
-    body = 1e3 * (part.outer_diameter / 2 if part.outer_diameter else part.contact_radius)
+    middle, at = np.interp(at, md, high) / size, at / metre
+    body = (part.outer_diameter / 2 if part.outer_diameter else part.contact_radius) / size
     axes.fill_between(at, middle - body, middle + body, color=_BODY, linewidth=0)
     if isinstance(part, Bit | Stabiliser):
-        blades = 1e3 * part.contact_radius
-        colour = _BIT if isinstance(part, Bit) else _BLADES
+        blades, colour = part.contact_radius / size, _BIT if isinstance(part, Bit) else _BLADES
         for sign in (1, -1):
             axes.fill_between(at, middle + sign * body, middle + sign * blades, color=colour, linewidth=0)
     axes.plot([at[0], at[0]], [middle[0], name], color="gray", linewidth=0.6)
-    axes.text((at[0] + at[-1]) / 2, name, part.name, ha="center", va="bottom", fontsize=9, color="#333333")
+    axes.text((at[0] + at[-1]) / 2, name, part.name, ha="center", va="bottom", color="#333333")
 
 
 def _draw_forces(axes, answer, top, width):
     """Arrows of the forces at points, from the wall to the string, and lines where it lies on the wall."""
-    shown = [(start, end, force, side) for start, end, force, side in answer.contacts if end >= top and force > 0]
-    points = [contact for contact in shown if contact[0] == contact[1] and contact[3] in ("high", "low")]
-    most = max((force for _, _, force, _ in points), default=0.0)
-    for start, end, force, side in shown:
-        sign = 1 if side == "high" else -1
-        wall = 1e3 * sign * float(answer.hole.at((start + end) / 2, "diameter")) / 2
-        if start < end:
-            axes.plot([max(start, top), end], [wall, wall], color=_FORCE, linewidth=3, solid_capstyle="butt")
-            words, at = f"{force / 1e3:.3g} kN from {start:.1f} to {end:.1f} m", (max(start, top) + end) / 2
+    (unit, force_size), (length_unit, metre) = unit_of(_AT_POINTS), unit_of(_DEPTH)
+    shown = [contact for contact in answer.contacts if contact.bottom >= top and contact.force > 0]
+    most = max((x.force for x in shown if x.at_point and x.side in ("high", "low")), default=0.0)
+    for contact in shown:
+        start, end, force, side = contact
+        sign, told = 1 if side == "high" else -1, force / force_size
+        wall = sign * float(answer.hole.at((start + end) / 2, "diameter")) / 2 / unit_of(_TOWARDS_HIGH_SIDE)[1]
+        note = {"ha": "center", "va": "bottom" if sign > 0 else "top", "color": _FORCE}
+        begin, end, at = max(start, top) / metre, end / metre, start / metre
+        if not contact.at_point:
+            axes.plot([begin, end], [wall, wall], color=_FORCE, linewidth=3, solid_capstyle="butt")
+            words = f"{told:.3g} {unit} from {at:.1f} to {end:.1f} {length_unit}"
             if side in ("high", "low"):
-                axes.text(at, wall + sign * 0.05 * width, words, ha="center", va="bottom" if sign > 0 else "top",
-                          fontsize=8, color=_FORCE)  # fmt: skip
+                axes.text((begin + end) / 2, wall + sign * 0.05 * width, words, fontsize=SMALL, **note)
         elif side in ("high", "low") and force > _LITTLE_FORCE * most:
             tail = wall + sign * _ARROW * width * max(force / most, 0.3)
-            axes.annotate("", (start, wall), (start, tail), arrowprops={"arrowstyle": "-|>", "color": _FORCE, "lw": 2})
-            axes.text(start, tail + sign * 0.02 * width, f"{force / 1e3:.2f} kN", ha="center",
-                      va="bottom" if sign > 0 else "top", fontsize=9, color=_FORCE)  # fmt: skip
+            axes.annotate("", (at, wall), (at, tail), arrowprops={"arrowstyle": "-|>", "color": _FORCE, "lw": 2})
+            axes.text(at, tail + sign * 0.02 * width, f"{told:.2f} {unit}", **note)

@@ -9,6 +9,7 @@ the mesh touch the wall. On the first mesh they were 21 to 23, and one start of 
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -98,18 +99,20 @@ class DepthSweep(Tabular):
 
         return {"": sweep_columns(self)}
 
-    def plot(self, file: File | None = None):
+    def plot(self, file: File | None = None, *, units: Any = "SI", width: int | None = None):
         """Draw hook load and surface torque over the depth of the bit, the depth downwards ("broomstick").
 
         Args:
             file: .png, .pdf or another format of matplotlib (rank 0 writes); None returns the Figure.
+            units: "SI", "field", or a dict of units by dimensions, such as {"force": "klbf"}.
+            width: of the picture, pixels, which its fonts and legends are arranged for; None for 150 to the inch.
 
         Raises:
             SceneError: matplotlib is missing, or the ending is unknown.
         """
         from cosserat_fenicsx.well.charts import draw_sweep
 
-        return draw_sweep(self, file)
+        return draw_sweep(self, file, units=units, width=width)
 
     def __repr__(self):
         names = ", ".join(operation.name for operation in self.operations)

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy.optimize import brentq
@@ -38,8 +39,12 @@ class Campbell(Tabular):
                 found[kind, name] = speeds[speeds <= self.fastest]
         return found
 
-    def plot(self, file: File | None = None):
+    def plot(self, file: File | None = None, *, units: Any = "SI", width: int | None = None):
         """Frequencies as lines, excitations as rays. With a file it is written, otherwise the Figure is returned.
+
+        Args:
+            file: .png, .pdf or another format of matplotlib (rank 0 writes).
+            units: "SI", "field" or a dict of units by dimensions. width: of the picture, pixels, or None.
 
         Raises:
             SceneError: matplotlib is missing, or the file's ending is unknown.
@@ -47,7 +52,7 @@ class Campbell(Tabular):
         """
         from cosserat_fenicsx.drilling.charts import draw_campbell
 
-        return draw_campbell(self, file)
+        return draw_campbell(self, file, units=units, width=width)
 
     def __repr__(self):
         found = ", ".join(f"{len(x)} {kind}" for kind, x in self.frequencies.items())
@@ -146,8 +151,12 @@ class BitBounce(Tabular):
         changes = np.flatnonzero(above[1:] != above[:-1])
         return np.array([brentq(excess, speeds[k], speeds[k + 1], xtol=1e-12) for k in changes])
 
-    def plot(self, file: File | None = None):
+    def plot(self, file: File | None = None, *, units: Any = "SI", width: int | None = None):
         """Amplitude over speed beside the static weight. With a file it is written, otherwise the Figure is returned.
+
+        Args:
+            file: .png, .pdf or another format of matplotlib (rank 0 writes).
+            units: "SI", "field" or a dict of units by dimensions. width: of the picture, pixels, or None.
 
         Raises:
             SceneError: matplotlib is missing, or the file's ending is unknown.
@@ -155,7 +164,7 @@ class BitBounce(Tabular):
         """
         from cosserat_fenicsx.drilling.charts import draw_bounce
 
-        return draw_bounce(self, file)
+        return draw_bounce(self, file, units=units, width=width)
 
     def __repr__(self):
         lifted = self.speeds[self.lifts_off]

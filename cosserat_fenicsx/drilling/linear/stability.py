@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -236,9 +237,13 @@ class Stability(Tabular):
         """
         return growth_with(self, i, j, drives)
 
-    def plot(self, file: File | None = None, mode: int | None = None):
+    def plot(self, file: File | None = None, mode: int | None = None, *, units: Any = "SI", width: int | None = None):
         """Maps of the growth over speed and weight, of each mode that grows somewhere, or of one; over the speed alone
         where there is a single weight. With a file it is written, otherwise the Figure is returned.
+
+        Args:
+            file: .png, .pdf or another format of matplotlib (rank 0 writes). mode: its number.
+            units: "SI", "field" or a dict of units by dimensions. width: of the picture, pixels, or None.
 
         Raises:
             SceneError: matplotlib is missing, there is no such mode, or the file's ending is unknown.
@@ -248,7 +253,7 @@ class Stability(Tabular):
 
         if mode is not None:
             self._known(mode)
-        return draw_stability(self, file, mode)
+        return draw_stability(self, file, mode, units=units, width=width)
 
     def __repr__(self):
         grow = self.unstable_modes

@@ -9,7 +9,7 @@ import contextlib
 from dataclasses import dataclass, fields
 from functools import cached_property
 from operator import attrgetter
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -127,20 +127,29 @@ class RodInContact(TorqueAndDrag):
         return [WallContact(float(a), float(b), x.force, name_of_side(x.side if leaning else np.nan), x.error)
                 for (a, b), x, leaning in zip(depths, self.solved.contacts, leans, strict=True)]  # fmt: skip
 
-    def plot_from_side(self, file: File | None = None, length: float | None = None):
+    def plot_from_side(
+        self,
+        file: File | None = None,
+        length: float | None = None,
+        *,
+        units: Any = "SI",
+        width: int | None = None,
+    ):
         """Draw the lower end of the string in its hole from the side, with the forces of the wall; across the hole
         lengths are enlarged.
 
         Args:
             file: .png, .pdf or another format of matplotlib (rank 0 writes); None returns the Figure.
             length: of the string that is drawn, from its lower end, m; None for all of it.
+            units: "SI", "field", or a dict of units by dimensions, such as {"force": "klbf"}.
+            width: of the picture, pixels, which its fonts and legends are arranged for; None for 150 to the inch.
 
         Raises:
             SceneError: matplotlib is missing, or the ending is unknown.
         """
         from cosserat_fenicsx.well.charts import draw_from_side
 
-        return draw_from_side(self, file, length)
+        return draw_from_side(self, file, length, units=units, width=width)
 
     @cached_property
     def helical(self):

@@ -1,0 +1,102 @@
+"""Texts of every kind of chart, at 1280 and at 400 pixels: they can be read, overlap nothing, and stay inside."""
+
+import itertools
+
+import numpy as np
+import pytest
+import test_orbits
+import test_well_sweep as wells
+from fake_string import scene, use
+from reference_strings import pipe_and_collars
+from test_orbits import collar  # noqa: F401
+
+import cosserat_fenicsx as cf
+
+pytest.importorskip("matplotlib")
+pytestmark = pytest.mark.serial
+#: Pixels that a letter is high at least, and that boxes of texts may share: their margins.
+LEGIBLE, MARGIN = 9.0, 1.0
+
+
+def texts_of(figure):
+    """[(words, box)] of all that is written in a Figure."""
+    figure.draw_without_rendering()
+    found = [figure._suptitle]
+    for panel in figure.axes:
+        if not panel.get_visible():
+            continue
+        found += [panel.title, panel.xaxis.label, panel.yaxis.label, *panel.texts]
+        found += [panel.xaxis.get_offset_text(), panel.yaxis.get_offset_text()]
+        for axis, limits in ((panel.xaxis, panel.get_xlim()), (panel.yaxis, panel.get_ylim())):
+            inside = [low - 1e-9 * abs(low) <= x <= high + 1e-9 * abs(high)
+                      for low, high in (sorted(limits),) for x in axis.get_ticklocs()]  # fmt: skip
+            ticks = axis.get_major_ticks(len(inside))
+            for tick in itertools.compress(ticks, inside):
+                found += [tick.label1, tick.label2]
+        if panel.get_legend() is not None:
+            found += [*panel.get_legend().get_texts(), panel.get_legend().get_title()]
+    found = [text for text in found if text is not None and text.get_visible() and text.get_text().strip()]
+    assert all(text.get_fontsize() * figure.dpi / 72 >= LEGIBLE for text in found)
+    return [(text.get_text(), text.get_window_extent()) for text in found]
+
+
+def check(figure, width):
+    assert figure.bbox.width == pytest.approx(width)
+    texts = texts_of(figure)
+    assert len(texts) > 8
+    for words, box in texts:
+        assert min(box.x0, box.y0) > -MARGIN, f"outside: {words!r}"
+        assert box.x1 < figure.bbox.x1 + MARGIN and box.y1 < figure.bbox.y1 + MARGIN, f"outside: {words!r}"
+    for (one, a), (other, b) in itertools.combinations(texts, 2):
+        shared = min(a.x1, b.x1) - max(a.x0, b.x0), min(a.y1, b.y1) - max(a.y0, b.y0)
+        assert min(shared) <= MARGIN, f"{one!r} and {other!r} share {shared} pixels"
+
+
+def check_all(*plots, units=True):
+    for width in (1280, 400):
+        for plot in plots:
+            check(plot(width=width), width)
+            if units:
+                check(plot(width=width, units="field"), width)
+
+
+def test_strings_in_motion(monkeypatch):
+    use(monkeypatch)
+    history, long = cf.simulate_drilling(scene(), 30.0), cf.simulate_drilling(scene(), 1000.0, profile_every=10.0)
+    check_all(history.plot, history.plot_map, history.plot_phase, history.plot_energy, long.plot, long.plot_map)
+    assert history.plot(units="field").axes[1].get_ylabel() == "torque (ft-lbf)"
+    torque = history.plot(units={"moment": "N m"}).axes[1].lines[0].get_ydata()
+    assert torque == pytest.approx(history.torque_on_bit)
+    for wrong in ({"units": "imperial"}, {"width": 10}, {"width": "wide"}):
+        with pytest.raises(cf.SceneError, match=next(iter(wrong))):
+            history.plot(**wrong)
+
+
+def test_stability_of_strings():
+    plain, speeds = pipe_and_collars("SoftSpeed"), np.linspace(4.0, 16.0, 7)
+    rock = cf.BitOnRock(cf.Lobes(3, 0.002), weight=8e4)
+    lobes = pipe_and_collars(bit=rock, hook=cf.Hook(1.0))
+    check_all(
+        cf.stability(plain, speeds, [3e4, 8e4], up_to=1.0).plot,
+        cf.stability(plain, speeds, up_to=1.0).plot,
+        cf.campbell(lobes, 20.0, up_to=2.0).plot,
+        cf.bit_bounce(lobes, speeds).plot,
+    )
+
+
+def test_sections_in_holes(collar):  # noqa: F811
+    rod, wall, history = collar
+    station = rod.at(test_orbits.LENGTH / 2)
+    check_all(
+        lambda **look: history.plot_orbit(station, wall, **look),
+        lambda **look: history.plot_whirl(station, **look),
+        history.plot_energy,
+    )
+
+
+@pytest.mark.slow
+def test_strings_in_wells():
+    sliding = cf.torque_and_drag(wells.HOLE, wells.STRING, cf.Sliding(1e5), mud=wells.MUD, model="buckled")
+    fit = cf.calibrate_friction(wells.HOLE.with_friction(0.0), wells.STRING, wells.measured(1.0), mud=wells.MUD)
+    check_all(sliding.plot, lambda **look: sliding.plot(between=(2300, 2500), **look), wells.sweep().plot, fit.plot)
+    assert sliding.plot(units="field").axes[1].get_xlabel() == "tension (klbf)"
