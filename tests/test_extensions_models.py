@@ -79,3 +79,16 @@ def test_a_load():
     assert path.model == "planar"
     history = cf.simulate(scene, 0.05, dt=1e-3, elements=2)
     assert history.displacement(ROD.end)[-1, 0] > 0
+
+
+@pytest.mark.parametrize("load", [AcrossRod(ROD, 2.0), cf.Wall(ROD, (0, 0, 0), (0, 0, 1.0), 1e-3, 1e3, Hardening(0.004))])
+def test_stored_and_resumed(load, tmp_path):
+    """A motion that is ended early and resumed is the one that was not, to the last digit."""
+    scene = cf.Scene([ROD], [cf.Clamp(ROD.start)], [cf.LineForce(ROD, (1.0, 0, 0)), load])
+    options = {"dt": 1e-3, "elements": 2}
+    cf.simulate(scene, 0.02, folder=tmp_path / "run", **options)
+    resumed = cf.resume(tmp_path / "run", scene=scene, duration=0.04)
+    whole = cf.simulate(scene, 0.04, **options)
+    np.testing.assert_array_equal(resumed.position(ROD.end), whole.position(ROD.end))
+    resumed.plot(tmp_path / "motion.png")
+    cf.solve(scene, [0.5, 1.0], elements=4).plot(tmp_path / "shape.png")
