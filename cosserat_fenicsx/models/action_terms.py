@@ -4,10 +4,9 @@ from collections import namedtuple
 
 import numpy as np
 import ufl
-from dolfinx import fem
 
 from cosserat_fenicsx import compat
-from cosserat_fenicsx.models.rod_data import gauss_function
+from cosserat_fenicsx.models.rod_data import element_function, gauss_function
 from cosserat_fenicsx.models.signature import place_actions
 from cosserat_fenicsx.numerics import directors
 from cosserat_fenicsx.scene.signals import at, signals_of, values_at, with_values
@@ -206,8 +205,7 @@ class Term:
         mesh, place = self._rods.mesh, self.kind.place
         if place == "line":
             return gauss_function(mesh, self._signature.points, size)
-        degree = 1 if place == "point" else self._signature.degree
-        return fem.Function(compat.function_space(mesh, compat.lagrange(mesh, degree, size, discontinuous=True)))
+        return element_function(mesh, 1 if place == "point" else self._signature.degree, size)
 
     # -- UFL ---------------------------------------------------------------------------------------------------------
 

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 import ufl
@@ -27,6 +28,7 @@ from cosserat_fenicsx.models.compiled import (
 from cosserat_fenicsx.models.connections import ties_of
 from cosserat_fenicsx.models.rod_data import (
     check_inertia,
+    element_function,
     gauss_function,
     joined,
     law_data,
@@ -289,22 +291,17 @@ class Moving:
 
     def _motion_fields(self):
         """Make the Functions that the forms need in addition to those of a `RodModel`."""
-        mesh, points = self.mesh, self.signature.points
+        mesh, points, coupled = self.mesh, self.signature.points, self.signature.coupled
         self.start, self.velocity = fem.Function(self.space), fem.Function(self.space)
         # dolfinx makes an array of a Function anew whenever it is asked for one
         self._arrays = self.state.x.array, self.start.x.array, self.velocity.x.array
         self.h = fem.Constant(mesh, np.float64(1))
-        self.mass, self.drag = self._at_element_nodes(1), self._at_element_nodes(1)
-        self.inertia = self._at_element_nodes(self.inertia_size)
-        self.offset = self._at_element_nodes(3) if self.signature.eccentric else None
-        self.lateral = self._at_element_nodes(self.moves) if self.signature.lateral else None
-        coupled = self.signature.coupled
+        at_nodes = partial(element_function, mesh, self.signature.degree)
+        self.mass, self.drag, self.inertia = (at_nodes(size) for size in (1, 1, self.inertia_size))
+        self.offset = at_nodes(3) if self.signature.eccentric else None
+        self.lateral = at_nodes(self.moves) if self.signature.lateral else None
         Kt, Jt = (gauss_function(mesh, points, 9 if coupled else 3) for _ in range(2))
         self.viscosity = Kt, None, Jt, gauss_function(mesh, points, 9) if coupled else None
-
-    def _at_element_nodes(self, size):
-        element = compat.lagrange(self.mesh, self.signature.degree, size, discontinuous=True)
-        return fem.Function(compat.function_space(self.mesh, element))
 
     def load(self, scene, layout):
         """See `RodModel`; mass and inertia too.
@@ -322,17 +319,18 @@ class Moving:
         ])  # fmt: skip
         mass, J, frames = nodal_inertia(scene, layout, self.nodes)
         drags = [rod.damping.drag * self.time if rod.damping else 0.0 for rod in scene.rods]
-        self._fill_nodes(self.mass, mass[..., None] / heaviest)
+        fill = partial(self.rods.fill, at_nodes=True)
+        fill(self.mass, mass[..., None] / heaviest)
         inertia = self._section_inertia(J / (heaviest * scales.length**2), frames)
         if self.offset is not None:
             offset, more = nodal_offsets(scene, layout, self.nodes, mass)
-            self._fill_nodes(self.offset, offset / scales.length)
+            fill(self.offset, offset / scales.length)
             inertia = inertia + six_of(more / (heaviest * scales.length**2))
-        self._fill_nodes(self.inertia, inertia)
+        fill(self.inertia, inertia)
         if self.lateral is not None:
             directions = nodal_lateral(scene, layout, self.nodes) / math.sqrt(heaviest)
-            self._fill_nodes(self.lateral, directions @ self.axes[: self.moves].T)
-        self._fill_nodes(self.drag, np.repeat(drags, layout.counts)[:, None, None] * np.ones((1, len(self.nodes), 1)))
+            fill(self.lateral, directions @ self.axes[: self.moves].T)
+        fill(self.drag, np.repeat(drags, layout.counts)[:, None, None] * np.ones((1, len(self.nodes), 1)))
         self.start.x.array[:] = self.state.x.array
         self.velocity.x.array[:] = 0.0
         self._damp()
@@ -353,14 +351,6 @@ class Moving:
             if function is not None:
                 self.rods.fill(function, values)
         self.damped = damped != [Damping()] * len(damped)
-
-    def _fill_nodes(self, function, values):
-        """Fill a Function with values (elements, p + 1, k) at the nodes of every element, in the scene's order."""
-        local = values[self.rods.cells]
-        local[self.rods.reversed] = local[self.rods.reversed][:, ::-1]
-        space = function.function_space
-        order = np.argsort(np.argsort(compat.element_nodes(space)))
-        function.x.array.reshape(-1, values.shape[2])[compat.cell_nodes(space)] = local[:, order]
 
     # -- for subclasses to define ------------------------------------------------------------------------------------
 

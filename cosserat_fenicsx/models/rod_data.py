@@ -185,6 +185,11 @@ def gauss_function(mesh, points, size):
     return fem.Function(compat.function_space(mesh, compat.at_quadrature_points(mesh, 2 * points - 1, size)))
 
 
+def element_function(mesh, degree, size):
+    """A Function of `size` components at the nodes of every element, where neighbours may have different values."""
+    return fem.Function(compat.function_space(mesh, compat.lagrange(mesh, degree, size, discontinuous=True)))
+
+
 def rod_fields(mesh, points, frame, strain, *, coupled):
     """Empty `RodFields` with `frame` components of R_R and `strain` of v_R, for a coupled or diagonal law."""
     law = (9,) * 5 if coupled else (3, 3, 3, 3, 0)

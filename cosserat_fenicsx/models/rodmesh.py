@@ -227,11 +227,14 @@ class RodMesh:
         offsets = np.concatenate([[0], np.cumsum([len(s) for s in ends])])[:-1]
         self.mesh.geometry.x[:, 0] = np.concatenate(ends)[offsets[self._vertex_rod] + self._vertex_inner]
 
-    def fill(self, function, values):
-        """Set a function at the Gauss points from values (elements, points, k) in the scene's order."""
-        local = values[self.cells]
+    def fill(self, function, values, at_nodes=False):
+        """Set a function at the Gauss points, or at the nodes of every element, from values (elements, points, k) in
+        the scene's order."""
+        local, space = values[self.cells], function.function_space
         local[self.reversed] = local[self.reversed][:, ::-1]
-        function.x.array.reshape(-1, values.shape[2])[compat.cell_nodes(function.function_space)] = local
+        if at_nodes:
+            local = local[:, np.argsort(np.argsort(compat.element_nodes(space)))]
+        function.x.array.reshape(-1, values.shape[2])[compat.cell_nodes(space)] = local
 
     def slots(self, space, degree):
         """The scene's number of every local node of a degree-`degree` space, and its local number, both (nodes,)."""
