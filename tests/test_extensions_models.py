@@ -81,7 +81,10 @@ def test_a_load():
     assert history.displacement(ROD.end)[-1, 0] > 0
 
 
-@pytest.mark.parametrize("load", [AcrossRod(ROD, 2.0), cf.Wall(ROD, (0, 0, 0), (0, 0, 1.0), 1e-3, 1e3, Hardening(0.004))])
+HARD = cf.Wall(ROD, (0, 0, 0), (0, 0, 1.0), clearance=1e-3, stiffness=1e3, law=Hardening(0.004))
+
+
+@pytest.mark.parametrize("load", [AcrossRod(ROD, 2.0), HARD])
 def test_stored_and_resumed(load, tmp_path):
     """A motion that is ended early and resumed is the one that was not, to the last digit."""
     scene = cf.Scene([ROD], [cf.Clamp(ROD.start)], [cf.LineForce(ROD, (1.0, 0, 0)), load])

@@ -44,26 +44,17 @@ def work_of(action):
     return getattr(virtual_work, action.work) if isinstance(action.work, str) else action.work
 
 
-def data_of(action, rod, s):
-    """`Datum`s of an action at the time 0, followed by its memory."""
-    return (*at(action, 0.0).data(rod, s), *action.memory)
-
-
 def traits_of(action, rods):
-    """The `Traits` of an action in a scene with these rods."""
+    """The `Traits` of an action in a scene with these rods: its own, or those found from its virtual work."""
     work = work_of(action)
-    if work is None and not action.traits:
+    if action.traits:
+        return Traits(**action.traits)
+    if work is None:
         return Traits(True, True, False, True, True)
-    return Traits(**action.traits) if action.traits else found_traits(action, rods)
-
-
-def found_traits(action, rods):
-    """The `Traits` of an action with a virtual work, found from it."""
-    work = work_of(action)
     named = action.station.rod if action.station is not None else action.rod
     rod = named or next(rod for rod in rods if action.acts_on(rod))
-    kinds = tuple((datum.size, is_axial(datum.unit)) for datum in data_of(action, rod, np.zeros(1)))
-    return _traits(work, kinds)
+    data = (*at(action, 0.0).data(rod, np.zeros(1)), *action.memory)
+    return _traits(work, tuple((datum.size, is_axial(datum.unit)) for datum in data))
 
 
 @lru_cache(maxsize=256)
