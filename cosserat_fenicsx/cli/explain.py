@@ -14,7 +14,7 @@ from cosserat_fenicsx.models.rod_data import check_inertia
 from cosserat_fenicsx.models.rodmesh import Layout
 from cosserat_fenicsx.models.signature import Signature
 from cosserat_fenicsx.results.accuracy import FEW
-from cosserat_fenicsx.results.compared import NAMES
+from cosserat_fenicsx.results.compared import NAMES, words_of
 from cosserat_fenicsx.scene.curves import Line, Spline
 from cosserat_fenicsx.scene.describe import actions_in_words, describe
 from cosserat_fenicsx.scene.rolled import Profile
@@ -80,7 +80,7 @@ def explain(scene, load_factors, settings):
     else:
         lines.append(
             f"Mesh: elements of degree {degree}, from {first} per rod ({unknowns} unknowns) refined until two meshes "
-            f"agree to tol = {tol:g} in {', '.join(f'{name}s' for name in bound)}."
+            f"agree to tol = {tol:g} in {', '.join(map(words_of, bound))}."
         )
     if isinstance(load_factors, tuple):
         lines.append(f"Path: load factor {load_factors[0]:g} to {load_factors[1]:g} in steps the solver chooses.")

@@ -2,7 +2,16 @@
 
 import numpy as np
 
-from cosserat_fenicsx.results.compared import FORCE, POSITION, ROTATION, ROUNDING, cell_nodes, differences, transferred
+from cosserat_fenicsx.results.compared import (
+    FORCE,
+    NAMES,
+    POSITION,
+    ROTATION,
+    ROUNDING,
+    cell_nodes,
+    differences,
+    transferred,
+)
 from cosserat_fenicsx.results.rods import resting
 
 #: Largest number of points of a path that are all sample points.
@@ -26,8 +35,8 @@ _BELOW, _ABOVE = 0.7, 1.4
 # Factor of an error that is interpolated over leading coefficients, as a power of their ratio to those of the nearest
 # sample point; the largest one.
 _WIDENED, _WIDEST = 0.5, 2.0
-# Factors of all errors that are interpolated, of positions, rotations, n and m.
-_BETWEEN = (1.25, 1.25, 2.0, 1.25)
+# Factors of all errors that are interpolated: of n, and of all others.
+_BETWEEN_FORCES, _BETWEEN = 2.0, 1.25
 # Largest ratio of the leading coefficients of sample points without another one between them.
 _APART = 10.0
 # Ratio of leading coefficients below which a second, smoother point is sampled, since its error may converge otherwise.
@@ -49,7 +58,8 @@ def estimate_error(fine, coarse, before=None, *, smooth=True):
       these at most 2^(p - 3). A quarter at most where that does not hold for every quantity, and on elements of
       unequal length, as in boundary layers.
 
-    Each quantity is judged by itself, relative to its own size, see `compared.sizes_of`.
+    Each quantity is judged by itself, relative to its own size, see `compared.sizes_of`: the four of the package, and
+    after them those of further criteria (see `compared.Criterion`); (4, n) is more for these.
 
     Args:
         smooth: of scenes with walls: False where an edge of contact lies inside elements. No gain is assumed then, and
@@ -66,7 +76,7 @@ def estimate_error(fine, coarse, before=None, *, smooth=True):
         ahead, far = difference > _AHEAD * at_ends, difference > _FAR_AHEAD * at_ends
         # n is constant where no loads act along rods, so that all of its error is that of the ends
         far[FORCE] |= far[:FORCE].all(axis=0) & (difference[FORCE] <= _OF_ENDS * at_ends[FORCE])
-        sure = (far | (relative == 0)).all(axis=0) & _equal(fine.layout)
+        sure = (far | (relative == 0))[: len(NAMES)].all(axis=0) & _equal(fine.layout)
         part = np.where(sure, part, 1 / _SAFETY)
         uniform = all(rod.uniform for rod in fine.scene.rods)
         gain = np.where(far & uniform, part * 2.0 ** (p + 1), np.where(ahead, max(1.0, 2.0 ** (p - 3)), 1.0))
@@ -184,10 +194,15 @@ def spread_error(path, few, which, coarse=None):
         coarse: the whole path on a coarser mesh, or None.
     """
     sizes = path._reference.sizes
-    told = differences(path, coarse)[0] if coarse is not None else path._roughness.max(axis=1)[[0, 1, 1, 1]]
+    if coarse is not None:
+        told = differences(path, coarse)[0]
+    else:
+        told = path._roughness.max(axis=1)[[POSITION] + [ROTATION] * (len(sizes) - 1)]
+    between = np.full(len(sizes), _BETWEEN)
+    between[FORCE] = _BETWEEN_FORCES
     found = np.array([
         _spread(*numbers, which, of_mesh=coarse is not None)
-        for numbers in zip(told, sizes, few.by_mesh, _BETWEEN, strict=True)
+        for numbers in zip(told, sizes, few.by_mesh, between, strict=True)
     ])  # fmt: skip
     least = _as_positions(found * sizes, few.by_mesh * sizes[:, which], which) / sizes[ROTATION]
     found[ROTATION] = np.maximum(found[ROTATION], least)

@@ -1,11 +1,13 @@
 """What errors of a path are estimated of, what they are relative to, and how far two meshes differ in it."""
 
 from collections import namedtuple
+from collections.abc import Sequence
 from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 
+from cosserat_fenicsx.errors import SceneError, nearest
 from cosserat_fenicsx.remember import per_scene
 
 
@@ -103,10 +105,109 @@ def halfway(places):
     return np.sort(np.concatenate([places, (places[:-1] + places[1:]) / 2]))
 
 
-#: Of the quantities that errors are estimated of: positions, rotations, contact forces n and contact moments m.
+class Criterion:
+    """An error that `tol` may bound: that of a quantity at the points of a path, relative to its size.
+
+    Those of the package are compared anywhere along the rods, see `differences`; one that is derived from this class
+    says with `values` what it compares. It is known by its `name` from its definition on: in `bound` of `solve` and of
+    scene files, in `Path.errors`, tables and stored paths.
+
+    Attributes:
+        name: a Python name.
+        words: the quantity in words, in the plural, such as "strain energies".
+    """
+
+    name = words = ""
+
+    def __init_subclass__(cls, **options):
+        super().__init_subclass__(**options)
+        if not cls.name.isidentifier():
+            raise TypeError(f"class {cls.__name__}: name = {cls.name!r}: expected a Python name")
+        CRITERIA[cls.name] = cls
+
+    def values(self, path):
+        """(n,) or (n, k) numbers at the points of a path, by its queries; NaN of a stored criterion that is unknown."""
+        return np.full(len(path), np.nan)
+
+    def sizes(self, path):
+        """(n,) what the errors are relative to, in the unit of the values: these themselves, but at least 1e-6 of the
+        largest of the path."""
+        sizes = _norms(self.values(path))
+        return np.maximum(sizes, _AT_REST * sizes.max(initial=0.0))
+
+
+#: The criteria by name; a subclass of `Criterion` enters itself.
+CRITERIA = {}
+
+
+class Position(Criterion):
+    """Positions, over the largest displacement."""
+
+    name, words = "position", "positions"
+
+
+class Rotation(Criterion):
+    """Rotations, over the largest one."""
+
+    name, words = "rotation", "rotations"
+
+
+class Force(Criterion):
+    """Contact forces n, over the largest one."""
+
+    name, words = "force", "forces"
+
+
+class Moment(Criterion):
+    """Contact moments m, over the largest one."""
+
+    name, words = "moment", "moments"
+
+
+#: Of the criteria that errors are always estimated of.
 Errors = namedtuple("Errors", "position rotation force moment")
 NAMES = Errors._fields
 POSITION, ROTATION, FORCE = 0, 1, 2
+
+
+def criteria_of(bound):
+    """(names of what `tol` bounds, the `Criterion`s beyond those of the package).
+
+    Args:
+        bound: names, or classes or objects of criteria.
+
+    Raises:
+        SceneError: something else.
+    """
+    if isinstance(bound, str) or not isinstance(bound, Sequence) or not bound:
+        raise SceneError(f"bound = {bound!r}: expected a list of some of {', '.join(map(repr, CRITERIA))}")
+    found = {}
+    for given in bound:
+        if isinstance(given, str) and given not in CRITERIA:
+            raise SceneError(f"bound: {given!r}: {nearest(given, CRITERIA)}")
+        criterion = CRITERIA[given] if isinstance(given, str) else given
+        criterion = criterion() if isinstance(criterion, type) else criterion
+        if not isinstance(criterion, Criterion):
+            raise SceneError(f"bound: {given!r}: expected a name or a Criterion")
+        found[criterion.name] = criterion
+    return tuple(found), tuple(criterion for name, criterion in found.items() if name not in NAMES)
+
+
+def stored_criteria(names):
+    """The `Criterion`s of a stored path by their names; of those that are unknown the names remain."""
+    found = tuple(CRITERIA.get(name, Criterion)() for name in names)
+    for name, criterion in zip(names, found, strict=True):
+        criterion.name = name
+    return found
+
+
+def words_of(name):
+    """What a criterion compares, in words."""
+    return (name in CRITERIA and CRITERIA[name].words) or name
+
+
+def _norms(values):
+    return np.linalg.norm(np.reshape(values, (len(values), -1)), axis=1)
 
 # Differences of positions and of rotations up to this are rounding alone, in units of the scales' length and rad.
 ROUNDING = 1e-14
@@ -149,6 +250,9 @@ def sizes_of(path):
     moment = np.maximum(np.maximum(moment, least * length * force), _NOTHING)
     sizes = np.array([np.maximum(moved, turned), rotation, force, moment])
     sizes[:2] = np.maximum(sizes[:2], _AT_REST * sizes[:2].max(axis=1, initial=0.0)[:, None])
+    for criterion in path.criteria:
+        own = np.maximum(criterion.sizes(path), 1e-300)
+        sizes, noise = np.vstack([sizes, own]), np.vstack([noise, np.zeros((1, noise.shape[1]))])
     return Sizes(sizes, turned > moved, np.broadcast_to(noise, sizes.shape))
 
 
@@ -201,7 +305,7 @@ def differences(fine, coarse):
 
     Returns:
         Over all places, and over the ends of elements of the coarse mesh alone: (4, points), dimensionless, rotations
-        in rad. Rounding counts as no difference.
+        in rad; then those of further criteria, in both. Rounding counts as no difference.
     """
     sizes = fine._reference
     places = compared(coarse.layout, fine.layout, coarse.rule)
@@ -218,5 +322,9 @@ def differences(fine, coarse):
             turned = np.where(sizes.turning[:, None], radius * apart[:, part, 1], 0.0)
             apart[:, part, 0] = np.maximum(apart[:, part, 0], turned)
     everywhere, at_ends = apart.max(axis=1).T, apart[:, places.ends].max(axis=1).T
-    everywhere[everywhere <= np.maximum(ROUNDING, _NOISE * sizes.rounding)] = 0.0
+    everywhere[everywhere <= np.maximum(ROUNDING, _NOISE * sizes.rounding[: len(NAMES)])] = 0.0
+    for k, criterion in enumerate(fine.criteria, start=len(NAMES)):
+        apart = _norms(criterion.values(fine) - criterion.values(coarse))
+        apart[apart <= ROUNDING * sizes.sizes[k].max(initial=0.0)] = 0.0
+        everywhere, at_ends = np.vstack([everywhere, apart]), np.vstack([at_ends, apart])
     return everywhere, at_ends

@@ -2,6 +2,7 @@
 
 import dataclasses
 import itertools
+from collections import namedtuple
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cached_property
 from typing import Self
@@ -11,7 +12,7 @@ import numpy as np
 from cosserat_fenicsx.quantities import Quantity
 from cosserat_fenicsx.results import screen
 from cosserat_fenicsx.results.accuracy import leading_of
-from cosserat_fenicsx.results.compared import NAMES, Errors, all_cell_nodes, sizes_of
+from cosserat_fenicsx.results.compared import NAMES, Errors, all_cell_nodes, sizes_of, words_of
 from cosserat_fenicsx.results.records import Event, Record, Records
 from cosserat_fenicsx.results.recovery import element_contact
 from cosserat_fenicsx.results.result import by_name
@@ -65,7 +66,8 @@ class Path(RodResult):
             singular. Where the loads have no potential (see `conservative`) its symmetric part is used, which does not
             detect flutter.
         stable: (n,) bool.
-        errors: the estimated errors of position, rotation, force and moment, each (n,), see there.
+        errors: the estimated errors of position, rotation, force and moment, and of further criteria that `tol` bounds,
+            each (n,), see there.
         error: (n,) the largest of those that `tol` bounds; NaN where not estimated.
         bounded: names of those that `tol` bounds.
         rounding: the error of positions and rotations that the rounding of the residual alone may cause, relative.
@@ -88,9 +90,17 @@ class Path(RodResult):
         super().__init__(*args, **more)
         self.events: list[Event] = []
         self.control, self.left = "load", False
-        self.rounding, self.bounded = 0.0, NAMES
+        self.rounding, self.bounded, self.criteria = 0.0, NAMES, ()
         self._errors = self.by_mesh = None
         self._expanded: Records | None = None
+
+    @property
+    def quantities(self) -> dict[str, Quantity]:
+        """{name: `Quantity`}, with the errors of further criteria that `tol` bounds."""
+        further = ((x.name, f"estimated error of {words_of(x.name)}", f"errors.{x.name}") for x in self.criteria)
+        return super().quantities | by_name(
+            *(Quantity(f"error_{name}", label, getter=getter, digits=2) for name, label, getter in further)
+        )
 
     @classmethod
     def of(cls, model, why=(), potential=None, differentiated=None):
@@ -326,7 +336,13 @@ class Path(RodResult):
         of the path. Rounding is included, over the largest size on the path, since it is the same at small loads: that
         of n is large on slender rods which bend without a large n.
         """
-        return Errors(*(np.full((4, len(self)), np.nan) if self._errors is None else self._errors))
+        known = np.full((len(self.judged), len(self)), np.nan) if self._errors is None else self._errors
+        return Errors(*known) if len(known) == len(NAMES) else namedtuple("Errors", self.judged)(*known)
+
+    @property
+    def judged(self):
+        """Names of what errors are estimated of: the four of the package, then further criteria of `bound`."""
+        return (*NAMES, *(criterion.name for criterion in self.criteria))
 
     @property
     def error(self) -> np.ndarray:
@@ -336,7 +352,7 @@ class Path(RodResult):
     @property
     def bounds(self):
         """Indices of what is `bounded`."""
-        return [NAMES.index(name) for name in self.bounded]
+        return [self.judged.index(name) for name in self.bounded]
 
     @property
     def worst(self):
@@ -421,16 +437,17 @@ def errors_in_words(path):
     """A sentence on the largest estimated errors; none where they are unknown."""
     known = [(name, values.max()) for name, values in path.errors._asdict().items() if not np.isnan(values).any()]
     if known and len(path):
-        by_rounding = dict(zip(NAMES, path.rounding_errors.max(axis=1), strict=True))
+        by_rounding = dict(zip(path.judged, path.rounding_errors.max(axis=1), strict=True))
         told = ", ".join(
-            f"{name}s {worst:.1e}{' (rounding)' if 0 < worst <= by_rounding[name] else ''}" for name, worst in known
+            f"{words_of(name)} {worst:.1e}{' (rounding)' if 0 < worst <= by_rounding[name] else ''}"
+            for name, worst in known
         )
         yield f"Estimated errors, each relative to the largest of its kind, are at most: {told}."
 
 
 def _bounded(path):
     """What `tol` bounds, in words."""
-    *names, last = [f"{name}s" for name in path.bounded]
+    *names, last = map(words_of, path.bounded)
     return f"{', '.join(names)} and {last}, relative" if names else f"{last}, relative"
 
 

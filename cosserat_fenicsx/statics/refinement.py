@@ -52,7 +52,7 @@ def refine(trace, correct, scene, layout, tol, bound, degree, usual=None):
         scene: the scene; layout: the first mesh.
         usual: where that one is coarser than usual, the mesh to begin with again unless the path on it is plain: load
             control, no events, no negative modes, elements shorter than boundary layers.
-        tol: largest estimated error, relative; bound: names of what it bounds, see `Path.errors`.
+        tol: largest estimated error, relative; bound: what it bounds, see `criteria_of`.
         degree: of the elements.
 
     Raises:
@@ -95,7 +95,7 @@ class _Search:
         self._level, self._level_of_whole = -1, -2
         self._plain = False  # see `_plain`, of the complete path
         # Assumed orders of the errors in h; refinement factor over the mesh before, None where meshes are not nested.
-        self._order, self._factor = np.ones(4), 2.0
+        self._order, self._factor = np.ones(len(NAMES) + len(self._bound[1])), 2.0
         self._failed, self._promoted, self._best = False, None, math.inf
         self.accurate, self._meshes_for_events, self._lost_events = None, _FOR_EVENTS, []
         self._halved = None  # sample points on this mesh and on the one before, if this one halves its elements
@@ -166,7 +166,7 @@ class _Search:
     def confirmed(self, path):
         """A path without the events that were not found on two meshes, and with what rounding leaves of its bounds."""
         by_rounding = path.rounding_errors.max(axis=1, initial=0.0)
-        hidden = [name for name in path.bounded if by_rounding[NAMES.index(name)] > self._tol]
+        hidden = [name for name in path.bounded if by_rounding[path.judged.index(name)] > self._tol]
         if hidden:
             path.bounded = tuple(name for name in path.bounded if name not in hidden)
             path.why.extend(_rounding_leaves(self._tol, name, path) for name in hidden)
@@ -247,7 +247,7 @@ class _Search:
     def _bounding(self, path):
         """The path, which knows what `tol` bounds."""
         if path is not None:
-            path.bounded = self._bound
+            path.bounded, path.criteria = self._bound
         return path
 
     def _all_judged(self, few):

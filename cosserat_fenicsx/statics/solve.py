@@ -20,7 +20,7 @@ from cosserat_fenicsx.models.rodmesh import Layout
 from cosserat_fenicsx.progress import Progress
 from cosserat_fenicsx.ranks import communicator
 from cosserat_fenicsx.results.accuracy import FEW
-from cosserat_fenicsx.results.compared import NAMES
+from cosserat_fenicsx.results.compared import NAMES, Criterion, criteria_of
 from cosserat_fenicsx.results.path import Path
 from cosserat_fenicsx.scene.action import path_dependent
 from cosserat_fenicsx.scene.scene import check_magnitudes
@@ -47,7 +47,7 @@ def solve(
     model: str = "auto",
     formulation: str | None = None,
     tol: float = 1e-6,
-    bound: Sequence[str] = NAMES,
+    bound: Sequence[str | Criterion | type[Criterion]] = NAMES,
     elements: int | None = None,
     degree: int | None = None,
     gauss_points: int | None = None,
@@ -71,9 +71,10 @@ def solve(
         tol: largest estimated error of positions, rotations, contact forces and contact moments anywhere along the
             rods, each relative to its own size at that load factor (see `Path.errors`). Elements are refined until the
             estimates are below it, unless `elements` is given.
-        bound: what `tol` bounds, of "position", "rotation", "force" and "moment"; the errors of the others are
-            estimated all the same. Forces and moments are left out where rounding alone exceeds `tol`, as on very
-            slender rods that bend, and moments on straight ones: `Path.bounded` and `Path.why` tell.
+        bound: what `tol` bounds, of "position", "rotation", "force" and "moment", whose errors are estimated all the
+            same where they are not bounded; and of `Criterion`s of your own, see docs/accuracy.md. Forces and moments
+            are left out where rounding alone exceeds `tol`, as on very slender rods that bend, and moments on straight
+            ones: `Path.bounded` and `Path.why` tell.
         elements: elements per rod; fixes the mesh, and errors are then not estimated (NaN).
         degree: 1 to 4, of r and q; default 4 (2 for "displacement").
         gauss_points: per element; default `degree`, which does not lock. More of them lock (docs/models.md).
@@ -122,7 +123,7 @@ def solve(
 
     oscillates = elements is None and gauss_points is not None and gauss_points > degree
     if oscillates:
-        bound = tuple(name for name in bound if name in _MOTION) or _MOTION
+        bound = [name for name in bound if name in _MOTION] or _MOTION
     in_order = path_dependent(scene)
     simple = not (branch or control == "arc" or until or in_order) and steps.adaptive
 
@@ -167,7 +168,7 @@ def solve(
         layout, usual = meshes_for(scene, degree, tol, many) if simple else (first_layout(scene, degree), None)
         turning = resolving_turns(scene, layout, max(map(abs, load_factors)))
         layout, usual = (layout, usual) if turning is None else (turning, None)
-        return refine(trace, correct, scene, layout, tol, tuple(bound), degree, usual)
+        return refine(trace, correct, scene, layout, tol, criteria_of(bound), degree, usual)
 
     with Progress(load_factors, progress, comm) as bar:
         try:
@@ -291,11 +292,7 @@ def check_arguments(scene, tol, elements, bound=NAMES):
     check_no_mechanism(scene)
     if isinstance(tol, bool) or not isinstance(tol, numbers.Real) or not 1e-12 <= tol < 1:
         raise SceneError(f"tol = {tol!r}: expected a number from 1e-12 to below 1")
-    if isinstance(bound, str) or not isinstance(bound, Sequence) or not bound:
-        raise SceneError(f"bound = {bound!r}: expected a list of some of {', '.join(map(repr, NAMES))}")
-    for name in bound:
-        if name not in NAMES:
-            raise SceneError(f"bound: {name!r}: {nearest(name, NAMES)}")
+    criteria_of(bound)
     if elements is not None and (
         isinstance(elements, bool) or not isinstance(elements, numbers.Integral) or elements < 1
     ):

@@ -19,7 +19,7 @@ from cosserat_fenicsx import __version__
 from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.new_files import h5py_for, new_hdf5, replaced
 from cosserat_fenicsx.numerics import ElementRule
-from cosserat_fenicsx.results.compared import NAMES
+from cosserat_fenicsx.results.compared import NAMES, stored_criteria
 from cosserat_fenicsx.results.records import Event, Instant, Ledger, Record, Records
 from cosserat_fenicsx.scene.as_data import NotData, from_data, to_data
 
@@ -76,7 +76,7 @@ def _write_variables(place, variables):
 
 def _settings(result):
     names = ["model", "formulation", "degree", "unknowns", "why"]
-    names += ["scheme", "time_unit"] if result.axis == "time" else [*_OF_PATH, "bounded"]
+    names += ["scheme", "time_unit"] if result.axis == "time" else [*_OF_PATH, "bounded", "judged"]
     scales = {name: getattr(result.scales, name) for name in ("length", "force", "moment")}
     return {name: getattr(result, name) for name in names} | {"elements": list(result.elements), "scales": scales}
 
@@ -180,19 +180,20 @@ def _restored(kind, scene, settings, numbers, assemble, comm):
     else:
         for name in _OF_PATH:
             setattr(result, name, settings[name])
-        result._errors, result.events = _errors(numbers, states), _events(numbers)
+        result.criteria = stored_criteria(settings.get("judged", NAMES)[len(NAMES) :])
+        result._errors, result.events = _errors(numbers, len(result.judged), states), _events(numbers)
         result.bounded = tuple(settings.get("bounded", NAMES[:1]))
     return result
 
 
-def _errors(numbers, states):
-    """(4, states) estimated errors, or None; older files have those of positions alone."""
+def _errors(numbers, count, states):
+    """(count, states) estimated errors, or None; older files have those of positions alone."""
     if "errors" in numbers:
-        _check_shape("errors", numbers["errors"].shape, (len(NAMES), states))
+        _check_shape("errors", numbers["errors"].shape, (count, states))
         return numbers["errors"]
     if "error" not in numbers:
         return None
-    return np.concatenate([numbers["error"][None], np.full((len(NAMES) - 1, states), np.nan)])
+    return np.concatenate([numbers["error"][None], np.full((count - 1, states), np.nan)])
 
 
 def _check_shape(name, shape, expected):
