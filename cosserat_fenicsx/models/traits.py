@@ -46,9 +46,12 @@ def work_of(action):
 
 def traits_of(action, rods):
     """The `Traits` of an action in a scene with these rods: its own, or those found from its virtual work."""
+    return Traits(**action.traits) if action.traits else found_traits(action, rods)
+
+
+def found_traits(action, rods):
+    """The `Traits` of an action, found from its virtual work."""
     work = work_of(action)
-    if action.traits:
-        return Traits(**action.traits)
     if work is None:
         return Traits(True, True, False, True, True)
     named = action.station.rod if action.station is not None else action.rod
