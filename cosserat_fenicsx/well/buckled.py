@@ -45,7 +45,7 @@ _Start = namedtuple("_Start", "EI clearance known load")
 
 
 def buckled_string(soft, pieces, sections, tol):
-    """The `Solved` with helices, from that of the soft string; None where it has none.
+    """The `Solved` with helices, from the soft string without them; None if it has none.
 
     Args:
         soft: a `Solved`; pieces: `Pieces`; sections: `Sections` of the components; tol: see `torque_and_drag`.
@@ -84,7 +84,7 @@ def earliest_helix(soft, pieces, sections):
 
 
 def growth(solved, pieces, sections):
-    """(n,) by what the helices above the lower ends of pieces multiply a change of the tension there."""
+    """(n,) factors by which helices above the lower ends of pieces amplify a change of tension there."""
     start = _start(solved.chain, pieces, sections, None)
     mean = np.abs(solved.tension @ UP_TO[-1])
     with np.errstate(invalid="ignore", divide="ignore"):
@@ -132,7 +132,7 @@ class _March:
         self._rows = []
 
     def up(self, first):
-        """The `Solved` with everything from piece `first` on integrated."""
+        """The `Solved`, integrated from piece `first` on."""
         soft = self._soft
         tension, torque = soft.tension[first, 0], soft.torque[first, 0]
         for i in range(first, len(soft.chain.length)):

@@ -49,7 +49,7 @@ class RigMeasurement(Part):
 
     Args:
         depth: measured depth of the bit, m.
-        operation: what was done, with weight and torque on bit.
+        operation: with weight and torque on bit.
         hook_load: N, as the indicator shows it; None where it was not read. The weight of block and top drive that it
             includes is the `block_weight` of `calibrate_friction`, which is zero unless given, or found.
         torque: at the surface, N m; None where it was not read.
@@ -86,7 +86,7 @@ class FrictionFit:
             diagonal of the covariance, scaled by the misfit.
         residuals: (k,) measured less computed over the standard deviations, hook loads before torques.
         misfit: root of the sum of their squares over the readings in excess: 1 where the standard deviations are right.
-        doubts: sentences on what may be wrong, where the misfit is far above 1; these are warned of, too.
+        doubts: sentences on possible mistakes, where the misfit is far above 1; also given as warnings.
         measurements: as given.
     """
 
@@ -137,7 +137,7 @@ def calibrate_friction(
 ) -> FrictionFit:
     """One coefficient of friction for each section of a hole, such that hook loads and torques fit measured ones best.
 
-    Where they fit badly, a warning says what may be the cause. Weighted least squares by SciPy, with the exact
+    Where they fit badly, a warning names possible causes. Weighted least squares by SciPy, with the exact
     derivatives of the soft string. The intervals are Student's, of the linearised problem, scaled by the misfit.
 
     Args:
@@ -149,7 +149,7 @@ def calibrate_friction(
         confidence: between 0 and 1.
 
     Raises:
-        SceneError: too few readings, or readings that do not tell a section's friction (named); see also
+        SceneError: too few readings, or readings that do not depend on a section's friction (named); see also
             `torque_and_drag`.
     """
     measurements = [
@@ -199,7 +199,7 @@ def calibrate_friction(
     start = [_SET.start] * sections + [0.5] * unknown_block
     jacobian = slopes if model == SOFT else "2-point"  # of buckled strings no derivative is known
     found = least_squares(residuals, start, jacobian, bounds, xtol=1e-10, ftol=1e-12, gtol=1e-12)
-    _check_told(hole, found.jac, unknown_block)
+    _check_determined(hole, found.jac, unknown_block)
     misfit = float(np.sqrt(2 * found.cost / (readings - wanted)))
     covariance = np.linalg.inv(found.jac.T @ found.jac) * misfit**2
     spread = np.sqrt(np.diag(covariance))
@@ -253,7 +253,7 @@ def _causes(hooks, computed, misfit, with_block):
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", SceneWarning)
             free = with_block() if with_block and hooks else None
-    except SceneError:  # the readings do not tell it
+    except SceneError:  # the readings do not determine it
         free = None
     if free is not None and free.misfit < misfit / _SET.bad:
         yield (
@@ -264,7 +264,7 @@ def _causes(hooks, computed, misfit, with_block):
         yield "expected depths in m, hook loads in N, torques in N m, and the string and mud of the readings"
 
 
-def _check_told(hole, sensitivity, unknown_block):
+def _check_determined(hole, sensitivity, unknown_block):
     """Refuse readings that leave an unknown open."""
     names = [f"section {i + 1} (to {section.to:g} m)" for i, section in enumerate(hole.sections)]
     names += ["block_weight"] * unknown_block
@@ -281,6 +281,6 @@ def _check_told(hole, sensitivity, unknown_block):
         return
     open_ones = [name for name, share in zip(names, np.abs(rows[-1]), strict=True) if share > 0.1]
     raise SceneError(
-        f"calibrate_friction: the measurements do not tell {' and '.join(open_ones)} apart: expected readings with "
+        f"calibrate_friction: the measurements do not separate {' and '.join(open_ones)}: expected readings with "
         "friction there, at several depths, and both up and down or rotating where block_weight is None"
     )

@@ -6,8 +6,8 @@ mud follows from it (`Mud`), or is given (`Component`).
 Standard sizes are in standard_sizes.csv. Drill pipe: bodies of API Spec 5DP (ISO 11961); tool joints and weights with
 them of API RP 7G, for new grade E75 pipe with the connection named, which other grades and connections exceed by up to
 a tenth. Drill collars: number, outer diameter and bore of API Spec 7-1 (ISO 10424-1); of those with two bores the
-larger one. Heavy-weight pipe: Drilco's Hevi-Wate; other makes differ by about 1 %. A weight of None: that of the plain
-section.
+larger one. Heavy-weight pipe: Drilco's Hevi-Wate; other makes differ by about 1 %. Sizes without a weight have
+the weight of the plain section.
 """
 
 import csv
@@ -72,7 +72,7 @@ def _plain(name):
 
 #: Drill-pipe steel: E = 30 million psi, as in API RP 7G.
 STEEL = Material(E=206.8e9, nu=0.3, density=7850.0)
-# Body of a bit over its diameter, where nothing else is known.
+# Default diameter of a bit's body, over the bit's diameter.
 _BIT_BODY = 0.7
 
 
@@ -95,7 +95,7 @@ class StringPart(Part, family="component of a string"):
 
     @property
     def body_radius(self):
-        """Of what touches along its whole length where the `diameter` stands out from the body, m."""
+        """Contact radius along its whole length, m; of the body, where the `diameter` stands out from it."""
         return self.contact_radius if self.touches is None else self.outer_diameter / 2
 
 
@@ -107,7 +107,7 @@ class Component(StringPart):
         length: m; None for the one that fills up to the surface.
         stiffness: a `Stiffness`, or None: only the soft string can be solved, without bending moments and stretch.
         weight: in mud, N/m.
-        contact_radius: where it touches the wall, m: that of the tool joints where there are some.
+        contact_radius: where it touches the wall, m: of the tool joints, if it has any.
         name: in tables.
 
     Raises:
@@ -123,7 +123,7 @@ class Component(StringPart):
     outer_diameter = inner_diameter = mass = None
 
     def validate(self):
-        """Refuse what has no weight or no contact radius."""
+        """Refuse a missing weight or contact radius."""
         if self.weight is None:
             refuse(self, "weight", None, "the weight in mud (N/m): a component without weight cannot be placed")
         if self.contact_radius is None:
@@ -139,7 +139,7 @@ class _Tubular(StringPart):
         size: the name of a standard size, from which whatever is not given is taken.
         outer_diameter, inner_diameter: of the body, m.
         tool_joint: largest outer diameter, which touches the wall, m; None for the body's.
-        mass: in air with tool joints, kg/m; None for that of the body.
+        mass: in air with tool joints, kg/m; None: the body's.
         material: a `Material` with a density.
         name: in tables.
 
@@ -160,20 +160,20 @@ class _Tubular(StringPart):
     weight = None
 
     def validate(self):
-        """Take what is not given from the standard size or from the body."""
+        """Fill in missing fields from the standard size or from the body."""
         store(self, name=self.name or type(self)._called)
         if self.size is not None:
             given = ("outer_diameter", "inner_diameter", "mass")
             changed = any(getattr(self, name) is not None for name in given)
             for field, value in standard_size(type(self).__name__, self.size).items():
-                # the weight of another section is not that of this one
+                # another section has another weight
                 if field == "size" or (getattr(self, field) is None and not (field == "mass" and changed)):
                     store(self, **{field: value})
         positive("Material", "density", self.material.density, "kg/m^3, for the weight")
         for field in ("outer_diameter", "inner_diameter"):
             if getattr(self, field) is None:
                 refuse(self, field, None, "a diameter (m), or the name of a standard size, size='...'")
-        Tube(self.outer_diameter, self.inner_diameter)  # refuses what is no tube
+        Tube(self.outer_diameter, self.inner_diameter)  # refuses diameters of no tube
         if self.mass is None:
             store(self, mass=self.material.density * math.pi / 4 * (self.outer_diameter**2 - self.inner_diameter**2))
         if self.tool_joint is not None and self.tool_joint < self.outer_diameter:
@@ -213,7 +213,7 @@ class Stabiliser(StringPart):
 
     Args:
         length: m.
-        diameter: across the blades, m; that of the hole at most.
+        diameter: across the blades, m; at most the hole's.
         outer_diameter, inner_diameter: of the body, m.
         mass, material, name: as of `DrillPipe`.
 
@@ -232,13 +232,13 @@ class Stabiliser(StringPart):
     weight, touches = None, "middle"
 
     def validate(self):
-        """Refuse blades that do not stand out, and what is no tube."""
+        """Refuse blades that do not stand out, and diameters of no tube."""
         if self.diameter < self.outer_diameter:
             refuse(
                 self, "diameter", self.diameter, f"across the blades, at least the body's, {self.outer_diameter:g} m"
             )
         sizes = (self.outer_diameter, self.inner_diameter, self.diameter, self.mass)
-        body = Collar(self.length, None, *sizes, self.material)  # its checks and its stiffness are those of a collar
+        body = Collar(self.length, None, *sizes, self.material)  # has the checks and the stiffness of a collar
         store(self, mass=body.mass, _body=body)
 
     contact_radius = property(lambda self: self._body.contact_radius)
@@ -250,10 +250,10 @@ class Bit(StringPart):
     """A bit, as a short solid cylinder.
 
     Args:
-        diameter: m; that of the hole at most.
+        diameter: m; at most the hole's.
         length: m.
         body_diameter: of the cylinder, m; None for 0.7 of the diameter.
-        mass: in air, kg/m; None for that of the cylinder.
+        mass: in air, kg/m; None: the cylinder's.
         material, name: as of `DrillPipe`.
 
     Raises:
@@ -270,7 +270,7 @@ class Bit(StringPart):
     inner_diameter, weight, touches = 0.0, None, "bottom"
 
     def validate(self):
-        """Take what is not given from the diameter."""
+        """Fill in missing fields from the diameter."""
         if self.body_diameter is None:
             store(self, body_diameter=_BIT_BODY * self.diameter)
         if self.body_diameter > self.diameter:
@@ -292,8 +292,8 @@ def weight_in_mud(component, mud):
     """N/m: as given, or from the mass in air and the fluids outside and inside, whose pressures carry a part of it.
 
     w = m g - rho_o g A_o + rho_i g A_i, the weight that goes with the effective tension: A. Sparks, J. Energy Resour.
-    Technol. 106 (1984) 46, doi:10.1115/1.3231023. The outer area A_o is that of the steel, mass over density, and of
-    the bore A_i, so that tool joints count.
+    Technol. 106 (1984) 46, doi:10.1115/1.3231023. The outer area A_o is the area of the steel, mass
+    over density, and of the bore A_i, so that tool joints count.
 
     Raises:
         SceneError: no mud, and no weight in it.

@@ -60,7 +60,7 @@ def high_side(tangents):
 
 
 def stretches(md, where):
-    """[(from, to)] depths of the stretches on which a condition (n,) holds, without those of no length."""
+    """[(from, to)] depths of the stretches on which a condition (n,) holds, those without length left out."""
     ends = np.flatnonzero(np.diff(where, prepend=False, append=False)).reshape(-1, 2) - (0, 1)
     return [(float(md[a]), float(md[b])) for a, b in ends if md[b] > md[a]]
 

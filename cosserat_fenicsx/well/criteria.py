@@ -1,6 +1,6 @@
 """Loads at which a string in a hole buckles, by the usual criteria, each by its name.
 
-EI: bending stiffness (N m^2); clearance: radius of the hole less that of contact (m); weight: in mud (N/m);
+EI: bending stiffness (N m^2); clearance: radius of the hole less the contact radius (m); weight: in mud (N/m);
 compression: N, positive. All functions take arrays.
 
 - Dawson-Paslay: sinusoidal, straight inclined hole, 2 sqrt(EI w sin i/r). R. Dawson & P. R. Paslay, J. Petr. Technol.
@@ -17,7 +17,7 @@ compression: N, positive. All functions take arrays.
   of the straight string a turn of length L bears 4 pi^2 EI/L^2 + w L/2 at its lower end, at least 4.05 (EI w^2)^(1/3),
   and half a sine wave 2.55: 4.05 is the mean of 2.55 and 5.55, and 0.14 is w L less than 5.55, L^3 = 16 pi^2 EI/w.
 
-The state of a string is told by the compression at each place: a snake above the greater of He-Kyllingstad's and
+The compression at each place decides the state of a string: a snake above the greater of He-Kyllingstad's and
 Lubinski's loads, a helix above the greater of sqrt(2) He-Kyllingstad's and 5.55 (EI w^2)^(1/3). A helix adds
 r F^2/(4 EI) to the wall force per length.
 

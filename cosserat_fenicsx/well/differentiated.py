@@ -1,4 +1,4 @@
-"""Derivatives of a torque and drag answer by friction, weights, mud and what acts on the bit, and its uncertainty."""
+"""Derivatives of a torque and drag answer by friction, weights, mud and loads on the bit, and its uncertainty."""
 
 import math
 import re
@@ -35,7 +35,7 @@ class Differentiated:
         """
         rod = self.model not in ("soft", "buckled")
         if rod or self.solved.helical.any():
-            why = "that of the rod in contact" if rod else "that of a string with a helix"
+            why = "by the rod in contact" if rod else "for a string with a helix"
             raise SceneError(
                 f"sensitivity: this answer is {why} (model = '{self.model}'), of which no derivatives are known: "
                 "expected the answer of torque_and_drag(..., model='soft')"

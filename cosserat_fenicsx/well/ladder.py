@@ -54,7 +54,7 @@ _SET = _Estimate()
 
 
 class ModelError(NamedTuple):
-    """What the soft string leaves out, in hook load (N), or in surface torque (N m) where it rotates."""
+    """Effects that the soft string leaves out, on the hook load (N), or on the torque (N m) of a rotating string."""
 
     clearance: float
     bending: float
@@ -130,8 +130,8 @@ def _snakes(chain, solved, EI, clearance):
 
 
 def _at_rings(chain, solved, depth, clearance, EI, rings):
-    """Wall force (N) of bits and stabilisers that pry; and (N) by what the larger radius on which they bear the load of
-    their spans multiplies the torque."""
+    """Wall force (N) of bits and stabilisers that pry; and the part of the load of their spans (N) that turns on their
+    larger radius."""
     ends = depth - np.append(0.0, np.cumsum(chain.length))  # measured depths, from the lower end up
     largest = np.array([solved.side.max(axis=1) * chain.climb, np.maximum(-solved.tension.min(axis=1), 0.0),
                         chain.curvature, clearance, EI])  # fmt: skip

@@ -1,4 +1,4 @@
-"""Operations: which way a string slips along the wall, and what acts on its lower end.
+"""Operations: the direction in which a string slips along the wall, and the loads on its lower end.
 
 (c, e) = (V, omega R)/sqrt(V^2 + (omega R)^2), V upwards, R the contact radius: c is the part of the friction that acts
 along the string (+1 where it moves up), e the part that acts around it.
@@ -23,10 +23,10 @@ _SLOW = 20.0
 
 
 class Operation(Part, family="operation"):
-    """What is done with a string.
+    """Base of operations with a string.
 
     Attributes:
-        name: in tables and charts: that of the class as words, such as "trip out".
+        name: in tables and charts: the class name as words, such as "trip out".
         slip: the signs of (c, e).
         weight: on bit, N: the thrust in the string at its lower end; below 0 a pull (overpull, a stuck tool).
         torque: on bit, N m, against the rotation.

@@ -1,4 +1,4 @@
-"""A string in its hole: cut into pieces where anything jumps, its sections with their stresses, its rings.
+"""A string in its hole, cut into pieces where a property jumps; stresses in its sections; its rings.
 
 Rings are bits and stabilisers, which touch at a place. A soft string lies on the wall with its weight everywhere. A
 stiff one rests on its rings: they carry the load of the spans beside them, on a larger radius; and two rings close to
@@ -75,12 +75,12 @@ def von_mises(sections, tension, torque, moment, outside, inside):
 #: Of a place: measured depth s (m), clearance (m), radius of contact (m), radius of the body beside it (m).
 Ring = namedtuple("Ring", "s clearance radius body")
 #: Of the string between two rings: its length, m; load, N/m; the moment (N m) at a ring that clamps it, the angle at
-#: one that does not; what it loads a ring with, N.
+#: one that does not; its load on a ring, N.
 _Span = namedtuple("_Span", "length load moment angle carried")
 
 # A beam under its load q that is clamped at a ring, and touches the wall, lower by d, with no curvature: it spans
 # (72 EI d/q)^(1/4) = l and bends with q l^2/6 at the ring, which carries 2/3 of q l. With a hinge at the ring it turns
-# there by less than q l^3/(24 EI), which is that of a beam between two hinges.
+# there by less than q l^3/(24 EI), as a beam between two hinges does.
 _SPAN, _MOMENT, _CARRIED, _TURN = 72.0, 1 / 6, 2 / 3, 1 / 24
 # Safety factor of moments, which are sums of sizes; cap on the factor by which compression enlarges bending; distance
 # from a ring within which the string affects it, m; spans below the last length (m) count as absent.

@@ -15,8 +15,8 @@ them at once, Newton's method on the function P: the linear equation of each ite
 factor, the integrals by Gauss's points. Pieces are cut where N has a kink, which is where q vanishes and turns round,
 and halved, until the friction on pieces and on their halves agrees to the tolerance.
 
-The derivatives of tension and torque by weight, friction and what acts on the lower end follow from the equations
-linearised at what was found: with V = T k + w (n cos ku + t sin ku) and N = sqrt(V^2 + (w b)^2), for the change dP
+Derivatives of tension and torque by weight, friction and the loads on the lower end follow from the equations
+linearised at the solution: with V = T k + w (n cos ku + t sin ku) and N = sqrt(V^2 + (w b)^2), for the change dP
 
     dP' = d k V/N dP + N dd + d (V (k dT_0 + dV_w) + w b^2 dw)/N,
 
@@ -97,7 +97,7 @@ def soft_string(chain, tension, torque, tol):
         defects = np.abs(coarse.forces - fine.forces.reshape(-1, 2).sum(axis=1))
         defects = 2 * (defects + (fine.unseen() + fine.unresolved()).reshape(-1, 2).sum(axis=1))
         scale = np.abs(fine.tension).max() + np.abs(fine.heights).sum() * 1e-3
-        # what comes up from below is changed by the friction above, at most by this factor
+        # friction above multiplies a change from below, at most by this factor
         grown = np.exp(np.cumsum((np.abs(chain.drag) * chain.curvature * chain.length)[::-1])[::-1])
         pulls, turns = np.abs(chain.drag) * defects * grown, chain.turn * defects
         moments = torque + np.concatenate([[0.0], np.cumsum(halves.turn * fine.forces)])
@@ -192,7 +192,7 @@ class _Friction:
         if not sharp.any():
             return np.zeros(len(below))
         # inside: a part of the triangle over the step; beside an end: the triangle that has the wrong sign, twice, and
-        # what the load along the binormal adds to it
+        # the contribution of the load along the binormal
         error = np.where(sharp & (load[:, 1:] * load[:, :-1] < 0), steps * widths / 4, 0.0)
         for i, end in ((0, below), (-1, above)):
             near = sharp[:, i] & (np.abs(end) < steps[:, i])
@@ -228,7 +228,7 @@ class _Friction:
 
 
 def chained(gain, added):
-    """(n + 1,) from 0: each value is gain times the one before plus what is added, (n,)."""
+    """(n + 1,) recurrence from 0: each value is gain times the value before, plus `added` (n,)."""
     found = [0.0]
     for a, b in zip(gain.tolist(), added.tolist(), strict=True):
         found.append(a * found[-1] + b)

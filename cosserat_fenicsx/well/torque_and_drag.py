@@ -45,7 +45,7 @@ def torque_and_drag(
 
     Args:
         hole: a `Borehole`. string: a `DrillString`.
-        operation: what is done: `TripOut()`, `TripIn()`, `RotateOffBottom()`, `RotaryDrilling(weight, torque)`,
+        operation: such as `TripOut()`, `TripIn()`, `RotateOffBottom()`, `RotaryDrilling(weight, torque)`,
             `Sliding(weight)`, `Ream(speed, rpm)`, `BackReam(speed, rpm)` or `Static()`.
         mud: a `Mud`; None where all components have their weight in mud.
         depth: measured depth of the string's lower end, m; None for the bottom of the hole.

@@ -1,8 +1,8 @@
-"""The answer of the exact rod in its hole: what the string bears, and how well that is known.
+"""The answer of the exact rod in its hole: forces, contact and error estimates.
 
 A wall of stiffness k changes hook load, torque and wall force by C/k^a from those in a rigid wall: a is 1 where a
 stabiliser presses on it, less where the string leaves it. From solutions at k/100, k/10 and k follows the ratio of the
-last two changes, rho = 10^-a; what is left at k is rho/(1 - rho) times the last change.
+last two changes, rho = 10^-a; the remaining error at k is rho/(1 - rho) times the last change.
 """
 
 from dataclasses import dataclass
@@ -29,19 +29,19 @@ class InHole:
     Attributes:
         path: a `Path` with the rod's state as its only point, for all that a `Path` offers; scene: its `Scene`.
         s: arc length from the top, m. md: measured depth of the closest point of the hole's axis, m.
-        position: (n, 3), m. offset: (n, 3) from the hole's axis, m; distance: its size. clearance: m, at a ring that of
-            the ring; standoff: the part of it that is left, 1 on the axis, 0 where it touches; touches: (n,) whether it
+        position: (n, 3), m. offset: (n, 3) from the hole's axis, m; distance: its size. clearance: m, at a ring the
+            ring's; standoff: the part of it that is left, 1 on the axis, 0 where it touches; touches: (n,) whether it
             does. node_length: the weights of integrals along the string, m.
         side: direction of the rod from the axis, rad, from the high side of the hole, clockwise looking down the hole
             (from the first axis, north, where it is vertical).
         tension: effective, N. torque: N m, that the upper part exerts in the sense of clockwise rotation on the lower.
         bending_moment: N m. These three are at the nodes by the polynomials through the Gauss points of each element,
-            where they are most accurate: on 256 elements of whole wells the moment is 20 to 100 times nearer to that of
-            a fine mesh than by the polynomials through the nodes.
+            where they are most accurate: on 256 elements of whole wells the moment is 20 to 100 times nearer to a
+            fine mesh's than by the polynomials through the nodes.
         side_force: of the wall on the rod, per length, N/m: of each element its mean, which is accurate, and the slope
             between the means of its neighbours. Within an element the wall's forces at the nodes alternate about it on
-            coarse meshes: 15 to 60 times farther from those of a fine mesh. node_force: those forces, N, exact in the
-            balance of forces.
+            coarse meshes, 15 to 60 times farther from a fine mesh's. node_force: the wall's forces at the nodes, N,
+            exact in the balance of forces.
         hook_load: of the held end, along the hole, N; surface_torque: N m; reaction: (3,) N and (3,) N m there.
         wall_force: sum of all forces of the wall and of the rings, across the rod, without friction, N.
         ring_forces: (rings, 3) on the string, with friction, N.
@@ -52,8 +52,8 @@ class InHole:
             none); an `extensible` string has them in its state.
         factor: stiffness of the wall that it was solved with, over that in the scene; wall_stiffness: N/m^2, with it.
         errors: {"hook_load": N, "surface_torque": N m, "wall_force": N}, estimated, from those in a rigid wall; error:
-            the largest relative one of the first two, that of the torque only where the string turns; of_stiffness: the
-            part of it that is left of the wall's softness, see `RodErrors`.
+            the largest relative error of the first two, of the torque only where the string turns; of_stiffness: its
+            part from the wall's softness, see `RodErrors`.
         errors_along: {"side_force": N/m, "bending_moment": N m}: the differences from the mesh before that 95 % of the
             string's length are below; beside concentrated forces they may be larger. They do not count in `error`.
         balance: N, between the reaction and the sum of all other forces.
@@ -77,7 +77,7 @@ class InHole:
 
         Args:
             values: {factor: {name: value}} in walls of several stiffnesses on this mesh; before: the `InHole` on the
-                mesh before, or None. Where that is no coarser, it tells nothing.
+                mesh before, or None; ignored where its mesh is no coarser.
         """
         coarser = before if before and before.path.elements[0] < self.path.elements[0] else None
         self.estimates = found = errors_of(self, values, coarser and coarser.estimates)
@@ -154,7 +154,7 @@ class InHole:
 
     @cached_property
     def clearance(self):
-        """(n,) m: radius of the hole less that of the string, at a ring less that of the ring."""
+        """(n,) m: radius of the hole less the string's, at a ring less the ring's."""
         found = self.string.wall.sizes(self.s, self.md)[0]
         found[self._ring_nodes] = [ring.clearance for ring in self.string.rings]
         return found
@@ -266,7 +266,7 @@ class InHole:
 
     def _averaged(self, values):
         """(n, k) from values of each element at its nodes (elements, nodes, k): where two elements meet, means by the
-        lengths that the node stands for in them, so that integrals stay what they are."""
+        lengths that the node stands for in them, so that integrals do not change."""
         return self._summed(values * self._of_nodes[..., None]) / self.node_length[:, None]
 
     @cached_property
@@ -291,7 +291,7 @@ class InHole:
 
     @cached_property
     def _ring_pressures(self):
-        """(rings,) N: across the hole, without friction; what is left of rounding where a ring does not touch."""
+        """(rings,) N: across the hole, without friction; of the size of rounding where a ring does not touch."""
         friction = [ring.friction * np.hypot(*ring.slip[0][1]) for ring in self.string.rings]
         return np.linalg.norm(self.ring_forces, axis=1) / np.hypot(1.0, friction)
 
@@ -309,8 +309,8 @@ class InHole:
 
     @cached_property
     def _kinks(self):
-        """Arc lengths at which the pressure of what lies on the wall may jump: stations of the survey, ends of sections
-        of the string and of the hole, m."""
+        """Arc lengths (m) at which the pressure on the wall may jump: stations of the survey, ends of sections
+        of the string and of the hole."""
         string, length = self.string, float(self.string.ends[-1])
         stations = np.interp(string.path.md, self.md, self.s, left=np.nan, right=np.nan)
         found = np.concatenate([stations, string.ends[:-1], list(string.wall.breaks(string.rod))])
@@ -329,8 +329,8 @@ class InHole:
 
     @cached_property
     def contacts(self):
-        """[`Contact`], without those of rounding size; errors of forces at points with what the mesh before tells
-        of them, see `with_errors`."""
+        """[`Contact`] above rounding size; errors of forces at points also by the mesh before, see
+        `with_errors`."""
         largest = max((x.force for x in self._resultants[0]), default=0.0)
         known = [x for x in self._resultants[0] if x.force > _ROUNDING * largest]
         other = self._mesh_before
@@ -384,7 +384,7 @@ class InHole:
         weight = np.diff(string.ends, prepend=0.0) @ string.weight
         return self.wall_force + weight + float(np.linalg.norm(string.bottom))
 
-    # -- what the equilibrium leaves out -----------------------------------------------------------------------------
+    # -- deformations outside the equilibrium -----------------------------------------------------------------------
 
     def _integral(self, values, of_section):
         """Integral over the string of values at the nodes over a stiffness of the sections."""
@@ -409,8 +409,8 @@ class InHole:
 
 #: Quantities with error estimates: hook load, N; surface torque, N m; sum of the wall's forces, N.
 NAMES = ("hook_load", "surface_torque", "wall_force")
-# Errors of the finer mesh over changes from one mesh to the next, whose signs alternate: what covered 97 random wells,
-# but for the wall force of one buckled string.
+# Errors of the finer mesh over changes from one mesh to the next, whose signs alternate: they cover 97 random wells,
+# except the wall force of one buckled string.
 _OF_CHANGE = {"hook_load": 3.0, "surface_torque": 4.0, "wall_force": 6.0}
 
 
@@ -420,8 +420,8 @@ class _Errors:
 
     Attributes:
         least_load: smallest scale of hook loads, over the string's weight.
-        least_torque: smallest scale of torques, over that of the wall's forces at the string's surface.
-        caution: over what is left of the wall's softness.
+        least_torque: smallest scale of torques, over the torque of the wall's forces at the string's surface.
+        caution: safety factor of the remaining effect of the wall's softness.
         ratios: bounds of the ratio of changes. unknown: that ratio where it is not known.
         falls: a change by the mesh below this share of the change before is taken as small by chance: changes fall to a
             twentieth (the median, from equal elements to others) or a seventh (later).
@@ -445,10 +445,10 @@ class RodErrors:
     """Estimated errors of an `InHole`.
 
     Attributes:
-        values: {factor: {name: value}} at walls so many times stiffer than the scene's, ascending; ratio: of their last
-            two changes; changes: {name: relative change from the mesh before}, infinite without one.
-        errors: {name: error} in N and N m; error: the largest relative one of hook load and torque, that of the torque
-            only where the string turns; of_stiffness: the part of it that is left of the wall's softness.
+        values: {factor: {name: value}} in walls stiffer than the scene's by ascending factors; ratio: of the last two
+            changes; changes: {name: relative change from the mesh before}, infinite without one.
+        errors: {name: error} in N and N m; error: the largest relative error of hook load and torque, of the torque
+            only where the string turns; of_stiffness: its part from the wall's softness.
     """
 
     def __init__(self, values, scales, rounding, counted, before=None, capped=np.inf):
@@ -456,7 +456,7 @@ class RodErrors:
         Args:
             values: see there. scales: {name: size that an error is relative to}. rounding: {name: error}. counted:
                 names of those in `error`. before: the `RodErrors` on the mesh before. capped: factor above which rings
-                are not made stiffer, so that changes tell nothing of theirs.
+                are not made stiffer, so that changes do not show their effect.
         """
         self.values, self._capped = dict(sorted(values.items())), capped
         self._of_rings = before._of_rings if before else dict.fromkeys(NAMES, 0.0)
@@ -476,7 +476,7 @@ class RodErrors:
         self.of_stiffness = max(self._by_stiffness[name] / scales[name] for name in counted)
 
     def _left_of_softness(self, scales, counted, before):
-        """{name: what a rigid wall would change}, and the ratio of changes."""
+        """{name: change to a rigid wall}, and the ratio of changes."""
         walls = list(self.values.values())
         if len(walls) < 2:
             if before is None:
@@ -491,7 +491,7 @@ class RodErrors:
             changes[-1] = {name: max(x, _ERRORS.ratios[0] * changes[-2][name]) for name, x in changes[-1].items()}
         share = _ERRORS.caution * ratio / (1 - ratio)
         factors = list(self.values)
-        if factors[-1] > self._capped:  # what is left of rings is known from walls in which they were stiffer, too
+        if factors[-1] > self._capped:  # the effect of rings is known from walls in which they were stiffer, too
             known = [pair for pair in zip(changes, factors[1:], strict=True) if pair[1] <= self._capped]
             if known:
                 change, factor = known[-1]

@@ -13,7 +13,7 @@ beyond, the contact splits, and the peak, taken for itself, holds P + 3/4 q g: u
 wall less by k^(-1/6) only. So the length that holds the peak is 2 g at least, and a peak and what follows are one
 contact where the gap between them is shorter than that.
 
-At a small kink of the wall the rod does not leave it, or hardly: there what is above the regular pressure is a force.
+At a small kink of the wall the rod hardly leaves it: there the excess over the regular pressure is a force.
 """
 
 from collections import namedtuple
@@ -33,16 +33,16 @@ class _Resultants:
 
     Attributes:
         layers, nodes: least length that holds a peak, in lam, and in nodes of the mesh.
-        roomy, far: where there is room, this multiple of it, and so many lam.
+        roomy, far: where there is room, this multiple of it, and this many lam.
         beside: length from which the regular pressure beside a peak is taken, over the length that holds the peak.
-        apart, between: contacts are one where the gap between them is below so many lam, or has at most so many nodes:
-            on coarse meshes nodes touch by turns.
+        apart, between: largest gap, in lam and in nodes, between contacts that count as one: on coarse meshes nodes
+            touch by turns.
         rises: g^3 q/(P lam^2). split: length in g that holds a peak behind which the rod rises.
-        excess: what such a peak holds beyond P, over q g.
-        rounds, same: the length that holds a peak is found in so many rounds, to this factor.
+        excess: force in such a peak beyond P, over q g.
+        rounds, same: most iterations for the length that holds a peak, and the factor to which it is found.
         shorter: the error of a force is the difference from that by a length shorter or longer by this factor.
-        caution: over what other lengths change of a force. left: of its change from the coarser mesh, what is left.
-        soft: what the wall's softness changes of it, over the square of lam over the free span.
+        caution: safety factor of a force's change by other lengths. left: remaining share of its change from the
+            coarser mesh. soft: its change by the wall's softness, over the square of lam over the free span.
         least: smallest force at an end of a contact, over the regular pressure on the length that holds the peak.
         peak: smallest force inside a contact, over the regular pressure on lam.
     """
@@ -178,7 +178,7 @@ def _joined(along, groups, kinks):
 
 #: A peak taken for itself: its force, N; its place, m; its first and its last node.
 _Peak = namedtuple("_Peak", "force at first last")
-#: What lies behind a peak: whether the two are one contact, and what the peak then holds of it, N.
+#: The part of a contact behind a peak: whether it belongs to the peak, and its force that the peak then holds, N.
 _Behind = namedtuple("_Behind", "belongs excess")
 
 
@@ -376,8 +376,8 @@ def _mean_side(side, weights):
     return float(np.arctan2((np.sin(side) * weights).sum(), (np.cos(side) * weights).sum()))
 
 
-#: The part of the string's length on which differences between two meshes are below the ones that are told: beside
-#: concentrated forces they are not.
+#: Share of the string's length on which differences between two meshes are below the reported errors; beside
+#: concentrated forces they are larger.
 MOSTLY = 0.95
 
 

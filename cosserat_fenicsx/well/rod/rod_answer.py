@@ -37,12 +37,12 @@ class RodInContact(TorqueAndDrag):
     """What a string in its hole carries as an exact rod in contact; the places of the arrays are the rod's nodes.
 
     `error` is relative to hook load and surface torque themselves, the latter only where the string turns;
-    `model_error` is not estimated (NaN), but of a string that would buckle what that may change. `solved` is the
-    `InHole`, whose `path` has all that the package tells of a rod. `md` is the measured depth of the
-    closest point of the hole's axis. A stabiliser touches in the middle of its length, and the bit at its lower end:
-    there `clearance`, `standoff` and `contact_side` are those of blades and bit, elsewhere those of the body. Forces of
-    the wall at points are in `contacts`. `side_force` has those of stabilisers and bit not at all, and those where the
-    string leaves the wall as narrow peaks, as wide as the wall's stiffness makes them.
+    `model_error` is not estimated (NaN), except the effect of buckling on a string that would buckle. `solved` is the
+    `InHole`, whose `path` has all quantities of a rod. `md` is the measured depth of the closest point of the hole's
+    axis. A stabiliser touches in the middle of its length, and the bit at its lower end: there `clearance`, `standoff`
+    and `contact_side` refer to blades and bit, elsewhere to the body. Forces of the wall at points are in `contacts`.
+    `side_force` leaves out stabilisers and bit; forces where the string leaves the wall are narrow peaks in it, as wide
+    as the wall's stiffness makes them.
     """
 
     words: ClassVar[str] = "exact rod in contact"
@@ -53,7 +53,7 @@ class RodInContact(TorqueAndDrag):
 
     @classmethod
     def _of(cls, flexible, solved, decided):
-        """From the answer of the soft string, the `InHole`, and sentences on what decided for it."""
+        """From the answer of the soft string, the `InHole`, and the reasons for the rod."""
         given = {field.name: getattr(flexible, field.name) for field in fields(TorqueAndDrag)}
         here = solved.hook_load, solved.surface_torque
         there = {flexible.model: (flexible.hook_load, flexible.surface_torque)}
@@ -85,7 +85,7 @@ class RodInContact(TorqueAndDrag):
     )
     clearance = _of_rod(
         "clearance",
-        "Radius of the hole less that of the string where it is solved: of the blades in the middle of a stabiliser, "
+        "Radius of the hole less the string's where it is solved: of the blades in the middle of a stabiliser, "
         "of the bit at its lower end, else of the body or the tool joints, m.",
     )
     bending_moment = _of_rod("bending_moment", "N m: of the rod itself.")
@@ -121,7 +121,7 @@ class RodInContact(TorqueAndDrag):
 
     @cached_property
     def contacts(self):
-        """See `TorqueAndDrag`: forces at points, and what lies on the wall between them."""
+        """See `TorqueAndDrag`: forces at points, and the contact between them."""
         depths = [np.interp([x.start, x.end], self.solved.s, self.md) for x in self.solved.contacts]
         leans = [self.hole.path.inclination_at(ends.mean()) > _VERTICAL for ends in depths]
         return [WallContact(float(a), float(b), x.force, name_of_side(x.side if leaning else np.nan), x.error)
@@ -153,7 +153,7 @@ class RodInContact(TorqueAndDrag):
 
     @cached_property
     def helical(self):
-        """True at `md` where the criteria tell a helix: the rod's wall force is that of whatever shape it has."""
+        """True at `md` where the criteria predict a helix; the rod's wall force follows from its actual shape."""
         return self.buckling == criteria.HELIX
 
     def _integral(self, values):
@@ -197,9 +197,10 @@ def _found(flexible, solved, differences):
             yield f"this is MORE than was estimated for the {name} string, {flexible.model_error:.1e}: look at both"
     if solved.negative_modes:
         count = solved.negative_modes
-        told = "singular" if count < 0 else "one negative eigenvalue" if count == 1 else f"{count} negative eigenvalues"
+        several = "one negative eigenvalue" if count == 1 else f"{count} negative eigenvalues"
+        modes = "singular" if count < 0 else several
         yield (
-            f"NOT STABLE without friction (second variation: {told}): it would buckle, or buckle otherwise, and what "
+            f"NOT STABLE without friction (second variation: {modes}): it would buckle, or buckle otherwise, and what "
             f"it bears then may differ as much as was estimated for the {flexible.model} string"
         )
 
@@ -224,7 +225,7 @@ def rod_in_contact(flexible, decided, progress=None, exact=True):
     check_rod(hole, laid, operation, flexible.mud, flexible.torque_convention)
 
     def solve(helix):
-        """The `InHole`, and what it is short of accuracy in words, or None."""
+        """The `InHole`, and the `NotAccurate` if it is less accurate than asked, else None."""
         try:
             return solve_in_hole(
                 hole.path,
@@ -266,7 +267,7 @@ def rod_in_contact(flexible, decided, progress=None, exact=True):
 
 
 def _of_hand(solved):
-    """A sentence on the hand of a helix, and its energy beside that of the other one, where it is most compressed."""
+    """A sentence on the hand of a helix, and the energies of both hands where it is most compressed."""
     at = int(np.argmin(solved.tension))
     EI = solved.string.bending[solved.string.section_at(solved.s[at])]
     compression, torque, hand = max(-solved.tension[at], 0.0), solved.torque[at], solved.string.hand
@@ -281,7 +282,7 @@ def _of_hand(solved):
 
 
 def check_rod(hole, laid, operation, mud, torque_convention):
-    """Refuse what is no rod in contact.
+    """Refuse a string that cannot be a rod in contact.
 
     Args:
         laid: the components in their places; the others: see `torque_and_drag`.

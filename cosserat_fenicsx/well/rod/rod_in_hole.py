@@ -32,7 +32,7 @@ class _Meshes:
             gain nothing.
         first, most: number of elements of the first mesh and of the last, where none is asked for.
         finer: factor from one mesh to the next.
-        before: where a number of elements is asked for, the mesh before it has so many times fewer.
+        before: where a number of elements is asked for, the factor by which the mesh before it has fewer.
         per_piece: elements of the first mesh over the pieces of the string, at least.
         fewest, densest: bounds of the density of elements on a finer mesh, over equal ones.
         by_wall: below this multiple of the wall-stiffness error, the mesh error is taken as resolved.
@@ -62,7 +62,8 @@ class _Walls:
         known: below this share of the tolerance, it is not.
         too_soft: above this share of the tolerance, the wall is made ten times stiffer.
         hold: springs that hold a helix, see `settle`.
-        rounding: of the residual of a node, over that of its position times the stiffness of its piece of wall or ring.
+        rounding: of the residual of a node, over the rounding of its position times the stiffness of its piece of wall
+            or its ring.
         unbalanced: largest difference between the reaction and all other forces, over the sum of the wall's forces.
     """
 
@@ -131,16 +132,15 @@ def solve_in_hole(
         bottom_torque: torque on bit, N m, against the rotation.
         rings: [(s, clearance, radius)] of stabilisers and bits: stations (m from the top) that stay within a clearance
             (m) of the hole's axis; 0 centres the string there.
-        wall_stiffness: N/m^2; None for a rigid wall, which is approached by stiffer ones until what is left is small
-            beside `tol`. Errors are those from a rigid wall in both cases.
+        wall_stiffness: N/m^2; None for a rigid wall, which is approached by stiffer ones until the remaining error is
+            small beside `tol`. Errors are from a rigid wall in both cases.
         hinge: None; or the direction about which the top turns freely, in place of a clamp.
-        extensible: whether the axial stiffness counts in the equilibrium; the lengths are then those of the
-            unstretched string.
+        extensible: whether the axial stiffness counts in the equilibrium; the lengths are then without stretch.
         has_arm: whether friction acts on the surface; False: on the centreline.
         helix: whether to begin as a helix along the wall where the string is compressed beyond its buckling load, see
             `in_helix`; False: on the axis. Where there are several equilibria, the start decides which one is found.
         tol: relative accuracy of hook load and torque.
-        elements: their number, which fixes the mesh; the estimate is then that of a mesh of a quarter of them.
+        elements: their number, which fixes the mesh; the error estimate then comes from a mesh with a quarter of them.
         degree: of the elements, 2 to 4.
         progress, comm: as `solve` takes them.
 
@@ -148,7 +148,7 @@ def solve_in_hole(
         `InHole`.
 
     Raises:
-        SceneError: numbers that are not what was expected.
+        SceneError: numbers outside their range, or of another count.
         NotConverged: no equilibrium was found, or, as a `NotAccurate`, not as accurately as asked.
     """
     first = _WALLS.first if wall_stiffness is None else wall_stiffness
@@ -168,7 +168,7 @@ def solve_in_hole(
                 if answer is not None or count >= min(_MESHES.fine, counts[-1]):
                     raise
                 continue  # too few elements for its turns, or for a snake
-            # finer meshes change nothing of what is left of the wall's softness
+            # finer meshes do not reduce the effect of the wall's softness
             if elements is None and answer.error <= max(tol, _MESHES.by_wall * answer.of_stiffness):
                 break
     string.leave(answer.factor)
@@ -178,7 +178,7 @@ def solve_in_hole(
 
 
 class NotAccurate(NotConverged):
-    """An equilibrium whose error is above the one asked for.
+    """An equilibrium whose error is above `tol`.
 
     Attributes:
         answer: the `InHole`.
@@ -194,7 +194,7 @@ class NotAccurate(NotConverged):
 
 
 def _counts(elements, pieces):
-    """Elements of the meshes in turn, for a string of so many pieces, each of which has at least one."""
+    """Numbers of elements of the meshes in turn, for a string of this many pieces: each has at least one."""
     if elements is None:
         first, finer = _MESHES.first, _MESHES.finer
         first *= finer ** max(0, math.ceil(math.log(_MESHES.per_piece * pieces / first, finer)))
@@ -208,8 +208,8 @@ def _counts(elements, pieces):
 
 
 class _Job(NamedTuple):
-    """What all meshes share: the degree of the elements, whether the start is a helix, the accuracy asked for, the
-    stiffest wall that may be taken for it (over the first one), the progress, and the ranks."""
+    """Settings that all meshes share: the degree of the elements, whether the start is a helix, the tolerance, the
+    stiffest wall that it may need (over the first one), the progress, and the ranks."""
 
     degree: int
     helix: bool
@@ -220,7 +220,7 @@ class _Job(NamedTuple):
 
 
 def _finer(string, count, before, job):
-    """The `InHole` on a mesh of so many elements, from that on the mesh before, or from the start in stages."""
+    """The `InHole` on a mesh of `count` elements, from the `InHole` on the mesh before, or from the start in stages."""
     if before is not None:
         layout = _divided(string, before.path.layout, _wanted(before), count)
         near = LAST_TWO if before.estimates.ratio <= _WALLS.regular else DECADES
@@ -240,7 +240,7 @@ def _finer(string, count, before, job):
             reason = failed
         if found and not found[-1].negative_modes:
             break
-    if found:  # the one in which the string would buckle in the fewest ways
+    if found:  # the equilibrium with the fewest negative modes
         return min(found, key=lambda answer: answer.negative_modes % _SINGULAR)
     raise NotConverged(
         f"no equilibrium of the rod in contact was found on {count} elements: {reason}. A string that is compressed "
@@ -346,7 +346,7 @@ def _negative_modes(string, problem, stability):
 
 
 def _begin(problem, string, layout, before, helix):
-    """Set the state: that of another mesh, or a helix or on the axis, without contact force."""
+    """Set the state: from another mesh, or a helix or on the axis, without contact force."""
     model = problem.model
     if before is not None:
         rq, n = on_mesh(before.path, layout)

@@ -28,14 +28,14 @@ class _Stiffening:
     """Settings of the rod, its wall and its rings.
 
     Attributes:
-        torsion: torsional stiffness of round sections over that of bending: torsion winds a long string up by many
+        torsion: torsional over bending stiffness of round sections: torsion winds a long string up by many
             turns, which changes nothing else of it, but makes Newton's method fail. The twist is computed from the
             torque afterwards.
-        of_rings: stiffness of a ring (N/m) over that of the wall (N/m^2), since a ring digs in less.
-        per_bending: cap on the stiffness of a ring above that of the wall, in EI/L^3, for rounding.
+        of_rings: stiffness of a ring (N/m) over the wall's (N/m^2), since a ring digs in less.
+        per_bending: cap on the stiffness of a ring above the wall's, in EI/L^3, for rounding.
         most, rounding: cap on ring stiffness (N/m) and on its rounding force (N) during wall stiffening.
         samples, typical, least: sample count, quantile and floor (over the weight) of the lateral load.
-        safe: the first spring over the one in which the string would buckle.
+        safe: the first spring over the softest in which the string does not buckle.
     """
 
     torsion: float = 1e4
@@ -62,7 +62,7 @@ class StringScene:
         weight: (n,) N/m; bottom: force at the lower end (3,), N.
         clearance: the smallest one of the wall, m. torque: at the lower end, against the rotation of drilling, N m.
         turns: whether torque is applied, or friction exerts one.
-        words: what was simplified, as text.
+        words: the simplifications, as text.
     """
 
     path: object
@@ -86,7 +86,7 @@ class StringScene:
 
     @property
     def hand(self):
-        """That of the helix which torque, or else the friction of rotation, favours: -1 where the angle round the axis
+        """Hand of the helix that torque, or else the friction of rotation, favours: -1 where the angle round the axis
         falls down the hole, 1 where it grows, and where there is neither."""
         around = self.torque or sum(across for _, (_, across) in self.wall.slip)
         return -1 if around > 0 else 1
@@ -108,8 +108,9 @@ class StringScene:
     @cached_property
     def spring(self):
         """Stiffness of a spring to the axis in which the loads, and the string's resistance to the axis's curvature k,
-        move it by about twice the clearance c, and in which its compression F does not buckle it; over that of the
-        wall. The moment EI k acts within the length sqrt(8 c/k), which gives EI k^2/(16 c^2); F^2/(4 EI) buckles."""
+        move it by about twice the clearance c, and in which its compression F does not buckle it; over the wall's
+        stiffness. The moment EI k acts within the length sqrt(8 c/k), which gives EI k^2/(16 c^2); F^2/(4 EI) prevents
+        buckling."""
         s = np.linspace(0.0, self.ends[-1], _SET.samples)
         near, at, tension = self.path.nearest(None, s), self.section_at(s)[1:], self.tension(s)[:-1]
         down = np.array([0.0, 0.0, 1.0]) - near.tangent[:, 2:] * near.tangent
@@ -126,7 +127,7 @@ class StringScene:
         return min((ring.stage.most for ring in self.rings), default=np.inf)
 
     def leave(self, factor):
-        """Leave the walls in the state of an answer: so many times stiffer, without springs."""
+        """Leave the walls in the state of an answer: stiffer by a factor, without springs."""
         for stage in self.stages:
             stage.wall, stage.spring, stage.friction, stage.anchor = factor, 0.0, 1.0, None
 
@@ -141,7 +142,7 @@ def string_in(path, lengths, stiffness, weight, contact_radius, radius, friction
     """The `StringScene` of the arguments of `solve_in_hole`.
 
     Raises:
-        SceneError: naming the argument, its value and what was expected.
+        SceneError: naming the argument, its value and the expected one.
     """
     lengths = _numbers("lengths", lengths, None, "positive numbers (m)", lambda x: x > 0)
     weight = _numbers("weight", weight, len(lengths), "positive numbers (N/m)", lambda x: x > 0)
@@ -245,7 +246,7 @@ def turns_of_helix(EI, compression, torque, hand):
 
 
 def energy_of_helix(EI, compression, torque, clearance, rate):
-    """(n,) J/m of a long helix over that of the straight string, see `turns_of_helix`."""
+    """(n,) energy (J/m) of a long helix less the straight string's, see `turns_of_helix`."""
     return clearance**2 * (EI * rate**4 - compression * rate**2 + torque * rate**3) / 2
 
 
