@@ -21,7 +21,6 @@ from cosserat_fenicsx.drilling.bit_laws import Lobes as Lobes
 from cosserat_fenicsx.drilling.bit_laws import Stribeck as Stribeck
 from cosserat_fenicsx.drilling.bit_laws import Wear as Wear
 from cosserat_fenicsx.drilling.history import DrillingHistory as DrillingHistory
-from cosserat_fenicsx.drilling.top_drive import Hook as Hook
 from cosserat_fenicsx.drilling.linear.excitation import BitBounce as BitBounce
 from cosserat_fenicsx.drilling.linear.excitation import Campbell as Campbell
 from cosserat_fenicsx.drilling.linear.excitation import bit_bounce as bit_bounce
@@ -47,6 +46,7 @@ from cosserat_fenicsx.drilling.simulate import read_drilling as read_drilling
 from cosserat_fenicsx.drilling.simulate import simulate_drilling as simulate_drilling
 from cosserat_fenicsx.drilling.stick_slip import StickSlip as StickSlip
 from cosserat_fenicsx.drilling.top_drive import PI as PI
+from cosserat_fenicsx.drilling.top_drive import Hook as Hook
 from cosserat_fenicsx.drilling.top_drive import Matched as Matched
 from cosserat_fenicsx.drilling.top_drive import Motor as Motor
 from cosserat_fenicsx.drilling.top_drive import Stiff as Stiff

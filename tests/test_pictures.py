@@ -10,6 +10,7 @@ import pytest
 from conftest import COMM, column
 
 import cosserat_fenicsx as cf
+from cosserat_fenicsx.pictures.charts import asked
 from cosserat_fenicsx.pictures.colours import colour_of, known, peak_of
 from cosserat_fenicsx.pictures.drawing import quantity
 from cosserat_fenicsx.pictures.signs import has_sign, loads_of, without_sign
@@ -62,6 +63,17 @@ def test_ticks_are_round_and_free_of_rounding():
     assert (
         quantity(3.04e-16, "N m") == "304 aN m" and quantity(1e3, "N") == "1 kN" and quantity(0.02, "1/m") == "0.02 1/m"
     )
+
+
+def test_drawings_take_the_units_that_are_asked_for(solved):
+    with asked(units="field"):
+        x, _, z = axes_of(np.array([[0.0, 0, 0], [30.48, 0, 1.0]]))
+        assert x.name == "x (ft)" and [text for _, text in x.ticks] == ["0", "20", "40", "60", "80", "100"]
+        assert x.ticks[-1][0] == pytest.approx(30.48) and z.name == "z (ft)"
+        assert quantity(4448.2216, "N") == "1 klbf" and quantity(0.02, "1/m") == "0.0061 1/ft"
+    assert quantity(4448.2216, "N") == "4.45 kN"
+    with pytest.raises(cf.SceneError, match="units"):
+        solved.plot(units="metric")
 
 
 def test_labels_keep_off_each_other_and_off_the_edge():

@@ -19,14 +19,17 @@ from cosserat_fenicsx.interrupts import obey
 from cosserat_fenicsx.new_files import replaced
 from cosserat_fenicsx.pictures.drawing import (
     add_body,
+    add_lines,
     add_wall,
     at_rest,
     body_of,
     frame,
     load_pyvista,
-    points_of,
-    prefix,
+    move,
+    stage,
+    suited,
     thickening,
+    thicker,
 )
 from cosserat_fenicsx.pictures.view import plain
 from cosserat_fenicsx.progress import Progress
@@ -181,10 +184,8 @@ class _Stage:
         everywhere = np.concatenate([*resting, *(body.line for made in bodies for body in made)])
         extent = float(np.ptp(everywhere, axis=0).max())
         peak = max(body.values.max() for made in bodies for body in made)
-        self._scale, _ = prefix(peak)
-        self._plotter = pyvista.Plotter(off_screen=True, window_size=size)
-        self._plotter.set_background("white")
-        self._plotter.enable_anti_aliasing("msaa")
+        self._scale, _ = suited(peak)
+        self._plotter = stage(pyvista, size)
         self._factors = [thickening(body, extent) for body in bodies[0]]
         self._meshes = [
             add_body(self._plotter, pyvista, body, factor, peak, moving=True)
@@ -192,8 +193,7 @@ class _Stage:
         ]
         radii = [factor * body.radius for body, factor in zip(bodies[0], self._factors, strict=True)]
         enlarged.add_holes(self._plotter, pyvista, radii)
-        for line in resting:
-            self._plotter.add_mesh(pyvista.lines_from_points(line), color="lightgrey", line_width=2)
+        add_lines(self._plotter, pyvista, resting, "lightgrey")
         self._head, self._letters = history.scene.title or "Motion", size[0] // _LETTER
         self._notes = self._not_to_scale()
         frame(self._plotter, everywhere)
@@ -204,8 +204,7 @@ class _Stage:
     def _not_to_scale(self):
         notes = [f"displacements magnified {self._magnify:g} times"] if self._magnify != 1 else []
         notes += self._enlarged.note
-        thicker = sorted({f"{float(f'{factor:.2g}'):g}" for factor in self._factors if factor > 1})
-        notes += [f"sections drawn {' and '.join(thicker)} times their size"] if thicker else []
+        notes += thicker(self._factors)
         if self._between.smooth < 1:
             notes.append("saved too seldom to be smooth")
         return "".join(f"\n{note}" for note in notes)
@@ -213,10 +212,7 @@ class _Stage:
     def at(self, t):
         """(height, width, 3) the picture at t (s)."""
         for mesh, body, factor in zip(self._meshes, self._bodies(t), self._factors, strict=True):
-            mesh.points[:] = points_of(body, factor)
-            mesh["value"][:] = np.repeat(body.values / self._scale, body.outline.shape[1])
-            mesh.GetPoints().Modified()
-            mesh.GetPointData().GetScalars().Modified()
+            move(mesh, body, factor, "value", body.values / self._scale)
         text = f"{self._head}: t = {t:.{self._digits}f} s ({self._pace}){self._notes}"
         self._plotter.add_text(
             plain("\n".join(textwrap.fill(line, self._letters) for line in text.split("\n"))),

@@ -7,6 +7,7 @@ labels are arranged in the room that there is.
 import io
 import math
 import textwrap
+from contextlib import contextmanager
 from contextvars import ContextVar
 from pathlib import Path
 
@@ -57,23 +58,29 @@ def draw_chart(make, file=None, comm=Alone, *, width=None, units="SI"):
     if width is not None:
         low, high = _WIDTHS
         width = number("plot", "width", width, f"pixels, from {low} to {high}", lambda x: low <= x <= high)
-    units = Units(units)
+    look = asked(width, Units(units))
+
+    def drawn():
+        with look, styled():
+            figure = make()
+            arrange(figure)
+        return figure
+
     if file is None:
-        return _drawn(make, width, units)
-    on_first(comm, lambda: _write(_drawn(make, width, units), Path(file)))
+        return drawn()
+    on_first(comm, lambda: _write(drawn(), Path(file)))
     return None
 
 
-def _drawn(make, width, units):
-    tokens = _pixels.set(width), _units.set(units)
+@contextmanager
+def asked(width=None, units="SI"):
+    """Within it, figures have a width in pixels, and charts and pictures these units."""
+    tokens = _pixels.set(width), _units.set(Units(units))
     try:
-        with styled():
-            figure = make()
-            arrange(figure)
+        yield
     finally:
         _pixels.reset(tokens[0])
         _units.reset(tokens[1])
-    return figure
 
 
 def _write(figure, file):
@@ -106,6 +113,11 @@ def unit_of(quantity, *values):
     unit of the quantity."""
     every = np.concatenate([np.ravel(x) for x in values]) if values else ()
     return Units(_units.get()).on_screen(quantity, every)
+
+
+def chosen_unit(unit):
+    """(unit, size) in which numbers of an SI unit are asked for, size in that; SI itself where nothing is chosen."""
+    return Units(_units.get()).of(Quantity("number", unit=unit))
 
 
 def scale(quantity, *values):

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from cosserat_fenicsx.errors import LibraryMissing
+from cosserat_fenicsx.pictures.charts import chosen_unit
 from cosserat_fenicsx.pictures.colours import BENDING
 from cosserat_fenicsx.pictures.view import Labels, View, axes_of, draw_axes, round_step
 from cosserat_fenicsx.scene.sections import Circle, Material
@@ -44,17 +45,42 @@ def load_pyvista():
     return pyvista
 
 
-def prefix(value, unit="N m"):
-    """(scale, SI prefix) that suit a value in a unit."""
-    if not unit.startswith(_PREFIXED):
-        return 1.0, ""
-    return next(((s, p) for s, p in _PREFIXES if abs(value) >= s * (1 - 1e-9)), (1.0, ""))
+def suited(value, unit="N m"):
+    """(size, name) of the unit that suits a value in an SI unit: the one that is asked for, or with a prefix."""
+    chosen, size = chosen_unit(unit)
+    if chosen != unit or not unit.startswith(_PREFIXED):
+        return size, chosen
+    size, letter = next(((s, p) for s, p in _PREFIXES if abs(value) >= s * (1 - 1e-9)), (1.0, ""))
+    return size, f"{letter}{unit}"
 
 
 def quantity(value, unit):
     """A value as text, to three digits, with its unit."""
-    scale, letter = prefix(value, unit)
-    return f"{value / scale:.3g} {letter}{unit}"
+    size, name = suited(value, unit)
+    return f"{value / size:.3g} {name}"
+
+
+def stage(pyvista, size, smooth="msaa", **panels):
+    """An empty plotter of a size in pixels; smooth: how edges are, see `Plotter.enable_anti_aliasing`."""
+    plotter = pyvista.Plotter(off_screen=True, window_size=size, **panels)
+    plotter.set_background("white")
+    if smooth:
+        plotter.enable_anti_aliasing(smooth, **({"multi_samples": 8} if panels else {}))
+    return plotter
+
+
+def add_lines(plotter, pyvista, lines, color="grey"):
+    """Draw lines (n, 3), m, such as rods at rest."""
+    for line in lines:
+        plotter.add_mesh(pyvista.lines_from_points(line), color=color, line_width=2)
+
+
+def thicker(factors):
+    """Words that say by which factors sections are enlarged, in a list; none where they are not."""
+    told = sorted({f"{float(f'{factor:.2g}'):g}" for factor in factors if factor > 1}, key=float)
+    if len(told) > 3:
+        told = [f"{told[0]} to {told[-1]}"]
+    return [f"sections drawn {' and '.join(told)} times their size"] if told else []
 
 
 @dataclass(frozen=True)
@@ -153,11 +179,11 @@ def add_body(plotter, pyvista, body, factor, peak, moving=False, colour=BENDING)
         The mesh.
     """
     surface = surface_of(pyvista, body, factor)
-    scale, letter = prefix(peak, colour.unit)
+    scale, name = suited(peak, colour.unit)
     step = round_step((2 if colour.signed else 1) * peak / scale or 1.0, _BAR)
     low, high = colour.limits(math.ceil(peak / scale / step - 1e-9) * step)
     font = round(plotter.window_size[0] / 70)
-    unit = ": zero" if peak == 0 else "" if colour.unit == "1" else f" ({letter}{colour.unit})"
+    unit = ": zero" if peak == 0 else "" if colour.unit == "1" else f" ({name})"
     surface["value"] = np.repeat(body.values / scale, body.outline.shape[1])
     plotter.add_mesh(
         surface,
@@ -166,21 +192,32 @@ def add_body(plotter, pyvista, body, factor, peak, moving=False, colour=BENDING)
         clim=(low, high),
         smooth_shading=not moving,
         split_sharp_edges=not moving,
-        scalar_bar_args={
-            "title": f"{colour.words}{unit}\n",
-            "color": "black",
-            "vertical": True,
-            "position_x": 0.86,
-            "position_y": 0.25,
-            "height": 0.55,
-            "width": 0.05,
-            "n_labels": round((high - low) / step) + 1 if peak else 0,
-            "fmt": _format(step),
-            "title_font_size": font,
-            "label_font_size": font,
-        },
+        scalar_bar_args=colour_bar(
+            f"{colour.words}{unit}", font, round((high - low) / step) + 1 if peak else 0, step, (0.86, 0.25, 0.05, 0.55)
+        ),
     )
     return surface
+
+
+def colour_bar(title, font, numbers, step, box):
+    """The arguments of pyvista for an upright bar of colours.
+
+    Args:
+        font: its size, pixels; numbers: how many there are, multiples of a round step; box: (x, y, width, height),
+            shares of the picture.
+    """
+    x, y, width, height = box
+    place = {"position_x": x, "position_y": y, "width": width, "height": height, "vertical": True}
+    fonts = {"title_font_size": font, "label_font_size": font, "color": "black"}
+    return {"title": f"{title}\n", "n_labels": numbers, "fmt": _format(step), **place, **fonts}
+
+
+def move(surface, body, factor, name, values):
+    """Move the mesh of a `Body` to where it is now, with the values (n,) of its sections."""
+    surface.points[:] = points_of(body, factor)
+    surface[name][:] = np.repeat(values, body.outline.shape[1])
+    surface.GetPoints().Modified()
+    surface.GetPointData().GetScalars().Modified()
 
 
 def add_wall(plotter, pyvista, axis, radius):

@@ -9,20 +9,25 @@ import numpy as np
 from cosserat_fenicsx.checks import positive
 from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.new_files import replaced
+from cosserat_fenicsx.pictures.charts import asked
 from cosserat_fenicsx.pictures.colours import colour_of, known, peak_of
 from cosserat_fenicsx.pictures.drawing import (
     add_body,
+    add_lines,
     add_tubes,
     at_rest,
     body_of,
     frame,
     load_pyvista,
+    stage,
     surface_of,
     swept,
     thickening,
+    thicker,
 )
 from cosserat_fenicsx.pictures.signs import Deformed, Resting, signs_of, without_sign
 from cosserat_fenicsx.pictures.view import Labels, plain
+from cosserat_fenicsx.quantities import Units
 from cosserat_fenicsx.ranks import communicator, on_first
 
 # Smallest visible displacement as a share of the extent of the drawing.
@@ -34,7 +39,7 @@ _NAMED, _FEW = 40, 8
 _AT_REST = "#9db4cc"
 
 
-def rods(path, file=None, points=None, magnify=1.0, color="bending_moment"):
+def rods(path, file=None, points=None, magnify=1.0, color="bending_moment", units="SI"):
     """The deformed rods at some points of a path, with the reference as a grey line, supports, joints and loads.
 
     Supports and joints are drawn on the last shape, each load on the last shape where it is not zero.
@@ -45,6 +50,7 @@ def rods(path, file=None, points=None, magnify=1.0, color="bending_moment"):
         points: indices of the points to show; None for up to five, evenly spread.
         magnify: factor on displacements.
         color: name of the field that colours the rods, see `colours.known`.
+        units: see `quantities.Units`.
 
     Returns:
         The pyvista Plotter where `file` is None.
@@ -57,15 +63,16 @@ def rods(path, file=None, points=None, magnify=1.0, color="bending_moment"):
         raise SceneError("the path has no point to draw")
     positive("plot", "magnify", magnify, "-")
     colour = colour_of(color, known(path))
-    return deliver(path.comm, file, lambda: _draw(path, points, magnify, colour))
+    return deliver(path.comm, file, lambda: _draw(path, points, magnify, colour), units)
 
 
-def scene(scene, file=None):
+def scene(scene, file=None, units="SI"):
     """The rods of a scene before anything is solved, with their names, supports, joints and loads.
 
     Args:
         scene: a `Scene`.
         file: where to write a .png (rank 0 writes); None returns the plotter.
+        units: see `quantities.Units`.
 
     Returns:
         The pyvista Plotter where `file` is None.
@@ -74,22 +81,28 @@ def scene(scene, file=None):
         SceneError: a file that is no .png, or pyvista is missing.
         OSError: the file cannot be written.
     """
-    return deliver(communicator(), file, lambda: _draw_scene(scene))
+    return deliver(communicator(), file, lambda: _draw_scene(scene), units)
 
 
-def deliver(comm, file, draw):
-    """The plotter that `draw()` returns where `file` is None, else a .png of it, written by rank 0.
+def deliver(comm, file, draw, units="SI"):
+    """The plotter that `draw()` returns where `file` is None, else a .png of it, written by rank 0; in these units.
 
     Raises:
-        SceneError: a file that is no .png.
+        SceneError: a file that is no .png, unknown units.
         OSError: the file cannot be written.
     """
+    units = Units(units)
+
+    def drawn():
+        with asked(units=units):
+            return draw()
+
     if file is None:
-        return draw()
+        return drawn()
     file = Path(file)
     if file.suffix != ".png":
         raise SceneError(f"{file}: expected a name that ends in .png")
-    on_first(comm, lambda: _save(draw, file))
+    on_first(comm, lambda: _save(drawn, file))
     return None
 
 
@@ -102,17 +115,10 @@ def _save(draw, file):
         plotter.close()
 
 
-def _stage(pyvista):
-    plotter = pyvista.Plotter(off_screen=True, window_size=_WINDOW)
-    plotter.set_background("white")
-    plotter.enable_anti_aliasing("ssaa")
-    return plotter
-
-
 def _draw(path, points, magnify, colour):
     pyvista = load_pyvista()
     shown = _spread(path) if points is None else [range(len(path))[k] for k in points]
-    plotter = _stage(pyvista)
+    plotter = stage(pyvista, _WINDOW, "ssaa")
     resting = at_rest(path.scene)
     bodies = {(k, rod): swept(path, k, rod, magnify, colour) for k in shown for rod in path.scene.rods}
     everywhere = np.concatenate([*resting, *(body.line for body in bodies.values())])
@@ -124,8 +130,7 @@ def _draw(path, points, magnify, colour):
     peak = peak_of(path, colour, [body.values for body in bodies.values()])
     for key, body in bodies.items():
         add_body(plotter, pyvista, body, factors[key], peak, colour=colour)
-    for line in resting:
-        plotter.add_mesh(pyvista.lines_from_points(line), color="grey", line_width=2)
+    add_lines(plotter, pyvista, resting)
     radii = {rod: factors[shown[-1], rod] * bodies[shown[-1], rod].radius for rod in path.scene.rods}
     if magnify == 1:  # elsewhere rods would leave their tubes
         add_tubes(plotter, pyvista, path.scene, radii)
@@ -140,7 +145,7 @@ def _draw(path, points, magnify, colour):
 
 def _draw_scene(scene):
     pyvista = load_pyvista()
-    plotter = _stage(pyvista)
+    plotter = stage(pyvista, _WINDOW, "ssaa")
     everywhere = np.concatenate(at_rest(scene))
     size, radii, factors = float(np.ptp(everywhere, axis=0).max()), {}, []
     x = np.linspace(0, 1, 201)
@@ -217,10 +222,7 @@ def _title(path, shown, factors, magnify, small):
 
 
 def _thicker(factors):
-    thicker = sorted({f"{float(f'{factor:.2g}'):g}" for factor in factors if factor > 1}, key=float)
-    if len(thicker) > 3:
-        thicker = [f"{thicker[0]} to {thicker[-1]}"]
-    return [f"(sections drawn {' and '.join(thicker)} times their size)"] if thicker else []
+    return [f"({words})" for words in thicker(factors)]
 
 
 def _undrawn(scene, tubes):

@@ -9,7 +9,17 @@ import numpy as np
 
 from cosserat_fenicsx.checks import number, positive, refuse
 from cosserat_fenicsx.pictures.animation import MOST_FRAMES, check_name, pixels, record
-from cosserat_fenicsx.pictures.drawing import body_of, frame, load_pyvista, points_of, surface_of, thickening
+from cosserat_fenicsx.pictures.drawing import (
+    add_lines,
+    body_of,
+    frame,
+    load_pyvista,
+    move,
+    stage,
+    surface_of,
+    thickening,
+    thicker,
+)
 from cosserat_fenicsx.pictures.plot import deliver
 from cosserat_fenicsx.pictures.view import view_of
 from cosserat_fenicsx.ranks import on_first
@@ -126,12 +136,10 @@ def _panels(found, shown, amplitude):
     everywhere = np.concatenate([shape.everywhere() for shape in drawn])
     panel = _height(everywhere)
     width, height = across * _WIDTH, down * panel + _TITLE
-    plotter = pyvista.Plotter(
-        off_screen=True, window_size=(width, height), border=False, shape=(down + 1, across),
+    plotter = stage(  # not with supersampling, which leaves all panels but one black
+        pyvista, (width, height), border=False, shape=(down + 1, across),
         row_weights=[_TITLE, *[panel] * down], groups=[(0, slice(None))],
     )  # fmt: skip
-    plotter.set_background("white")
-    plotter.enable_anti_aliasing("msaa", multi_samples=8)  # supersampling leaves all panels but one black
     plotter.subplot(0, 0)
     plotter.add_text(_head(found, width), position="upper_edge", color="black", font_size=12)
     for i, (k, shape) in enumerate(zip(shown, drawn, strict=True)):
@@ -160,8 +168,7 @@ def _head(found, width):
 def _below(shape, bodies, everywhere, width):
     """The lines under a title: what is not to scale."""
     extent = float(np.ptp(everywhere, axis=0).max())
-    thicker = sorted({f"{float(f'{thickening(body, extent):.2g}'):g}" for body in bodies} - {"1"})
-    notes = [shape.note, *([f"sections drawn {' and '.join(thicker)} times their size"] if thicker else [])]
+    notes = [shape.note, *thicker(thickening(body, extent) for body in bodies)]
     return "\n".join(textwrap.fill(note, width // _LETTER * 2) for note in notes)
 
 
@@ -173,8 +180,7 @@ def _add(plotter, pyvista, shape, bodies, everywhere):
         surface["values"] = np.repeat(body.values, body.outline.shape[1])
         plotter.add_mesh(surface, scalars="values", cmap="viridis", clim=(0, 1), show_scalar_bar=False)
         surfaces.append(surface)
-    for line in shape.lines:
-        plotter.add_mesh(pyvista.lines_from_points(line), color="grey", line_width=2)
+    add_lines(plotter, pyvista, shape.lines)
     return surfaces
 
 
@@ -186,9 +192,7 @@ class _Stage:
         self._shape = Drawn(found, k, amplitude)
         self._everywhere = self._shape.everywhere()
         bodies = self._shape.bodies()
-        self._plotter = pyvista.Plotter(off_screen=True, window_size=size)
-        self._plotter.set_background("white")
-        self._plotter.enable_anti_aliasing("msaa")
+        self._plotter = stage(pyvista, size)
         self._surfaces = _add(self._plotter, pyvista, self._shape, bodies, self._everywhere)
         extent = float(np.ptp(self._everywhere, axis=0).max())
         self._factors = [thickening(body, extent) for body in bodies]
@@ -200,10 +204,7 @@ class _Stage:
 
     def _draw(self, share):
         for surface, body, factor in zip(self._surfaces, self._shape.bodies(share), self._factors, strict=True):
-            surface.points[:] = points_of(body, factor)
-            surface["values"][:] = np.repeat(body.values, body.outline.shape[1])
-            surface.GetPoints().Modified()
-            surface.GetPointData().GetScalars().Modified()
+            move(surface, body, factor, "values", body.values)
         self._plotter.render()
         return self._plotter.screenshot(return_img=True)
 

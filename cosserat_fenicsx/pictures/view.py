@@ -7,6 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cosserat_fenicsx.pictures.charts import chosen_unit
+
 # The drawing fills these shares of the width, left of the colour bar, and of the height, between title and lowest axis,
 # and is moved by these shares of the picture's half sizes, to the left and upwards.
 _WHOLE = (0.62, 0.64, 0.12, -0.03)
@@ -246,8 +248,10 @@ def axes_of(points):
     """The three `Axis` of a drawing of points (n, 3), m."""
     low, high = points.min(axis=0), points.max(axis=0)
     size = float((high - low).max())
-    scale, unit = next((scale, unit) for least, scale, unit in _UNITS if size >= least)
-    step = round_step(size, _INTERVALS)
+    unit, scale = chosen_unit("m")
+    if unit == "m":
+        scale, unit = next((scale, unit) for least, scale, unit in _UNITS if size >= least)
+    step = scale * round_step(size / scale, _INTERVALS)
     first, last = np.floor(low / step + 1e-9), np.ceil(high / step - 1e-9)
     return tuple(
         _axis(f"{name} ({unit})", int(a), int(b), step, scale, size) if b > a else _flat(f"{name} ({unit})", x, size)

@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from cosserat_fenicsx.new_files import replaced
 from cosserat_fenicsx.pictures.colours import MAPS, known, peak_of
-from cosserat_fenicsx.pictures.drawing import at_rest, outlines, thickness
+from cosserat_fenicsx.pictures.drawing import at_rest, outlines, thicker, thickness
 from cosserat_fenicsx.pictures.view import axes_of, view_of
 
 #: Fields that can be chosen in the file, where the result has them; the first is shown at first.
@@ -167,8 +167,7 @@ def _notes(result, shown, factors):
     if result.axis == "time" and duration > 0:
         speed = duration / _seconds(result)
         notes.append("played in real time" if speed == 1 else f"played at {speed:.3g} times the real speed")
-    thicker = sorted({f"{float(f'{factor:.2g}'):g}" for factor in factors if factor > 1})
-    return notes + ([f"sections drawn {' and '.join(thicker)} times their size"] if thicker else [])
+    return notes + thicker(factors)
 
 
 def _view(span):

@@ -571,7 +571,7 @@ class RodResult(Result, Extremes, Reactions, Stresses, States):
             written = xdmf.write_series if file.suffix == ".xdmf" else xdmf.write_state
             on_first(self.comm, lambda: written(self, file, k))
 
-    def plot(self, file=None, points=None, *, magnify=1.0, color="bending_moment"):
+    def plot(self, file=None, points=None, *, magnify=1.0, color="bending_moment", units="SI"):
         """Picture of the deformed rods with supports, joints and loads, at some points (default up to five).
 
         Args:
@@ -581,13 +581,14 @@ class RodResult(Result, Extremes, Reactions, Stresses, States):
             color: what colours the rods: bending_moment, twisting_moment, tension, shear_force, n, m, displacement,
                 strain, curvature, of a motion velocity and angular_velocity too; n.x, n.y, n.z for an inertial
                 component, n.1, n.2, n.3 for one along d_1, d_2, d_3.
+            units: "SI", "field", or a dict of units by dimensions, such as {"force": "klbf"}.
 
         Raises:
-            SceneError: an unknown field (lists the names), or pyvista is missing.
+            SceneError: an unknown field (lists the names), unknown units, or pyvista is missing.
         """
         from cosserat_fenicsx.pictures import plot
 
-        return plot.rods(self, file, points, magnify, color)
+        return plot.rods(self, file, points, magnify, color, units)
 
 
 def group_names(scene):

@@ -336,18 +336,19 @@ class Scene:
             "20.05 EI/L^2), one with none may flutter, which only dynamics can show"
         ]
 
-    def plot(self, file=None):
+    def plot(self, file=None, *, units="SI"):
         """Picture of the rods at rest with their names, supports, joints and loads (at load factor 1).
 
         Args:
             file: a .png; None returns the pyvista plotter.
+            units: "SI", "field", or a dict of units by dimensions, such as {"force": "klbf"}.
 
         Raises:
             SceneError: a file that is no .png, or pyvista is missing.
         """
         from cosserat_fenicsx.pictures import plot
 
-        return plot.scene(self, file)
+        return plot.scene(self, file, units)
 
     def station(self, name: str) -> Station:
         """The station 'rod.start', 'rod.end' or 'rod@s', s in m, as scene files name it.

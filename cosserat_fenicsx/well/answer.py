@@ -325,20 +325,28 @@ class TorqueAndDrag(Differentiated, Tabular):
         """See `RodInContact.plot_from_side`; a soft string has no shape of its own, and raises a SceneError."""
         raise SceneError(f"plot_from_side: a {self.words} lies on the axis: expected an answer of model = 'rod'")
 
-    def plot_3d(self, file: File, enlarge: float | None = None, between: tuple[float, float] | None = None) -> None:
+    def plot_3d(
+        self,
+        file: File,
+        enlarge: float | None = None,
+        between: tuple[float, float] | None = None,
+        *,
+        units: Any = "SI",
+    ) -> None:
         """Draw the string in its hole in space, coloured by the side force.
 
         Args:
             file: .png (rank 0 writes).
             enlarge: factor on radii and clearance, which the picture says; None for one that shows them.
             between: measured depths (m) from which to which it shows them.
+            units: see `plot`.
 
         Raises:
             SceneError: pyvista is missing, or the name does not end in .png; depths that the string has not.
         """
         from cosserat_fenicsx.well.in_space import draw_in_space
 
-        draw_in_space(self, file, enlarge, between)
+        draw_in_space(self, file, enlarge, between, units)
 
     def __repr__(self):
         loads = f"hook load {self.hook_load:.6g} N, surface torque {self.surface_torque:.6g} N m"

@@ -6,10 +6,12 @@ from pathlib import Path
 import numpy as np
 
 from cosserat_fenicsx.checks import positive
-from cosserat_fenicsx.errors import SceneError
-from cosserat_fenicsx.pictures.drawing import load_pyvista
+from cosserat_fenicsx.pictures.charts import unit_of
+from cosserat_fenicsx.pictures.drawing import colour_bar, load_pyvista, stage
+from cosserat_fenicsx.pictures.plot import deliver
 from cosserat_fenicsx.pictures.view import Axis, Labels, View, draw_axes, round_step, text_of
-from cosserat_fenicsx.ranks import on_first, world
+from cosserat_fenicsx.quantities import Quantity
+from cosserat_fenicsx.ranks import world
 from cosserat_fenicsx.well.charts import SIDES, depths_between, points_between, rows_between, usual_side_force
 
 # Pixels: height of the drawing, bounds of its width, margins at the left (numbers of depths), right (colour bar), above
@@ -29,21 +31,21 @@ _POINTS, _BETWEEN, _SHADOW, _NUMBERED = 20000, 400, 300, (3, 8)
 _SPHERE, _LINE = 0.35, 4
 # Radii of the hole in the picture that a well goes down at least, which is not horizontal.
 _SLENDER = 10
-_FIELD = "side force (N/m)"
+_FIELD = "side force"
+_SIDE_FORCE = Quantity("side force", unit="N/m", shown="N/m", dimension="force per length")
+_AT_POINT = Quantity("force at a point", unit="N", shown="kN")
+_DEPTH = Quantity("depth", unit="m", shown="m", dimension="length")
 
 
-def draw_in_space(answer, file, enlarge=None, between=None):
+def draw_in_space(answer, file, enlarge=None, between=None, units="SI"):
     """See `TorqueAndDrag.plot_3d`."""
-    file = Path(file)
-    if file.suffix != ".png":
-        raise SceneError(f"{file}: expected a name that ends in .png")
     if enlarge is not None:
         positive("plot_3d", "enlarge", enlarge, "-")
     ends = depths_between("plot_3d", between, answer.depth)
-    on_first(world(), lambda: _draw(answer, file, enlarge, *ends))
+    deliver(world(), Path(file), lambda: _draw(answer, enlarge, *ends), units)
 
 
-def _draw(answer, file, enlarge, top, bottom):
+def _draw(answer, enlarge, top, bottom):
     pyvista = load_pyvista()
     md = _places(answer.md, top, bottom)
     axis, radius = _picture(answer.hole.path.position(md)), answer.hole.at(md, "diameter") / 2
@@ -53,8 +55,7 @@ def _draw(answer, file, enlarge, top, bottom):
         enlarge = max(1.0, float(f"{(_HOLE if whole else _HOLE_OF_PART) * size / radius.max():.1g}"))
     axes = _axes_of(axis, enlarge * radius.max())
     view = _view_of(axis, axes)
-    plotter = pyvista.Plotter(off_screen=True, window_size=view.window)
-    plotter.set_background("white")
+    plotter = stage(pyvista, view.window, smooth=None)
     tubes = enlarge * radius.max() > view.pixel
     if not tubes:  # of lines, parts shorter than pixels would be drawn as dots
         way = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(axis, axis=0), axis=1)))
@@ -74,10 +75,11 @@ def _draw(answer, file, enlarge, top, bottom):
     draw_axes(plotter, pyvista, axes, view, labels)
     _add_names(plotter, pyvista, answer, labels, view, (md, axis, line, enlarge * radius), (top, bottom))
     labels.draw(plotter, pyvista)
-    _add_title(plotter, answer, enlarge, "" if whole else f", from {top:g} to {bottom:g} m", view.window)
+    unit, size = unit_of(_DEPTH)
+    part = "" if whole else f", from {top / size:g} to {bottom / size:g} {unit}"
+    _add_title(plotter, answer, enlarge, part, view.window)
     view.place(plotter)
-    plotter.screenshot(file)
-    plotter.close()
+    return plotter
 
 
 def _places(md, top, bottom):
@@ -104,12 +106,13 @@ def _axes_of(points, room):
         high[2] = points[:, 2].max()  # the surface
     thin = np.maximum(_THIN * (high - low).max() - (high - low), 0.0) * (1, 1, 0) / 2
     low, high = low - thin, high + thin
-    most, least = _INTERVALS
+    (most, least), (unit, size) = _INTERVALS, unit_of(_DEPTH)
     found = []
-    for name, a, b, sign in zip(("east (m)", "north (m)", "depth (m)"), low, high, (1, 1, -1), strict=True):
-        step = min(round_step(float((high - low).max()), most), round_step(float(b - a), least))
+    for name, a, b, sign in zip(("east", "north", "depth"), low, high, (1, 1, -1), strict=True):
+        step = min(round_step(float((high - low).max()) / size, most), round_step(float(b - a) / size, least)) * size
         ticks = step * np.arange(math.ceil(a / step - 1e-6), math.floor(b / step + 1e-6) + 1)
-        found.append(Axis(name, float(a), float(b), tuple((float(x), text_of(sign * x, step)) for x in ticks)))
+        texts = tuple((float(x), text_of(sign * x, step, size)) for x in ticks)
+        found.append(Axis(f"{name} ({unit})", float(a), float(b), texts))
     return tuple(found)
 
 
@@ -141,23 +144,22 @@ def _view_of(points, axes):
 def _add_string(plotter, pyvista, answer, md, line, radius, tube):
     """As a tube, or as a line where a tube were thinner than a pixel."""
     distributed = answer.distributed_force
-    force, rows = _at(md, answer, distributed), rows_between(answer.md, md[0], md[-1])
+    unit, size = unit_of(_SIDE_FORCE)
+    force, rows = _at(md, answer, distributed) / size, rows_between(answer.md, md[0], md[-1])
     string = pyvista.MultipleLines(line)
     string[_FIELD], string["radius"] = force, radius
-    usual = usual_side_force(answer, distributed[rows], answer.md[rows]) or force.max(initial=0.0)
+    usual = usual_side_force(answer, distributed[rows], answer.md[rows]) / size or force.max(initial=0.0)
     step = round_step(usual, _BAR) if usual > 0 else 1.0
     most = math.ceil(usual / step - 1e-9) * step or step
     labels = round(most / step) + 1
     (width, height), beside = plotter.window_size, _MARGINS[1]
     more = "\n(more: yellow)" if force.max(initial=0.0) > most else ""
-    look = {"title": f"side force\n(N/m){more}\n", "n_labels": labels, "fmt": "%.0f" if step >= 1 else "%g"}
-    place = {"position_x": 1 - 0.75 * beside / width, "width": 0.4 * beside / width, "position_y": 0.2, "height": 0.5}
-    font = {"title_font_size": round(height / 60), "label_font_size": round(height / 60), "color": "black"}
+    box = 1 - 0.75 * beside / width, 0.2, 0.4 * beside / width, 0.5
+    bar = colour_bar(f"side force\n({unit}){more}", round(height / 60), labels, step, box)
     if tube:
         string = string.tube(scalars="radius", absolute=True, n_sides=24)
     shading = {"smooth_shading": tube, "lighting": tube, "line_width": _LINE}
-    plotter.add_mesh(string, scalars=_FIELD, cmap="viridis", clim=(0.0, most), **shading,
-                     scalar_bar_args={"vertical": True, **look, **place, **font})  # fmt: skip
+    plotter.add_mesh(string, scalars=_FIELD, cmap="viridis", clim=(0.0, most), **shading, scalar_bar_args=bar)
 
 
 def _add_hole(plotter, pyvista, answer, md, axis, radius):
@@ -194,6 +196,7 @@ def _add_names(plotter, pyvista, answer, labels, view, lines, ends):
     def at(depth, curve):
         return np.array([np.interp(depth, md, curve[:, i]) for i in range(3)])
 
+    (unit, length), (force_unit, force_size) = unit_of(_DEPTH), unit_of(_AT_POINT)
     points = sorted(points_between(answer, *ends), key=lambda point: -point[1])
     for k, (depth, force, side) in enumerate(points):
         centre, on = at(depth, axis), at(depth, line)
@@ -202,10 +205,11 @@ def _add_names(plotter, pyvista, answer, labels, view, lines, ends):
         centre = on + away / (np.linalg.norm(away) or 1.0) * size
         plotter.add_mesh(pyvista.Sphere(radius=size, center=centre), color=SIDES[side].removeprefix("tab:"))
         if k < _NUMBERED[ends != (0.0, answer.depth)]:
-            labels.near(f"{force / 1e3:.3g} kN at {depth:.5g} m", centre, away, size=font)
+            told = f"{force / force_size:.3g} {force_unit} at {depth / length:.5g} {unit}"
+            labels.near(told, centre, away, size=font)
     for section in answer.hole.sections[:-1]:
         if ends[0] < section.to < ends[1]:
-            name = f"{section.name or 'section'} ends, {section.to:g} m"
+            name = f"{section.name or 'section'} ends, {section.to / length:g} {unit}"
             labels.near(name, at(section.to, axis), view.right, size=font, colour="saddlebrown")
     if ends != (0.0, answer.depth):
         for place in answer.laid:
@@ -216,9 +220,10 @@ def _add_names(plotter, pyvista, answer, labels, view, lines, ends):
 
 def _add_title(plotter, answer, enlarge, part, window):
     how = f"radii and clearance {enlarge:g} times as large" if enlarge != 1 else "radii and clearance as they are"
+    unit, size = unit_of(_DEPTH)
     straight = answer.model != "rod" and answer.helical.any()
     lines = [
-        f"{answer.operation.name}, bit at {answer.depth:g} m, {answer.words}{part}",
+        f"{answer.operation.name}, bit at {answer.depth / size:g} {unit}, {answer.words}{part}",
         how + ("; its helix is drawn straight" if straight else ""),
     ]
     size = round(min(window[1] / 80, window[0] / (0.62 * max(map(len, lines))) / 1.5))
