@@ -81,7 +81,7 @@ def test_tables_and_files(history, tmp_path):
     history.write(tmp_path / "out.csv")
     lines = (tmp_path / "out.csv").read_text(encoding="utf-8").splitlines()
     assert lines[0].startswith("time (s),drive speed (rad/s),drive angle (rad)") and "hook load" not in lines[0]
-    assert len(lines) == 6001 and lines[-1].startswith("60,6.28318531,")
+    assert len(lines) == 6001 and lines[-1].startswith("60.0,6.283185307179586,")
     with pytest.raises(cf.SceneError, match=r"ends in .csv or .nc"):
         history.write(tmp_path / "out.xlsx")
     pytest.importorskip("pandas")

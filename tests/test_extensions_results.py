@@ -31,12 +31,12 @@ def path(tmp_path, monkeypatch):
 def test_a_quantity_of_a_path(path, tmp_path):
     expected = np.hypot(*path.displacement("column.end")[:, :2].T)
     assert path.quantities["sway"].unit == "m" and path.quantities["sway"].axes == ("point",)
-    np.testing.assert_array_equal(path.values("sway"), expected)
-    np.testing.assert_allclose(path.values("sway", "field"), expected / cf.units.foot, rtol=1e-15)
+    np.testing.assert_array_equal(path.value("sway"), expected)
+    np.testing.assert_allclose(path.value("sway", "field"), expected / cf.units.foot, rtol=1e-15)
     path.write(tmp_path / "path.csv", units={"length": "ft"})
     with (tmp_path / "path.csv").open(newline="") as stream:
         rows = list(csv.DictReader(stream))
-    assert [float(row["sway of the tip (ft)"]) for row in rows] == path.values("sway", "field").tolist()
+    assert [float(row["sway of the tip (ft)"]) for row in rows] == path.value("sway", "field").tolist()
     told = path.to_dict()
     assert told["units"]["sway"] == "m" and told["sway"].tolist() == expected.tolist()
     assert path.to_dataframe()["sway of the tip (m)"].tolist() == expected.tolist()
@@ -57,7 +57,7 @@ def test_a_quantity_along_rods(path, tmp_path):
 
 
 def test_what_is_not_known_is_refused(path):
-    with pytest.raises(cf.SceneError, match="values.'sways'.: expected one of .*sway"):
-        path.values("sways")
+    with pytest.raises(cf.SceneError, match="value.'sways'.: expected one of .*sway"):
+        path.value("sways")
     with pytest.raises(cf.SceneError, match="path.vtu: units is not for the ending '.vtu'"):
         path.write("path.vtu", units="field")

@@ -9,8 +9,8 @@ import pytest
 from reference_strings import GIVEN, RPM, drive_of, falling, pipe_and_collars, public_discs, tubes, weight_of_slope
 
 import cosserat_fenicsx as cf
-from cosserat_fenicsx.drilling.linear.impedances import axial, torsional
 from cosserat_fenicsx.drilling.laws import check_bit
+from cosserat_fenicsx.drilling.linear.impedances import axial, torsional
 
 pytestmark = [pytest.mark.serial, pytest.mark.once]
 BAND = 60 / (2 * math.pi)  # Hz, of the reference
@@ -77,7 +77,7 @@ def test_a_drive_calms_the_first_mode_and_leaves_the_collars():
     assert drives["SoftSpeed"][collars] == pytest.approx(answer.growth[0, 0, collars], rel=0.01)
     alone = cf.stability(pipe_and_collars("SoftSpeed"), [92 * RPM], up_to=BAND)
     assert drives["SoftSpeed"][first] == pytest.approx(alone.growth[0, 0, :2].max(), rel=1e-12)
-    text = str(answer)
+    text = answer.details()
     assert "SoftSpeed calms 0.191" in text and "densest in the collar" in answer.shape(collars).where
     assert "8.137 Hz moves" in text
 
@@ -98,7 +98,7 @@ def test_a_tuned_drive_is_one_drive_whoever_tells_of_it():
     assert heard.Ki == pytest.approx(2900.0 * (2 * math.pi * cf.natural_frequencies(own.scene, 1)[0]) ** 2, rel=1e-12)
     columns, k = own.with_drives(0), own.unstable(0)[0]
     assert (columns["SoftSpeed"] == own.growth[0, 0]).all()
-    text = str(own)
+    text = own.details()
     assert "SoftSpeed (own)" in text and "of the scene, SoftSpeed." in " ".join(text.split())
     for other in (told(torque), told(cf.PI(38e3, 1e5))):
         near = int(np.abs(other.frequency[0, 0] - own.frequency[0, 0, k]).argmin())

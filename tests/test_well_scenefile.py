@@ -143,12 +143,12 @@ def test_the_command_line(tmp_path, capsys):
     assert "largest inclination 53.43 degrees" in told and "String, drill pipe: md 0 to 3227.7 m" in told
     assert main(["run", str(VOLVE), "-o", str(tmp_path), "--no-picture", "--tol", "1e-3", "--model", "soft"]) == 0
     told = capsys.readouterr().out
-    assert "asked for 0.001: NOT ENOUGH" in told and "rotary drilling, friction" not in told.splitlines()[0]
+    assert "NOT ENOUGH for tol = 0.001: " in told and "rotary drilling, friction" not in told.splitlines()[0]
     names = {"depth_sweep.csv", *(f"{name}{end}.csv" for name in ("trip_out", "trip_in", "rotary_drilling")
                                   for end in ("", "_contacts"))}  # fmt: skip
     assert {file.name for file in tmp_path.iterdir()} == names == set(re.findall(r"\w+\.csv", told))
     rows = (tmp_path / "trip_out.csv").read_text(encoding="utf-8").splitlines()
-    assert rows[0].startswith("md (m),north (m)") and rows[-1].startswith("3438,-346.4")
+    assert rows[0].startswith("md (m),north (m)") and rows[-1].startswith("3438.0,-346.4")
     for option, value in (("--elements", "4"), ("--color", "tension")):
         assert main(["run", str(VOLVE), option, value]) == 2
         assert f"{option} is for rods" in capsys.readouterr().err

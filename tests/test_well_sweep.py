@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import cosserat_fenicsx as cf
+from cosserat_fenicsx.quantities import Units
 from cosserat_fenicsx.well import depth_sweep as module
 from cosserat_fenicsx.well.rod import rod_in_hole
 
@@ -231,7 +232,7 @@ def test_charts(tmp_path):
         found.plot(tmp_path / "sweep.doc")
     found.write(tmp_path / "sweep.csv")
     rows = (tmp_path / "sweep.csv").read_text(encoding="utf-8").splitlines()
-    assert len(rows) == 6 and rows[0].startswith('depth_m,"trip out, friction 0.1: hook load (N)"')
+    assert len(rows) == 6 and rows[0].startswith('depth (m),"trip out, friction 0.1: hook load (N)"')
     assert ": model" in rows[0] and "soft" in rows[1] and "model: soft" in str(found)
     assert float(rows[5].split(",")[1]) == pytest.approx(found.hook_load[0, 0, 4])
 
@@ -282,7 +283,7 @@ def test_the_largest_error_of_a_sweep_names_its_quantity_and_place():
     operations, depths = (cf.TripIn(), cf.RotateOffBottom()), np.array([1e3, 2e3, 5409.0])
     for worst, told in ((0.5, "5e-01"), (np.inf, "without a bound: it may lock up")):
         values["model_error"][0, 0, 1] = worst
-        last = str(cf.DepthSweep(operations, depths, (None,), values, {})).splitlines()[-1]
+        last = list(cf.DepthSweep(operations, depths, (None,), values, {})._answer(Units()))[-2]
         assert "hook load and surface torque" in last and last.endswith(f"{told} (trip in, bit at 2000 m)")
 
 

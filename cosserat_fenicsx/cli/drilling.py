@@ -74,7 +74,7 @@ def _stability(found, options):
     except NotConverged as failure:
         say(f"cosserat: {failure}")
         return NOT_CONVERGED
-    say(str(answer), file=sys.stdout)
+    say(answer.details(), file=sys.stdout)
     if options.output:
         out = Path(options.output)
         prepare(out)
@@ -106,7 +106,7 @@ def _deliver(compute, options):
         check_name(film)
     history, trouble, code = ended(compute)
     if len(history):
-        say(str(history), file=sys.stdout)
+        say(history.details(), file=sys.stdout)
         if out is not None:
             _write(history, out, not options.no_picture, film if code == DONE else None, options.speed, code == DONE)
     if trouble is not None:

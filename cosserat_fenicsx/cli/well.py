@@ -57,7 +57,7 @@ def run_well(options, tables):
     written = Files(out, stops=False)
     for operation, stem in zip(scene.operations, stems, strict=True):
         answer = scene.answer(operation)
-        say(str(answer), file=sys.stdout)
+        say(answer.details(), file=sys.stdout)
         if out is not None:
             _write(answer, written, stem, not options.no_picture)
     code = DONE
@@ -67,7 +67,7 @@ def run_well(options, tables):
         sweep, code = stop.path, INTERRUPTED
         say(f"cosserat: {stop.words}")
     if sweep is not None:
-        say(str(sweep), file=sys.stdout)
+        say(sweep.details(), file=sys.stdout)
         if out is not None:
             if code == DONE:  # complete: another run begins anew
                 on_first(world(), lambda: discard(out / "depth_sweep"))

@@ -1,27 +1,55 @@
 """`DrillingHistory`: a drill-string in motion over time."""
 
-from pathlib import Path
+
 from typing import Any
 
 import numpy as np
 
 from cosserat_fenicsx.checks import File, number
+from cosserat_fenicsx.drilling import tables
 from cosserat_fenicsx.drilling.protocol import LEDGER, PROFILE, SERIES
-from cosserat_fenicsx.drilling.quantities import QUANTITIES, heading
 from cosserat_fenicsx.drilling.scene import Drilling
 from cosserat_fenicsx.drilling.segments import Discs
 from cosserat_fenicsx.drilling.stick_slip import StickSlip, stick_slip_of
 from cosserat_fenicsx.errors import SceneError
-from cosserat_fenicsx.new_files import replaced
-from cosserat_fenicsx.ranks import on_first, world
-from cosserat_fenicsx.results.result import import_library
-from cosserat_fenicsx.well.tabular import Tabular
+from cosserat_fenicsx.quantities import Quantity
+from cosserat_fenicsx.results.result import Result, by_name
 
 #: Columns of the rows that a `StringModel` gives.
 COLUMNS = ("times", *SERIES, *LEDGER)
 
 
-class DrillingHistory(Tabular):
+_TIME, _ALONG = ("time",), ("profile_time", "depth")
+_QUANTITIES = by_name(
+    Quantity("time", unit="s", axes=_TIME, getter="times"),
+    Quantity("drive_speed", unit="rad/s", axes=_TIME, shown="rpm", digits=5, short="drive"),
+    Quantity("drive_angle", unit="rad", axes=_TIME),
+    Quantity("surface_torque", unit="N m", axes=_TIME, digits=5),
+    Quantity("bit_speed", unit="rad/s", axes=_TIME, shown="rpm", digits=5, noise=1e-9, short="bit"),
+    Quantity("bit_angle", unit="rad", axes=_TIME),
+    Quantity("torque_on_bit", unit="N m", axes=_TIME, digits=5),
+    Quantity("hook_load", unit="N", axes=_TIME, digits=5),
+    Quantity("bit_velocity", unit="m/s", axes=_TIME),
+    Quantity("bit_advance", unit="m", axes=_TIME, digits=5),
+    Quantity("weight_on_bit", unit="N", axes=_TIME, digits=5),
+    Quantity("impulse_on_bit", "impulse of impacts on bit", "N s", axes=_TIME),
+    Quantity("kinetic", "kinetic energy", "J", axes=_TIME),
+    Quantity("strain", "strain energy", "J", axes=_TIME),
+    *(Quantity(name, unit="J", axes=_TIME) for name in LEDGER[2:]),
+    Quantity("balance", "not accounted for", "J", axes=_TIME),
+    Quantity("profile_time", unit="s", axes=("profile_time",), getter="profile_times"),
+    Quantity("depth", unit="m", axes=("depth",), getter="depths"),
+    Quantity("angle", "angle along the string", "rad", axes=_ALONG),
+    Quantity("speed", "speed of rotation along the string", "rad/s", axes=_ALONG),
+    Quantity("torque", "torque along the string", "N m", axes=_ALONG),
+    Quantity("displacement", "displacement along the string", "m", axes=_ALONG),
+    Quantity("velocity", "velocity along the string", "m/s", axes=_ALONG),
+    Quantity("tension", "tension along the string", "N", axes=_ALONG),
+    Quantity("sticking", "1 where the wall holds the string", axes=_ALONG, getter=lambda x: x.sticking.astype(np.int8)),
+)  # fmt: skip
+
+
+class DrillingHistory(Result):
     """The motion of a drill-string, from `simulate_drilling`.
 
     SI units, angles in rad. Angles, speeds and torques are positive in the sense of drilling; displacements, velocities
@@ -56,7 +84,8 @@ class DrillingHistory(Tabular):
     """
 
     #: For messages.
-    axis = "time"
+    axis = _rows_axis = "time"
+    _quantities = _QUANTITIES
 
     def __init__(self, scene, model, why, dt, depths, rows=None, profiles=None, counts=None, folder=None):
         self.scene: Drilling = scene
@@ -147,51 +176,17 @@ class DrillingHistory(Tabular):
 
     # -- tables ------------------------------------------------------------------------------------------------------
 
-    def _tables(self):
-        named = {heading(name): getattr(self, name) for name in (*SERIES, *LEDGER, "balance")}
-        return {"": {"time (s)": self.times, **{name: x for name, x in named.items() if not np.isnan(x).all()}}}
+    def _about(self):
+        return {"kind": "DrillingHistory", "model": self.model, "why": self.why, "dt": self.dt}
 
-    def to_xarray(self) -> Any:
-        """An xarray Dataset: series over `time`, and profiles over `profile_time` and `depth`, with their units.
+    def _answer(self, units):
+        return tables.answer_in_words(self)
 
-        Raises:
-            InstallationError: xarray is missing.
-        """
-        xarray = import_library("xarray", "to_xarray")
-        data = {name: ("time", getattr(self, name)) for name in (*SERIES, *LEDGER, "balance")}
-        data |= {name: (("profile_time", "depth"), getattr(self, name)) for name in PROFILE}
-        data["sticking"] = (data["sticking"][0], data["sticking"][1].astype(np.int8))
-        given = {name: (*entry, {"long_name": QUANTITIES[name][0], "units": QUANTITIES[name][1]})
-                 for name, entry in data.items()}  # fmt: skip
-        axes = {"time": (self.times, "s"), "profile_time": (self.profile_times, "s"), "depth": (self.depths, "m")}
-        coordinates = {name: (name, values, {"units": unit}) for name, (values, unit) in axes.items()}
-        about = {"model": self.model, "why": "\n".join(self.why), "dt": self.dt}
-        return xarray.Dataset(given, coordinates, about)
+    def _more(self, units):
+        return tables.more_in_words(self)
 
-    def write(self, file: File) -> None:
-        """Write the series as a .csv file, or all of it as a .nc file (NetCDF 4), in SI. Rank 0 writes.
-
-        Raises:
-            SceneError: another ending, or a motion without times.
-            InstallationError: xarray or h5netcdf is missing, for .nc.
-            OSError: it cannot be written.
-        """
-        file = Path(file)
-        if not len(self):
-            raise SceneError(f"{file}: the motion has no time to write")
-        if file.suffix.lower() == ".csv":
-            super().write(file)
-        elif file.suffix.lower() == ".nc":
-            import_library("h5netcdf", "write")
-            dataset = self.to_xarray()
-
-            def written():
-                with replaced(file) as fresh:
-                    dataset.to_netcdf(fresh, engine="h5netcdf")
-
-            on_first(world(), written)
-        else:
-            raise SceneError(f"{file}: expected a name that ends in .csv or .nc")
+    def _table(self, units, rows):
+        return tables.over_time(self, units, rows) if len(self) else None
 
     # -- pictures ----------------------------------------------------------------------------------------------------
 
@@ -284,8 +279,3 @@ class DrillingHistory(Tabular):
     def __repr__(self):
         last = f" up to t = {self.times[-1]:g} s" if len(self) else ""
         return f"DrillingHistory({self.model}: {len(self)} times{last}, {len(self.profile_times)} profiles)"
-
-    def __str__(self):
-        from cosserat_fenicsx.drilling.tables import history_table
-
-        return history_table(self)

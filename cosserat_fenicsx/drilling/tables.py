@@ -1,24 +1,14 @@
 """Tables of a drill-string in motion for the screen."""
 
 import numpy as np
-from rich.table import Table
 
-from cosserat_fenicsx.results.screen import as_text
+from cosserat_fenicsx.results import screen
 
-# Rows that are shown.
+# Rows of the table of `details`.
 _ROWS = 16
 _RPM = 30 / np.pi
-#: (heading, attribute, factor).
-_SHOWN = (
-    ("t (s)", "times", 1.0),
-    ("drive (rpm)", "drive_speed", _RPM),
-    ("bit (rpm)", "bit_speed", _RPM),
-    ("surface torque (kN m)", "surface_torque", 1e-3),
-    ("torque on bit (kN m)", "torque_on_bit", 1e-3),
-    ("hook load (kN)", "hook_load", 1e-3),
-    ("weight on bit (kN)", "weight_on_bit", 1e-3),
-    ("bit advance", "bit_advance", 1.0),
-)
+_SHOWN = ("time", "drive_speed", "bit_speed", "surface_torque", "torque_on_bit", "hook_load", "weight_on_bit",
+          "bit_advance")  # fmt: skip
 _CAPTION = (
     "A row holds for the end of a step, forces and torques in it are means over the step, or of torsion alone over two "
     "(at the first one, the time before the start counts with zero): history.mean_times. The motion begins at t = 0, "
@@ -26,38 +16,41 @@ _CAPTION = (
 )
 
 
-def history_table(history):
-    """Text: the state at some times, what the bit does, and what decided for the model."""
+def over_time(history, units, rows):
+    """The table of the state at some times."""
     halved = history.counts.get("halved", 0)
     told = f", {halved} times halved where the motion needs it" if halved else ""
-    table = Table(title=f"{history.model} model, steps of {history.dt:.4g} s{told}", caption=_CAPTION)
-    rows = np.unique(np.linspace(0, len(history) - 1, _ROWS).astype(int)) if len(history) else []
-    columns = [(head, getattr(history, name) * factor) for head, name, factor in _SHOWN]
-    columns = [(head, values) for head, values in columns if head == "t (s)" or not np.isnan(values).all()]
-    unit, factor = advance_unit(history.bit_advance)
-    columns = [(f"{head} ({unit})", values * factor) if head == "bit advance" else (head, values)
-               for head, values in columns]  # fmt: skip
-    for head, _ in columns:
-        table.add_column(head, justify="right")
-    for k in rows:
-        table.add_row(*(f"{round(values[k], 9) + 0.0:.5g}" for _, values in columns))
-    lines = [as_text(table)]
+    given = [(history.quantities[name], getattr(history, "times" if name == "time" else name)) for name in _SHOWN]
+    given = [(x, values) for x, values in given if x.name == "time" or not np.isnan(values).all()]
+    return screen.table(given, units, min(rows, _ROWS), f"{history.model} model, steps of {history.dt:.4g} s{told}",
+                        _CAPTION if rows == screen.ROWS else None)  # fmt: skip
+
+
+def answer_in_words(history):
+    """Sentences: what the bit does, estimated errors, cautions, and why this model."""
     if len(history) > 5:
-        lines.append(str(history.stick_slip()))
-        worked = {name: np.nan_to_num(getattr(history, f"work_of_{name}")[-1]) for name in ("drive", "hook", "weight")}
-        done = ", ".join(f"of the {name} {x / 1e3:.5g} kJ" for name, x in worked.items() if x or name == "drive")
-        lines.append(f"Energy: work {done}; the ledger does not account for "
-                     f"{history.balance[-1] / 1e3:.3g} kJ.")  # fmt: skip
-    lines += _impacts(history)
+        yield str(history.stick_slip())
     if history.errors is not None:
         period, peak, *torques = history.errors
         told = "" if np.isnan(period) else f"period {period:.2g} s, "
-        lines.append(f"Estimated errors by the step: {told}peak {peak * _RPM:.2g} rpm, surface torque "
-                     f"{max(torques) / 1e3:.2g} kN m.")  # fmt: skip
+        yield (
+            f"Estimated errors by the step: {told}peak {peak * _RPM:.2g} rpm, surface torque "
+            f"{max(torques) / 1e3:.2g} kN m."
+        )
     caution = alias(history)
     if caution:
-        lines.append(f"{caution[0].upper()}{caution[1:]}.")
-    return "\n".join([*lines, *history.why])
+        yield f"{caution[0].upper()}{caution[1:]}."
+    yield from history.why[:1]
+
+
+def more_in_words(history):
+    """Sentences of `details`: energies, impacts, and all reasons."""
+    if len(history) > 5:
+        worked = {name: np.nan_to_num(getattr(history, f"work_of_{name}")[-1]) for name in ("drive", "hook", "weight")}
+        done = ", ".join(f"of the {name} {x / 1e3:.5g} kJ" for name, x in worked.items() if x or name == "drive")
+        yield f"Energy: work {done}; the ledger does not account for {history.balance[-1] / 1e3:.3g} kJ."
+    yield from _impacts(history)
+    yield from history.why[1:]
 
 
 def _impacts(history):

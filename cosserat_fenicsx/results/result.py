@@ -75,7 +75,7 @@ class Result:
             found |= vars(kind).get("_quantities", {})
         return found
 
-    def values(self, name: str, units: str | Mapping = "SI") -> Any:
+    def value(self, name: str, units: str | Mapping = "SI") -> Any:
         """A quantity by its name, in some units.
 
         Raises:
@@ -83,7 +83,7 @@ class Result:
         """
         known = self.quantities
         if name not in known:
-            raise SceneError(f"values({name!r}): expected one of {', '.join(known)}")
+            raise SceneError(f"value({name!r}): expected one of {', '.join(known)}")
         size = Units(units).of(known[name])[1]
         return known[name].of(self) if size == 1.0 else known[name].of(self) / size
 
@@ -198,6 +198,14 @@ class Result:
     def _titles(self, units: Units) -> tuple[str | None, str | None]:
         """The title of the table, and what stands under it."""
         return None, None
+
+    def _told(self, name: str, units: Units, value: float | None = None, form: str = ".6g") -> str:
+        """A number with its unit: that of a quantity, or another one of its kind."""
+        quantity = self.quantities[name]
+        value = float(quantity.of(self)) if value is None else value
+        unit, size = units.on_screen(quantity, [value])
+        number = 0.0 if abs(value) <= quantity.noise else value / size
+        return f"{number:{form}} {unit}" if unit != "1" else f"{number:{form}}"
 
     # -- of subclasses -----------------------------------------------------------------------------------------------
 

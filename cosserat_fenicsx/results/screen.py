@@ -47,7 +47,8 @@ def table(given, units, rows, title=None, caption=None, which=None):
         parts = values.reshape(count, -1).T
         for part, column in zip(quantity.parts or [""], parts, strict=True):
             label = dataclasses.replace(quantity, label=f"{quantity.short or f'{quantity.label} '}{part}".strip())
-            found.add_column(label.heading(unit), justify="right" if numbers else "left", overflow="fold")
+            found.add_column(label.heading(unit), justify="right" if numbers else "left", overflow="fold",
+                             no_wrap=not numbers)  # fmt: skip
             texts.append([value_text(column[k], quantity.digits) for k in which])
     for i, row in enumerate(zip(*texts, strict=True)):
         if gaps and which[i] > (which[i - 1] + 1 if i else 0):
@@ -83,9 +84,10 @@ def page(answer, table_of):
     if len(lines) > LINES - _FRAME - _FEWEST:
         lines = [*lines[: LINES - _FRAME - _FEWEST - 1], "... more by `details()`"]
     rows = SHORT
-    while (shown := table_of(rows)) is not None and rows >= 1:
+    while rows >= 1 and (shown := table_of(rows)) is not None:
         text = as_text(shown, WIDTH).splitlines()
-        if len(lines) + len(text) <= LINES:
+        beyond = len(lines) + len(text) - LINES
+        if beyond <= 0:
             return "\n".join([*lines, *text])
-        rows -= 1
-    return "\n".join(lines[:LINES])
+        rows -= beyond
+    return "\n".join(lines)

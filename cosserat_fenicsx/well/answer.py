@@ -2,13 +2,16 @@
 
 from dataclasses import dataclass
 from functools import cached_property
+from types import MappingProxyType
 from typing import Any, ClassVar
 
 import numpy as np
 
 from cosserat_fenicsx.checks import File
 from cosserat_fenicsx.errors import SceneError
-from cosserat_fenicsx.well import criteria
+from cosserat_fenicsx.quantities import Quantity
+from cosserat_fenicsx.results.result import Result, by_name
+from cosserat_fenicsx.well import criteria, tables
 from cosserat_fenicsx.well.components import DrillString
 from cosserat_fenicsx.well.contacts import WallContact, contacts_of, high_side, side_force_up_to, sides_of
 from cosserat_fenicsx.well.differentiated import Differentiated
@@ -16,14 +19,65 @@ from cosserat_fenicsx.well.hole import Borehole, Mud
 from cosserat_fenicsx.well.operations import Operation
 from cosserat_fenicsx.well.pieces import Sections, sections_of, stretch, true_tension, von_mises
 from cosserat_fenicsx.well.softstring import UP_TO
-from cosserat_fenicsx.well.tabular import Tabular
 
 # A torque below this share of the largest tension times the contact radius is nothing that errors are compared with.
 _LITTLE = 1e-2
 
 
+def _axis_of_hole(k):
+    return lambda answer: answer.hole.path.position(answer.md)[:, k]
+
+
+def _of_contacts(name):
+    return lambda answer: np.array([getattr(contact, name) for contact in answer.contacts])
+
+
+def _degrees(name):
+    return lambda answer: np.degrees(getattr(answer, name))
+
+
+_ALONG, _CONTACT = ("place",), ("contact",)
+_QUANTITIES = by_name(
+    Quantity("hook_load", unit="N", axes=()),
+    Quantity("surface_torque", unit="N m", axes=(), noise=1e-6),
+    Quantity("drag", "friction", "N", axes=()),
+    Quantity("error", "estimated relative error of the solution", axes=()),
+    Quantity("model_error", "estimated relative error of the model", axes=()),
+    Quantity("stretch", unit="m", axes=()),
+    Quantity("twist", unit="rad", axes=(), noise=1e-8),
+    Quantity("neutral_point", unit="m", axes=()),
+    Quantity("md", unit="m", axes=_ALONG),
+    Quantity("north", unit="m", axes=_ALONG, getter=_axis_of_hole(0)),
+    Quantity("east", unit="m", axes=_ALONG, getter=_axis_of_hole(1)),
+    Quantity("down", unit="m", axes=_ALONG, getter=_axis_of_hole(2)),
+    Quantity("inclination", unit="deg", axes=_ALONG, getter=_degrees("inclination"), digits=4, short="incl."),
+    Quantity("azimuth", unit="deg", axes=_ALONG, getter=_degrees("azimuth")),
+    Quantity("tension", "effective tension", "N", axes=_ALONG, short="tension"),
+    Quantity("true_tension", unit="N", axes=_ALONG),
+    Quantity("torque", unit="N m", axes=_ALONG, noise=1e-6),
+    Quantity("side_force", unit="N/m", axes=_ALONG, dimension="force per length"),
+    Quantity("distributed_force", "distributed side force", "N/m", axes=_ALONG, dimension="force per length",
+             shown="N/m", digits=5, short="side force"),
+    Quantity("contact_side", "contact side from the high side", "deg", axes=_ALONG, getter=_degrees("contact_side")),
+    Quantity("standoff", "stand-off", axes=_ALONG),
+    Quantity("clearance", unit="m", axes=_ALONG, dimension="diameter"),
+    Quantity("bending_moment", unit="N m", axes=_ALONG, digits=4, short="moment"),
+    Quantity("von_mises", "von Mises", "Pa", axes=_ALONG, digits=4),
+    Quantity("state", axes=_ALONG, getter=lambda answer: np.array([criteria.STATES[x] for x in answer.buckling])),
+    Quantity("component_name", "component", axes=_ALONG,
+             getter=lambda answer: np.array([x.name for x in answer.string.components])[answer.component]),
+    Quantity("contact_top", "from md", "m", axes=_CONTACT, getter=_of_contacts("top")),
+    Quantity("contact_bottom", "to md", "m", axes=_CONTACT, getter=_of_contacts("bottom")),
+    Quantity("contact_force", "force", "N", axes=_CONTACT, getter=_of_contacts("force")),
+    Quantity("contact_error", "error", "N", axes=_CONTACT, getter=_of_contacts("error")),
+    Quantity("contact_where", "side", axes=_CONTACT, getter=_of_contacts("side")),
+    Quantity("contact_component", "component", axes=_CONTACT,
+             getter=lambda answer: np.array([tables.parts_at(answer, x) for x in answer.contacts])),
+)  # fmt: skip
+
+
 @dataclass(frozen=True, eq=False, repr=False)
-class TorqueAndDrag(Differentiated, Tabular):
+class TorqueAndDrag(Differentiated, Result):
     """What a string in its hole carries, from `torque_and_drag`. SI units; depths are measured depths.
 
     Arrays run down the hole along `md`, which repeats a depth where something jumps: the value above it, then that
@@ -46,6 +100,9 @@ class TorqueAndDrag(Differentiated, Tabular):
     words = property(lambda self: f"{self.model} string", doc="What was solved, for titles.")
     distributed_force = property(lambda self: self.side_force, doc="`side_force` (N/m) without forces at points.")
     # Which bending moment it has; and what the model leaves out for all that is estimated.
+    _quantities, _rows_axis, _beside = _QUANTITIES, "place", MappingProxyType({"_contacts": "contact"})
+    _on_screen = ("md", "component_name", "inclination", "tension", "torque", "distributed_force", "bending_moment",
+                  "von_mises", "state")  # fmt: skip
     _moment_words: ClassVar[str] = "EI times the hole's curvature"
     _leaves_out: ClassVar[str] = ""
 
@@ -285,10 +342,23 @@ class TorqueAndDrag(Differentiated, Tabular):
             criterion, self._sections.EI, self.clearance, weight, self.inclination, along, across, k
         )
 
-    def _tables(self):
-        from cosserat_fenicsx.well.tables import answer_columns, contact_columns
+    # -- tables and pictures -----------------------------------------------------------------------------------------
 
-        return {"": answer_columns(self), "_contacts": contact_columns(self)}
+    def __len__(self) -> int:
+        return len(self.md)
+
+    def _about(self):
+        names = ("depth", "model", "tol", "enough", "torque_convention", "why")
+        return {"kind": "TorqueAndDrag", "operation": self.operation.name} | {x: getattr(self, x) for x in names}
+
+    def _answer(self, units):
+        return tables.answer_in_words(self, units)
+
+    def _more(self, units):
+        return tables.more_in_words(self, units)
+
+    def _table(self, units, rows):
+        return tables.along(self, units, rows)
 
     def plot(
         self,
@@ -351,11 +421,6 @@ class TorqueAndDrag(Differentiated, Tabular):
     def __repr__(self):
         loads = f"hook load {self.hook_load:.6g} N, surface torque {self.surface_torque:.6g} N m"
         return f"TorqueAndDrag({self.operation.name}, bit at {self.depth:g} m, {self.model}: {loads})"
-
-    def __str__(self):
-        from cosserat_fenicsx.well.tables import answer_table
-
-        return answer_table(self)
 
 
 def scales_of(solved, pieces):

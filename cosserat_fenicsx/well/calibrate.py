@@ -13,6 +13,8 @@ from scipy.stats import t as student
 from cosserat_fenicsx.checks import File, instance, number, refuse, warn
 from cosserat_fenicsx.errors import SceneError, SceneWarning
 from cosserat_fenicsx.parts import Depth, ForceSize, Part, Torque, positive
+from cosserat_fenicsx.quantities import Quantity
+from cosserat_fenicsx.results.result import Result, by_name
 from cosserat_fenicsx.well.components import DrillString
 from cosserat_fenicsx.well.hole import Borehole, Mud
 from cosserat_fenicsx.well.operations import Operation
@@ -73,7 +75,7 @@ class RigMeasurement(Part):
 
 
 @dataclass(frozen=True, eq=False)
-class FrictionFit:
+class FrictionFit(Result):
     """Coefficients of friction by least squares, from `calibrate_friction`.
 
     Attributes:
@@ -118,10 +120,33 @@ class FrictionFit:
 
         return draw_fit(self, file, units=units, width=width)
 
-    def __str__(self):
-        from cosserat_fenicsx.well.tables import fit_table
+    _rows_axis = "section"
+    _quantities = by_name(
+        Quantity("section", axes=("section",),
+                 getter=lambda x: np.array([one.name or str(i) for i, one in enumerate(x.hole.sections, start=1)])),
+        Quantity("to", unit="m", axes=("section",), getter=lambda x: np.array([one.to for one in x.hole.sections])),
+        Quantity("friction", axes=("section",), digits=4, noise=1e-6),
+        Quantity("interval", parts=("from", "to"), axes=("section",), digits=4),
+        Quantity("block_weight", unit="N", axes=()),
+        Quantity("block_interval", unit="N", parts=("from", "to"), axes=()),
+        Quantity("residuals", axes=("reading",)),
+        Quantity("misfit", axes=()),
+    )  # fmt: skip
+    _on_screen = ("section", "to", "friction", "interval")
 
-        return fit_table(self)
+    def __len__(self):
+        return len(self.friction)
+
+    def _answer(self, units):
+        yield f"Coefficients of friction by least squares, with {100 * self.confidence:g} % intervals."
+        yield f"misfit {self.misfit:.3g} (1: as the standard deviations say)"
+        for section, friction in zip(self.quantities["section"].of(self), self.friction, strict=True):
+            if friction < 1e-6:
+                yield f"The friction of {section} is at its bound: the readings ask for less than none."
+        if np.isfinite(self.block_interval).all():
+            low, high = (self._told("block_weight", units, x) for x in self.block_interval)
+            yield f"block weight {self._told('block_weight', units)}, from {low} to {high}"
+        yield from (f"DOUBTFUL: {doubt}" for doubt in self.doubts)
 
 
 def calibrate_friction(

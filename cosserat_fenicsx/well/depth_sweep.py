@@ -7,7 +7,7 @@ the mesh touch the wall. On the first mesh they were 21 to 23, and one start of 
 """
 
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -16,15 +16,18 @@ import numpy as np
 from cosserat_fenicsx.checks import File, Numbers, finite_array, refuse
 from cosserat_fenicsx.errors import Interrupted, NotConverged, SceneError
 from cosserat_fenicsx.progress import Progress
+from cosserat_fenicsx.quantities import Quantity, Units
 from cosserat_fenicsx.ranks import world
+from cosserat_fenicsx.results import screen
+from cosserat_fenicsx.results.result import Result, by_name
 from cosserat_fenicsx.storage.mark import NotMarked, mark_of
 from cosserat_fenicsx.storage.store import Kind, Store
+from cosserat_fenicsx.well import tables
 from cosserat_fenicsx.well.buckled import LockUp
 from cosserat_fenicsx.well.components import DrillString
 from cosserat_fenicsx.well.hole import Borehole, Mud
 from cosserat_fenicsx.well.operations import Operation
 from cosserat_fenicsx.well.pieces import pieces_of
-from cosserat_fenicsx.well.tabular import Tabular
 from cosserat_fenicsx.well.torque_and_drag import AUTO, BUCKLED, ROD, SOFT, torque_and_drag
 
 #: Numbers that are kept of an answer; `locked` is where the string locks up, m, or NaN; `rung` the index of its model.
@@ -37,8 +40,13 @@ KIND = Kind(
 _PLACE = ("operation", "friction", "depth")
 
 
-@dataclass(frozen=True, eq=False)
-class DepthSweep(Tabular):
+_CASES = ("operation", "friction", "depth")
+# Columns of the table that `print` shows, beside the depth.
+_COLUMNS = 6
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class DepthSweep(Result):
     """Surface loads over the depth of the bit, from `depth_sweep`.
 
     Attributes:
@@ -57,7 +65,21 @@ class DepthSweep(Tabular):
     notes: dict[tuple[int, int, int], str] = field(default_factory=dict)
 
     #: For messages.
-    axis = "answer"
+    axis, _rows_axis = "answer", "depth"
+    _quantities = by_name(
+        Quantity("operation", axes=("operation",), getter=lambda x: np.array([one.name for one in x.operations])),
+        Quantity("friction", axes=("friction",), getter=lambda x: np.array([_as_text(one) for one in x.friction])),
+        Quantity("depth", unit="m", axes=("depth",), getter="depths"),
+        Quantity("hook_load", unit="N", axes=_CASES),
+        Quantity("surface_torque", unit="N m", axes=_CASES),
+        *(Quantity(name, label, unit, axes=_CASES, getter=lambda x, name=name: x.values[name])
+          for name, label, unit in (("error", "estimated relative error of the solution", "1"),
+                                    ("model_error", "estimated relative error of the model", "1"),
+                                    ("locked", "measured depth where it locks up", "m"))),
+        Quantity("models", "model", axes=_CASES),
+        Quantity("notes", axes=("depth",),
+                 getter=lambda x: np.array(["; ".join(x.noted(k)) for k in range(len(x.depths))])),
+    )  # fmt: skip
 
     hook_load = property(lambda self: self.values["hook_load"], doc="(operations, friction, depths) N.")
     surface_torque = property(lambda self: self.values["surface_torque"], doc="(operations, friction, depths) N m.")
@@ -83,8 +105,7 @@ class DepthSweep(Tabular):
         friction = self.friction[j]
         if friction is None:
             return self.operations[i].name
-        told = f"{friction:g}" if np.ndim(friction) == 0 else ", ".join(f"{x:g}" for x in friction)
-        return f"{self.operations[i].name}, friction {told}"
+        return f"{self.operations[i].name}, friction {_as_text(friction)}"
 
     def noted(self, k: int | None = None) -> list[str]:
         """The notes in words, with operation, friction and depth; those of depth k alone where it is given."""
@@ -94,10 +115,21 @@ class DepthSweep(Tabular):
             if k in (None, index[2])
         ]
 
-    def _tables(self):
-        from cosserat_fenicsx.well.tables import sweep_columns
+    def columns(self, units: str | Mapping = "SI", axis: str = "") -> dict[str, np.ndarray]:
+        """{heading: (depths,)} of loads and models of each operation and friction, and notes."""
+        found, units, known = super().columns(units, axis), Units(units), self.quantities
+        notes = found.pop("notes", None)
+        for i in range(len(self.operations)):
+            for j in range(len(self.friction)):
+                for name in ("hook_load", "surface_torque", "models"):
+                    found |= known[name].columns(getattr(self, name)[i, j], units, f"{self.label(i, j)}: ")
+        return found if notes is None else found | {"notes": notes}
 
-        return {"": sweep_columns(self)}
+    def _answer(self, units):
+        return tables.sweep_in_words(self)
+
+    def _table(self, units, rows):
+        return tables.over_depths(self, units, rows, 100 if rows == screen.ROWS else _COLUMNS)
 
     def plot(self, file: File | None = None, *, units: Any = "SI", width: int | None = None):
         """Draw hook load and surface torque over the depth of the bit, the depth downwards ("broomstick").
@@ -118,10 +150,12 @@ class DepthSweep(Tabular):
         names = ", ".join(operation.name for operation in self.operations)
         return f"DepthSweep({names}; {len(self.depths)} depths; {len(self)} of {self.done.size} answers)"
 
-    def __str__(self):
-        from cosserat_fenicsx.well.tables import sweep_table
 
-        return sweep_table(self)
+def _as_text(friction):
+    """Coefficients of friction in words; "" for those of the hole."""
+    if friction is None:
+        return ""
+    return f"{friction:g}" if np.ndim(friction) == 0 else ", ".join(f"{x:g}" for x in friction)
 
 
 def depth_sweep(

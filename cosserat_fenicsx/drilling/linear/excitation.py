@@ -13,11 +13,12 @@ from cosserat_fenicsx.drilling.linear.characteristic import speeds_and_weights
 from cosserat_fenicsx.drilling.linear.frequencies import natural_frequencies
 from cosserat_fenicsx.drilling.linear.impedances import axial
 from cosserat_fenicsx.drilling.scene import Drilling
-from cosserat_fenicsx.well.tabular import Tabular
+from cosserat_fenicsx.quantities import Quantity
+from cosserat_fenicsx.results.result import Result, by_name
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Campbell(Tabular):
+class Campbell(Result):
     """Result of `campbell`.
 
     Attributes:
@@ -58,16 +59,30 @@ class Campbell(Tabular):
         found = ", ".join(f"{len(x)} {kind}" for kind, x in self.frequencies.items())
         return f"<Campbell: {found} frequencies up to {self.up_to:.4g} Hz; {', '.join(self.excitations)}>"
 
-    def _tables(self):
-        rows = [
-            (kind, name, float(speed), times * speed / (2 * math.pi))
+    axis = _rows_axis = "critical speed"
+    _quantities = by_name(*(
+        Quantity(name, unit=unit, axes=("critical speed",), shown=shown,
+                 getter=lambda x, k=k: np.array([row[k] for row in x._rows]))
+        for k, (name, unit, shown) in enumerate((
+            ("kind", "1", ""), ("excitation", "1", ""), ("critical_speed", "rad/s", "rpm"), ("frequency", "Hz", "")))
+    ))  # fmt: skip
+
+    def __len__(self) -> int:
+        return len(self._rows)
+
+    @property
+    def _rows(self):
+        """(kind, excitation, speed, frequency) of every critical speed."""
+        return [
+            (kind, name, float(speed), self.excitations[name] * speed / (2 * math.pi))
             for (kind, name), speeds in self.critical_speeds().items()
-            for times in (self.excitations[name],)
             for speed in speeds
         ]
-        headings = ("kind", "excitation", "critical speed (rad/s)", "frequency (Hz)")
-        columns = list(zip(*rows, strict=True)) or [()] * 4
-        return {"": {heading: list(column) for heading, column in zip(headings, columns, strict=True)}}
+
+    def _answer(self, units):
+        found = " and ".join(f"{len(x)} of {kind}" for kind, x in self.frequencies.items())
+        yield f"{len(self)} critical speeds up to {self.fastest * 30 / math.pi:.4g} rpm."
+        yield f"Natural frequencies up to {self.up_to:.4g} Hz: {found}; excitations: {', '.join(self.excitations)}."
 
 
 def campbell(
@@ -118,7 +133,7 @@ def _up_to(scene, kind, end, up_to):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class BitBounce(Tabular):
+class BitBounce(Result):
     """Result of `bit_bounce`.
 
     Attributes:
@@ -172,11 +187,19 @@ class BitBounce(Tabular):
         told = f"the bit lifts off at {len(lifted)} of {len(self.speeds)} speeds"
         return f"<BitBounce: {told}" + (f", from {rpm.min():.4g} to {rpm.max():.4g} rpm>" if len(lifted) else ">")
 
-    def _tables(self):
-        return {"": {
-            "speed (rad/s)": self.speeds, "frequency (Hz)": self.frequency, "amplitude of weight (N)": self.amplitude,
-            "lifts off": self.lifts_off.astype(float),
-        }}  # fmt: skip
+    axis = _rows_axis = "speed"
+    _quantities = by_name(
+        Quantity("speed", unit="rad/s", axes=("speed",), getter="speeds", shown="rpm"),
+        Quantity("frequency", unit="Hz", axes=("speed",)),
+        Quantity("amplitude", "amplitude of weight", "N", axes=("speed",)),
+        Quantity("lifts_off", axes=("speed",)),
+    )
+
+    def __len__(self) -> int:
+        return len(self.speeds)
+
+    def _answer(self, units):
+        yield f"{repr(self)[12:-1]}; the static weight on bit is {self.scene.bit.weight / 1e3:.4g} kN."
 
 
 def bit_bounce(scene: Drilling, speeds: Numbers) -> BitBounce:

@@ -6,7 +6,6 @@ import numpy as np
 from rich.table import Table
 
 from cosserat_fenicsx.drilling.linear.frequencies import own_rule
-from cosserat_fenicsx.results.screen import as_text
 
 #: Modes that are listed with their places and drives, the fastest ones.
 _LISTED = 12
@@ -18,45 +17,68 @@ _DRIVES = {
 }
 
 
-def stability_table(answer):
-    """Text: every mode that grows, where it moves, in how many cases, and what other drives make of it."""
-    grows = [k for k in range(answer.roots.shape[2]) if (answer.growth[:, :, k] > 0).any()]
-    cases = answer.growth.shape[0] * answer.growth.shape[1]
-    lines = [f"{_range(answer)}, all modes up to {answer.up_to:.4g} Hz.", *(f"{x}." for x in answer.cautions)]
-    if not grows:
-        k = int(np.nanargmax(np.nanmax(answer.growth, axis=(0, 1))))
-        i, j = answer.worst(k)
-        least = f"{answer.frequency[i, j, k]:.4g} Hz, which decays by {-answer.growth[i, j, k]:.3g} 1/s"
-        return "\n".join([*lines, f"No mode grows. Least damped: {least} at {_case(answer, i, j)}."])
-    grows.sort(key=lambda k: -np.nanmax(answer.growth[:, :, k]))
-    rows, places, known = [], [], {}
-    for k in grows[:_LISTED]:
-        i, j = _middle(answer, k)
-        if (i, j) not in known:
-            known[i, j] = answer.with_drives(i, j)
-        drives = {name: growth[k] for name, growth in known[i, j].items()}
-        places.append(f"{answer.frequency[i, j, k]:.4g} Hz moves: {answer.shape(k, i, j).where}")
-        rows.append((k, i, j, drives))
-    names, own = list(rows[0][3]), own_rule(answer.scene)
-    drive = own or type(answer.scene.drive.control).__name__
-    table = Table(
-        caption="growth: in 1/s. fastest: the largest of all cases. at: the middle one of those in which the mode "
-        f"grows, its frequency and growth there, with the drive of the scene, {drive}. mode: counted from 0 by "
-        f"frequency there. To the right the growth with {'each drive' if own else 'other drives'}: {_words(names)}. "
-        "gone: with that drive no mode is near."
-    )
-    headings = [f"{name} (own)" if name == own else name for name in names]
-    for heading in ("mode", "grows in", "fastest", "at rpm", "kN", "frequency (Hz)", "growth", *headings):
-        table.add_column(heading, justify="right")
-    for k, i, j, drives in rows:
-        share = f"{int((answer.growth[:, :, k] > 0).sum())} of {cases}"
-        told = [share, f"{np.nanmax(answer.growth[:, :, k]):.4f}", *_numbers(answer, i, j)]
-        here = f"{answer.frequency[i, j, k]:.4f}", f"{answer.growth[i, j, k]:.4f}"
-        table.add_row(str(k), *told, *here, *("gone" if math.isnan(x) else f"{x:.4f}" for x in drives.values()))
-    lines += [as_text(table), *places]
-    if len(grows) > _LISTED:
-        lines.append(f"{len(grows) - _LISTED} more modes grow: to_dataframe() has all.")
-    return "\n".join([*lines, *map("{}.".format, _advice(answer, rows, [name for name in names if name != own]))])
+class Growing:
+    """The modes of a `Stability` that grow: where they move, in how many cases, and what other drives make of them."""
+
+    def __init__(self, answer):
+        self.answer, self.rows, known = answer, [], {}
+        self.count = 0
+        grows = [k for k in range(answer.roots.shape[2]) if (answer.growth[:, :, k] > 0).any()]
+        grows.sort(key=lambda k: -np.nanmax(answer.growth[:, :, k]))
+        self.count = len(grows)
+        for k in grows[:_LISTED]:
+            i, j = _middle(answer, k)
+            if (i, j) not in known:
+                known[i, j] = answer.with_drives(i, j)
+            self.rows.append((k, i, j, {name: growth[k] for name, growth in known[i, j].items()}))
+        self.names, self.own = list(self.rows[0][3]) if self.rows else [], own_rule(answer.scene)
+
+    def in_words(self):
+        """Sentences: what was looked for, whether a mode grows, and what each drive calms."""
+        answer = self.answer
+        yield f"{_range(answer)}, all modes up to {answer.up_to:.4g} Hz."
+        yield from (f"{caution}." for caution in answer.cautions)
+        if not self.rows:
+            k = int(np.nanargmax(np.nanmax(answer.growth, axis=(0, 1))))
+            i, j = answer.worst(k)
+            least = f"{answer.frequency[i, j, k]:.4g} Hz, which decays by {-answer.growth[i, j, k]:.3g} 1/s"
+            yield f"No mode grows. Least damped: {least} at {_case(answer, i, j)}."
+            return
+        yield f"{self.count} modes grow."
+        yield from map("{}.".format, _advice(answer, self.rows, [name for name in self.names if name != self.own]))
+
+    @property
+    def more(self):
+        """Sentences of `details`: what the columns mean, and where the modes move."""
+        if not self.rows:
+            return
+        drive = self.own or type(self.answer.scene.drive.control).__name__
+        yield (
+            "growth: in 1/s. fastest: the largest of all cases. at: the middle one of those in which the mode grows, "
+            f"its frequency and growth there, with the drive of the scene, {drive}. mode: counted from 0 by frequency "
+            f"there. To the right the growth with {'each drive' if self.own else 'other drives'}: "
+            f"{_words(self.names)}. gone: with that drive no mode is near."
+        )
+        for k, i, j, _ in self.rows:
+            yield f"{self.answer.frequency[i, j, k]:.4g} Hz moves: {self.answer.shape(k, i, j).where}"
+        if self.count > _LISTED:
+            yield f"{self.count - _LISTED} more modes grow: to_dataframe() has all."
+
+    def table(self, rows):
+        """The rich table of the fastest modes that grow; None where none does."""
+        if not self.rows:
+            return None
+        answer, cases = self.answer, self.answer.growth.shape[0] * self.answer.growth.shape[1]
+        table = Table()
+        headings = [f"{name} (own)" if name == self.own else name for name in self.names]
+        for heading in ("mode", "grows in", "fastest", "at rpm", "kN", "frequency (Hz)", "growth", *headings):
+            table.add_column(heading, justify="right", overflow="fold")
+        for k, i, j, drives in self.rows[:rows]:
+            share = f"{int((answer.growth[:, :, k] > 0).sum())} of {cases}"
+            told = [share, f"{np.nanmax(answer.growth[:, :, k]):.4g}", *_numbers(answer, i, j)]
+            here = f"{answer.frequency[i, j, k]:.4f}", f"{answer.growth[i, j, k]:.4g}"
+            table.add_row(str(k), *told, *here, *("gone" if math.isnan(x) else f"{x:.4g}" for x in drives.values()))
+        return table
 
 
 def _words(names):

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,8 @@ from cosserat_fenicsx.drilling.linear.impedances import Disc, Uniform
 from cosserat_fenicsx.drilling.linear.roots import all_roots, follow
 from cosserat_fenicsx.drilling.scene import Drilling
 from cosserat_fenicsx.drilling.top_drive import Matched, Stiff, TopDrive
-from cosserat_fenicsx.well.tabular import Tabular
+from cosserat_fenicsx.quantities import Quantity
+from cosserat_fenicsx.results.result import Result, by_name
 
 #: A growth below this share of the root is rounding: a mode without losses.
 _NEUTRAL = 1e-11
@@ -153,7 +155,7 @@ def growth_with(answer, i, j, drives=None):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Stability(Tabular):
+class Stability(Result):
     """Growth and frequency of every mode at every speed and weight.
 
     Attributes:
@@ -169,6 +171,41 @@ class Stability(Tabular):
     weights: np.ndarray
     roots: np.ndarray
     up_to: float
+
+    axis = _rows_axis = "root"
+    _quantities = by_name(
+        Quantity("speed", unit="rad/s", axes=("root",), getter=lambda x: x.speeds[x._found[0]], shown="rpm"),
+        Quantity("weight_on_bit", unit="N", axes=("root",), getter=lambda x: x.weights[x._found[1]]),
+        Quantity("mode", axes=("root",), getter=lambda x: x._found[2]),
+        Quantity("growth", unit="1/s", axes=("root",), getter=lambda x: x.growth[x._found]),
+        Quantity("frequency", unit="Hz", axes=("root",), getter=lambda x: x.frequency[x._found]),
+    )
+
+    def __len__(self) -> int:
+        return len(self._found[0])
+
+    @property
+    def _found(self):
+        """Indices (speeds, weights, modes) of all roots that are known."""
+        return np.nonzero(np.isfinite(self.growth))
+
+    def _about(self):
+        return {"kind": "Stability", "up_to": self.up_to, "cautions": self.cautions}
+
+    @cached_property
+    def _growing(self):
+        from cosserat_fenicsx.drilling.linear.spectrum_table import Growing
+
+        return Growing(self)
+
+    def _answer(self, units):
+        return self._growing.in_words()
+
+    def _more(self, units):
+        return self._growing.more
+
+    def _table(self, units, rows):
+        return self._growing.table(rows)
 
     @property
     def growth(self) -> np.ndarray:
@@ -260,11 +297,6 @@ class Stability(Tabular):
         cases = f"{len(self.speeds)} speeds and {len(self.weights)} weights, up to {self.up_to:.4g} Hz"
         return f"<Stability: {cases}; modes grow in {(grow > 0).sum()} of {grow.size} cases, {grow.max()} at most>"
 
-    def __str__(self):
-        from cosserat_fenicsx.drilling.linear.spectrum_table import stability_table
-
-        return stability_table(self)
-
     def _known(self, k):
         if not 0 <= k < self.roots.shape[2]:
             refuse("Stability", "mode", k, f"a number from 0 to {self.roots.shape[2] - 1}")
@@ -272,13 +304,6 @@ class Stability(Tabular):
     def _equation(self, i, j):
         steady = Steady(self.scene)
         return steady.equation(steady.parameters(self.speeds[i], or_none(self.weights[j])))
-
-    def _tables(self):
-        i, j, k = np.nonzero(np.isfinite(self.growth))
-        return {"": {
-            "speed (rad/s)": self.speeds[i], "weight on bit (N)": self.weights[j], "mode": k.astype(float),
-            "growth (1/s)": self.growth[i, j, k], "frequency (Hz)": self.frequency[i, j, k],
-        }}  # fmt: skip
 
 
 def stability(
