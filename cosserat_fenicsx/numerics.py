@@ -65,7 +65,7 @@ class ElementRule:
         """(p + 1,) weights of the quadrature rule whose points are the nodes."""
         return lobatto_weights(self.nodes)
 
-    @property
+    @cached_property
     def leading(self):
         """(p + 1,) weights of the nodal values in the coefficient of x^p, x in [-1, 1]."""
         return self._to_coefficients[-1]

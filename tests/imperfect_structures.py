@@ -19,7 +19,7 @@ import cosserat_fenicsx as cf
 from cosserat_fenicsx.models.rodmesh import Layout
 from cosserat_fenicsx.results.path import Path
 from cosserat_fenicsx.statics.path.track import Track
-from cosserat_fenicsx.statics.solvers import record_of, solvers_of
+from cosserat_fenicsx.statics.problem import record_of, solvers_of
 
 _SMALLEST, _LARGEST = 1e-5, 3e-2
 # Length of the steps of the truth: a share of its scale, which is that of rotations (rad), rod lengths, and of the load

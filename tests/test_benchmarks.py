@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 
 import cosserat_fenicsx as cf
 from cosserat_fenicsx.results.accuracy import on_mesh
-from cosserat_fenicsx.statics import solvers
+from cosserat_fenicsx.statics.problem import solvers_of
 
 pytestmark = pytest.mark.serial  # the references are computed by scipy and slow
 TRUTH = json.loads((Path(__file__).parent / "reference" / "statics.json").read_text(encoding="utf-8"))
@@ -113,7 +113,7 @@ def test_order_of_loads_does_not_matter():
     rod = cf.Rod(cf.Line((0, 0, 0), (0, 0, 1.0)), cf.Stiffness((1e3, 2e3), 3e3, (1.0, 2.0), 0.8))
     force, moment = cf.Force(rod.end, (0.7, 1.0, -0.8)), cf.Moment(rod.end, (0.5, -0.4, 0.6))
     together = cf.solve(held(rod, force, moment), [1.0], elements=6)
-    with solvers.solvers_of(held(rod, force, moment), together.layout) as (problem, newton, _):
+    with solvers_of(held(rod, force, moment), together.layout) as (problem, newton, _):
         newton.allow(10)
         for first in (force, moment):
             alone = cf.solve(held(rod, first), [1.0], elements=6)

@@ -16,7 +16,7 @@ from cosserat_fenicsx.actions.walls import TubeWall
 from cosserat_fenicsx.algebra.newton import LimitedNewton
 from cosserat_fenicsx.models.rodmesh import Layout
 from cosserat_fenicsx.scene import action
-from cosserat_fenicsx.statics.solvers import solvers_of
+from cosserat_fenicsx.statics.problem import solvers_of
 from cosserat_fenicsx.well.rod.rod_in_hole import solve_in_hole
 
 pytestmark = pytest.mark.serial

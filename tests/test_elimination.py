@@ -12,7 +12,7 @@ from scipy.linalg import eigvalsh_tridiagonal
 import cosserat_fenicsx as cf
 from cosserat_fenicsx.algebra import elimination
 from cosserat_fenicsx.models.rodmesh import Layout
-from cosserat_fenicsx.statics.solvers import solvers_of
+from cosserat_fenicsx.statics.problem import solvers_of
 
 SOFT = cf.Stiffness(shear=(3e3, 5e3), axial=8e3, bending=(1.0, 2.5), torsion=0.7)
 RIGID = cf.Stiffness(shear=(np.inf, np.inf), axial=np.inf, bending=(1.0, 2.5), torsion=0.7)

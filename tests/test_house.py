@@ -85,7 +85,7 @@ FITTERS = {
         "refinement",
         "sensitivity",
         "solve",
-        "solvers",
+        "problem",
         "path/recorder",
     },
     "dynamics": {

@@ -11,7 +11,7 @@ from cosserat_fenicsx.algebra.pool import ProblemPool
 from cosserat_fenicsx.dynamics import simulate as of_motions
 from cosserat_fenicsx.models.rodmesh import RodMesh
 from cosserat_fenicsx.statics import circulatory
-from cosserat_fenicsx.statics import solvers as of_equilibria
+from cosserat_fenicsx.statics import problem as of_equilibria
 
 KEPT = 2
 WORK = {

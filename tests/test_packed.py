@@ -7,7 +7,7 @@ from dolfinx.fem import petsc as fem_petsc
 
 from cosserat_fenicsx.algebra.packed import Packed
 from cosserat_fenicsx.models.rodmesh import Layout
-from cosserat_fenicsx.statics import solvers
+from cosserat_fenicsx.statics.problem import solvers_of
 
 pytestmark = pytest.mark.ranks
 
@@ -21,7 +21,7 @@ def test_packed_forms_are_the_forms(formulation, degree):
     for length in (20.0, 30.0):
         _, scene = column(arm=True, length=length)
         layout = Layout.of(scene, 3)
-        with solvers.solvers_of(scene, layout, formulation=formulation, degree=degree) as (problem, _, _):
+        with solvers_of(scene, layout, formulation=formulation, degree=degree) as (problem, _, _):
             model, forms = problem.model, problem.model.forms
             moving = [model.state, *model.carried]
             compiled = forms.residual, forms.tangent, forms.second_variations[0]

@@ -10,7 +10,7 @@ from cosserat_fenicsx.dynamics.simulate import solvers_of as moving_solvers
 from cosserat_fenicsx.models.connections import TiePattern, Ties
 from cosserat_fenicsx.models.rodmesh import Layout
 from cosserat_fenicsx.scene.supports import AngleTie, PositionTie, TurnTie
-from cosserat_fenicsx.statics.solvers import solvers_of as static_solvers
+from cosserat_fenicsx.statics.problem import solvers_of as static_solvers
 
 pytestmark = pytest.mark.serial
 ETA, STEP = 0.4, 1e-6

@@ -27,8 +27,8 @@ from cosserat_fenicsx.statics.circulatory import circulatory_part
 from cosserat_fenicsx.statics.meshes import FIRST_ELEMENTS, layers_of, until_two_meshes_agree
 from cosserat_fenicsx.statics.path.follower import Follower
 from cosserat_fenicsx.statics.path.load_control import StepControl
+from cosserat_fenicsx.statics.problem import solvers_of
 from cosserat_fenicsx.statics.solve import check_arguments
-from cosserat_fenicsx.statics.solvers import solvers_of
 from cosserat_fenicsx.statics.stability import shapes_of
 
 _MOST_ELEMENTS = 128

@@ -238,7 +238,7 @@ class Sections:
         """Arc lengths inside the rod where the section may jump, m."""
         return tuple(end for end, _ in self.pieces[:-1])
 
-    @property
+    @cached_property
     def uniform(self):
         """Whether the section is constant between the `breaks`."""
         return not any(self._law)

@@ -6,6 +6,7 @@ import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -165,7 +166,7 @@ class Rod:
     def __repr__(self):
         return f"<Rod '{self.name}': {type(self.curve).__name__}, length {self.length:g} m>"
 
-    @property
+    @cached_property
     def length(self) -> float:
         """Reference arc length, m."""
         return self.curve.length
@@ -179,7 +180,7 @@ class Rod:
                 breaks.append(s)
         return tuple(breaks)
 
-    @property
+    @cached_property
     def uniform(self) -> bool:
         """Whether curvature, twist and section are constant between the `breaks`: no splines, no functions of s."""
         return self.curve.uniform and self.profile.uniform

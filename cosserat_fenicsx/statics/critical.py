@@ -32,8 +32,8 @@ from cosserat_fenicsx.results.sensitivity import Sensitivity, called
 from cosserat_fenicsx.scene.parameters import parameter_of
 from cosserat_fenicsx.statics.path.follower import Follower
 from cosserat_fenicsx.statics.path.load_control import StepControl
+from cosserat_fenicsx.statics.problem import solvers_of
 from cosserat_fenicsx.statics.sensitivity import Direct, check_scene, scenes_near, sensitivity
-from cosserat_fenicsx.statics.solvers import solvers_of
 
 # Load factors are equal that differ by less, relative; derivatives of equal ones, likewise, with rounding.
 _EQUAL, _PAIRED = 1e-5, 1e-5

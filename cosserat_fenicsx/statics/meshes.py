@@ -12,8 +12,14 @@ from cosserat_fenicsx.interrupts import obey
 from cosserat_fenicsx.models.rodmesh import Layout
 from cosserat_fenicsx.models.traits import traits_of
 from cosserat_fenicsx.remember import per_scene
-from cosserat_fenicsx.results.accuracy import leading_coefficients
-from cosserat_fenicsx.results.indicators import contact_edges, element_differences, layer_lengths, turns_of, unresolved
+from cosserat_fenicsx.results.accuracy import (
+    contact_edges,
+    element_differences,
+    layer_lengths,
+    leading_coefficients,
+    turns_of,
+    unresolved,
+)
 from cosserat_fenicsx.scene.curves import Line
 from cosserat_fenicsx.scene.signals import FUNCTIONS_ALONG
 
@@ -224,7 +230,7 @@ def with_layers(scene, layout, lengths):
     """The layout with elements that resolve boundary layers at the ends of its pieces; None where it resolves them.
 
     Args:
-        lengths: what `results.indicators.layer_lengths` returns; None where no element is too long.
+        lengths: what `results.accuracy.layer_lengths` returns; None where no element is too long.
     """
     if lengths is None:
         return None

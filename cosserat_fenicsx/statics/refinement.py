@@ -13,17 +13,20 @@ from cosserat_fenicsx.errors import Interrupted, NotConverged
 from cosserat_fenicsx.results.accuracy import (
     carry_error,
     compare,
+    contact_edges,
     error_before,
     estimate_error,
     hardest,
+    of_path,
     order_of,
+    resolves,
     spread_error,
+    winding_lengths,
 )
 from cosserat_fenicsx.results.compared import NAMES, POSITION
-from cosserat_fenicsx.results.indicators import contact_edges, of_path, resolves, winding_lengths
 from cosserat_fenicsx.results.records import find_again, keep_confirmed
 from cosserat_fenicsx.statics.meshes import balanced, loose_edges, resolving, with_edges, with_layers, with_turns
-from cosserat_fenicsx.statics.solvers import Promoted
+from cosserat_fenicsx.statics.problem import Promoted
 
 _MOST_ELEMENTS = 1024
 # Positions that differ by less than this on two meshes, relative to the largest displacement, are on the same branch:

@@ -27,7 +27,7 @@ from cosserat_fenicsx.results.path import PerturbedPath
 from cosserat_fenicsx.results.sensitivity import Sensitivity
 from cosserat_fenicsx.scene.action import path_dependent
 from cosserat_fenicsx.scene.parameters import parameter_of
-from cosserat_fenicsx.statics.solvers import record_of, solvers_of
+from cosserat_fenicsx.statics.problem import record_of, solvers_of
 
 # Newton iterations from the recorded state to the same state, and how far it may move (lengths, rad).
 _ITERATIONS, _MOVED = 25, 1e-3

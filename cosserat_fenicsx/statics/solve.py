@@ -19,6 +19,7 @@ from cosserat_fenicsx.models.formulation import formulation_of
 from cosserat_fenicsx.models.rodmesh import Layout
 from cosserat_fenicsx.progress import Progress
 from cosserat_fenicsx.ranks import communicator
+from cosserat_fenicsx.remember import per_scene
 from cosserat_fenicsx.results.accuracy import FEW
 from cosserat_fenicsx.results.compared import NAMES, Criterion, criteria_of
 from cosserat_fenicsx.results.path import Path
@@ -32,10 +33,13 @@ from cosserat_fenicsx.statics.path.follower import CONTROLS
 from cosserat_fenicsx.statics.path.load_control import StepControl
 from cosserat_fenicsx.statics.path.recorder import Tracing
 from cosserat_fenicsx.statics.refinement import refine
-from cosserat_fenicsx.statics.solvers import Promoted, solvers_of
+from cosserat_fenicsx.statics.problem import Promoted, solvers_of
 
 # What `tol` bounds where contact forces oscillate.
 _MOTION = ("position", "rotation")
+_STEPS = StepControl()
+# Whether the points of a path have to be computed in their order.
+_in_order = per_scene(path_dependent)
 # Largest change of a prescribed rotation in one step, rad: rotations that differ by a full turn are indistinguishable.
 _LARGEST_TURN = 1.0
 
@@ -114,7 +118,7 @@ def solve(
         points=gauss_points,
         follows=branch is not None or control == "arc",
     )
-    steps = instance("solve", "steps", StepControl() if steps is None else steps, StepControl, "a StepControl")
+    steps = _STEPS if steps is None else instance("solve", "steps", steps, StepControl, "a StepControl")
     follow, until = _follow_options(steps, control, branch), _until(until, free)
     if not steps.adaptive:
         _check_jumps(scene, load_factors)
@@ -124,7 +128,7 @@ def solve(
     oscillates = elements is None and gauss_points is not None and gauss_points > degree
     if oscillates:
         bound = [name for name in bound if name in _MOTION] or _MOTION
-    in_order = path_dependent(scene)
+    in_order = _in_order(scene)
     simple = not (branch or control == "arc" or until or in_order) and steps.adaptive
 
     def take(choice, bar):
@@ -272,6 +276,19 @@ def check_arguments(scene, tol, elements, bound=NAMES):
     if not isinstance(scene, Scene):
         hint = ", which is the first of what read_scene returns" if isinstance(scene, tuple) else ""
         raise SceneError(f"scene is a {type(scene).__name__}: expected a Scene{hint}")
+    _check_static(scene)
+    if isinstance(tol, bool) or not isinstance(tol, numbers.Real) or not 1e-12 <= tol < 1:
+        raise SceneError(f"tol = {tol!r}: expected a number from 1e-12 to below 1")
+    criteria_of(bound)
+    if elements is not None and (
+        isinstance(elements, bool) or not isinstance(elements, numbers.Integral) or elements < 1
+    ):
+        raise SceneError(f"elements = {elements!r}: expected a whole number above zero")
+
+
+@per_scene
+def _check_static(scene):
+    """Refuse a scene that has no equilibrium to look for."""
     if not scene.loads and not any(isinstance(support, Prescribed) for support in scene.supports):
         raise SceneError(
             "Scene.loads is empty: expected at least one load, such as Force(rod.end, (0, 0, -1)), or a Prescribed "
@@ -290,10 +307,3 @@ def check_arguments(scene, tol, elements, bound=NAMES):
                 "equilibrium, or a motion: cf.simulate(scene, duration)"
             )
     check_no_mechanism(scene)
-    if isinstance(tol, bool) or not isinstance(tol, numbers.Real) or not 1e-12 <= tol < 1:
-        raise SceneError(f"tol = {tol!r}: expected a number from 1e-12 to below 1")
-    criteria_of(bound)
-    if elements is not None and (
-        isinstance(elements, bool) or not isinstance(elements, numbers.Integral) or elements < 1
-    ):
-        raise SceneError(f"elements = {elements!r}: expected a whole number above zero")

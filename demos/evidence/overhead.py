@@ -20,7 +20,7 @@ from written import write
 
 import cosserat_fenicsx as cf
 from cosserat_fenicsx import compat
-from cosserat_fenicsx.statics import solvers
+from cosserat_fenicsx.statics.problem import solvers_of
 
 ETAS = np.linspace(0.05, 1.5, 31)
 MESHES = ((2, 8), (3, 8), (3, 4))  # degree, elements
@@ -108,7 +108,7 @@ def compare(degree, elements, runs):
         return cf.solve(scene, ETAS, degree=degree, elements=elements, model="spatial")
 
     path = public()
-    with solvers.solvers_of(scene, path.layout, degree=degree) as (problem, _, _):
+    with solvers_of(scene, path.layout, degree=degree) as (problem, _, _):
         bare = BareLoop(problem.model, path)
         layout = path.layout
         tips = bare.run(scene, layout, stability=False)

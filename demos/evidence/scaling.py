@@ -25,7 +25,7 @@ from written import options, write
 
 from cosserat_fenicsx import compat
 from cosserat_fenicsx.models.rodmesh import Layout
-from cosserat_fenicsx.statics import solvers
+from cosserat_fenicsx.statics.problem import solvers_of
 
 SIZES = (4, 16, 64, 256, 1024, 4096, 16384, 35715)  # elements of degree 4: 28 unknowns each
 QUICK = SIZES[:5]
@@ -39,7 +39,7 @@ KINDS = (("determinate", 1), ("planar", 1), ("spatial", 1), ("determinate", 4), 
 def loaded(elements, degree=DEGREE, model="spatial"):
     """Context manager: the problem of the cantilever, its Newton solver for single steps, and its stability count."""
     _, scene = column()
-    return solvers.solvers_of(scene, Layout.of(scene, elements), degree=degree, model=model)
+    return solvers_of(scene, Layout.of(scene, elements), degree=degree, model=model)
 
 
 def from_rest(problem, newton, clock=time.process_time, meet=lambda: None):

@@ -25,7 +25,7 @@ from cosserat_fenicsx.statics.path.chord import Chord
 from cosserat_fenicsx.statics.path.events import Lost
 from cosserat_fenicsx.statics.path.follower import Follower
 from cosserat_fenicsx.statics.path.track import NOTHING
-from cosserat_fenicsx.statics.solvers import Promoted, record_of
+from cosserat_fenicsx.statics.problem import Promoted, record_of
 
 # Loads over EA, about the axial strain that they cause, above which a mistake in the units is suggested.
 _ENORMOUS = 1.0

@@ -19,7 +19,7 @@ from cosserat_fenicsx.forms import equilibrium
 from cosserat_fenicsx.forms import spatial as eq
 from cosserat_fenicsx.models.rod_data import as_matrix, law_of
 from cosserat_fenicsx.models.rodmesh import Layout
-from cosserat_fenicsx.statics import solvers
+from cosserat_fenicsx.statics.problem import solvers_of
 from trials import problems
 from trials.cells import Answer, NotForIt, Stopped
 from trials.own import against_steps
@@ -47,7 +47,7 @@ class Loop:
         _, scene = problems.scene_of(problem)
         layout = Layout.of(scene, elements)
         self._lease = ExitStack()  # never closed: the problem is not returned to the pool
-        lent = solvers.solvers_of(scene, layout, formulation=formulation, degree=degree, points=points)
+        lent = solvers_of(scene, layout, formulation=formulation, degree=degree, points=points)
         loaded, _, _ = self._lease.enter_context(lent)
         self.problem, self.model = problem, loaded.model
         self.forms = weakly_unit(self.model) if weak else self.model.forms

@@ -7,7 +7,7 @@ from scipy.spatial.transform import Rotation
 
 import cosserat_fenicsx as cf
 from cosserat_fenicsx.models.formulation import formulation_of
-from cosserat_fenicsx.statics import solvers
+from cosserat_fenicsx.statics.problem import solvers_of
 from trials import problems
 from trials.cells import Answer, NotForIt, Stopped, load_factor_in
 
@@ -95,7 +95,7 @@ class Own:
         state = None
         for force, moment in problem["history"]:
             scaled = _with_loads(problem, force, moment)
-            with solvers.solvers_of(problems.scene_of(scaled)[1], plain.layout, **options) as (solver, newton, _):
+            with solvers_of(problems.scene_of(scaled)[1], plain.layout, **options) as (solver, newton, _):
                 if state is not None:
                     solver.put(state)
                 solver.set_load_factor(1.0)
