@@ -228,6 +228,5 @@ class _Equations:
 
 def _rest(piece, done):
     """A piece without its lower part."""
-    angle = piece.curvature * done
-    cos, sin = math.cos(angle), math.sin(angle)
-    return piece._replace(length=piece.length - done, t=piece.t * cos - piece.n * sin, n=piece.n * cos + piece.t * sin)
+    t, n = map(float, piece.down(done))
+    return piece._replace(length=piece.length - done, t=t, n=n)

@@ -68,10 +68,9 @@ def stretches(md, where):
 def sides_of(pieces, solved, climbing):
     """(n, m) angles of contact at the places of a `Solved`, rad clockwise from the high side; see `TorqueAndDrag`."""
     chain = solved.chain
-    angle = chain.curvature[:, None] * chain.length[:, None] * solved.at
-    n = chain.n[:, None] * np.cos(angle) + chain.t[:, None] * np.sin(angle)
-    b = chain.b[:, None]
-    load, aside = chain.curvature[:, None] * solved.tension + chain.weight[:, None] * n, chain.weight[:, None] * b
+    rows = chain.columns
+    n, b = rows.down(rows.length * solved.at)[1], rows.b
+    load, aside = rows.curvature * solved.tension + rows.weight * n, rows.weight * b
     # high side -(n, b), and to its right -(-b, n), in the plane of normal and binormal
     side = np.arctan2(load * b - aside * n, -(load * n + aside * b))
     if climbing:

@@ -30,6 +30,7 @@ import numpy as np
 from cosserat_fenicsx.well import criteria
 from cosserat_fenicsx.well.buckled import LockUp, earliest_helix, growth
 from cosserat_fenicsx.well.pieces import free_span, prying
+from cosserat_fenicsx.well.softstring import Chain
 
 
 @dataclass(frozen=True)
@@ -170,11 +171,10 @@ def _turns(chain, solved, groups, clearance):
     """Wall force (N) that is missed within pieces whose load turns to the other side."""
     last = np.append(groups[1:], len(chain.length)) - 1
     length = np.add.reduceat(chain.length, groups)
-    angle = chain.curvature[groups] * length
-    lower, upper = chain.n[groups], chain.n[groups] * np.cos(angle) + chain.t[groups] * np.sin(angle)
+    part = Chain(*(array[groups] for array in chain))
     q = [
-        np.stack([chain.curvature[groups] * T + chain.weight[groups] * n, chain.weight[groups] * chain.b[groups]])
-        for n, T in ((lower, solved.tension[groups, 0]), (upper, solved.tension[last, -1]))
+        np.stack([part.curvature * T + part.weight * n, part.weight * part.b])
+        for n, T in ((part.n, solved.tension[groups, 0]), (part.down(length)[1], solved.tension[last, -1]))
     ]
     way = np.linalg.norm(_unit(q[1], 0) - _unit(q[0], 0), axis=0)
     rate = np.linalg.norm(q[1] - q[0], axis=0) / length

@@ -25,6 +25,7 @@ Where N has a kink pieces are cut, and N is continuous there, so that the place 
 """
 
 from collections import namedtuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.polynomial.legendre import legval, legvander
@@ -38,10 +39,46 @@ _ITERATIONS, _ROUNDS = 60, 60
 _SHORTEST = 1e-9  # m, of pieces that are still cut
 _EPS = np.finfo(float).eps
 
-#: A string as arrays over pieces, from its lower end up. length (m); weight (N/m); curvature (1/m); t, n, b: downward
-#: components of tangent, normal, binormal at the lower end of the piece; drag: c mu over the root of Coulomb's law;
-#: turn: e_s mu R over the same root (m); climb: the root.
-Chain = namedtuple("Chain", "length weight curvature t n b drag turn climb origin")
+
+class Chain(NamedTuple):
+    """A string as arrays over pieces, from its lower end up.
+
+    Attributes:
+        length: m. weight: N/m. curvature: 1/m.
+        t, n, b: downward components of tangent, normal and binormal at the lower end of the piece.
+        drag: c mu over the root of Coulomb's law. turn: e_s mu R over the same root, m. climb: the root.
+        origin: index of the piece in `Pieces`.
+    """
+
+    length: np.ndarray
+    weight: np.ndarray
+    curvature: np.ndarray
+    t: np.ndarray
+    n: np.ndarray
+    b: np.ndarray
+    drag: np.ndarray
+    turn: np.ndarray
+    climb: np.ndarray
+    origin: np.ndarray
+
+    @property
+    def columns(self):
+        """The same with columns (n, 1), for several places on each piece."""
+        return Chain(*(array[:, None] for array in self))
+
+    def down(self, u):
+        """Downward components of tangent and normal at distances u (m) above the lower ends."""
+        angle = self.curvature * u
+        cos, sin = np.cos(angle), np.sin(angle)
+        return self.t * cos - self.n * sin, self.n * cos + self.t * sin
+
+    def height(self, u):
+        """Height (m) of places at distances u (m) above the lower ends."""
+        angle = self.curvature * u
+        bent = self.n * self.curvature * u**2 / 2 * np.sinc(angle / 2 / np.pi) ** 2
+        return self.t * u * np.sinc(angle / np.pi) - bent
+
+
 #: What is found on a chain. at: (m,) places on a piece, as shares of its length from its lower end; tension (N), torque
 #: (N m), side (wall force per length, N/m): (n, m) there; side_force: of each piece (N); error, torque_error: estimates
 #: for the uppermost values (N, N m); helical: (n,) True where the string is buckled into a helix.
@@ -120,19 +157,14 @@ class _Friction:
 
     def __init__(self, chain, tension):
         self.chain = chain
-        length, k = chain.length[:, None], chain.curvature[:, None]
-        u = length * AT
-        cos, sin = np.cos(k * u), np.sin(k * u)
-        self._across = chain.weight[:, None] * (chain.n[:, None] * cos + chain.t[:, None] * sin)
-        heights = chain.weight[:, None] * (
-            chain.t[:, None] * u * np.sinc(k * u / np.pi)
-            - chain.n[:, None] * k * u**2 / 2 * np.sinc(k * u / 2 / np.pi) ** 2
-        )
+        rows = chain.columns
+        u = rows.length * AT
+        self._across, heights = rows.weight * rows.down(u)[1], rows.weight * rows.height(u)
         self.heights = heights[:, -1]
         below = np.concatenate([[tension], tension + np.cumsum(self.heights)])
         self._below, self._pull = below, below[:-1, None] + heights
         self._b2 = (chain.weight * chain.b)[:, None] ** 2
-        self._k, self._drag, self._length = k, chain.drag[:, None], chain.length
+        self._k, self._drag, self._length = rows.curvature, rows.drag, chain.length
 
     def solve(self, start=None):
         """Newton's method; `start`: P at the points."""
@@ -146,11 +178,7 @@ class _Friction:
                 V = k * (pull + P) + across
                 N = np.sqrt(V * V + b2)
                 slope = drag * k * np.divide(V, N, out=np.zeros_like(V), where=N > 0)
-                A, A_end = (slope @ POINTS_TO.T) * length[:, None], (slope @ WEIGHTS) * length
-                decay = (drag * N - slope * P) * np.exp(-A)
-                gain = np.exp(A_end)
-                self.starts = chained(gain, gain * (decay @ WEIGHTS) * length)
-                new = np.exp(A) * (self.starts[:-1, None] + (decay @ POINTS_TO.T) * length[:, None])
+                self.starts, new = _integrated(slope, drag * N - slope * P, length)
                 change = np.abs(new - P).max()
                 P = new
                 scale = max(scale, np.abs(self.starts).max())
@@ -227,6 +255,21 @@ class _Friction:
         return cuts
 
 
+def _integrated(slope, source, length):
+    """P with P' = slope P + source, from 0 at the lower end of the lowest piece, by its integrating factor.
+
+    Args:
+        slope, source: (n, points) at Gauss's points of pieces of a length (n,), m.
+
+    Returns:
+        P at the lower ends of the pieces and the upper end of the last, (n + 1,), and at the points.
+    """
+    A, gain = (slope @ POINTS_TO.T) * length[:, None], np.exp((slope @ WEIGHTS) * length)
+    decay = source * np.exp(-A)
+    starts = chained(gain, gain * (decay @ WEIGHTS) * length)
+    return starts, np.exp(A) * (starts[:-1, None] + (decay @ POINTS_TO.T) * length[:, None])
+
+
 def chained(gain, added):
     """(n + 1,) recurrence from 0: each value is gain times the value before, plus `added` (n,)."""
     found = [0.0]
@@ -254,11 +297,8 @@ def _cut(chain, places):
     last = np.append(which[1:] != which[:-1], True)
     end = np.where(last, 1.0, np.append(start[1:], 1.0))
     parts = Chain(*(array[which] for array in chain))
-    angle = parts.curvature * start * parts.length
-    cos, sin = np.cos(angle), np.sin(angle)
-    return parts._replace(
-        length=(end - start) * parts.length, t=parts.t * cos - parts.n * sin, n=parts.n * cos + parts.t * sin
-    )
+    t, n = parts.down(start * parts.length)
+    return parts._replace(length=(end - start) * parts.length, t=t, n=n)
 
 
 #: Changes per unit of a parameter: arrays over `Pieces`, of weight (N/m) and friction, and numbers at the lower end, of
@@ -276,19 +316,15 @@ def rates_of(solved, pieces, change, coulomb):
         (tension, torque), (n, m) each, at the places of `solved`, per unit of the parameter.
     """
     chain, at = solved.chain, solved.at
-    k, length = chain.curvature[:, None], chain.length[:, None]
-    weight, dw = chain.weight[:, None], change.weight[chain.origin][:, None]
+    rows, dw = chain.columns, change.weight[chain.origin][:, None]
+    k, length, weight, drag = rows.curvature, rows.length, rows.weight, rows.drag
     # mu/sqrt(1 + (e mu)^2) has the derivative 1/(..)^(3/2); without the root it is 1
     of_friction = change.friction[chain.origin] / (chain.climb**3 if coulomb else 1.0)
     d_drag = (pieces.axial[chain.origin] * of_friction)[:, None]
     d_turn = ((pieces.around * pieces.radius)[chain.origin] * of_friction)[:, None]
-    drag, turn = chain.drag[:, None], chain.turn[:, None]
     u = length * at
-    cos, sin = np.cos(k * u), np.sin(k * u)
-    across = chain.n[:, None] * cos + chain.t[:, None] * sin  # per unit of weight
-    height = chain.t[:, None] * u * np.sinc(k * u / np.pi)
-    height -= chain.n[:, None] * k * u**2 / 2 * np.sinc(k * u / 2 / np.pi) ** 2
-    b2 = chain.b[:, None] ** 2
+    (_, across), height = rows.down(u), rows.height(u)  # per unit of weight
+    b2 = rows.b**2
     V = k * solved.tension + weight * across
     N = np.sqrt(V * V + weight**2 * b2)
     known = change.tension + np.concatenate([[0.0], np.cumsum((dw * height)[:-1, -1])])[:, None] + dw * height
@@ -300,12 +336,8 @@ def rates_of(solved, pieces, change, coulomb):
 
     inner = slice(1, -1)
     slope = (drag * k * np.divide(V, N, out=np.zeros_like(V), where=N > 0))[:, inner]
-    A, A_end = (slope @ POINTS_TO.T) * length, (slope @ WEIGHTS) * length[:, 0]
-    decay = (d_drag * N + drag * of_load(known))[:, inner] * np.exp(-A)
-    gain = np.exp(A_end)
-    starts = chained(gain, gain * (decay @ WEIGHTS) * length[:, 0])
-    inside = np.exp(A) * (starts[:-1, None] + (decay @ POINTS_TO.T) * length)
+    starts, inside = _integrated(slope, (d_drag * N + drag * of_load(known))[:, inner], chain.length)
     tension = known + np.concatenate([starts[:-1, None], inside, starts[1:, None]], axis=1)
-    turned = length * ((d_turn * N + turn * of_load(tension)) @ UP_TO.T)
+    turned = length * ((d_turn * N + rows.turn * of_load(tension)) @ UP_TO.T)
     torque = change.torque + np.concatenate([[0.0], np.cumsum(turned[:-1, -1])])[:, None] + turned
     return tension, torque
