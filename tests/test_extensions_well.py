@@ -29,14 +29,15 @@ def test_an_operation():
 
 
 def test_its_sweep_is_kept_and_drawn(tmp_path):
-    """Another overpull is another sweep; the file holds whole objects."""
-    given = {"mud": MUD, "model": "soft", "file": tmp_path / "sweep.jsonl", "progress": False}
+    """Another overpull is another sweep; the folder holds whole objects."""
+    given = {"mud": MUD, "model": "soft", "folder": tmp_path / "sweep", "progress": False}
     first = cf.depth_sweep(HOLE, STRING, [OPERATION], [1000.0, 2500.0], **given)
-    lines = given["file"].read_bytes().splitlines(keepends=True)
-    given["file"].write_bytes(b"".join(lines[:-1]))  # as a run that was ended leaves it
+    rows = given["folder"] / "rows.0.jsonl"
+    lines = rows.read_bytes().splitlines(keepends=True)
+    rows.write_bytes(b"".join(lines[:-1]))  # as a run that was ended leaves it
     again = cf.depth_sweep(HOLE, STRING, [OPERATION], [1000.0, 2500.0], **given)
     np.testing.assert_array_equal(again.hook_load, first.hook_load)
-    assert given["file"].read_bytes() == b"".join(lines)
+    assert rows.read_bytes() == b"".join(lines)
     with pytest.raises(cf.SceneError, match="holds another sweep"):
         cf.depth_sweep(HOLE, STRING, [PullRotating(1e5, 0.1, 40)], [1000.0, 2500.0], **given)
     figure = first.plot()
