@@ -40,7 +40,6 @@ from cosserat_fenicsx.drilling.mixed import mixed_scene as mixed_scene
 from cosserat_fenicsx.drilling.pipe_above import PipeAbove as PipeAbove
 from cosserat_fenicsx.drilling.scene import Drilling as Drilling
 from cosserat_fenicsx.drilling.scenefile import DrillingScene as DrillingScene
-from cosserat_fenicsx.drilling.scenefile import read_drilling_scene as read_drilling_scene
 from cosserat_fenicsx.drilling.segments import Discs as Discs
 from cosserat_fenicsx.drilling.simulate import read_drilling as read_drilling
 from cosserat_fenicsx.drilling.simulate import simulate_drilling as simulate_drilling
@@ -63,6 +62,9 @@ from cosserat_fenicsx.errors import NotConverged as NotConverged
 from cosserat_fenicsx.errors import NotStored as NotStored
 from cosserat_fenicsx.errors import SceneError as SceneError
 from cosserat_fenicsx.errors import SceneWarning as SceneWarning
+from cosserat_fenicsx.files.read import read as read
+from cosserat_fenicsx.files.read import write as write
+from cosserat_fenicsx.files.rods import RodScene as RodScene
 from cosserat_fenicsx.results.history import History as History
 from cosserat_fenicsx.results.modes import Buckling as Buckling
 from cosserat_fenicsx.results.modes import Modes as Modes
@@ -94,8 +96,6 @@ from cosserat_fenicsx.scene.rod import Rod as Rod
 from cosserat_fenicsx.scene.rod import euler_load as euler_load
 from cosserat_fenicsx.scene.rolled import Profile as Profile
 from cosserat_fenicsx.scene.scene import Scene as Scene
-from cosserat_fenicsx.scene.scenefile import read_motion as read_motion
-from cosserat_fenicsx.scene.scenefile import read_scene as read_scene
 from cosserat_fenicsx.scene.sections import Circle as Circle
 from cosserat_fenicsx.scene.sections import Material as Material
 from cosserat_fenicsx.scene.sections import Rectangle as Rectangle
@@ -150,7 +150,6 @@ from cosserat_fenicsx.well.operations import TripIn as TripIn
 from cosserat_fenicsx.well.operations import TripOut as TripOut
 from cosserat_fenicsx.well.path import WellPath as WellPath
 from cosserat_fenicsx.well.scenefile import WellScene as WellScene
-from cosserat_fenicsx.well.scenefile import read_well as read_well
 from cosserat_fenicsx.well.torque_and_drag import torque_and_drag as torque_and_drag
 
 __version__: str

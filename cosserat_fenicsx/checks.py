@@ -20,7 +20,7 @@ from pathlib import Path
 
 import numpy as np
 
-from cosserat_fenicsx.dimensions import LARGEST, MOST
+from cosserat_fenicsx.dimensions import BY_UNIT, LARGEST, MOST, in_si
 from cosserat_fenicsx.errors import SceneError, SceneWarning, nearest
 
 #: Numbers, as a list, a tuple or an array.
@@ -42,12 +42,19 @@ _OF_STRINGS = ("cosserat_fenicsx.well.", "cosserat_fenicsx.drilling.")
 _LONGEST = 100
 
 
+def name_of(owner):
+    """The name of an object in messages: its class, or what it is called in scene files; a text as it is."""
+    return owner if isinstance(owner, str) else getattr(owner, "called", "") or type(owner).__name__
+
+
 def refuse(owner, field, value, expected):
     """Raise a SceneError: 'owner.field = value: expected ...'."""
-    where, given = owner if isinstance(owner, str) else type(owner).__name__, repr(value)
+    where, given = name_of(owner), repr(value)
     if len(given) > _LONGEST:
         given = f"{given[:_LONGEST]}..."
-    raise SceneError(f"{where}.{field} = {given}: expected {expected}")
+    problem = SceneError(f"{where}.{field} = {given}: expected {expected}")
+    problem.field = (field,)
+    raise problem
 
 
 def warn(text, kind=SceneWarning):
@@ -58,8 +65,25 @@ def warn(text, kind=SceneWarning):
     warnings.warn(text, kind, stacklevel=2 if frame is None else level)
 
 
+def _unit_of(expected):
+    unit = re.search(r"\(([^(),]+)", expected)
+    return unit[1] if unit else ""
+
+
+def _in_si(owner, field, value, unit):
+    """A number from text with a unit of the dimension of `unit`; anything else as it is."""
+    if not isinstance(value, str) or unit not in BY_UNIT:
+        return value
+    return in_si(f"{name_of(owner)}.{field}", value, BY_UNIT[unit])
+
+
 def number(owner, field, value, expected, accept):
-    """`value` as a float where it is a number that `accept` accepts; refused otherwise."""
+    """`value` as a float where it is a number that `accept` accepts, or text with a unit; refused otherwise.
+
+    Args:
+        expected: for messages, with the SI unit in its first parentheses.
+    """
+    value = _in_si(owner, field, value, _unit_of(expected))
     if isinstance(value, bool) or not isinstance(value, numbers.Real):
         refuse(owner, field, value, expected)
     try:
@@ -69,10 +93,10 @@ def number(owner, field, value, expected, accept):
     if math.isnan(given) or not accept(given):
         refuse(owner, field, value, expected)
     if abs(given) > _SMALLEST and abs(given) != math.inf:
-        unit = re.search(r"\(([^(),]+)", expected)
-        most = _most(owner, unit[1] if unit else "")
+        unit = _unit_of(expected)
+        most = _most(owner, unit)
         if abs(given) > most:
-            refuse(owner, field, value, f"{expected}, of at most {most:g}{f' {unit[1]}' if unit else ''}")
+            refuse(owner, field, value, f"{expected}, of at most {most:g}{f' {unit}' if unit else ''}")
     return given
 
 
@@ -109,7 +133,9 @@ def finite_array(owner, field, value, expected):
 
 
 def vector(owner, field, value, unit, size=3):
-    """A tuple of `size` finite numbers."""
+    """A tuple of `size` finite numbers; text with a unit is converted."""
+    if isinstance(value, list | tuple) and any(isinstance(x, str) for x in value):
+        value = [_in_si(owner, f"{field}[{i}]", x, unit) for i, x in enumerate(value)]
     expected = f"{size} finite numbers ({unit})"
     array = finite_array(owner, field, value, expected)
     if array.shape != (size,):

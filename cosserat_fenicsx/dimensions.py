@@ -90,6 +90,8 @@ DIMENSIONS = {
     "power": Dimension("W", {"W": 1.0, "kW": 1e3, "MW": 1e6, "hp": 550 * units.ft_lbf}, "hp"),
     "curvature": Dimension("1/m", {"1/m": 1.0, "1/ft": 1 / units.foot}, "1/ft"),
 }  # fmt: skip
+#: {SI unit: dimension}, the first one with that unit.
+BY_UNIT = {dimension.si: name for name, dimension in reversed(DIMENSIONS.items())}
 #: {SI unit: largest size}, see `Dimension.most`.
 MOST = {dimension.si: dimension.most for dimension in DIMENSIONS.values() if dimension.most < LARGEST}
 _NUMBER = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(.*?)\s*$")
@@ -119,7 +121,8 @@ def in_si(where, value, dimension):
         raise SceneError(f"{where} = {value!r}: expected tf, 1000 kgf, or kN or klbf: there are several tons")
     if unit not in known:
         others = [name for name, other in DIMENSIONS.items() if unit in other.units]
-        other = f"{unit} is a unit of {others[0]}, expected one of {dimension}" if others else nearest(unit, known)
+        name = next(name for name, other in DIMENSIONS.items() if other.units is known)  # a diameter is a length
+        other = f"{unit} is a unit of {others[0]}, expected one of {name}" if others else nearest(unit, known)
         raise SceneError(f"{where} = {value!r}: {other} ({', '.join(known)})")
     return number * known[unit]
 

@@ -117,7 +117,8 @@ def run(demo, out="out"):
         (Path, Check).
     """
     name = demo.__name__
-    scene, settings = cf.read_scene(SCENES / f"{name}.toml")
+    found = cf.read(SCENES / f"{name}.toml")
+    scene, settings = found.scene, found.settings
     asked, drawn = GALLERY[demo]
     if asked is not None:
         settings["load_factors"] = asked

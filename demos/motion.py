@@ -187,7 +187,8 @@ def run(demo, out=None, *, quick=False, film=False):
         (History, Check).
     """
     name = demo.__name__
-    scene, settings = cf.read_motion(SCENES / f"{name}.toml")
+    found = cf.read(SCENES / f"{name}.toml")
+    scene, settings = found.scene, found.motion
     history = cf.simulate(scene, **{**settings, **(DEMOS[demo] if quick else {})})
     check, shapes, curve = demo(history)
     if out is not None:

@@ -105,8 +105,8 @@ def run(demo, out="out/strings"):
         (the model's name, [Check]).
     """
     folder = None if out is None else Path(out) / demo.__name__
-    found = cf.read_drilling_scene(SCENES / f"{demo.__name__}.toml")
-    history = found.simulate()
+    found = cf.read(SCENES / f"{demo.__name__}.toml")
+    history = found.run()
     if folder is not None:
         folder.mkdir(parents=True, exist_ok=True)
         history.plot(folder / "drilling.png")

@@ -20,7 +20,7 @@ from mpi4py import MPI
 import cosserat_fenicsx as cf
 from cosserat_fenicsx.pictures.charts import draw_chart, empty_figure
 
-FOUND = cf.read_drilling_scene(Path(__file__).parent / "strings" / "stability_map.toml")
+FOUND = cf.read(Path(__file__).parent / "strings" / "stability_map.toml")
 #: A bit whose speed has this severity at the end does not rotate steadily; modes that grow faster than this (1/s) have
 #: grown out of rounding by then.
 OSCILLATES, FAST = 0.05, 0.05

@@ -137,8 +137,8 @@ def run(demo, out="out/wells"):
         folder.mkdir(parents=True, exist_ok=True)
     if demo in TUBES:
         return demo(folder)
-    scene = cf.read_well(SCENES / f"{demo.__name__}.toml")
-    answers, sweep = scene.answers(), scene.depth_sweep()
+    scene = cf.read(SCENES / f"{demo.__name__}.toml")
+    answers, sweep = scene.run(), scene.swept()
     if folder is not None:
         for answer in answers:
             name = answer.operation.name.replace(" ", "_")

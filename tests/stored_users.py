@@ -55,11 +55,6 @@ def of_study(found):
     return [repr(x) for x in found.results] + [failure.why for failure in found.failures]
 
 
-def of_sweep(found):
-    """To 13 digits: where the system puts arrays decides how BLAS sums, in the last one of error estimates."""
-    return {name: [f"{x:.13g}" for x in values.ravel()] for name, values in found.values.items()}
-
-
 @dataclass(frozen=True)
 class User:
     """A kind of computation: how it begins, goes on and is read; another one of its kind; the digits of its result."""
@@ -86,7 +81,7 @@ USERS = {
     "study": User(study, study, study, lambda folder: study(folder, 13), of_study, "study", "study"),
     "sweep": User(
         sweep, sweep, sweep, lambda folder: sweep(folder, 1e-3),
-of_sweep, "depth_sweep", "sweep",
+        lambda x: [x.values[name].tobytes() for name in sorted(x.values)], "depth_sweep", "sweep",
     ),
 }  # fmt: skip
 

@@ -328,7 +328,7 @@ type = "Force"
 station = "beam.end"
 force = [0, 0, 0.01]
 """)
-    scene, _ = cf.read_scene(tmp_path / "scene.toml")
+    scene = cf.read(tmp_path / "scene.toml").scene
     beam = scene.rods[0]
     path = cf.solve(scene, [0.0, 1.0], elements=4)
     # the end moves by (11 q/120 + F/3)/(1 + k/3)
@@ -337,4 +337,4 @@ force = [0, 0, 0.01]
     )
     with pytest.raises(cf.SceneError, match="did you mean 'Spring'"):
         (tmp_path / "wrong.toml").write_text((tmp_path / "scene.toml").read_text().replace('"Spring"', '"Sprig"'))
-        cf.read_scene(tmp_path / "wrong.toml")
+        cf.read(tmp_path / "wrong.toml")

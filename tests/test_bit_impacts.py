@@ -8,8 +8,9 @@ from axial_scenes import column, hanging, unbalanced
 from scipy.integrate import solve_ivp
 
 import cosserat_fenicsx as cf
-from cosserat_fenicsx.drilling.as_data import from_data, to_data
 from cosserat_fenicsx.drilling.elements import AxialTorsional
+from cosserat_fenicsx.drilling.scene import Drilling
+from cosserat_fenicsx.parts import from_data, to_data
 
 pytestmark = pytest.mark.serial
 TURNS, LOBES, HEIGHT, WEIGHT, MASS = 120 * cf.units.rpm, 3, 8e-3, 6e4, 300.0
@@ -176,8 +177,8 @@ def test_rock_in_a_scene_file(tmp_path):
     """
     file = tmp_path / "bounce.toml"
     file.write_text(text, encoding="utf-8")
-    scene = cf.read_drilling_scene(file).scene
-    assert scene.bit.rock_stiffness == 4e7 and from_data(to_data(scene)).bit == scene.bit
+    scene = cf.read(file).scene
+    assert scene.bit.rock_stiffness == 4e7 and from_data(Drilling, to_data(scene)).bit == scene.bit
 
 
 @pytest.mark.parametrize("stiffness", [1e6, 1e8, math.inf])

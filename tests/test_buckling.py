@@ -215,7 +215,7 @@ def test_a_taut_line_has_no_critical_load(tmp_path):
     text = pathlib.Path(__file__).parents[1].joinpath("README.md").read_text()
     file = tmp_path / "line.toml"
     file.write_text(re.search(r"```toml\n(.*?)```", text, re.DOTALL)[1])
-    scene, _ = cf.read_scene(file)
+    scene = cf.read(file).scene
     found = cf.buckling(scene, 3)
     assert len(found) == 0 and "no critical load factor up to 18.84, where linear" in repr(found)
     before = time.process_time()

@@ -58,11 +58,11 @@ def test_run_prints_a_table_and_writes_files(tmp_path):
 
 def test_the_table_shows_a_station_and_the_reaction():
     """Reactions against the equilibrium of the whole column: the force, and its moment about the foot."""
-    from cosserat_fenicsx import euler_load, read_scene
+    from cosserat_fenicsx import euler_load
 
     done = cosserat("run", DEMO, "--load-factors", "0.9", "--station", "column@10")
     assert done.returncode == 0 and "rotation: of column@10." in done.stdout, done.stderr
-    P = 0.9 * euler_load(read_scene(DEMO)[0].rods[0])
+    P = 0.9 * euler_load(cf.read(DEMO).scene.rods[0])
     force, moment = re.search(r"Clamp at column.start exerts \((.*?)\) N and \((.*?)\) N m", done.stdout).groups()
     assert [float(x) for x in force.split(", ")] == pytest.approx([0, 0, P], rel=1e-5)
     assert [float(x) for x in moment.split(", ")] == pytest.approx([0, -P * (0.2 + 2.200615447827733), 0], rel=1e-5)
@@ -72,13 +72,13 @@ def test_the_table_shows_a_station_and_the_reaction():
 
 def test_pictures_are_asked_for(tmp_path):
     """Options for points and magnification; the picture suggests a magnification where displacements are invisible."""
-    from cosserat_fenicsx import read_scene, solve
+    from cosserat_fenicsx import solve
     from cosserat_fenicsx.pictures import plot
 
     look = ("--at", "0.01,0.03", "--magnify", "500")
     done = cosserat("run", DEMO, "--load-factors", "0.01,0.02,0.03", "-o", tmp_path, *look)
     assert done.returncode == 0 and (tmp_path / "rods.png").stat().st_size > 10_000, done.stderr
-    scene, _ = read_scene(DEMO)
+    scene = cf.read(DEMO).scene
     path = solve(scene, [0.01, 0.02, 0.03])
     assert (
         plot._small(path, [0, 2], 20.0, 1.0)
@@ -108,9 +108,9 @@ def test_explain():
 
 
 def test_explained_size_is_the_solved_size():
-    from cosserat_fenicsx import read_scene, solve
+    from cosserat_fenicsx import solve
 
-    scene, _ = read_scene(DEMO)
+    scene = cf.read(DEMO).scene
     for formulation in ("mixed", "multiplier"):
         told = cosserat("explain", DEMO, "--elements", "3", "--formulation", formulation).stdout
         path = solve(scene, [0.01], elements=3, formulation=formulation)
@@ -229,12 +229,12 @@ def test_buckling():
 
 def test_modes(capsys):
     """Frequencies are those of `modes`; the table gives place and direction of the largest displacement."""
-    from cosserat_fenicsx import modes, read_scene
+    from cosserat_fenicsx import modes
     from cosserat_fenicsx.cli import main as cli
 
     assert cli.main(["modes", str(DEMO), "--count", "2"]) == 0
     said = capsys.readouterr().out
-    found = modes(read_scene(DEMO)[0], 2)
+    found = modes(cf.read(DEMO).scene, 2)
     rows = [line.split("│") for line in said.splitlines() if line.startswith("│")]
     assert [float(row[2]) for row in rows] == pytest.approx(found.frequencies, rel=1e-6)
     for row in rows:

@@ -149,7 +149,8 @@ type = "Force"
 station = "rod.end"
 force = [0.01, 0, 0]
 """, encoding="utf-8")  # fmt: skip
-    read, settings = cf.read_scene(file)
+    found = cf.read(file)
+    read, settings = found.scene, found.settings
     section = read.rods[0].section
     assert section.matrix[0][4] == section.matrix[4][0] == 0.25 and section.mass == 2.0
     assert "sections couple strains" in explain(read, [1.0], settings)

@@ -86,11 +86,7 @@ def test_programs_run(page, program, tmp_path, monkeypatch, capsys):
 def test_scene_files_are_read(page, scene, tmp_path):
     file = tmp_path / "scene.toml"
     file.write_text(scene, encoding="utf-8")
-    if "[drive]" in scene:
-        found = cf.read_drilling_scene(file)
-    else:
-        found = cf.read_well(file) if "[well]" in scene else cf.read_scene(file)[0]
-    assert found.title
+    assert cf.read(file).title
 
 
 @pytest.mark.slow

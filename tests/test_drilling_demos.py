@@ -12,7 +12,7 @@ from test_scene_fuzz import damaged
 
 import cosserat_fenicsx as cf
 from cosserat_fenicsx.cli.main import main
-from cosserat_fenicsx.scene import toml_tables
+from cosserat_fenicsx.files import toml
 
 pytestmark = pytest.mark.serial
 DEMOS = Path(__file__).parent.parent / "demos"
@@ -66,11 +66,11 @@ def test_damaged_files(seed, monkeypatch, tmp_path):
     tables.append(tomllib.loads(_whole()))
     for _ in range(200):
         table = damaged(chance.choice(tables), chance)
-        monkeypatch.setattr(toml_tables.tomllib, "loads", lambda stream, table=table: copy.deepcopy(table))
+        monkeypatch.setattr(toml.tomllib, "loads", lambda stream, table=table: copy.deepcopy(table))
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", cf.SceneWarning)
             try:
-                cf.read_drilling_scene(FILES[0])
+                cf.read(FILES[0])
             except cf.SceneError as problem:
                 refused += 1
                 assert len(str(problem)) < 3000

@@ -7,7 +7,8 @@ from fake_string import scene, use
 
 import cosserat_fenicsx as cf
 from cosserat_fenicsx.drilling import time_loop
-from cosserat_fenicsx.drilling.as_data import from_data, to_data
+from cosserat_fenicsx.drilling.scene import Drilling
+from cosserat_fenicsx.parts import from_data, to_data
 from cosserat_fenicsx.storage import files
 
 pytestmark = pytest.mark.serial
@@ -66,10 +67,10 @@ def test_scenes_as_data():
     discs = cf.Drilling(cf.Discs((930.0, 2782.0), (700.0,)), cf.TopDrive(6.0), cf.BitOnRock(cf.Stribeck(3.0, 2.0, 1.0)))
     for given in (whole, discs, scene()):
         data = json.loads(json.dumps(to_data(given)))
-        again = from_data(data)
+        again = from_data(Drilling, data)
         assert to_data(again) == to_data(given) and again.segments == given.segments if given is not discs else True
     with pytest.raises(cf.SceneError, match="no data of a Drilling"):
-        from_data({"type": "Nothing"})
+        from_data(Drilling, {"type": "Nothing"})
 
 
 def test_checkpoints_are_seldom(tmp_path, monkeypatch):

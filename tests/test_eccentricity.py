@@ -6,7 +6,7 @@ from moving_scenes import drift
 
 import cosserat_fenicsx as cf
 from cosserat_fenicsx.numerics import directors
-from cosserat_fenicsx.scene.as_data import from_data, to_data
+from cosserat_fenicsx.parts import from_data, to_data
 
 pytestmark = pytest.mark.serial
 
@@ -202,16 +202,16 @@ def test_files_and_stored_motions(tmp_path):
         degree = 2
     """
     file.write_text(text.replace("ECCENTRICITY", "[{ to = 0.5, offset = [0.01, 0.0] }, { offset = [0.0, 0.02] }]"))
-    scene, asked = cf.read_motion(file)
+    found = cf.read(file)
+    scene, asked = found.scene, found.motion
     assert scene.rods[0].eccentricity == ((0.5, (0.01, 0.0)), (2.0, (0.0, 0.02)))
-    assert (
-        scene.rods[0].breaks == (0.5,) and from_data(to_data(scene)).rods[0].eccentricity == scene.rods[0].eccentricity
-    )
+    again = from_data(cf.Scene, to_data(scene))
+    assert scene.rods[0].breaks == (0.5,) and again.rods[0].eccentricity == scene.rods[0].eccentricity
     file.write_text(text.replace("ECCENTRICITY", "[{ offset = [0.01, 0.0] }, { offset = [0.0, 0.02] }]"))
     with pytest.raises(cf.SceneError, match=r"rods\[0\].eccentricity\[0\]: 'to' is missing"):
-        cf.read_motion(file)
+        cf.read(file)
     file.write_text(text.replace("ECCENTRICITY", "[0.01, 0.0]"))
-    other, _ = cf.read_motion(file)
+    other = cf.read(file).scene
     cf.simulate(scene, **asked, folder=tmp_path / "motion")
     with pytest.raises(cf.SceneError, match=r"eccentricity is .* where the motion has"):
         cf.resume(tmp_path / "motion", other)

@@ -7,7 +7,6 @@ import pytest
 from conftest import column
 
 import cosserat_fenicsx as cf
-from cosserat_fenicsx.scene.scenefile import read_scene
 
 pytestmark = pytest.mark.serial  # estimates do not depend on ranks
 DEMOS = Path(__file__).parent.parent / "demos"
@@ -15,7 +14,7 @@ _PLACES = np.linspace(0, 1, 101)
 
 
 def demo(name):
-    return read_scene(DEMOS / f"{name}.toml")[0]
+    return cf.read(DEMOS / f"{name}.toml").scene
 
 
 def positions(path):

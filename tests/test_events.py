@@ -18,7 +18,7 @@ DEMOS = Path(__file__).parent.parent / "demos"
 
 
 def lees_frame_with_a_follower():
-    scene, _ = cf.read_scene(DEMOS / "lees_frame.toml")
+    scene = cf.read(DEMOS / "lees_frame.toml").scene
     load = cf.FollowerForce(scene.rod("beam").at(24.0), (0, -1e4, 0))
     return cf.Scene(scene.rods, scene.supports, [load], scene.joints)
 

@@ -172,17 +172,17 @@ type = "FollowerForce"
 station = "leg@0.5"
 force = [0.2, 0, 0]
 """)
-    scene, _ = cf.read_scene(file)
+    scene = cf.read(file).scene
     path = cf.solve(scene, [1.0], elements=3, comm=MPI.COMM_SELF)
     assert path.stable[0] and np.abs(path.displacement(scene.rod("leg").end)).max() > 1e-3
     for old, new, words in (
         ('"leg.end"', '"lag.end"', "joints[0].first = 'lag.end': no rod is named 'lag', did you mean 'leg'?"),
-        ('rod = "bow"', "rod = 3", "loads[0].rod = 3: no rod has this name"),
+        ('rod = "bow"', "rod = 3", "loads[0]: LineForce.rod = 3: expected a Rod, or its name"),
         ("release", "relaese", "unknown key 'relaese', did you mean 'release'?"),
     ):
         file.write_text(file.read_text().replace(old, new))
         with pytest.raises(cf.SceneError) as refusal:
-            cf.read_scene(file)
+            cf.read(file)
         assert words in str(refusal.value)
         file.write_text(file.read_text().replace(new, old))
 

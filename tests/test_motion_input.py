@@ -76,7 +76,8 @@ REFUSED = {
                         "the Force depends on time, which a static analysis excludes"),
     "a step longer than the motion": (lambda: cf.simulate(FREE, 1.0, dt=50.0),
                                       "simulate.dt = 50.0: expected at most the duration, 1 s"),
-    "a number for a vector": (lambda: cf.Sine(5.0, 2.0), "Sine.value = 5.0: expected a vector"),
+    "a number for a vector": (lambda: cf.Force(FREE.rods[0].end, cf.Sine(5.0, 2.0)),
+                              "Force.force = (0.0,): expected 3 finite numbers (N)"),
     "no end of steps": (lambda: cf.simulate(FREE, 1.0, dt=1e-18),
                         "simulate: duration = 1 s and dt = 1e-18 s: expected at most 1e+09 steps"),
     "no end of states": (lambda: cf.simulate(FREE, 1.0, save_every=1e-12),
@@ -237,12 +238,12 @@ def test_a_moving_scene_in_toml(tmp_path):
         linear = [1, 0, 0]
         """
     )
-    scene, _ = cf.read_scene(file)
+    scene = cf.read(file).scene
     history = cf.simulate(scene, 1.0, dt=0.1, elements=2, degree=2)
     np.testing.assert_allclose(history.linear_momentum[-1], [4, 0, 3], atol=1e-11)
     file.write_text(file.read_text().replace('"Ramp"', '"Rampe"'))
     with pytest.raises(cf.SceneError, match=r"loads\[0\].force.type = 'Rampe': did you mean 'Ramp'"):
-        cf.read_scene(file)
+        cf.read(file)
 
 
 def test_a_motion_may_start_under_permanent_loads_alone():

@@ -123,16 +123,17 @@ def test_refused(case):
 def test_what_a_file_says_is_what_solve_takes(tmp_path):
     file = tmp_path / "post.toml"
     file.write_text(FRAME)
-    scene, settings = cf.read_scene(file)
+    found = cf.read(file)
+    scene, settings = found.scene, found.settings
     assert settings["load_factors"] == (0.0, 1.0)
     path = cf.solve(scene, **settings)
     assert path.load_factors[-1] == 1.0
     assert (cf.solve(scene, elements=2, degree=2).load_factors == path.load_factors).all()
     file.write_text(FRAME.replace("0:1", "0.25,1"))
-    assert cf.read_scene(file)[1]["load_factors"] == [0.25, 1.0]
+    assert cf.read(file).settings["load_factors"] == [0.25, 1.0]
     file.write_text(FRAME.replace("0:1", "0:1:2"))
     with pytest.raises(cf.SceneError, match="load factors '0:1:2': expected A:B"):
-        cf.read_scene(file)
+        cf.read(file)
 
 
 @pytest.mark.parametrize("given", [(0, 1, 2), (1,), (), "0:1"])

@@ -142,7 +142,7 @@ def read(tmp_path, curve=None, section=CIRCLE):
     (tmp_path / "scene.toml").write_text(
         SCENE.format(curve=curve or '{ type = "Line", start = [0, 0, 0], end = [8, 0, 0] }', section=section)
     )
-    scene, _ = cf.read_scene(tmp_path / "scene.toml")
+    scene = cf.read(tmp_path / "scene.toml").scene
     return scene
 
 

@@ -20,6 +20,7 @@ from cosserat_fenicsx.cli.drilling import explain_drilling
 from cosserat_fenicsx.cli.main import main
 from cosserat_fenicsx.cli.options import parser
 from cosserat_fenicsx.cli.well import explain_well
+from cosserat_fenicsx.files.read import from_tables
 from cosserat_fenicsx.storage.mark import mark_of
 
 pytestmark = pytest.mark.serial
@@ -85,7 +86,7 @@ def test_surveys(case, tmp_path):
     with zipfile.ZipFile(tmp_path / "s.xlsx", "w") as book:
         book.writestr("sheet", "1")
     with pytest.raises(cf.SceneError, match=words):
-        cf.read_well(written(tmp_path, survey))
+        cf.read(written(tmp_path, survey))
 
 
 def test_a_unit_says_which_of_two_columns(tmp_path):
@@ -102,7 +103,7 @@ def test_files_of_bounded_size(tmp_path, monkeypatch):
 
 
 def test_other_files_are_plain_ones_too(tmp_path):
-    for read in (cf.read_scene, cf.read_well, lambda file: cf.Spline("/dev/zero"), cf.AlongTable):
+    for read in (cf.read, lambda file: cf.Spline("/dev/zero"), cf.AlongTable):
         with pytest.raises(cf.SceneError, match="/dev/zero"):
             read("/dev/zero")
     os.symlink("/dev/zero", tmp_path / "points.csv")
@@ -113,7 +114,7 @@ def test_other_files_are_plain_ones_too(tmp_path):
 def test_a_whole_number_of_too_many_digits(tmp_path):
     (tmp_path / "s.toml").write_text(f"a = {'9' * 5000}\n", encoding="utf-8")
     with pytest.raises(cf.SceneError, match="s.toml: not valid TOML: .*digits"):
-        cf.read_scene(tmp_path / "s.toml")
+        cf.read(tmp_path / "s.toml")
 
 
 def test_too_little_memory_in_words(monkeypatch, capsys):
@@ -128,7 +129,7 @@ def test_too_little_memory_in_words(monkeypatch, capsys):
 def test_scenes_may_come_from_a_pipe():
     """As from `cosserat explain <(make_scene)`, but not without end."""
     text = (DEMOS / "eccentric_cantilever.toml").read_text(encoding="utf-8")
-    code = "import cosserat_fenicsx as cf; print(cf.read_scene('/dev/stdin')[0].title)"
+    code = "import cosserat_fenicsx as cf; print(cf.read('/dev/stdin').scene.title)"
     done = subprocess.run([sys.executable, "-c", code], input=text, capture_output=True, encoding="utf-8", check=True)
     assert done.stdout.strip() == tomllib.loads(text).get("title", "")
 
@@ -149,7 +150,7 @@ def test_scenes_may_come_from_a_pipe():
 def test_wells(given, words, tmp_path, capsys):
     file = written(tmp_path, **given)
     with pytest.raises(cf.SceneError, match=words):
-        cf.read_well(file)
+        cf.read(file)
     assert main(["run", file]) == 2 and capsys.readouterr().err.startswith("cosserat: ")
 
 
@@ -167,7 +168,7 @@ def test_a_step_longer_than_all_parts(tmp_path, capsys):
     file.write_text(DRILLING, encoding="utf-8")
     assert main(["run", str(file)]) == 2
     assert "expected a step of at most 0.0531 s" in capsys.readouterr().err
-    scene = cf.read_drilling_scene(file).scene
+    scene = cf.read(file).scene
     slow = cf.Drilling(scene.string, cf.TopDrive(1.0))
     coarse, fine = (cf.simulate_drilling(slow, 2.0, dt=dt, progress=False) for dt in (1.0, 1e-3))
     assert coarse.dt < 0.1 and coarse.bit_speed[-1] == pytest.approx(fine.bit_speed[-1], abs=0.5)
@@ -191,7 +192,7 @@ def test_arguments_that_there_are_not(call, words):
 
 
 def test_a_type_error_from_inside_stays():
-    for read in (cf.read_scene, cf.read_well):
+    for read in (cf.read,):
         with pytest.raises(TypeError, match="os.PathLike object"):
             read(3)
 
@@ -229,7 +230,8 @@ def test_damaged_files_of_strings(seed):
                 warnings.simplefilter("ignore")
                 warnings.simplefilter("error", RuntimeWarning)
                 try:
-                    explain(commands.parse_args(["explain", str(file)]), damaged(known[file], chance))
+                    found = from_tables(damaged(known[file], chance), file.parent)
+                    explain(commands.parse_args(["explain", str(file)]), found)
                 except cf.SceneError as problem:
                     refused += 1
                     assert len(str(problem)) < 3000

@@ -111,10 +111,10 @@ section = { type = "Profile", name = "IPE 200" }
 curve = { type = "Line", start = [0, 0, 0], end = [3, 0, 0] }
 """
     )
-    scene, _ = cf.read_scene(file)
+    scene = cf.read(file).scene
     k = scene.rods[0].stiffness
     beam = 10 * 3**3 / (3 * k.bending[0]) + 10 * 3 / k.shear[1]
     assert cf.solve(scene, [1.0]).displacement("beam.end")[0, 2] == pytest.approx(-beam, rel=1e-6)
     file.write_text(file.read_text().replace("IPE 200", "IPE 201"))
     with pytest.raises(cf.SceneError, match=r"rods\[0\].section: Profile.name = 'IPE 201': did you mean .*IPE 200"):
-        cf.read_scene(file)
+        cf.read(file)

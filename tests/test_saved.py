@@ -180,7 +180,7 @@ def test_scenes_with_code_are_not_saved(tmp_path_all):
     if COMM.rank == 0:
         file.write_text("old")
     path = cf.solve(scene, [0.3], elements=2)
-    with pytest.raises(cf.SceneError, match=r"path.h5: rods\[0\] \(column\): a function written in Python cannot be"):
+    with pytest.raises(cf.SceneError, match=r"path.h5: rods\[0\].section: a function written in Python cannot be"):
         path.save(file)
     with pytest.raises(cf.SceneError, match="save: expected a result with at least one load factor"):
         path.at_points([]).save(file)

@@ -32,7 +32,7 @@ REFUSED = {
     "E is no number": (lambda: cf.Material(E=None), "Material.E = None"),
     "density is NaN": (lambda: cf.Material(E=1.0, density=nan), "Material.density = nan"),
     "density is negative": (lambda: cf.Material(E=1.0, density=-1), "Material.density = -1"),
-    "nu = -1": (lambda: cf.Material(E=1.0, nu=-1), "Material.nu = -1: expected a Poisson's ratio in (-1, 0.5]"),
+    "nu = -1": (lambda: cf.Material(E=1.0, nu=-1), "nu = -1: expected a Poisson's ratio above -1 and up to 0.5"),
     "nu = 0.6": (lambda: cf.Material(E=1.0, nu=0.6), "Material.nu = 0.6"),
     "stiffness sign": (lambda: cf.Stiffness((1, 1), -1, (1, 1), 1), "Stiffness.axial = -1"),
     "stiffness count": (lambda: cf.Stiffness((1,), 1, (1, 1), 1), "Stiffness.shear = (1,)"),
@@ -207,7 +207,5 @@ def test_what_looks_like_a_slip_is_asked_about():
     assert any("add Joint(one.end, two.start)" in why for why in path.why)
     with pytest.raises(cf.SceneError, match="a name without '@'"):
         cf.Rod(cf.Line((0, 0, 0), (0, 0, 4)), cf.Circle(0.1), cf.Material(1e9), name="b@2")
-    with pytest.raises(
-        cf.SceneError, match="scene is a tuple: expected a Scene, which is the first of what read_scene"
-    ):
+    with pytest.raises(cf.SceneError, match="scene is a tuple: expected a Scene"):
         cf.solve((scene(), {}), [1.0])

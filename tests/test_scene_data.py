@@ -7,8 +7,8 @@ import pytest
 import ufl
 
 import cosserat_fenicsx as cf
+from cosserat_fenicsx.parts import NotData, from_data, to_data
 from cosserat_fenicsx.scene import action
-from cosserat_fenicsx.scene.as_data import NotData, from_data, to_data
 
 pytestmark = [pytest.mark.serial, pytest.mark.once]
 STEEL = cf.Material(E=210e9, nu=0.3, density=7850.0)
@@ -62,7 +62,7 @@ def test_back_to_the_last_digit():
     scene = everything()
     data = to_data(scene)
     text = json.dumps(data)
-    again = from_data(json.loads(text))
+    again = from_data(cf.Scene, json.loads(text))
     assert json.dumps(to_data(again)) == text
     for one, other in zip(scene.rods, again.rods, strict=True):
         s = np.linspace(0, one.length, 7)
@@ -84,12 +84,12 @@ def test_what_has_no_form_as_data_is_named():
             return (action.vector((0, 0, 1.0), "N"),)
 
     for scene, words in (
-        (cf.Scene([cone]), r"rods\[0\] \(cone\): a function written in Python"),
+        (cf.Scene([cone]), r"rods\[0\].section: a function written in Python"),
         (
             cf.Scene([rod], loads=[cf.Force(rod.end, lambda t: (t, 0, 0))]),
-            r"loads\[0\] \(Force at rod.end\): a function",
+            r"loads\[0\].force: a function",
         ),
-        (cf.Scene([rod], loads=[Own()]), r"loads\[0\] \(Own at rod.end\): a part of the class Own cannot"),
+        (cf.Scene([rod], loads=[Own()]), r"loads\[0\]: a part of the class Own cannot"),
     ):
         with pytest.raises(NotData, match=words):
             to_data(scene)
@@ -104,4 +104,4 @@ def test_what_has_no_form_as_data_is_named():
 ])  # fmt: skip
 def test_data_of_anything_else_are_refused(damage):
     with pytest.raises(cf.SceneError):
-        from_data(damage)
+        from_data(cf.Scene, damage)

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 import cosserat_fenicsx as cf
-from cosserat_fenicsx.scene import toml_tables
+from cosserat_fenicsx.files import toml
 
 pytestmark = [pytest.mark.serial, pytest.mark.once]
 FILES = sorted((Path(__file__).parent.parent / "demos").glob("**/*.toml"))
@@ -61,13 +61,13 @@ def test_damaged_files(seed, monkeypatch):
     for _ in range(200):
         file = chance.choice(FILES)
         table = damaged(tables[file], chance)
-        monkeypatch.setattr(toml_tables.tomllib, "loads", lambda stream, table=table: copy.deepcopy(table))
+        monkeypatch.setattr(toml.tomllib, "loads", lambda stream, table=table: copy.deepcopy(table))
         with warnings.catch_warnings():
             warnings.simplefilter("error", RuntimeWarning)
             try:
-                scene, _ = cf.read_scene(file)
-                cf.read_motion(file)
-                assert scene.cautions is not None and scene.flatness
+                found = cf.read(file)
+                if isinstance(found, cf.RodScene):
+                    assert found.scene.cautions is not None and found.scene.flatness
             except cf.SceneError as problem:
                 refused += 1
                 assert len(str(problem)) < 3000

@@ -230,7 +230,7 @@ def test_materials_of_a_scene_file_have_names(tmp_path):
         station = "arm.end"
         force = [0, 0, -2e3]
         """)
-    scene = cf.read_scene(tmp_path / "scene.toml")[0]
+    scene = cf.read(tmp_path / "scene.toml").scene
     path = cf.solve(scene, [1.0], elements=4)
     names = ["materials.steel.E", "materials[0].E", "rods.arm.material.E", "loads[0].force[2]"]
     found = path.sensitivity(lambda path: path.rotation("arm.end")[:, 2], names)

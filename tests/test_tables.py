@@ -50,7 +50,7 @@ section = { type = "Stiffness", shear = [1e4, 1e4], axial = 1e4, bending = [10, 
 def test_an_offset_in_a_scene_file(tmp_path):
     file = tmp_path / "arm.toml"
     file.write_text(SCENE.replace("GIVEN", "centroid = [0.01, 0], angle = 0.2, mass = 3.0"))
-    (rod,) = cf.read_scene(file)[0].rods
+    (rod,) = cf.read(file).scene.rods
     assert rod.section == cf.Stiffness.offset((1e4, 1e4), 1e4, (10, 20), 5, centroid=(0.01, 0), angle=0.2, mass=3.0)
     for given, words in (
         ("centre = [0.01, 0], angle = 0.2", "unknown key 'centre', did you mean 'centroid'?"),
@@ -58,8 +58,8 @@ def test_an_offset_in_a_scene_file(tmp_path):
     ):
         file.write_text(SCENE.replace("GIVEN", given))
         with pytest.raises(cf.SceneError) as refusal:
-            cf.read_scene(file)
+            cf.read(file)
         assert words in str(refusal.value)
     file.write_text(SCENE.replace("GIVEN", "angle = 0.1").replace(" torsion = 5,", ""))
     with pytest.raises(cf.SceneError, match="'torsion' is missing"):
-        cf.read_scene(file)
+        cf.read(file)

@@ -11,7 +11,7 @@ from cosserat_fenicsx.cli.say import DONE, INTERRUPTED, NOT_CONVERGED, Files, en
 from cosserat_fenicsx.dimensions import in_si
 from cosserat_fenicsx.drilling.bit_laws import Stribeck
 from cosserat_fenicsx.drilling.choose import chosen, model_of
-from cosserat_fenicsx.drilling.scenefile import drilling_in
+from cosserat_fenicsx.drilling.scenefile import SimulateDrilling
 from cosserat_fenicsx.drilling.segments import Discs
 from cosserat_fenicsx.drilling.simulate import KIND, check_arguments
 from cosserat_fenicsx.drilling.tables import turns
@@ -27,7 +27,7 @@ _OTHERS = ("load_factors", "tol", "bound", "degree", "formulation", "control", "
            "at", "color", "magnify")  # fmt: skip
 
 
-def _scene(options, tables):
+def _scene(options, found):
     for name in _OTHERS:
         if getattr(options, name, None) is not None:
             option = f"--{name.replace('_', '-')}"
@@ -35,15 +35,14 @@ def _scene(options, tables):
     if options.static:
         raise SceneError("--static is for rods, and this scene is a drill-string in motion: strings in equilibrium are "
                          "scenes with [well] and [[operations]]")  # fmt: skip
-    found = drilling_in(tables, Path(options.scene))
     asked = {name: getattr(options, name) for name in _TAKEN if getattr(options, name, None) is not None}
-    return replace(found, settings={**found.settings, **asked})
+    return replace(found, simulate=replace(found.simulate or SimulateDrilling(), **asked))
 
 
 @warnings_in_words()
-def run_drilling(options, tables):
+def run_drilling(options, found, tables):
     """`cosserat run` of the tables of a scene file; returns the exit code."""
-    found = _scene(options, tables)
+    found = _scene(options, found)
     if found.title:
         say(found.title, file=sys.stdout)
     _check_folder(options.folder, found.scene)
@@ -53,7 +52,7 @@ def run_drilling(options, tables):
         )
     code = DONE
     if "duration" in found.settings or not found.speeds:
-        code = _deliver(lambda: found.simulate(folder=options.folder), options)
+        code = _deliver(lambda: found.run(folder=options.folder), options)
     return _stability(found, options) if code == DONE and found.speeds else code
 
 
@@ -70,7 +69,7 @@ def _stability(found, options):
     """Compute, print and write the map of stability; returns the exit code."""
     try:
         with patience():
-            answer = found.stability()
+            answer = found.map()
     except NotConverged as failure:
         say(f"cosserat: {failure}")
         return NOT_CONVERGED
@@ -137,9 +136,9 @@ def _write(history, out, pictures, film, speed, stops):
 
 
 @warnings_in_words()
-def explain_drilling(options, tables):
+def explain_drilling(options, found):
     """Text of `cosserat explain` of the tables of a scene file."""
-    found = _scene(options, tables)
+    found = _scene(options, found)
     scene, settings = found.scene, found.settings
     lines = [found.title] if found.title else []
     if isinstance(scene.string, Discs):

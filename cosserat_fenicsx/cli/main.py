@@ -13,9 +13,6 @@ from cosserat_fenicsx.cli.rods import deliver, run_buckling, run_modes
 from cosserat_fenicsx.cli.say import BAD_INPUT, DONE, INTERRUPTED, in_words, say, together, warnings_in_words
 from cosserat_fenicsx.errors import CosseratError, SceneError, SceneWarning
 
-# Tables that a drill-string in motion has, and a string in a well has not.
-_OF_DRILLING = {"drive", "bit", "hook", "wall_friction", "drag", "simulate", "stability", "discs"}
-
 
 def main(arguments=None):
     """Entry point of `cosserat`.
@@ -52,56 +49,51 @@ def main(arguments=None):
         return BAD_INPUT
 
 
-def _is_drilling(tables):
-    """Whether a file is that of a drill-string in motion, also one whose [drive] is missing or misspelt."""
-    return "drive" in tables or bool({"string", "well", "discs"} & set(tables) and _OF_DRILLING & set(tables))
-
-
 def _rods_alone(do):
     """A command that refuses scenes of strings."""
 
     def command(options):
-        from cosserat_fenicsx.scene.toml_tables import tables_of
+        from cosserat_fenicsx.files.read import kind_of, read_with_tables
 
-        tables = tables_of(options.scene)
-        if _is_drilling(tables):
+        found, tables = read_with_tables(options.scene)
+        if kind_of(tables) == "drilling":
             raise SceneError(f"cosserat {options.command} is for rods, and {options.scene} is a drill-string in "
                              "motion: `cosserat run` with a table [stability] computes its modes")  # fmt: skip
-        return do(options)
+        if kind_of(tables) == "well":
+            raise SceneError(f"cosserat {options.command} is for rods, and {options.scene} is a string in a well")
+        return do(options, found.scene, tables)
 
     return command
 
 
-def _settings(options):
+def _settings(options, found):
     """The scene and the arguments of `solve`: options of the command line replace those of the file."""
-    from cosserat_fenicsx.scene.scenefile import load_factors_in, read_scene
+    from cosserat_fenicsx.files.rods import load_factors_in
 
-    scene, settings = read_scene(options.scene)
+    settings = found.settings
     for name in ("tol", "bound", "elements", "degree", "formulation", "model", "control", "branch"):
         if getattr(options, name) is not None:
             settings[name] = getattr(options, name)
     if options.load_factors is not None:
         settings["load_factors"] = load_factors_in(options.load_factors)
-    return scene, settings.pop("load_factors", (0.0, 1.0)), settings
+    return found.scene, settings.pop("load_factors", (0.0, 1.0)), settings
 
 
 def _run(options):
     from cosserat_fenicsx.cli.rods import motion_of
-    from cosserat_fenicsx.scene.toml_tables import tables_of
+    from cosserat_fenicsx.files.read import kind_of, read_with_tables
 
-    tables = tables_of(options.scene)
-    if _is_drilling(tables):
+    found, tables = read_with_tables(options.scene)
+    if kind_of(tables) == "drilling":
         from cosserat_fenicsx.cli.drilling import run_drilling
 
-        return run_drilling(options, tables)
-    if "well" in tables:
+        return run_drilling(options, found, tables)
+    if kind_of(tables) == "well":
         from cosserat_fenicsx.cli.well import run_well
 
-        return run_well(options, tables)
-    moving = motion_of(options)
-    scene, load_factors, settings = (None, None, None) if moving else _settings(options)
-
-    scene = moving[0] if moving else scene
+        return run_well(options, found, tables)
+    moving = motion_of(options, found)
+    scene, load_factors, settings = (found.scene, None, None) if moving else _settings(options, found)
     if options.station:
         scene.station(options.station)  # refused before the computation
     for caution in scene.doubts if moving else scene.cautions:
@@ -143,20 +135,20 @@ def _resume(options):
 
 def _explain(options):
     from cosserat_fenicsx.cli.rods import motion_of
-    from cosserat_fenicsx.scene.toml_tables import tables_of
+    from cosserat_fenicsx.files.read import kind_of, read_with_tables
 
-    tables = tables_of(options.scene)
-    if _is_drilling(tables):
+    found, tables = read_with_tables(options.scene)
+    if kind_of(tables) == "drilling":
         from cosserat_fenicsx.cli.drilling import explain_drilling
 
-        say(explain_drilling(options, tables), file=sys.stdout)
+        say(explain_drilling(options, found), file=sys.stdout)
         return DONE
-    if "well" in tables:
+    if kind_of(tables) == "well":
         from cosserat_fenicsx.cli.well import explain_well
 
-        say(explain_well(options, tables), file=sys.stdout)
+        say(explain_well(options, found), file=sys.stdout)
         return DONE
-    moving = motion_of(options)
+    moving = motion_of(options, found)
     if moving:
         from cosserat_fenicsx.cli.explain import explain_motion
 
@@ -164,7 +156,7 @@ def _explain(options):
     else:
         from cosserat_fenicsx.cli.explain import explain
 
-        scene, *asked = _settings(options)
+        scene, *asked = _settings(options, found)
         text = explain(scene, *asked)
     for doubt in scene.doubts:
         say(f"cosserat: warning: {doubt}")

@@ -28,20 +28,18 @@ MOTION, PATH = (
 _BOTH = ("tol", "elements", "degree", "model")
 
 
-def motion_of(options):
+def motion_of(options, found):
     """The scene and the arguments of `simulate`, or None where an equilibrium path is requested.
 
     Args:
-        options: of the command line; they replace the arguments in the file.
+        options: of the command line; they replace the arguments in the file. found: the `RodScene` of the file.
 
     Raises:
-        SceneError: a file that cannot be read, or an option of a path for a motion or vice versa.
+        SceneError: an option of a path for a motion or vice versa.
     """
-    from cosserat_fenicsx.scene.scenefile import read_motion
-
     given = {name: getattr(options, name, None) for name in (*MOTION, *PATH, *_BOTH)}
     given = {name: value for name, value in given.items() if value is not None}
-    scene, settings = read_motion(options.scene)
+    settings = found.motion
     moves = not options.static and (settings or "duration" in given)
     for name in PATH if moves else MOTION:
         if name in given:
@@ -52,7 +50,7 @@ def motion_of(options):
         settings.pop("tol", None)
     if "tol" in given:
         settings.pop("dt", None)
-    return scene, {**settings, **given}
+    return found.scene, {**settings, **given}
 
 
 def refuse_other(name, moves):
@@ -70,32 +68,26 @@ def refuse_other(name, moves):
     )
 
 
-def run_buckling(options):
+def run_buckling(options, scene, tables):
     """`cosserat buckling`; returns the exit code."""
-    from cosserat_fenicsx.results.shapes import buckling_table
     from cosserat_fenicsx.statics.linear_buckling import buckling
 
-    return _deliver(options, buckling, buckling_table)
+    return _deliver(options, scene, tables, buckling)
 
 
-def run_modes(options):
+def run_modes(options, scene, tables):
     """`cosserat modes`; returns the exit code."""
     from cosserat_fenicsx.dynamics.natural_modes import modes
-    from cosserat_fenicsx.results.shapes import modes_table
 
-    return _deliver(options, modes, modes_table)
+    return _deliver(options, scene, tables, modes)
 
 
-def _deliver(options, compute, table):
+def _deliver(options, scene, tables, compute):
     """Compute, print the table and write the files; returns the exit code."""
-    from cosserat_fenicsx.scene.scenefile import read_scene
-    from cosserat_fenicsx.scene.toml_tables import tables_of
-
-    scene, _ = read_scene(options.scene)
     out = Path(options.output) if options.output else None
     if out is not None:
         names = [f"{options.command}.{ending}" for ending in ("csv", "xdmf", "h5", "png")]
-        keep_inputs(out, names, options.scene, tables_of(options.scene))
+        keep_inputs(out, names, options.scene, tables)
         prepare(out)  # fail before the computation, not after it
     for caution in scene.doubts:
         say(f"cosserat: warning: {caution}")
@@ -107,7 +99,7 @@ def _deliver(options, compute, table):
     except NotConverged as failure:
         say(f"cosserat: {failure}")
         return NOT_CONVERGED
-    say(table(found), file=sys.stdout)
+    say(str(found), file=sys.stdout)
     return DONE if out is None else _write_shapes(found, out, options.command, picture=not options.no_picture)
 
 

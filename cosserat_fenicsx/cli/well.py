@@ -14,7 +14,7 @@ from cosserat_fenicsx.errors import Interrupted, SceneError
 from cosserat_fenicsx.ranks import on_first, world
 from cosserat_fenicsx.storage.store import discard
 from cosserat_fenicsx.well.components import weight_in_mud
-from cosserat_fenicsx.well.scenefile import well_in
+from cosserat_fenicsx.well.scenefile import TorqueAndDragSettings
 
 # Options of the command line that are for rods alone.
 _OTHERS = ("load_factors", "bound", "elements", "degree", "formulation", "control", "branch", "duration", "dt",
@@ -34,19 +34,18 @@ _MODELS = {
 }
 
 
-def _scene(options, tables):
+def _scene(options, scene):
     for name in _OTHERS:
         if getattr(options, name, None) is not None:
             raise SceneError(f"--{name.replace('_', '-')} is for rods, and this scene is a well")
-    scene = well_in(tables, Path(options.scene))
     asked = {name: getattr(options, name) for name in ("tol", "model") if getattr(options, name) is not None}
-    return replace(scene, settings={**scene.settings, **asked})
+    return replace(scene, torque_and_drag=replace(scene.torque_and_drag or TorqueAndDragSettings(), **asked))
 
 
 @warnings_in_words()
-def run_well(options, tables):
+def run_well(options, scene, tables):
     """`cosserat run` of the tables of a scene file; returns the exit code."""
-    scene, out = _scene(options, tables), Path(options.output) if options.output else None
+    scene, out = _scene(options, scene), Path(options.output) if options.output else None
     stems = _stems(scene.operations)
     if out is not None:
         names = [f"{stem}{ending}" for stem in stems for ending in (".csv", "_contacts.csv", ".png", "_3d.png")]
@@ -62,7 +61,7 @@ def run_well(options, tables):
             _write(answer, written, stem, not options.no_picture)
     code = DONE
     try:
-        sweep = scene.depth_sweep(out / "depth_sweep" if out is not None else None)
+        sweep = scene.swept(out / "depth_sweep" if out is not None else None)
     except Interrupted as stop:
         sweep, code = stop.path, INTERRUPTED
         say(f"cosserat: {stop.words}")
@@ -93,9 +92,9 @@ def _write(answer, written, stem, pictures):
 
 
 @warnings_in_words()
-def explain_well(options, tables):
+def explain_well(options, scene):
     """Text of `cosserat explain` of the tables of a scene file."""
-    scene = _scene(options, tables)
+    scene = _scene(options, scene)
     hole, path = scene.hole, scene.hole.path
     end, worst = path.position(path.length), int(np.argmax(path.dogleg_severity))
     lines = [scene.title] if scene.title else []

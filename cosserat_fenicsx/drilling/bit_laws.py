@@ -248,7 +248,7 @@ class Lobes(BitLaw):
 
     count: Annotated[int, Number(limits=at_least(1, "a number of lobes"), whole=True)]
     amplitude: Length
-    law: BitLaw | None = None
+    law: Stribeck | BitLaw | None = None
 
     lifts = "the lobes of the rock lift the bit"
 

@@ -9,12 +9,13 @@ from cosserat_fenicsx.drilling.bit_laws import BitOnRock
 from cosserat_fenicsx.drilling.segments import Discs, Segment, segment_of
 from cosserat_fenicsx.drilling.top_drive import Hook, TopDrive
 from cosserat_fenicsx.drilling.wall_friction import FrictionLaw, ViscousDrag
+from cosserat_fenicsx.parts import Part
 from cosserat_fenicsx.well.components import DrillString, weight_in_mud
 from cosserat_fenicsx.well.hole import Borehole, Mud
 
 
 @dataclass(frozen=True)
-class Drilling:
+class Drilling(Part):
     """A drill-string with what turns it, holds it and brakes it.
 
     Args:

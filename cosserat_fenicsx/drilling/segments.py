@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from cosserat_fenicsx.checks import finite_array, refuse, store
+from cosserat_fenicsx.parts import Part
 
 
 @dataclass(frozen=True)
@@ -70,7 +71,7 @@ def segment_of(place, weight):
 
 
 @dataclass(frozen=True)
-class Discs:
+class Discs(Part):
     """Discs from the top drive down to the bit, joined by springs and dampers in torsion, and, with masses, axially.
 
     The first disc is the top drive's own inertia (beside that of `TopDrive`), the last the bit's.

@@ -1,5 +1,6 @@
 """`simulate_drilling`: a drill-string in motion; it is read from its folder, and gone on with."""
 
+import functools
 import math
 import numbers
 from functools import partial
@@ -7,7 +8,6 @@ from functools import partial
 import numpy as np
 
 from cosserat_fenicsx.checks import File, instance, number, refuse
-from cosserat_fenicsx.drilling.as_data import from_data, to_data
 from cosserat_fenicsx.drilling.choose import OtherSteps, chosen, fastest, model_of
 from cosserat_fenicsx.drilling.history import COLUMNS, DrillingHistory
 from cosserat_fenicsx.drilling.protocol import PROFILE
@@ -15,6 +15,7 @@ from cosserat_fenicsx.drilling.scene import Drilling
 from cosserat_fenicsx.drilling.stick_slip import step_errors
 from cosserat_fenicsx.drilling.time_loop import TimeLoop
 from cosserat_fenicsx.errors import SceneError
+from cosserat_fenicsx.parts import from_data, to_data
 from cosserat_fenicsx.storage.store import Kind, Store
 
 #: More steps, and rows of a history, are refused as a mistake; so many profiles where nothing else is asked for.
@@ -28,7 +29,7 @@ KIND = Kind(
     what="motion of a drill-string", home="drilling.simulate", call="simulate_drilling",
     again="cosserat_fenicsx.resume('{place}'), or `cosserat resume {place}`, continues it",
     differs="the scene is not the one of the motion", tables=("series", "profiles"), starts=True, rounding=1e-9,
-    as_data=to_data, from_data=from_data,
+    as_data=to_data, from_data=functools.partial(from_data, Drilling),
 )  # fmt: skip
 
 

@@ -10,6 +10,8 @@ from collections import namedtuple
 
 import numpy as np
 
+from cosserat_fenicsx.parts import Part
+
 #: A scalar (size 1) or a vector (size 3, inertial) in a virtual work: value (size,), or (n, size) along a rod.
 Datum = namedtuple("Datum", "value unit size")
 
@@ -67,7 +69,7 @@ def _known(unit):
     return unit
 
 
-class Action:
+class Action(Part, family="load or action", homes=("cosserat_fenicsx.scene.loads", "cosserat_fenicsx.actions")):
     """Base of loads, springs, dashpots and walls.
 
     A class of your own is a `PointAction` with a `station`, or a `LineAction` with a `rod`: a frozen dataclass with a

@@ -11,6 +11,7 @@ import io
 import math
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 from numpy.polynomial import legendre
@@ -19,6 +20,7 @@ from cosserat_fenicsx.checks import File, Numbers, Rows, instance, number, posit
 from cosserat_fenicsx.dimensions import LARGEST
 from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.numerics import gauss
+from cosserat_fenicsx.parts import FileName, Part
 
 # Smallest distance of neighbouring points over the extent of all: nearer ones leave the curvature to rounding errors.
 _APART = 1e-7
@@ -213,8 +215,12 @@ _GAUSS = gauss(20)
 _MOST_HALVINGS, _MOST_PANELS = 24, 200
 
 
+class Curve(Part, family="curve"):
+    """Base of reference centrelines."""
+
+
 @dataclass(frozen=True)
-class Spline:
+class Spline(Curve):
     """The cubic spline through points, twice continuously differentiable, with chord lengths as its parameter.
 
     At open ends it is "not-a-knot": points of a smooth curve give that curve to fourth order up to its ends, where the
@@ -239,7 +245,7 @@ class Spline:
             that turns back on itself in a cusp, or d1 along the tangent.
     """
 
-    points: Rows | File = field(repr=False, metadata={"file": True})
+    points: Annotated[Rows | File, FileName()] = field(repr=False)
     d1: Numbers | None = None
     closed: bool = False
     length: float = field(init=False)
@@ -390,7 +396,7 @@ def _moved(d1, a, t, angle):
 
 
 @dataclass(frozen=True)
-class Line:
+class Line(Curve):
     """A straight line.
 
     Args:
@@ -429,7 +435,7 @@ class Line:
         return np.broadcast_to(self._frame, (*np.shape(s), 3, 3))
 
 
-class _Uniform:
+class _Uniform(Curve):
     """A curve of constant material curvature u: R_R(s) = R_R(0) exp(s u x), r(s) = r(0) + integral of R_R (0, 0, 1).
 
     Subclasses store `start`, `length`, `_frame` = R_R(0) and `_curvature` = u.
@@ -554,6 +560,10 @@ class UniformCurvature(_Uniform):
             q /= np.linalg.norm(q)
         store(self, quaternion=tuple(q.tolist()), _frame=rotation(q), _curvature=np.array(self.curvature))
 
+    def arguments(self):
+        """See `Part`."""
+        return {"frame" if name == "quaternion" else name: value for name, value in super().arguments().items()}
+
 
 def _check_d1(curve):
     if curve.d1 is not None:
@@ -582,7 +592,3 @@ def _axis_and_arm(curve):
         refuse(curve, "start", curve.start, f"a point off the axis through centre = {curve.centre}")
     return axis, across / radius, radius
 
-
-#: Curves that scene files know.
-CURVES = (Line, Arc, Helix, Spline, UniformCurvature)
-Curve = Line | Arc | Helix | Spline | UniformCurvature

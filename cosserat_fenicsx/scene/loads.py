@@ -9,11 +9,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from cosserat_fenicsx.checks import Numbers, NumbersInTime, instance, refuse, store, vector
+from cosserat_fenicsx.parts import FunctionAlong
 from cosserat_fenicsx.scene import action
 from cosserat_fenicsx.scene.action import LineAction, PointAction
 from cosserat_fenicsx.scene.rod import Rod, RodOrName, Station, StationOrName, is_known
 from cosserat_fenicsx.scene.signals import (
-    FunctionAlong,
     along_or_vector,
     breaks_of,
     kinks_of,
@@ -23,7 +23,7 @@ from cosserat_fenicsx.scene.signals import (
 
 
 @dataclass(frozen=True)
-class WeightOffAxis(LineAction):
+class _WeightOffAxis(LineAction):
     """The moment R a x rho A g per unit of reference length about the axis of an eccentric rod; `Weight` adds it.
 
     Args:
@@ -264,7 +264,7 @@ class Weight(Load, LineAction):
             if found is not None
         )
         offset = [rod for rod in scene.rods if rod.mass_centre]
-        return (*weights, *(WeightOffAxis(rod, self.gravity, self.permanent) for rod in offset))
+        return (*weights, *(_WeightOffAxis(rod, self.gravity, self.permanent) for rod in offset))
 
 
 class LineLoad(Load, LineAction):
@@ -350,7 +350,3 @@ class LineMoment(LineLoad):
     def kinks(self, rod):
         """See `Action`."""
         return kinks_of(self.moment)
-
-
-#: Loads that scene files know.
-LOADS = (Force, Moment, EccentricForce, FollowerForce, FollowerMoment, LineForce, LineMoment, Weight)

@@ -15,8 +15,7 @@ import numpy as np
 
 from cosserat_fenicsx.checks import instance, number
 from cosserat_fenicsx.errors import SceneError, nearest
-from cosserat_fenicsx.scene.as_data import argument_of
-from cosserat_fenicsx.scene.curves import CURVES, Spline
+from cosserat_fenicsx.scene.curves import Curve, Spline
 from cosserat_fenicsx.scene.rod import Station
 from cosserat_fenicsx.scene.scene import Scene
 from cosserat_fenicsx.scene.sections import Tube
@@ -123,7 +122,7 @@ def parameter_of(scene, given):
     if isinstance(leaf, bool) or not isinstance(leaf, numbers.Real):
         raise SceneError(f"parameter '{given}' is {_kind(leaf)}: expected the name of a number{_inside(leaf, given)}")
     unit = _UNITS.get(f"{type(owner).__name__}.{field}", _UNITS.get(field, "its SI unit"))
-    if isinstance(owner, CURVES) and unit == "m":  # places change by parts of the curve, wherever its origin lies
+    if isinstance(owner, Curve) and unit == "m":  # places change by parts of the curve, wherever its origin lies
         size = _extent(owner)
     elif isinstance(owner, Tube) and field != "shear_factor":  # a thin wall is gone where a diameter changes little
         size = owner.outer_diameter - owner.inner_diameter
@@ -203,8 +202,9 @@ def _put(value, keys, leaf):
 
 def _made(item, changes):
     """A dataclass of the package, made anew with other fields."""
-    fields = [x.name for x in dataclasses.fields(item) if x.init]
-    return type(item)(**{argument_of(x): changes.get(x, getattr(item, x)) for x in fields})
+    given = item.arguments()  # in the order of the fields, whose names may differ
+    names = dict(zip([x.name for x in dataclasses.fields(item) if x.init], given, strict=True))
+    return type(item)(**given | {names[field]: value for field, value in changes.items()})
 
 
 class _Rebuilding:

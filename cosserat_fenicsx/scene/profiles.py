@@ -5,13 +5,14 @@ from collections import namedtuple
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Annotated
 
 import numpy as np
 
 from cosserat_fenicsx.checks import Numbers, call, instance, number, refuse, store, vector
 from cosserat_fenicsx.errors import SceneError
-from cosserat_fenicsx.scene.rolled import Profile
-from cosserat_fenicsx.scene.sections import Circle, Material, Rectangle, Stiffness, Tube, inverse, representative
+from cosserat_fenicsx.parts import Kind, Object, Several, misplaced, spoken
+from cosserat_fenicsx.scene.sections import Material, Section, Stiffness, inverse, representative
 from cosserat_fenicsx.scene.stresses import Stress
 
 
@@ -43,9 +44,59 @@ def checked_pieces(where, field, given, length, what):
     return pieces
 
 
+@dataclass(frozen=True)
+class InPieces(Kind):
+    """What another kind takes, or pieces of it along a rod, (s_end, value).
+
+    Attributes:
+        key: that of the value in the table of a piece, beside "to"; "" where the value is itself the table.
+    """
+
+    inner: Kind = Kind()
+    key: str = ""
+
+    def read(self, where, data, reading):
+        """See `Kind`."""
+        if not isinstance(data, list) or not any(isinstance(piece, dict) for piece in data):
+            return self.inner.read(where, data, reading)
+        pieces = []
+        for i, piece in enumerate(data):
+            place = (*where, i)
+            if not isinstance(piece, dict):
+                raise misplaced(place, f"{spoken(place)} = {piece!r}: expected a table")
+            if "to" not in piece and i < len(data) - 1:
+                raise misplaced(place, f"{spoken(place)}: 'to' is missing: expected where this piece ends (m)")
+            rest = {name: value for name, value in piece.items() if name != "to"}
+            if self.key and rest.keys() != {self.key}:
+                other = next((name for name in rest if name != self.key), None)
+                words = f"'{self.key}' is missing" if other is None else f"unknown key '{other}', did you mean"
+                words += "" if other is None else f" '{self.key}'?"
+                raise misplaced((*place, other) if other else place, f"{spoken(place)}: {words}")
+            pieces.append((piece.get("to"), self.inner.read(place, rest[self.key] if self.key else rest, reading)))
+        return pieces
+
+    def write(self, value, writing):
+        """See `Kind`."""
+        if not _has_pieces(value):
+            return self.inner.write(value, writing)
+        pieces = []
+        for end, part in value:
+            written = self.inner.write(part, writing)
+            pieces.append(({} if end is None else {"to": end}) | ({self.key: written} if self.key else written))
+        return pieces
+
+    def schema(self, definitions):
+        """See `Kind`."""
+        item = {"properties": {self.key: self.inner.schema(definitions)}} if self.key else {}
+        return {"anyOf": [self.inner.schema(definitions), {"type": "array", "items": {"type": "object", **item}}]}
+
+
 #: What `Rod.eccentricity` may be.
 OffsetOfLength = Callable[[float], Numbers]
-Offset = Numbers | OffsetOfLength | Sequence[tuple[float | None, Numbers | OffsetOfLength]]
+Offset = Annotated[
+    Numbers | OffsetOfLength | Sequence[tuple[float | None, Numbers | OffsetOfLength]],
+    InPieces(Several("diameter", 2), "offset"),
+]
 
 _EXPECTED = (
     "(a1, a2) along d_1 and d_2 (m), a function from arc length to it, or pieces (s_end, (a1, a2) or function), the "
@@ -162,10 +213,11 @@ class Stiffnesses(namedtuple("Stiffnesses", "K J mass inertia matrix", defaults=
         return both[..., :3], both[..., 3:]
 
 
-#: Sections that scene files know.
-SECTIONS = (Circle, Tube, Rectangle, Profile, Stiffness)
-Section = Circle | Tube | Rectangle | Profile | Stiffness
 SectionOfLength = Callable[[float], Section]
+#: What `Rod.section` may be.
+SectionsAlong = Annotated[
+    Section | SectionOfLength | Sequence[tuple[float | None, Section | SectionOfLength]], InPieces(Object((Section,)))
+]
 
 _SAMPLES = 33
 _DIAGONAL = 10  # numbers (GA1, GA2, EA, EI1, EI2, GJ, mass, inertia) of a section; the 36 of its matrix follow
@@ -230,7 +282,7 @@ class Sections:
         for i, (_, section) in enumerate(pieces):
             if not _is_law(section):
                 field = "section" if len(given) == 1 else f"section[{i}]"
-                instance("Rod", field, section, SECTIONS, "a section such as Circle(diameter), or a function of s")
+                instance("Rod", field, section, Section, "a section such as Circle(diameter), or a function of s")
         return tuple(pieces)
 
     @property
@@ -309,7 +361,7 @@ class Sections:
             made = section(s)
         except SceneError as problem:
             raise SceneError(f"{where}, section at s = {s:g} m: {problem}") from None
-        return instance(where, f"section({s:g})", made, SECTIONS, "a section such as Circle(diameter)")
+        return instance(where, f"section({s:g})", made, Section, "a section such as Circle(diameter)")
 
     def _stiffness(self, section):
         if self.material is None and not isinstance(section, Stiffness):

@@ -4,22 +4,23 @@ joints refer to, also by names, which are looked up when the scene is put togeth
 import dataclasses
 import itertools
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Annotated
 
 import numpy as np
 
 from cosserat_fenicsx.checks import Numbers, instance, number, refuse, store
 from cosserat_fenicsx.errors import SceneError, nearest
 from cosserat_fenicsx.numerics import gauss
-from cosserat_fenicsx.scene.curves import CURVES, Curve
+from cosserat_fenicsx.parts import Part, Text
+from cosserat_fenicsx.scene.curves import Curve
 from cosserat_fenicsx.scene.profiles import (
     MassCentre,
     Offset,
     Section,
-    SectionOfLength,
     Sections,
+    SectionsAlong,
     Stiffnesses,
     mass_centre_of,
 )
@@ -28,7 +29,7 @@ from cosserat_fenicsx.scene.signals import Signal
 
 
 @dataclass(frozen=True)
-class Damping:
+class Damping(Part):
     """Damping of a rod.
 
     Kelvin-Voigt: to n and m are added Kt v_t and Jt u_t, the rates of the material strains, eqs. (2)-(3). A mode of a
@@ -82,6 +83,11 @@ class Damping:
         )
         return cls(time=2 * ratio / (one + two), drag=2 * ratio * one * two / (one + two))
 
+    @classmethod
+    def constructors(cls):
+        """See `Part`."""
+        return cls, cls.ratio
+
     @property
     def sizes(self):
         """All its numbers, zero where nothing is damped."""
@@ -113,7 +119,7 @@ _NAMED = 8
 
 
 @dataclass(frozen=True, eq=False)
-class Rod:
+class Rod(Part):
     """A slender body with its reference centreline, free of stress in the reference.
 
     Args:
@@ -138,7 +144,7 @@ class Rod:
     """
 
     curve: Curve
-    section: Section | SectionOfLength | Sequence[tuple[float | None, Section | SectionOfLength]]
+    section: SectionsAlong
     material: Material | None = None
     name: str | None = None
     damping: Damping | None = None
@@ -153,7 +159,7 @@ class Rod:
         instance(self, "name", self.name, str, "a string")
         if "@" in self.name:
             refuse(self, "name", self.name, "a name without '@', which separates it from the s of a station")
-        instance(self, "curve", self.curve, CURVES, "a curve such as Line(start, end)")
+        instance(self, "curve", self.curve, Curve, "a curve such as Line(start, end)")
         if self.material is not None:
             instance(self, "material", self.material, Material, "a Material")
         if self.damping is not None:
@@ -222,6 +228,21 @@ class Rod:
 
 
 @dataclass(frozen=True)
+class ByName(Text):
+    """A rod or a station, or its name, which data have."""
+
+    words = "a rod, a station such as rod.end, or its name"
+
+    def check(self, owner, field, value):
+        """See `Kind`."""
+        return instance(owner, field, value, Station | Rod | str, self.words)
+
+    def write(self, value, writing):
+        """See `Kind`."""
+        return value if isinstance(value, str) else value.name if isinstance(value, Rod) else value.full_name
+
+
+@dataclass(frozen=True)
 class Station:
     """A point of a rod by its reference arc length s, m; made by `rod.start`, `rod.end`, `rod.at(s)`."""
 
@@ -234,6 +255,12 @@ class Station:
         return f"{self.rod.name}.start" if self.s == 0 else f"{self.rod.name}@{self.s:g}"
 
     __repr__ = __str__
+
+    @property
+    def full_name(self):
+        """Its name with all digits of s."""
+        places = {0.0: ".start", self.rod.length: ".end"}
+        return f"{self.rod.name}{places.get(self.s, f'@{self.s!r}')}"
 
 
 def station_named(where, text, rods):
@@ -270,8 +297,9 @@ def station_named(where, text, rods):
 
 
 #: What the fields of supports, loads and joints take that say where they act: names are looked up by `Scene`.
-StationOrName = Station | str
-RodOrName = Rod | str
+Station.by_name = Rod.by_name = ByName()
+StationOrName = Annotated[Station | str, ByName()]
+RodOrName = Annotated[Rod | str, ByName()]
 
 
 def is_known(owner, field, kind):

@@ -25,7 +25,7 @@ from numpy.polynomial.legendre import legvander
 from cosserat_fenicsx.checks import instance
 from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.numerics import gauss
-from cosserat_fenicsx.scene.sections import Material, Stiffness
+from cosserat_fenicsx.scene.sections import Material, Section, Stiffness
 from cosserat_fenicsx.scene.stresses import Stress
 
 _TABLE = Path(__file__).with_name("rolled_profiles.csv")
@@ -43,7 +43,7 @@ def _table():
 
 
 @dataclass(frozen=True)
-class Profile:
+class Profile(Section):
     """A hot-rolled profile of steel by its name: "IPE 200", "HEA 160", "HEB 300", "HEM 100".
 
     Its flanges are parallel to d_1, its web to d_2: its larger bending stiffness is about d_1.

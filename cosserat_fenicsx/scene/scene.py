@@ -8,18 +8,20 @@ from collections import Counter, namedtuple
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Annotated
 
 import numpy as np
 
 from cosserat_fenicsx.checks import instance, warn
 from cosserat_fenicsx.errors import SceneError, nearest
+from cosserat_fenicsx.parts import Items, Object, Part
 from cosserat_fenicsx.scene.action import Action, powers
 from cosserat_fenicsx.scene.describe import describe
 from cosserat_fenicsx.scene.planes import find_plane
 from cosserat_fenicsx.scene.rod import Rod, Station, StationOrName, station_named, with_names
 from cosserat_fenicsx.scene.signals import at, sample_times, signals_of
 from cosserat_fenicsx.scene.statical import Groups, check_held_once, touching
-from cosserat_fenicsx.scene.supports import SUPPORTS, InitialVelocity, Joint, Support
+from cosserat_fenicsx.scene.supports import InitialVelocity, Joint, Support
 
 # Largest load over the largest EA; and over EI/L^2 where a rod's EA is infinite. For larger loads rounding errors
 # dominate.
@@ -101,7 +103,7 @@ _SOFTEST = 1e6
 
 
 @dataclass(frozen=True, eq=False)
-class Scene:
+class Scene(Part):
     """The complete input of a solver.
 
     Args:
@@ -119,7 +121,7 @@ class Scene:
             statics refuses them.)
     """
 
-    rods: Sequence[Rod]
+    rods: Annotated[Sequence[Rod], Items(Object((Rod,)))]
     supports: Sequence[Support] = ()
     loads: Sequence[Action] = ()
     joints: Sequence[Joint] = ()
@@ -151,7 +153,7 @@ class Scene:
             items = [with_names(f"Scene.{field}[{i}]", x, rods) for i, x in enumerate(getattr(self, field))]
             object.__setattr__(self, field, tuple(items))
         for i, support in enumerate(self.supports):
-            instance("Scene", f"supports[{i}]", support, SUPPORTS, "a support such as Clamp(rod.start)")
+            instance("Scene", f"supports[{i}]", support, Support, "a support such as Clamp(rod.start)")
             self._check_rod(f"supports[{i}]", support.station, support.station.rod)
         for i, joint in enumerate(self.joints):
             instance("Scene", f"joints[{i}]", joint, Joint, "a Joint(one.end, other.start)")

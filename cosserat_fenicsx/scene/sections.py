@@ -9,10 +9,11 @@ series.
 import math
 from collections import namedtuple
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
+from cosserat_fenicsx import parts
 from cosserat_fenicsx.checks import (
     Numbers,
     Rows,
@@ -30,7 +31,7 @@ from cosserat_fenicsx.scene.stresses import rectangle_fibres, round_stress
 
 
 @dataclass(frozen=True)
-class Material:
+class Material(parts.Part):
     """A linear elastic, isotropic material.
 
     Args:
@@ -42,15 +43,9 @@ class Material:
         SceneError: a value outside its range.
     """
 
-    E: float
-    nu: float = 0.3
-    density: float | None = None
-
-    def __post_init__(self):
-        store(self, E=positive(self, "E", self.E, "Pa"))
-        store(self, nu=number(self, "nu", self.nu, "a Poisson's ratio in (-1, 0.5]", lambda nu: -1 < nu <= 0.5))
-        if self.density is not None:
-            store(self, density=positive(self, "density", self.density, "kg/m^3"))
+    E: parts.Pressure
+    nu: Annotated[float, parts.Number(limits=parts.Limits(-1, 0.5, above=True, what="a Poisson's ratio"))] = 0.3
+    density: Annotated[parts.Density, parts.positive()] | None = None
 
     @property
     def G(self) -> float:
@@ -190,8 +185,15 @@ _ZETA_5 = 1.0369277551433699263  # sum of 1/n^5
 _ROUNDING = 1e-12
 
 
+ShearFactor = Annotated[float, parts.Number(limits=parts.Limits(0, 1, above=True))]
+
+
+class Section(parts.Part, family="section"):
+    """Base of cross-sections."""
+
+
 @dataclass(frozen=True)
-class Stiffness:
+class Stiffness(Section):
     """A section by its stiffnesses, in the order of the directors d_1, d_2, d_3; needs no material.
 
     They are given one by one, or as the matrix of a section that couples strains: an anisotropic one, or one whose
@@ -298,6 +300,11 @@ class Stiffness:
         return cls(matrix=(strains.T @ diagonal @ strains).tolist(), **others)
 
     @classmethod
+    def constructors(cls):
+        """See `Part`."""
+        return cls, cls.offset
+
+    @classmethod
     def from_section(
         cls, section: Any, material: Material | None = None, *, line: Numbers | None = None, unit: float = 1.0
     ) -> "Stiffness":
@@ -336,7 +343,7 @@ class Stiffness:
 
 
 @dataclass(frozen=True)
-class Circle:
+class Circle(Section):
     """A solid circular section.
 
     Args:
@@ -347,11 +354,8 @@ class Circle:
         SceneError: a value that is not positive.
     """
 
-    diameter: float
-    shear_factor: float | None = None
-
-    def __post_init__(self):
-        _check_lengths(self, "diameter")
+    diameter: parts.Diameter
+    shear_factor: ShearFactor | None = None
 
     def stiffness(self, material: Material) -> Stiffness:
         """The section's `Stiffness` in a material."""
@@ -366,7 +370,7 @@ class Circle:
 
 
 @dataclass(frozen=True)
-class Tube:
+class Tube(Section):
     """A circular tube.
 
     Args:
@@ -378,12 +382,12 @@ class Tube:
         SceneError: a value that is not positive, or an inner diameter that is not below the outer one.
     """
 
-    outer_diameter: float
-    inner_diameter: float
-    shear_factor: float | None = None
+    outer_diameter: parts.Diameter
+    inner_diameter: parts.Diameter
+    shear_factor: ShearFactor | None = None
 
-    def __post_init__(self):
-        _check_lengths(self, "outer_diameter", "inner_diameter")
+    def validate(self):
+        """See `Part`."""
         if self.inner_diameter >= self.outer_diameter:
             refuse(self, "inner_diameter", self.inner_diameter, f"less than outer_diameter = {self.outer_diameter}")
 
@@ -402,7 +406,7 @@ class Tube:
 
 
 @dataclass(frozen=True)
-class Rectangle:
+class Rectangle(Section):
     """A solid rectangular section.
 
     Args:
@@ -414,12 +418,9 @@ class Rectangle:
         SceneError: a value that is not positive.
     """
 
-    width: float
-    height: float
-    shear_factor: float | None = None
-
-    def __post_init__(self):
-        _check_lengths(self, "width", "height")
+    width: parts.Diameter
+    height: parts.Diameter
+    shear_factor: ShearFactor | None = None
 
     def stiffness(self, material: Material) -> Stiffness:
         """The section's `Stiffness` in a material."""
@@ -439,14 +440,6 @@ def _check_numbers(section, field, expected, unit, check, size):
     if not isinstance(values, tuple | list) or len(values) != size:
         refuse(section, field, values, expected)
     store(section, **{field: tuple(check(section, field, value, unit) for value in values)})
-
-
-def _check_lengths(section, *fields):
-    for field in fields:
-        store(section, **{field: positive(section, field, getattr(section, field), "m")})
-    if section.shear_factor is not None:
-        k = number(section, "shear_factor", section.shear_factor, "a number in (0, 1]", lambda x: 0 < x <= 1)
-        store(section, shear_factor=k)
 
 
 def _checked(section, matrix):

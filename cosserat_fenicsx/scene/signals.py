@@ -8,23 +8,25 @@ Vectors that change along a rod, for distributed loads, have classes of their ow
 `AlongPieces`), so that a function of the arc length cannot be taken for one of time.
 """
 
-import dataclasses
 import itertools
 import math
+import numbers
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import PurePath
+from typing import Annotated
 
 import numpy as np
 
-from cosserat_fenicsx.checks import File, Numbers, Rows, call, number, refuse, text_of, vector
+from cosserat_fenicsx.checks import File, Numbers, Rows, call, number, refuse, store, text_of, vector
 from cosserat_fenicsx.dimensions import LARGEST
 from cosserat_fenicsx.errors import SceneError
+from cosserat_fenicsx.parts import FileName, FunctionAlong, FunctionOfTime
 
 
 @dataclass(frozen=True)
-class Step:
+class Step(FunctionOfTime):
     """`value` from `start` up to `end`, or for ever; zero otherwise. Times in s.
 
     Raises:
@@ -51,7 +53,7 @@ class Step:
 
 
 @dataclass(frozen=True)
-class _FromTo:
+class _FromTo(FunctionOfTime):
     """Base of functions that change between two times, s."""
 
     value: Numbers
@@ -105,7 +107,7 @@ class RunUp(_FromTo):
 
 
 @dataclass(frozen=True)
-class Triangle:
+class Triangle(FunctionOfTime):
     """Linear from zero at `start` to `value` at `peak` and back to zero at `end`; zero otherwise. Times in s.
 
     Raises:
@@ -134,7 +136,7 @@ class Triangle:
 
 
 @dataclass(frozen=True)
-class Sine:
+class Sine(FunctionOfTime):
     """`value` times sin(2 pi frequency (t - start) + phase) from `start` up to `end`, or for ever; zero otherwise.
 
     Args:
@@ -167,7 +169,7 @@ class Sine:
 
 
 @dataclass(frozen=True)
-class Table:
+class Table(FunctionOfTime):
     """Piecewise linear between the rows of a table; constant before the first and after the last.
 
     Args:
@@ -183,15 +185,21 @@ class Table:
     straight = True
 
     def __post_init__(self):
+        if isinstance(self.times, list | tuple) and any(isinstance(t, str) for t in self.times):
+            times = [number(self, f"times[{i}]", t, "a time (s)", math.isfinite) for i, t in enumerate(self.times)]
+            store(self, times=tuple(times))
         times = self._array("times", 1)
         if not (np.diff(times) > 0).all():
             refuse(self, "times", self.times, "ascending times (s)")
-        if len(self._array("values", 2)) != len(times):
+        rows = self.values if _as_text(self.values) else self._array("values", 2)
+        if len(rows) != len(times):
             refuse(self, "values", self.values, f"one vector for each of the {len(times)} times")
 
     def _array(self, field, dimensions):
         try:
             array = np.asarray(getattr(self, field), dtype=float)
+            if field == "values" and array.ndim == 1:
+                array = array[:, None]  # numbers
         except (ValueError, TypeError, OverflowError):
             array = np.empty(0)
         if array.ndim != dimensions or len(array) == 0 or not np.isfinite(array).all():
@@ -214,21 +222,24 @@ class Table:
         return np.array(self.times, dtype=float), np.array(np.transpose(self.values), dtype=float, order="C")
 
 
+def _as_text(rows):
+    """Whether rows of a table have text with units, which what the table is given to checks."""
+    inner = [x for row in rows for x in (row if isinstance(row, list | tuple) else (row,))] if np.ndim(rows) else ()
+    return any(isinstance(x, str) for x in inner)
+
+
 def _check(signal, *times):
-    if not isinstance(signal.value, tuple | list | np.ndarray):
-        refuse(signal, "value", signal.value, "a vector, such as (0, 0, 1)")
+    if not isinstance(signal.value, tuple | list | np.ndarray | str | numbers.Real) or isinstance(signal.value, bool):
+        refuse(signal, "value", signal.value, "a vector, such as (0, 0, 1), or a number")
     values = [number(signal, field, getattr(signal, field), "a time (s)", math.isfinite) for field in times]
+    store(signal, **dict(zip(times, values, strict=True)))
     for field, before, after in zip(times[1:], values[:-1], values[1:], strict=True):
         if after <= before:
             refuse(signal, field, after, f"a time after {before:g} s")
 
 
 def _times(factor, value):
-    return tuple(float(factor) * x for x in value)
-
-
-#: Functions of time that scene files know.
-SIGNALS = (Step, Ramp, RunUp, Triangle, Sine, Table)
+    return tuple(float(factor) * x for x in (value if np.ndim(value) else (value,)))
 
 
 @dataclass(frozen=True)
@@ -249,6 +260,10 @@ class Signal:
     jumps: tuple
     size: int = 3
     place: str = ""
+
+    def as_data(self):
+        """What stands for it in data."""
+        return self.function
 
     def __call__(self, t: float) -> tuple:
         """The vector at t, s.
@@ -278,6 +293,8 @@ def vector_or_signal(owner, field, value, unit, jumps=()):
         if len(jumps):
             refuse(owner, "jumps", jumps, f"none, since {field} does not depend on time")
         return vector(owner, field, value, unit)
+    if isinstance(value, FunctionOfTime):
+        value = value.in_units(lambda x: number(owner, field, x, f"a number ({unit})", math.isfinite))
     place = getattr(owner, "station", None) or getattr(owner, "rod", None)
     place = str(getattr(place, "name", place) or "")
     signal = Signal(type(owner).__name__, field, unit, value, _times_of(owner, value, jumps), place=place)
@@ -338,7 +355,7 @@ _SAMPLES = 33
 
 
 @dataclass(frozen=True)
-class Along:
+class Along(FunctionAlong):
     """A function of the arc length.
 
     Args:
@@ -371,7 +388,7 @@ class Along:
 
 
 @dataclass(frozen=True)
-class AlongTable:
+class AlongTable(FunctionAlong):
     """Piecewise linear between the rows of a table; constant before the first and after the last.
 
     Args:
@@ -382,7 +399,7 @@ class AlongTable:
         SceneError: arc lengths that do not ascend, not one vector per arc length, or a file that cannot be read.
     """
 
-    s: Numbers | File = dataclasses.field(metadata={"file": True})
+    s: Annotated[Numbers | File, FileName()]
     values: Rows | None = None
 
     def __post_init__(self):
@@ -422,7 +439,7 @@ class AlongTable:
 
 
 @dataclass(frozen=True)
-class AlongPieces:
+class AlongPieces(FunctionAlong):
     """Piecewise constant.
 
     Args:
@@ -461,17 +478,11 @@ class AlongPieces:
         """Pieces fit any length."""
 
 
-#: Functions of the arc length in scene files, and all functions of the arc length.
-ALONG = (AlongTable, AlongPieces)
-FUNCTIONS_ALONG = (Along, *ALONG)
-FunctionAlong = Along | AlongTable | AlongPieces
-
-
 def along_or_vector(owner, field, value, rod):
     """`value` where it is a function of the arc length, checked along the rod; None where it is something else."""
     if isinstance(value, str | PurePath):
         refuse(owner, field, value, f"a vector, or AlongTable({str(value)!r}) for a file of s and three components")
-    if not isinstance(value, FUNCTIONS_ALONG):
+    if not isinstance(value, FunctionAlong):
         return None
     if len(owner.jumps):
         refuse(owner, "jumps", owner.jumps, f"none, since {field} does not depend on time")
@@ -482,17 +493,17 @@ def along_or_vector(owner, field, value, rod):
 
 def values_of(value, s):
     """(3,) or (n, 3) numbers of a vector or of a function of the arc length at s (n,), m."""
-    return value(s) if isinstance(value, FUNCTIONS_ALONG) else value
+    return value(s) if isinstance(value, FunctionAlong) else value
 
 
 def breaks_of(value):
     """Arc lengths (m) where a vector or a function of the arc length is not smooth."""
-    return getattr(value, "breaks", ()) if isinstance(value, FUNCTIONS_ALONG) else ()
+    return getattr(value, "breaks", ()) if isinstance(value, FunctionAlong) else ()
 
 
 def kinks_of(value):
     """Arc lengths (m) where a function of the arc length is not smooth, though elements need not end there."""
-    return getattr(value, "kinks", ()) if isinstance(value, FUNCTIONS_ALONG) else ()
+    return getattr(value, "kinks", ()) if isinstance(value, FunctionAlong) else ()
 
 
 def _read(file):

@@ -12,6 +12,7 @@ import numpy as np
 
 from cosserat_fenicsx.checks import Numbers, NumbersInTime, direction, refuse, store, vector
 from cosserat_fenicsx.errors import SceneError
+from cosserat_fenicsx.parts import Part
 from cosserat_fenicsx.scene.rod import Rod, RodOrName, Station, StationOrName, is_known
 from cosserat_fenicsx.scene.signals import at, vector_or_signal
 
@@ -51,8 +52,12 @@ def _unit(a):
     return tuple(x / size for x in a)
 
 
+class Support(Part, family="support"):
+    """Base of supports."""
+
+
 @dataclass(frozen=True)
-class Clamp:
+class Clamp(Support):
     """Position and rotation of a station are held as they are in the reference.
 
     Raises:
@@ -72,7 +77,7 @@ class Clamp:
 
 
 @dataclass(frozen=True)
-class Pin:
+class Pin(Support):
     """The position of a station is held; it may turn about every axis.
 
     Raises:
@@ -92,7 +97,7 @@ class Pin:
 
 
 @dataclass(frozen=True)
-class Hinge:
+class Hinge(Support):
     """The position of a station is held; it may turn about one axis, which is fixed in space.
 
     Args:
@@ -118,7 +123,7 @@ class Hinge:
 
 
 @dataclass(frozen=True)
-class Roller:
+class Roller(Support):
     """A station stays in a plane; it may move along the plane and turn about every axis.
 
     Args:
@@ -144,7 +149,7 @@ class Roller:
 
 
 @dataclass(frozen=True)
-class Prescribed:
+class Prescribed(Support):
     """A station is moved in proportion to the load factor; displacement or rotation is free where None.
 
     Both motions may be functions of time (`signals`), with `jumps` where these are not smooth.
@@ -183,13 +188,8 @@ class Prescribed:
         return moved if now.rotation is None else (*moved, *turned(self.station, now.rotation))
 
 
-#: Supports that scene files know.
-SUPPORTS = (Clamp, Pin, Hinge, Roller, Prescribed)
-Support = Clamp | Pin | Hinge | Roller | Prescribed
-
-
 @dataclass(frozen=True)
-class Joint:
+class Joint(Part):
     """Two stations share their position and, unless released, their rotation.
 
     Args:
@@ -241,7 +241,7 @@ def _point(x):
 
 
 @dataclass(frozen=True, eq=False)
-class InitialVelocity:
+class InitialVelocity(Part):
     """Velocity of a rod at the time 0.
 
     Two vectors define a rigid motion: the point `about` has the velocity `linear`, and the rod rotates about it with

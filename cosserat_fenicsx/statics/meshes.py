@@ -11,6 +11,7 @@ from cosserat_fenicsx.errors import NotConverged
 from cosserat_fenicsx.interrupts import obey
 from cosserat_fenicsx.models.rodmesh import Layout
 from cosserat_fenicsx.models.traits import traits_of
+from cosserat_fenicsx.parts import FunctionAlong
 from cosserat_fenicsx.remember import per_scene
 from cosserat_fenicsx.results.accuracy import (
     contact_edges,
@@ -21,7 +22,6 @@ from cosserat_fenicsx.results.accuracy import (
     unresolved,
 )
 from cosserat_fenicsx.scene.curves import Line
-from cosserat_fenicsx.scene.signals import FUNCTIONS_ALONG
 
 #: Elements per rod of the first mesh, where the mesh is not given.
 FIRST_ELEMENTS = 4
@@ -144,7 +144,7 @@ def resolving(scene, layout, degree, parts=4):
 def _varying(scene, rod):
     """Functions, of (n,) arc lengths over the rod's length, that vary along a rod, with values (n, m)."""
     loads = [value for action in scene.actions if getattr(action, "rod", None) is rod
-             for value in vars(action).values() if isinstance(value, FUNCTIONS_ALONG)]  # fmt: skip
+             for value in vars(action).values() if isinstance(value, FunctionAlong)]  # fmt: skip
     functions = [lambda s, value=value: value(s * rod.length) for value in loads]
     low, high = rod.profile.range
     twisted = not isinstance(rod.curve, Line) and (low.J[0] != high.J[1] or rod.profile.coupled)

@@ -274,7 +274,7 @@ def check_arguments(scene, tol, elements, bound=NAMES):
         SceneError: naming the argument, its value and what was expected.
     """
     if not isinstance(scene, Scene):
-        hint = ", which is the first of what read_scene returns" if isinstance(scene, tuple) else ""
+        hint = ", as in read(file).scene" if hasattr(scene, "scene") else ""
         raise SceneError(f"scene is a {type(scene).__name__}: expected a Scene{hint}")
     _check_static(scene)
     if isinstance(tol, bool) or not isinstance(tol, numbers.Real) or not 1e-12 <= tol < 1:

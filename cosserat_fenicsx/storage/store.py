@@ -26,8 +26,8 @@ import numpy as np
 from cosserat_fenicsx import __version__
 from cosserat_fenicsx.checks import File, instance, warn
 from cosserat_fenicsx.errors import NotStored, SceneError
+from cosserat_fenicsx.parts import NotData
 from cosserat_fenicsx.ranks import on_first, world
-from cosserat_fenicsx.scene.as_data import NotData
 from cosserat_fenicsx.storage import files, mark
 
 if TYPE_CHECKING:
@@ -180,7 +180,7 @@ class Store:
         self._on_first(self._put_head)
 
     def compare(self, marked, until=float("inf")):
-        """Refuse another computation than the one in the folder, by the objects of rank 0.
+        """Refuse another computation than the one in the folder.
 
         Args:
             marked: the mark of all that its numbers follow from; until: the time up to which they are compared, s.
@@ -188,15 +188,12 @@ class Store:
         Raises:
             SceneError: saying what differs.
         """
-
-        def compared():
-            given, expected = (mark.until(x, until) for x in (json.loads(json.dumps(marked)), self.head["mark"]))
-            what = self.kind.what.partition(" of ")[0]
-            differs = mark.difference(given, expected, what, self.kind.rounding)
-            if differs:
-                raise SceneError(f"{self.place}: {self.kind.differs}: {differs}")
-
-        on_first(self.comm, compared)
+        given = json.loads(json.dumps(marked))
+        expected, given = mark.until(self.head["mark"], until), mark.until(given, until)
+        what = self.kind.what.partition(" of ")[0]
+        differs = mark.difference(given, expected, what, self.kind.rounding)
+        if differs:
+            raise SceneError(f"{self.place}: {self.kind.differs}: {differs}")
 
     def scene(self, given, until):
         """The scene: the given one, compared with that of the folder up to a time (s), or the one that is stored.

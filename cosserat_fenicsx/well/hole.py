@@ -1,6 +1,7 @@
 """A hole along an axis, with diameters and friction of its cased and open sections, and the drilling fluid in it."""
 
 import math
+from collections.abc import Sequence
 from copy import copy
 from dataclasses import dataclass, replace
 from typing import Annotated, ClassVar
@@ -9,9 +10,10 @@ import numpy as np
 
 from cosserat_fenicsx import units
 from cosserat_fenicsx.actions.fluids import AddedMass, LinearDrag
-from cosserat_fenicsx.checks import number, positive, refuse, store, warn
+from cosserat_fenicsx.checks import File, Numbers, number, positive, refuse, store, warn
+from cosserat_fenicsx.dimensions import in_si, size_of
 from cosserat_fenicsx.errors import SceneError
-from cosserat_fenicsx.parts import Density, Depth, Diameter, Friction, Number, Part, WallStiffness, at_least
+from cosserat_fenicsx.parts import Density, Depth, Diameter, FileName, Friction, Number, Part, WallStiffness, at_least
 from cosserat_fenicsx.scene.rod import Rod
 from cosserat_fenicsx.scene.sections import Circle, Tube
 from cosserat_fenicsx.well.path import WellPath
@@ -50,6 +52,11 @@ class HoleSection(Part):
                           "8.5 * units.inch = 0.2159")  # fmt: skip
 
 
+def _depth(i, depth, unit):
+    """Measured depth of a station, m: text has its own unit."""
+    return in_si(f"Borehole.stations[{i}]", depth, "length") if isinstance(depth, str) else depth * unit
+
+
 @dataclass(frozen=True)
 class Borehole(Part):
     """A hole along an axis.
@@ -68,6 +75,52 @@ class Borehole(Part):
     path: WellPath
     sections: tuple[HoleSection, ...]
     wall_stiffness: WallStiffness | None = None
+
+    @classmethod
+    def constructors(cls):
+        """See `Part`."""
+        return cls, cls.from_survey
+
+    @classmethod
+    def from_survey(
+        cls,
+        sections: tuple[HoleSection, ...],
+        survey: Annotated[File | None, FileName()] = None,
+        stations: Numbers | None = None,
+        columns: Sequence[str] = ("md", "inc", "azi"),
+        degrees: bool | None = None,
+        length_unit: str | None = None,
+        wall_stiffness: WallStiffness | None = None,
+    ) -> "Borehole":
+        """A hole from its survey, as in a scene file.
+
+        Args:
+            sections, wall_stiffness: see the class.
+            survey: the name of a .csv file, see `WellPath.from_csv`; or
+            stations: rows of measured depth, inclination and azimuth; depths in m or text with a unit.
+            columns: names of the columns of the file. degrees: see `WellPath.from_survey`.
+            length_unit: of the measured depths of survey or stations, such as "ft".
+
+        Raises:
+            SceneError: neither survey nor stations, or both; see also `WellPath`.
+        """
+        if (survey is None) == (stations is None):
+            raise SceneError("expected either survey, the name of a .csv file, or stations, rows of md, inc, azi")
+        unit = None if length_unit is None else size_of("Borehole.length_unit", length_unit, "length")
+        if stations is None:
+            if not isinstance(columns, list | tuple) or len(columns) != 3:
+                refuse("Borehole", "columns", columns, "three names of columns: md, inclination, azimuth")
+            path = WellPath.from_csv(survey, *columns, degrees=degrees, length_unit=unit)
+        else:
+            try:
+                rows = [(_depth(i, md, unit or 1.0), *angles) for i, (md, *angles) in enumerate(stations)]
+                md, inc, azi = np.array(rows, dtype=float).T
+            except (ValueError, TypeError, OverflowError) as problem:
+                if isinstance(problem, SceneError):
+                    raise
+                refuse("Borehole", "stations", stations, "rows of three numbers: md, inclination, azimuth")
+            path = WellPath.from_survey(md, inc, azi, degrees)
+        return cls(path, sections, wall_stiffness)
 
     def __post_init__(self):
         if isinstance(self.sections, HoleSection):

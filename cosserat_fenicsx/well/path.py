@@ -22,6 +22,7 @@ from cosserat_fenicsx import units
 from cosserat_fenicsx.checks import File, Numbers, finite_array, instance, positive, refuse, text_of, warn
 from cosserat_fenicsx.dimensions import size_of
 from cosserat_fenicsx.errors import SceneError, nearest
+from cosserat_fenicsx.parts import Part
 
 #: The arcs between stations, arrays over these: md of the start (m), there position (m, 3), tangent (3) and curvature
 #: vector (1/m, 3), and length (m).
@@ -35,7 +36,7 @@ _PAIRS = 1 << 20
 
 
 @dataclass(frozen=True, eq=False)
-class WellPath:
+class WellPath(Part):
     """The axis of a hole, of circular arcs and straight lines. Made by `from_survey` or `from_csv`.
 
     Attributes:
@@ -52,6 +53,8 @@ class WellPath:
     azimuth: np.ndarray
 
     def __post_init__(self):
+        for name in ("md", "inclination", "azimuth"):
+            object.__setattr__(self, name, np.array(getattr(self, name), dtype=float))
         length, tangent = np.diff(self.md), _tangents(self.inclination, self.azimuth)
         dogleg, curvature = _curvatures(self.inclination, self.azimuth, length)
         sections = Sections(self.md[:-1], np.zeros_like(curvature), tangent[:-1], curvature, length)

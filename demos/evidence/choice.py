@@ -21,7 +21,6 @@ from written import write
 import cosserat_fenicsx as cf
 from cosserat_fenicsx import compat
 from cosserat_fenicsx.models.choose import fitting
-from cosserat_fenicsx.scene.scenefile import read_scene
 
 SCENES = ("eccentric_cantilever", "bend_45", "lees_frame", "helical_spring", "riser", "tripod")
 ASKED = 1.7  # at most, the time of "auto" over that of the best by hand
@@ -116,7 +115,8 @@ def main(runs=9, out="out", scenes=SCENES, counts=COUNTS):
     ]
     found = {}
     for name in scenes:
-        scene, options = read_scene(Path(__file__).parents[1] / f"{name}.toml")
+        found = cf.read(Path(__file__).parents[1] / f"{name}.toml")
+        scene, options = found.scene, found.settings
         tol = options.get("tol", 1e-6)
         rows, ratio = found[name] = compare(scene, load_factors_of(options["load_factors"]), tol, runs, counts)
         for who, model, degree, elements, unknowns, seconds, off, estimate in rows:

@@ -72,7 +72,7 @@ def theirs(peer, path, spacing):
 def measure(install):
     """[(well, program, setting, relative error, s)], and what could not be measured."""
     rows, silent = [], []
-    paths = {name: cf.read_well(SCENES / f"{name}.toml").hole.path for name in TRUTH}
+    paths = {name: cf.read(SCENES / f"{name}.toml").hole.path for name in TRUTH}
 
     def keep(name, program, setting, found):
         loads, seconds = found

@@ -40,7 +40,8 @@ path.to_dict()
 print(history.times[-1], history.balance.max(), history.velocity("column.end").shape, history.energy[0])
 found: cf.Buckling = cf.buckling(scene, 3)
 print(found.load_factors[0], cf.modes(scene, 2).frequencies[0])
-file_scene, settings = cf.read_scene("column.toml")
+from_file = cf.read("column.toml")
+file_scene, settings = from_file.scene, from_file.settings
 cf.solve(file_scene, **settings)
 try:
     cf.solve(file_scene)

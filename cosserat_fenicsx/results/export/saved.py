@@ -1,6 +1,6 @@
 """A result in one HDF5 file that other programs can read, and back to the last digit.
 
-scene, settings   JSON texts: the scene as data, see `scene.as_data`, and what the result was computed with
+scene, settings   JSON texts: the scene as data, see `parts.to_data`, and what the result was computed with
 the root          what belongs to every state, reactions and events, in SI units
 rods/<name>       the fields along each rod, in SI units
 solution          dimensionless: what the result is made from again
@@ -19,9 +19,10 @@ from cosserat_fenicsx import __version__
 from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.new_files import h5py_for, new_hdf5, replaced
 from cosserat_fenicsx.numerics import ElementRule
+from cosserat_fenicsx.parts import NotData, from_data, to_data
 from cosserat_fenicsx.results.compared import NAMES, stored_criteria
 from cosserat_fenicsx.results.records import Event, Instant, Ledger, Record, Records
-from cosserat_fenicsx.scene.as_data import NotData, from_data, to_data
+from cosserat_fenicsx.scene.scene import Scene
 
 _FORMAT, _VERSION = "result of cosserat_fenicsx", 1
 # Fields of a record by the last dimensions of their arrays, in terms of the mesh: see `_sizes`.
@@ -126,7 +127,7 @@ def read(file, kind, assemble, comm):
         try:
             settings, data = (json.loads(_checked(store, name)) for name in ("settings", "scene"))
             numbers = {name: _checked(store["solution"], name) for name in store["solution"]}
-            return _restored(kind, from_data(data), settings, numbers, assemble, comm)
+            return _restored(kind, from_data(Scene, data), settings, numbers, assemble, comm)
         except (KeyError, ValueError, TypeError, AttributeError, IndexError, OSError, RuntimeError, RecursionError,
                 MemoryError) as problem:  # fmt: skip
             raise SceneError(f"{file} is damaged ({type(problem).__name__}: {problem})") from None

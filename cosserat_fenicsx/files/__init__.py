@@ -1,0 +1,1 @@
+"""Scene files: TOML as tables, and what the tables say."""
