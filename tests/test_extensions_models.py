@@ -14,7 +14,7 @@ ROD = cf.Rod(cf.Line((0, 0, 0), (0, 0, 1.0)), SECTION, name="column")
 BENT = cf.Scene([ROD], [cf.Clamp(ROD.start)], [cf.Force(ROD.end, (3.0, 4.0, -15.0))])
 
 
-def test_a_formulation(tmp_path):
+def test_a_formulation(tmp_path_all):
     """By its name and as a class; the penalty vanishes at the solution, which is that of the multiplier form."""
     options = {"elements": 4, "model": "spatial"}
     path, same = (cf.solve(BENT, [0.5, 1.0], formulation=x, **options) for x in ("augmented", Augmented))
@@ -23,8 +23,8 @@ def test_a_formulation(tmp_path):
     np.testing.assert_array_equal(path.position(ROD.end), same.position(ROD.end))
     np.testing.assert_allclose(path.moment(ROD.start), expected.moment(ROD.start), rtol=1e-7)
     assert path.formulation == "augmented" and any("a multiplier and a penalty" in why for why in path.why)
-    path.save(tmp_path / "path.h5")
-    assert cf.read_path(tmp_path / "path.h5").formulation == "augmented"
+    path.save(tmp_path_all / "path.h5")
+    assert cf.read_path(tmp_path_all / "path.h5").formulation == "augmented"
     with pytest.raises(cf.SceneError, match="did you mean 'augmented'"):
         cf.solve(BENT, [1.0], formulation="augmentd")
 
@@ -85,13 +85,13 @@ HARD = cf.Wall(ROD, (0, 0, 0), (0, 0, 1.0), clearance=1e-3, stiffness=1e3, law=H
 
 
 @pytest.mark.parametrize("load", [AcrossRod(ROD, 2.0), HARD])
-def test_stored_and_resumed(load, tmp_path):
+def test_stored_and_resumed(load, tmp_path_all):
     """A motion that is ended early and resumed is the one that was not, to the last digit."""
     scene = cf.Scene([ROD], [cf.Clamp(ROD.start)], [cf.LineForce(ROD, (1.0, 0, 0)), load])
     options = {"dt": 1e-3, "elements": 2}
-    cf.simulate(scene, 0.02, folder=tmp_path / "run", **options)
-    resumed = cf.resume(tmp_path / "run", scene=scene, duration=0.04)
+    cf.simulate(scene, 0.02, folder=tmp_path_all / "run", **options)
+    resumed = cf.resume(tmp_path_all / "run", scene=scene, duration=0.04)
     whole = cf.simulate(scene, 0.04, **options)
     np.testing.assert_array_equal(resumed.position(ROD.end), whole.position(ROD.end))
-    resumed.plot(tmp_path / "motion.png")
-    cf.solve(scene, [0.5, 1.0], elements=4).plot(tmp_path / "shape.png")
+    resumed.plot(tmp_path_all / "motion.png")
+    cf.solve(scene, [0.5, 1.0], elements=4).plot(tmp_path_all / "shape.png")
