@@ -8,7 +8,7 @@ import ufl
 from cosserat_fenicsx.checks import Numbers, refuse, store, vector
 from cosserat_fenicsx.scene import action
 from cosserat_fenicsx.scene.action import LineAction, PointAction
-from cosserat_fenicsx.scene.rod import Rod, Station
+from cosserat_fenicsx.scene.rod import Rod, Station, require_inertia
 from cosserat_fenicsx.scene.supports import InitialVelocity
 
 # Samples along a rod, and the sine of the angle below which it has the direction of the axis.
@@ -51,12 +51,7 @@ class Centrifugal(LineAction):
         return True
 
     def check_rod(self, rod):
-        """Refuse a rod without mass or inertia."""
-        low = rod.profile.range[0]
-        for name in ("mass", "inertia"):
-            if getattr(low, name) is None:
-                owner, field = ("Stiffness", name) if rod.material is None else ("Material", "density")
-                refuse(f"Rod '{rod.name}': {owner}", field, None, "a value, which Centrifugal needs")
+        require_inertia(rod, "Centrifugal")
 
     def velocities(self, rods):
         """The velocities of the rotation, an `InitialVelocity` for each of the rods."""

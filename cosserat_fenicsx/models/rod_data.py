@@ -13,10 +13,10 @@ import ufl
 from dolfinx import fem
 
 from cosserat_fenicsx import compat
-from cosserat_fenicsx.checks import refuse
 from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.forms.law import CoupledLaw, DiagonalLaw
 from cosserat_fenicsx.numerics import lobatto_weights
+from cosserat_fenicsx.scene.rod import require_inertia
 
 #: Arrays (.., 3) K and J, which may be infinite in K; and (.., 3, 3), or None where all sections are diagonal: the
 #: principal axes of A and of S as columns, and G. Dimensionless.
@@ -239,11 +239,7 @@ def check_inertia(scene):
                 "without it, which may start from an equilibrium with it (simulate(start=path), Scene.velocities)"
             )
     for rod in scene.rods:
-        low = rod.profile.range[0]
-        for field, value in (("mass", low.mass), ("inertia", low.inertia)):
-            if value is None:
-                owner, name = ("Stiffness", field) if rod.material is None else ("Material", "density")
-                refuse(f"Rod '{rod.name}': {owner}", name, None, "a value, which a motion needs")
+        require_inertia(rod, "a motion")
 
 
 def nodal_inertia(scene, layout, nodes):

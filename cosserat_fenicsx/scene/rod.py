@@ -315,6 +315,19 @@ def is_known(owner, field, kind):
     return not isinstance(instance(owner, field, getattr(owner, field), kind | str, f"{expected}, or its name"), str)
 
 
+def require_inertia(rod, user):
+    """Refuse a rod without mass or inertia, which `user` needs.
+
+    Raises:
+        SceneError: naming the property that the rod lacks.
+    """
+    low = rod.profile.range[0]
+    for name in ("mass", "inertia"):
+        if getattr(low, name) is None:
+            owner, field = ("Stiffness", name) if rod.material is None else ("Material", "density")
+            refuse(f"Rod '{rod.name}': {owner}", field, None, f"a value, which {user} needs")
+
+
 def euler_load(rod: Rod) -> float:
     """Critical load of the cantilever column, N: pi^2 EI/(2L)^2 with the smaller bending stiffness.
 
