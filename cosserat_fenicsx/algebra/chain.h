@@ -70,6 +70,9 @@ typedef struct {
     void *self;                     /* for the hooks */
 } problem;
 
+/* Why Newton's method stopped, by SNES and in time steps; words in newton.py. */
+enum { ITERATING, CONVERGED, SINGULAR, NOT_A_NUMBER, GROWN, RAN_OUT };
+
 /* Newton's method by SNES. */
 typedef struct {
     problem *problem;
@@ -79,11 +82,11 @@ typedef struct {
     int period, contracts;          /* steps that are compared; whether quadratic convergence is expected */
     int most, iterations;
     double steps[4];                /* sizes of the last ones, the latest first */
-    int iterating, converged, ran_out, grown, not_a_number; /* SNES's reasons */
-    int verdict;                    /* the last of them; PETSc 3.25 may end a solution with the reason of the one before */
+    int verdict, reasons[6];        /* SNES's reasons for the verdicts; PETSc 3.25 may end a solution with the one of the
+                                       solution before */
 } newton;
 
-/* Newton's method of a time step, see dynamics/stepper.py for what its numbers mean. */
+/* Newton's method of a time step, see `Iteration` in dynamics/stepper.py. */
 typedef struct {
     problem *problem;
     int motions;                    /* nodal unknowns of this rank */
@@ -91,7 +94,7 @@ typedef struct {
     double increment, smallest, rounding, rate, price, diverged;
     int most;
     double *x, *start, *b, *change; /* (unknowns,) each; x from the guess to the solution, start: before the step */
-    int fresh, served, iterations, outcome;
+    int fresh, served, iterations, verdict;
     double spent, enough;
 } stepping;
 
@@ -148,6 +151,10 @@ typedef struct {
     int rejections, patience, accepted; /* rejected steps without two accepted ones between, and most of them; whether the
                                        last one was accepted */
 } step_control;
+
+/* What to do with a step (the last three reject it), and why a sweep returned. */
+enum { ACCEPTED, UNSURE, REJECTED, TOO_FAR, OPPOSITE };
+enum { DONE, LEFT, LATER, FULL };
 
 /* A continuation in the load factor, see statics/path/load_control.py. */
 typedef struct {

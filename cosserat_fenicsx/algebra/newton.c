@@ -81,9 +81,19 @@ void advance(problem *p)
     memcpy(p->before, p->state, p->locals * sizeof *p->state);
 }
 
-/* ---- time steps -------------------------------------------------------------------------------------------------- */
+/* ---- convergence ------------------------------------------------------------------------------------------------- */
 
-enum { ITERATING, CONVERGED, SINGULAR, NOT_A_NUMBER, GROWN, RAN_OUT };
+/* Whether the estimated error after a step of Newton's method is below what is allowed, from the step before.
+
+   With the ratio c of the two the error is step * c/(1 - c) for linear convergence. Where convergence is quadratic the next
+   ratio is c^2 or less; the estimate is then multiplied by min(1, 100 c), with a margin. */
+static int error_is_small(double step, double before, int quadratic, double allowed)
+{
+    const double c = step / before;
+    return c < 0.9 && step * c * (quadratic ? fmin(1, 100 * c) : 1) <= allowed * (1 - c);
+}
+
+/* ---- time steps -------------------------------------------------------------------------------------------------- */
 
 /* The root mean square of the nodal unknowns in a - b, or in a where b is 0. */
 static int motion_in(const stepping *s, const double *a, const double *b, double *size)
@@ -103,12 +113,12 @@ static int motion_in(const stepping *s, const double *a, const double *b, double
 static void judge_increment(stepping *s, double step, double before)
 {
     const double rate = s->iterations > 1 ? step / before : 1;
-    if (!isfinite(step)) s->outcome = NOT_A_NUMBER;
-    else if (step > s->diverged) s->outcome = GROWN;
-    else if (step <= s->enough || (rate < 0.9 && step * rate / (1 - rate) <= s->enough)
+    if (!isfinite(step)) s->verdict = NOT_A_NUMBER;
+    else if (step > s->diverged) s->verdict = GROWN;
+    else if (step <= s->enough || (s->iterations > 1 && error_is_small(step, before, 0, s->enough))
              || (step <= s->rounding && rate > 0.5 && s->iterations > 1))
-        s->outcome = CONVERGED;
-    else if (s->iterations >= s->most) s->outcome = RAN_OUT;
+        s->verdict = CONVERGED;
+    else if (s->iterations >= s->most) s->verdict = RAN_OUT;
     else if (s->iterations > 1) {
         const double left = log(s->enough / step);
         s->fresh = rate > 0.9 || left / log(rate) > s->price + left / log(s->rate);
@@ -122,8 +132,8 @@ int iterate(stepping *s)
     double step = 0, before;
     if (motion_in(s, s->x, s->start, &s->enough)) return FAILED;
     s->enough = fmax(s->smallest, s->increment * s->enough);
-    s->iterations = 0, s->outcome = ITERATING;
-    while (s->outcome == ITERATING) {
+    s->iterations = 0, s->verdict = ITERATING;
+    while (s->verdict == ITERATING) {
         if (residual(p, s->x, s->b)) return FAILED;
         if (s->fresh) {
             if (tangent(p)) return FAILED;
@@ -132,7 +142,7 @@ int iterate(stepping *s)
         if (solve(p, s->b, s->change)) return FAILED;
         if (!p->singular && hook(p, CONTACT, s->x, s->change)) return FAILED;
         if (p->singular) {
-            s->outcome = SINGULAR;
+            s->verdict = SINGULAR;
             break;
         }
         for (int i = 0; i < p->size; i++) s->x[i] -= s->change[i];
@@ -182,24 +192,20 @@ static int update(void *snes, PetscInt iteration)
     return 0;
 }
 
-/* Whether the estimated error after the last step is below the increment allowed.
-
-   With the ratio c of the last two steps the error is step * c/(1 - c) for linear convergence. Where convergence is
-   quadratic the next ratio is c^2 or less; the estimate is then multiplied by min(1, 100 c), with a margin. That factor
-   is not used (`contracts`) for slender rods whose contact force is carried or unknown: rounding makes their tangent
-   inexact for motions of low stiffness. Where n follows from the motion alone, Newton steps alternate between bending
-   and the correction of the stretch that this causes; c is then the ratio of successive pairs of steps (`period`),
-   because one small step does not imply convergence. */
-static int error_is_small(const newton *n)
+/* See `error_is_small`. Convergence is not taken for quadratic (`contracts`) on slender rods whose contact force is carried
+   or unknown: rounding makes their tangent inexact for motions of low stiffness. Where n follows from the motion alone,
+   Newton steps alternate between bending and the correction of the stretch that this causes; the larger ones of successive
+   pairs of steps (`period`) are compared then, because one small step does not imply convergence. */
+static int has_converged(const newton *n)
 {
     double before = 0, step = 0;
+    if (n->steps[0] <= n->increment) return 1;
     if (n->iterations < 2 * n->period) return 0;
     for (int i = 1; i <= n->period; i++) {
         step = fmax(step, n->steps[i - 1]);
         before = fmax(before, n->steps[n->period + i - 1]);
     }
-    const double c = step / before, quadratic = n->contracts ? fmin(1, 100 * c) : 1;
-    return c < 0.9 && step * c * quadratic <= n->increment * (1 - c);
+    return error_is_small(step, before, n->contracts, n->increment);
 }
 
 /* Norm of the part of SNES's last step that is motion: forces and multipliers differ in scale and in rounding error. */
@@ -221,16 +227,17 @@ static int test(void *snes, PetscInt iteration, double size, double change, doub
     newton *n = context;
     double step;
     (void)size, (void)change;
-    *reason = n->verdict = isfinite(norm) ? n->iterating : n->not_a_number;
-    if (*reason != n->iterating || iteration == 0) return 0;
+    n->verdict = isfinite(norm) ? ITERATING : NOT_A_NUMBER;
+    *reason = n->reasons[n->verdict];
+    if (n->verdict != ITERATING || iteration == 0) return 0;
     if (motion(n, snes, &step)) return FAILED;
     memmove(n->steps + 1, n->steps, 3 * sizeof step);
     n->steps[0] = step, n->iterations++;
     const int balanced = norm <= 1e-6 * (1 + n->loads) + n->rounding;
-    if (!(step < 1e3)) *reason = n->grown;
-    else if (balanced && (step <= n->increment || error_is_small(n))) *reason = n->converged;
-    else if (n->iterations >= n->most) *reason = n->ran_out;
-    n->verdict = *reason;
+    if (!(step < 1e3)) n->verdict = GROWN;
+    else if (balanced && has_converged(n)) n->verdict = CONVERGED;
+    else if (n->iterations >= n->most) n->verdict = RAN_OUT;
+    *reason = n->reasons[n->verdict];
     return 0;
 }
 
@@ -238,7 +245,7 @@ static int test(void *snes, PetscInt iteration, double size, double change, doub
 void begin(newton *n)
 {
     problem *p = n->problem;
-    n->iterations = 0, n->verdict = n->iterating;
+    n->iterations = 0, n->verdict = ITERATING;
     if (p->advance) memcpy(p->before, p->state, p->locals * sizeof *p->state);
 }
 

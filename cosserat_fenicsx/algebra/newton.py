@@ -23,14 +23,16 @@ from cosserat_fenicsx.errors import NotConverged
 #: square over the nodal unknowns, positions in units of L).
 INCREMENT = 1e-11
 _Reason = PETSc.SNES.ConvergedReason
-#: Why SNES stopped.
-WORDS = {
-    _Reason.CONVERGED_SNORM_RELATIVE: "converged",
-    _Reason.DIVERGED_MAX_IT: "Newton's iterations ran out",
-    _Reason.DIVERGED_DTOL: "Newton's steps grew without bound",
-    RESIDUAL_NOT_A_NUMBER: "the residual is not a number",
-    _Reason.DIVERGED_LINEAR_SOLVE: "the tangent is singular",
-}
+# SNES's reasons for the verdicts in chain.h.
+_REASONS = (
+    _Reason.CONVERGED_ITERATING, _Reason.CONVERGED_SNORM_RELATIVE, _Reason.DIVERGED_LINEAR_SOLVE, RESIDUAL_NOT_A_NUMBER,
+    _Reason.DIVERGED_DTOL, _Reason.DIVERGED_MAX_IT,
+)  # fmt: skip
+#: The verdicts in words, of SNES and of time steps.
+WORDS = (
+    "", "converged", "the tangent is singular", "the residual is not a number", "Newton's steps grew without bound",
+    "Newton's iterations ran out",
+)  # fmt: skip
 
 
 _FUNCTIONS = {
@@ -88,9 +90,7 @@ class Newton:
         newton.root = math.sqrt(comm.allreduce(numbering.nodes * newton.motion))
         newton.increment, newton.period = INCREMENT, 1 if model.carries_force else 2
         newton.contracts = not (model.signature.slender and model.carries_force)
-        newton.iterating, newton.converged = _Reason.CONVERGED_ITERATING, _Reason.CONVERGED_SNORM_RELATIVE
-        newton.ran_out, newton.grown = _Reason.DIVERGED_MAX_IT, _Reason.DIVERGED_DTOL
-        newton.not_a_number = RESIDUAL_NOT_A_NUMBER
+        newton.reasons = _REASONS
         self.snes = snes = PETSc.SNES().create(comm)
         snes.setType("newtonls")
         self._matrix = PETSc.Mat().create(comm)  # SNES wants one; only its inverse is ever applied
@@ -142,14 +142,15 @@ class Newton:
         except PETSc.Error:
             problem.raise_failure()
             raise
-        reason = self.snes.getConvergedReason()
-        if reason > 0 and newton.verdict != newton.converged:
-            reason = RESIDUAL_NOT_A_NUMBER
-        if reason > 0:  # the residual was last evaluated at x, so the state agrees with it
+        reason, verdict = self.snes.getConvergedReason(), newton.verdict
+        converged = reason > 0 and verdict == self._lib.CONVERGED
+        if converged:  # the residual was last evaluated at x, so the state agrees with it
             problem.advance()
+        elif reason > 0 or reason == RESIDUAL_NOT_A_NUMBER:
+            verdict = self._lib.NOT_A_NUMBER
         elif problem.c.singular:
-            reason = _Reason.DIVERGED_LINEAR_SOLVE
-        return Solved(reason > 0, newton.iterations, WORDS.get(reason, f"PETSc's reason {reason}"))
+            verdict = self._lib.SINGULAR
+        return Solved(converged, newton.iterations, WORDS[verdict] or f"PETSc's reason {reason}")
 
 
 class BorderedNewton(Newton):

@@ -6,8 +6,6 @@
 #include <string.h>
 #include <time.h>
 
-enum { DONE, LEFT, LATER, FULL };
-enum { ACCEPTED, UNSURE, REJECTED, TOO_FAR, OPPOSITE }; /* the last three reject a step */
 enum { COUNT = 128, FAILED_COUNT = -100 };
 
 static int python_hook(void *self, int what, double *a, double *b);
@@ -216,7 +214,7 @@ static int attempt(sweep *s, double goal)
     begin(n);
     if (s->with->solve(s->snes, 0, s->x) || s->with->get_reason(s->snes, &reason)) return UNSURE;
     s->iterations += n->iterations;
-    if (reason <= 0 || n->verdict != n->converged) return REJECTED;
+    if (reason <= 0 || n->verdict != CONVERGED) return REJECTED;
     advance(n->problem);
     if (take(s, found)) return UNSURE;
     const double off = largest(s, found, guess);

@@ -3,12 +3,14 @@ rule, whatever the forms conserve), and Newton's method for a step.
 """
 
 import math
+from dataclasses import dataclass
 from functools import lru_cache
 from typing import Protocol
 
 import numpy as np
 
-from cosserat_fenicsx.algebra.newton import Solved
+from cosserat_fenicsx.algebra.building import module
+from cosserat_fenicsx.algebra.newton import WORDS, Solved
 from cosserat_fenicsx.dynamics.start import drive
 
 
@@ -263,31 +265,36 @@ def _weights(h, *steps):
     return weights
 
 
-#: Newton's method stops when the remaining error, estimated from the contraction of the increments, is below the first
-#: number times the motion in the step (root mean square, units L, 1), since that is the relative error of velocities
-#: and momenta; or below the second, the rounding of positions. The rounding of a stiff rod may be larger: increments
-#: below the third that no longer shrink have converged, too.
-INCREMENT, SMALLEST, ROUNDING = 1e-12, 2e-16, 1e-10
+@dataclass(frozen=True)
+class Iteration:
+    """When Newton's method for a time step stops, and when it takes a new tangent (`stepping` in C).
+
+    Attributes:
+        increment: the remaining error that is allowed, over the motion in the step (root mean square, units L, 1): it
+            is the relative error of velocities and momenta, estimated from the contraction of the increments.
+        smallest: the same, absolute: the rounding of positions.
+        rounding: increments below this that no longer shrink have converged, too: the rounding of a stiff rod.
+        rate: contraction of increments with a new tangent, as measured.
+        price: of a new tangent, in iterations. Measured: from 1.3 in a plane to 5 in space, and 8 with constraint
+            equations; from 1 to 8 the time of a motion varies by a few per cent.
+        diverged, most: dimensionless increment, and iterations, that are taken as divergence.
+    """
+
+    increment: float = 1e-12
+    smallest: float = 2e-16
+    rounding: float = 1e-10
+    rate: float = 3e-4
+    price: float = 2.0
+    diverged: float = 10.0
+    most: int = 15
+
+
+ITERATION = Iteration()
 # Times the first two where nodes may touch walls: the errors that are left there do not cancel from step to step, and
 # would add up to 1e-8 of the energy in 10 000.
 _WITH_CONTACT = 0.03
-# Contraction of increments with a new tangent, as measured.
-_NEW_TANGENT_RATE = 3e-4
-# Cost of a new tangent, in iterations. Measured: from 1.3 in a plane to 5 in space, and 8 with constraint equations;
-# from 1 to 8 the time of a motion varies by a few per cent.
-_PRICE = 2.0
 # Number of steps with a new tangent each, after a tangent that was useful for one step only.
 _STEPS_WITH_NEW_TANGENTS = 8
-# Iterations, and dimensionless increment, that are taken as divergence.
-_MOST_ITERATIONS, _DIVERGED = 15, 10.0
-
-
-# Why the iteration stopped: `stepping.outcome` in newton.c.
-_CONVERGED = 1
-_OUTCOMES = (
-    "", "converged", "the tangent is singular", "the residual is not a number", "Newton's steps grew without bound",
-    "Newton's iterations ran out",
-)  # fmt: skip
 
 
 class StepNewton:
@@ -310,10 +317,8 @@ class StepNewton:
         self._motions = numbering.nodes * numbering.block  # nodal unknowns of this rank
         motions = problem.model.comm.allreduce(self._motions)
         self._start = np.zeros(self._motions)
-        self._c = problem.stepping(
-            self._start, motions=self._motions, root=math.sqrt(motions), increment=INCREMENT, smallest=SMALLEST,
-            rounding=ROUNDING, rate=_NEW_TANGENT_RATE, price=_PRICE, diverged=_DIVERGED, most=_MOST_ITERATIONS,
-        )  # fmt: skip
+        self._converged = module()[1].CONVERGED
+        self._c = problem.stepping(self._start, motions=self._motions, root=math.sqrt(motions), **vars(ITERATION))
         self.forget()
 
     def forget(self):
@@ -333,7 +338,7 @@ class StepNewton:
             Solved.
         """
         kept, share = not self.problem.fresh, _WITH_CONTACT if self.problem.contact else 1.0
-        self._c.increment, self._c.smallest = share * INCREMENT, share * SMALLEST
+        self._c.increment, self._c.smallest = share * ITERATION.increment, share * ITERATION.smallest
         self._start[:] = self.problem.x.array_r[: self._motions]
         iterations = 0
         for guess in [guesses[0], *guesses] if kept else guesses:
@@ -350,7 +355,7 @@ class StepNewton:
         c.fresh, c.spent, c.served = began_fresh, self._spent, self._served
         problem.guess(guess)
         problem.iterate(c)
-        converged, found = c.outcome == _CONVERGED, _OUTCOMES[c.outcome]
+        converged, found = c.verdict == self._converged, WORDS[c.verdict]
         if converged and problem.model.turned_over():
             converged, found = False, "a section turned by half a turn or more in one step"
         if converged and problem.contact and problem.contact.broken:

@@ -30,12 +30,11 @@ _FIRST_REJECTIONS = 3
 _SMOOTH, _NEAR = 0.01, 0.3
 # The same distance below which such a change is accepted although no event explains it.
 _EXPECTED = 1e-4
-# What `judge_step` says of a step, and why one is rejected.
-_ACCEPTED, _UNSURE, _, _TOO_FAR, _OPPOSITE = range(5)
+# Why `judge_step` or `_jumped` rejects a step, by what the former says.
 _REASONS = {
-    _TOO_FAR: "the equilibrium jumped away from the path",
-    _OPPOSITE: "the equilibrium lies opposite to the direction of the path",
-    _UNSURE: "the equilibrium jumped away from the path's direction",
+    "TOO_FAR": "the equilibrium jumped away from the path",
+    "OPPOSITE": "the equilibrium lies opposite to the direction of the path",
+    "UNSURE": "the equilibrium jumped away from the path's direction",
 }
 _ENDLESS = 2**30
 
@@ -212,12 +211,12 @@ class Continuation:
         if LIMITS.slight < off <= LIMITS.far:
             beside = move - increment
             sizes = [track.product(*pair) for pair in ((move, increment), (increment, increment), (beside, beside))]
-        judged = self._lib.judge_step(self.c, len(track.history), off, *sizes)
-        if judged == _UNSURE and not self._jumped(move, load_factor - track.here.load_factor):
-            judged = _ACCEPTED
-        if judged != _ACCEPTED:
-            track.failure = _REASONS[judged]
-        return judged == _ACCEPTED
+        judged, lib = self._lib.judge_step(self.c, len(track.history), off, *sizes), self._lib
+        change = load_factor - track.here.load_factor
+        if judged == lib.ACCEPTED or (judged == lib.UNSURE and not self._jumped(move, change)):
+            return True
+        track.failure = next(words for name, words in _REASONS.items() if getattr(lib, name) == judged)
+        return False
 
     def _jumped(self, move, change):
         """Whether a step is longer than twice the mean slope of its two ends times the change of the load factor.
@@ -244,7 +243,6 @@ class Continuation:
 
 # Seconds after which C returns, so that Ctrl-C is obeyed; load factors recorded between two returns.
 _SECONDS, _ROOM = 0.05, 64
-_DONE, _LEFT, _LATER, _FULL = range(4)
 
 #: Recorded points: load factors, unknowns (k, unknowns), values of the fields (k, elements, n) or None, iterations
 #: since the point before, and steps so far.
@@ -327,7 +325,7 @@ class Sweep(Pointers):
             track.problem.raise_failure()
             track.stability.raise_failure()
             obey()
-            if why in (_DONE, _LEFT):
+            if why in (self._lib.DONE, self._lib.LEFT):
                 return sweep.next, sweep.iterations
 
     def _follow(self):
