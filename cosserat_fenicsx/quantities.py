@@ -43,6 +43,8 @@ class Quantity:
         noise: values up to this, in `unit`, are rounding and shown as 0.
         digits: significant ones in tables on the screen.
         short: its label there, followed by the name of a component ("d" for dx, dy, dz).
+        chart: a function of matplotlib's Axes and of the values along the axis and of the quantity, both in the units
+            of the chart, which draws them; None for lines.
     """
 
     name: str
@@ -57,6 +59,7 @@ class Quantity:
     noise: float = 0.0
     digits: int = 6
     short: str = ""
+    chart: Callable | None = None
 
     def __post_init__(self):
         object.__setattr__(self, "label", self.label or self.name.replace("_", " "))

@@ -35,6 +35,8 @@ _SQUEEZED, _TALL = 1.3, 1.2
 # Most passes of the arrangement of texts; mean width of a letter over the size of its font.
 _PASSES, _LETTER = 5, 0.55
 _ENERGY, _UNACCOUNTED = Quantity("energy", unit="J"), Quantity("not accounted for", unit="J")
+# Most points of a line that are marked.
+_FEW = 40
 # Energies below this share of the largest are not drawn.
 _LITTLE = 1e-9
 # What is asked for of the chart that is drawn: its width in pixels, and its units.
@@ -223,6 +225,34 @@ def ledger(times, curves, balance, title, about=""):
     legend(above)
     figure.suptitle(title)
     return figure
+
+
+def draw_quantity(over, shown, title="", file=None, comm=Alone, **look):
+    """Draw a quantity over another one: lines, one for each component, or its own `chart`.
+
+    Args:
+        over, shown: each a `Quantity` and its values (n,), or (n, components) of what is shown.
+        file, comm, look: see `draw_chart`.
+    """
+
+    def make():
+        figure, (panel,) = stacked(8, (4.0,))
+        (across, x), (quantity, values) = over, shown
+        (below, size), (beside, unit) = scale(across, x), scale(quantity, values)
+        if quantity.chart is not None:
+            quantity.chart(panel, x / size, values / unit)
+        else:
+            marker = "o-" if len(x) <= _FEW else "-"
+            for part, y in zip(quantity.parts or [quantity.label], values.reshape(len(x), -1).T, strict=True):
+                panel.plot(x / size, y / unit, marker, markersize=3, label=part)
+            if quantity.parts:
+                legend(panel)
+        panel.set(xlabel=below, ylabel=beside)
+        if title:
+            figure.suptitle(title)
+        return figure
+
+    return draw_chart(make, file, comm, **look)
 
 
 # -- texts that overlap nothing ----------------------------------------------------------------------------------------

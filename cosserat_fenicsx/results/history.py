@@ -100,7 +100,7 @@ class History(RodResult):
         some = f"{rows} of " if rows < len(self) else ""
         speed = np.linalg.norm(self.velocity(station), axis=1)
         energies = [(dataclasses.replace(known.get(f"{x}_energy", known.get(x)), label=x, digits=5), getattr(self, x))
-                    for x in _ENERGIES[:-1]]  # fmt: skip
+                    for x in (_ENERGIES[:-1] if rows == _TIMES else _ENERGIES[:2])]  # fmt: skip
         return screen.table(
             [
                 (known["time"], self.times),

@@ -38,6 +38,8 @@ class Result:
     _beside: ClassVar[dict[str, str]] = {}
     # Quantities of the table on the screen; () for all along `_rows_axis`.
     _on_screen: ClassVar[tuple[str, ...]] = ()
+    # The quantity that charts have across; "" for the first one along `_rows_axis`.
+    _over: ClassVar[str] = ""
     # Quantities that are coordinates beside those that have the name of their axis.
     _coordinates: ClassVar[tuple[str, ...]] = ()
 
@@ -114,7 +116,10 @@ class Result:
         """
         xarray = import_library("xarray", "to_xarray")
         self._refuse_empty("to_xarray")
-        about = {name: "\n".join(x) if isinstance(x, tuple | list) else x for name, x in self._about().items()}
+        about = {
+            name: "\n".join(x) if isinstance(x, tuple | list) and all(isinstance(y, str) for y in x) else x
+            for name, x in self._about().items()
+        }
         return dataset(xarray, self._variables(Units(units)), self._coordinates, about)
 
     def columns(self, units: str | Mapping = "SI", axis: str = "") -> dict[str, np.ndarray]:
@@ -155,6 +160,43 @@ class Result:
             on_first(self._ranks, written)
         else:
             raise SceneError(f"{file}: expected a name that ends in .csv or .nc")
+
+    def save(self, file: File) -> None:
+        """Write all quantities, with their units, to one HDF5 file, from which `read_result` makes a `StoredResult`:
+        tables, charts and data frames of the same digits. An old file is replaced once the new one is complete.
+
+        Raises:
+            OSError: the file cannot be written; an old one stays.
+            SceneError: an empty result.
+        """
+        from cosserat_fenicsx.results.export import saved
+
+        self._refuse_empty("save")
+        on_first(self._ranks, lambda: saved.save_quantities(self, file))
+
+    def plot_quantity(self, name: str, file: File | None = None, *, units: str | Mapping = "SI",
+                      width: int | None = None):  # fmt: skip
+        """Chart of a quantity along the axis of the tables: of a path over the load factor, of a motion over time, of a
+        string over the measured depth.
+
+        Args:
+            name: of one with a value for each row, see `quantities`; with its own chart where it has one.
+            file: .png, .pdf or another format of matplotlib (rank 0 writes); None returns the Figure.
+            units: see `Result`. width: of the picture, pixels.
+
+        Raises:
+            SceneError: an unknown name, or another kind of quantity; matplotlib is missing, or an unknown ending.
+        """
+        from cosserat_fenicsx.pictures.charts import draw_quantity
+
+        known = {key: x for key, x in self.quantities.items() if x.axes == (self._rows_axis,)}
+        given = {key: values for key in known if (values := np.asarray(known[key].of(self))).dtype.kind in "fiub"}
+        if name not in given:
+            raise SceneError(f"plot_quantity({name!r}): expected one of {', '.join(given)}")
+        over = self._over if self._over in given else next(iter(given))
+        shown = [(known[key], given[key]) for key in (over, name)]
+        title = getattr(getattr(self, "scene", None), "title", "")
+        return draw_quantity(*shown, title, file, self._ranks, units=units, width=width)
 
     # -- on the screen -----------------------------------------------------------------------------------------------
 

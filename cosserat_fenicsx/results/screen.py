@@ -15,6 +15,8 @@ from cosserat_fenicsx.quantities import as_text as value_text
 ROWS, SHORT, LINES, WIDTH = 40, 12, 30, 100
 # Lines that a table has beside its rows, and the fewest rows.
 _FRAME, _FEWEST = 6, 4
+# Most significant digits in the short table.
+_DIGITS = 5
 # Numbers below this times the largest of their column are rounding.
 _ROUNDING = 1e-12
 
@@ -44,12 +46,12 @@ def table(given, units, rows, title=None, caption=None, which=None):
         if values.dtype.kind == "f":
             least = max(least, _ROUNDING * float(np.nanmax(np.abs(values), initial=0.0)))
             values = np.where(np.abs(values) <= least, 0.0, values) / size
-        parts = values.reshape(count, -1).T
+        parts, digits = values.reshape(count, -1).T, quantity.digits if rows > SHORT else min(quantity.digits, _DIGITS)
         for part, column in zip(quantity.parts or [""], parts, strict=True):
             label = dataclasses.replace(quantity, label=f"{quantity.short or f'{quantity.label} '}{part}".strip())
             found.add_column(label.heading(unit), justify="right" if numbers else "left", overflow="fold",
                              no_wrap=not numbers)  # fmt: skip
-            texts.append([value_text(column[k], quantity.digits) for k in which])
+            texts.append([value_text(column[k], digits) for k in which])
     for i, row in enumerate(zip(*texts, strict=True)):
         if gaps and which[i] > (which[i - 1] + 1 if i else 0):
             found.add_row(*["..."] * len(row))

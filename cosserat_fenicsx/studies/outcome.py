@@ -1,11 +1,15 @@
 """`Study`: the cases of a task, and what came of each."""
 
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from cosserat_fenicsx.checks import File
 from cosserat_fenicsx.errors import SceneError
-from cosserat_fenicsx.results.result import import_library
+from cosserat_fenicsx.quantities import Quantity, Units
+from cosserat_fenicsx.results import screen
+from cosserat_fenicsx.results.result import Result, import_library
 
 
 class Failure(NamedTuple):
@@ -15,7 +19,7 @@ class Failure(NamedTuple):
     why: str
 
 
-class Study:
+class Study(Result):
     """The results of a task over many cases, from `study`; the same on all ranks.
 
     Attributes:
@@ -26,14 +30,17 @@ class Study:
         failures: list of `Failure` (case, why), in the order of the cases.
         done: (cases,) whether each case is computed, failures included; all are, but in the `path` of an exception.
         seconds: (cases,) time that each case took on its rank, s; NaN where it is not computed.
+        units: {name of an argument or a result: its unit, such as "N"}, which may be set; in other units of tables and
+            charts what is not named stays as it is.
     """
 
     #: For messages.
-    axis = "case"
+    axis = _rows_axis = "case"
 
     def __init__(self, cases, grid, outcomes):
         self.cases: list[dict[str, Any]] = cases
         self.grid: dict[str, list[Any]] | None = grid
+        self.units: dict[str, str] = {}
         self._outcomes = outcomes  # {number of the case: (result, why it failed or "", s)}
         self.results: list[Any] = [outcomes.get(i, (None,))[0] for i in range(len(cases))]
         self.failures: list[Failure] = [Failure(cases[i], outcomes[i][1]) for i in sorted(outcomes) if outcomes[i][1]]
@@ -47,7 +54,17 @@ class Study:
         """The sentence on the failure of case i; "" where it has not failed."""
         return self._outcomes[i][1] if i in self._outcomes else ""
 
-    def to_dataframe(self) -> Any:
+    @property
+    def quantities(self) -> dict[str, Quantity]:
+        """{name: `Quantity`} of the arguments, the results and `failure`, a text, "" for none."""
+        given, found = _columns(self)
+        columns = {**given, **found, "failure": [self.why(i) for i in range(len(self.cases))]}
+        return super().quantities | {
+            name: Quantity(name, name, self.units.get(name, "1"), axes=("case",), getter=lambda _, x=values: _series(x))
+            for name, values in columns.items()
+        }
+
+    def to_dataframe(self, units: str | Mapping = "SI") -> Any:
         """A pandas DataFrame with a row for every case: its arguments, its results and `failure`, a text, "" for none.
 
         A result that is a single value is in the column `result`, that of a dict in columns by its names ("name
@@ -56,9 +73,17 @@ class Study:
         Raises:
             InstallationError: pandas is missing.
         """
-        return dataframe(self)
+        pandas = import_library("pandas", "to_dataframe")
+        return pandas.DataFrame({name: pandas.Series(values) for name, values in self.columns(units).items()})
 
-    def to_xarray(self) -> Any:
+    def columns(self, units: str | Mapping = "SI", axis: str = "") -> dict[str, np.ndarray]:
+        """{heading: (cases,)} as of `Result`, with those of which nothing is known."""
+        units, found = Units(units), {}
+        for quantity in self.quantities.values():
+            found |= quantity.columns(quantity.of(self), units)
+        return found
+
+    def to_xarray(self, units: str | Mapping = "SI") -> Any:
         """An xarray Dataset of the columns of `to_dataframe`: over the arguments where the cases are a grid, else over
         `case`. Results that are arrays have further dimensions "name_0", "name_1" ...
 
@@ -66,18 +91,48 @@ class Study:
             InstallationError: xarray is missing.
             SceneError: arrays of a result differ in shape.
         """
-        return dataset(self)
+        return dataset(self, Units(units))
+
+    def plot(self, file: File | None = None, name: str | None = None, *, units: str | Mapping = "SI",
+             width: int | None = None):  # fmt: skip
+        """Chart of a result over the first argument that is a number; see `plot_quantity`.
+
+        Args:
+            name: of the result; None for the first that is a number.
+        """
+        numbers = [x for x, values in _columns(self)[1].items() if _series(values).dtype.kind in "fi"]
+        if name is None and not numbers:
+            raise SceneError("plot: expected a study with a result that is a number for each case")
+        return self.plot_quantity(name or numbers[0], file, units=units, width=width)
 
     def __repr__(self):
         failed = f", {len(self.failures)} failed" if self.failures else ""
         return f"Study({len(self.cases)} cases, {len(self)} done{failed})"
 
-    def __str__(self):
-        return as_lines(self)
+    def _answer(self, units):
+        yield f"{len(self.cases)} cases, {len(self)} done, {len(self.failures)} failed"
+        failed = [i for i in range(len(self.cases)) if self.why(i)]
+        yield from (f"case {i} failed: {self.why(i)}" for i in failed[:_FAILURES])
+        if len(failed) > _FAILURES:
+            yield f"and {len(failed) - _FAILURES} more: Study.failures has all"
+
+    def _table(self, units, rows):
+        count, known = len(self.cases), self.quantities
+        given = [(Quantity("case"), np.arange(count))]
+        for name, quantity in known.items():
+            values = quantity.of(self)
+            if name == "failure":
+                quantity, values = Quantity("failed"), ["yes" if text else "" for text in values]
+            elif values.dtype.kind not in "fi":
+                values = [_cell(x) for x in values]
+            if name != "failure" or self.failures:
+                given.append((quantity, values))
+        half = max(rows // 2, 1)
+        return screen.table(given, units, rows, which=[i for i in range(count) if i < half or i >= count - half])
 
 
-# Rows that are shown, and failures; more are counted.
-_ROWS, _FAILURES = 40, 12
+# Failures that are told; more are counted.
+_FAILURES = 12
 
 
 def _columns(study):
@@ -97,27 +152,16 @@ def _names(dicts):
     return list(dict.fromkeys(name for x in dicts for name in x))
 
 
-def _failures(study):
-    return [study.why(i) for i in range(len(study.cases))]
-
-
-def dataframe(study):
-    """See `Study.to_dataframe`."""
-    pandas = import_library("pandas", "to_dataframe")
-    given, found = _columns(study)
-    columns = {name: _series(pandas, values) for name, values in {**given, **found}.items()}
-    return pandas.DataFrame({**columns, "failure": _failures(study)})
-
-
-def _series(pandas, values):
+def _series(values):
+    """(n,) values as numbers or texts, or as objects."""
     array = _filled(values)
     if array.ndim > 1 or array.dtype == object:
         array = np.empty(len(values), object)
         array[:] = values
-    return pandas.Series(array)
+    return array
 
 
-def dataset(study):
+def dataset(study, units):
     """See `Study.to_xarray`."""
     xarray = import_library("xarray", "to_xarray")
     given, found = _columns(study)
@@ -128,13 +172,16 @@ def dataset(study):
     else:
         dims, shape = tuple(study.grid), tuple(map(len, study.grid.values()))
         coordinates = {name: _labels(values) for name, values in study.grid.items()}
-    variables = {"failure": (dims, np.array(_failures(study)).reshape(shape))}
+    known, failures = study.quantities, [study.why(i) for i in range(len(study.cases))]
+    variables = {"failure": (dims, np.array(failures).reshape(shape))}
     for name, values in found.items():
         array = _filled(values)
         if array.dtype == object and any(isinstance(value, np.ndarray) for value in values):
             raise SceneError(f"to_xarray: the arrays of '{name}' differ in shape: expected the same one in all cases")
         more = tuple(f"{name}_{k}" for k in range(array.ndim - 1))
-        variables[name] = ((*dims, *more), array.reshape(*shape, *array.shape[1:]))
+        unit, size = units.of(known[name])
+        array = array if size == 1.0 else array / size
+        variables[name] = ((*dims, *more), array.reshape(*shape, *array.shape[1:]), {"units": unit})
     return xarray.Dataset(variables, coordinates)
 
 
@@ -165,40 +212,6 @@ def _labels(values):
 def _label(value):
     name = getattr(value, "name", None)
     return name if isinstance(name, str) else str(value)
-
-
-def as_lines(study):
-    """Text: a table of cases and results, and what failed."""
-    from rich.table import Table
-
-    from cosserat_fenicsx.results.screen import as_text
-
-    given, found = _columns(study)
-    columns = given | found
-    table = Table(title=f"{len(study.cases)} cases, {len(study)} done, {len(study.failures)} failed")
-    table.add_column("case", justify="right")
-    for name, values in columns.items():
-        texts = all(isinstance(value, str | type(None)) for value in values)
-        table.add_column(name, justify="left" if texts else "right")
-    if study.failures:
-        table.add_column("failed")
-    before = -1
-    for i in _shown(len(study.cases)):
-        if i > before + 1:
-            table.add_row(*["..."] * len(table.columns))
-        before = i
-        failed = ["yes" if study.why(i) else ""] if study.failures else []
-        table.add_row(str(i), *(_cell(values[i]) for values in columns.values()), *failed)
-    lines = [as_text(table)]
-    numbers = [i for i in range(len(study.cases)) if study.why(i)]
-    lines += [f"case {i} failed: {study.why(i)}" for i in numbers[:_FAILURES]]
-    if len(numbers) > _FAILURES:
-        lines.append(f"and {len(numbers) - _FAILURES} more: Study.failures has all")
-    return "\n".join(lines)
-
-
-def _shown(count):
-    return [i for i in range(count) if i < _ROWS // 2 or i >= count - _ROWS // 2]
 
 
 def _cell(value):

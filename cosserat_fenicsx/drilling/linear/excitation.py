@@ -61,10 +61,11 @@ class Campbell(Result):
 
     axis = _rows_axis = "critical speed"
     _quantities = by_name(*(
-        Quantity(name, unit=unit, axes=("critical speed",), shown=shown,
+        Quantity(name, label, unit, axes=("critical speed",), shown=shown,
                  getter=lambda x, k=k: np.array([row[k] for row in x._rows]))
-        for k, (name, unit, shown) in enumerate((
-            ("kind", "1", ""), ("excitation", "1", ""), ("critical_speed", "rad/s", "rpm"), ("frequency", "Hz", "")))
+        for k, (name, label, unit, shown) in enumerate((
+            ("motion", "kind", "1", ""), ("excitation", "", "1", ""), ("critical_speed", "", "rad/s", "rpm"),
+            ("frequency", "", "Hz", "")))
     ))  # fmt: skip
 
     def __len__(self) -> int:

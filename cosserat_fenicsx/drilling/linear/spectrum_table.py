@@ -75,9 +75,9 @@ class Growing:
             table.add_column(heading, justify="right", overflow="fold")
         for k, i, j, drives in self.rows[:rows]:
             share = f"{int((answer.growth[:, :, k] > 0).sum())} of {cases}"
-            told = [share, f"{np.nanmax(answer.growth[:, :, k]):.4g}", *_numbers(answer, i, j)]
-            here = f"{answer.frequency[i, j, k]:.4f}", f"{answer.growth[i, j, k]:.4g}"
-            table.add_row(str(k), *told, *here, *("gone" if math.isnan(x) else f"{x:.4g}" for x in drives.values()))
+            told = [share, f"{np.nanmax(answer.growth[:, :, k]):.3g}", *_numbers(answer, i, j)]
+            here = f"{answer.frequency[i, j, k]:.4f}", f"{answer.growth[i, j, k]:.3g}"
+            table.add_row(str(k), *told, *here, *("gone" if math.isnan(x) else f"{x:.3g}" for x in drives.values()))
         return table
 
 

@@ -1,9 +1,13 @@
 """A result in one HDF5 file that other programs can read, and back to the last digit.
 
+Of a path or a motion:
+
 scene, settings   JSON texts: the scene as data, see `parts.to_data`, and what the result was computed with
 the root          what belongs to every state, reactions and events, in SI units
 rods/<name>       the fields along each rod, in SI units
 solution          dimensionless: what the result is made from again
+
+Of other results `head`, a JSON text that says what the quantities are, and a dataset for each.
 
 Datasets have the attributes units and, where they have components, frame; their dimensions have labels. Only the texts
 and the solution are read back, and their check sums compared; no code is ever stored or run.
@@ -12,6 +16,8 @@ and the solution are read back, and their check sums compared; no code is ever s
 import json
 import os
 import zlib
+from contextlib import contextmanager
+from dataclasses import fields
 
 import numpy as np
 
@@ -20,11 +26,15 @@ from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.new_files import h5py_for, new_hdf5, replaced
 from cosserat_fenicsx.numerics import ElementRule
 from cosserat_fenicsx.parts import NotData, from_data, to_data
+from cosserat_fenicsx.quantities import Quantity, Units
 from cosserat_fenicsx.results.compared import NAMES, stored_criteria
 from cosserat_fenicsx.results.records import Event, Instant, Ledger, Record, Records
 from cosserat_fenicsx.scene.scene import Scene
 
-_FORMAT, _VERSION = "result of cosserat_fenicsx", 1
+_FORMAT, VERSION = "result of cosserat_fenicsx", 1
+#: Format of files of quantities alone; what these are, but for functions.
+QUANTITIES = "quantities of cosserat_fenicsx"
+SAID = [x.name for x in fields(Quantity) if x.name not in ("getter", "chart")]
 # Fields of a record by the last dimensions of their arrays, in terms of the mesh: see `_sizes`.
 _OF_RECORD = {"load_factor": "", "rq": "N7", "gauss_fields": "EG9", "negative_modes": "", "iterations": "",
               "steps": "", "reactions": "*", "neutral": "", "tie_forces": "T26"}  # fmt: skip
@@ -47,7 +57,7 @@ def save(result, file):
             "need no scene"
         ) from None
     with replaced(file) as fresh, new_hdf5(fresh) as store:
-        store.attrs.update(format=_FORMAT, version=_VERSION, written_by=f"cosserat_fenicsx {__version__}",
+        store.attrs.update(format=_FORMAT, version=VERSION, written_by=f"cosserat_fenicsx {__version__}",
                            kind=result._kind, title=result.scene.title)  # fmt: skip
         for name, text in (
             ("scene", scene),
@@ -64,6 +74,43 @@ def save(result, file):
         for name, values in _solution(result).items():
             solution[name] = values
             solution[name].attrs["crc32"] = zlib.crc32(np.ascontiguousarray(values))
+
+
+def save_quantities(result, file):
+    """See `Result.save`; on one rank."""
+    known = result.quantities
+    values = {name: x.of(result) for name, x in known.items()}
+    values = {name: np.asarray(x) for name, x in values.items() if x is not None}
+    head = {
+        "kind": type(result).__name__,
+        "about": result._about(),
+        "rows": len(result),
+        "rows_axis": result._rows_axis,
+        "over": result._over,
+        "on_screen": [name for name in result._on_screen if name in values],
+        "beside": dict(result._beside),
+        "answer": list(result._answer(Units())),
+        "quantities": [{name: getattr(known[key], name) for name in SAID} for key in values],
+    }
+    text = json.dumps(head, default=lambda x: x.tolist() if hasattr(x, "tolist") else str(x))
+    for name, array in values.items():
+        if array.dtype.kind == "O" and not all(isinstance(x, str) for x in array.flat):
+            raise SceneError(f"{file}: '{name}' holds values that are neither numbers nor texts: expected such arrays")
+    with replaced(file) as fresh, new_hdf5(fresh) as store:
+        store.attrs.update(format=QUANTITIES, version=VERSION, written_by=f"cosserat_fenicsx {__version__}",
+                           kind=head["kind"])  # fmt: skip
+        store["head"] = text
+        store["head"].attrs["crc32"] = zlib.crc32(text.encode())
+        for name, array in values.items():
+            store[name] = array.astype(object) if array.dtype.kind == "U" else array
+            store[name].attrs.update(units=known[name].unit, long_name=known[name].label, crc32=_check_sum(array))
+
+
+def _check_sum(values):
+    """Of an array of numbers, or of texts."""
+    if values.dtype.kind in "OU":
+        return zlib.crc32(json.dumps(values.tolist()).encode())
+    return zlib.crc32(np.ascontiguousarray(values))
 
 
 def _write_variables(place, variables):
@@ -115,7 +162,21 @@ def read(file, kind, assemble, comm):
     Raises:
         SceneError: it cannot be read, is damaged, holds something else, or is of a newer release.
     """
-    h5py, expected = h5py_for(file), f"expected a file that `save` of a {kind._kind} wrote"
+    with opened(file, kind._kind) as store:
+        _check_kind(file, store.attrs, kind._kind)
+        settings, data = (json.loads(checked(store, name)) for name in ("settings", "scene"))
+        numbers = {name: checked(store["solution"], name) for name in store["solution"]}
+        return _restored(kind, from_data(Scene, data), settings, numbers, assemble, comm)
+
+
+@contextmanager
+def opened(file, kind):
+    """Context manager: an `h5py.File` that a `kind` of result was saved to; what fails in it is told in words.
+
+    Raises:
+        SceneError: there is none, or it is damaged.
+    """
+    h5py, expected = h5py_for(file), f"expected a file that `save` of a {kind} wrote"
     if not os.path.isfile(file):
         raise SceneError(f"{file}: there is no such file: {expected}")
     try:
@@ -123,13 +184,12 @@ def read(file, kind, assemble, comm):
     except OSError as problem:
         raise SceneError(f"{file}: it cannot be read ({problem}): {expected}") from None
     with store:
-        _check_kind(file, store.attrs, kind._kind)
         try:
-            settings, data = (json.loads(_checked(store, name)) for name in ("settings", "scene"))
-            numbers = {name: _checked(store["solution"], name) for name in store["solution"]}
-            return _restored(kind, from_data(Scene, data), settings, numbers, assemble, comm)
+            yield store
         except (KeyError, ValueError, TypeError, AttributeError, IndexError, OSError, RuntimeError, RecursionError,
                 MemoryError) as problem:  # fmt: skip
+            if isinstance(problem, SceneError) and str(problem).startswith(str(file)):
+                raise
             raise SceneError(f"{file} is damaged ({type(problem).__name__}: {problem})") from None
 
 
@@ -138,23 +198,26 @@ def _check_kind(file, attributes, kind):
     if attributes.get("format") != _FORMAT:
         raise SceneError(f"{file}: it is of another program: expected a file that `save` of a {kind} wrote")
     version = attributes.get("version")
-    if not isinstance(version, np.integer) or version > _VERSION:
+    if not isinstance(version, np.integer) or version > VERSION:
         raise SceneError(
-            f"{file}: its format is {version}, and this release reads up to {_VERSION}: expected a newer one"
+            f"{file}: its format is {version}, and this release reads up to {VERSION}: expected a newer one"
         )
     if attributes.get("kind") != kind:
         reader = {"Path": "read_path", "History": "read_history"}.get(attributes.get("kind"), "another function")
         raise SceneError(f"{file}: it holds a {attributes.get('kind')}: expected {reader} to read it, or a {kind}")
 
 
-def _checked(place, name):
-    """A text or an array of numbers, whose check sum agrees."""
+def checked(place, name):
+    """A text, or an array of numbers or texts, whose check sum agrees."""
     stored = place[name]
-    text = stored.dtype.kind == "O" and stored.shape == ()
-    if not text and (stored.dtype.kind not in "fib" or stored.id.get_storage_size() < stored.nbytes):
+    texts = stored.dtype.kind == "O"
+    if not texts and (stored.dtype.kind not in "fib" or stored.id.get_storage_size() < stored.nbytes):
         raise ValueError(f"{name} is neither a text nor an array of numbers")
     values = stored[()]
-    if zlib.crc32(values if text else np.ascontiguousarray(values)) != stored.attrs["crc32"]:
+    if texts and stored.shape != ():
+        values = np.array([x.decode() for x in values.flat], dtype=str).reshape(values.shape)
+    found = zlib.crc32(values) if texts and stored.shape == () else _check_sum(np.asarray(values))
+    if found != stored.attrs["crc32"]:
         raise ValueError(f"the check sum of {name} is wrong")
     return values
 

@@ -1,0 +1,147 @@
+"""What all results offer: quantities with units, dicts, data frames, files, charts, tables that fit a screen."""
+
+import csv
+import json
+
+import numpy as np
+import pytest
+from conftest import column
+from moving_scenes import SPAGHETTI
+from reference_strings import pipe_and_collars
+
+import cosserat_fenicsx as cf
+from cosserat_fenicsx.quantities import Units
+from cosserat_fenicsx.results.screen import LINES, WIDTH
+from cosserat_fenicsx.results.stored import read_result
+
+pytestmark = pytest.mark.serial
+WELL = cf.WellPath.from_survey([0, 500, 1500, 2500], [0, 0, 60, 85], [0, 0, 0, 0])
+HOLE = cf.Borehole(WELL, [cf.HoleSection(2500.0, 0.2159, 0.25)])
+STRING = cf.DrillString([cf.Bit(0.2159), cf.Collar(90.0, "NC46-65"), cf.DrillPipe(size="5 in 19.50 lb/ft")])
+
+
+def path():
+    _, scene = column()
+    return cf.solve(scene, np.linspace(0.1, 1.2, 40).tolist(), elements=2)
+
+
+def history():
+    rod = cf.Rod(cf.Line((0, 0, 0), (10, 0, 0)), SPAGHETTI, name="rod")
+    scene = cf.Scene([rod], [cf.Clamp(rod.start)], [cf.Force(rod.end, (0, 0, 2.0))])
+    return cf.simulate(scene, 0.1, dt=0.005, elements=2, degree=2)
+
+
+def sweep():
+    operations = [cf.TripOut(), cf.TripIn(), cf.RotateOffBottom()]
+    return cf.depth_sweep(HOLE, STRING, operations, np.linspace(500, 2500, 20), mud=cf.Mud(1200.0), model="soft")
+
+
+def answer():
+    return cf.torque_and_drag(HOLE, STRING, cf.TripOut(), mud=cf.Mud(1200.0), model="soft")
+
+
+#: A result of each class; and the name and the unit of one of its quantities, in field units too.
+RESULTS = {
+    "Path": (path, "load_factor", "1", "1"),
+    "History": (history, "kinetic_energy", "J", "ft-lbf"),
+    "Modes": (lambda: cf.modes(column()[1], 3), "frequency", "Hz", "Hz"),
+    "Buckling": (lambda: cf.buckling(column()[1], 2), "critical_load_factor", "1", "1"),
+    "TorqueAndDrag": (answer, "tension", "N", "klbf"),
+    "DepthSweep": (sweep, "depth", "m", "ft"),
+    "DrillingHistory": (lambda: cf.simulate_drilling(pipe_and_collars("PI_stiff"), 5.0), "bit_speed", "rad/s", "rpm"),
+    "Stability": (lambda: cf.stability(pipe_and_collars("PI_stiff"), [9.0], up_to=2.0), "growth", "1/s", "1/s"),
+    "Campbell": (lambda: cf.campbell(pipe_and_collars(), 20.0, up_to=4.0), "critical_speed", "rad/s", "rpm"),
+    "Study": (lambda: cf.study(lambda force: {"work": 2.0 * force}, {"force": range(60)}), "work", "1", "1"),
+}
+
+
+@pytest.fixture(scope="module")
+def results():
+    return {}
+
+
+@pytest.fixture(params=RESULTS)
+def found(request, results):
+    """A result, computed once, with its class and the quantity."""
+    make, *quantity = RESULTS[request.param]
+    if request.param not in results:
+        results[request.param] = make()
+    return results[request.param], request.param, *quantity
+
+
+def test_quantities_and_units(found):
+    result, kind, name, unit, field = found
+    quantity = result.quantities[name]
+    assert quantity.unit == unit and Units("field").of(quantity)[0] == field and len(quantity.axes) == 1
+    assert all(x.name == key and isinstance(x.axes, tuple) for key, x in result.quantities.items())
+    factor = Units("field").of(quantity)[1]
+    np.testing.assert_allclose(result.value(name, "field") * factor, result.value(name), rtol=1e-14)
+
+
+def test_print_fits_a_screen(found):
+    result, kind, *_ = found
+    for text in (str(result), result.summary("field"), result.summary({"length": "km", "N": "kN"})):
+        lines = text.splitlines()
+        assert len(lines) <= LINES and max(map(len, lines)) <= WIDTH, text
+        assert "e-1" not in text.replace("e-10", "") or kind in ("Path", "History", "DepthSweep"), text
+    assert len(result.details().splitlines()) >= 10 and "mN m" not in str(result)
+
+
+def test_dicts_frames_and_files(found, tmp_path):
+    result, kind, name, unit, field = found
+    told = result.to_dict("field")
+    assert json.loads(json.dumps(told, default=lambda x: x.tolist()))["kind"] == kind
+    assert told["units"][name] == field and result.to_dict()["units"][name] == unit
+    np.testing.assert_array_equal(told[name], result.value(name, "field"))
+    heading = result.quantities[name].heading(field)
+    frame = pytest.importorskip("pandas") and result.to_dataframe(units="field")
+    assert frame[heading].tolist() == told[name].tolist()
+    result.write(tmp_path / "out.csv", units="field")
+    with (tmp_path / "out.csv").open(newline="") as stream:
+        assert [float(row[heading]) for row in csv.DictReader(stream)] == told[name].tolist()
+    pytest.importorskip("xarray")
+    data = result.to_xarray("field")
+    assert data[name].attrs["units"] == field and data[name].values.ravel().tolist() == told[name].tolist()
+    assert "<table>" in result._repr_html_()
+
+
+def test_charts(found, tmp_path):
+    pytest.importorskip("matplotlib")
+    result, kind, name, _, field = found
+    figure = result.plot_quantity(name, units="field")
+    assert figure.axes[0].get_ylabel() == result.quantities[name].heading(Units("field").on_screen(
+        result.quantities[name], result.value(name))[0])  # fmt: skip
+    result.plot_quantity(name, tmp_path / "chart.png", width=400)
+    assert (tmp_path / "chart.png").stat().st_size > 3000
+    with pytest.raises(cf.SceneError, match="plot_quantity.'nothing'.: expected one of "):
+        result.plot_quantity("nothing")
+
+
+def test_saved_and_read(found, tmp_path):
+    """Paths and motions come back whole; of others the quantities do, with tables and charts."""
+    result, kind, name, *_ = found
+    file = tmp_path / "result.h5"
+    result.save(file)
+    if kind in ("Path", "History"):
+        again = (cf.read_path if kind == "Path" else cf.read_history)(file)
+        with pytest.raises(cf.SceneError, match=f"read_{kind.lower()} to read it"):
+            read_result(file)
+    else:
+        again = read_result(file)
+        assert again.kind == kind and str(again).splitlines()[0] == str(result).splitlines()[0]
+        assert again.about.keys() == result._about().keys() and set(again.quantities) == set(again.to_dict()["units"])
+        data = file.read_bytes()
+        (tmp_path / "cut.h5").write_bytes(data[: len(data) // 2])
+        with pytest.raises(cf.SceneError, match="cut.h5"):
+            read_result(tmp_path / "cut.h5")
+    np.testing.assert_array_equal(again.value(name), result.value(name))
+    assert again.plot_quantity(name) is not None
+
+
+def test_empty_results_are_refused():
+    empty = cf.solve(column()[1], [0.5], elements=2).at_points([])
+    for method in ("to_dataframe", "to_xarray"):
+        with pytest.raises(cf.SceneError, match=f"{method}: expected a result with at least one load factor"):
+            getattr(empty, method)()
+    with pytest.raises(cf.SceneError, match="save: expected"):
+        empty.save("nothing.h5")
