@@ -214,7 +214,7 @@ def test_an_interrupt_of_one_rank_ends_all_and_says_how_to_go_on(tmp_path_all):
             raise KeyboardInterrupt
         return i
 
-    with pytest.raises(cf.Interrupted, match=r"cases, which .* they are kept in .*, the same call") as stop:
+    with pytest.raises(cf.Interrupted, match=r"cases, which .* they are kept in .*, and the same call") as stop:
         cf.study(stops, {"i": range(40)}, folder=tmp_path_all)
     found = stop.value.path
     assert 5 <= len(found) < 5 + 4 * COMM.size and not found.done[5] and found.results[:5] == [0, 1, 2, 3, 4]

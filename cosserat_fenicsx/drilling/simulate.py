@@ -1,6 +1,5 @@
 """`simulate_drilling`: a drill-string in motion; it is read from its folder, and gone on with."""
 
-import functools
 import math
 import numbers
 from functools import partial
@@ -15,8 +14,7 @@ from cosserat_fenicsx.drilling.scene import Drilling
 from cosserat_fenicsx.drilling.stick_slip import step_errors
 from cosserat_fenicsx.drilling.time_loop import TimeLoop
 from cosserat_fenicsx.errors import SceneError
-from cosserat_fenicsx.parts import from_data, to_data
-from cosserat_fenicsx.storage.store import Kind, Store
+from cosserat_fenicsx.storage.store import Kind, Nowhere, Store
 
 #: More steps, and rows of a history, are refused as a mistake; so many profiles where nothing else is asked for.
 MOST_STEPS, MOST_ROWS, PROFILES = 1e8, 2e7, 400
@@ -29,7 +27,7 @@ KIND = Kind(
     what="motion of a drill-string", home="drilling.simulate", call="simulate_drilling",
     again="cosserat_fenicsx.resume('{place}'), or `cosserat resume {place}`, continues it",
     differs="the scene is not the one of the motion", tables=("series", "profiles"), starts=True, rounding=1e-9,
-    as_data=to_data, from_data=functools.partial(from_data, Drilling),
+    scene=Drilling,
 )  # fmt: skip
 
 
@@ -84,14 +82,14 @@ def simulate_drilling(
         "save_every": max(1, round((save_every or 0.0) / running.dt)),
         "profile_every": max(1, round((profile_every or duration / PROFILES) / running.dt)),
     }
-    kept = None
+    store = Nowhere()
     if folder is not None:
         told = {"duration": float(duration), "asked": {"model": name, "dt": dt, "elements": elements}, "apart": apart}
         told |= {"model": history.model, "why": history.why, "dt": history.dt, "depths": history.depths.tolist()}
-        kept = Store(folder, KIND).make(told, scene, float(duration))
-        _tables(kept)
-        history.folder = kept.place
-    TimeLoop(running, history, kept, **apart, turn=_turn_to_watch(scene)).until(duration, progress)
+        store = Store(folder, KIND).make(told, scene, float(duration))
+        _tables(store)
+        history.folder = store.place
+    TimeLoop(running, history, store, **apart, turn=_turn_to_watch(scene)).until(duration, progress)
     if check:
         history.errors = step_errors(OtherSteps(scene, name, running), history.rows, duration / 2)
     return history

@@ -3,7 +3,7 @@
 import numpy as np
 
 from cosserat_fenicsx.drilling.history import COLUMNS
-from cosserat_fenicsx.errors import Interrupted, NotConverged
+from cosserat_fenicsx.errors import NotConverged
 from cosserat_fenicsx.interrupts import obey
 from cosserat_fenicsx.progress import Progress
 from cosserat_fenicsx.ranks import world
@@ -20,13 +20,13 @@ class TimeLoop:
 
     Args:
         model: a `StringModel`. history: the `DrillingHistory` that it is written to.
-        folder: the `Store`, or None.
+        store: the `Store`, or `Nowhere`.
         save_every, profile_every: steps between rows and between profiles.
         turn: the largest rotation of the bit in a step, rad.
     """
 
-    def __init__(self, model, history, folder, save_every, profile_every, turn=np.inf):
-        self.model, self.history, self._folder = model, history, folder
+    def __init__(self, model, history, store, save_every, profile_every, turn=np.inf):
+        self.model, self.history, self._store = model, history, store
         self._save_every, self._profile_every, self._turn = save_every, profile_every, turn
 
     def until(self, duration, progress=None):
@@ -38,7 +38,7 @@ class TimeLoop:
         model, history = self.model, self.history
         end = duration - _NOTHING * model.dt
         try:
-            with Progress([duration], progress, world(), "t (s) =") as bar:
+            with self._store.ending(history), Progress([duration], progress, world(), "t (s) =") as bar:
                 bar.start(f"{model.name}, {len(model.depths)} places")
                 bar.reached(model.time)
                 if not model.steps:
@@ -54,14 +54,8 @@ class TimeLoop:
                 self._add(np.asarray(rows)[self._saved(len(rows))])
             failure.path = history
             raise
-        except KeyboardInterrupt as stop:
-            if isinstance(stop, Interrupted):
-                raise
-            raise Interrupted(history, f"; {self._folder.again}" if self._folder else "") from None
         finally:
             history.counts = dict(model.counts)
-            if self._folder:
-                self._folder.release()
         return history
 
     def _chunk(self, end):
@@ -74,7 +68,7 @@ class TimeLoop:
             raise NotConverged(f"the {model.name} model does not advance from t = {model.time:g} s")
         self._watch(rows)
         self._add(rows[self._saved(len(rows))], profile=model.steps % self._profile_every == 0)
-        if self._folder and self._folder.due:
+        if self._store.due:
             self._keep()
 
     def _watch(self, rows):
@@ -98,9 +92,7 @@ class TimeLoop:
         along = []
         if profile:
             along = self.history.append_profile(self.model.time, self.model.profile())[None]
-        if self._folder:
-            self._folder.put(self.history, "the motion", series=rows, profiles=along)
+        self._store.put(self.history, "the motion", series=rows, profiles=along)
 
     def _keep(self):
-        if self._folder:
-            self._folder.checkpoint(self.model.memory(), self.history)
+        self._store.checkpoint(self.model.memory(), self.history)

@@ -19,7 +19,7 @@ from cosserat_fenicsx.models.rodmesh import Layout
 from cosserat_fenicsx.dynamics.time_loop import TimeLoop
 from cosserat_fenicsx.dynamics.pace import Adaptive
 from cosserat_fenicsx.dynamics.pace import Fixed
-from cosserat_fenicsx.storage.store import Store
+from cosserat_fenicsx.storage.store import Nowhere, Store
 from cosserat_fenicsx.scene.action import path_dependent
 from cosserat_fenicsx.scene.scene import check_magnitudes
 from cosserat_fenicsx.scene.scene import Scene
@@ -149,14 +149,15 @@ def simulate(
         problem.begin()
         stepper.begin()
         history = (History if folder is None else StoredHistory).of(problem.model, scheme, [why, *cautions])
+        store = Nowhere()
         if folder is not None:
             asked = {"duration": duration, "tol": tol, "dt": dt, "scheme": scheme, "save_every": save_every,
                      "load_factor": load_factor, "elements": elements, "degree": degree,
                      "rho_inf": rho_inf}  # fmt: skip
             told = {"asked": asked, "durations": [duration], "told": history.told()}
-            folder = Store(folder, KIND, comm).make(told, scene, duration)
-            history.keep_in(folder)
-        motion = TimeLoop(problem, stepper, pace, history, folder)
+            store = Store(folder, KIND, comm).make(told, scene, duration)
+            history.keep_in(store)
+        motion = TimeLoop(problem, stepper, pace, history, store)
         return motion.over(marks, save_every is None, progress)
 
 

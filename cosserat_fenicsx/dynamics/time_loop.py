@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cosserat_fenicsx.errors import Interrupted, NotConverged, SceneError
+from cosserat_fenicsx.errors import NotConverged, SceneError
 from cosserat_fenicsx.interrupts import obey
 from cosserat_fenicsx.progress import Progress
 from cosserat_fenicsx.results.records import Instant, Ledger
@@ -23,12 +23,12 @@ class TimeLoop:
     Args:
         problem: a `StepProblem`; stepper: see `Stepper`; pace: the step size control, see `pace`.
         history: the `History` that states are appended to.
-        folder: the `Store` that states and checkpoints are written to, or None.
+        store: the `Store` that states and checkpoints are written to, or `Nowhere`.
     """
 
-    def __init__(self, problem, stepper, pace, history, folder):
+    def __init__(self, problem, stepper, pace, history, store):
         self.problem, self.model, self._stepper, self._pace = problem, problem.model, stepper, pace
-        self.history, self._folder = history, folder
+        self.history, self._store = history, store
         self._t = self._first = self._h = 0.0
         self._count = self._steps = self._iterations = self._saved = 0
 
@@ -56,23 +56,18 @@ class TimeLoop:
         """
         comm, model = self.model.comm, self.model
         try:
-            with Progress([marks[-1].time], progress, comm, "t (s) =") as bar:
+            with self._store.ending(self.history), Progress([marks[-1].time], progress, comm, "t (s) =") as bar:
                 bar.start(f"{model.name}, {model.unknowns} unknowns")
                 bar.reached(self._t)
-                self._keep()
+                self._store.checkpoint(self.memory(), self.history)
                 if not self._saved:
                     self._save(self._t, stepped=False)
                 for mark, after in itertools.pairwise(marks):
                     self._between(mark, after, save_all, bar)
-                self._keep()
-        except KeyboardInterrupt:
-            raise Interrupted(self.history, f"; {self._folder.again}" if self._folder else "") from None
+                self._store.checkpoint(self.memory(), self.history)
         except SceneError as problem:  # a function of time that raises, or gives no finite numbers, after the start
             problem.path = self.history
             raise
-        finally:
-            if self._folder:
-                self._folder.release()
         return self.history
 
     def _between(self, mark, after, save_all, bar):
@@ -110,12 +105,8 @@ class TimeLoop:
             bar.reached(self._t)
             if save_all or (after.saved and self._t == end):
                 self._save(self._t)
-            if self._folder and self._folder.due:
-                self._keep()
-
-    def _keep(self):
-        if self._folder:
-            self._folder.checkpoint(self.memory(), self.history)
+            if self._store.due:
+                self._store.checkpoint(self.memory(), self.history)
 
     def _advance(self, t, h, halvings=0):
         """Step from t by h (s), in halves where that fails; False where a shorter step is to be tried instead."""

@@ -16,7 +16,6 @@ import importlib
 import json
 import os
 import time
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -25,8 +24,8 @@ import numpy as np
 
 from cosserat_fenicsx import __version__
 from cosserat_fenicsx.checks import File, instance, warn
-from cosserat_fenicsx.errors import NotStored, SceneError
-from cosserat_fenicsx.parts import NotData
+from cosserat_fenicsx.errors import Interrupted, NotStored, SceneError
+from cosserat_fenicsx.parts import NotData, from_data, to_data
 from cosserat_fenicsx.ranks import on_first, world
 from cosserat_fenicsx.storage import files, mark
 
@@ -59,7 +58,7 @@ class Kind:
         each_rank: whether every rank has rows and a memory of its own.
         starts: whether there is a checkpoint of the start, before which nothing is stored.
         rounding: relative difference of numbers that does not make the arguments others.
-        as_data, from_data: the scene as data, and back; None where no scene is stored.
+        scene: the class of the scene, which is stored as data; None where none is.
     """
 
     what: str
@@ -71,11 +70,44 @@ class Kind:
     each_rank: bool = False
     starts: bool = False
     rounding: float = 0.0
-    as_data: Callable | None = None
-    from_data: Callable | None = None
+    scene: type | None = None
 
 
-class Store:
+class Nowhere:
+    """In place of a `Store`: nothing is stored."""
+
+    due, kept = False, ""
+
+    def put(self, result, what, **rows):
+        """See `Store`, and so for all others."""
+
+    def keep(self, row, result=()):
+        pass
+
+    def checkpoint(self, memory, result):
+        pass
+
+    def release(self):
+        pass
+
+    @contextlib.contextmanager
+    def ending(self, result):
+        """Context manager of a computation, at whose end the folder is released.
+
+        Raises:
+            Interrupted: by Ctrl-C; with what is done so far, and how to go on.
+        """
+        try:
+            yield
+        except Interrupted:
+            raise
+        except KeyboardInterrupt:
+            raise Interrupted(result, self.kept) from None
+        finally:
+            self.release()
+
+
+class Store(Nowhere):
     """A folder of one `Kind`. All ranks call; rank 0 writes, but for rows of each rank.
 
     Args:
@@ -108,11 +140,7 @@ class Store:
             SceneError: it holds a computation, or files of the user's own that have the names of this one's; another
                 process writes to it, or it cannot be made.
         """
-        try:
-            data = self.kind.as_data(scene)
-        except NotData as problem:
-            data = {"missing": str(problem)}
-        return self._made({**asked, "scene": data, **_marked(scene, mark.sample_times(duration))})
+        return self._made({**asked, "scene": _data(scene), **_marked(scene, mark.sample_times(duration))})
 
     def _made(self, told):
         told = {"holds": self.kind.what, "home": self.kind.home, **told}
@@ -210,7 +238,7 @@ class Store:
         data = self.head["scene"]
         try:
             if "missing" not in data:
-                return self.kind.from_data(data)
+                return from_data(self.kind.scene, data)
             why = f"the folder does not hold it: {data['missing']}"
         except (SceneError, *_UNFIT) as problem:
             why = f"the folder's own cannot be loaded here ({type(problem).__name__}: {problem})"
@@ -225,6 +253,11 @@ class Store:
     def again(self):
         """How the computation is gone on with, in words."""
         return self.kind.again.format(place=str(self.place))
+
+    @property
+    def kept(self):
+        """Where what is done is kept, and how it is gone on with, for `Interrupted`."""
+        return f"; they are kept in {self.place}, and {self.again}"
 
     # -- one process at a time ---------------------------------------------------------------------------------------
 
@@ -507,6 +540,13 @@ class Store:
             f"{self.kind.what} are kept there, and {self.again}",
             result,
         )
+
+
+def _data(scene):
+    try:
+        return to_data(scene)
+    except NotData as problem:
+        return {"missing": str(problem)}
 
 
 def _marked(scene, times):

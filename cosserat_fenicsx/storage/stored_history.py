@@ -1,12 +1,10 @@
 """A `History` whose states are stored in a file, written as they are saved and read on demand."""
 
-import functools
 
 import numpy as np
 
 from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.numerics import ElementRule
-from cosserat_fenicsx.parts import from_data, to_data
 from cosserat_fenicsx.results.history import History
 from cosserat_fenicsx.results.records import Instant, Ledger
 from cosserat_fenicsx.scene.scene import Scene
@@ -18,7 +16,7 @@ _ARRAYS = ("rq", "rates", "gauss_fields", "reactions", "tie_forces", "clamp_forc
 KIND = Kind(
     what="motion", home="dynamics.resuming", call="simulate", differs="the scene is not the one of the motion",
     again="cosserat_fenicsx.resume('{place}'), or `cosserat resume {place}`, continues it", tables=("instants",),
-    each_rank=True, starts=True, rounding=1e-9, as_data=to_data, from_data=functools.partial(from_data, Scene),
+    each_rank=True, starts=True, rounding=1e-9, scene=Scene,
 )  # fmt: skip
 
 

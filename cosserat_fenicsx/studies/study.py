@@ -249,7 +249,7 @@ def _raise_first(own, troubles, found, store):
         kept = (
             "; with a folder they would be kept there, and the same call would go on from them"
             if store is None
-            else f"; they are kept in {store.place}, {store.again}"
+            else store.kept
         )
         raise Interrupted(found, kept) from None
     if name == _CannotKeep.__name__:

@@ -6,7 +6,6 @@ the mesh touch the wall. On the first mesh they were 21 to 23, and one start of 
 13 at 1 to 30 m, where the start by springs takes 24; the finer meshes, which take 60 % of the time, remain the same.
 """
 
-import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -14,14 +13,14 @@ from typing import Any
 import numpy as np
 
 from cosserat_fenicsx.checks import File, Numbers, finite_array, refuse
-from cosserat_fenicsx.errors import Interrupted, NotConverged, SceneError
+from cosserat_fenicsx.errors import NotConverged, SceneError
 from cosserat_fenicsx.progress import Progress
 from cosserat_fenicsx.quantities import Quantity, Units
 from cosserat_fenicsx.ranks import world
 from cosserat_fenicsx.results import screen
 from cosserat_fenicsx.results.result import Result, by_name
 from cosserat_fenicsx.storage.mark import NotMarked, mark_of
-from cosserat_fenicsx.storage.store import Kind, Store
+from cosserat_fenicsx.storage.store import Kind, Nowhere, Store
 from cosserat_fenicsx.well import tables
 from cosserat_fenicsx.well.buckled import LockUp
 from cosserat_fenicsx.well.components import DrillString
@@ -208,24 +207,19 @@ def depth_sweep(
     values = {name: np.full(shape, np.nan) for name in KEPT}
     sweep = DepthSweep(operations, depths, friction, values)
     about = {"hole": hole, "string": string, "operations": operations, "depths": depths, "friction": friction}
-    store = None if folder is None else Store(folder, KIND).begin(_mark({**about, **settings}))
-    for answer in store.lines(lambda row: _answer_in(row, shape)) if store else ():
-        _put(sweep, *answer)
+    store = Nowhere()
+    if folder is not None:
+        store = Store(folder, KIND).begin(_mark({**about, **settings}))
+        for answer in store.lines(lambda row: _answer_in(row, shape)):
+            _put(sweep, *answer)
     missing = np.argwhere(~sweep.done)
-    try:
-        with Progress([len(missing)], progress, world(), "answer") as bar:
-            bar.start("depth sweep")
-            for number, (i, j, k) in enumerate(missing.tolist(), start=1):
-                found = _answer(holes[j], string, operations[i], float(depths[k]), settings)
-                _put(sweep, (i, j, k), *found)
-                if store:
-                    store.keep(_row((i, j, k), *found), sweep)
-                bar.reached(number)
-    except KeyboardInterrupt:
-        raise Interrupted(sweep, f"; they are kept in {os.fspath(folder)}, {store.again}" if store else "") from None
-    finally:
-        if store:
-            store.release()
+    with store.ending(sweep), Progress([len(missing)], progress, world(), "answer") as bar:
+        bar.start("depth sweep")
+        for number, (i, j, k) in enumerate(missing.tolist(), start=1):
+            found = _answer(holes[j], string, operations[i], float(depths[k]), settings)
+            _put(sweep, (i, j, k), *found)
+            store.keep(_row((i, j, k), *found), sweep)
+            bar.reached(number)
     return sweep
 
 
