@@ -13,12 +13,30 @@ import numpy as np
 
 from cosserat_fenicsx.drilling.wall_friction import law_of, scene_pieces
 
-# Shares of the mass that couples neighbours.
-_LEAST, _MOST = 1 / 12, 0.235
-# Without a step, or a number of elements, that is asked for.
-_LONGEST, _USUAL = 0.01, 250
-_FEWEST, _MOST_ELEMENTS = 40, 400
-_SHARE = 0.1  # of 1/omega of the discs
+
+@dataclass(frozen=True)
+class _Settings:
+    """Settings of meshes and steps.
+
+    Attributes:
+        coupling: least and largest share of an element's mass that couples its nodes.
+        longest: longest step where none is asked for, s. elements: their number without that and without a step.
+        fewest, most: elements for a step that is asked for. disc: longest step over 1/omega of the stiffest disc.
+        impact: the usual step over the time in which rock stops a bit. resolved: longest step, and passing time of a
+            wave along the lowest element, over that time, with which the largest weight on bit is right to 1 %.
+    """
+
+    coupling: tuple[float, float] = (1 / 12, 0.235)
+    longest: float = 0.01
+    elements: int = 250
+    fewest: int = 40
+    most: int = 400
+    disc: float = 0.1
+    impact: float = 0.2
+    resolved: float = 0.4
+
+
+_SETTINGS = _Settings()
 
 
 @dataclass(frozen=True)
@@ -69,15 +87,15 @@ class Wall:
 
 def usual_step(scene, elements: int | None, axial: bool) -> float:
     """The time step (s) of a `Drilling` for so many elements, where none is asked for."""
-    longest = min(_LONGEST, USUAL * time_of_impact(scene)) if axial else _LONGEST
+    longest = min(_SETTINGS.longest, _SETTINGS.impact * time_of_impact(scene)) if axial else _SETTINGS.longest
     if scene.discs:
         discs, shortest = scene.discs, math.inf
         for inertias, springs in ((discs.inertias, discs.stiffnesses), (discs.masses, discs.axial_stiffnesses)):
             if inertias is not None:
                 around = np.append(springs, 0.0) + np.append(0.0, springs)
                 shortest = min(shortest, float(np.sqrt(np.array(inertias) / around).min()))
-        return min(longest, _SHARE * shortest)
-    return min(longest, _travel_time(scene) / (elements or _USUAL))
+        return min(longest, _SETTINGS.disc * shortest)
+    return min(longest, _travel_time(scene) / (elements or _SETTINGS.elements))
 
 
 def _travel_time(scene):
@@ -89,7 +107,7 @@ def chain_of(scene, dt: float, elements: int | None, axial: bool) -> Chain:
     if scene.discs:
         return _chain_of_discs(scene.discs, axial, _static_weight(scene) if axial else 0.0)
     if elements is None:
-        elements = min(max(_travel_time(scene) / dt, _FEWEST), _MOST_ELEMENTS)
+        elements = min(max(_travel_time(scene) / dt, _SETTINGS.fewest), _SETTINGS.most)
     return _chain_of_string(scene, dt, elements, axial)
 
 
@@ -128,7 +146,7 @@ def _chain_of_string(drilling, dt, elements, axial):
     for inertia, stiffness, rate in kinds:
         mass, spring = of(inertia) * lengths, of(stiffness) / lengths
         courant = dt * np.sqrt(spring / mass)
-        share = np.minimum(_LEAST + courant**2 / 6, _MOST)
+        share = np.minimum(_SETTINGS.coupling[0] + courant**2 / 6, _SETTINGS.coupling[1])
         diagonal = np.zeros(len(depths))
         diagonal[:-1] += (0.5 - share) * mass
         diagonal[1:] += (0.5 - share) * mass
@@ -176,11 +194,6 @@ def _static_weight(drilling):
     return 0.0 if drilling.bit is None or drilling.bit.weight is None else drilling.bit.weight
 
 
-#: Steps where none is asked for, and the longest ones, with waves along the lowest element, that resolve an impact:
-#: parts of its time. The largest weight on bit is then right to 1 %.
-USUAL, ENOUGH = 0.2, 0.4
-
-
 def time_of_impact(scene) -> float:
     """Time (s) in which the rock of a `Drilling` stops the bit: Z/k by the impedance Z (N s/m) of the lowest section,
     or sqrt(m/k) by the mass m (kg) of the bit, the longer one; infinite without rock of a stiffness k (N/m)."""
@@ -202,15 +215,13 @@ def passing_time(scene, depths) -> float:
 def unresolved(scene, depths, dt) -> str:
     """A sentence where the steps (s) or the elements are too long for impacts, or ""."""
     impact, passing = time_of_impact(scene), passing_time(scene, depths)
-    if max(dt, passing) <= ENOUGH * impact:
+    longest = _SETTINGS.resolved * impact
+    if max(dt, passing) <= longest:
         return ""
-    few = (
-        ""
-        if passing <= ENOUGH * impact
-        else (f", and elements of at most {ENOUGH * impact * scene.segments[-1].axial_speed:.2g} m at the bit")
-    )
+    most = longest * scene.segments[-1].axial_speed if passing > longest else 0.0
+    few = f", and elements of at most {most:.2g} m at the bit" if most else ""
     return (
         f"APPROXIMATE: the rock stops the bit within {impact:.2g} s, which steps of {dt:.2g} s and elements that a "
         f"wave passes in {passing:.2g} s do not resolve: peaks of the weight on bit depend on them; expected a dt of "
-        f"at most {ENOUGH * impact:.2g} s{few}, or rock without a stiffness, whose impacts are told as impulses"
+        f"at most {longest:.2g} s{few}, or rock without a stiffness, whose impacts are told as impulses"
     )

@@ -139,27 +139,19 @@ def fastest(scene, until):
     return max(abs(signal(t)) for t in ([0.0] if signal.constant else times))
 
 
-class OtherSteps:
-    """Models of the same motion with other steps, for `step_errors`: of a scene, by the name and the `StringModel` that
-    computed it."""
+def with_step(scene, name, model, factor: float):
+    """A new `StringModel` at rest with so many times the step of another one, and elements of so many times the length.
 
-    def __init__(self, scene, name, model):
-        self._given, self.dt = (scene, name, model), model.dt
-
-    def with_step(self, factor: float):
-        """A new `StringModel` at rest, with so many times the step, and elements of so many times the length.
-
-        Raises:
-            SceneError: a step that the laws of friction do not allow, or a mesh that is as coarse as it can be.
-        """
-        scene, name, model = self._given
-        if name == TORSION or scene.discs:
-            return model_of(scene, name, factor * model.dt)
-        asked = max(2, round((len(model.depths) - 1) / factor))
-        other = model_of(scene, name, factor * model.dt, asked)
-        if len(other.depths) - 1 > 1.2 * asked or asked * factor > 1.2 * (len(model.depths) - 1):
-            refuse("simulate_drilling", "elements", asked, f"at least {len(other.depths) - 1}, one in each component")
-        return other
+    Raises:
+        SceneError: a step that the laws of friction do not allow, or a mesh that is as coarse as it can be.
+    """
+    if name == TORSION or scene.discs:
+        return model_of(scene, name, factor * model.dt)
+    asked = max(2, round((len(model.depths) - 1) / factor))
+    other = model_of(scene, name, factor * model.dt, asked)
+    if len(other.depths) - 1 > 1.2 * asked or asked * factor > 1.2 * (len(model.depths) - 1):
+        refuse("simulate_drilling", "elements", asked, f"at least {len(other.depths) - 1}, one in each component")
+    return other
 
 
 def model_of(scene, name, dt=None, elements=None):

@@ -311,11 +311,6 @@ class AxialTorsional(Pointers):
         if given.rock is not None:
             bit.rock, (bit.floor, bit.sinking) = 1, given.rock
 
-    def with_step(self, factor: float) -> "AxialTorsional":
-        """The same scene at rest, with so many times the step, and elements of so many times the length."""
-        elements = None if self._asked is None else max(2, round(self._asked / factor))
-        return type(self)(self.scene, factor * self.dt, elements, axial=self._axial, end=self._given_end)
-
     def bit_state(self) -> np.ndarray:
         """(2, 2) of the bit at the end of the last step: place (m downwards, rad) and velocity; NaN where axial motion
         is left out."""

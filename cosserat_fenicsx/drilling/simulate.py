@@ -7,7 +7,7 @@ from functools import partial
 import numpy as np
 
 from cosserat_fenicsx.checks import File, instance, number, refuse
-from cosserat_fenicsx.drilling.choose import OtherSteps, chosen, fastest, model_of
+from cosserat_fenicsx.drilling.choose import chosen, fastest, model_of, with_step
 from cosserat_fenicsx.drilling.history import COLUMNS, DrillingHistory
 from cosserat_fenicsx.drilling.protocol import PROFILE
 from cosserat_fenicsx.drilling.scene import Drilling
@@ -91,7 +91,9 @@ def simulate_drilling(
         history.folder = store.place
     TimeLoop(running, history, store, **apart, turn=_turn_to_watch(scene)).until(duration, progress)
     if check:
-        history.errors = step_errors(OtherSteps(scene, name, running), history.rows, duration / 2)
+        history.errors = step_errors(
+            running.dt, partial(with_step, scene, name, running), history.rows, duration / 2
+        )
     return history
 
 

@@ -155,7 +155,7 @@ def cycle_of(rows, since=0.0):
     return Cycle(period, float(speed.max()), float(torque.min()), float(torque.max()))
 
 
-def step_errors(model, rows, since=0.0):
+def step_errors(dt, other_model, rows, since=0.0):
     """Errors of the `Cycle` of a motion by its step, from a run with twice the step, which takes a quarter to a half
     of the time.
 
@@ -165,16 +165,16 @@ def step_errors(model, rows, since=0.0):
     the step, the other run is one with half of it, and takes two to four times the time.
 
     Args:
-        model: a `StringModel` with `with_step(factor)`, such as `TorsionWaves`, which has computed the motion.
-        rows: that `advance` returned, (n, ...). since: see `cycle_of`.
+        dt: step of the motion, s. other_model: function that returns a `StringModel` of it at rest, with so many times
+            that step. rows: of the motion, see `StringModel.advance`. since: see `cycle_of`.
 
     Returns:
         A `Cycle` of errors, all NaN where no other run was possible.
     """
     for factor in (2.0, 0.5):
         try:
-            other = model.with_step(factor)
-            if factor > 1 and other.dt < _LONGER * model.dt:
+            other = other_model(factor)
+            if factor > 1 and other.dt < _LONGER * dt:
                 continue
             found = cycle_of(other.advance(int(np.ceil(rows[-1, 0] / other.dt - 1e-6))), since)
         except (SceneError, NotConverged):  # of that step

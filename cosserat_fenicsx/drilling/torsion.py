@@ -21,6 +21,7 @@ time is at most 0.16 dt (omega dt)^2.
 
 import math
 from collections import namedtuple
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -36,10 +37,32 @@ from cosserat_fenicsx.drilling.wall_friction import law_of, wall_of
 from cosserat_fenicsx.errors import NotConverged
 from cosserat_fenicsx.well.components import DrillString
 
-_EXACT = 1e-9  # steps; travel times nearer to a whole number of steps are one
-_SHORTEST = 1.5  # steps
-_LEAST = 0.75  # of the step asked for: the shortest that is tried so that travel times fit
 
+@dataclass(frozen=True)
+class _Settings:
+    """Settings of cells and steps.
+
+    Attributes:
+        exact: travel times nearer to a whole number of steps are one, steps. misfit: larger differences are told.
+        shortest: travel time of a part that has its own cells, steps. step: the shortest step that is tried so that
+            travel times fit, over the one asked for. narrower: step over the longest one for which a law of friction
+            has one answer.
+        cells: their number without a step that is asked for, of at least `length` (m) each, but at least `fewest`.
+        most: cells.
+    """
+
+    exact: float = 1e-9
+    misfit: float = 0.01
+    shortest: float = 1.5
+    step: float = 0.75
+    narrower: float = 0.9
+    cells: int = 300
+    length: float = 5.0
+    fewest: int = 40
+    most: float = 1e5
+
+
+_SETTINGS = _Settings()
 #: A uniform part: travel time (s), impedance (N m s/rad), measured depths of its ends (m).
 Part = namedtuple("Part", "time impedance top bottom")
 #: dt: s. depths: (n + 1,) of the nodes, m. impedance, time: (n,) of the cells. turn: (n,) coefficients of the filters,
@@ -79,9 +102,9 @@ def cells_of(segments, dt):
 def _delays(steps):
     """Travel times of the cells of a part, in steps, and the coefficient of the filter of the longest one."""
     whole = round(steps)
-    if abs(steps - whole) <= _EXACT * max(1.0, steps):
+    if abs(steps - whole) <= _SETTINGS.exact * max(1.0, steps):
         return np.ones(whole), 0.0
-    short = math.floor(steps - _SHORTEST)
+    short = math.floor(steps - _SETTINGS.shortest)
     delays, extra = np.ones(short + 1), steps - short - 1
     delays[short // 2] += extra
     return delays, (1 - extra) / (1 + extra)
@@ -89,19 +112,19 @@ def _delays(steps):
 
 def _step(times, dt):
     """The step from 0.75 dt to dt for which travel times of so many seconds are nearest to whole numbers of steps."""
-    times = np.array([time for time in times if time >= _SHORTEST * dt])
+    times = np.array([time for time in times if time >= _SETTINGS.shortest * dt])
     tried = [dt]
     for time in times:
-        tried.append(time / np.arange(math.ceil(time / dt * (1 - 1e-12)), math.floor(time / (_LEAST * dt)) + 1))
+        tried.append(time / np.arange(math.ceil(time / dt * (1 - 1e-12)), math.floor(time / (_SETTINGS.step * dt)) + 1))
     tried = np.unique(np.concatenate([np.atleast_1d(x) for x in tried]))[::-1]
     steps = times[:, None] / tried
     off = np.abs(steps - np.round(steps)).max(axis=0, initial=0.0)  # of none where all are short
-    return float(tried[np.argmax(off <= max(off.min(), _EXACT) * (1 + 1e-6))])
+    return float(tried[np.argmax(off <= max(off.min(), _SETTINGS.exact) * (1 + 1e-6))])
 
 
 def _fits(part, dt):
     steps = part.time / dt
-    return steps >= _SHORTEST or abs(steps - 1) <= _EXACT
+    return steps >= _SETTINGS.shortest or abs(steps - 1) <= _SETTINGS.exact
 
 
 def _joined(a, b):
@@ -142,12 +165,6 @@ _WIDTH = 1 + len(SERIES) + len(LEDGER)
 # Numbers and arrays of C that change in a step.
 _NUMBERS = ("drive_speed", "integral", "bit_speed", "last_on_bit", "work", "at_bit", "at_wall", "in_mud", "iterations")
 _CHANGING = ("down", "up", "down_kept", "up_kept", "speed", "angle", "torque", "moment", "last_speed", "last_moment")
-# Without a step that is asked for: a cell of the length of the string over the first number, but at least of so many
-# metres, and at least so many cells.
-_CELLS, _LONGEST, _FEWEST = 300, 5.0, 40
-_NARROWER = 0.9  # of the longest step for which a law of friction has one answer
-_MOST = 1e5  # cells
-_TOLD = 0.01  # steps; smaller misfits of travel times are no matter
 
 
 class TorsionWaves(Pointers):
@@ -183,22 +200,23 @@ class TorsionWaves(Pointers):
             dt = positive("TorsionWaves", "dt", dt, "s")
         if elements is not None:
             dt = min(time / positive("TorsionWaves", "elements", elements, "cells"), dt or math.inf)
-        asked = dt = dt or time / min(max(scene.bit_depth / _LONGEST, _FEWEST), _CELLS)
-        if time / dt > _MOST:
-            refuse("TorsionWaves", "dt", dt, f"at least {1 / _MOST:g} of the travel time of the string, {time:.4g} s")
+        asked = dt = dt or time / min(max(scene.bit_depth / _SETTINGS.length, _SETTINGS.fewest), _SETTINGS.cells)
+        most = _SETTINGS.most
+        if time / dt > most:
+            refuse("TorsionWaves", "dt", dt, f"at least {1 / most:g} of the travel time of the string, {time:.4g} s")
         factor, at_bit = 1.0, False
         while factor >= 1:
-            if time / dt > _MOST:
+            if time / dt > most:
                 if at_bit:
                     refuse("BitOnRock", "law", scene.bit.law, "a torque that falls more slowly with the speed, or a "
-                           f"larger inertia of the bit than {scene.bit.inertia:g} kg m^2: with {_MOST:g} cells the "
+                           f"larger inertia of the bit than {scene.bit.inertia:g} kg m^2: with {most:g} cells the "
                            "speed of the bit is not determined")  # fmt: skip
                 refuse("Drilling", "friction", scene.friction, "a friction that decays more slowly with the "
-                       f"speed: with {_MOST:g} cells the speed at every place is not determined")  # fmt: skip
+                       f"speed: with {most:g} cells the speed at every place is not determined")  # fmt: skip
             self.cells = cells = cells_of(scene.segments, dt)
             self._set_nodes(drag)
             factor, at_bit = self._steepness()
-            dt = cells.dt * min(_NARROWER / factor if factor else 1.0, _NARROWER)
+            dt = cells.dt * min(_SETTINGS.narrower / factor if factor else 1.0, _SETTINGS.narrower)
         self.dt, self.depths = cells.dt, cells.depths
         self.signal = MeanSpeeds(scene.drive.signal(), self.dt)
         self.why = tuple(self._reasons(asked))
@@ -243,7 +261,7 @@ class TorsionWaves(Pointers):
                 f"{cells.joined} part{' is' if cells.joined == 1 else 's are'} shorter than 1.5 cells, and joined with "
                 "pieces of the neighbours, with the same inertia and compliance"
             )
-        if cells.unfit > _TOLD:
+        if cells.unfit > _SETTINGS.misfit:
             yield (
                 f"travel times of parts differ from whole numbers of steps by up to {cells.unfit:.2g} steps: the rest "
                 "is made up by filters that are exact for slow waves; jumps are smeared over some steps"
@@ -339,10 +357,6 @@ class TorsionWaves(Pointers):
         buffer = self._ffi.from_buffer
         return self._lib.advance_waves(self.c, len(rows), buffer("double[]", speeds), self.steps, _WIDTH,
                                        buffer("double[]", rows, require_writable=True))  # fmt: skip
-
-    def with_step(self, factor: float) -> "TorsionWaves":
-        """The same scene at rest, with so many times the step."""
-        return type(self)(self.scene, factor * self.dt, normal_force=self.normal_force)
 
     def profile(self) -> np.ndarray:
         """See `StringModel`; speeds and torques are means over the last two steps; a bit that sticks counts, too."""

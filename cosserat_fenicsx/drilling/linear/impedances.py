@@ -80,7 +80,17 @@ class Uniform:
             C * dP + b * S * dw + dC * turn * P + (b * dS * turn - self.inertia * S) * w,
         )
 
-    def decay(self, s, length):
+    def along(self, s, state, points, places):
+        """Places (m) below the upper end, w there, twice the kinetic energy by Gauss's rule with so many points, and
+        the state at the lower end, all but the places by one and the same factor."""
+        nodes, weights = np.polynomial.legendre.leggauss(points)
+        x = np.concatenate([self.length * (1 + nodes) / 2, np.linspace(0.0, self.length, places)])
+        here = self.through(s, state, x).w * np.exp(self._decay(s, x))
+        twice = self.inertia * self.length / 2 * float(weights @ np.abs(here[:points]) ** 2)
+        below = self.through(s, state, self.length).times(np.exp(self._decay(s, self.length)))
+        return x[points:], here[points:], twice, below
+
+    def _decay(self, s, length):
         """Re(g length)."""
         return (np.sqrt(self.inertia / self.stiffness * s * (s + self.drag)) * length).real
 
@@ -109,6 +119,8 @@ class Disc:
     damping: float
     name: str
 
+    length = 0.0
+
     @property
     def impedance(self):
         """For scaling, N m s/rad."""
@@ -122,6 +134,10 @@ class Disc:
     def down(self, s, state):
         """The state at the next disc, above it."""
         return self.through(s, state).scaled(self.impedance)
+
+    def along(self, s, state, points, places):
+        """See `Uniform.along`."""
+        return np.zeros(1), state.w, self.inertia * abs(state.w[0]) ** 2, self.through(s, state)
 
     def through(self, s, state):
         """The same in its own size."""

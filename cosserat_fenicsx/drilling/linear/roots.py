@@ -14,13 +14,34 @@ import numpy as np
 
 from cosserat_fenicsx.errors import NotConverged
 
-#: Largest change of phase from point to point of a contour, rad; how far it may be from that of the derivatives; and
-#: the largest step, in units of the distance of a single root that would lead to the same derivative.
-_TURN, _MISMATCH, _REACH = 1.0, 0.3, 1.5
-#: A contour that comes as near to a root as this share of its size is moved.
-_NEAR = 1e-9
-#: Newton's method stops at steps below the second number, or below the third where they no longer fall; relative.
-_STEPS, _SETTLED, _ROUNDING = 60, 1e-14, 1e-11
+
+@dataclass(frozen=True)
+class _Settings:
+    """Settings of the search for roots.
+
+    Attributes:
+        turn: largest change of phase from point to point of a contour, rad. mismatch: from that foretold by the
+            derivatives, rad. reach: largest step, over the distance of a single root with the same derivative.
+        near: a contour that comes as near to a root as this share of its size is moved.
+        steps: of Newton's method at most. settled: relative step at which it stops. rounding: the same where steps no
+            longer fall.
+        far: share of the distance of roots beyond which one is followed in smaller steps, halved `halvings` times.
+        same: roots nearer to each other than this share of their size are one.
+    """
+
+    turn: float = 1.0
+    mismatch: float = 0.3
+    reach: float = 1.5
+    near: float = 1e-9
+    steps: int = 60
+    settled: float = 1e-14
+    rounding: float = 1e-11
+    far: float = 0.25
+    halvings: int = 7
+    same: float = 1e-8
+
+
+_SETTINGS = _Settings()
 
 
 @dataclass(frozen=True)
@@ -60,7 +81,7 @@ class OnContour(Exception):
 def turns(f, corners, spacing):
     """Change of the phase of f along straight lines from corner to corner, rad.
 
-    Intervals are halved until the phase turns by less than `_TURN` in each, as the derivatives at both ends foretell,
+    Intervals are halved until the phase turns by less than a limit in each, as the derivatives at both ends foretell,
     and until no root can be as near as the interval is long.
 
     Raises:
@@ -70,7 +91,7 @@ def turns(f, corners, spacing):
     for a, b in zip(corners[:-1], corners[1:], strict=True):
         s = a + (b - a) * _shares(a, b, spacing)
         value, derivative = f(s)
-        least = _NEAR * max(abs(x - y) for x in corners for y in corners)
+        least = _SETTINGS.near * max(abs(x - y) for x in corners for y in corners)
         while True:
             if not np.all(value != 0):
                 raise OnContour
@@ -81,8 +102,8 @@ def turns(f, corners, spacing):
             # beside two roots that are close to each other the phase turns by 2 pi, of which nothing is seen at points
             # on both sides: the size of the logarithmic derivative says how near roots are
             near = np.abs(log - _rate(f, s))
-            rough = (np.abs(change) > _TURN) | (np.abs(change - foretold) > _MISMATCH)
-            rough |= np.maximum(near[1:], near[:-1]) * np.abs(step) > _REACH
+            rough = (np.abs(change) > _SETTINGS.turn) | (np.abs(change - foretold) > _SETTINGS.mismatch)
+            rough |= np.maximum(near[1:], near[:-1]) * np.abs(step) > _SETTINGS.reach
             if not rough.any():
                 break
             where = np.flatnonzero(rough)
@@ -131,7 +152,7 @@ def each(f, starts, stride):
     """
     s = np.array(starts, dtype=complex)
     size, open_ = np.full(len(s), np.inf), np.arange(len(s))
-    for _ in range(_STEPS):
+    for _ in range(_SETTINGS.steps):
         if not open_.size:
             break
         here = s[open_]
@@ -144,9 +165,9 @@ def each(f, starts, stride):
         s[open_] = here + step * np.minimum(1.0, longest / np.maximum(length, 1e-300))
         size[open_] = length
         scale = np.maximum(np.abs(here), stride * 1e-3)
-        done = (length <= _SETTLED * scale) | ((length <= _ROUNDING * scale) & (length >= before / 4))
+        done = (length <= _SETTINGS.settled * scale) | ((length <= _SETTINGS.rounding * scale) & (length >= before / 4))
         open_ = open_[~done]
-    return np.where(size <= _ROUNDING * np.maximum(np.abs(s), stride * 1e-3), s, np.nan)
+    return np.where(size <= _SETTINGS.rounding * np.maximum(np.abs(s), stride * 1e-3), s, np.nan)
 
 
 def _rate(f, s):
@@ -253,12 +274,6 @@ def _net(box, spacing):
     return np.concatenate([(columns[:, None] + 1j * heights[None, :]).ravel(), axis])
 
 
-#: A root that moves farther than this share of their distance is followed in smaller steps, so often at most.
-_FAR, _HALVINGS = 0.25, 7
-#: Roots nearer to each other than this share of their size are the same.
-_SAME = 1e-8
-
-
 def follow(equation, points, parents, box, spacing):
     """The roots of a family of functions at many points, each mode in a column of its own.
 
@@ -306,15 +321,15 @@ def _moved(equation, start, end, roots, spacing, depth=0):
     new = each(equation(end), old, spacing / 2)
     new = np.where(new.imag < 0, new.conj(), new)
     apart = np.abs(new[:, None] - new[None, :]) + np.diag(np.full(len(new), np.inf))
-    safe = np.isfinite(new) & (np.abs(new - old) < _FAR * np.maximum(spacing, np.abs(old.real)))
-    safe &= ~(apart < _SAME * np.abs(new)[:, None]).any(axis=1)
+    safe = np.isfinite(new) & (np.abs(new - old) < _SETTINGS.far * np.maximum(spacing, np.abs(old.real)))
+    safe &= ~(apart < _SETTINGS.same * np.abs(new)[:, None]).any(axis=1)
     moved = {name: s for name, s, good in zip(names, new, safe, strict=True) if good}
     rest = {name: roots[name] for name in names if name not in moved}
-    if rest and depth < _HALVINGS:
+    if rest and depth < _SETTINGS.halvings:
         middle = (start + end) / 2
         half = _moved(equation, start, middle, rest, spacing, depth + 1)
         for name, s in _moved(equation, middle, end, half, spacing, depth + 1).items():
-            if all(abs(s - other) > _SAME * abs(s) for other in moved.values()):
+            if all(abs(s - other) > _SETTINGS.same * abs(s) for other in moved.values()):
                 moved[name] = s
     return moved
 

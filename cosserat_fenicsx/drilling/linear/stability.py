@@ -7,10 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from cosserat_fenicsx.checks import File, Numbers, number, positive, refuse
+from cosserat_fenicsx.checks import File, Numbers, instance, number, positive, refuse
 from cosserat_fenicsx.drilling.linear.characteristic import Steady, box_up_to, or_none, speeds_and_weights
 from cosserat_fenicsx.drilling.linear.frequencies import SoftSpeed, SoftTorque, natural_frequencies, own_rule, with_rule
-from cosserat_fenicsx.drilling.linear.impedances import Disc, Uniform
 from cosserat_fenicsx.drilling.linear.roots import all_roots, follow
 from cosserat_fenicsx.drilling.scene import Drilling
 from cosserat_fenicsx.drilling.top_drive import Matched, Stiff, TopDrive
@@ -80,7 +79,7 @@ def shape_of(equation, s, points=200):
     shares = {name: float(value / total) for name, value in energies.items() if value}
     lengths = {}
     for part in equation.guides[0].parts:
-        if isinstance(part, Uniform):
+        if part.length:
             lengths[part.name] = lengths.get(part.name, 0.0) + part.length
     return ModeShape(complex(s), depth, motions[0], motions[1] if len(motions) > 1 else None, shares, lengths)
 
@@ -93,23 +92,12 @@ def _along(guide, s, points):
     if guide.top_inertia and state.w[0] != 0:
         energy["top drive"] = guide.top_inertia * abs(state.w[0]) ** 2
     for k, part in enumerate(guide.parts):
-        if isinstance(part, Disc):
-            depth.append(np.array([k + 1.0]))
-            w.append(size * state.w)
-            energy[part.name] = part.inertia * abs(size * state.w[0]) ** 2
-            below = part.through(at, state)
-        else:
-            n = _POINTS + 2 * int(abs(s) * part.travel)
-            share = max(2, round(points * part.travel / guide.travel))
-            nodes, weights = np.polynomial.legendre.leggauss(n)
-            x = np.concatenate([part.length * (1 + nodes) / 2, np.linspace(0.0, part.length, share)])
-            here = size * part.through(at, state, x).w * np.exp(part.decay(at, x))
-            twice = part.inertia * part.length / 2 * float(weights @ np.abs(here[:n]) ** 2)
-            energy[part.name] = energy.get(part.name, 0.0) + twice
-            depth.append(top + x[n:])
-            w.append(here[n:])
-            top += part.length
-            below = part.through(at, state, part.length).times(np.exp(part.decay(at, part.length)))
+        share = max(2, round(points * part.travel / guide.travel))
+        x, here, twice, below = part.along(at, state, _POINTS + 2 * int(abs(s) * part.travel), share)
+        energy[part.name] = energy.get(part.name, 0.0) + size**2 * twice
+        depth.append(top + x if part.length else np.array([k + 1.0]))
+        w.append(size * here)
+        top += part.length
         scaled = below.scaled(part.impedance)
         size *= (abs(below.w) + abs(below.P))[0] / (abs(scaled.w) + abs(scaled.P))[0]
         state = scaled
@@ -336,8 +324,7 @@ def stability(
         SceneError: numbers out of range; a torque on bit that falls faster than the string can follow without inertia.
         NotConverged: the roots that were found are fewer than those counted.
     """
-    if not isinstance(scene, Drilling):
-        refuse("stability", "scene", scene, "a Drilling(...)")
+    instance("stability", "scene", scene, Drilling, "a Drilling(...)")
     speeds, weights = speeds_and_weights("stability", scene, speeds, weights)
     top = 2 * math.pi * highest(scene, modes, up_to)
     steady = Steady(scene)
