@@ -55,7 +55,7 @@ def test_a_weight_on_rigid_rock_is_that_of_the_wave_and_the_impulse_is_told(mass
     peaks, means = np.array(found).T
     assert peaks.max() < 1.15 * wave and np.ptp(peaks) < 0.06 * wave, peaks  # a jump rings for some elements
     assert np.abs(means / means[-1] - 1).max() < 0.02, means
-    told = str(history)
+    told = history.details()
     assert ("largest impulse" in told) == (mass > 0) and "stopped by an impulse" in told and "N s" in told
     assert any("impulse" in axes.get_ylabel() for axes in history.plot().axes) == (mass > 0)
 
@@ -75,7 +75,7 @@ def test_rock_that_gives_way_makes_a_force_that_converges(stiffness, mass):
             assert history.weight_on_bit.max() == pytest.approx(weight(np.linspace(0, 0.5, 20001)).max(), rel=0.01)
         assert np.abs(history.balance).max() < 1e-9 * np.abs(history.lost_at_bit).max()
     assert off[1] < 0.01 and off[2] < 0.5 * off[1] < 0.5 * 0.5 * off[0], off
-    assert f"a spring of {stiffness:.4g} N/m" in str(history) and "impulse" not in str(history)
+    assert f"a spring of {stiffness:.4g} N/m" in history.details() and "impulse" not in history.details()
 
 
 def test_steps_that_do_not_resolve_an_impact_are_told():
