@@ -180,7 +180,7 @@ def draw(rod, path, file):
             axes.plot(x, y, label=label, **style)
         axes.set(xlabel=r"load factor $\eta = F / P_{cr}$", ylabel=r"transverse tip displacement $\delta$ (m)")
         axes.set(title="Eccentrically compressed cantilever, e = L/100", ylim=(0, 18))
-        axes.legend()
+        axes.legend(frameon=True)
         return figure
 
     draw_chart(chart, file)

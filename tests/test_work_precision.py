@@ -155,7 +155,7 @@ def test_time_at_an_accuracy():
 
 def test_ratios_that_are_asked_for():
     """Of each side the fastest that is accurate enough; by tol it is the true error that counts."""
-    from asked import judged
+    from harness import judged
     from work_precision_table import ASKED, called, deciding, ratios
 
     def row(peer, kind, seconds, error, **configuration):

@@ -314,11 +314,13 @@ def _thin_out(axis):
 
 def _spread(panel):
     """Whether texts within a panel were moved, since they covered others or left the panel at a side."""
+    from matplotlib.text import Text
+
     placed, moved = [], False
     for text in panel.texts:
         if not text.get_text():
             continue
-        box = text.get_window_extent()
+        box = Text.get_window_extent(text)  # that of an annotation holds its arrow, too
         left, over = max(panel.bbox.x0 - box.x0, 0.0), max(box.x1 - panel.bbox.x1, 0.0)
         right = left - over if box.width < panel.bbox.width else 0.0
         box, up = box.translated(right, 0.0), 0.0
@@ -337,6 +339,9 @@ def _move(text, right, up):
     if hasattr(text, "xyann") and text.anncoords == "offset points":
         per_point = text.figure.dpi / 72
         text.xyann = (text.xyann[0] + right / per_point, text.xyann[1] + up / per_point)
+    elif hasattr(text, "xyann"):
+        transform = {"data": text.axes.transData, "axes fraction": text.axes.transAxes}[text.anncoords]
+        text.xyann = transform.inverted().transform(transform.transform(text.xyann) + (right, up))
     else:
         transform = text.get_transform()
         text.set_position(transform.inverted().transform(transform.transform(text.get_position()) + (right, up)))

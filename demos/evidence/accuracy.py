@@ -4,13 +4,12 @@ python demos/evidence/accuracy.py            writes out/accuracy.md and prints i
 python demos/evidence/accuracy.py --quick    two meshes and two slendernesses
 """
 
-import argparse
 import math
 import platform
 
 import numpy as np
 from cantilever import ECCENTRICITY, L, column, exact
-from written import write
+from harness import command, table, write
 
 import cosserat_fenicsx as cf
 from cosserat_fenicsx import analytic, compat
@@ -32,12 +31,6 @@ def orders(meshes):
     """Errors of delta by formulation, degree and mesh, and the last observed order above round-off."""
     rod, scene = column()
     truth = exact(rod, np.array(ETAS)).delta
-    yield (
-        "| formulation | degree | "
-        + " | ".join(f"{n} elements" for n in meshes)
-        + " | observed order | Newton iterations |"
-    )
-    yield "|---|---|" + "---|" * (len(meshes) + 2)
     for formulation in ("mixed", "displacement", "multiplier"):
         for degree in (1, 2, 3, 4):
             found = [
@@ -47,7 +40,7 @@ def orders(meshes):
             cells = [f"{e[0]:.1e}, {e[1]:.1e}" if f else "stops" for e, f in zip(errors, found, strict=True)]
             rates = [_last_order(errors[:, i], meshes) for i in range(len(ETAS))]
             newton = ", ".join(str(f[1]) if f else "-" for f in found)
-            yield f"| {formulation} | P{degree} | " + " | ".join(cells) + f" | {', '.join(rates)} | {newton} |"
+            yield formulation, f"P{degree}", *cells, ", ".join(rates), newton
 
 
 def _last_order(errors, meshes):
@@ -60,8 +53,6 @@ def _last_order(errors, meshes):
 
 def slenderness(ratios):
     """Errors of delta at eta = 0.9, 1.5, mixed, against the exact rod of the same slenderness, and iterations."""
-    yield "| L/d | " + " | ".join(f"P{p}, {n} elements" for p, n in SLENDER) + " | Newton iterations |"
-    yield "|---|" + "---|" * (len(SLENDER) + 1)
     for ratio in ratios:
         rod, scene = column(diameter=L / ratio if math.isfinite(ratio) else 0.2, rigid=math.isinf(ratio))
         k = rod.stiffness
@@ -72,40 +63,40 @@ def slenderness(ratios):
         name = f"{ratio:g}" if math.isfinite(ratio) else "EA = GA = infinity"
         cells = [f"{f[0][0]:.1e}, {f[0][1]:.1e}" if f else "stops" for f in found]
         newton = ", ".join(str(f[1]) if f else "-" for f in found)
-        yield f"| {name} | {' | '.join(cells)} | {newton} |"
+        yield name, *cells, newton
 
 
 def newton_work():
     """Iterations of paths whose steps the solver chooses, rejected steps included, P4 at 8 elements."""
-    yield "| path, mixed | points | Newton iterations |"
-    yield "|---|---|---|"
     rod, scene = column()
     for far in (1.5, 4.0, 9.0):
         path = cf.solve(scene, (0.0, far), elements=8, model="spatial")
-        yield f"| eccentric cantilever, eta = 0 to {far:g} | {len(path)} | {path.iterations.sum()} |"
+        yield f"eccentric cantilever, eta = 0 to {far:g}", len(path), path.iterations.sum()
 
 
 def main(quick=False, out="out"):
     """Write and print the tables; returns the text."""
+    meshes = (4, 8) if quick else (4, 8, 16, 32)
+    of_meshes, of_slender = (" | ".join(f"{words}{n} elements" for words, n in pairs) for pairs in (
+        [("", n) for n in meshes], [(f"P{p}, ", n) for p, n in SLENDER]))  # fmt: skip
     lines = [
         f"{compat.version()}, {platform.machine()}.",
         "",
         "Relative error of delta at eta = 0.9, 1.5 against the exact rod:",
         "",
-        *orders((4, 8) if quick else (4, 8, 16, 32)),
+        *table(f"formulation | degree | {of_meshes} | observed order | Newton iterations", orders(meshes)),
         "",
         "Slenderness:",
         "",
-        *slenderness((1e2, np.inf) if quick else (1e2, 1e3, 1e4, 1e5, np.inf)),
+        *table(f"L/d | {of_slender} | Newton iterations",
+               slenderness((1e2, np.inf) if quick else (1e2, 1e3, 1e4, 1e5, np.inf))),
         "",
-        *newton_work(),
-    ]
+        *table("path, mixed | points | Newton iterations", newton_work()),
+    ]  # fmt: skip
     text = write("accuracy", lines, out)
     print(text)
     return text
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--quick", action="store_true")
-    main(parser.parse_args().quick)
+    command(__doc__, main, {"quick": True})

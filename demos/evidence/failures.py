@@ -9,18 +9,15 @@ such: `make work-precision` installs them.
 """
 
 import hashlib
-import json
-import os
 import sys
 from pathlib import Path
 
-import machine
+from harness import command, record, save, unfinished
 from mpi4py import MPI
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 from trials import catalogue, methods, picture, programs, table
 from trials.cells import MISSING, SILENT, Cell
-from unfinished import command
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
@@ -37,31 +34,14 @@ class Store:
 
     def __init__(self, file, quick, fresh):
         self.file = file
-        file.parent.mkdir(parents=True, exist_ok=True)
-        self.data = {"complete": False, "quick": quick, "machine": machine.record(), "sources": _fingerprint(),
+        self.data = {"complete": False, "quick": quick, "machine": record(), "sources": _fingerprint(),
                      "seed": None,
                      "programs": {}, "methods": [], "trials": [], "cells": {}}  # fmt: skip
-        before = None if fresh else self._before()
+        before = None if fresh else unfinished(file, self.data, ["quick", "sources"])
         if before:
             kept = {key: cell for key, cell in before["cells"].items() if cell["verdict"] != MISSING}
             self.data |= {"cells": kept, "programs": before["programs"]}
             print(f"goes on from {file}: {len(kept)} cells kept", file=sys.stderr)
-
-    def _before(self):
-        """The results of an interrupted run, if this one can continue it."""
-        try:
-            before = json.loads(self.file.read_text(encoding="utf-8"))
-            same = all(before[key] == self.data[key] for key in ("quick", "sources")) and not before["complete"]
-            here, there = self.data["machine"], before["machine"]
-            return before if same and all(here[k] == there[k] for k in here if k not in ("date", "cores")) else None
-        except (OSError, ValueError, KeyError):
-            return None
-
-    def save(self):
-        """Replace the file in one step, so that a killed process leaves a complete one."""
-        new = self.file.with_suffix(".new")
-        new.write_text(json.dumps(self.data, indent=1) + "\n", encoding="utf-8")
-        os.replace(new, self.file)
 
 
 def _fingerprint():
@@ -88,12 +68,12 @@ def compute(store, columns, rows):
             data["cells"][f"{trial.key}/{method.key}"] = cell.plain()
             if getattr(method, "versions", None):
                 data["programs"][method.key] = method.versions
-            store.save()
+            save(store.file, data)
             bar.advance(task)
             if not console.is_terminal and trial is rows[-1]:
                 print(f"{name}: done", file=sys.stderr, flush=True)
     data["complete"] = True
-    store.save()
+    save(store.file, data)
 
 
 def main(out="out", quick=False, fresh=False):
@@ -128,4 +108,4 @@ def main(out="out", quick=False, fresh=False):
 
 
 if __name__ == "__main__":
-    command(main, __doc__, quick="without other programs, fewer steps; at most a minute")
+    command(__doc__, main, {"quick": True}, fresh=True)

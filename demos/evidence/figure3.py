@@ -14,12 +14,11 @@ import sys
 from dataclasses import asdict
 from pathlib import Path
 
-import machine
 import numpy as np
 from comparison import curves, picture, verdicts
 from comparison.follow import Point
+from harness import command, record, save, unfinished
 from mpi4py import MPI
-from unfinished import command
 
 
 class Store:
@@ -35,8 +34,8 @@ class Store:
         self.folder = Path(folder)
         self.folder.mkdir(parents=True, exist_ok=True)
         self.file = self.folder / "figure3.json"
-        self.data = {"complete": False, "machine": machine.record(), "settings": _plain(asdict(settings)), "curves": {}}
-        before = self._before() if not fresh else None
+        self.data = {"complete": False, "machine": record(), "settings": _plain(asdict(settings)), "curves": {}}
+        before = None if fresh else unfinished(self.file, self.data, ["settings"])
         if before:
             self.data["curves"] = before["curves"]
             done = [name for name, curve in before["curves"].items() if curve["complete"]]
@@ -44,16 +43,6 @@ class Store:
         else:
             for name in self.folder.glob("figure3-*.npz"):
                 name.unlink()
-
-    def _before(self):
-        """The results of an interrupted run, if this one can continue it."""
-        try:
-            before = json.loads(self.file.read_text(encoding="utf-8"))
-            same = before["settings"] == self.data["settings"] and not before["complete"]
-            here, there = self.data["machine"], before["machine"]
-            return before if same and all(here[k] == there[k] for k in here if k not in ("date", "cores")) else None
-        except (OSError, ValueError, KeyError):
-            return None
 
     def curve(self, name, compute, words):
         """The curve `name`: from an earlier run, or computed, timed and stored."""
@@ -65,13 +54,7 @@ class Store:
     def put(self, name, curve, complete=False):
         """Store a curve, or a part of it."""
         self.data["curves"][name] = {**curve, "complete": complete}
-        self.save()
-
-    def save(self):
-        """Replace the file in one step, so that a killed process leaves a complete one."""
-        new = self.file.with_suffix(".new")
-        new.write_text(json.dumps(self.data, indent=1) + "\n", encoding="utf-8")
-        os.replace(new, self.file)
+        save(self.file, self.data)
 
     def part_of(self, name):
         """The unfinished curve `name` and the last points of its path: (dict, list of Point), or (None, [])."""
@@ -97,7 +80,7 @@ class Store:
     def finish(self):
         """Mark the file as finished: the next run starts anew."""
         self.data["complete"] = True
-        self.save()
+        save(self.file, self.data)
         for name in self.folder.glob("figure3-*.npz"):
             name.unlink()
 
@@ -148,4 +131,4 @@ def main(out="out", quick=False, fresh=False):
 
 
 if __name__ == "__main__":
-    command(main, __doc__, quick="coarse meshes")
+    command(__doc__, main, {"quick": True}, fresh=True)

@@ -7,7 +7,6 @@ Processor time holds that of the C compiler; wall-clock time is that of the whol
 Another checkout is measured by `--package FOLDER`.
 """
 
-import argparse
 import os
 import resource
 import statistics
@@ -17,7 +16,7 @@ import tempfile
 import time
 from pathlib import Path
 
-from written import write
+from harness import command, table, write
 
 from cosserat_fenicsx import compat
 
@@ -60,28 +59,20 @@ def main(runs=3, out="out", kinds=tuple(RUNS), package=ROOT):
     Returns:
         {kind: (first, next, compiled files)}, times (processor, wall-clock) in s.
     """
-    lines = [
-        f"{compat.version()}; medians of {runs} run(s); processor time, and wall-clock time on {os.cpu_count()} cores.",
-        "",
-        "| scene | compiled files | first: processor (s) | wall clock (s) | next: processor (s) | wall clock (s) |",
-        "|---|---|---|---|---|---|",
-    ]
-    found = {}
+    rows, found = [], {}
     for kind in kinds:
         measured = [first_and_next(RUNS[kind], package) for _ in range(runs)]
         times = [[statistics.median(one[i][j] for one in measured) for j in range(2)] for i in range(2)]
         found[kind] = *times, measured[0][2]
-        numbers = " | ".join(f"{value:.1f}" for pair in times for value in pair)
-        lines.append(f"| {kind} | {measured[0][2]} | {numbers} |")
-        print(lines[-1], file=sys.stderr, flush=True)
-    print(write("first_runs", lines, out))
+        rows.append((kind, measured[0][2], *(f"{value:.1f}" for pair in times for value in pair)))
+        print(*rows[-1], sep=" | ", file=sys.stderr, flush=True)
+    about = f"{compat.version()}; medians of {runs} run(s); processor time, and wall-clock time on "
+    about += f"{os.cpu_count()} cores."
+    heads = "scene | compiled files | first: processor (s) | wall clock (s) | next: processor (s) | wall clock (s)"
+    print(write("first_runs", [about, "", *table(heads, rows)], out))
     return found
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--quick", action="store_true")
-    parser.add_argument("--package", default=ROOT, help="a checkout of the package; default this one")
-    given = parser.parse_args()
-    some = {"runs": 1, "kinds": list(RUNS)[:1]} if given.quick else {}
-    main(**some, package=given.package)
+    command(__doc__, main, {"runs": 1, "kinds": list(RUNS)[:1]},
+            package={"default": ROOT, "help": "a checkout of the package; default this one"})  # fmt: skip

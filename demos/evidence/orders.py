@@ -10,11 +10,10 @@ space: errors at three element ends against a fine mesh, all with the same steps
 smooth up to its ends. Changes and errors that may be affected by rounding are marked * and not used for orders.
 """
 
-import argparse
 import math
 
 import numpy as np
-from written import write
+from harness import command, table, write
 
 import cosserat_fenicsx as cf
 from cosserat_fenicsx import compat
@@ -113,18 +112,17 @@ def time_table(steps):
         f"Relative changes at the end from {steps[-2]} to {steps[-1]} steps, and the orders in dt observed from"
         f" {steps[0]} steps on (2 P2 elements a rod):"
     )
-    head = "| scene | scheme | position | rotation | velocity | angular velocity |"
-    lines, observed = [text, "", head, "|---|---|---|---|---|---|"], {}
+    rows, observed = [], {}
     for name, scene, station, duration in (("pinned", swinging, rod.at(0.5), 0.4), ("chain", driven, b.end, 2.0)):
         for scheme in SCHEMES:
             if (name, scheme) == ("chain", "triple-jump"):
                 continue  # it does not allow damping
             found = in_time(scene, station, duration, scheme, steps)
             observed[name, scheme] = {query: last(ways) for query, (_, ways) in found.items()}
-            row = " | ".join(f"{changes[-1]:.1e} ({words(ways)})" for changes, ways in found.values())
-            lines.append(f"| {name} | {scheme} | {row} |")
-            print(lines[-1], flush=True)
-    return lines, observed
+            rows.append((name, scheme, *(f"{changes[-1]:.1e} ({words(ways)})" for changes, ways in found.values())))
+            print(*rows[-1], sep=" | ", flush=True)
+    heads = "scene | scheme | position | rotation | velocity | angular velocity"
+    return [text, "", *table(heads, rows)], observed
 
 
 def space_table(meshes, fine):
@@ -138,15 +136,14 @@ def space_table(meshes, fine):
         f" steps of the momentum scheme, and the orders in h between the meshes (*: below {floor:.0e}, where rounding"
         " takes part):"
     )
-    lines = [text, "", "| degree p | elements | errors | orders | 2p |", "|---|---|---|---|---|"]
-    observed = {}
+    rows, observed = [], {}
     for degree, counts in meshes.items():
         errors, ways = in_space(rod, scene, degree, counts, reference, floor)
         observed[degree] = last(ways)
         sizes, found = ", ".join(map(str, counts)), ", ".join(f"{error:.1e}" for error in errors)
-        lines.append(f"| {degree} | {sizes} | {found} | {words(ways)} | {2 * degree} |")
-        print(lines[-1], flush=True)
-    return lines, observed
+        rows.append((degree, sizes, found, words(ways), 2 * degree))
+        print(*rows[-1], sep=" | ", flush=True)
+    return [text, "", *table("degree p | elements | errors | orders | 2p", rows)], observed
 
 
 def main(quick=False, out="out"):
@@ -163,6 +160,4 @@ def main(quick=False, out="out"):
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--quick", action="store_true")
-    main(parser.parse_args().quick)
+    command(__doc__, main, {"quick": True})

@@ -8,15 +8,12 @@ the carried contact force. The stability count (one more assembly and factorisat
 package; the loop is timed without it and with it.
 """
 
-import argparse
-import time
-
 import numpy as np
 from cantilever import column
 from dolfinx import fem
 from dolfinx.fem import petsc as fem_petsc
+from harness import command, in_turns, table, write
 from petsc4py import PETSc
-from written import write
 
 import cosserat_fenicsx as cf
 from cosserat_fenicsx import compat
@@ -118,12 +115,7 @@ def compare(degree, elements, runs):
             lambda: bare.run(scene, layout, stability=False),
             lambda: bare.run(scene, layout, stability=True),
         )
-        times = np.empty((runs, 3))
-        for i in range(runs):
-            for j, task in enumerate(tasks):
-                began = time.process_time()
-                task()
-                times[i, j] = time.process_time() - began
+        times = in_turns(tasks, runs)
         ratios = np.median(times[:, :1] / times[:, 1:], axis=0)
         return np.median(times, axis=0), ratios, difference, int(path.iterations.sum())
 
@@ -134,28 +126,18 @@ def main(runs=15, out="out"):
     Returns:
         Ratios to the bare loop, ratios to the one with the stability count, differences (m), one per mesh.
     """
-    lines = [
-        f"{compat.version()}; medians of {runs} run(s), processor time, one process.",
-        "",
-        (
-            "| degree, elements | Newton iterations | `cf.solve` (ms) | bare loop (ms) | ratio | bare loop with"
-            " stability count (ms) | ratio |"
-        ),
-        "|---|---|---|---|---|---|---|",
-    ]
-    results = []
+    rows, results = [], []
     for degree, elements in MESHES:
-        (public, bare, stable), ratios, difference, newton = compare(degree, elements, runs)
-        lines.append(
-            f"| P{degree}, {elements} | {newton} | {1e3 * public:.1f} | {1e3 * bare:.1f} | {ratios[0]:.2f} "
-            f"| {1e3 * stable:.1f} | {ratios[1]:.2f} |"
-        )
+        seconds, ratios, difference, newton = compare(degree, elements, runs)
+        public, bare, stable = (f"{1e3 * s:.1f}" for s in seconds)
+        rows.append((f"P{degree}, {elements}", newton, public, bare, f"{ratios[0]:.2f}", stable, f"{ratios[1]:.2f}"))
         results.append((*ratios, difference))
-    print(write("overhead", lines, out))
+    about = f"{compat.version()}; medians of {runs} run(s), processor time, one process."
+    heads = "degree, elements | Newton iterations | `cf.solve` (ms) | bare loop (ms) | ratio"
+    heads += " | bare loop with stability count (ms) | ratio"
+    print(write("overhead", [about, "", *table(heads, rows)], out))
     return np.array(results).T
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--quick", action="store_true")
-    main(1 if parser.parse_args().quick else 15)
+    command(__doc__, main, {"runs": 1})

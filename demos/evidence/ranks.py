@@ -16,11 +16,9 @@ import time
 from pathlib import Path
 
 import numpy as np
-from asked import HEADS, judged
-from machine import in_words, record
+from harness import HEADS, command, in_words, judged, table, write
 from mpi4py import MPI
 from scaling import from_rest, loaded
-from written import options, write
 
 SIZES, QUICK = (3600, 35715), (256,)  # elements of degree 4: 28 unknowns each
 RANKS = (1, 2, 4)
@@ -58,14 +56,11 @@ def main(sizes=SIZES, rounds=ROUNDS, out="out", ranks=RANKS):
         [(unknowns, {ranks: median time (s)}, largest difference of the tip's displacement, relative)].
     """
     lines = [
-        f"{in_words(record())}. Wall clock, medians of {rounds} run(s) in turn; at the start {os.getloadavg()[0]:.1f}"
+        f"{in_words()}. Wall clock, medians of {rounds} run(s) in turn; at the start {os.getloadavg()[0]:.1f}"
         " other processes were running.",
         "",
-        "| unknowns | " + " | ".join(f"{n} rank{'s' * (n > 1)} (ms)" for n in ranks)
-        + f" | digits: largest difference of the tip | two over one | {HEADS}",
-        "|---|" + "---|" * (len(ranks) + 4),
-    ]  # fmt: skip
-    found = []
+    ]
+    rows, found = [], []
     for elements in sizes:
         seconds, tips = {n: [] for n in ranks}, {}
         for _ in range(rounds):
@@ -75,18 +70,14 @@ def main(sizes=SIZES, rounds=ROUNDS, out="out", ranks=RANKS):
         medians = {n: float(np.median(times)) for n, times in seconds.items()}
         one = np.array(tips[1])
         apart = max(float(np.abs(np.array(tip) - one).max() / np.abs(one).max()) for tip in tips.values())
-        told = " | ".join(f"{1e3 * s:.1f}" for s in medians.values())
-        lines.append(f"| {unknowns} | {told} | {apart:.0e} | {judged(medians[2] / medians[1], ASKED)} |")
+        told = [f"{1e3 * s:.1f}" for s in medians.values()]
+        rows.append((unknowns, *told, f"{apart:.0e}", judged(medians[2] / medians[1], ASKED)))
         found.append((unknowns, medians, apart))
-    print(write("ranks", lines, out))
+    heads = " | ".join(f"{n} rank{'s' * (n > 1)} (ms)" for n in ranks)
+    heads = f"unknowns | {heads} | digits: largest difference of the tip | two over one | {HEADS}"
+    print(write("ranks", [*lines, *table(heads, rows)], out))
     return found
 
 
 if __name__ == "__main__":
-    asked = options(__doc__)
-    if asked.one:
-        numbers = measure(asked.one)
-        if MPI.COMM_WORLD.rank == 0:
-            print(json.dumps(numbers))
-    else:
-        main(*((QUICK, 1) if asked.quick else ()))
+    command(__doc__, main, {"sizes": QUICK, "rounds": 1}, one=measure)

@@ -11,16 +11,13 @@ forms compiled. The ratio, which depends less on the machine, is the time on ele
 solutions with banded matrices of the same sizes (LAPACK's gbsv) as there were Newton steps.
 """
 
-import argparse
 import json
 import statistics
-import time
 from pathlib import Path
 
 import numpy as np
-from machine import in_words, record
+from harness import command, in_words, table, timed, write
 from scipy.linalg import solve_banded
-from written import write
 
 import cosserat_fenicsx as cf
 from cosserat_fenicsx.well.rod.rod_in_hole import solve_in_hole
@@ -67,13 +64,6 @@ def solved(hole, operation, centred, elements=None, **settings):
         slip=operation.direction(RADIUS), bottom_tension=-operation.weight, bottom_torque=operation.torque,
         rings=[(end, 0.0, BIT)] if centred else [], elements=elements, progress=False, **settings,
     )  # fmt: skip
-
-
-def timed(task):
-    """What a task returns, and its processor time, s."""
-    began = time.process_time()
-    found = task()
-    return found, time.process_time() - began
 
 
 def yardstick(elements):
@@ -127,30 +117,24 @@ def broomstick(hole, operation, depths):
 def lines(rows, sweeps, runs, depths):
     """The tables as Markdown."""
     yield (
-        f"{in_words(record())}. Medians of {runs} run(s); in each cell first at the default settings, then on elements "
+        f"{in_words()}. Medians of {runs} run(s); in each cell first at the default settings, then on elements "
         f"of {LENGTH:g} m. Asked: at most {STEPS} Newton steps, {DEFAULT:g} s and {AT_2M:g} s, hook load to {ERROR:g}."
     )
     yield ""
-    yield (
-        "| well | operation | elements | Newton steps | s | ratio | hook load (N) | its relative error | estimated |"
-        " missed |"
-    )
-    yield "|---|---|---:|---:|---:|---:|---:|---:|---:|---|"
+    cells = []
     for name, what, found in rows:
         elements, steps, seconds, errors, estimates = (
             ", ".join(format(number, form) for number in found[key]) for key, form in FORMS.items()
         )
-        yield (
-            f"| {name} | {what} | {elements} | {steps} | {seconds} | {found['ratio']:.1f} | {found['load']:.1f} "
-            f"| {errors} | {estimates} | {missed(found)} |"
-        )
+        cells.append((name, what, elements, steps, seconds, f"{found['ratio']:.1f}", f"{found['load']:.1f}", errors,
+                      estimates, missed(found)))  # fmt: skip
+    heads = "well | operation | elements | Newton steps | s | ratio | hook load (N) | its relative error | estimated"
+    yield from table(f"{heads} | missed", cells)
     yield ""
     yield f"Broomsticks of {depths} depths, asked at most {BROOM:g} s:"
     yield ""
-    yield "| well | operation | s | largest estimated error |"
-    yield "|---|---|---:|---:|"
-    for name, what, seconds, error in sweeps:
-        yield f"| {name} | {what} | {seconds:.1f} | {error:.0e} |"
+    cells = [(name, what, f"{seconds:.1f}", f"{error:.0e}") for name, what, seconds, error in sweeps]
+    yield from table("well | operation | s | largest estimated error", cells)
 
 
 def missed(found):
@@ -185,6 +169,4 @@ def main(quick=False, out="out"):
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--quick", action="store_true", help="one operation in one well, one run")
-    main(parser.parse_args().quick)
+    command(__doc__, main, {"quick": True})

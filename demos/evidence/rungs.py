@@ -8,14 +8,12 @@ error is that of the tip, the largest over the path, relative to its displacemen
 (`cosserat_fenicsx.analytic`) if available, otherwise against the spatial model on four times as many elements.
 """
 
-import argparse
 import platform
-import time
+from pathlib import Path
 
 import numpy as np
-from asked import HEADS, judged, share
 from cantilever import column, exact
-from written import write
+from harness import HEADS, command, in_turns, judged, share, table, write
 
 import cosserat_fenicsx as cf
 from cosserat_fenicsx import compat
@@ -46,40 +44,27 @@ def self_weight():
     return cf.Scene([rod], [cf.Clamp(rod.start)], [cf.Weight()]), rod.end, np.linspace(0.1, 1, 10), None
 
 
+def from_file(name, station, etas):
+    """A scene of demos/ whose tip is at a station."""
+    scene = cf.read(Path(__file__).parents[1] / f"{name}.toml").scene
+    return scene, scene.station(station), etas, None
+
+
 def bend():
     """The 45-degree bend (Bathe & Bolourchi, 1979), loaded out of its plane."""
-    E = 1e7
-    material = cf.Material(E=E, nu=0.0)
-    rod = cf.Rod(cf.Arc((0, 100, 0), (0, 0, 0), np.pi / 4, axis=(0, 0, 1)),
-                 cf.Stiffness((E / 2, E / 2), E, (E / 12, E / 12), E / 12), material, name="bend")  # fmt: skip
-    return (
-        cf.Scene([rod], [cf.Clamp(rod.start)], [cf.Force(rod.end, (0, 0, 600.0))]),
-        rod.end,
-        np.linspace(0.1, 1, 10),
-        None,
-    )
+    return from_file("bend_45", "bend.end", np.linspace(0.1, 1, 10))
 
 
 def lee_frame():
-    """Lee's frame (Lee, Manuel & Rossow, 1968) up to three quarters of its limit load, 18.5 kN."""
-    material = cf.Material(E=70.6e9, nu=0.3)
-    post = cf.Rod(cf.Line((0, 0, 0), (0, 0, 1.2), d1=(1, 0, 0)), cf.Rectangle(0.02, 0.03), material, name="post")
-    beam = cf.Rod(cf.Line((0, 0, 1.2), (1.2, 0, 1.2), d1=(0, 0, 1)), cf.Rectangle(0.02, 0.03), material, name="beam")
-    hinges = [cf.Hinge(end, (0, 1, 0)) for end in (post.start, beam.end)]
-    loaded = beam.at(0.24)
-    scene = cf.Scene([post, beam], hinges, [cf.Force(loaded, (0, 0, -18.5e3))], [cf.Joint(post.end, beam.start)])
-    return scene, loaded, np.linspace(0.075, 0.75, 10), None
+    """Lee's frame (Lee, Manuel & Rossow, 1968) up to three quarters of its limit load."""
+    return from_file("lees_frame", "beam@24.0", 1.854656 * np.linspace(0.075, 0.75, 10))
 
 
 def spring():
     """A helix of three turns, stretched by a dead force."""
     rod = cf.Rod(cf.Helix((0, 0, 0), (0.05, 0, 0), 3, 0.03), cf.Circle(0.004), STEEL, name="spring")
-    return (
-        cf.Scene([rod], [cf.Clamp(rod.start)], [cf.Force(rod.end, (0, 0, 60.0))]),
-        rod.end,
-        np.linspace(0.1, 1, 10),
-        None,
-    )
+    scene = cf.Scene([rod], [cf.Clamp(rod.start)], [cf.Force(rod.end, (0, 0, 60.0))])
+    return scene, rod.end, np.linspace(0.1, 1, 10), None
 
 
 #: At most, the time of the automatic choice over that of the spatial model, both refined.
@@ -114,12 +99,8 @@ def compare(draw, mesh, runs):
         def error(tip):
             return (np.linalg.norm(tip - truth, axis=1) / np.linalg.norm(truth, axis=1)).max()
 
-    times = {model: np.empty(runs) for model in models}
-    for i in range(runs):
-        for model in models:
-            began = time.process_time()
-            run(model)
-            times[model][i] = time.process_time() - began
+    measured = in_turns([lambda model=model: run(model) for model in models], runs)
+    times = dict(zip(models, measured.T, strict=True))
     return [
         (
             model,
@@ -139,13 +120,7 @@ def main(runs=9, out="out", scenes=SCENES):
     Returns:
         {(scene, mesh): rows of `compare`}.
     """
-    lines = [
-        f"{compat.version()}, {platform.machine()}.",
-        "",
-        f"| scene | mesh | model | unknowns | error of the tip | estimate | ms | over spatial | {HEADS}",
-        "|---|---|---|---|---|---|---|---|---|---|",
-    ]
-    found = {}
+    cells, found = [], {}
     for draw, meshes in scenes:
         for mesh in meshes:
             rows = found[draw.__name__, mesh] = compare(draw, mesh, runs)
@@ -153,15 +128,13 @@ def main(runs=9, out="out", scenes=SCENES):
             for model, unknowns, seconds, ratio, error, estimate in rows:
                 told = f"{estimate:.0e}" if np.isfinite(estimate) else "-"
                 most = ASKED.get(draw.__name__) if model == "auto" else None
-                lines.append(
-                    f"| {draw.__name__.replace('_', ' ')} | {name} | {model} | {unknowns} | {error:.0e} | {told} | "
-                    f"{1e3 * seconds:.2f} | {judged(ratio, most) if most else f'{share(ratio)} | - | -'} |"
-                )
-    print(write("rungs", lines, out))
+                scene, verdict = draw.__name__.replace("_", " "), judged(ratio, most) if most else (
+                    f"{share(ratio)} | - | -")
+                cells.append((scene, name, model, unknowns, f"{error:.0e}", told, f"{1e3 * seconds:.2f}", verdict))
+    heads = f"scene | mesh | model | unknowns | error of the tip | estimate | ms | over spatial | {HEADS}"
+    print(write("rungs", [f"{compat.version()}, {platform.machine()}.", "", *table(heads, cells)], out))
     return found
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--quick", action="store_true")
-    main(runs=1 if parser.parse_args().quick else 9)
+    command(__doc__, main, {"runs": 1})

@@ -19,9 +19,8 @@ import time
 from pathlib import Path
 
 import numpy as np
-from asked import HEADS, judged
 from cantilever import column
-from written import options, write
+from harness import HEADS, command, judged, table, timed, write
 
 from cosserat_fenicsx import compat
 from cosserat_fenicsx.models.rodmesh import Layout
@@ -55,16 +54,9 @@ def from_rest(problem, newton, clock=time.process_time, meet=lambda: None):
         problem.put(start)
         problem.set_load_factor(LOAD)
         meet()
-        return timed(newton.solve, clock)
+        return timed(newton.solve, clock)[1]
 
     return step
-
-
-def timed(task, clock=time.process_time):
-    """Seconds of a call."""
-    began = clock()
-    task()
-    return clock() - began
 
 
 def measure(elements):
@@ -72,7 +64,7 @@ def measure(elements):
     process (MB)."""
     with loaded(elements) as (problem, newton, stability):
         step = from_rest(problem, newton)
-        times = [(step(), timed(stability.count)) for _ in range(max(5, min(100, 20000 // elements)))]
+        times = [(step(), timed(stability.count)[1]) for _ in range(max(5, min(100, 20000 // elements)))]
         memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
         return problem.model.unknowns, *np.median(times, axis=0).tolist(), memory
 
@@ -97,7 +89,7 @@ def parts(model, degree, runs):
         def solution():
             ksp.solve(problem.b, change)
 
-        tasks = step, *(lambda task=task: timed(task) for task in (residual, factors, solution, lambda: None))
+        tasks = step, *(lambda task=task: timed(task)[1] for task in (residual, factors, solution, lambda: None))
         found = np.median([[task() for task in tasks] for _ in range(runs)], axis=0)
         return (found[:-1] - found[-1]) * (1, 2, 1, 1)  # without the time of taking the time
 
@@ -105,7 +97,7 @@ def parts(model, degree, runs):
 def kernels(model, degree, runs):
     """Time (s) of FFCx's kernels alone for the tangents of FEW elements; of 16 times as many, since calls take time."""
     with loaded(16 * FEW, degree, model) as (problem, _, _):
-        return float(np.median([timed(problem.tangent_form.matrices) for _ in range(runs)])) / 16
+        return float(np.median([timed(problem.tangent_form.matrices)[1] for _ in range(runs)])) / 16
 
 
 def floor(steps, elements=FEW):
@@ -128,18 +120,16 @@ def exponent(x, y):
 def sizes_table(rows):
     """Lines of the table of sizes, and of what is asked of it."""
     unknowns, step, count, _ = rows.T
-    yield "| unknowns | Newton step (ms) | us an unknown | count of negative modes (ms) | memory (MB) |"
-    yield "|---|---|---|---|---|"
-    for n, a, c, m in rows:
-        yield f"| {n:.0f} | {1e3 * a:.3f} | {1e6 * a / n:.2f} | {1e3 * c:.3f} | {m:.0f} |"
+    heads = "unknowns | Newton step (ms) | us an unknown | count of negative modes (ms) | memory (MB)"
+    yield from table(heads, [(f"{n:.0f}", f"{1e3 * a:.3f}", f"{1e6 * a / n:.2f}", f"{1e3 * c:.3f}", f"{m:.0f}")
+                             for n, a, c, m in rows])  # fmt: skip
     yield ""
-    yield f"| asked | found | {HEADS}"
-    yield "|---|---|---|---|"
-    all_rows = judged(exponent(unknowns, step), EXPONENT, ".3f")
-    yield f"| exponent of the Newton step, least squares over all rows | {all_rows} |"
+    asked = [("exponent of the Newton step, least squares over all rows",
+              judged(exponent(unknowns, step), EXPONENT, ".3f"))]  # fmt: skip
     if unknowns[-1] >= 1e6:
-        yield f"| Newton step of {unknowns[-1]:.0f} unknowns (s) | {judged(step[-1], MILLION, '.2f')} |"
-    yield f"| exponent of the count of negative modes | {exponent(unknowns, count):.3f} | - | - |"
+        asked.append((f"Newton step of {unknowns[-1]:.0f} unknowns (s)", judged(step[-1], MILLION, ".2f")))
+    asked.append(("exponent of the count of negative modes", f"{exponent(unknowns, count):.3f}", "-", "-"))
+    yield from table(f"asked | found | {HEADS}", asked)
 
 
 def floor_table(runs):
@@ -155,8 +145,7 @@ def floor_table(runs):
         "step (us) | two residuals | kernels of the tangent | its elimination | solution | the rest |"
         " over the rod in plain C"
     )
-    yield f"| model | {heads} | {HEADS}"
-    yield "|---|---|---|---|---|---|---|---|---|---|"
+    rows = []
     for model, degree in KINDS:
         found, alone = parts(model, degree, runs), kernels(model, degree, runs)
         step, residuals, tangent, solution = found
@@ -165,7 +154,8 @@ def floor_table(runs):
         over = found[0] / least
         in_plane = degree == 1 and model != "spatial"
         told = judged(over, FLOOR) if in_plane else f"{over:.3g} | - | -"
-        yield f"| {model} P{degree} | {' | '.join(cells)} | {told} |"
+        rows.append((f"{model} P{degree}", *cells, told))
+    yield from table(f"model | {heads} | {HEADS}", rows)
 
 
 def main(sizes=SIZES, out="out", runs=300):
@@ -188,8 +178,4 @@ def main(sizes=SIZES, out="out", runs=300):
 
 
 if __name__ == "__main__":
-    asked = options(__doc__)
-    if asked.one:
-        print(json.dumps(measure(asked.one)))
-    else:
-        main(QUICK if asked.quick else SIZES)
+    command(__doc__, main, {"sizes": QUICK}, one=measure)

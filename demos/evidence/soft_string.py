@@ -10,17 +10,16 @@ horizontal) and in Volve 15/9-F-12. Peers get the exact survey at stations that 
 the stations as they are and a tolerance. Times are processor times of one warm answer, the median of 25, on one thread.
 """
 
-import argparse
 import statistics
-import time
 from pathlib import Path
 
 import numpy as np
-from machine import in_words, record
+from harness import command, in_words, table, timed, write
 from peers.environments import Missing
 from peers.process import Peer
 
 import cosserat_fenicsx as cf
+from cosserat_fenicsx.pictures.charts import beside, draw_chart, legend
 
 SCENES = Path(__file__).resolve().parents[1] / "wells"
 #: Hook loads out and in, N, by a differential equation at 1e-13.
@@ -41,9 +40,8 @@ def ours(path, tol):
     loads, seconds = [], []
     for operation in (cf.TripOut(), cf.TripIn()):
         for _ in range(SAMPLES):
-            began = time.process_time()
-            answer = cf.torque_and_drag(hole, string, operation, model="soft", tol=tol)
-            seconds.append(time.process_time() - began)
+            answer, spent = timed(lambda op=operation: cf.torque_and_drag(hole, string, op, model="soft", tol=tol))
+            seconds.append(spent)
         loads.append(answer.hook_load)
     return loads, statistics.median(seconds)
 
@@ -92,45 +90,44 @@ def measure(install):
     return rows, silent
 
 
-def table(rows, silent):
+def lines(rows, silent):
     """Markdown: errors and times in both wells."""
     cells = {}
     for name, program, setting, error, seconds in rows:
         cells.setdefault((program, setting), {})[name] = f"{max(error, 1e-16):.0e} | {1e3 * seconds:.2f}"
     heads = " | ".join(f"`{name}`: relative error | ms" for name in TRUTH)
-    lines = [f"| program | setting | {heads} |", f"|---|---|{'---:|' * (2 * len(TRUTH))}"]
-    for (program, setting), found in cells.items():
-        lines.append(f"| {program} | {setting} | {' | '.join(found[name] for name in TRUTH)} |")
-    return "\n".join([*lines, "", *(f"Not measured: {line}." for line in silent), in_words(record())])
+    told = [(program, setting, *(found[name] for name in TRUTH)) for (program, setting), found in cells.items()]
+    missing = (f"Not measured: {line}." for line in silent)
+    return [*table(f"program | setting | {heads}", told), "", *missing, in_words()]
 
 
-def chart(rows, file):
+def chart(rows):
     """Error over time, one panel a well."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(12, 5), layout="constrained")
-    FigureCanvasAgg(figure)
-    for panel, name in zip(figure.subplots(1, 2, sharey=True), TRUTH, strict=True):
+    figure, panels, _ = beside([6.0, 6.0], 5.0)
+    for panel, name in zip(panels, TRUTH, strict=True):
         for program, colour in zip(("cosserat_fenicsx", *PEERS), ("#08519c", "#d95f02", "#7570b3"), strict=True):
             here = [(seconds, error) for well, by, _, error, seconds in rows if (well, by) == (name, program)]
             if here:
                 seconds, errors = zip(*here, strict=True)
                 panel.loglog(1e3 * np.array(seconds), np.maximum(errors, 1e-15), "o-", color=colour, label=program)
-        panel.set(xlabel="processor time of an answer (ms)", title=name)
-        panel.grid(alpha=0.3)
-        panel.legend()
-    figure.axes[0].set_ylabel("largest relative error of hook loads out and in")
+        panel.set(xlabel=f"processor time of an answer (ms), {name}")
+    legend(*panels)
+    panels[0].set_ylabel("largest relative error of hook loads out and in")
     figure.suptitle("Soft string: speed against accuracy")
-    figure.savefig(file, dpi=110)
+    return figure
+
+
+def main(install=True, out="out"):
+    """Measure, write table and chart; returns the rows.
+
+    Args:
+        install: whether peers that are not there are installed.
+    """
+    rows, silent = measure(install)
+    print(write("soft_string", lines(rows, silent), out))
+    draw_chart(lambda: chart(rows), Path(out) / "soft_string.png")
+    return rows
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--quick", action="store_true", help="without peers that are not installed")
-    found, unmeasured = measure(not parser.parse_args().quick)
-    out = Path("out")
-    out.mkdir(exist_ok=True)
-    (out / "soft_string.md").write_text(table(found, unmeasured) + "\n", encoding="utf-8")
-    chart(found, out / "soft_string.png")
-    print(table(found, unmeasured))
+    command(__doc__, main, {"install": False})

@@ -10,13 +10,9 @@ Forms are compiled and the initial equilibrium is computed before; the time is t
 with the energy balance and the state saved every second.
 """
 
-import argparse
 import statistics
-import time
 
-from asked import HEADS, judged
-from machine import in_words, record
-from written import write
+from harness import HEADS, command, in_words, judged, table, timed, write
 
 import cosserat_fenicsx as cf
 
@@ -48,9 +44,8 @@ def measure(model, scheme, runs, duration):
     start, seconds = hanging(model), []
     cf.simulate(scene, 2 * DT, start=start, **settings)
     for _ in range(runs):
-        began = time.process_time()
-        history = cf.simulate(scene, duration, start=start, **settings)
-        seconds.append((time.process_time() - began) / duration)
+        history, spent = timed(lambda: cf.simulate(scene, duration, start=start, **settings))
+        seconds.append(spent / duration)
     return statistics.median(seconds), history.iterations.sum() / history.steps[-1], history
 
 
@@ -74,10 +69,10 @@ def compare(runs, duration):
     for run in range(runs + 1):  # the first compiles
         for held, (scene, _) in scenes.items():
             elements = FEW // len(scene.rods)
-            began = time.process_time()
-            found[held] = cf.simulate(scene, duration, dt=STEP, elements=elements, degree=DEGREE, model="spatial")
+            settings = {"dt": STEP, "elements": elements, "degree": DEGREE, "model": "spatial"}
+            found[held], spent = timed(lambda scene=scene, given=settings: cf.simulate(scene, duration, **given))
             if run:
-                seconds[held].append(time.process_time() - began)
+                seconds[held].append(spent)
     return [
         (1e3 * statistics.median(seconds[held]) / history.steps[-1], history.iterations.sum() / history.steps[-1],
          history.position(scenes[held][1])[-1])
@@ -91,30 +86,27 @@ def main(runs=7, duration=5.0, out="out"):
     Returns:
         [(seconds, iterations, History)], one of each kind; and what `compare` found.
     """
-    lines = [
-        (
-            f"{in_words(record())}. Medians of {runs} run(s) of {duration:g} s, steps of {1e3 * DT:g} ms, {ELEMENTS}"
-            f" P{DEGREE} elements."
-        ),
-        "",
-        "| model | scheme | unknowns | iterations a step | processor seconds a simulated second |",
-        "|---|---|---|---|---|",
-    ]
-    found = []
+    rows, found = [], []
     for model, scheme in KINDS:
         seconds, iterations, history = measure(model, scheme, runs, duration)
-        lines.append(f"| {model} | {scheme} | {history.unknowns} | {iterations:.1f} | {seconds:.3f} |")
+        rows.append((model, scheme, history.unknowns, f"{iterations:.1f}", f"{seconds:.3f}"))
         found.append((seconds, iterations, history))
-    lines += ["", f"{FEW} P{DEGREE} elements in space, steps of {1e3 * STEP:g} ms:", ""]
-    lines += [f"| held by | iterations a step | ms a step | {HEADS}", "|---|---|---|---|---|"]
     few = compare(runs, min(duration, 2.0))
-    for held, (milliseconds, iterations, _) in zip(HELD, few, strict=True):
-        lines.append(f"| {held} | {iterations:.1f} | {judged(milliseconds, ASKED, '.2f')} |")
+    held = [(name, f"{iterations:.1f}", judged(milliseconds, ASKED, ".2f"))
+            for name, (milliseconds, iterations, _) in zip(HELD, few, strict=True)]  # fmt: skip
+    lines = [
+        f"{in_words()}. Medians of {runs} run(s) of {duration:g} s, steps of {1e3 * DT:g} ms, {ELEMENTS} P{DEGREE} "
+        "elements.",
+        "",
+        *table("model | scheme | unknowns | iterations a step | processor seconds a simulated second", rows),
+        "",
+        f"{FEW} P{DEGREE} elements in space, steps of {1e3 * STEP:g} ms:",
+        "",
+        *table(f"held by | iterations a step | ms a step | {HEADS}", held),
+    ]
     print(write("steps", lines, out))
     return found, few
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--quick", action="store_true")
-    main(*((1, 0.2) if parser.parse_args().quick else ()))
+    command(__doc__, main, {"runs": 1, "duration": 0.2})

@@ -13,7 +13,6 @@ rounds the others, in a changing order, so that peers alternate, until a configu
 decide a ratio that is asked for get 25. Results are medians.
 """
 
-import argparse
 import json
 import random
 import time
@@ -22,7 +21,7 @@ from pathlib import Path
 
 import work_precision_chart as chart
 import work_precision_table as table
-from machine import record
+from harness import command, record, save
 from peers.configurations import PEERS, configurations, kind, model
 from peers.environments import OWN, Missing, fingerprint
 from peers.problems import error, problems
@@ -99,10 +98,7 @@ class Record:
         self._saved = time.monotonic()
         told = {"about": self.about, "versions": self.versions, "missing": self.missing, "spent_s": self.spent,
                 "waits": self.waits, "samples": list(self.rows.values())}  # fmt: skip
-        self.file.parent.mkdir(parents=True, exist_ok=True)
-        part = self.file.with_suffix(".part")
-        part.write_text(json.dumps(told, indent=1), encoding="utf-8")
-        part.replace(self.file)
+        save(self.file, told)
 
 
 def start(peers, install, found):
@@ -209,6 +205,30 @@ def _round(todo, like, started, found, wanted, limits, bar, name):
     bar.update(task, description=name, completed=len(todo))
 
 
+def run(found, peers, budgets, *, quick, wanted, limits, after=None):
+    """All samples of the problems in `budgets` ({name: s of measuring until then}); returns the rows.
+
+    Args:
+        after: what is measured at last, a function of the started peers and the rows.
+
+    Raises:
+        SystemExit: Ctrl-C; the samples are kept.
+    """
+    started, rows = start(peers, not quick, found), []
+    try:
+        for name, budget in budgets.items():
+            rows += measure(started, [name], found, quick=quick, wanted=wanted, limits=limits, budget=budget)
+        if after and not quick:
+            after(started, rows)
+    except KeyboardInterrupt:
+        raise SystemExit(f"\nbroken off; {found.file} keeps the samples, the same command goes on from them") from None
+    finally:
+        for peer in started.values():
+            peer.end()
+        found.write(now=True)
+    return rows
+
+
 def main(out="out", quick=False, fresh=False, peers=PEERS, names=None, wanted=None):
     """Measure, write the JSON, the table and the charts.
 
@@ -225,20 +245,14 @@ def main(out="out", quick=False, fresh=False, peers=PEERS, names=None, wanted=No
     out = Path(out)
     names = names or (("sweep", "bend") if quick else tuple(problems()))
     found = Record(out / ("work_precision_quick.json" if quick else "work_precision.json"), fresh or quick)
-    started = start(peers, not quick, found)
     limits = {peer: QUICK_LIMIT if quick and peer != OWN else limit for peer, limit in LIMITS.items()}
     wanted = wanted or (2 if quick else SAMPLES)
-    try:
-        rows = measure(started, names, found, quick=quick, wanted=wanted, limits=limits, budget=BUDGET)
-        if not quick:
-            decide(started, rows, found, limits)
-            found.waits = waits(started, rows)
-    except KeyboardInterrupt:
-        raise SystemExit(f"\nbroken off; {found.file} keeps the samples, the same command goes on from them") from None
-    finally:
-        for peer in started.values():
-            peer.end()
-        found.write(now=True)
+
+    def after(started, rows):
+        decide(started, rows, found, limits)
+        found.waits = waits(started, rows)
+
+    rows = run(found, peers, dict.fromkeys(names, BUDGET), quick=quick, wanted=wanted, limits=limits, after=after)
     text = table.text(found, rows)
     stem = found.file.stem
     (out / f"{stem}.md").write_text(text + "\n", encoding="utf-8")
@@ -253,9 +267,5 @@ def main(out="out", quick=False, fresh=False, peers=PEERS, names=None, wanted=No
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--quick", action="store_true", help="at most a minute, nothing is installed")
-    parser.add_argument("--fresh", action="store_true", help="forget the samples of earlier runs")
-    parser.add_argument("--problems", nargs="+", choices=tuple(problems()), help="only these")
-    given = parser.parse_args()
-    main(quick=given.quick, fresh=given.fresh, names=given.problems)
+    command(__doc__, main, {"quick": True}, fresh=True,
+            problems={"nargs": "+", "choices": tuple(problems()), "dest": "names", "help": "only these"})  # fmt: skip

@@ -3,15 +3,12 @@
 import statistics
 from pathlib import Path
 
-import matplotlib
-
-matplotlib.use("Agg")
-
-import matplotlib.pyplot as plt
 import numpy as np
 from peers.environments import OWN
 from peers.problems import TITLES
 from work_precision_table import answered, median
+
+from cosserat_fenicsx.pictures.charts import SMALL, draw_chart, empty_figure, legend
 
 #: (problem, file, subtitle, whether only the spatial model of this package is shown).
 _VIEWS = (
@@ -40,10 +37,11 @@ def draw(found, rows, out, stem):
             names.append(f"{stem}_{file}.png")
             silent = sorted({r["peer"] for r in rows if r["problem"] == problem} - {r["peer"] for r in here})
             absent = f"; no answer from {', '.join(silent)}" if silent else ""
-            _chart(here, f"{TITLES[problem]}\n{subtitle}{absent}", problem, Path(out) / names[-1])
+            title = f"{TITLES[problem]}\n{subtitle}{absent}"
+            draw_chart(lambda: _chart(here, title, problem), Path(out) / names[-1])  # noqa: B023 called at once
     if any(row["wall"] for row in found.waits):
         names.append(f"{stem}_waiting.png")
-        _bars(found.waits, Path(out) / names[-1])
+        draw_chart(lambda: _bars(found.waits), Path(out) / names[-1])
     return names
 
 
@@ -84,20 +82,34 @@ def _in_full(element):
     return " ".join(_ELEMENTS.get(word, word) for word in element.split())
 
 
-def _chart(rows, title, problem, file):
-    figure, axes = plt.subplots(figsize=(9.5, 6.5), layout="constrained")
+def points(rows):
+    """Errors and times of rows, for a chart."""
+    return [max(row["error"], _ROUND_OFF) for row in rows], [median(row) for row in rows]
+
+
+def plot(axes, members, label, width, **style):
+    """Small dots for all rows, and a line through the best of them, which is returned."""
+    axes.plot(*points(members), style["marker"], color=style["color"], ms=3, alpha=0.25, mew=0)
+    (line,) = axes.plot(*points(frontier(members)), lw=width, ms=5, label=label, **style)
+    return line
+
+
+def in_time(axes):
+    """Logarithmic axes, with times in words."""
+    axes.set(xscale="log", yscale="log")
+    axes.yaxis.set_major_formatter(lambda seconds, _: f"{seconds:g} s" if seconds >= 1 else f"{1e3 * seconds:g} ms")
+    axes.grid(which="major", alpha=0.4)
+
+
+def _chart(rows, title, problem):
+    figure = empty_figure(9.5, 6.5)
+    axes = figure.subplots()
     for label, (colour, marker, style, members) in _groups(rows).items():
         ours = label.startswith("cosserat")
-        x, y = _points(members)
-        axes.plot(x, y, marker, color=colour, ms=3, alpha=0.25, mew=0)
-        x, y = _points(frontier(members))
-        axes.plot(x, y, style, marker=marker, color=colour, ms=6 if ours else 5, lw=2.6 if ours else 1.3, label=label)
-    axes.set_xscale("log")
-    axes.set_yscale("log")
-    axes.set_xlim(0.4 * min(_points(rows)[0]), 2.0)
-    times = _points(rows)[1]
-    axes.set_ylim(0.3 * min(times), 2 * max(times))  # with space for the text at the bottom
-    axes.yaxis.set_major_formatter(lambda seconds, _: f"{seconds:g} s" if seconds >= 1 else f"{1e3 * seconds:g} ms")
+        plot(axes, members, label, 2.6 if ours else 1.3, color=colour, marker=marker, ls=style)
+    in_time(axes)
+    errors, times = points(rows)
+    axes.set(xlim=(0.4 * min(errors), 2.0), ylim=(0.3 * min(times), 2 * max(times)))  # with space for the text below
     measured = (
         r"of the tip displacement $\delta$"
         if problem in ("sweep", "single")
@@ -106,37 +118,30 @@ def _chart(rows, title, problem, file):
     most = ", largest over the load factors" if problem == "sweep" or problem.startswith("roll-up") else ""
     axes.set_xlabel(f"relative error {measured}{most} (-)")
     axes.set_ylabel("processor time of one warm answer, one thread")
-    axes.set_title(title)
-    axes.grid(which="major", alpha=0.4)
+    figure.suptitle(title)
     axes.annotate("better: faster,\nmore accurate", (0.015, 0.02), (0.09, 0.10), xycoords="axes fraction",
-                  textcoords="axes fraction",
-                  fontsize=10, arrowprops={"arrowstyle": "->"})  # fmt: skip
+                  textcoords="axes fraction", arrowprops={"arrowstyle": "->"})  # fmt: skip
     axes.text(0.99, 0.01, "small dots: every mesh, degree and formulation measured; lines: the best of each; dashed: "
-                          "peers in space", fontsize=8,
+                          "peers in space", fontsize=SMALL,
               transform=axes.transAxes, ha="right", color="0.3")  # fmt: skip
-    figure.legend(*axes.get_legend_handles_labels(), loc="outside lower center", ncols=3, fontsize=8.5, frameon=False)
-    figure.savefig(file, dpi=130)
-    plt.close(figure)
+    legend(axes)
+    return figure
 
 
-def _points(rows):
-    return [max(row["error"], _ROUND_OFF) for row in rows], [median(row) for row in rows]
-
-
-def _bars(waits, file):
+def _bars(waits):
     shown = [row for row in waits if row["wall"]]
-    figure, axes = plt.subplots(figsize=(9.5, 0.75 * len(shown) + 1.8), layout="constrained")
+    figure = empty_figure(9.5, 0.75 * len(shown) + 1.8)
+    axes = figure.subplots()
     for i, row in enumerate(shown):
         seconds = statistics.median(row["wall"])
         axes.barh(i, seconds, color=_THEIRS.get(row["who"], "#3182bd"), alpha=0.9 if row["caches"] == "warm" else 0.45)
         worked = statistics.median(row["processor"])
-        axes.text(seconds, i, f"  {seconds:.2f} s\n  (processor {worked:.2f} s)", va="center", fontsize=8)
+        axes.text(seconds, i, f"  {seconds:.2f} s\n  (processor {worked:.2f} s)", va="center", fontsize=SMALL)
     names = [f"{row['who']}, {row['caches']}\n{row['what']}" for row in shown]
-    axes.set_yticks(np.arange(len(shown)), names, fontsize=8)
+    axes.set_yticks(np.arange(len(shown)), names, fontsize=SMALL)
     axes.invert_yaxis()
     axes.margins(x=0.25)
     axes.set_xlabel("wall clock from the start of the process to its end (s), median")
     axes.set_title("What a person waits for an answer: eccentric cantilever, whole processes")
-    axes.grid(axis="x", alpha=0.4)
-    figure.savefig(file, dpi=130)
-    plt.close(figure)
+    axes.grid(axis="y", visible=False)
+    return figure

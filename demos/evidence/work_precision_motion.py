@@ -9,22 +9,17 @@ Writes to out/: work_precision_motion.json (every sample), .md (the table), .png
 (peers/motions.py).
 """
 
-import argparse
 from pathlib import Path
 
-import matplotlib
-
-matplotlib.use("Agg")
-
-import matplotlib.pyplot as plt
-from asked import HEADS, judged
-from machine import in_words
+from harness import HEADS, command, in_words, judged, table
 from matplotlib.ticker import LogLocator
 from peers import motions
 from peers.environments import OWN
-from work_precision import SAMPLES, Panel, Record, measure, start
-from work_precision_chart import frontier
-from work_precision_table import answered, cheapest, median, milliseconds
+from work_precision import SAMPLES, Panel, Record, run
+from work_precision_chart import in_time, plot
+from work_precision_table import answered, at_accuracies, cheapest, median, milliseconds
+
+from cosserat_fenicsx.pictures.charts import SMALL, beside, draw_chart, legend
 
 PANEL = Panel(
     motions.PEERS, motions.problems, motions.error, motions.configurations, motions.kind, motions.model, 1, False
@@ -77,20 +72,16 @@ def text(found, rows):
         ),
         *(f"\n{peer} is missing: {why}" for peer, why in found.missing.items()),
         "",
-        f"| problem | error | here | Exudyn | ratio | {HEADS}",
-        "|---|---|---|---|---|---|---|",
     ]
+    asked, times = [], []
     for problem, title in motions.TITLES.items():
         mine, theirs, share = ratio(rows, problem)
         cells = [f"{milliseconds(median(r))} ({called(r)})" if r else "none is so accurate" for r in (mine, theirs)]
-        lines.append(f"| {title} | {ASKED_AT:.0e} | {' | '.join(cells)} | {judged(share, ASKED[problem])} |")
-    heads = " | ".join(f"{accuracy:.0e}" for accuracy in ACCURACIES)
-    lines += ["", f"| problem | solver | {heads} | best error |", "|---|---|" + "---|" * (len(ACCURACIES) + 1)]
-    for problem, title in motions.TITLES.items():
+        asked.append((title, f"{ASKED_AT:.0e}", *cells, judged(share, ASKED[problem])))
         for name, members in _groups(answered(rows, problem)).items():
-            best = [cheapest(members, accuracy) for accuracy in ACCURACIES]
-            cells = " | ".join(milliseconds(median(row)) if row else "-" for row in best)
-            lines.append(f"| {title} | {name} | {cells} | {min(row['error'] for row in members):.0e} |")
+            times.append((title, name, *at_accuracies(members, ACCURACIES)))
+    lines += [*table(f"problem | error | here | Exudyn | ratio | {HEADS}", asked), ""]
+    lines += table(f"problem | solver | {' | '.join(f'{x:.0e}' for x in ACCURACIES)} | best error", times)
     failed = [row for row in rows if row["failed"]]
     if failed:
         lines += ["", f"Without an answer: {len(failed)} configurations, such as {called(failed[0])} "
@@ -106,10 +97,9 @@ def _groups(rows):
     return groups
 
 
-def draw(rows, file):
+def draw(rows):
     """The chart, one panel per problem."""
-    figure, panels = plt.subplots(1, len(motions.TITLES), figsize=(12.5, 6.2), layout="constrained", sharey=True)
-    seen = {}
+    figure, panels, _ = beside([6.3] * len(motions.TITLES), 6.2)
     for axes, (problem, title) in zip(panels, motions.TITLES.items(), strict=True):
         for name, members in _groups(answered(rows, problem)).items():
             ours, kind = members[0]["peer"] == OWN, members[0]["kind"]
@@ -123,28 +113,21 @@ def draw(rows, file):
                 "marker": "o" if ours else "s",
                 "ls": ":" if "tol" in kind else "-",
             }
-            axes.plot(*_points(members), style["marker"], color=style["color"], ms=3, alpha=0.25, mew=0)
-            (seen[name],) = axes.plot(*_points(frontier(members)), lw=2.2 if ours else 1.5, ms=5, label=name, **style)
+            plot(axes, members, name, 2.2 if ours else 1.5, **style)
         _, _, share = ratio(rows, problem)
         axes.axvline(ASKED_AT, color="0.5", lw=1, ls="--")
         if share:
             words = f"at {ASKED_AT:.0e}: 1/{1 / share:.3g} of Exudyn's time "
-            axes.text(ASKED_AT, 0.985, words, va="top", ha="right", fontsize=9, transform=axes.get_xaxis_transform())
-        axes.set(xscale="log", yscale="log", title=title)
-        axes.set_xlabel("error of the ends' positions, over a rod's length (-)")
-        axes.grid(which="major", alpha=0.4)
+            axes.text(ASKED_AT, 0.985, words, va="top", ha="right", fontsize=SMALL,
+                      transform=axes.get_xaxis_transform())  # fmt: skip
+        in_time(axes)
+        axes.set_xlabel(f"{title}: error of the ends' positions, over a rod's length (-)")
     panels[0].set_ylabel("processor time of one warm answer, one thread")
     panels[0].yaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
-    panels[0].yaxis.set_major_formatter(lambda s, _: f"{s:g} s" if s >= 1 else f"{1e3 * s:g} ms")
-    panels[0].text(0.01, 0.01, "small dots: every mesh and step measured; lines: the best of each", fontsize=8,
+    panels[0].text(0.01, 0.01, "small dots: every mesh and step measured; lines: the best of each", fontsize=SMALL,
                    transform=panels[0].transAxes, color="0.3")  # fmt: skip
-    figure.legend(seen.values(), seen.keys(), loc="outside lower center", ncols=3, fontsize=9, frameon=False)
-    figure.savefig(file, dpi=130)
-    plt.close(figure)
-
-
-def _points(rows):
-    return [row["error"] for row in rows], [median(row) for row in rows]
+    legend(*panels)
+    return figure
 
 
 def main(out="out", quick=False, fresh=False, peers=motions.PEERS, wanted=None):
@@ -160,30 +143,16 @@ def main(out="out", quick=False, fresh=False, peers=motions.PEERS, wanted=None):
     out = Path(out)
     stem = "work_precision_motion_quick" if quick else "work_precision_motion"
     found = Record(out / f"{stem}.json", fresh or quick, PANEL)
-    started = start(peers, not quick, found)
     limits = {peer: QUICK_LIMIT if quick and peer != OWN else LIMIT for peer in peers}
     wanted = wanted or (1 if quick else SAMPLES)
-    try:
-        rows = []
-        for k, name in enumerate(motions.TITLES, 1):  # each has its share of the time
-            budget = BUDGET * k / len(motions.TITLES)
-            rows += measure(started, [name], found, quick=quick, wanted=wanted, limits=limits, budget=budget)
-    except KeyboardInterrupt:
-        raise SystemExit(f"\nbroken off; {found.file} keeps the samples, the same command goes on from them") from None
-    finally:
-        for peer in started.values():
-            peer.end()
-        found.write(now=True)
+    budgets = {name: BUDGET * k / len(motions.TITLES) for k, name in enumerate(motions.TITLES, 1)}  # a share for each
+    rows = run(found, peers, budgets, quick=quick, wanted=wanted, limits=limits)
     told = text(found, rows)
     (out / f"{stem}.md").write_text(told + "\n", encoding="utf-8")
-    draw(rows, out / f"{stem}.png")
+    draw_chart(lambda: draw(rows), out / f"{stem}.png")
     print(f"{told}\n\nwritten: {found.file}, {stem}.md, {stem}.png")
     return found
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--quick", action="store_true", help="a few configurations, nothing is installed")
-    parser.add_argument("--fresh", action="store_true", help="forget the samples of earlier runs")
-    given = parser.parse_args()
-    main(quick=given.quick, fresh=given.fresh)
+    command(__doc__, main, {"quick": True}, fresh=True)

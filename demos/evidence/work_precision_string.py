@@ -11,20 +11,18 @@ characteristics on three meshes. The upwind scheme is that of the open literatur
 are processor times of a whole computation, in C all three, on one thread: medians of 5.
 """
 
-import argparse
 import statistics
-import time
 from pathlib import Path
 
 import numpy as np
-from machine import in_words, record
+from harness import command, in_words, table, timed, write
 from peers import upwind_torsion
-from written import write
 
 import cosserat_fenicsx as cf
 from cosserat_fenicsx.drilling.elements import AxialTorsional
 from cosserat_fenicsx.drilling.protocol import SERIES
 from cosserat_fenicsx.drilling.torsion import TorsionWaves
+from cosserat_fenicsx.pictures.charts import SMALL, draw_chart, empty_figure, legend
 
 #: Mean of the last four periods (s), largest speed of the bit after 60 s (rad/s); and how far these may be wrong, as
 #: relative errors: the differences of meshes, and of the levels at which a period is measured.
@@ -78,35 +76,29 @@ def measure(cases, samples):
         for cells in counts:
             seconds = []
             for _ in range(samples):
-                began = time.process_time()
-                found = solved(drilling, method, cells)
-                seconds.append(time.process_time() - began)
+                found, spent = timed(lambda: solved(drilling, method, cells))  # noqa: B023 called at once
+                seconds.append(spent)
             rows.append((method, cells, errors(*found), statistics.median(seconds)))
     return rows
 
 
-def table(rows):
-    """Markdown lines: errors and times."""
-    lines = ["| method | cells | error of the period | error of the bit's largest speed | processor time (ms) |",
-             "|---|---:|---:|---:|---:|"]  # fmt: skip
-    for method, cells, off, seconds in rows:
-        lines.append(f"| {method} | {cells} | {off['period']:.1e} | {off['peak']:.1e} | {1e3 * seconds:.1f} |")
-    return [*lines, "", f"{in_words(record())}. The truth is known to {KNOWN['period']:.0e} (period) and "
+def lines(rows):
+    """Markdown: errors and times."""
+    heads = "method | cells | error of the period | error of the bit's largest speed | processor time (ms)"
+    told = [(method, cells, f"{off['period']:.1e}", f"{off['peak']:.1e}", f"{1e3 * seconds:.1f}")
+            for method, cells, off, seconds in rows]  # fmt: skip
+    return [*table(heads, told), "", f"{in_words()}. The truth is known to {KNOWN['period']:.0e} (period) and "
             f"{KNOWN['peak']:.1e} (speed); smaller errors are chance."]  # fmt: skip
 
 
-def chart(rows, file):
+def chart(rows):
     """Errors over time, one panel for the period and one for the largest speed."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(12, 5.2), layout="constrained")
-    FigureCanvasAgg(figure)
+    figure = empty_figure(12, 5.2)
     colours = dict(zip(CASES, ("#08519c", "#31a354", "#d95f02"), strict=True))
     titles = {"period": "period of stick-slip", "peak": "largest speed of the bit"}
     for panel, (name, title) in zip(figure.subplots(1, 2), titles.items(), strict=True):
         panel.axhspan(KNOWN[name] / 100, KNOWN[name], color="0.9", zorder=0)
-        panel.text(0.99, KNOWN[name] * 0.9, "not known better ", transform=panel.get_yaxis_transform(), fontsize=8,
+        panel.text(0.99, KNOWN[name] * 0.9, "not known better ", transform=panel.get_yaxis_transform(), fontsize=SMALL,
                    color="0.4", ha="right", va="top")  # fmt: skip
         for method, colour in colours.items():
             here = [(cells, off[name], seconds) for by, cells, off, seconds in rows if by == method]
@@ -114,29 +106,24 @@ def chart(rows, file):
             shown = np.maximum(off, KNOWN[name] / 5)
             panel.loglog(1e3 * np.array(seconds), shown, "o-", color=colour, label=method)
             for x, y, n in zip(seconds, shown, cells, strict=True):
-                panel.annotate(f"{n}", (1e3 * x, y), xytext=(4, 4), textcoords="offset points", fontsize=8,
+                panel.annotate(f"{n}", (1e3 * x, y), xytext=(4, 4), textcoords="offset points", fontsize=SMALL,
                                color=colour)  # fmt: skip
-        panel.set(
-            xlabel="processor time of 120 s of motion (ms), one thread", title=title, ylim=(KNOWN[name] / 8, 5e-3)
-        )
+        panel.set(xlabel="processor time of 120 s of motion (ms), one thread", ylim=(KNOWN[name] / 8, 5e-3))
+        panel.set_ylabel(f"relative error, {title}")
         panel.margins(x=0.12)
-        panel.grid(alpha=0.3)
-    figure.axes[0].set_ylabel("relative error")
-    figure.axes[1].legend()
+    legend(figure.axes[0])
     figure.suptitle("Stick-slip of 3200 m at 60 rpm: speed against accuracy (numbers of cells at the points)")
-    figure.savefig(file, dpi=110)
+    return figure
 
 
 def main(out="out", quick=False):
     """Measure, write table and chart; returns the rows."""
     rows = measure(QUICK if quick else CASES, 1 if quick else SAMPLES)
     stem = "work_precision_string_quick" if quick else "work_precision_string"
-    print(write(stem, table(rows), out))
-    chart(rows, Path(out) / f"{stem}.png")
+    print(write(stem, lines(rows), out))
+    draw_chart(lambda: chart(rows), Path(out) / f"{stem}.png")
     return rows
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--quick", action="store_true", help="one sample of the coarser ones")
-    main(quick=parser.parse_args().quick)
+    command(__doc__, main, {"quick": True})

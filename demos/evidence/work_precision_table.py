@@ -2,8 +2,7 @@
 
 import statistics
 
-from asked import HEADS, judged, share
-from machine import in_words
+from harness import HEADS, in_words, judged, share, table
 from peers.environments import OWN
 from peers.problems import TITLES
 
@@ -58,6 +57,12 @@ def cheapest(rows, accuracy):
     """The fastest row with at least this accuracy, or None."""
     good = [row for row in rows if row["error"] <= accuracy]
     return min(good, key=median, default=None)
+
+
+def at_accuracies(rows, accuracies):
+    """Cells of a table: the times of the cheapest rows at some accuracies, and the best error."""
+    found = [cheapest(rows, accuracy) for accuracy in accuracies]
+    return [*(milliseconds(median(row)) if row else "-" for row in found), f"{min(row['error'] for row in rows):.0e}"]
 
 
 def called(row):
@@ -141,11 +146,11 @@ def _head(found):
 
 
 def _ratios(rows):
-    lines = [f"| asked | error | here | fastest peer | ratio | {HEADS}", "|---|---|---|---|---|---|---|"]
+    cells = []
     for words, accuracy, mine, peer, ratio, largest in ratios(rows):
-        cells = [f"{milliseconds(median(r))} ({called(r)})" if r else "none is so accurate" for r in (mine, peer)]
-        lines.append(f"| {words} | {accuracy:.0e} | {' | '.join(cells)} | {judged(ratio, largest)} |")
-    return lines
+        both = [f"{milliseconds(median(r))} ({called(r)})" if r else "none is so accurate" for r in (mine, peer)]
+        cells.append((words, f"{accuracy:.0e}", *both, judged(ratio, largest)))
+    return table(f"asked | error | here | fastest peer | ratio | {HEADS}", cells)
 
 
 def _by_tol(rows):
@@ -155,36 +160,22 @@ def _by_tol(rows):
     theirs = [row for row in sweep if planar_exudyn(row)]
     if not mine:
         return []
-    lines = [
-        '| `model="auto"`, tol | true error | here | Exudyn, planar, as accurate | ratio |',
-        "|---|---|---|---|---|",
-    ]
+    cells = []
     for row in mine:
         peer = cheapest(theirs, row["error"])
-        cells = (
-            (milliseconds(median(peer)), share(median(row) / median(peer))) if peer else ("none is so accurate", "-")
-        )
-        lines.append(
-            f"| {row['configuration']['tol']:.0e} | {row['error']:.0e} | {milliseconds(median(row))} | "
-            f"{' | '.join(cells)} |"
-        )
-    return [*lines, ""]
+        both = (milliseconds(median(peer)), share(median(row) / median(peer))) if peer else ("none is so accurate", "-")
+        cells.append((f"{row['configuration']['tol']:.0e}", f"{row['error']:.0e}", milliseconds(median(row)), *both))
+    return [*table('`model="auto"`, tol | true error | here | Exudyn, planar, as accurate | ratio', cells), ""]
 
 
 def _times(rows):
-    lines = [
-        "| problem | solver | " + " | ".join(f"{accuracy:.0e}" for accuracy in ACCURACIES) + " | best error |",
-        "|---|---|" + "---|" * (len(ACCURACIES) + 1),
-    ]
+    cells = []
     for problem, title in TITLES.items():
         here = answered(rows, problem)
         for peer, name in sorted({(row["peer"], row["kind"]) for row in here}, key=lambda pair: (pair[0] != OWN, pair)):
             mine = [row for row in here if (row["peer"], row["kind"]) == (peer, name)]
-            found = [cheapest(mine, accuracy) for accuracy in ACCURACIES]
-            cells = [milliseconds(median(row)) if row else "-" for row in found]
-            best = min(row["error"] for row in mine)
-            lines.append(f"| {title} | {peer}: {name} | {' | '.join(cells)} | {best:.0e} |")
-    return lines
+            cells.append((title, f"{peer}: {name}", *at_accuracies(mine, ACCURACIES)))
+    return table(f"problem | solver | {' | '.join(f'{x:.0e}' for x in ACCURACIES)} | best error", cells)
 
 
 def _stopped(rows):
@@ -203,17 +194,15 @@ def _stopped(rows):
 def _waits(found):
     if not found.waits:
         return []
-    lines = [
-        f"| what a person waits for | caches | what is computed | processor time (s) | wall clock (s) | {HEADS}",
-        "|---|---|---|---|---|---|---|",
-    ]
+    cells = []
     for row in found.waits:
-        start = f"| {row['who']} | {row['caches']} | {row['what']} |"
+        start = row["who"], row["caches"], row["what"]
         if not row["wall"]:
-            lines.append(f"{start} {row['failed']} | - | - | - |")
+            cells.append((*start, row["failed"], "-", "-", "-"))
             continue
         worked, waited = (statistics.median(row[key]) for key in ("processor", "wall"))
         most = WAITS.get((row["who"], row["caches"]))
         told = judged(waited, most, ".2f") if most else f"{waited:.2f} | - | -"
-        lines.append(f"{start} {worked:.2f} | {told} |")
-    return lines
+        cells.append((*start, f"{worked:.2f}", told))
+    heads = "what a person waits for | caches | what is computed | processor time (s) | wall clock (s)"
+    return table(f"{heads} | {HEADS}", cells)

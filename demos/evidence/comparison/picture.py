@@ -1,12 +1,11 @@
 """The chart of Figure 3: the whole path, the part below eta = 1, and the differences of the models."""
 
-from pathlib import Path
-
 import numpy as np
 
 from comparison.column import Column
 from comparison.curves import MANY, exact
 from cosserat_fenicsx import analytic
+from cosserat_fenicsx.pictures.charts import draw_chart, empty_figure
 
 _GREEN = {"1": "#98d594", "2": "#4daf4a", str(MANY): "#1b7837"}
 _ETA = r"load factor $\eta = F/P_{cr}$ (-)"
@@ -14,10 +13,11 @@ _ETA = r"load factor $\eta = F/P_{cr}$ (-)"
 
 def draw(data, file):
     """Draw the curves of figure3.json into `file`."""
-    from matplotlib.figure import Figure
+    draw_chart(lambda: _figure(data["curves"]), file)
 
-    curves = data["curves"]
-    figure = Figure(figsize=(13, 8.5), layout="constrained")
+
+def _figure(curves):
+    figure = empty_figure(13, 8.5)
     panels = figure.subplot_mosaic([["whole", "near"], ["whole", "apart"]])
     whole, near, apart = panels["whole"], panels["near"], panels["apart"]
     for axes in (whole, near):
@@ -27,7 +27,6 @@ def draw(data, file):
     near.set(xlim=(0, 1), ylim=(0, 2.5), title="Below the critical load, where the models part")
     _differences(apart, curves)
     for axes in panels.values():
-        axes.grid(alpha=0.3)
         axes.axvline(1.0, color="tab:red", lw=0.8, alpha=0.5)
     whole.text(0.94, 17.1, "pole of eq. (8)", ha="right", color="tab:red", fontsize=9)
     whole.plot([0, 1, 1], [2.5, 2.5, 0], color="grey", lw=0.8)
@@ -38,8 +37,7 @@ def draw(data, file):
         " above"
     )
     figure.legend(*whole.get_legend_handles_labels(), loc="outside lower center", ncols=3, frameon=False, fontsize=9)
-    Path(file).parent.mkdir(parents=True, exist_ok=True)
-    figure.savefig(file, dpi=110)
+    return figure
 
 
 def _curves(axes, curves):
@@ -95,7 +93,7 @@ def _differences(axes, curves):
     axes.set_title(
         f"Difference from the exact rod under the same load\n(the Cosserat rod here: {rods:.0e} %, below the chart)"
     )
-    axes.legend(fontsize=9, loc="upper right")
+    axes.legend(loc="upper right", frameon=True)
 
 
 def _branch(curves, name):

@@ -1,7 +1,7 @@
 """The table under Figure 3: statements of the paper and the results here, point by point."""
 
-import machine
 import numpy as np
+from harness import in_words
 
 from comparison.column import Column
 from comparison.curves import MANY, exact
@@ -21,7 +21,7 @@ def table(data):
         _HEAD, *lines, "",
         "delta is the transverse displacement of the tip, eta = F/P_cr. The truth of the rod is the strong form by "
         "quadrature "
-        "(`analytic.reissner`). " + machine.in_words(data["machine"]) + ".",
+        "(`analytic.reissner`). " + in_words(data["machine"]) + ".",
     ])  # fmt: skip
 
 

@@ -1,9 +1,8 @@
 """The table as a picture: a colour, a mark and a number in every cell."""
 
-from pathlib import Path
+from harness import in_words
 
-import machine
-
+from cosserat_fenicsx.pictures.charts import draw_chart, empty_figure
 from trials import catalogue, methods
 from trials.cells import MISSING, NOT, RIGHT, SAID, SILENT, STOPPED, Cell
 from trials.table import MARKS
@@ -30,11 +29,13 @@ _GROUPS = ("this package", "written for comparison", "other programs")
 
 def draw(data, file):
     """Draw failures.json into `file`."""
-    from matplotlib.figure import Figure
+    draw_chart(lambda: _figure(data), file)
 
+
+def _figure(data):
     columns = [method for method in methods.METHODS if method.key in data["methods"]]
     rows = [trial for trial in catalogue.TRIALS if trial.key in data["trials"]]
-    figure = Figure(figsize=(3.1 + 1.02 * len(columns), 2.6 + 0.5 * len(rows)), layout="constrained")
+    figure = empty_figure(3.1 + 1.02 * len(columns), 2.6 + 0.5 * len(rows))
     axes = figure.subplots()
     axes.set(xlim=(-0.5, len(columns) - 0.5), ylim=(len(rows) - 0.5, -0.5))
     for j, trial in enumerate(rows):
@@ -46,6 +47,7 @@ def draw(data, file):
     axes.set_yticks(range(len(rows)), [trial.title for trial in rows], fontsize=8.5)
     axes.xaxis.tick_top()
     axes.tick_params(length=0)
+    axes.grid(visible=False)
     for side in axes.spines.values():
         side.set_visible(False)
     _groups(axes, columns)
@@ -53,8 +55,7 @@ def draw(data, file):
     figure.suptitle(
         "Where methods fail: what is tried (rows) with which method (columns), and what becomes of it", fontsize=13
     )
-    Path(file).parent.mkdir(parents=True, exist_ok=True)
-    figure.savefig(file, dpi=110)
+    return figure
 
 
 def _cell(axes, i, j, cell):
@@ -101,4 +102,4 @@ def _legend(figure, data):
         "the load over the limit "
         "or flutter load; in that of\nthe line search, Newton iterations. What each row tries, and what right means "
         "there, is in failures.md. "
-        + machine.in_words(data["machine"]) + "."), title_fontsize=8.5)  # fmt: skip
+        + in_words(data["machine"]) + "."), title_fontsize=8.5)  # fmt: skip

@@ -1,6 +1,6 @@
 """The table in Markdown: a row per trial, a column per method, a legend, and a sentence on each trial."""
 
-import machine
+from harness import in_words
 
 from trials import catalogue, methods
 from trials.cells import MISSING, NOT, RIGHT, SAID, SILENT, STOPPED
@@ -41,7 +41,7 @@ def text(data):
     for trial in rows:
         lines.append(f"- **{trial.title.replace(chr(10), ' ')}**: {trial.tried} Number: {unit(data, trial)}.")
     told = "; ".join(f"{name} {release}" for name, release in sorted(data["programs"].items()))
-    lines += ["", f"Nothing here is random. {machine.in_words(data['machine'])}{'; ' + told if told else ''}."]
+    lines += ["", f"Nothing here is random. {in_words(data['machine'])}{'; ' + told if told else ''}."]
     return "\n".join(lines)
 
 

@@ -1,0 +1,169 @@
+"""What all measurements share: times, tables, verdicts, the machine, files that a later run goes on from, options."""
+
+import argparse
+import datetime
+import json
+import os
+import platform
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+
+from cosserat_fenicsx import compat
+from cosserat_fenicsx.ranks import launched
+
+#: The heads of the cells of `judged`, after that of the number found.
+HEADS = "asked at most | "
+
+
+def timed(task, clock=time.process_time):
+    """(what a task returns, seconds): by default of processor time."""
+    began = clock()
+    found = task()
+    return found, clock() - began
+
+
+def in_turns(tasks, runs):
+    """Processor times (s) of tasks that take turns, (runs, number of tasks): ratios within a row are of one time."""
+    return np.array([[timed(task)[1] for task in tasks] for _ in range(runs)])
+
+
+# -- tables ------------------------------------------------------------------------------------------------------------
+
+
+def table(heads, rows):
+    """Lines of a Markdown table.
+
+    Args:
+        heads: in one text, such as "degree | error"; rows: of cells, as texts or numbers.
+    """
+    yield f"| {heads} |"
+    yield "|" + "---|" * (heads.count("|") + 1)
+    for row in rows:
+        yield f"| {' | '.join(map(str, row))} |"
+
+
+def write(name, lines, out):
+    """Write the lines to `name`.md in the folder `out`, where put_in_docs.py finds them; returns them as one text."""
+    text = "\n".join(lines)
+    Path(out).mkdir(parents=True, exist_ok=True)
+    (Path(out) / f"{name}.md").write_text(text + "\n", encoding="utf-8")
+    return text
+
+
+def share(number):
+    """A ratio as text, below one as a fraction: 1/4.3; a dash for None."""
+    if number is None:
+        return "-"
+    return f"1/{1 / number:.3g}" if number < 1 else f"{number:.3g}"
+
+
+def judged(found, most, form=None):
+    """The last three cells of a row: what was found, what is asked at most, and whether it is met.
+
+    Args:
+        found: a ratio; or a number of another unit, with the format specification `form`; or None.
+    """
+    verdict = "-" if found is None else "met" if found <= most else "missed"
+    return " | ".join((format(found, form), f"{most:g}", verdict) if form else (share(found), share(most), verdict))
+
+
+# -- the machine -------------------------------------------------------------------------------------------------------
+
+
+def record():
+    """The conditions of a measurement, as a dict of strings and numbers for JSON.
+
+    Returns:
+        date (UTC, ISO 8601), cpu (model), cores (that this process may use), platform, and the releases by the names
+        dolfinx, petsc, numpy, python.
+    """
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
+    return {
+        "date": datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
+        "cpu": _cpu(),
+        "cores": cores,
+        "platform": platform.platform(),
+        **{name.lower(): release for name, release in map(str.split, compat.version().split(", "))},
+    }
+
+
+def in_words(found=None):
+    """One line for the foot of a table or a chart, from `record`: by default that of now."""
+    found = found or record()
+    return (
+        f"dolfinx {found['dolfinx']}, PETSc {found['petsc']}, numpy {found['numpy']}, Python {found['python']}; "
+        f"{found['cpu']}, {found['cores']} cores; {found['date'][:10]}"
+    )
+
+
+def _cpu():
+    """The processor's name: Linux has it in /proc/cpuinfo."""
+    listed = Path("/proc/cpuinfo")
+    lines = listed.read_text(encoding="utf-8").splitlines() if listed.exists() else []
+    names = [line.split(":", 1)[1].strip() for line in lines if line.startswith("model name")]
+    return names[0] if names else platform.processor() or platform.machine()
+
+
+# -- files that a later run goes on from -------------------------------------------------------------------------------
+
+
+def unfinished(file, data, keys):
+    """The results of an interrupted run in a file of `save`, if a run with this data can go on from them; else None.
+
+    Args:
+        data: with "machine", of `record`; keys: of what must be the same in both.
+    """
+    try:
+        before = json.loads(Path(file).read_text(encoding="utf-8"))
+        here, there = data["machine"], before["machine"]
+        same = all(before[key] == data[key] for key in keys) and not before["complete"]
+        return before if same and all(here[k] == there[k] for k in here if k not in ("date", "cores")) else None
+    except (OSError, ValueError, KeyError):
+        return None
+
+
+def save(file, data):
+    """Replace a file of JSON in one step, so that a killed process leaves a complete one."""
+    new = Path(file).with_suffix(".new")
+    new.parent.mkdir(parents=True, exist_ok=True)
+    new.write_text(json.dumps(data, indent=1) + "\n", encoding="utf-8")
+    os.replace(new, file)
+
+
+# -- the command line --------------------------------------------------------------------------------------------------
+
+
+def command(about, main, quick, *, fresh=False, one=None, **more):
+    """Run `main` with the options of the command line.
+
+    Args:
+        about: the docstring of the command. quick: arguments of `main` with `--quick`.
+        fresh: whether `main` goes on from an earlier run unless it is told not to.
+        one: a function of a number that `--one` calls instead in a process of its own; its result is printed as JSON.
+        more: further options of `main`, with their arguments of `ArgumentParser.add_argument`.
+    """
+    parser = argparse.ArgumentParser(description=about, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--quick", action="store_true", help="a short run, such as a test takes")
+    parser.add_argument("-o", "--out", default="out", help="folder for what is written (default: out)")
+    if fresh:
+        parser.add_argument("--fresh", action="store_true", help="continue no earlier run")
+    if one:
+        parser.add_argument("--one", type=int, help=argparse.SUPPRESS)
+    for name, settings in more.items():
+        parser.add_argument(f"--{name}", **settings)
+    given = vars(parser.parse_args())
+    number, short = given.pop("one", None), given.pop("quick")
+    try:
+        if number is not None:
+            found = one(number)
+            if launched()[0] == 0:
+                print(json.dumps(found))
+        else:
+            main(**(quick if short else {}), **given)
+    except KeyboardInterrupt:
+        told = "broken off" + ("; what is done is kept, and the same command goes on from there" if fresh else "")
+        print(f"\n{told}", file=sys.stderr)
+        sys.exit(130)
