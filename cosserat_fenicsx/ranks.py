@@ -1,8 +1,8 @@
-"""Which MPI ranks work together, what one of them does for all (files and pictures), and how they end together.
+"""MPI ranks: communicators, work of rank 0 for all (files and pictures), and a common end.
 
 Under mpirun a rank that ends with an exception, also a thread that does, or by `sys.exit` with a failure, ends all
-ranks: the others would wait for it in MPI for ever, since Python's end waits for them in MPI_Finalize. `python -m
-mpi4py` does the same for scripts that are started with it. Nothing happens where all ranks fail: each ends by itself.
+ranks: the others would wait for it in MPI_Finalize forever. `python -m mpi4py` does the same for scripts that it
+starts. Where all ranks fail, each ends by itself.
 """
 
 import builtins
@@ -15,7 +15,8 @@ from cosserat_fenicsx.errors import SceneError
 
 #: Time (s) within which the other ranks get here where all of them fail.
 PATIENCE = 3.0
-#: Numbers of processes, as launchers tell them: Open MPI, Hydra of MPICH and of Intel, MVAPICH, Slurm's srun.
+#: Environment variables of launchers with the number of processes: Open MPI, Hydra of MPICH and of Intel, MVAPICH,
+#: Slurm's srun.
 SIZES = ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "MV2_COMM_WORLD_SIZE", "SLURM_STEP_NUM_TASKS")
 
 _apart = False
@@ -23,7 +24,7 @@ _watched = None  # the process that `watch` was called in
 
 
 class Alone:
-    """The communicator of a process that is alone, for what needs no MPI otherwise."""
+    """Communicator of a single process, without loading MPI."""
 
     rank, size = 0, 1
 
@@ -48,8 +49,8 @@ def launched():
 
 @contextlib.contextmanager
 def apart():
-    """Context manager in which this rank computes without the others, as in a case of a study: what takes no
-    communicator gets that of this process alone."""
+    """Context manager in which this rank computes without the others, as in a case of a study: the default
+    communicator is this process alone."""
     global _apart
     before, _apart = _apart, True
     try:
@@ -64,10 +65,10 @@ def are_apart():
 
 
 def communicator(comm=None):
-    """The MPI communicator of a computation: `comm`, or by default that of all ranks; within `apart`, of this one.
+    """The MPI communicator of a computation: `comm`, by default all ranks; within `apart`, this one.
 
     Raises:
-        SceneError: within `apart`, one of several ranks, which would wait for the others for ever.
+        SceneError: within `apart`, a communicator of several ranks, which would wait for the others forever.
     """
     from mpi4py import MPI
 
@@ -97,9 +98,9 @@ def on_first(comm, action):
             action()
         except Exception as problem:
             trouble = problem
-    told = comm.bcast(_that_can_be_sent(trouble))
-    if told is not None:
-        raise trouble or told
+    sent = comm.bcast(_that_can_be_sent(trouble))
+    if sent is not None:
+        raise trouble or sent
 
 
 def _that_can_be_sent(problem):
@@ -146,16 +147,22 @@ def end_all(code=1):
 
 def all_are_here(comm, patience=None):
     """Whether all ranks call this within `patience` (s; None for `PATIENCE`)."""
-    met, until = comm.Ibarrier(), time.monotonic() + (PATIENCE if patience is None else patience)
-    while not met.Test():
-        if time.monotonic() > until:
-            return False
-        time.sleep(0.01)
+    from mpi4py import MPI
+
+    until = time.monotonic() + (PATIENCE if patience is None else patience)
+    try:
+        met = comm.Ibarrier()
+        while not met.Test():
+            if time.monotonic() > until:
+                return False
+            time.sleep(0.01)
+    except MPI.Exception:  # another rank is in another collective operation, which the barrier does not match
+        return False
     return True
 
 
 def _after(hook):
-    """A hook for exceptions that nothing catches, which ends all ranks after what another one does."""
+    """A hook for uncaught exceptions that ends all ranks after calling another hook."""
 
     def hooked(*given):
         hook(*given)
@@ -180,7 +187,7 @@ def _end_unless_all_end(what, code=1):
 
 
 class _Exit(SystemExit):
-    """What `sys.exit` raises: Python asks it for its `code`, from no function, where nothing has caught it."""
+    """Exception of `sys.exit`: Python reads its `code` outside any function if it was not caught."""
 
     @property
     def code(self):
@@ -203,7 +210,7 @@ def _exit(status=None, /):
 
 def _is_asked_by_python():
     try:
-        sys._getframe(2)  # that of the caller of `code`
+        sys._getframe(2)  # the caller of `code`
     except ValueError:
         return True
     return False
