@@ -1,10 +1,10 @@
 """The folder of compiled code: which one it is, whose its files are, and one process at a time that makes a file of it.
 
 Whoever can write to a file there runs code in the name of whoever loads it. So the folder and its files must belong to
-the user, and nobody else may write to them; what does not is not loaded.
+the user, and nobody else may write to them; other files are not loaded.
 
-A file is made in a folder of its own and moved to its place when it is complete, so a process that is ended meanwhile
-leaves nothing that others would take for compiled code, or would wait for.
+A file is made in a folder of its own and moved to its place when it is complete, so a process that is killed meanwhile
+leaves no incomplete file that others would load or wait for.
 
 Compiled code depends on the processor's `instructions`, flags of the C compiler.
 """
@@ -169,7 +169,7 @@ _LEVEL_3 = {"avx", "avx2", "bmi1", "bmi2", "f16c", "fma", "abm", "movbe", "xsave
 
 @functools.cache
 def instructions():
-    """Flags that let the compiler use the instructions of this processor; none where it is not known.
+    """Flags that let the compiler use the instructions of this processor; none for unknown processors.
 
     They belong to the key of whatever is kept on disk: computers of different age may share a home directory.
     """

@@ -12,7 +12,7 @@ class InstallationError(CosseratError, ImportError):
 
 
 class SceneError(CosseratError, ValueError):
-    """A scene that cannot be solved as it is described: says what, where, and what was expected.
+    """A scene that cannot be solved as described: the message names the field, its value and the expected one.
 
     Attributes:
         path: the `History` so far where the error arose during a motion, else None.
@@ -25,7 +25,7 @@ class SceneError(CosseratError, ValueError):
 
 
 class LibraryMissing(SceneError):
-    """A library for pictures is missing, which nothing else needs; says how to install it."""
+    """An optional library, for pictures, is missing; the message says how to install it."""
 
 
 class SceneWarning(UserWarning):

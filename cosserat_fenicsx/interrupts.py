@@ -2,7 +2,7 @@
 
 Python runs signal handlers only between its own instructions. So long computations in C either call back (`obey` at
 every step of an eigensolver), or run in a second thread, which the main thread waits for. Before and between
-computations, a signal ends what is done at once.
+computations, a signal takes effect at once.
 """
 
 import contextlib
@@ -41,7 +41,7 @@ def renew():
 
 
 def ignore():
-    """Ignore signals from now on: what was asked for is done, and the process ends."""
+    """Ignore signals from now on: the work is done, and the process ends."""
     for number in _SIGNALS:
         signal.signal(number, signal.SIG_IGN)
 
@@ -56,7 +56,7 @@ def _ask(number, frame):
 
 
 def _leave_closed_terminals():
-    """Let what is printed to a terminal that is gone vanish, instead of raising errors that would end the writing."""
+    """Discard output to a closed terminal, instead of raising errors that would end the writing of files."""
     for stream in (1, 2):
         try:
             os.write(stream, b"")

@@ -1,7 +1,7 @@
 """Numerical tools that all rooms share: Gauss's rules, the polynomials of an element, quaternions, differences.
 
 Quaternions are unit quaternions in numpy, scalar first; for UFL see forms/rotation.py. Differences are central, of
-eighth order, of data that Python computes from numbers; nothing that a solver iterates is differenced.
+eighth order, of data that Python computes from numbers; results of iterations are never differenced.
 """
 
 from functools import cache, cached_property
@@ -184,7 +184,7 @@ PLACES = (-4, -3, -2, -1, 1, 2, 3, 4)
 STEP = 4e-3
 # Weights of f(k h) - f(-k h), k = 1 .. 4, of orders eight and six.
 _EIGHT, _SIX = (4 / 5, -1 / 5, 4 / 105, -1 / 280), (3 / 4, -3 / 20, 1 / 60, 0.0)
-# Largest relative error of a derivative of what is smooth, and relative rounding of the values.
+# Largest relative error of the derivative of a smooth function, and relative rounding of the values.
 _SMOOTH, _ROUNDING = 1e-6, 1e-9
 
 

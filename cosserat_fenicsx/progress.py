@@ -84,7 +84,7 @@ class Progress:
 
 
 class _Clocked:
-    """Base of what a thread shows, since nothing may be reached for minutes.
+    """Base of progress that a thread shows, since one step may take minutes.
 
     Args:
         wanted, comm: see `Progress`.

@@ -1,4 +1,4 @@
-"""What follows from a scene, which is immutable, is found once and remembered as long as the scene lives."""
+"""Per-scene cache of derived data (scenes are immutable)."""
 
 import functools
 import weakref

@@ -1,4 +1,4 @@
-"""The exact rod in contact through torque_and_drag: the ladder, what is handed on, what the answer tells, refusals."""
+"""The exact rod in contact through torque_and_drag: the choice of the model, arguments, the answer, refusals."""
 
 import json
 import math

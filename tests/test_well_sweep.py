@@ -253,7 +253,7 @@ def test_the_chart_of_a_sweep_marks_lock_up_and_thrusts_beyond_all_others():
         "surface_torque": 0 * loads,
     }
     values["locked"][0, 0, 4] = 90.0
-    values["rung"][0, 0], values["rung"][1, 0] = 0, 2  # soft, rod
+    values["model"][0, 0], values["model"][1, 0] = 0, 2  # soft, rod
     operations, depths = (cf.TripIn(), cf.RotateOffBottom()), np.arange(1e3, 6e3, 1e3)
     found = cf.DepthSweep(operations, depths, (None,), values, {(0, 0, 4): "locks up"})
     hook, torque = found.plot().axes
@@ -279,7 +279,7 @@ def test_notes_in_the_chart_of_a_sweep_do_not_cover_each_other():
 
 def test_the_largest_error_of_a_sweep_names_its_quantity_and_place():
     values = {name: np.full((2, 1, 3), 1e-3) for name in module.KEPT}
-    values["rung"][:] = 1
+    values["model"][:] = 1
     operations, depths = (cf.TripIn(), cf.RotateOffBottom()), np.array([1e3, 2e3, 5409.0])
     for worst, told in ((0.5, "5e-01"), (np.inf, "without a bound: it may lock up")):
         values["model_error"][0, 0, 1] = worst

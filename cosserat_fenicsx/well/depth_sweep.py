@@ -29,9 +29,9 @@ from cosserat_fenicsx.well.operations import Operation
 from cosserat_fenicsx.well.pieces import pieces_of
 from cosserat_fenicsx.well.torque_and_drag import AUTO, BUCKLED, ROD, SOFT, torque_and_drag
 
-#: Numbers that are kept of an answer; `locked` is where the string locks up, m, or NaN; `rung` the index of its model.
-KEPT = ("hook_load", "surface_torque", "error", "model_error", "locked", "rung")
-_RUNGS = (SOFT, BUCKLED, ROD)
+#: Numbers that are kept of an answer; `locked` is where the string locks up, m, or NaN; `model` the index of its model.
+KEPT = ("hook_load", "surface_torque", "error", "model_error", "locked", "model")
+_MODELS = (SOFT, BUCKLED, ROD)
 KIND = Kind(
     what="sweep", home="well.depth_sweep", call="depth_sweep", again="the same call of depth_sweep goes on from there",
     differs="it holds another sweep, expected the same call, or another folder",
@@ -52,7 +52,7 @@ class DepthSweep(Result):
         operations, depths (m), friction: as asked for; friction is (None,) for that of the hole.
         values: {name: array (operations, friction, depths)} of "hook_load" (N), "surface_torque" (N m), "error" and
             "model_error" (see `TorqueAndDrag`), "locked" (m): where the string locks up, which leaves the others NaN,
-            and "rung", from which `models` follows. What is not computed yet is NaN.
+            and "model", from which `models` follows. What is not computed yet is NaN.
         notes: {(operation, friction, depth): text}, by indices, of the answers to look at: why there is none (the
             string locks up, no equilibrium was found), or why it is not as accurate as asked.
     """
@@ -94,7 +94,7 @@ class DepthSweep(Result):
     @property
     def models(self) -> np.ndarray:
         """(operations, friction, depths) what was solved: "soft", "buckled" or "rod"; "" where nothing was."""
-        return np.array([*_RUNGS, ""])[np.nan_to_num(self.values["rung"], nan=len(_RUNGS)).astype(int)]
+        return np.array([*_MODELS, ""])[np.nan_to_num(self.values["model"], nan=len(_MODELS)).astype(int)]
 
     def __len__(self):
         return int(self.done.sum())
@@ -271,7 +271,7 @@ def _answer(hole, string, operation, depth, settings):
     except NotConverged as failed:
         # an equilibrium that is not as accurate as asked is one
         found, none = getattr(failed, "answer", None), (np.nan,) * len(KEPT)
-        told = found and (found.hook_load, found.surface_torque, found.error, np.nan, np.nan, float(_RUNGS.index(ROD)))
+        told = found and (found.hook_load, found.surface_torque, found.error, np.nan, np.nan, float(_MODELS.index(ROD)))
         return told or none, str(failed)
     notes = [line for line in answer.why if line.startswith("BEYOND")]
     if settings["model"] == AUTO and not answer.enough:
@@ -279,4 +279,4 @@ def _answer(hole, string, operation, depth, settings):
         why += [] if answer.model == ROD else answer.why[-1:]  # why it is not the rod
         notes += [answer.words, *why]
     numbers = (answer.hook_load, answer.surface_torque, answer.error, answer.model_error, np.nan)
-    return (*numbers, float(_RUNGS.index(answer.model))), "; ".join(notes)
+    return (*numbers, float(_MODELS.index(answer.model))), "; ".join(notes)

@@ -10,7 +10,7 @@ from cosserat_fenicsx.well.answer import TorqueAndDrag, scales_of, share
 from cosserat_fenicsx.well.buckled import LockUp, buckled_string
 from cosserat_fenicsx.well.components import DrillString
 from cosserat_fenicsx.well.hole import Borehole, Mud
-from cosserat_fenicsx.well.ladder import model_errors
+from cosserat_fenicsx.well.model_error import model_errors
 from cosserat_fenicsx.well.operations import Operation
 from cosserat_fenicsx.well.pieces import is_ring, pieces_of, ring_of, sections_of
 from cosserat_fenicsx.well.rod.rod_answer import rod_in_contact

@@ -108,7 +108,6 @@ class InHole:
 
     @cached_property
     def s(self):
-        """(n,) m."""
         return self.path.layout.node_s(self.path.rule.nodes)[0] * self.string.rod.length
 
     @property
@@ -117,7 +116,6 @@ class InHole:
 
     @cached_property
     def position(self):
-        """(n, 3) m."""
         return self._record.rq[:, :3] * self.path.scales.length + self.scene.origin(self.string.rod)
 
     @cached_property
@@ -126,7 +124,6 @@ class InHole:
 
     @property
     def md(self):
-        """(n,) m."""
         return self._near.md
 
     @cached_property
@@ -137,7 +134,6 @@ class InHole:
 
     @cached_property
     def distance(self):
-        """(n,) m."""
         return np.linalg.norm(self.offset, axis=1)
 
     @cached_property
@@ -180,7 +176,6 @@ class InHole:
 
     @cached_property
     def side(self):
-        """(n,) rad."""
         return side_in_space(self._near.tangent, self._outward)
 
     @cached_property
@@ -210,17 +205,14 @@ class InHole:
 
     @cached_property
     def tension(self):
-        """(n,) N."""
         return (self._between_gauss(slice(3), self.path.scales.force) * self._along).sum(axis=1)
 
     @cached_property
     def torque(self):
-        """(n,) N m."""
         return -(self._moment * self._along).sum(axis=1)
 
     @cached_property
     def bending_moment(self):
-        """(n,) N m."""
         return np.linalg.norm(self._moment + self.torque[:, None] * self._along, axis=1)
 
     # -- the wall ------------------------------------------------------------------------------------------------------
@@ -248,7 +240,6 @@ class InHole:
 
     @cached_property
     def side_force(self):
-        """(n,) N/m."""
         return self._smoothed(self.element_pressures)
 
     def _smoothed(self, pressures):
@@ -276,7 +267,6 @@ class InHole:
 
     @cached_property
     def node_force(self):
-        """(n,) N."""
         return self._summed(self.element_pressures * self._of_nodes)
 
     @cached_property
@@ -297,7 +287,6 @@ class InHole:
 
     @cached_property
     def wall_force(self):
-        """N."""
         return float(self.node_force.sum() + self._ring_pressures.sum())
 
     @cached_property
@@ -348,7 +337,6 @@ class InHole:
 
     @cached_property
     def distributed_force(self):
-        """(n,) N/m."""
         return self._smoothed(self._resultants[1])
 
     # -- the ends ----------------------------------------------------------------------------------------------------
@@ -361,17 +349,14 @@ class InHole:
 
     @property
     def hook_load(self):
-        """N."""
         return float(-self.reaction[0] @ self._near.tangent[0])
 
     @property
     def surface_torque(self):
-        """N m."""
         return float(self.reaction[1] @ self._near.tangent[0])
 
     @cached_property
     def balance(self):
-        """N."""
         string = self.string
         weight = np.array([0.0, 0.0, np.diff(string.ends, prepend=0.0) @ string.weight])
         wall = (self._wall_density * self._of_nodes[..., None]).sum(axis=(0, 1)) + self.ring_forces.sum(axis=0)
@@ -394,12 +379,10 @@ class InHole:
 
     @property
     def stretch(self):
-        """m."""
         return self._integral(self.tension, lambda x: x.axial)
 
     @property
     def twist(self):
-        """rad."""
         return self._integral(self.torque, lambda x: x.torsion if is_round(x) else np.nan)
 
     def __repr__(self):
