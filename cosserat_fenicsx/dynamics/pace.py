@@ -15,6 +15,7 @@ Two conditions limit the step:
 """
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -185,21 +186,39 @@ def _even(left, dt):
 # Sample points in a step, as shares of it: just inside its ends, where functions may jump, and between, no two
 # distances in a simple ratio.
 _SAMPLE_POINTS = np.array([1e-6, 0.137, 0.311, 0.5, 0.647, 0.871, 1 - 1e-6])
-# Largest deviation from the straight line over the range of the function; a sine with ten steps a period has 0.024.
-_LARGEST_DEVIATION = 0.02
-# Samples that estimate the range of a function beforehand: over the whole motion, and at least between two jumps.
-_RANGE_SAMPLES, _FEWEST_RANGE_SAMPLES = 512, 16
-# A load is ignored where acting in resonance all the time would move its rod by less than this share of the allowed
-# error.
-_NEGLIGIBLE = 0.1
-# Share of the tolerance for the errors of impulses.
-_SHARE = 0.5
-# The step requirement found in a step decays by the first factor per later step, since the impulse errors of equal
-# steps cancel best. It is halved per step instead where the requirement has dropped below the second share of it, as
-# after a jump that the user did not name.
-_DECAY, _SUDDEN_DROP = 0.99, 1e-3
-# Number of fixed steps that are tested, and the share of dt below which the longest resolving step causes a warning.
-_TESTED_STEPS, _WARNING_SHARE = 200, 0.85
+
+
+@dataclass(frozen=True)
+class Sampling:
+    """How loads and prescribed motions are sampled, and what of them steps resolve.
+
+    Attributes:
+        deviation: largest deviation from the straight line over the range of the function; a sine with ten steps a
+            period has 0.024.
+        range_samples, fewest_range_samples: samples that estimate the range of a function beforehand: over the whole
+            motion, and at least between two jumps.
+        negligible: a load is ignored where acting in resonance all the time would move its rod by less than this share
+            of the allowed error.
+        share: of the tolerance for the errors of impulses.
+        decay, sudden_drop: the step requirement found in a step decays by the first factor per later step, since the
+            impulse errors of equal steps cancel best. It is halved per step instead where the requirement has dropped
+            below the second share of it, as after a jump that the user did not name.
+        tested_steps, warning_share: number of fixed steps that are tested, and the share of dt below which the longest
+            resolving step causes a warning.
+    """
+
+    deviation: float = 0.02
+    range_samples: int = 512
+    fewest_range_samples: int = 16
+    negligible: float = 0.1
+    share: float = 0.5
+    decay: float = 0.99
+    sudden_drop: float = 1e-3
+    tested_steps: int = 200
+    warning_share: float = 0.85
+
+
+_SAMPLING = Sampling()
 # Multiples of the golden ratio modulo 1 are evenly distributed in [0, 1] without a common spacing.
 _GOLDEN = (math.sqrt(5) - 1) / 2
 
@@ -214,7 +233,7 @@ class Resolution:
 
     def __init__(self, scene, duration, tol, load_factor, impulse_error):
         size = max(rod.length for rod in scene.rods)
-        allowed = _SHARE * tol * size / max(24 * impulse_error * abs(load_factor), 1e-300)
+        allowed = _SAMPLING.share * tol * size / max(24 * impulse_error * abs(load_factor), 1e-300)
         persistence = _persistence(scene, duration)
         self._sampled = [
             _SampledSignal(signal, _largest_acceleration(scene, item, field), persistence, duration, allowed)
@@ -247,9 +266,9 @@ def unresolved_by_fixed_steps(scene, duration, dt):
     for item, field, signal in _nonlinear(scene):
         sampled = _SampledSignal(signal, None, duration, duration, 1.0)
         steps = max(1, math.ceil(duration / dt - 1e-9))
-        for t in sorted({dt * int(steps * x) for x in np.arange(_TESTED_STEPS) * _GOLDEN % 1}):
+        for t in sorted({dt * int(steps * x) for x in np.arange(_SAMPLING.tested_steps) * _GOLDEN % 1}):
             h = min([dt, *(x - t for x in signal.jumps if x > t + 1e-6 * dt)])
-            if sampled.longest(t, h) < _WARNING_SHARE * h:
+            if sampled.longest(t, h) < _SAMPLING.warning_share * h:
                 return (
                     f"{type(item).__name__}.{field} changes faster than steps of {dt:g} s can follow, such as at "
                     f"t = {t:.4g} s: fewer than about ten steps a period, or a rise within a step. The answer may be "
@@ -292,7 +311,7 @@ class _SampledSignal:
 
     def enter(self, begin, end):
         """Estimate its range and mean slope in the interval between two jumps (s)."""
-        count = max(_FEWEST_RANGE_SAMPLES, _RANGE_SAMPLES // len(self._marks))
+        count = max(_SAMPLING.fewest_range_samples, _SAMPLING.range_samples // len(self._marks))
         shares = np.concatenate([[1e-6, 1 - 1e-6], (np.arange(count) * _GOLDEN) % 1])
         values = self._at(begin + (end - begin) * shares)
         self.piece, self.range, self.required = (begin, end), float(np.ptp(values, axis=0).max()), 0.0
@@ -309,7 +328,7 @@ class _SampledSignal:
             )
             self.enter(before, after)
         before, now = self.required, self._required_in(t, h)
-        self.required = max(now, before * (_DECAY if now > _SUDDEN_DROP * before else 0.5))
+        self.required = max(now, before * (_SAMPLING.decay if now > _SAMPLING.sudden_drop * before else 0.5))
         while self.required * h**2 > 1 and h > self._shortest:
             h = max(h / 4, 0.95 / math.sqrt(self.required), self._shortest)
             self.required = max(self.required, self._required_in(t, h))
@@ -320,14 +339,14 @@ class _SampledSignal:
         h)."""
         values = self._at(t + h * _SAMPLE_POINTS)
         self.range = max(self.range, float(np.ptp(values, axis=0).max()))
-        if self._resonance * self.range <= _NEGLIGIBLE:
+        if self._resonance * self.range <= _SAMPLING.negligible:
             return 0.0
         deviation = np.abs(values - values[0] - np.outer(_SAMPLE_POINTS, values[-1] - values[0])).max()
         if deviation <= 1e-5 * self.range:
             return 0.0
         slopes = np.diff(values, axis=0) / np.diff(_SAMPLE_POINTS * h)[:, None]
         impulse_error = h**2 / 24 * np.linalg.norm(slopes - self._slope, axis=1).max()
-        return max(deviation / (_LARGEST_DEVIATION * self.range), self._drift * impulse_error) / h**2
+        return max(deviation / (_SAMPLING.deviation * self.range), self._drift * impulse_error) / h**2
 
     def _at(self, times):
         values = []

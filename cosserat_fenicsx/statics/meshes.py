@@ -4,6 +4,7 @@ Graded meshes have short elements in boundary layers, and element lengths that e
 """
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -25,26 +26,44 @@ from cosserat_fenicsx.scene.curves import Line
 
 #: Elements per rod of the first mesh, where the mesh is not given.
 FIRST_ELEMENTS = 4
-# Where sections or loads are functions of s: the relative accuracy with which the first mesh must integrate the
-# flexibilities 1/EI and the loads, and the rod's length over the longest step of the quadrature that it is compared
-# with, and over the shortest element.
-_INTEGRATED, _SAMPLED, _SHORTEST_PART = 1e-3, 256, 1024
-# Angle, rad, by which an element of the first mesh may turn, where rods turn by more than the second; most elements of
-# a rod that are made for that.
-_TURNS, _MANY_TURNS, _MOST_FOR_TURNS = 2.5, 6.3, 512
-# Elements are halved where their quadrature error exceeds this share of the largest one.
-_LARGE = 0.1
-# Smallest mean ratio of chord to arc over a quarter of an element, or over an element where the mesh is coarser than
-# usual: that of a circular arc of one radian.
-_STRAIGHT = 0.958
-# Wave number of the displacement of a straight rod that bends by about a radian, over its length; most elements of the
-# first mesh per unit of it.
-_BENDING, _MOST_FIRST = 4.0, 3
-# Places at which the direction of a rod's axis is compared.
-_SAMPLES = 257
-# Error of a mesh that is estimated by its difference from another one over the true error, about; and the part of the
-# gain in accuracy of a halving that is assumed for the error of the finer mesh.
-_ESTIMATED, _GAINED = 1.5, 0.25
+
+
+@dataclass(frozen=True)
+class FirstMesh:
+    """What the first mesh has to resolve, and how large it may be.
+
+    Attributes:
+        integrated, sampled, shortest: where sections or loads are functions of s: the relative accuracy with which it
+            must integrate the flexibilities 1/EI and the loads, and the rod's length over the longest step of the
+            quadrature that it is compared with, and over the shortest element.
+        turns, many_turns, most_for_turns: angle (rad) by which an element may turn, where rods turn by more than the
+            second; most elements of a rod that are made for that.
+        large: elements are halved where their quadrature error exceeds this share of the largest one.
+        straight: smallest mean ratio of chord to arc over a quarter of an element, or over an element where the mesh is
+            coarser than usual: that of a circular arc of one radian.
+        bending, most: wave number of the displacement of a straight rod that bends by about a radian, over its length;
+            most elements per unit of it.
+        samples: places at which the direction of a rod's axis is compared.
+        estimated, gained: error of a mesh that is estimated by its difference from another one over the true error,
+            about; and the part of the gain in accuracy of a halving that is assumed for the error of the finer mesh.
+    """
+
+    integrated: float = 1e-3
+    sampled: int = 256
+    shortest: int = 1024
+    turns: float = 2.5
+    many_turns: float = 6.3
+    most_for_turns: int = 512
+    large: float = 0.1
+    straight: float = 0.958
+    bending: float = 4.0
+    most: int = 3
+    samples: int = 257
+    estimated: float = 1.5
+    gained: float = 0.25
+
+
+_FIRST = FirstMesh()
 
 
 def meshes_for(scene, degree, tol, many):
@@ -57,11 +76,11 @@ def meshes_for(scene, degree, tol, many):
     usual = first_layout(scene, degree)
     if not 1 <= degree <= 4 or not all(rod.uniform for rod in scene.rods) or not _acts_evenly(scene):
         return usual, None
-    wanted = (tol if many else _GAINED * 2 ** (degree + 1) * tol) / _ESTIMATED
-    waves = _BENDING + _turning(scene)
+    wanted = (tol if many else _FIRST.gained * 2 ** (degree + 1) * tol) / _FIRST.estimated
+    waves = _FIRST.bending + _turning(scene)
     # the best polynomial for a wave is off by (waves/2n)^(p + 1)/((p + 1)! 2^p) of its amplitude, that by 1/waves
     elements = waves / 2 * (wanted * waves * math.factorial(degree + 1) * 2**degree) ** (-1 / (degree + 1))
-    layout = first_layout(scene, degree, math.ceil(min(max(elements, 1), _MOST_FIRST * waves)))
+    layout = first_layout(scene, degree, math.ceil(min(max(elements, 1), _FIRST.most * waves)))
     if elements <= FIRST_ELEMENTS and any(a > b for a, b in zip(layout.counts, usual.counts, strict=True)):
         return usual, None  # which asks less of curves
     coarser = any(a < b for a, b in zip(layout.counts, usual.counts, strict=True))
@@ -83,8 +102,10 @@ def resolving_turns(scene, layout, largest):
         turn = max((_size(getattr(x, "rotation", None)) for x in here), default=0.0)
         moment = sum(_size(getattr(x, "moment", None)) for x in here)
         turn = largest * max(turn, moment * rod.length / rod.profile.range[0].J.min())
-        turn = turn if turn > _MANY_TURNS else 0.0
-        wanted.append(np.maximum(1.0, np.minimum(turn / _TURNS * np.diff(breaks), _MOST_FOR_TURNS / len(breaks))))
+        turn = turn if turn > _FIRST.many_turns else 0.0
+        wanted.append(
+            np.maximum(1.0, np.minimum(turn / _FIRST.turns * np.diff(breaks), _FIRST.most_for_turns / len(breaks)))
+        )
     return layout.resized(scene, wanted) if max(map(np.max, wanted)) > 1 else None
 
 
@@ -113,7 +134,7 @@ def _acts_evenly(scene):
 @per_scene
 def _turning(scene):
     """The largest angle by which the direction of a rod's axis turns in all along it, rad."""
-    tangents = (rod.curve.frame(np.linspace(0, rod.length, _SAMPLES))[:, :, 2] for rod in scene.rods)
+    tangents = (rod.curve.frame(np.linspace(0, rod.length, _FIRST.samples))[:, :, 2] for rod in scene.rods)
     return float(max(2 * np.arcsin(np.linalg.norm(np.diff(t, axis=0), axis=1) / 2).sum() for t in tangents))
 
 
@@ -167,10 +188,10 @@ def _too_long(rod, functions, breaks, degree, parts):
     All of them until so many equal parts of them are almost straight. Then those in which the Gauss points do not
     integrate the functions, compared with a fine quadrature.
     """
-    long_enough = np.diff(breaks) > 1.01 / _SHORTEST_PART
+    long_enough = np.diff(breaks) > 1.01 / _FIRST.shortest
     ends = (breaks[:-1, None] + np.diff(breaks)[:, None] * np.arange(parts) / parts).ravel()
     chords = np.diff(rod.curve.position(np.append(ends, 1.0) * rod.length), axis=0)
-    if np.linalg.norm(chords, axis=1).sum() < _STRAIGHT * rod.length:
+    if np.linalg.norm(chords, axis=1).sum() < _FIRST.straight * rod.length:
         return long_enough
     marked = np.zeros(len(breaks) - 1, dtype=bool)
     for values in functions:
@@ -195,29 +216,43 @@ def _unresolved(values, breaks, degree):
         return found
 
     whole = np.ones(len(breaks) - 1, dtype=int)
-    fine = integrals(np.maximum(8, np.ceil(_SAMPLED * np.diff(breaks) - 1e-9).astype(int)))
+    fine = integrals(np.maximum(8, np.ceil(_FIRST.sampled * np.diff(breaks) - 1e-9).astype(int)))
     # of whole elements and of parts: one of these may agree by chance
     error = np.max([np.abs(integrals(parts * whole) - fine) for parts in (1, 2, 3)], axis=0)
-    if (error.sum(axis=0) <= _INTEGRATED * np.abs(fine).sum(axis=0).max()).all():
+    if (error.sum(axis=0) <= _FIRST.integrated * np.abs(fine).sum(axis=0).max()).all():
         return np.zeros(len(whole), dtype=bool)
     error = error.max(axis=1)
-    return error > _LARGE * error.max()
+    return error > _FIRST.large * error.max()
 
 
-# Largest length of an element next to a support, load or kink, over the length of the boundary layer there.
-_RESOLVED = 2.0
-# Smallest length of an element over that of its rod.
-_SHORTEST = 1e-6
-# Largest angle by which an element of high degree may turn relative to its rest state, rad.
-_TURNED = 2.0
-# Largest distance of an edge of contact from the end of an element, over its length; most edges of one rod that
-# elements end at.
-_BESIDE, _MOST_EDGES = 3e-4, 12
-# A mesh is graded only if that needs less than this share of the elements of uniform refinement, and uniform
-# refinement needs at least so many elements.
-_WORTH, _MANY = 0.5, 32
-# Bounds of the number of elements that replace one element.
-_FEWEST, _MOST = 0.5, 4.0
+@dataclass(frozen=True)
+class Grading:
+    """How long the elements of graded meshes are.
+
+    Attributes:
+        resolved: largest length of an element next to a support, load or kink, over the length of the boundary layer
+            there.
+        shortest: smallest length of an element over that of its rod.
+        turned: largest angle (rad) by which an element of high degree may turn relative to its rest state.
+        beside, most_edges: largest distance of an edge of contact from the end of an element, over its length; most
+            edges of one rod that elements end at.
+        worth, many: a mesh is graded only if that needs less than this share of the elements of uniform refinement, and
+            uniform refinement needs at least so many elements.
+        fewest, most: bounds of the number of elements that replace one element.
+    """
+
+    resolved: float = 2.0
+    shortest: float = 1e-6
+    turned: float = 2.0
+    beside: float = 3e-4
+    most_edges: int = 12
+    worth: float = 0.5
+    many: int = 32
+    fewest: float = 0.5
+    most: float = 4.0
+
+
+_GRADING = Grading()
 
 
 def layers_of(model):
@@ -234,10 +269,10 @@ def with_layers(scene, layout, lengths):
     """
     if lengths is None:
         return None
-    lengths = [np.maximum(layers, _SHORTEST) for layers in lengths]
+    lengths = [np.maximum(layers, _GRADING.shortest) for layers in lengths]
     if not unresolved(scene, layout, lengths):
         return None
-    return layout.with_short_ends(scene, [_RESOLVED * layers for layers in lengths])
+    return layout.with_short_ends(scene, [_GRADING.resolved * layers for layers in lengths])
 
 
 def with_turns(scene, path):
@@ -246,7 +281,7 @@ def with_turns(scene, path):
     An element that turns by more than half a turn may have another number of turns than the rod, and finer meshes
     repeat that.
     """
-    most = min(_TURNED, path.degree / 2)
+    most = min(_GRADING.turned, path.degree / 2)
     turns = turns_of(path, most)
     if turns is None:
         return None
@@ -260,7 +295,7 @@ def with_edges(scene, path):
     are at element ends, or there are too many of them.
     """
     edges = contact_edges(path)
-    if edges is None or not loose_edges(path, edges) or max(map(len, edges)) > _MOST_EDGES:
+    if edges is None or not loose_edges(path, edges) or max(map(len, edges)) > _GRADING.most_edges:
         return None
     breaks, layout = [], path.layout
     for i, pieces in enumerate(layout.pieces(scene)):
@@ -271,7 +306,7 @@ def with_edges(scene, path):
             if near not in taken:
                 moved[near] = x
                 taken.add(near)
-            elif abs(moved[near] - x) > _BESIDE * np.diff(layout.breaks[i]).min():
+            elif abs(moved[near] - x) > _GRADING.beside * np.diff(layout.breaks[i]).min():
                 more.append(x)
         breaks.append(np.sort(np.concatenate([moved, more])))
     return Layout(tuple(breaks))
@@ -282,7 +317,7 @@ def loose_edges(path, edges):
     for breaks, found in zip(path.layout.breaks, edges, strict=True):
         cells = np.clip(np.searchsorted(breaks, found) - 1, 0, len(breaks) - 2)
         off = np.minimum(np.abs(found - breaks[cells]), np.abs(found - breaks[cells + 1]))
-        if (off > _BESIDE * np.diff(breaks)[cells]).any():
+        if (off > _GRADING.beside * np.diff(breaks)[cells]).any():
             return True
     return False
 
@@ -297,7 +332,7 @@ def balanced(fine, coarse, above):
         above: the estimated error of `fine` over the target error.
     """
     layout, order = coarse.layout, coarse.degree + 1
-    if sum(fine.elements) * above ** (1 / order) < _MANY:
+    if sum(fine.elements) * above ** (1 / order) < _GRADING.many:
         return None
     rough = np.concatenate([found.max(axis=0) for found in leading_coefficients(fine, fine._moved)])
     if _even(rough ** (1 / coarse.degree)):
@@ -307,7 +342,7 @@ def balanced(fine, coarse, above):
     if largest == 0:
         return None
     wanted = [(above * found / largest) ** (1 / order) for found in differences]
-    wanted = [np.clip(number, _FEWEST, _MOST) for number in wanted]
+    wanted = [np.clip(number, _GRADING.fewest, _GRADING.most) for number in wanted]
     if _even(np.concatenate(wanted)):
         return None
     for number, pieces in zip(wanted, layout.pieces(coarse.scene), strict=True):
@@ -319,7 +354,7 @@ def balanced(fine, coarse, above):
 
 def _even(numbers):
     """Whether the mean of the numbers of elements is close to their maximum, so that grading saves little."""
-    return numbers.mean() > _WORTH * numbers.max()
+    return numbers.mean() > _GRADING.worth * numbers.max()
 
 
 def _round_up(number):

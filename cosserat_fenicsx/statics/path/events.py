@@ -16,20 +16,33 @@ import numpy as np
 from cosserat_fenicsx.statics.path.chord import Chord, zero_of
 from cosserat_fenicsx.statics.path.track import PathPoint
 
-# Two eigenvalues vanish at the same point where one is below this times its size at the ends of the chord while the
-# other vanishes.
-_SAME = 1e-5
-# Largest number of iterations for a requested load factor.
-_MOST = 25
-# Largest residual of an event, see `Crossing`.
-_SINGULAR = 1e-5
-# Two events are the same where the cosine of their null vectors is above the first number and their coordinates on the
-# chord differ by less than the second.
-_ALIKE, _ONE_PLACE = 0.7, 1e-2
-# Relative difference of two load factors that may be rounding.
-_LEVEL = 1e-10
-# Largest change of the logarithm of the bordered tangent's determinant within a step without a bifurcation.
-_BORDERED = math.log(30.0)
+
+@dataclass(frozen=True)
+class Tolerances:
+    """What is one event, and what is none.
+
+    Attributes:
+        same: two eigenvalues vanish at the same point where one is below this times its size at the ends of the chord
+            while the other vanishes.
+        most: largest number of iterations for a requested load factor.
+        singular: largest residual of an event, see `Crossing`.
+        alike, one_place: two events are the same where the cosine of their null vectors is above the first number and
+            their coordinates on the chord differ by less than the second.
+        level: relative difference of two load factors that may be rounding.
+        bordered: largest change of the logarithm of the bordered tangent's determinant within a step without a
+            bifurcation.
+    """
+
+    same: float = 1e-5
+    most: int = 25
+    singular: float = 1e-5
+    alike: float = 0.7
+    one_place: float = 1e-2
+    level: float = 1e-10
+    bordered: float = math.log(30.0)
+
+
+_TOLERANCES = Tolerances()
 #: Why a step is shortened, in words.
 UNEXPLAINED = "the number of negative modes changes otherwise than the critical points that were located tell"
 NEARLY = "two modes are almost neutral together"
@@ -139,7 +152,9 @@ class Locator:
             return False
         parts = [(a, limits[0], a.rise), (limits[0], b, b.rise)] if limits else [(a, b, a.rise)]
         for begin, end, rise in parts:
-            if (end.load_factor - begin.load_factor) * math.copysign(1.0, rise) < -_LEVEL * abs(end.load_factor):
+            if (end.load_factor - begin.load_factor) * math.copysign(1.0, rise) < -_TOLERANCES.level * abs(
+                end.load_factor
+            ):
                 return False
         return self.counts_agree(a, b, crossings)
 
@@ -159,7 +174,7 @@ class Locator:
         """
         limits = self.limits(chord) if limits is None else limits
         found = [*limits, *self.bifurcations(chord, limits)]
-        return _in_order([crossing for crossing in found if crossing.residual <= _SINGULAR])
+        return _in_order([crossing for crossing in found if crossing.residual <= _TOLERANCES.singular])
 
     def limits(self, chord):
         """[the `Crossing` at the extremum of the load factor], whatever its residual; an empty list without one.
@@ -194,7 +209,7 @@ class Locator:
             place = chord.root(self._stiffness_against(self.track.motion_at(point, modes[0])), near)
             if place is not None:
                 here = self._singular("bifurcation", chord, place, modes)
-                here = [x for x in here if x.residual <= _SINGULAR and not self._known(x, (*limits, *found))]
+                here = [x for x in here if x.residual <= _TOLERANCES.singular and not self._known(x, (*limits, *found))]
                 if here and not chord.passes(place, turning=False):
                     raise Lost(0.5, ASIDE)
                 found += here
@@ -205,8 +220,8 @@ class Locator:
 
     def _known(self, crossing, others):
         """Whether one of other `Crossing`s has the same null vector at the same point."""
-        near = [other for other in others if abs(other.place - crossing.place) < _ONE_PLACE]
-        return any(abs(self.track.work(other.null, crossing.null)) > _ALIKE for other in near)
+        near = [other for other in others if abs(other.place - crossing.place) < _TOLERANCES.one_place]
+        return any(abs(self.track.work(other.null, crossing.null)) > _TOLERANCES.alike for other in near)
 
     def _by_count(self, chord, counts, limits):
         """(coordinate, `PathPoint`, modes) of the eigenvalues of the second variation that change their sign.
@@ -298,7 +313,7 @@ class Locator:
         together = 1
         while j + together < last:
             ends = max(abs(eigenvalue(end, j + together)) for _, end in (chord.known[0], chord.known[-1]))
-            if abs(eigenvalue(point, j + together)) > _SAME * ends:
+            if abs(eigenvalue(point, j + together)) > _TOLERANCES.same * ends:
                 break
             together += 1
         return place, point, together
@@ -306,7 +321,7 @@ class Locator:
     def _land(self, chord, low, high, before, after, load_factor):
         """(coordinate, `PathPoint`) at a load factor between two coordinates, by Newton's method."""
         track = self.track
-        for _ in range(_MOST):
+        for _ in range(_TOLERANCES.most):
             place = zero_of(lambda at: chord.load_factor(at) - load_factor, low, high)
             predicted, _ = chord.guess(place)
             solved = track.at_load(predicted, load_factor)
@@ -335,7 +350,7 @@ def _near_bifurcation(a, b):
     if not a.rise or not b.rise:
         return False
     change = b.logarithm - a.logarithm - math.log(abs(b.rise / a.rise))
-    return abs(change) > _BORDERED  # not where it is unknown
+    return abs(change) > _TOLERANCES.bordered  # not where it is unknown
 
 
 def _in_order(crossings):
