@@ -52,9 +52,7 @@ def refuse(owner, field, value, expected):
     where, given = name_of(owner), repr(value)
     if len(given) > _LONGEST:
         given = f"{given[:_LONGEST]}..."
-    problem = SceneError(f"{where}.{field} = {given}: expected {expected}")
-    problem.field = (field,)
-    raise problem
+    raise SceneError(f"{where}.{field} = {given}: expected {expected}")
 
 
 def warn(text, kind=SceneWarning):

@@ -16,12 +16,10 @@ class SceneError(CosseratError, ValueError):
 
     Attributes:
         path: the `History` so far where the error arose during a motion, else None.
-        field: (name of the field that is refused,), or () where it is not one.
         where: the place in a scene file, a tuple of keys and numbers; None outside of files.
     """
 
     path = where = None
-    field = ()
 
 
 class LibraryMissing(SceneError):

@@ -10,6 +10,7 @@ import inspect
 import math
 import numbers
 import pkgutil
+import re
 import types
 import typing
 from collections.abc import Callable, Sequence
@@ -162,7 +163,8 @@ def made(make, data, where=(), reading=Reading()):
         if not where:
             raise
         at = "" if str(problem).startswith(f"{spoken(where)}.") else f"{spoken(where)}: "
-        raise misplaced((*where, *problem.field), f"{at}{problem}") from None
+        field = re.match(r"\w+\.(\w+)", str(problem))  # 'Owner.field = value: ...'
+        raise misplaced((*where, field[1]) if field and field[1] in data else where, f"{at}{problem}") from None
 
 
 def table_schema(cls, definitions):
@@ -499,10 +501,12 @@ class Object(Kind):
             reference = {"$ref": f"#/$defs/{name}"}
             said = self._typed and cls is not self._usual
             found.append({"allOf": [reference], "required": ["type"]} if said else reference)
-            if self._typed and not definitions[name]["required"]:
+            if self._typed and not any(needed for _, needed in arguments_of(cls).values()):
                 found.append({"const": name})
         if named:
             found.append({"type": "string", "description": "the name of one in the table of that class"})
+        if not found:  # a family whose members are all the users' own
+            return {"type": "object"}
         return found[0] if len(found) == 1 else {"anyOf": found}
 
 

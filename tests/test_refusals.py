@@ -222,7 +222,7 @@ def test_damaged_files_of_strings(seed):
     kinds = [(explain_drilling, {file: x for file, x in tables.items() if "drive" in x}),
              (explain_well, {file: x for file, x in tables.items() if "well" in x and "drive" not in x})]  # fmt: skip
     chance, refused = random.Random(seed), 0
-    commands = parser(dict.fromkeys(("run", "resume", "buckling", "modes", "explain"), main))
+    commands = parser(dict.fromkeys(("run", "resume", "buckling", "modes", "explain", "schema"), main))
     for _ in range(60):
         for explain, known in kinds:
             file = chance.choice(list(known))

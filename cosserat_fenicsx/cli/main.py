@@ -3,6 +3,7 @@
 Modules beyond the standard library are imported by the commands that need them, so that --help is instant.
 """
 
+import json
 import sys
 import warnings
 from pathlib import Path
@@ -21,7 +22,7 @@ def main(arguments=None):
         0 done, 1 not converged (the partial path is written), 2 bad input, 130 interrupted (likewise written).
     """
     whole = parser({"run": _run, "resume": _resume, "buckling": _rods_alone(run_buckling),
-                    "modes": _rods_alone(run_modes), "explain": _explain})  # fmt: skip
+                    "modes": _rods_alone(run_modes), "explain": _explain, "schema": _schema})  # fmt: skip
     options = whole.parse_args(arguments)
     if options.command is None:
         whole.print_help()
@@ -161,6 +162,15 @@ def _explain(options):
     for doubt in scene.doubts:
         say(f"cosserat: warning: {doubt}")
     say(text, file=sys.stdout)
+    return DONE
+
+
+def _schema(options):
+    from cosserat_fenicsx.files.read import schema_of_files
+    from cosserat_fenicsx.parts import use
+
+    use(options.modules)
+    say(json.dumps(schema_of_files(), indent=1), file=sys.stdout)
     return DONE
 
 

@@ -51,6 +51,10 @@ def parser(do):
     explain = commands.add_parser("explain", help="say which model would be solved and how large it is")
     _common(explain)
     explain.set_defaults(do=do["explain"])
+
+    schema = commands.add_parser("schema", help="print the JSON Schema of scene files, for editors")
+    schema.add_argument("modules", nargs="*", metavar="MODULE", help="modules of your own classes, as in `use`")
+    schema.set_defaults(do=do["schema"])
     return whole
 
 
