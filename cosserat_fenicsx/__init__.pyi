@@ -65,6 +65,7 @@ from cosserat_fenicsx.errors import SceneWarning as SceneWarning
 from cosserat_fenicsx.files.read import read as read
 from cosserat_fenicsx.files.read import write as write
 from cosserat_fenicsx.files.rods import RodScene as RodScene
+from cosserat_fenicsx.quantities import Quantity as Quantity
 from cosserat_fenicsx.results.history import History as History
 from cosserat_fenicsx.results.modes import Buckling as Buckling
 from cosserat_fenicsx.results.modes import Modes as Modes
@@ -72,6 +73,7 @@ from cosserat_fenicsx.results.path import Path as Path
 from cosserat_fenicsx.results.records import Event as Event
 from cosserat_fenicsx.results.sensitivity import Sensitivity as Sensitivity
 from cosserat_fenicsx.results.sensitivity import Uncertainty as Uncertainty
+from cosserat_fenicsx.results.stored import read_result as read_result
 from cosserat_fenicsx.results.whirl import Orbit as Orbit
 from cosserat_fenicsx.results.whirl import Whirl as Whirl
 from cosserat_fenicsx.scene.action import Action as Action

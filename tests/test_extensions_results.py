@@ -56,6 +56,13 @@ def test_a_quantity_along_rods(path, tmp_path):
         np.testing.assert_array_equal(series["slope_1"], tree["column/slope"].values[1])
 
 
+def test_its_own_chart(path):
+    pytest.importorskip("matplotlib")
+    (panel,) = path.plot_quantity("sway", units="field").axes
+    assert panel.get_ylabel() == "sway of the tip (ft)" and len(panel.lines) == 2
+    np.testing.assert_allclose(panel.lines[1].get_ydata(), path.value("sway", "field").max())
+
+
 def test_what_is_not_known_is_refused(path):
     with pytest.raises(cf.SceneError, match="value.'sways'.: expected one of .*sway"):
         path.value("sways")

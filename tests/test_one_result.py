@@ -12,7 +12,6 @@ from reference_strings import pipe_and_collars
 import cosserat_fenicsx as cf
 from cosserat_fenicsx.quantities import Units
 from cosserat_fenicsx.results.screen import LINES, WIDTH
-from cosserat_fenicsx.results.stored import read_result
 
 pytestmark = pytest.mark.serial
 WELL = cf.WellPath.from_survey([0, 500, 1500, 2500], [0, 0, 60, 85], [0, 0, 0, 0])
@@ -125,15 +124,15 @@ def test_saved_and_read(found, tmp_path):
     if kind in ("Path", "History"):
         again = (cf.read_path if kind == "Path" else cf.read_history)(file)
         with pytest.raises(cf.SceneError, match=f"read_{kind.lower()} to read it"):
-            read_result(file)
+            cf.read_result(file)
     else:
-        again = read_result(file)
+        again = cf.read_result(file)
         assert again.kind == kind and str(again).splitlines()[0] == str(result).splitlines()[0]
         assert again.about.keys() == result._about().keys() and set(again.quantities) == set(again.to_dict()["units"])
         data = file.read_bytes()
         (tmp_path / "cut.h5").write_bytes(data[: len(data) // 2])
         with pytest.raises(cf.SceneError, match="cut.h5"):
-            read_result(tmp_path / "cut.h5")
+            cf.read_result(tmp_path / "cut.h5")
     np.testing.assert_array_equal(again.value(name), result.value(name))
     assert again.plot_quantity(name) is not None
 

@@ -5,7 +5,13 @@ import numpy as np
 import cosserat_fenicsx as cf
 
 
-@cf.Path.quantity("sway of the tip", unit="m")
+def steps(panel, along, values):
+    """A chart of its own: steps, and a dashed line at the largest sway."""
+    panel.step(along, values)
+    panel.axhline(values.max(), linestyle="--")
+
+
+@cf.Path.quantity("sway of the tip", unit="m", chart=steps)
 def sway(path):
     """(n,) horizontal distance of the end of the first rod from where it was at rest, m."""
     return np.linalg.norm(path.displacement(path.rod().end)[:, :2], axis=1)
