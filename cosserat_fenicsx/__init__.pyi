@@ -41,7 +41,6 @@ from cosserat_fenicsx.drilling.pipe_above import PipeAbove as PipeAbove
 from cosserat_fenicsx.drilling.scene import Drilling as Drilling
 from cosserat_fenicsx.drilling.scenefile import DrillingScene as DrillingScene
 from cosserat_fenicsx.drilling.segments import Discs as Discs
-from cosserat_fenicsx.drilling.simulate import read_drilling as read_drilling
 from cosserat_fenicsx.drilling.simulate import simulate_drilling as simulate_drilling
 from cosserat_fenicsx.drilling.stick_slip import StickSlip as StickSlip
 from cosserat_fenicsx.drilling.top_drive import PI as PI

@@ -75,7 +75,7 @@ USERS = {
         "simulate", "motion",
     ),
     "string": User(
-        string, goes_on, cf.read_drilling, lambda folder: string(folder, 0.02),
+        string, goes_on, cf.read, lambda folder: string(folder, 0.02),
         lambda x: [x.rows.tobytes(), x._along().tobytes()], "simulate_drilling", "motion of a drill-string",
     ),
     "study": User(study, study, study, lambda folder: study(folder, 13), of_study, "study", "study"),

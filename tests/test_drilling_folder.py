@@ -37,7 +37,7 @@ def test_folders_that_are_refused(tmp_path, monkeypatch):
     with pytest.raises(cf.SceneError, match=r"not the one of the motion: Drilling.drive.speed is 7.*where .* 6.28"):
         cf.resume(tmp_path / "one", scene(drive=cf.TopDrive(7.0)))
     with pytest.raises(cf.SceneError, match="no motion was found there"):
-        cf.read_drilling(tmp_path / "none")
+        cf.resume(tmp_path / "none")
 
 
 def test_functions_of_time_are_compared_by_their_values(tmp_path, monkeypatch):

@@ -49,7 +49,7 @@ def test_kill_9(kind, tmp_path):
     process.kill()
     process.wait()
     whole = cf.simulate_drilling(scene_of(kind), DURATION)
-    assert 0 < len(cf.read_drilling(place)) < len(whole)
+    assert 0 < len(cf.read(place)) < len(whole)
     again = cf.resume(place)
     assert np.array_equal(again.rows, whole.rows, equal_nan=True) and again.counts == whole.counts
     for name in ("profile_times", "angle", "speed", "torque", "tension", "sticking"):

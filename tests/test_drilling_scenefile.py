@@ -142,7 +142,7 @@ def test_the_command_line(tmp_path, capsys, monkeypatch):
     names = {"drilling.csv", "drilling.png", "phase.png", "energy.png", "map.png"}
     assert {file.name for file in (tmp_path / "out").iterdir()} == names == set(re.findall(r"\w+\.(?:csv|png)", told))
     assert main(["resume", str(tmp_path / "run"), "--duration", "30"]) == 0
-    assert len(cf.read_drilling(tmp_path / "run")) == 3000
+    assert len(cf.read(tmp_path / "run")) == 3000
     for option, value in (("--tol", "1e-3"), ("--degree", "2"), ("--scheme", "energy")):
         assert main(["run", str(file), option, value]) == 2
         assert f"{option} is for rods" in capsys.readouterr().err

@@ -73,7 +73,7 @@ ROOMS = {
     "studies": {"results", "storage"},
     "well": {"actions", "scene", "models", "statics", "results", "storage", "pictures"},
     "drilling": {"actions", "well", "scene", "results", "storage", "pictures", "algebra"},
-    "files": {"drilling", "well", "scene", "statics", "dynamics"},
+    "files": {"drilling", "well", "scene", "statics", "dynamics", "storage"},
     "cli": {"files", "drilling", "well", "scene", "models", "statics", "dynamics", "results", "storage", "pictures"},
 }
 #: Files that combine scenes, models, solvers and results; all other solver files import none of scene, models and

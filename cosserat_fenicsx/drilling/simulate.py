@@ -141,17 +141,6 @@ def _running(store, scene):
     return running
 
 
-def read_drilling(folder: File, scene: Drilling | None = None) -> DrillingHistory:
-    """The motion that a folder holds so far; another process may still be computing it.
-
-    Args: see `resume`.
-
-    Raises:
-        SceneError: no such folder, or another scene.
-    """
-    return read(Store(folder, KIND).open(), scene)
-
-
 def read(store, scene):
     """The motion of a drill-string that is stored so far."""
     scene, tables = _scene(store, scene, store.head["duration"]), _tables(store)

@@ -10,14 +10,16 @@ E = "210 GPa"
 Numbers are in SI, or text with a unit (`dimensions`).
 """
 
+from os import PathLike
 from pathlib import Path
 from typing import Any
 
-from cosserat_fenicsx.checks import File, store
+from cosserat_fenicsx.checks import File, refuse, store
 from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.files.toml import place_of, text_and_tables, to_toml
 from cosserat_fenicsx.parts import Part, Reading, made, misplaced, schema, to_data, use
 from cosserat_fenicsx.scene.sections import Material
+from cosserat_fenicsx.storage.store import read as stored
 
 # Tables that a drill-string in motion has, and a string in a well has not.
 _OF_DRILLING = {"drive", "bit", "hook", "wall_friction", "drag", "simulate", "stability", "discs"}
@@ -39,19 +41,27 @@ def kind_of(tables) -> str:
     return "well" if "rods" not in tables and {"well", "string", "operations"} & tables.keys() else "rods"
 
 
-def read(file: File) -> Any:
-    """What a scene file describes: rods, a string in a well, or a drill-string in motion.
+def read(file: File, scene: Any = None) -> Any:
+    """What a scene file describes (rods, a string in a well, a drill-string in motion), or what a folder holds so far.
 
     Args:
-        file: path of a TOML file, see the head of this module.
+        file: path of a TOML file, see the head of this module; or the `folder` of `simulate`, `simulate_drilling` or
+            `depth_sweep`, which another process may still be writing to.
+        scene: of a folder whose scene cannot be stored as data, see `resume`; else None.
 
     Returns:
-        A `RodScene`, a `WellScene` or a `DrillingScene`; `run()` computes what the file asks for.
+        Of a file a `RodScene`, a `WellScene` or a `DrillingScene`; `run()` computes what the file asks for. Of a folder
+        a `History`, a `DrillingHistory` or a `DepthSweep`.
 
     Raises:
         SceneError: the file is missing or not TOML, a key, a type or a unit is unknown (named, with the nearest known
-            one), or a value is refused; the message gives line and column.
+            one), or a value is refused; the message gives line and column. Of a folder: nothing that was stored is
+            there, it is of another scene, or damaged.
     """
+    if isinstance(file, str | PathLike) and Path(file).is_dir():
+        return stored(file, scene)
+    if scene is not None:
+        refuse("read", "scene", scene, f"None, since {file} is no folder")
     return read_with_tables(file)[0]
 
 

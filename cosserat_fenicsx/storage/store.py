@@ -81,6 +81,9 @@ class Nowhere:
     def put(self, result, what, **rows):
         """See `Store`, and so for all others."""
 
+    def lines(self, read):
+        return []
+
     def keep(self, row, result=()):
         pass
 
@@ -140,7 +143,8 @@ class Store(Nowhere):
             SceneError: it holds a computation, or files of the user's own that have the names of this one's; another
                 process writes to it, or it cannot be made.
         """
-        return self._made({**asked, "scene": _data(scene), **_marked(scene, mark.sample_times(duration))})
+        data = _data(lambda: to_data(scene))
+        return self._made({**asked, "scene": data, **_marked(scene, mark.sample_times(duration))})
 
     def _made(self, told):
         told = {"holds": self.kind.what, "home": self.kind.home, **told}
@@ -294,14 +298,17 @@ class Store(Nowhere):
 
     # -- rows that stand for themselves ------------------------------------------------------------------------------
 
-    def begin(self, marked):
+    def begin(self, marked, as_data=None):
         """Make the folder, or go on with it where it holds the same computation.
+
+        Args:
+            marked: the mark of all that the numbers follow from; as_data: function that gives the arguments as data.
 
         Raises:
             SceneError: see `make` and `compare`.
         """
         if self._from_first(lambda: holds(self.place)) != self.kind.what:
-            return self._made({"mark": marked})
+            return self._made({"scene": _data(as_data) if as_data else None, "mark": marked})
         self.open().hold()
         try:
             self.compare(marked)
@@ -312,7 +319,7 @@ class Store(Nowhere):
 
     def lines(self, read):
         """What `read(row)` makes of the stored rows. A row that it refuses by an exception, or that is damaged, is left
-        out with a warning, and removed from its file."""
+        out with a warning, and removed from its file where the folder is held."""
         return self._from_first(
             lambda: [row for file in sorted(self.place.glob(_LINES.format("*"))) for row in self._lines_of(file, read)]
         )
@@ -326,7 +333,7 @@ class Store(Nowhere):
                 sound.append(line + b"\n")
             except (files.Damaged, *_UNFIT) as problem:
                 lost.append(f"line {k}: {problem}")
-        if lost or rest:  # a last line that was not written to its end, as by a process that was killed
+        if self._lock is not None and (lost or rest):  # the rest: of a line that was not written to its end
             files.replace(file, b"".join(sound))
         if lost:
             more = f", and {len(lost) - 1} more" if len(lost) > 1 else ""
@@ -542,9 +549,9 @@ class Store(Nowhere):
         )
 
 
-def _data(scene):
+def _data(as_data):
     try:
-        return to_data(scene)
+        return as_data()
     except NotData as problem:
         return {"missing": str(problem)}
 
@@ -597,7 +604,7 @@ def resume(
     progress: bool | None = None,
     comm: "MPI.Comm | None" = None,
 ) -> Any:
-    """Continue what a folder holds, to the same digits: a motion of rods or of a drill-string.
+    """Continue what a folder holds, to the same digits: a motion of rods or of a drill-string, or a sweep over depths.
 
     It does not matter what ended the run: a killed process, Ctrl-C, a full disk. All saved states are kept. The run
     continues from the last checkpoint of the solver and computes what came after it again. Checkpoints are two seconds
@@ -606,10 +613,10 @@ def resume(
     A motion that fails again in the same way, such as where steps fail however short they are, needs another
     `simulate`, with `start=` if need be.
 
-    A study, or a sweep over depths, goes on by the same call that began it: its folder does not hold the functions.
+    A study goes on by the same call that began it: its folder does not hold the task.
 
     Args:
-        folder: its name, the `folder` of `simulate` or `simulate_drilling`.
+        folder: its name, the `folder` of `simulate`, `simulate_drilling` or `depth_sweep`.
         scene: the `Scene` or `Drilling` of the motion; it is compared with the mark in the folder. None for the scene
             stored in the folder, which is missing where a part of it is a function written in Python or of a class of
             your own. It is stored as data, so that a folder cannot run code.
@@ -618,7 +625,7 @@ def resume(
         progress, comm: as of `simulate`; with the same number of ranks.
 
     Returns:
-        `History` or `DrillingHistory` with all states from the start; at once where the motion is complete.
+        `History` or `DrillingHistory` with all states from the start, or `DepthSweep`; at once where it is complete.
 
     Raises:
         SceneError: no such folder, another scene, a shorter duration, another number of ranks, another process that

@@ -95,9 +95,16 @@ def study(
     return found
 
 
-def go_on(store, scene, duration, progress):
-    """`resume` of a study, which holds no functions."""
+def go_on(store, *given):
+    """`resume` and `read` of a study, whose folder does not hold the task.
+
+    Raises:
+        SceneError: always.
+    """
     raise SceneError(f"{store.place}: it holds a study: expected the same call of study, which goes on")
+
+
+read = go_on
 
 
 def _told(task, cases, *, strictly):

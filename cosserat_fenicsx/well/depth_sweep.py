@@ -8,12 +8,14 @@ the mesh touch the wall. On the first mesh they were 21 to 23, and one start of 
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from cosserat_fenicsx.checks import File, Numbers, finite_array, refuse
 from cosserat_fenicsx.errors import NotConverged, SceneError
+from cosserat_fenicsx.parts import from_data, to_data
 from cosserat_fenicsx.progress import Progress
 from cosserat_fenicsx.quantities import Quantity, Units
 from cosserat_fenicsx.ranks import world
@@ -36,6 +38,8 @@ KIND = Kind(
     what="sweep", home="well.depth_sweep", call="depth_sweep", again="the same call of depth_sweep goes on from there",
     differs="it holds another sweep, expected the same call, or another folder",
 )  # fmt: skip
+#: Arguments that are parts; the others are plain, but for the operations.
+_PARTS = {"hole": Borehole, "string": DrillString, "mud": Mud}
 _PLACE = ("operation", "friction", "depth")
 
 
@@ -203,29 +207,75 @@ def depth_sweep(
     settings = {"mud": mud, "model": model, "tol": tol, "torque_convention": torque_convention}
     for depth in (depths.min(), depths.max()):  # what does not fit is refused before the computation
         pieces_of(hole, string, operations[0], mud, float(depth))
-    shape = (len(operations), len(friction), len(depths))
-    values = {name: np.full(shape, np.nan) for name in KEPT}
-    sweep = DepthSweep(operations, depths, friction, values)
-    about = {"hole": hole, "string": string, "operations": operations, "depths": depths, "friction": friction}
+    sweep = _empty(operations, depths, friction)
     store = Nowhere()
     if folder is not None:
-        store = Store(folder, KIND).begin(_mark({**about, **settings}))
-        for answer in store.lines(lambda row: _answer_in(row, shape)):
-            _put(sweep, *answer)
-    missing = np.argwhere(~sweep.done)
-    with store.ending(sweep), Progress([len(missing)], progress, world(), "answer") as bar:
-        bar.start("depth sweep")
-        for number, (i, j, k) in enumerate(missing.tolist(), start=1):
-            found = _answer(holes[j], string, operations[i], float(depths[k]), settings)
-            _put(sweep, (i, j, k), *found)
-            store.keep(_row((i, j, k), *found), sweep)
-            bar.reached(number)
+        about = {"hole": hole, "string": string, "operations": operations, "depths": depths, "friction": friction}
+        about |= settings
+        store = Store(folder, KIND).begin(_mark(about), partial(_as_data, about))
+    with store.ending(sweep):
+        _put_stored(sweep, store)
+        missing = np.argwhere(~sweep.done)
+        with Progress([len(missing)], progress, world(), "answer") as bar:
+            bar.start("depth sweep")
+            for number, (i, j, k) in enumerate(missing.tolist(), start=1):
+                found = _answer(holes[j], string, operations[i], float(depths[k]), settings)
+                _put(sweep, (i, j, k), *found)
+                store.keep(_row((i, j, k), *found), sweep)
+                bar.reached(number)
     return sweep
 
 
 def go_on(store, scene, duration, progress):
-    """`resume` of a sweep, which holds no objects."""
-    raise SceneError(f"{store.place}: it holds a sweep: expected the same call of depth_sweep, which goes on")
+    """`resume` of a sweep; see there."""
+    for name, value in (("scene", scene), ("duration", duration)):
+        if value is not None:
+            refuse("resume", name, value, f"None, since {store.place} holds a sweep")
+    return depth_sweep(**_asked(store), folder=store.place, progress=progress)
+
+
+def read(store, scene):
+    """The answers of a sweep that are stored so far."""
+    asked = _asked(store)
+    sweep = _empty(*(asked[name] for name in ("operations", "depths", "friction")))
+    _put_stored(sweep, store)
+    return sweep
+
+
+def _empty(operations, depths, friction):
+    shape = (len(operations), len(friction), len(depths))
+    return DepthSweep(operations, depths, friction, {name: np.full(shape, np.nan) for name in KEPT})
+
+
+def _as_data(about):
+    """The arguments of `depth_sweep` as data."""
+    parts = {name: about[name] and to_data(about[name]) for name in _PARTS}
+    listed = {"operations": [*map(to_data, about["operations"])], "depths": about["depths"].tolist()}
+    listed["friction"] = [np.asarray(x).tolist() for x in about["friction"]]
+    return {**about, **parts, **listed}
+
+
+def _asked(store):
+    """The arguments of `depth_sweep` in a folder.
+
+    Raises:
+        SceneError: they are not stored.
+    """
+    data = store.head["scene"]
+    if "missing" in data:
+        raise SceneError(
+            f"{store.place}: it does not hold the arguments ({data['missing']}): expected the same call of "
+            "depth_sweep, which goes on from there"
+        )
+    parts = {name: data[name] and from_data(cls, data[name]) for name, cls in _PARTS.items()}
+    operations = tuple(from_data(Operation, x) for x in data["operations"])
+    return {**data, **parts, "operations": operations, "depths": np.array(data["depths"]),
+            "friction": tuple(data["friction"])}  # fmt: skip
+
+
+def _put_stored(sweep, store):
+    for answer in store.lines(lambda row: _answer_in(row, sweep.done.shape)):
+        _put(sweep, *answer)
 
 
 def _mark(about):
