@@ -95,3 +95,66 @@ def test_stored_and_resumed(load, tmp_path_all):
     np.testing.assert_array_equal(resumed.position(ROD.end), whole.position(ROD.end))
     resumed.plot(tmp_path_all / "motion.png")
     cf.solve(scene, [0.5, 1.0], elements=4).plot(tmp_path_all / "shape.png")
+
+
+FILE = """
+use = ["extensions.augmented", "extensions.hardening", "extensions.pressure"]
+[[rods]]
+name = "column"
+curve = { type = "Line", start = [0, 0, 0], end = [0, 0, 1] }
+[rods.section]
+type = "Stiffness"
+shear = [1e4, 1e4]
+axial = 2e4
+bending = [10, 8]
+torsion = 7
+mass = 1
+inertia = [0.1, 0.1, 0.2]
+[[supports]]
+type = "Clamp"
+station = "column.start"
+[[loads]]
+type = "AcrossRod"
+rod = "column"
+pressure = "2 N/m"
+[[loads]]
+type = "Wall"
+rod = "column"
+point = [0, 0, 0]
+direction = [0, 0, 1]
+clearance = 1e-3
+stiffness = 1e3
+law = { type = "Hardening", doubling = "4 mm" }
+"""
+#: The same scene in Python.
+SAME = cf.Scene([ROD], [cf.Clamp(ROD.start)], [AcrossRod(ROD, 2.0), HARD])
+
+
+def test_in_a_scene_file(tmp_path_all):
+    """Load, law and formulation; a result is saved with its scene, and a motion resumed without a scene given."""
+    file = tmp_path_all / "scene.toml"
+    file.write_text(FILE + '[solve]\nload_factors = [1.0]\nelements = 4\nformulation = "augmented"\n')
+    task = cf.read(file)
+    path, scene = task.run(model="spatial"), task.scene
+    expected = cf.solve(SAME, [1.0], model="spatial", elements=4, formulation=Augmented).position(ROD.end)
+    np.testing.assert_array_equal(path.position("column.end"), expected)
+    path.save(tmp_path_all / "path.h5")
+    again = cf.read_path(tmp_path_all / "path.h5")
+    np.testing.assert_array_equal(again.position("column.end"), path.position("column.end"))
+    assert again.scene.loads[1].law == Hardening(0.004)
+    cf.simulate(scene, 0.01, dt=1e-3, elements=2, folder=tmp_path_all / "run")
+    resumed = cf.resume(tmp_path_all / "run", duration=0.02)
+    whole = cf.simulate(SAME, 0.02, dt=1e-3, elements=2)
+    np.testing.assert_array_equal(resumed.position("column.end"), whole.position(ROD.end))
+
+
+def test_mistakes_in_a_scene_file(tmp_path_all):
+    file = tmp_path_all / "scene.toml"
+    for wrong, words in (
+        (("AcrossRod", "AcrosRod"), "did you mean 'AcrossRod'"),
+        (("doubling", "doublin"), "did you mean 'doubling'"),
+        (('"2 N/m"', '"2 N"'), "pressure = '2 N'"),
+    ):
+        file.write_text(FILE.replace(*wrong))
+        with pytest.raises(cf.SceneError, match=words):
+            cf.read(file)

@@ -5,7 +5,9 @@ from dataclasses import dataclass
 import ufl
 
 import cosserat_fenicsx as cf
+from cosserat_fenicsx.parts import ForcePerLength
 from cosserat_fenicsx.scene.action import vector
+from cosserat_fenicsx.scene.rod import RodOrName
 
 
 @dataclass(frozen=True)
@@ -17,8 +19,8 @@ class AcrossRod(cf.LineAction):
         pressure: N/m.
     """
 
-    rod: cf.Rod
-    pressure: float
+    rod: RodOrName
+    pressure: ForcePerLength
 
     follows = True
 
