@@ -84,6 +84,7 @@ DIMENSIONS = {
                                                 "GPa": units.GPa}, "N/m^2", 1e15),
     "damping": Dimension("N s/m", {"N s/m": 1.0, "kN s/m": units.kN}, "N s/m"),
     "damping per length": Dimension("N s/m^2", {"N s/m^2": 1.0}, "N s/m^2", 1e10),
+    "drag per length": Dimension("N s^2/m^3", {"N s^2/m^3": 1.0}, "N s^2/m^3"),
     "torsional damping": Dimension("N m s/rad", {"N m s/rad": 1.0, "kN m s/rad": units.kNm}, "N m s/rad", 1e10),
     "bending stiffness": Dimension("N m^2", {"N m^2": 1.0, "kN m^2": units.kN, "MN m^2": units.MN}, "N m^2"),
     "energy": Dimension("J", {"J": 1.0, "kJ": 1e3, "MJ": 1e6, "ft-lbf": units.ft_lbf}, "ft-lbf"),

@@ -331,6 +331,17 @@ class Several(Kind):
 
 
 @dataclasses.dataclass(frozen=True)
+class Direction(Several):
+    """Three finite numbers that are not all zero, made a unit vector."""
+
+    words = "a direction, three numbers"
+
+    def check(self, owner, field, value):
+        """See `Kind`."""
+        return checks.direction(owner, field, value)
+
+
+@dataclasses.dataclass(frozen=True)
 class Text(Kind):
     """A text."""
 

@@ -31,6 +31,7 @@ from typing import Annotated, Any, TypeVar
 from cosserat_fenicsx.checks import Numbers, store
 from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.kinds import FAMILIES, Writing, fields_of, table_schema
+from cosserat_fenicsx.kinds import Direction as Direction
 from cosserat_fenicsx.kinds import FileName as FileName
 from cosserat_fenicsx.kinds import Items as Items
 from cosserat_fenicsx.kinds import Kind as Kind
@@ -223,10 +224,14 @@ TorsionalStiffness = Annotated[float, Number("torsional stiffness", at_least(0))
 WallStiffness = Annotated[float, Number("stiffness per length", positive())]
 Damping = Annotated[float, Number("damping", at_least(0))]
 TorsionalDamping = Annotated[float, Number("torsional damping", at_least(0))]
+DampingPerLength = Annotated[float, Number("damping per length", at_least(0))]
+QuadraticDrag = Annotated[float, Number("drag per length", at_least(0))]
 Friction = Annotated[float, Number(limits=between(0, 5, "a coefficient of friction"))]
 Ratio = Annotated[float, Number(limits=positive())]
 Count = Annotated[int, Number(limits=at_least(1), whole=True)]
 #: Three numbers, inertial.
 Vector = Annotated[Numbers, Several()]
+#: Three numbers of any length, inertial, made a unit vector.
+UnitVector = Annotated[Numbers, Direction()]
 #: The name of a file.
 File = Annotated[str | PathLike[str], FileName()]

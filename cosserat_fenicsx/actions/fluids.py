@@ -6,8 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 import ufl
 
-from cosserat_fenicsx.actions.springs import store_coefficients
-from cosserat_fenicsx.checks import Numbers, instance, number, positive, refuse, store, vector
+from cosserat_fenicsx.actions.springs import require_one
+from cosserat_fenicsx.checks import Numbers, number, positive, refuse, store, vector
+from cosserat_fenicsx.parts import DampingPerLength, QuadraticDrag
 from cosserat_fenicsx.scene import action
 from cosserat_fenicsx.scene.action import LineAction, scalar
 from cosserat_fenicsx.scene.loads import Load
@@ -43,9 +44,8 @@ class AddedMass(LineAction):
 
     work, scaled = None, False
 
-    def __post_init__(self):
+    def validate(self):
         known = is_known(self, "rod", Rod)
-        instance(self, "axial", self.axial, bool, "True or False")
         if not isinstance(self.mass, list | tuple):
             store(self, mass=positive(self, "mass", self.mass, "kg/m"))
             return
@@ -102,17 +102,16 @@ class Drag(Load, LineAction):
     """
 
     rod: RodOrName
-    normal: float
-    tangential: float = 0.0
+    normal: QuadraticDrag
+    tangential: QuadraticDrag = 0.0
     current: Numbers | FunctionAlong = (0.0, 0.0, 0.0)
     permanent: bool = False
 
     jumps, follows = (), True
 
-    def __post_init__(self):
+    def validate(self):
         is_known(self, "rod", Rod)
-        units = dict.fromkeys(("normal", "tangential"), "N s^2/m^3")
-        store_coefficients(self, units, "a coefficient (N s^2/m^3)")
+        require_one(self, ("normal", "tangential"), "a coefficient (N s^2/m^3)")
         if along_or_vector(self, "current", self.current, self.rod) is None:
             store(self, current=vector(self, "current", self.current, "m/s"))
         self._check_permanent()
@@ -156,15 +155,14 @@ class LinearDrag(LineAction):
     """
 
     rod: RodOrName
-    normal: float
-    tangential: float = 0.0
+    normal: DampingPerLength
+    tangential: DampingPerLength = 0.0
 
     scaled = False
 
-    def __post_init__(self):
+    def validate(self):
         is_known(self, "rod", Rod)
-        units = dict.fromkeys(("normal", "tangential"), "N s/m^2")
-        store_coefficients(self, units, "a coefficient (N s/m^2)")
+        require_one(self, ("normal", "tangential"), "a coefficient (N s/m^2)")
 
     def data(self, rod, s):
         return scalar(self.normal, "N s/m^2"), scalar(self.tangential, "N s/m^2")

@@ -1,31 +1,31 @@
 """Springs, elastic beds, dashpots and point masses: what holds, damps and loads a station or a rod in place."""
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 import ufl
 
-from cosserat_fenicsx.checks import Numbers, direction, number, positive, refuse, store
+from cosserat_fenicsx.checks import Numbers, number, refuse, store
+from cosserat_fenicsx.parts import (
+    Damping,
+    Mass,
+    Stiffness,
+    TorsionalDamping,
+    TorsionalStiffness,
+    UnitVector,
+    WallStiffness,
+    at_least,
+    positive,
+)
 from cosserat_fenicsx.scene.action import LineAction, PointAction, scalar, vector
 from cosserat_fenicsx.scene.rod import Rod, RodOrName, Station, StationOrName, is_known
 
 
-def store_coefficients(action, units, expected):
-    """Check and store the coefficients of an action: numbers from 0 on, at least one of them not 0.
-
-    Args:
-        action: the action, a frozen dataclass.
-        units: {field: unit}.
-        expected: end of the message if all are 0.
-
-    Raises:
-        SceneError: a negative or infinite coefficient, or all are 0.
-    """
-    for field, unit in units.items():
-        value = number(action, field, getattr(action, field), f"a number from 0 on ({unit})", lambda x: 0 <= x < np.inf)
-        store(action, **{field: value})
-    if not any(getattr(action, field) for field in units):
-        refuse(action, next(iter(units)), 0.0, expected)
+def require_one(action, fields, expected):
+    """Refuse an action whose coefficients in these fields are all 0."""
+    if not any(getattr(action, field) for field in fields):
+        refuse(action, fields[0], 0.0, expected)
 
 
 class Directed:
@@ -34,10 +34,6 @@ class Directed:
     Attributes:
         works: the virtual works without a direction and with one, the latter with the direction as its last datum.
     """
-
-    def _store_direction(self):
-        if self.direction is not None:
-            store(self, direction=direction(self, "direction", self.direction))
 
     @property
     def work(self):
@@ -70,8 +66,8 @@ class Foundation(Directed, LineAction):
     """
 
     rod: RodOrName
-    stiffness: float
-    direction: Numbers | None = None
+    stiffness: WallStiffness
+    direction: UnitVector | None = None
 
     scaled = False
 
@@ -79,10 +75,8 @@ class Foundation(Directed, LineAction):
     def works(self):
         return alike, along
 
-    def __post_init__(self):
+    def validate(self):
         is_known(self, "rod", Rod)
-        store(self, stiffness=positive(self, "stiffness", self.stiffness, "N/m^2"))
-        self._store_direction()
 
     def data(self, rod, s):
         return self._with_direction(scalar(self.stiffness, "N/m^2"))
@@ -121,9 +115,9 @@ class Spring(Directed, PointAction):
     """
 
     station: StationOrName
-    stiffness: float = 0.0
-    rotational: float = 0.0
-    direction: Numbers | None = None
+    stiffness: Annotated[Stiffness, at_least(0)] = 0.0
+    rotational: TorsionalStiffness = 0.0
+    direction: UnitVector | None = None
 
     scaled = False
 
@@ -131,11 +125,9 @@ class Spring(Directed, PointAction):
     def works(self):
         return _sprung, _sprung_along
 
-    def __post_init__(self):
+    def validate(self):
         is_known(self, "station", Station)
-        units = {"stiffness": "N/m", "rotational": "N m/rad"}
-        store_coefficients(self, units, "a stiffness (N/m), or a rotational one (N m/rad)")
-        self._store_direction()
+        require_one(self, ("stiffness", "rotational"), "a stiffness (N/m), or a rotational one (N m/rad)")
 
     def data(self, rod, s):
         return self._with_direction(scalar(self.stiffness, "N/m"), scalar(self.rotational, "N m/rad"))
@@ -175,9 +167,9 @@ class Dashpot(Directed, PointAction):
     """
 
     station: StationOrName
-    damping: float = 0.0
-    rotational: float = 0.0
-    direction: Numbers | None = None
+    damping: Damping = 0.0
+    rotational: TorsionalDamping = 0.0
+    direction: UnitVector | None = None
 
     scaled = False
 
@@ -185,11 +177,9 @@ class Dashpot(Directed, PointAction):
     def works(self):
         return _resisted, _resisted_along
 
-    def __post_init__(self):
+    def validate(self):
         is_known(self, "station", Station)
-        units = {"damping": "N s/m", "rotational": "N m s/rad"}
-        store_coefficients(self, units, "a damping (N s/m), or a rotational one (N m s/rad)")
-        self._store_direction()
+        require_one(self, ("damping", "rotational"), "a damping (N s/m), or a rotational one (N m s/rad)")
 
     def data(self, rod, s):
         return self._with_direction(scalar(self.damping, "N s/m"), scalar(self.rotational, "N m s/rad"))
@@ -217,14 +207,13 @@ class PointMass(PointAction):
     """
 
     station: StationOrName
-    mass: float
+    mass: Annotated[Mass, positive()]
     moments: float | Numbers = 0.0
 
     work, scaled = None, False
 
-    def __post_init__(self):
+    def validate(self):
         is_known(self, "station", Station)
-        store(self, mass=positive(self, "mass", self.mass, "kg"))
         given = np.atleast_1d(self.moments)
         if given.shape not in ((1,), (3,)):
             refuse(self, "moments", self.moments, "one number, or three about d_1, d_2, d_3 (kg m^2)")
