@@ -331,17 +331,6 @@ class Several(Kind):
 
 
 @dataclasses.dataclass(frozen=True)
-class Direction(Several):
-    """Three finite numbers that are not all zero, made a unit vector."""
-
-    words = "a direction, three numbers"
-
-    def check(self, owner, field, value):
-        """See `Kind`."""
-        return checks.direction(owner, field, value)
-
-
-@dataclasses.dataclass(frozen=True)
 class Text(Kind):
     """A text."""
 
@@ -428,7 +417,8 @@ class Object(Kind):
     @property
     def words(self):
         """See `Kind`."""
-        *first, last = [f"{name}(...)" for name in self.known()] or ["an object"]
+        known = [f"{name}(...)" for name in self.known()]
+        *first, last = known or [f"a {cls._of}" if is_family(cls) else "an object" for cls in self.classes[:1]]
         return f"{', '.join(first)} or {last}" if first else last
 
     def check(self, owner, field, value):

@@ -28,10 +28,9 @@ from collections.abc import Callable
 from os import PathLike
 from typing import Annotated, Any, TypeVar
 
-from cosserat_fenicsx.checks import Numbers, store
+from cosserat_fenicsx.checks import Numbers, direction, store
 from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.kinds import FAMILIES, Writing, fields_of, table_schema
-from cosserat_fenicsx.kinds import Direction as Direction
 from cosserat_fenicsx.kinds import FileName as FileName
 from cosserat_fenicsx.kinds import Items as Items
 from cosserat_fenicsx.kinds import Kind as Kind
@@ -195,6 +194,16 @@ def positive(what="", *, infinite=False):
 def at_least(low, what=""):
     """Limits of numbers from `low`; `what`: see `Limits`."""
     return Limits(low, what=what)
+
+
+@dataclasses.dataclass(frozen=True)
+class Direction(Several):
+    """Three finite numbers that are not all zero, made a unit vector."""
+
+    words = "a direction, three numbers"
+
+    def check(self, owner, field, value):
+        return direction(owner, field, value)
 
 
 _T = TypeVar("_T")

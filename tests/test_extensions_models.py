@@ -64,7 +64,7 @@ def test_a_contact_law_in_motion():
 def test_a_law_is_refused_in_words():
     with pytest.raises(cf.SceneError, match="Hardening.doubling = -1: expected a positive number"):
         Hardening(-1)
-    with pytest.raises(cf.SceneError, match="Wall.law = 'stiff': expected a law of contact"):
+    with pytest.raises(cf.SceneError, match="Wall.law = 'stiff': expected Hardening"):
         pressed("stiff")
 
 

@@ -7,14 +7,29 @@ and `HoleRing`, in motions, set-valued friction.
 from collections import namedtuple
 from dataclasses import dataclass, field
 from functools import cache
+from typing import Annotated
 
 import numpy as np
 import ufl
 
-from cosserat_fenicsx.checks import Numbers, direction, instance, number, positive, refuse, store, vector
+from cosserat_fenicsx.checks import Numbers, number, refuse, store, vector
 from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.forms.contact import linear, wall_work
-from cosserat_fenicsx.parts import Part, fields_of
+from cosserat_fenicsx.parts import (
+    Length,
+    Limits,
+    Number,
+    Part,
+    Several,
+    Speed,
+    Stiffness,
+    UnitVector,
+    WallStiffness,
+    at_least,
+    between,
+    fields_of,
+    positive,
+)
 from cosserat_fenicsx.scene import action
 from cosserat_fenicsx.scene.action import LineAction, PointAction
 from cosserat_fenicsx.scene.rod import Rod, RodOrName, Station, StationOrName, is_known
@@ -65,10 +80,6 @@ class _Pressing:
     def _law_data(self):
         return () if self.law is None else self.law.data()
 
-    def _check_law(self):
-        if self.law is not None:
-            instance(self, "law", self.law, ContactLaw, "a law of contact, such as a class of your own")
-
 
 def straight_wall(point, test, a, t, clearance, kp, *law, pressure=linear):
     """Virtual work of a straight wall without friction; a, t: a point and the direction of its axis."""
@@ -99,21 +110,15 @@ class Wall(_Pressing, LineAction):
     """
 
     rod: RodOrName
-    point: Numbers
-    direction: Numbers
-    clearance: float
-    stiffness: float = 1e9
+    point: Annotated[Numbers, Several("length")]
+    direction: UnitVector
+    clearance: Length
+    stiffness: WallStiffness = 1e9
     law: ContactLaw | None = None
 
     scaled, at_nodes, presses, wall_work = False, True, True, staticmethod(straight_wall)
 
-    def __post_init__(self):
-        store(
-            self, point=vector(self, "point", self.point, "m"), direction=direction(self, "direction", self.direction)
-        )
-        store(self, clearance=positive(self, "clearance", self.clearance, "m"))
-        store(self, stiffness=positive(self, "stiffness", self.stiffness, "N/m^2"))
-        self._check_law()
+    def validate(self):
         if is_known(self, "rod", Rod):
             self._check_inside()
 
@@ -164,12 +169,10 @@ class _Confined(_Pressing):
     scaled, wall_work = False, staticmethod(wall_work)
     traits = {"dead": False, "known_force": False, "rates": False, "turns": True, "flat": False}
 
-    def _check(self, unit):
+    def validate(self):
         if not callable(getattr(self.path, "nearest", None)):
             refuse(self, "path", self.path, "the axis of the tube, such as a WellPath")
-        store(self, stiffness=positive(self, "stiffness", self.stiffness, unit))
-        store(self, begins=number(self, "begins", self.begins, "a number (m)", np.isfinite))
-        self._check_law()
+        super().validate()
 
     def data(self, rod, s):
         """See `Action`: as where the rod lies on the axis, to which the spring leads again."""
@@ -228,18 +231,18 @@ class TubeWall(_Confined, LineAction):
     path: object
     radius: float | Numbers
     contact_radius: float | Numbers
-    stiffness: float = 1e9
+    stiffness: WallStiffness = 1e9
     friction: float | Numbers = 0.0
     slip: Numbers = (0.0, 0.0)
-    begins: float = 0.0
+    begins: Annotated[Length, Limits()] = 0.0
     has_arm: bool = True
     law: ContactLaw | None = None
     stage: Stage = field(default_factory=Stage, init=False, repr=False, compare=False)
 
     at_nodes, presses, unit = True, True, "N/m^2"
 
-    def __post_init__(self):
-        self._check("N/m^2")
+    def validate(self):
+        super().validate()
         store(self, radius=pieces(self, "radius", self.radius, "m", least=0.0))
         store(self, contact_radius=pieces(self, "contact_radius", self.contact_radius, "m", least=0.0))
         store(self, friction=pieces(self, "friction", self.friction, "1"), slip=slip_pieces(self, self.slip))
@@ -321,25 +324,19 @@ class TubeRing(_Confined, PointAction):
 
     station: StationOrName
     path: object
-    clearance: float
-    contact_radius: float
-    stiffness: float = 1e9
-    friction: float = 0.0
+    clearance: Annotated[Length, at_least(0)]
+    contact_radius: Length
+    stiffness: Annotated[Stiffness, positive()] = 1e9
+    friction: Annotated[float, Number(limits=at_least(0))] = 0.0
     slip: Numbers = (0.0, 0.0)
-    begins: float = 0.0
+    begins: Annotated[Length, Limits()] = 0.0
     law: ContactLaw | None = None
     stage: Stage = field(default_factory=Stage, init=False, repr=False, compare=False)
 
     unit = "N/m"
 
-    def __post_init__(self):
-        self._check("N/m")
-        store(self, contact_radius=positive(self, "contact_radius", self.contact_radius, "m"))
-        for name, unit in (("clearance", "m"), ("friction", "1")):
-            value = number(
-                self, name, getattr(self, name), f"a number of zero or more ({unit})", lambda x: 0 <= x < np.inf
-            )
-            store(self, **{name: value})
+    def validate(self):
+        super().validate()
         store(self, slip=slip_pieces(self, self.slip))
         is_known(self, "station", Station)
 
@@ -412,13 +409,6 @@ class _InMotion:
 
     touches, work, refreshed = True, None, None
 
-    def _check(self, unit):
-        super()._check(unit)
-        expected = "a number of zero or more (s/m)"
-        store(self, damping=number(self, "damping", self.damping, expected, lambda x: 0 <= x < np.inf))
-        store(self, kinetic=number(self, "kinetic", self.kinetic, "a number from 0 to 1", lambda x: 0 <= x <= 1))
-        store(self, speed=positive(self, "speed", self.speed, "m/s"))
-
     def data(self, rod, s):
         return ()
 
@@ -462,9 +452,9 @@ class HoleWall(_InMotion, TubeWall):
     slip: Numbers = field(default=(0.0, 0.0), init=False, repr=False, compare=False)
     law: None = field(default=None, init=False, repr=False, compare=False)
     has_arm: bool = field(default=True, init=False, repr=False, compare=False)
-    damping: float = 0.0
-    kinetic: float = 1.0
-    speed: float = 0.1
+    damping: Annotated[float, Number(limits=at_least(0))] = 0.0
+    kinetic: Annotated[float, Number(limits=between(0, 1))] = 1.0
+    speed: Annotated[Speed, positive()] = 0.1
 
 
 @dataclass(frozen=True)
@@ -486,6 +476,6 @@ class HoleRing(_InMotion, TubeRing):
 
     slip: Numbers = field(default=(0.0, 0.0), init=False, repr=False, compare=False)
     law: None = field(default=None, init=False, repr=False, compare=False)
-    damping: float = 0.0
-    kinetic: float = 1.0
-    speed: float = 0.1
+    damping: Annotated[float, Number(limits=at_least(0))] = 0.0
+    kinetic: Annotated[float, Number(limits=between(0, 1))] = 1.0
+    speed: Annotated[Speed, positive()] = 0.1
