@@ -1,7 +1,10 @@
 """Laws and drives of drill-strings that are defined outside the package, each in one file of tests/extensions."""
 
 
+import subprocess
+import sys
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -148,6 +151,64 @@ def test_a_control_called_once_a_sample(model, tmp_path):
     cf.simulate_drilling(ours, 2.503, folder=tmp_path / "run", **options)
     resumed = cf.resume(tmp_path / "run", ours, duration=6.0, progress=False)
     np.testing.assert_array_equal(resumed.rows, whole.rows)
+
+
+FILE = """
+use = ["extensions.karnopp", "extensions.sampled_speed", "extensions.stribeck_wall"]
+
+[well]
+stations = [[0, 0, 0], [200, 0, 0], [600, 40, 0], [1000, 40, 0]]
+sections = [{ to = 1000.0, diameter = 0.25, friction = 0.3 }]
+
+[string]
+components = [
+    { type = "Collar", length = 100.0, outer_diameter = 0.165, inner_diameter = 0.057 },
+    { type = "DrillPipe", outer_diameter = 0.127, inner_diameter = 0.1086 },
+]
+
+[mud]
+density = 1200.0
+
+[drive]
+speed = "60 rpm"
+inertia = 2000.0
+control = { type = "LimitedSpeed", Kp = 2e3, Ki = 1e3, most = "20 kN m" }
+
+[bit]
+weight = "50 kN"
+law = { type = "Karnopp", static = "3 kN m", dynamic = "2 kN m" }
+
+[wall_friction]
+type = "StribeckCurve"
+static = 0.3
+kinetic = 0.2
+speed = "0.1 m/s"
+
+[simulate]
+duration = 1.0
+"""
+
+
+def test_all_three_in_a_scene_file_stored_and_resumed(tmp_path):
+    """Another process, which has not imported them, goes on from the folder to the same digits."""
+    (tmp_path / "rig.toml").write_text(FILE)
+    found = cf.read(tmp_path / "rig.toml")
+    assert found.scene.bit.law == Karnopp(3e3, 2e3) and found.scene.friction == StribeckCurve(0.3, 0.2, 0.1)
+    assert found.scene.drive.control == LimitedSpeed(2e3, 1e3, 2e4)
+    found.run(folder=tmp_path / "run", duration=0.5, progress=False).plot(tmp_path / "run.png")
+    code = f"import cosserat_fenicsx as cf; cf.resume({str(tmp_path / 'run')!r}, duration=1.0, progress=False)"
+    path = [str(Path(__file__).parent), *sys.path]
+    subprocess.run([sys.executable, "-c", f"import sys; sys.path[:0] = {path!r}; {code}"], check=True)
+    resumed, whole = cf.resume(tmp_path / "run"), found.run(profile_every=0.5 / 400, progress=False)
+    np.testing.assert_array_equal(resumed.rows, whole.rows)
+    for name, wrong, words in (
+        ("Karnopp", "Karnop", "'Karnop': did you mean 'Karnopp'"),
+        ('"2 kN m"', '"2 kN"', "Karnopp.dynamic = '2 kN': .*N m"),
+        ('"3 kN m"', '"1 kN m"', "line 24, column 27: .*Karnopp.static = 1000.0: expected at least the dynamic"),
+    ):
+        (tmp_path / "wrong.toml").write_text(FILE.replace(name, wrong))
+        with pytest.raises(cf.SceneError, match=words):
+            cf.read(tmp_path / "wrong.toml")
 
 
 def test_a_control_called_once_a_sample_in_the_linear_theory():

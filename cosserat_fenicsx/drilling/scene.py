@@ -3,13 +3,14 @@
 import math
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Literal
 
-from cosserat_fenicsx.checks import instance, positive, refuse, store
+from cosserat_fenicsx.checks import refuse
 from cosserat_fenicsx.drilling.bit_laws import BitOnRock
 from cosserat_fenicsx.drilling.segments import Discs, Segment, segment_of
 from cosserat_fenicsx.drilling.top_drive import Hook, TopDrive
 from cosserat_fenicsx.drilling.wall_friction import FrictionLaw, ViscousDrag
-from cosserat_fenicsx.parts import Part
+from cosserat_fenicsx.parts import Depth, Part
 from cosserat_fenicsx.well.components import DrillString, weight_in_mud
 from cosserat_fenicsx.well.hole import Borehole, Mud
 
@@ -44,21 +45,11 @@ class Drilling(Part):
     mud: Mud | None = None
     friction: FrictionLaw | None = None
     drag: ViscousDrag | None = None
-    depth: float | None = None
-    start: str = "rest"
+    depth: Depth | None = None
+    start: Literal["rest", "steady"] = "rest"
 
-    def __post_init__(self):
-        parts = {
-            "string": (DrillString, Discs), "drive": TopDrive, "bit": BitOnRock, "hole": Borehole, "hook": Hook,
-            "mud": Mud, "friction": FrictionLaw, "drag": ViscousDrag,
-        }  # fmt: skip
-        for field, kinds in parts.items():
-            value = getattr(self, field)
-            if value is not None or field in ("string", "drive"):
-                names = " or ".join(x.__name__ for x in (kinds if isinstance(kinds, tuple) else (kinds,)))
-                instance(self, field, value, kinds, f"{names}(...)")
-        if self.start not in ("rest", "steady"):
-            refuse(self, "start", self.start, "'rest' or 'steady'")
+    def validate(self):
+        """See `Part`."""
         if self.discs is not None:
             for field in ("hole", "mud", "friction", "drag", "depth"):
                 if getattr(self, field) is not None:
@@ -68,9 +59,7 @@ class Drilling(Part):
             return
         if self.friction is not None and self.hole is None:
             refuse(self, "hole", None, "a Borehole, where there is friction at its wall")
-        if self.depth is not None:
-            store(self, depth=positive(self, "depth", self.depth, "m"))
-        elif self.hole is None and self.string.components[-1].length is None:
+        if self.depth is None and self.hole is None and self.string.components[-1].length is None:
             refuse(self.string.components[-1], "length", None, "a length (m), where there is neither hole nor depth")
         _ = self.segments
 

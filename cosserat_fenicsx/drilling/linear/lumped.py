@@ -12,16 +12,20 @@ characteristic equation, with E = 1 - exp(-2 pi s/(n om0)) and rho = v0/om0,
 
 import math
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from scipy.optimize import brentq
 
-from cosserat_fenicsx.checks import number, positive, refuse, store
+from cosserat_fenicsx.checks import positive, refuse
 from cosserat_fenicsx.drilling.linear.roots import Box, all_roots
+from cosserat_fenicsx.parts import Number, Part, Ratio, at_least
+
+NotNegative = Annotated[float, Number(limits=at_least(0))]
 
 
 @dataclass(frozen=True)
-class LumpedCutting:
+class LumpedCutting(Part):
     """The lumped model in its own units, see the head of its file.
 
     Args:
@@ -34,19 +38,12 @@ class LumpedCutting:
         SceneError: numbers out of range.
     """
 
-    psi: float
-    blades: int
-    penetration: float = 0.0
-    axial_frequency: float = 0.0
-    axial_damping: float = 0.0
-    torsional_damping: float = 0.0
-
-    def __post_init__(self):
-        store(self, psi=positive(self, "psi", self.psi, "number"))
-        number(self, "blades", self.blades, "a number of blades from 1", lambda x: x >= 1 and x == int(x))
-        for field in ("penetration", "axial_frequency", "axial_damping", "torsional_damping"):
-            value = number(self, field, getattr(self, field), "a number, not negative", lambda x: 0 <= x < math.inf)
-            store(self, **{field: value})
+    psi: Ratio
+    blades: Annotated[int, Number(limits=at_least(1, "a number of blades"), whole=True)]
+    penetration: NotNegative = 0.0
+    axial_frequency: NotNegative = 0.0
+    axial_damping: NotNegative = 0.0
+    torsional_damping: NotNegative = 0.0
 
     def roots(self, rotation: float, up_to: float | None = None) -> np.ndarray:
         """All roots with Re s > -1 at a rotation om0.
