@@ -38,7 +38,7 @@ MOST_TEXT = 2**27
 _WORKBOOKS = (b"PK\x03\x04", b"\xd0\xcf\x11\xe0")
 _SMALLEST = min(MOST.values())
 _OF_STRINGS = ("cosserat_fenicsx.well.", "cosserat_fenicsx.drilling.")
-# Values with a longer text, such as that of a rod, are abbreviated in messages.
+# Longer texts of values, such as a rod's, are abbreviated in messages.
 _LONGEST = 100
 
 
@@ -118,7 +118,7 @@ def stiffness(owner, field, value, unit):
 
 
 def finite_array(owner, field, value, expected):
-    """`value` as an array of floats where it is one of finite numbers, of any shape; refused otherwise."""
+    """`value` as an array of floats of any shape; refused unless all are finite numbers."""
     try:
         array = np.asarray(value)
     except ValueError:
@@ -199,7 +199,7 @@ def direction(owner, field, value):
 
 
 def instance(owner, field, value, kinds, expected):
-    """`value`, refused where it is not one of `kinds`."""
+    """`value`; refused unless it is an instance of `kinds`."""
     if not isinstance(value, kinds):
         refuse(owner, field, value, expected)
     return value
@@ -211,7 +211,7 @@ def store(obj, **fields):
         object.__setattr__(obj, name, value)
 
 
-#: The attribute of what says so.
+#: Attribute of functions that report their arguments in words.
 NAMED = "_names_its_arguments"
 # Names that people try, and those that the package uses.
 _USUAL = {"radius": "diameter", "r": "diameter", "d": "diameter", "young": "E", "youngs_modulus": "E", "rho": "density",
@@ -219,7 +219,7 @@ _USUAL = {"radius": "diameter", "r": "diameter", "d": "diameter", "young": "E", 
 
 
 def in_words(found):
-    """A public class or function, which says what is wrong with its arguments; anything else as it is.
+    """A public class or function with messages on wrong arguments; any other object unchanged.
 
     Classes stay the same objects: the method `__init__` of those that are dataclasses is replaced.
     """
@@ -239,17 +239,17 @@ def _checked(call, named):
         try:
             return call(*given, **named_ones)
         except TypeError:
-            told = _told(call, named.__name__, given, named_ones)
-            if told is None:  # of something that was called inside
+            words = _wrong_arguments(call, named.__name__, given, named_ones)
+            if words is None:  # raised inside the call
                 raise
-        raise TypeError(told)
+        raise TypeError(words)
 
     setattr(checked, NAMED, True)
     return checked
 
 
-def _told(call, name, given, named):
-    """What is wrong with the arguments of a call; None where nothing is."""
+def _wrong_arguments(call, name, given, named):
+    """A message on the wrong arguments of a call; None if they fit."""
     signature = inspect.signature(call)
     try:
         signature.bind(*given, **named)
