@@ -150,7 +150,7 @@ def test_what_is_refused_in_words(collar):
         (lambda: history.orbit(rod.end, wall), r"orbit.station = .*expected a station that the wall is around"),
         (lambda: history.whirl(rod.end), "whirl.wall: expected one of the scene's walls .* 0 are around"),
         (lambda: history.whirl(middle, since=0.1), r"whirl.since = 0.1: expected a time \(s\), at most 0.099"),
-        (lambda: history.whirl(middle, since="late"), "whirl.since = 'late': expected a time"),
+        (lambda: history.whirl(middle, since="late"), "whirl.since = 'late': expected a number"),
         (lambda: history[0].whirl(middle), "whirl: expected a motion with at least two times"),
         (lambda: history[0].plot_orbit(middle), "expected a history with at least two times"),
         (lambda: history.plot_campbell(middle), "expected a motion with at least 200 times"),

@@ -99,7 +99,7 @@ def _deliver(options, scene, tables, compute):
     except NotConverged as failure:
         say(f"cosserat: {failure}")
         return NOT_CONVERGED
-    say(str(found), file=sys.stdout)
+    say(found.details(), file=sys.stdout)
     return DONE if out is None else _write_shapes(found, out, options.command, picture=not options.no_picture)
 
 
