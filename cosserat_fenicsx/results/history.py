@@ -39,6 +39,15 @@ _QUANTITIES = by_name(
 )
 
 
+def _of_ledger(name):
+    """The property of a `History` that has a column of its ledger."""
+
+    def column(history) -> np.ndarray:
+        return history._booked(name)
+
+    return property(column, doc="(n,) or (n, 3), see the class.")
+
+
 class History(RodResult):
     """A motion: its states at the saved times, energies and momenta.
 
@@ -137,38 +146,15 @@ class History(RodResult):
         """(n,), see the class."""
         return self._array("steps")
 
-    @property
-    def kinetic(self) -> np.ndarray:
-        """(n,), see the class."""
-        return self._booked("kinetic")
-
-    @property
-    def strain(self) -> np.ndarray:
-        """(n,), see the class."""
-        return self._booked("strain")
-
-    @property
-    def work(self) -> np.ndarray:
-        """(n,), see the class."""
-        return self._booked("work")
-
-    @property
-    def dissipated(self) -> np.ndarray:
-        """(n,), see the class."""
-        return self._booked("dissipated")
-
-    @property
-    def linear_momentum(self) -> np.ndarray:
-        """(n, 3), see the class."""
-        return self._booked("linear_momentum")
-
-    @property
-    def angular_momentum(self) -> np.ndarray:
-        """(n, 3), see the class."""
-        return self._booked("angular_momentum")
+    kinetic = _of_ledger("kinetic")
+    strain = _of_ledger("strain")
+    work = _of_ledger("work")
+    dissipated = _of_ledger("dissipated")
+    linear_momentum = _of_ledger("linear_momentum")
+    angular_momentum = _of_ledger("angular_momentum")
 
     def _booked(self, name):
-        return np.array([getattr(ledger, name) for ledger in (x.ledger for x in self._records)])
+        return np.array([getattr(record.ledger, name) for record in self._records])
 
     @property
     def time_unit(self) -> float:

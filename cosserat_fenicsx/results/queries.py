@@ -7,7 +7,7 @@ import numpy as np
 from cosserat_fenicsx.checks import refuse
 from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.numerics import directors
-from cosserat_fenicsx.results.on_nodes import OnNodes
+from cosserat_fenicsx.results.result import OnNodes
 from cosserat_fenicsx.scene.describe import describe
 from cosserat_fenicsx.scene.rod import Station, StationOrName
 from cosserat_fenicsx.scene.stresses import Stress

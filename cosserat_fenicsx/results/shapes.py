@@ -12,8 +12,7 @@ from cosserat_fenicsx.checks import refuse
 from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.numerics import ElementRule, directors
 from cosserat_fenicsx.quantities import Quantity
-from cosserat_fenicsx.results.on_nodes import OnNodes
-from cosserat_fenicsx.results.result import Result, by_name
+from cosserat_fenicsx.results.result import OnNodes, Result, by_name
 
 # Largest displacement of a mode of pure twist, m (the largest displacement or rotation of a mode is 1).
 _TWIST = 1e-6

@@ -9,7 +9,7 @@ import numpy as np
 from mpi4py import MPI
 
 from cosserat_fenicsx.errors import SceneError
-from cosserat_fenicsx.results.on_nodes import OnNodes
+from cosserat_fenicsx.results.result import OnNodes
 from cosserat_fenicsx.scene.describe import unpicklable
 
 
