@@ -81,7 +81,8 @@ def number(owner, field, value, expected, accept):
     Args:
         expected: for messages, with the SI unit in its first parentheses.
     """
-    value = _in_si(owner, field, value, _unit_of(expected))
+    if isinstance(value, str):
+        value = _in_si(owner, field, value, _unit_of(expected))
     if isinstance(value, bool) or not isinstance(value, numbers.Real):
         refuse(owner, field, value, expected)
     try:

@@ -5,8 +5,11 @@ from pathlib import Path
 
 sys.path.append(str(Path(__file__).parent))
 
+import scene_keys
+
 import cosserat_fenicsx
 
+scene_keys.write(Path(__file__).parent / "api")
 project, copyright = "cosserat_fenicsx", "MIT licence"
 version = release = cosserat_fenicsx.__version__
 html_title = f"cosserat_fenicsx {release}"
