@@ -205,7 +205,7 @@ def depth_sweep(
     friction = tuple(friction) if isinstance(friction, Sequence | np.ndarray) else (friction,)
     holes = [hole if value is None else hole.with_friction(value) for value in friction]
     settings = {"mud": mud, "model": model, "tol": tol, "torque_convention": torque_convention}
-    for depth in (depths.min(), depths.max()):  # what does not fit is refused before the computation
+    for depth in (depths.min(), depths.max()):  # refuse misfits before the computation
         pieces_of(hole, string, operations[0], mud, float(depth))
     sweep = _empty(operations, depths, friction)
     store = Nowhere()
@@ -313,7 +313,7 @@ def _put(sweep, place, numbers, note):
 
 
 def _answer(hole, string, operation, depth, settings):
-    """The numbers of `KEPT`, and a note, "" where there is nothing to say."""
+    """The numbers of `KEPT`, and a note or ""."""
     try:
         answer = torque_and_drag(hole, string, operation, depth=depth, progress=False, **settings)
     except LockUp as locked:
@@ -321,8 +321,8 @@ def _answer(hole, string, operation, depth, settings):
     except NotConverged as failed:
         # an equilibrium that is not as accurate as asked is one
         found, none = getattr(failed, "answer", None), (np.nan,) * len(KEPT)
-        told = found and (found.hook_load, found.surface_torque, found.error, np.nan, np.nan, float(_MODELS.index(ROD)))
-        return told or none, str(failed)
+        loads = found and (found.hook_load, found.surface_torque, found.error, np.nan, np.nan, float(_MODELS.index(ROD)))
+        return loads or none, str(failed)
     notes = [line for line in answer.why if line.startswith("BEYOND")]
     if settings["model"] == AUTO and not answer.enough:
         why = [line for line in answer.why if line.startswith("NOT ENOUGH")]

@@ -20,7 +20,7 @@ from cosserat_fenicsx.well.path import WellPath
 
 # Survey and sections that differ by more than this part end at different depths.
 _APART = 1e-3
-# Diameters (m) above this are hardly those of holes.
+# Diameters (m) above this are probably in another unit.
 _WIDEST = 1.5
 # Densities (kg/m^3) between these are neither a gas's nor a liquid's, and no mud is heavier than the last.
 _NO_FLUID, _HEAVIEST = (5.0, 300.0), 2700.0
@@ -63,10 +63,10 @@ class Borehole(Part):
 
     Args:
         path: a `WellPath`.
-        sections: those of the hole, each a `HoleSection`, from the surface down.
+        sections: `HoleSection`s, from the surface down.
         wall_stiffness: pressure per length over penetration, N/m^2; rock and steel have 1e9 and more. None for a rigid
-            wall, which the rod in contact approaches by stiffer ones until what is left is small beside the accuracy
-            asked for. Only the rod in contact needs it.
+            wall, which the rod in contact approaches by stiffer ones until the remaining error is small beside the
+            tolerance. Only the rod in contact needs it.
 
     Raises:
         SceneError: sections that do not follow each other downwards.
@@ -192,7 +192,7 @@ class Mud(Part):
     gravity: ClassVar[float] = 9.80665
 
     def validate(self):
-        """The same mud inside where nothing else is said; a warning of a density that is probably in another unit."""
+        """Take the same mud inside by default; warn of a density that is probably in another unit."""
         if self.inside is None:
             store(self, inside=self.density)
         if _NO_FLUID[0] < self.density < _NO_FLUID[1] or 0.5 < self.density < 3 or self.density > _HEAVIEST:
@@ -202,12 +202,12 @@ class Mud(Part):
             )
 
     def along(self, rod: Rod, outer: float | None = None, inner: float | None = None) -> tuple:
-        """What the mud does to a moving rod: an `AddedMass`, across the rod alone, and a `LinearDrag`, as far as they
-        are not zero.
+        """Actions of the mud on a moving rod: an `AddedMass`, across the rod alone, and a `LinearDrag`, if they are not
+        zero.
 
         Args:
             rod: the rod.
-            outer, inner: diameters, m, of the rod and of its bore (0 without one); None for those of its sections.
+            outer, inner: diameters, m, of the rod and of its bore (0 without one); None: of its sections.
 
         Raises:
             SceneError: a diameter that is not positive, or not given where a section is neither `Circle` nor `Tube`.

@@ -75,8 +75,8 @@ class WellPath(Part):
             md: measured depths, m, ascending from 0 (where the survey begins further down, add the station
                 (0, 0, azimuth of the next) of a vertical start).
             inc: inclinations from the vertical, 0 to 180 degrees; above 90 the hole climbs.
-            azi: azimuths from north towards east, of any turn from -360 to 360 degrees; that of a vertical station has
-                no meaning.
+            azi: azimuths from north towards east, of any turn from -360 to 360 degrees; without meaning at a vertical
+                station.
             degrees: False where the angles are in radians. None: degrees, refused where they look like radians; True:
                 degrees, whatever they look like.
 
@@ -123,7 +123,7 @@ class WellPath(Part):
         return self._at(*self._place(md))[1]
 
     def curvature(self, md: float | Numbers) -> np.ndarray:
-        """(..., 3) derivative of the tangent by md, 1/m; at a station that of the section below it."""
+        """(..., 3) derivative of the tangent by md, 1/m; at a station, in the section below it."""
         return self._at(*self._place(md))[2]
 
     def inclination_at(self, md: float | Numbers) -> np.ndarray:
@@ -164,7 +164,7 @@ class WellPath(Part):
         return found.reshape(points.shape[:-1])
 
     def nearest(self, points: Numbers | None, near: Numbers) -> "Nearest":
-        """The points of the axis that are closest to points, with what a projection on the axis needs there.
+        """The points of the axis that are closest to points, with tangent and curvature there.
 
         Args:
             points: (n, 3) m; None for the points of the axis at `near`.
@@ -287,7 +287,7 @@ _ANGLES = {
 _UNITS = {*_LENGTHS, *_ANGLES}
 # Largest measured depth, and least distance of stations, m.
 _DEEPEST, _APART = 1e6, 1e-6
-# Doglegs (rad) above this are refused: the plane of the arc would be that of rounding errors.
+# Doglegs (rad) above this are refused: rounding errors would decide the plane of the arc.
 _MOST_DOGLEG = math.pi - 1e-6
 
 
@@ -497,9 +497,9 @@ def _length_unit(file, heading, says, given):
 
 def _degrees(file, headings, says, given):
     """Whether angles are in degrees, see `WellPath.from_survey`."""
-    told = {_ANGLES[unit] for unit in says if unit in _ANGLES} | ({given} - {None})
-    if len(told) > 1:
+    stated = {_ANGLES[unit] for unit in says if unit in _ANGLES} | ({given} - {None})
+    if len(stated) > 1:
         raise SceneError(
             f"{file}: '{headings[0]}', '{headings[1]}' and degrees = {given} contradict each other: expected one unit"
         )
-    return False if told == {False} else given
+    return False if stated == {False} else given
