@@ -321,8 +321,9 @@ def _answer(hole, string, operation, depth, settings):
     except NotConverged as failed:
         # an equilibrium that is not as accurate as asked is one
         found, none = getattr(failed, "answer", None), (np.nan,) * len(KEPT)
-        loads = found and (found.hook_load, found.surface_torque, found.error, np.nan, np.nan, float(_MODELS.index(ROD)))
-        return loads or none, str(failed)
+        rod = float(_MODELS.index(ROD))
+        numbers = found and (found.hook_load, found.surface_torque, found.error, np.nan, np.nan, rod)
+        return numbers or none, str(failed)
     notes = [line for line in answer.why if line.startswith("BEYOND")]
     if settings["model"] == AUTO and not answer.enough:
         why = [line for line in answer.why if line.startswith("NOT ENOUGH")]
