@@ -251,6 +251,22 @@ def test_laws_that_fail_are_refused_in_words(torque, words):
         cf.mixed_scene(scene(friction=StribeckCurve(0.3, 0.2, 0.1), hole=HOLE), 900.0)
 
 
+def test_a_law_with_an_array():
+    """It cannot be hashed, and is sampled anew."""
+
+    @dataclass(frozen=True, eq=False)
+    class Table(BitLaw):
+        values: np.ndarray
+        __hash__ = None
+
+        def torque(self, speed, weight):
+            return np.interp(speed, *self.values)
+
+    law, same_law = Table(np.array([[0.0, 2.0, 50.0], [6e3, 4e3, 4e3]])), cf.Stribeck(6e3, 4e3)
+    history = cf.simulate_drilling(scene(law), 6.0, progress=False)
+    assert history.torque_on_bit.max() == pytest.approx(same_law.static, rel=1e-3) and history.bit_speed.max() > 6.0
+
+
 def test_a_law_that_fails_during_the_motion():
     @dataclass(frozen=True)
     class Fails(BitLaw):

@@ -32,7 +32,6 @@ does not pull. Its face below the bit is at u = -amplitude sin(count Phi), downw
 the bit is expected to have turned since the start at the end of the step.
 """
 
-import functools
 import math
 from bisect import bisect_right
 from dataclasses import dataclass
@@ -41,7 +40,7 @@ from typing import Annotated, Any, NamedTuple, Protocol
 import numpy as np
 
 from cosserat_fenicsx.checks import refuse, warn
-from cosserat_fenicsx.drilling.laws import Resistance, by_function, checked
+from cosserat_fenicsx.drilling.laws import Resistance, by_method, checked
 from cosserat_fenicsx.parts import (
     AngularVelocity,
     ForceSize,
@@ -93,7 +92,7 @@ class BitLaw(Part, family="bit law"):
         Raises:
             SceneError: `torque` fails, or its values are no numbers from 0 on.
         """
-        return _sampled(self, weight if self.needs_weight else math.nan)
+        return by_method(self, "torque", weight if self.needs_weight else math.nan)
 
     def in_c(self):
         """The torque as a function of speed and weight on bit, which C calls where `resistance` has a function."""
@@ -111,11 +110,6 @@ class BitLaw(Part, family="bit law"):
         """(2,) weight (N) and torque (N m) on bit in steady motion: (2,) m/s downwards and rad/s."""
         law = self.resistance(weight)
         return np.array([weight, 0.0 if law is None else float(law(motion[1]))])
-
-
-@functools.lru_cache(64)
-def _sampled(law, weight):
-    return by_function(law, "torque", checked(law, "torque", weight))
 
 
 @dataclass(frozen=True)

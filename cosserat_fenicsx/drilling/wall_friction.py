@@ -1,6 +1,5 @@
 """Friction between the string and the wall of its hole: laws, and the wall force of a string that only rotates."""
 
-import functools
 from collections import namedtuple
 from dataclasses import dataclass
 from typing import Annotated
@@ -8,7 +7,7 @@ from typing import Annotated
 import numpy as np
 
 from cosserat_fenicsx.checks import refuse, store
-from cosserat_fenicsx.drilling.laws import Resistance, by_function, checked
+from cosserat_fenicsx.drilling.laws import Resistance, by_method
 from cosserat_fenicsx.numerics import gauss
 from cosserat_fenicsx.parts import Friction, Kind, Number, Part, Rate, positive
 from cosserat_fenicsx.well.hole import Mud
@@ -40,17 +39,12 @@ class FrictionLaw(Part, family="law of friction at the wall"):
         Raises:
             SceneError: `coefficient` fails, or its values are no numbers from 0 on.
         """
-        return _sampled(self)
+        return by_method(self, "coefficient")
 
     @property
     def decays(self) -> bool:
         """Whether the coefficient falls with the slip."""
         return self.resistance.steepest > 0 or self.resistance.drops
-
-
-@functools.lru_cache(64)
-def _sampled(law):
-    return by_function(law, "coefficient", checked(law, "coefficient"))
 
 
 @dataclass(frozen=True)
