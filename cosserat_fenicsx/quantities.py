@@ -22,6 +22,8 @@ _PREFIXED = {
     "W": {"W": 1.0, "kW": 1e3, "MW": 1e6},
     "m": {"mm": 1e-3, "m": 1.0},
 }
+# Numbers below this are written without an exponent, all digits before the point.
+_PLAIN = 1e7
 #: Lengths (m) are shown in mm only below this.
 _SHORT = 1e-2
 
@@ -167,4 +169,6 @@ def as_text(value: Any, digits: int = 6, noise: float = 0.0) -> str:
         return str(value)
     if np.isnan(value):
         return "-"
-    return "0" if abs(value) <= noise else f"{value:.{digits}g}"
+    if abs(value) <= noise:
+        return "0"
+    return f"{value:.0f}" if 10.0**digits <= abs(value) < _PLAIN else f"{value:.{digits}g}"

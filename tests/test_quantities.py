@@ -64,3 +64,4 @@ def test_columns_and_values():
     assert LOAD.heading() == "hook load (N)" and Quantity("steps").heading() == "steps"
     assert [as_text(x) for x in (1.23456789, np.nan, True, "a", 3)] == ["1.23457", "-", "yes", "a", "3"]
     assert as_text(-1.887e-12, noise=1e-9) == "0"
+    assert [as_text(x, 4) for x in (21987.4, -123456.7, 2e9, 1e-5)] == ["21987", "-123457", "2e+09", "1e-05"]

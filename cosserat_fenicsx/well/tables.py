@@ -75,7 +75,7 @@ def answer_in_words(answer, units):
     )
     yield (
         f"{'Enough' if answer.enough else 'NOT ENOUGH'} for tol = {answer.tol:g}: estimated relative errors of these "
-        f"are {answer.error:.0e} of the solution, {_estimate(answer)} of the model."
+        f"are {answer.error:.0e} of the solution; of the model: {_estimate(answer)}."
     )
     if answer.hook_load < 0:
         yield "The string does not go down by its own weight: a negative hook load is a push at the surface."
