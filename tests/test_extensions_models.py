@@ -130,6 +130,7 @@ law = { type = "Hardening", doubling = "4 mm" }
 SAME = cf.Scene([ROD], [cf.Clamp(ROD.start)], [AcrossRod(ROD, 2.0), HARD])
 
 
+@pytest.mark.serial  # ranks would write the file while others read it
 def test_in_a_scene_file(tmp_path_all):
     """Load, law and formulation; a result is saved with its scene, and a motion resumed without a scene given."""
     file = tmp_path_all / "scene.toml"
@@ -148,6 +149,7 @@ def test_in_a_scene_file(tmp_path_all):
     np.testing.assert_array_equal(resumed.position("column.end"), whole.position(ROD.end))
 
 
+@pytest.mark.serial
 def test_mistakes_in_a_scene_file(tmp_path_all):
     file = tmp_path_all / "scene.toml"
     for wrong, words in (
