@@ -146,10 +146,10 @@ class Newton:
         converged = reason > 0 and verdict == self._lib.CONVERGED
         if converged:  # the residual was last evaluated at x, so the state agrees with it
             problem.advance()
+        elif problem.c.singular and reason <= 0:
+            verdict = self._lib.SINGULAR
         elif reason > 0 or reason == RESIDUAL_NOT_A_NUMBER:
             verdict = self._lib.NOT_A_NUMBER
-        elif problem.c.singular:
-            verdict = self._lib.SINGULAR
         return Solved(converged, newton.iterations, WORDS[verdict] or f"PETSc's reason {reason}")
 
 
