@@ -18,7 +18,7 @@ export VTK_DEFAULT_OPENGL_WINDOW = vtkEGLRenderWindow
 # A numpy in the user's own site directory would hide the distribution's.
 export PYTHONNOUSERSITE = 1
 
-.PHONY: help setup packages demo motion gallery well string whirl test docs tables figure3 work-precision failures rods-in-wells random random-wells imperfect mutants clean
+.PHONY: help setup packages demo motion gallery well string whirl test docs tables figure3 work-precision failures rods-in-wells folders random random-wells imperfect mutants clean
 
 help:
 	@echo "make demo    solve the eccentric cantilever of the paper on two processes; writes out/"

@@ -212,7 +212,7 @@ class Store(Nowhere):
         self._on_first(self._put_head)
 
     def compare(self, marked, until=float("inf")):
-        """Refuse another computation than the one in the folder.
+        """Refuse another computation than the one in the folder, by the objects of rank 0.
 
         Args:
             marked: the mark of all that its numbers follow from; until: the time up to which they are compared, s.
@@ -220,12 +220,15 @@ class Store(Nowhere):
         Raises:
             SceneError: saying what differs.
         """
-        given = json.loads(json.dumps(marked))
-        expected, given = mark.until(self.head["mark"], until), mark.until(given, until)
-        what = self.kind.what.partition(" of ")[0]
-        differs = mark.difference(given, expected, what, self.kind.rounding)
-        if differs:
-            raise SceneError(f"{self.place}: {self.kind.differs}: {differs}")
+
+        def compared():
+            given, expected = (mark.until(x, until) for x in (json.loads(json.dumps(marked)), self.head["mark"]))
+            what = self.kind.what.partition(" of ")[0]
+            differs = mark.difference(given, expected, what, self.kind.rounding)
+            if differs:
+                raise SceneError(f"{self.place}: {self.kind.differs}: {differs}")
+
+        on_first(self.comm, compared)
 
     def scene(self, given, until):
         """The scene: the given one, compared with that of the folder up to a time (s), or the one that is stored.
