@@ -36,6 +36,8 @@ class Result:
     _quantities: ClassVar[dict[str, Quantity]] = {}
     # The axis that data frames, .csv files and tables run along; those of further .csv files, by ends of their names.
     _rows_axis: ClassVar[str] = "point"
+    # Whether its table can be written without rows.
+    _may_be_empty: ClassVar[bool] = False
     _beside: ClassVar[dict[str, str]] = {}
     # Quantities of the table on the screen; () for all along `_rows_axis`.
     _on_screen: ClassVar[tuple[str, ...]] = ()
@@ -144,7 +146,8 @@ class Result:
             OSError: it cannot be written; an old one stays.
         """
         file = Path(file)
-        self._refuse_empty(f"{file}")
+        if not self._may_be_empty or file.suffix.lower() != ".csv":
+            self._refuse_empty(f"{file}")
         if file.suffix.lower() == ".csv":
             for ending, axis in {"": self._rows_axis, **self._beside}.items():
                 columns = self.columns(units, axis)

@@ -114,6 +114,8 @@ class Shapes(Result, OnNodes):
         comm: the MPI communicator; every rank has the whole result, rank 0 writes files and pictures.
     """
 
+    _may_be_empty = True
+
     equilibrium: Equilibrium
     shapes: np.ndarray
     error: np.ndarray

@@ -288,7 +288,7 @@ def quick(root=ROOT):
     """The verdicts of a mutant of scene/curves.py that its tests must find, and of the file as it is."""
     name = "cosserat_fenicsx/scene/curves.py"
     mutants = mutants_in("scene", name, (root / name).read_text(encoding="utf-8"))
-    wrong = [x for x in mutants if x.kind == "arithmetic"][1]  # in the direction of a line
+    wrong = next(x for x in mutants if x.new.startswith("-(np.eye"))  # a rotation
     same = Mutant("scene", name, wrong.line, "none", wrong.offset, wrong.old, wrong.old)
     return [verdict(x, root, ["tests/test_curves.py"]) for x in (wrong, same)]
 
