@@ -170,7 +170,7 @@ def test_curves_in_a_scene_file(table, tmp_path):
 
 
 def test_a_file_that_a_scene_misses(tmp_path):
-    with pytest.raises(cf.SceneError, match=r"scene.toml: rods\[0\].curve: Spline.points = '.*nowhere.csv'"):
+    with pytest.raises(cf.SceneError, match=r"line 4, column 28: rods\[0\].curve: Spline.points = '.*nowhere"):
         read(tmp_path, curve='{ type = "Spline", points = "nowhere.csv" }')
     with pytest.raises(cf.SceneError, match="unknown key 'centr', did you mean 'centre'?"):
         read(tmp_path, curve='{ type = "Arc", centr = [0, 0, 0], start = [2, 0, 0], angle = 1.5 }')
@@ -196,7 +196,7 @@ def test_pieces_in_a_scene_file(tmp_path):
             r"section\[1\].to = 7: expected the rod's length 8 m"
         ),
         "[]": "at least one piece",
-        "[3]": r"rods\[0\].section\[0\] = 3: expected a table",
+        "[3]": r"section\[0\] = 3: expected a piece",
     }
     for section, words in refused.items():
         with pytest.raises(cf.SceneError, match=words):

@@ -57,8 +57,10 @@ class InPieces(Kind):
 
     def read(self, where, data, reading):
         """See `Kind`."""
-        if not isinstance(data, list) or not any(isinstance(piece, dict) for piece in data):
+        if not isinstance(data, list):
             return self.inner.read(where, data, reading)
+        if not any(isinstance(piece, dict) for piece in data):
+            return data  # two numbers; anything else is refused by the constructor
         pieces = []
         for i, piece in enumerate(data):
             place = (*where, i)
