@@ -57,3 +57,28 @@ def test_unknown_ones(tmp_path, monkeypatch):
     monkeypatch.delitem(compared.CRITERIA, "sway")
     back = cf.read_path(tmp_path / "path.h5")
     assert (back.errors.sway == path.errors.sway).all() and "sway" in str(back)
+
+
+def test_in_a_scene_file(tmp_path):
+    """`use` names the module that defines them."""
+    (tmp_path / "column.toml").write_text(
+        """
+use = ["extensions.own_criteria"]
+solve = { load_factors = [1.0], tol = 1e-3, bound = ["sway"] }
+supports = [{ type = "Clamp", station = "column.start" }]
+loads = [{ type = "Force", station = "column.end", force = [0.5, 0, -2.0] }]
+
+[materials.soft]
+E = 1e6
+nu = 0.3
+
+[[rods]]
+name = "column"
+curve = { type = "Line", start = [0, 0, 0], end = [0, 0, 1] }
+section = { type = "Circle", diameter = 0.067 }
+material = "soft"
+""",
+        encoding="utf-8",
+    )
+    path = cf.read(tmp_path / "column.toml").run()
+    assert path.bounded == ("sway",) and path.errors.sway.max() <= 1e-3
