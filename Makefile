@@ -98,6 +98,9 @@ rods-in-wells: setup
 	$(PYTHON) demos/evidence/rods_in_wells.py
 	$(PYTHON) demos/evidence/put_in_docs.py rods_in_wells
 
+folders: setup
+	$(PYTHON) -m pytest tests/test_store.py -k damaged_folders --mutations 200
+
 random: setup
 	$(PYTHON) tests/random_comparison.py 200
 

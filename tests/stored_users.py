@@ -16,7 +16,7 @@ from moving_scenes import flying_in_space
 import cosserat_fenicsx as cf
 from cosserat_fenicsx.dynamics import resuming
 from cosserat_fenicsx.storage import files
-from cosserat_fenicsx.storage.store import Store
+from cosserat_fenicsx.storage.store import Store, read
 
 HOLE = cf.Borehole(cf.WellPath.from_survey([0, 500, 1000], [0, 0, 30], [0, 0, 0]), cf.HoleSection(1000.0, 0.2159, 0.2))
 STRING = cf.DrillString([cf.DrillPipe(size="5 in 19.50 lb/ft")])
@@ -55,6 +55,11 @@ def of_study(found):
     return [repr(x) for x in found.results] + [failure.why for failure in found.failures]
 
 
+def of_sweep(found):
+    """To 13 digits: where the system puts arrays decides how BLAS sums, in the last one of error estimates."""
+    return {name: [f"{x:.13g}" for x in values.ravel()] for name, values in found.values.items()}
+
+
 @dataclass(frozen=True)
 class User:
     """A kind of computation: how it begins, goes on and is read; another one of its kind; the digits of its result."""
@@ -80,8 +85,7 @@ USERS = {
     ),
     "study": User(study, study, study, lambda folder: study(folder, 13), of_study, "study", "study"),
     "sweep": User(
-        sweep, sweep, sweep, lambda folder: sweep(folder, 1e-3),
-        lambda x: [x.values[name].tobytes() for name in sorted(x.values)], "depth_sweep", "sweep",
+        sweep, goes_on, read, lambda folder: sweep(folder, 1e-3), of_sweep, "depth_sweep", "sweep",
     ),
 }  # fmt: skip
 
@@ -160,9 +164,10 @@ def mutated(folder, chance, other):
         "longer": lambda: data[:place] + noise + data[place:], "shorter": lambda: data[:place] + data[place + size :],
         "twice": lambda: data * 2, "zeros": lambda: data + bytes(size), "emptied": lambda: b"",
         "digit": lambda: data.replace(b"1", b"2", 1), "swapped": lambda: data[place:] + data[:place],
-        "of another": lambda: (other / file.name).read_bytes() if (other / file.name).exists() else b"",
+        "of another": lambda: (other / file.name).read_bytes() if file.name in names else b"",
         "missing": None,
     }  # fmt: skip
+    names = {x.name for x in other.iterdir()} - {"stored.json"}  # with which it is that computation
     way = chance.choice(list(ways))
     file.unlink() if way == "missing" else file.write_bytes(ways[way]())
     return f"{file.name} {way} at {place}"

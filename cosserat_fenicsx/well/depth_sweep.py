@@ -15,7 +15,7 @@ import numpy as np
 
 from cosserat_fenicsx.checks import File, Numbers, finite_array, refuse
 from cosserat_fenicsx.errors import NotConverged, SceneError
-from cosserat_fenicsx.parts import from_data, to_data
+from cosserat_fenicsx.parts import from_data, members, to_data, use
 from cosserat_fenicsx.progress import Progress
 from cosserat_fenicsx.quantities import Quantity, Units
 from cosserat_fenicsx.ranks import world
@@ -250,7 +250,8 @@ def _empty(operations, depths, friction):
 def _as_data(about):
     """The arguments of `depth_sweep` as data."""
     parts = {name: about[name] and to_data(about[name]) for name in _PARTS}
-    listed = {"operations": [*map(to_data, about["operations"])], "depths": about["depths"].tolist()}
+    listed = {"operations": [{"is": type(x).__name__, "data": to_data(x)} for x in about["operations"]]}
+    listed["depths"] = about["depths"].tolist()
     listed["friction"] = [np.asarray(x).tolist() for x in about["friction"]]
     return {**about, **parts, **listed}
 
@@ -268,7 +269,8 @@ def _asked(store):
             "depth_sweep, which goes on from there"
         )
     parts = {name: data[name] and from_data(cls, data[name]) for name, cls in _PARTS.items()}
-    operations = tuple(from_data(Operation, x) for x in data["operations"])
+    use([module for x in data["operations"] for module in x["data"].get("use", ())])
+    operations = tuple(from_data(members(Operation)[x["is"]], x["data"]) for x in data["operations"])
     return {**data, **parts, "operations": operations, "depths": np.array(data["depths"]),
             "friction": tuple(data["friction"])}  # fmt: skip
 
