@@ -63,7 +63,7 @@ class Borehole(Part):
 
     Args:
         path: a `WellPath`.
-        sections: `HoleSection`s, from the surface down.
+        sections: each a `HoleSection`, from the surface down.
         wall_stiffness: pressure per length over penetration, N/m^2; rock and steel have 1e9 and more. None for a rigid
             wall, which the rod in contact approaches by stiffer ones until the remaining error is small beside the
             tolerance. Only the rod in contact needs it.
